@@ -106,6 +106,10 @@ def parse_record(table: Table, columns: ColumnOptions, name: str) -> Record:
     time_column = None if columns.rate else find_time_column(table, candidates, columns)
     if time_column is None and not (columns.rate or table.interval):
         raise SceneError(no_time_message(table))
+    if len(candidates) < 2 and time_column is not None:
+        raise SceneError(
+            f"{table.name} has only one column that is not empty, {time_column.heading}; time and position are required"
+        )
     motion_column, choice = find_signal_column(table, candidates, columns, time_column)
     notes += choice
     if time_column is not None and columns.time is None:

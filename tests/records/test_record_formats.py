@@ -333,6 +333,8 @@ ROWS = "\n".join(f"{i},{i}" for i in range(20))
         (ROWS, ColumnOptions(), "--columns 't [s],x [mm]'"),
         (ROWS, ColumnOptions(names="t"), "--columns names 1 columns, and record.csv has 2"),
         ("", ColumnOptions(), "is empty"),
+        ("t [s]\n" + ROWS.replace(",", "."), ColumnOptions(), "only one column that is not empty, t [s]; time and pos"),
+        ('{"t": [0.1, 0.2, 0.3], "x": 1}', ColumnOptions(), "only one column that is not empty, t; time and position"),
         ("Dear Sir,\nno table.\n", ColumnOptions(), "contains no table"),
         (f"t [s],count [counts]\n{ROWS}", ColumnOptions(), "--per-count"),
         (f"t [s],count [counts]\n{ROWS}", ColumnOptions(per_count="half a turn"), "give a number and a unit"),
