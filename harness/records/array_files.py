@@ -16,7 +16,7 @@ import numpy as np
 
 from ..errors import SceneError
 from ..process.temporary_directory import temporary_directory
-from .size_limits import check_mat, check_size, check_zip
+from .size_limits import check_size, check_zip
 
 UNIT_KEYS = ("unit", "units")
 VALUE_KEYS = ("value", "values", "data", "signal")  # names of the only array in a dictionary: it has that of its parent
@@ -57,7 +57,6 @@ def read_mat(data: bytes, name: str) -> dict[str, Any]:
         return read_hdf5(data, name)
     from scipy.io import loadmat
 
-    check_mat(data, name)
     variables = loadmat(io.BytesIO(data), simplify_cells=True)
     if "__function_workspace__" in variables:  # has objects, such as a table
         return read_matlab_objects(data)
@@ -186,6 +185,9 @@ def arrays_of_json(value: Any, depth: int = 0) -> Any:
     return value
 
 
+READERS = {"mat": read_mat, "hdf5": read_hdf5, "parquet": read_parquet, "npy": read_npy, "npz": read_npz}
+
+
 def list_columns(values: Mapping[str, Any], prefix: str = "", unit: str | None = None) -> list[ArrayColumn]:
     """Return the columns of nested arrays by name, those in dictionaries as dictionary.name."""
     columns = []
@@ -236,6 +238,11 @@ def is_array(value: Any) -> bool:
         return False
     is_number = value.dtype.kind in NUMERIC and value.ndim in (1, 2)
     return is_number or (value.dtype.kind in TIME_KINDS and value.ndim == 1)
+
+
+def as_list(values: Any) -> list[Any]:
+    """Return the values of a column as a list."""
+    return values if isinstance(values, list) else list(values.tolist())
 
 
 def unit_text(value: Any) -> str | None:

@@ -38,12 +38,14 @@ def check_zip(archive: ZipFile, name: str) -> None:
 
 
 def check_mat(data: bytes, name: str) -> None:
-    """Raise SceneError if the compressed elements of a .mat file (version 5) are too large.
+    """Raise SceneError if the compressed elements of a .mat file (version 5) are too large; others are not checked.
 
     References
     ----------
     MathWorks, MAT-File Format (2023), "Level 5 MAT-File Format": a header, then elements with a type and a size
     """
+    if data[:10] != b"MATLAB 5.0" or data[512:516] == b"\x89HDF":
+        return
     order = ">" if data[MAT_HEADER - 2 : MAT_HEADER] == b"MI" else "<"
     position, size = MAT_HEADER, 0
     while position + 8 <= len(data):

@@ -7,7 +7,6 @@ The format is detected from the first bytes, so standard input works for all of 
 import io
 import re
 import sys
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from pathlib import Path
@@ -18,8 +17,8 @@ import numpy as np
 
 from ..errors import HarnessError, SceneError, first_line, format_value
 from . import array_files, text_table
-from .size_limits import check_zip, unpack_gzip
-from .workbook import read_workbook
+from .child_reader import read_in_child
+from .size_limits import check_mat, check_zip, unpack_gzip
 
 TEXT_SUFFIXES = (".csv", ".tsv", ".txt")
 INSTALL_COMMAND = "python -m pip install 'friction-fmus[records]'"
@@ -111,12 +110,16 @@ def parse_table_file(data: bytes, name: str) -> Table:
             member = find_member(archive.namelist(), name)
             data = data if member is None else archive.read(member)
     if data.startswith((b"PK", b"\xd0\xcf\x11\xe0")) and b".npy" not in data[:200]:
-        headings, rows, line, sheets = read_workbook(data, name)
-        others = f"{name} has a table in several sheets ({', '.join(sheets)}): the longest is used."
-        return replace(table_from_rows(headings, rows, line, name), notes=(others,) if len(sheets) > 1 else ())
-    for magics, read in ARRAY_READERS:
-        if data.startswith(magics):
-            return table_from_arrays(read(data, name), name)
+        return table_from_workbook(read_in_child(data, name, "workbook"), name)
+    for magic, file_format in ARRAY_FORMATS:
+        if data.startswith(magic):
+            if file_format == "mat":
+                check_mat(data, name)
+            if file_format in ("npy", "npz"):  # numpy checks what it reads
+                return table_from_arrays(array_files.READERS[file_format](data, name), name)
+            answer = read_in_child(data, name, file_format)
+            columns = [array_files.ArrayColumn(*column) for column in answer["columns"]]
+            return table_from_columns(columns, answer["names"], name)
     if data.lstrip()[:1] in (b"{", b"["):
         arrays = array_files.read_json(text_table.decode_text(data, name))
         if arrays is not None:
@@ -125,12 +128,12 @@ def parse_table_file(data: bytes, name: str) -> Table:
     return replace(table_from_rows(headings, rows, line, name), interval=interval)
 
 
-ARRAY_READERS: tuple[tuple[tuple[bytes, ...], Callable[[bytes, str], dict[str, Any]]], ...] = (
-    ((b"\x93NUMPY",), array_files.read_npy),
-    ((b"PK",), array_files.read_npz),
-    ((b"\x89HDF",), array_files.read_hdf5),
-    ((b"MATLAB",), array_files.read_mat),
-    ((b"PAR1",), array_files.read_parquet),
+ARRAY_FORMATS = (
+    (b"\x93NUMPY", "npy"),
+    (b"PK", "npz"),
+    (b"\x89HDF", "hdf5"),
+    (b"MATLAB", "mat"),
+    (b"PAR1", "parquet"),
 )
 
 
@@ -167,16 +170,28 @@ def table_from_rows(headings: list[str], rows: list[list[Any]], line: int, name:
     return Table(name, tuple(heading for heading, _ in used), tuple(cells for _, cells in used), line)
 
 
+def table_from_workbook(answer: dict[str, Any], name: str) -> Table:
+    """Return the table of a workbook, with a note if several sheets have one."""
+    table = table_from_rows(answer["headings"], answer["rows"], answer["line"], name)
+    sheets = answer["sheets"]
+    note = f"{name} has a table in several sheets ({', '.join(sheets)}): the longest is used."
+    return replace(table, notes=(note,) if len(sheets) > 1 else ())
+
+
 def table_from_arrays(arrays: dict[str, Any], name: str) -> Table:
     """Return a table from named arrays: vectors and columns of matrices with the most frequent length."""
-    columns = array_files.list_columns(arrays)
+    return table_from_columns(array_files.list_columns(arrays), [*filter(None, arrays)], name)
+
+
+def table_from_columns(columns: list[array_files.ArrayColumn], names: list[str], name: str) -> Table:
+    """Return a table from the columns of the most frequent length; `names` are those of all entries of the file."""
     lengths = [len(column.values) for column in columns if len(column.values) > 2]
     length = max(lengths, key=lambda n: (lengths.count(n), n), default=0)
     selected = [column for column in columns if len(column.values) == length]
     if not selected:
-        raise SceneError(f"{name} has no array of numbers (it has {', '.join(filter(None, arrays)) or 'none'})")
+        raise SceneError(f"{name} has no array of numbers (it has {', '.join(names) or 'none'})")
     parents = {column.name.rpartition(".")[0] for column in selected}
     prefix = f"{parents.pop()}." if len(parents) == 1 else ""
-    return Table(
-        name, tuple(column.heading(prefix) for column in selected), tuple(column.values for column in selected)
-    )
+    headings = tuple(column.heading(prefix) for column in selected)
+    cells = (column.values for column in selected)
+    return Table(name, headings, tuple(c if isinstance(c[0], str) else np.asarray(c, float) for c in cells))

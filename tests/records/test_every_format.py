@@ -1,7 +1,5 @@
 """The same decay in every format of tests/support/record_formats.py gives the same values, or the message listed."""
 
-import sys
-
 import numpy as np
 import pytest
 import record_formats
@@ -9,7 +7,7 @@ from record_formats import FORMATS, OMEGA, ZETA, T
 
 from harness.analyses.decay.estimates import KnownParameters
 from harness.analyses.decay.identification import fit_decay
-from harness.errors import HarnessError, SceneError
+from harness.errors import SceneError
 from harness.records.array_files import columns_of_frame, list_columns
 from harness.records.columns import ColumnOptions, read_record
 from harness.records.record import Record
@@ -55,6 +53,34 @@ def test_a_refused_format_has_its_message(tmp_path, form):
     assert str(refusal.value) == form.refusal
 
 
+@pytest.mark.parametrize(
+    ("file", "share"),
+    [
+        ("sheet.xlsx", 0.3),
+        ("sheet.ods", 0.9),
+        ("vectors.mat", 0.9),
+        ("structure.mat", 0.3),
+        ("new.mat", 0.5),
+        ("timetable.mat", 0.9),
+        ("measured.h5", 0.9),
+        ("frame.parquet", 0.5),
+        ("column.npy", 0.9),
+        ("arrays.npz", 0.01),
+        ("arrays.npz", 0.9),
+        ("packed.csv.gz", 0.5),
+        ("phyphox.zip", 0.9),
+        ("arrays.json", 0.9),
+    ],
+)
+def test_a_truncated_file_is_refused_in_one_sentence(tmp_path, file, share):
+    path = write(tmp_path, next(form for form in FORMATS if form.file == file))
+    path.write_bytes(path.read_bytes()[: int(share * path.stat().st_size)])
+    with pytest.raises(SceneError) as refusal:
+        read_record(str(path), ColumnOptions(unit="m"), "record")
+    assert file in str(refusal.value)
+    assert "\n" not in str(refusal.value)
+
+
 def test_units_of_a_matlab_table_are_read():
     frame = pytest.importorskip("pandas", reason="extra sweep").DataFrame({"t": T, "x": X})
     for attribute in ("varUnits", "VariableUnits"):
@@ -76,19 +102,21 @@ def test_units_beside_arrays_are_read(entry, headings):
     assert [each.heading("") for each in list_columns({"t": T, "x": X} | entry)] == headings
 
 
-def test_a_missing_library_is_named_with_its_installation(tmp_path, monkeypatch):
-    forms = {form.file: form for form in FORMATS}
-    for library, file in (
+@pytest.mark.parametrize(
+    ("library", "file"),
+    [
         ("pyarrow", "frame.parquet"),
         ("matio", "timetable.mat"),
         ("h5py", "measured.h5"),
         ("python_calamine", "sheet.xlsx"),
-    ):
-        path = write(tmp_path, forms[file])
-        with monkeypatch.context() as patch:
-            patch.setitem(sys.modules, library, None)
-            with pytest.raises(HarnessError, match=rf"{library}.* python -m pip install 'friction-fmus\[records\]'"):
-                read_record(str(path), ColumnOptions(), "record")
+    ],
+)
+def test_a_missing_library_is_named_with_its_installation(tmp_path, monkeypatch, library, file):
+    path = write(tmp_path, next(form for form in FORMATS if form.file == file))
+    (tmp_path / f"{library}.py").write_text(f"raise ModuleNotFoundError(name={library!r})")
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    with pytest.raises(SceneError, match=rf"{file} needs {library} to be read: .* 'friction-fmus\[records\]'"):
+        read_record(str(path), ColumnOptions(), "record")
 
 
 @pytest.mark.parametrize("options", [{}, {"position": "x [mm] #2"}, {"time": "t [s] #2"}])

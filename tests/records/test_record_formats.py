@@ -122,16 +122,10 @@ FILES = {
     "accelerometer-in-g.csv": lambda: text_of("t [s],az [g]\n" + rows(T, 1 + motion(2) / 9.80665)),
     "encoder.csv": lambda: text_of("t [ms],count [counts]\n" + rows(1e3 * T, counts())),
     "status.csv": lambda: text_of("t [s],status,x [mm]\n" + rows(T, ["ok"] * len(T), 1e3 * X)),
-    "numpy.npz": lambda: npz(t=T, x=X),
-    "matlab5.mat": lambda: mat5({"t": T[:, None], "x": X[:, None]}),
-    "matlab-structure.mat": lambda: mat5({"run": {"t": T, "x": X, "note": "second"}}),
-    "matlab73.mat": lambda: mat73(t=T[None], x=X[None]),
-    "spreadsheet.xlsx": lambda: xlsx([["Laser"], [], ["t [s]", "x [mm]"], *np.stack([T, 1e3 * X], 1).tolist()]),
 }  # fmt: skip
 OPTIONS = {
     "no-heading.csv": {"names": "t [s],x [mm]"},
     "encoder.csv": {"per_count": "0.001deg"},
-    **{name: {"unit": "m"} for name in ("numpy.npz", "matlab5.mat", "matlab-structure.mat", "matlab73.mat")},
 }
 PENDULUMS = ("stamps.csv", "gyroscope.csv", "encoder.csv")
 QUANTITIES = {"phone.csv": "acceleration", "accelerometer-in-g.csv": "acceleration", "gyroscope.csv": "velocity"}
@@ -141,30 +135,6 @@ MESSAGES = {
     "cut-off.csv": "1 of 601 rows have a missing cell",
     "phone.csv": "Linear Acceleration z (m/s^2)",
 }
-
-
-def npz(**arrays):
-    file = io.BytesIO()
-    np.savez(file, **arrays)
-    return file.getvalue()
-
-
-def mat5(arrays):
-    from scipy.io import savemat
-
-    file = io.BytesIO()
-    savemat(file, arrays)
-    return file.getvalue()
-
-
-def mat73(**arrays):
-    """As written by MATLAB: HDF5 after a user block of 512 bytes."""
-    h5py = pytest.importorskip("h5py", reason="extra records")
-    file = io.BytesIO()
-    with h5py.File(file, "w", userblock_size=512) as data:
-        for name, values in arrays.items():
-            data[name] = values
-    return b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(512) + file.getvalue()[512:]
 
 
 def xlsx(*sheets):
@@ -350,17 +320,6 @@ def test_a_file_without_a_record_is_refused_in_one_sentence(tmp_path, text, colu
     with pytest.raises(SceneError) as refusal:
         read_record(str(path), columns, "record")
     assert sentence in str(refusal.value)
-    assert "\n" not in str(refusal.value)
-
-
-@pytest.mark.parametrize("name", [name for name in FILES if not name.endswith((".csv", ".txt", ".tsv", ".dat"))])
-@pytest.mark.parametrize("share", [0.01, 0.3, 0.9])
-def test_a_damaged_file_is_refused_in_one_sentence(tmp_path, name, share):
-    path, data = tmp_path / name, FILES[name]()
-    path.write_bytes(data[: int(share * len(data))])
-    with pytest.raises(HarnessError) as refusal:
-        read_record(str(path), ColumnOptions(unit="m"), path.stem)
-    assert name in str(refusal.value)
     assert "\n" not in str(refusal.value)
 
 

@@ -1,0 +1,121 @@
+"""Reads spreadsheets, .mat, HDF5 and Parquet files in a child process with limited memory.
+
+The libraries for these formats end their process for some files: one cell in the last row and column of a sheet makes
+python-calamine allocate 549 GB, and scipy reads beyond the end of some damaged .mat files.
+"""
+
+import json
+import os
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import Any
+
+from ..errors import HarnessError, SceneError, first_line
+from ..process.subprocess_runner import SubprocessTimeoutError, run_module, serve_request
+from ..process.temporary_directory import temporary_directory
+from . import text_table
+
+MAX_MEMORY = 4 << 30  # bytes
+TIMEOUT = 120.0  # s
+
+
+@dataclass(frozen=True)
+class ReadRequest:
+    """A file to read: its path, its name in messages, and its format, `workbook` or that of an array file."""
+
+    path: str
+    name: str
+    format: str
+
+
+def read_in_child(data: bytes, name: str, file_format: str) -> dict[str, Any]:
+    """Return what `read_workbook` or `read_arrays` returns for a file.
+
+    Raises
+    ------
+    SceneError
+        If the file cannot be read.
+    ImportError
+        If the library for the format is not installed.
+    """
+    with temporary_directory("record-") as folder:
+        path = folder / "record"
+        path.write_bytes(data)
+        request = json.dumps({"path": str(path), "name": name, "format": file_format})
+        try:
+            done = run_module(__name__, request, timeout=TIMEOUT)
+        except SubprocessTimeoutError:
+            raise SceneError(f"{name} takes longer than {TIMEOUT:g} s to read: save its columns as .csv") from None
+    if done.returncode:
+        raise SceneError(
+            f"{name} cannot be read: it is damaged, has cells far from its table, or needs more than "
+            f"{MAX_MEMORY >> 30} GB of memory; save its columns as .csv"
+        )
+    answer: dict[str, Any] = json.loads(done.stdout)
+    if "library" in answer:
+        raise ImportError(name=answer["library"])
+    if "error" in answer:
+        raise SceneError(answer["error"])
+    return answer
+
+
+def answer_request(request: ReadRequest) -> dict[str, Any]:
+    """Return the contents of a file, the `error` that it has, or the `library` that is missing."""
+    try:
+        return read_workbook(request) if request.format == "workbook" else read_arrays(request)
+    except HarnessError as error:
+        return {"error": str(error)}
+    except ImportError as error:
+        return {"library": error.name}
+    except MemoryError:
+        raise
+    except Exception as error:  # the readers raise arbitrary exceptions for damaged files
+        return {"error": f"{request.name} cannot be read: {first_line(error)}"}
+
+
+def read_workbook(request: ReadRequest) -> dict[str, Any]:
+    """Return headings, rows, number of the row before the first one, and names of the sheets with tables."""
+    from python_calamine import CalamineWorkbook
+
+    candidates = []
+    workbook = CalamineWorkbook.from_path(request.path)
+    for sheet_name in workbook.sheet_names:
+        rows = [[str(cell).strip() for cell in row] for row in workbook.get_sheet_by_name(sheet_name).to_python()]
+        first_row = text_table.find_first_number_row(rows)
+        if first_row is None and not any(any(row[1:]) for row in rows):
+            rows = [row[:1] for row in rows]
+            first_row = text_table.find_first_number_row(rows, min_width=1)
+        if first_row is not None:
+            candidates.append((rows, first_row, sheet_name))
+    if not candidates:
+        raise SceneError(f"{request.name} has no sheet with a heading and rows of numbers")
+    rows, first_row, _ = max(candidates, key=lambda sheet: len(sheet[0]) - sheet[1])
+    headings = text_table.find_headings(rows[:first_row], len(rows[first_row]))
+    sheets = [sheet_name for _, _, sheet_name in candidates]
+    return {"headings": headings, "rows": rows[first_row:], "line": first_row, "sheets": sheets}
+
+
+def read_arrays(request: ReadRequest) -> dict[str, Any]:
+    """Return the columns of an array file, and the names of all that it has."""
+    os.environ["OPENBLAS_NUM_THREADS"] = "1"  # each thread would reserve some of the memory
+    from . import array_files
+
+    with open(request.path, "rb") as file:
+        arrays = array_files.READERS[request.format](file.read(), request.name)
+    columns = [
+        (column.name, array_files.as_list(column.values), column.unit) for column in array_files.list_columns(arrays)
+    ]
+    return {"columns": columns, "names": [*filter(None, arrays)]}
+
+
+def limit_memory() -> None:
+    """Limit the memory of this process, where the system can."""
+    with suppress(ImportError, ValueError, OSError):
+        import resource
+
+        resource.setrlimit(resource.RLIMIT_AS, (MAX_MEMORY, MAX_MEMORY))
+
+
+if __name__ == "__main__":
+    limit_memory()
+    serve_request(ReadRequest, answer_request)
