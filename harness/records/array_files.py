@@ -97,7 +97,9 @@ def read_hdf5(data: bytes, name: str) -> dict[str, Any]:
 
     def visit(path: str, item: Any) -> None:
         nonlocal size
-        if not isinstance(item, h5py.Dataset) or item.dtype.kind not in NUMERIC or path.startswith("#"):
+        if not isinstance(item, h5py.Dataset) or path.startswith("#"):
+            return
+        if item.dtype.kind not in NUMERIC and not item.dtype.names:
             return
         size += item.nbytes
         check_size(size, name)
@@ -106,7 +108,10 @@ def read_hdf5(data: bytes, name: str) -> dict[str, Any]:
         for folder in folders:
             branch = branch.setdefault(folder, {})
         is_text = item.attrs.get("MATLAB_class") == b"char"
-        branch[key] = "".join(map(chr, item[()].ravel().tolist())) if is_text else item[()]
+        values = item[()]
+        branch[key] = "".join(map(chr, values.ravel().tolist())) if is_text else values
+        if item.dtype.names:
+            branch[key] = {field: values[field] for field in item.dtype.names}
         for attribute, value in item.attrs.items():
             if attribute.lower() in UNIT_KEYS:
                 branch[f"{key}_units"] = value

@@ -102,24 +102,27 @@ def read_record(source: str, columns: ColumnOptions, name: str) -> Record:
 def parse_record(table: Table, columns: ColumnOptions, name: str) -> Record:
     """Return the record in a table; raise SceneError if it contains none."""
     notes = list(table.notes)
-    candidates = list_columns(table, notes)
-    time_column = None if columns.rate else find_time_column(table, candidates, columns)
-    if time_column is None and not (columns.rate or table.interval):
+    candidates = list_columns(table)
+    time_column = find_time_column(table, candidates, columns)
+    interval = 1 / columns.rate if columns.rate else None if time_column else table.interval
+    if time_column is None and interval is None:
         raise SceneError(no_time_message(table))
-    if len(candidates) < 2 and time_column is not None:
+    if interval is None and len(candidates) < 2 and time_column is not None:
         raise SceneError(
             f"{table.name} has only one column that is not empty, {time_column.heading}; time and position are required"
         )
     motion_column, choice = find_signal_column(table, candidates, columns, time_column)
     notes += choice
-    if time_column is not None and columns.time is None:
+    if not any(table.column_headings) and len(candidates) > 1:
+        times = "" if time_column is None or interval else f"{time_column.heading} is used as time in s and "
+        notes.append(f"The file has no headings: {times}{motion_column.heading} is the signal; --columns names them.")
+    elif time_column is not None and columns.time is None:
         notes += runs_side_by_side(candidates, time_column, motion_column)
     label, unit = motion_column.name or motion_column.heading, columns.unit or motion_column.unit
     x = parse_numbers(table, motion_column.index).copy()
     order, base, size, assumption = resolve_unit(label, unit, columns, table.name)
-    if time_column is None:
-        t = np.arange(len(x)) / columns.rate if columns.rate else np.arange(len(x)) * (table.interval or 0.0)
-        time_label = "the time"
+    if time_column is None or interval is not None:
+        t, time_label = np.arange(len(x)) * (interval or 0.0), "the time"
     else:
         t, time_label = read_times(table, time_column, columns), time_column.heading
         if columns.time is None and not (is_time_column(time_column) or notes):
@@ -148,16 +151,11 @@ def parse_record(table: Table, columns: ColumnOptions, name: str) -> Record:
     return record
 
 
-def list_columns(table: Table, notes: list[str]) -> list[Column]:
+def list_columns(table: Table) -> list[Column]:
     """Return the columns of a table. Headings that occur twice are numbered; columns without any are named."""
     headings = list(table.column_headings)
     if not any(headings):
         headings = [f"column {i}" for i in range(1, len(headings) + 1)]
-        if len(headings) > 1:
-            notes.append(
-                f"The file has no headings: its first column is used as time in s, and {headings[1]} as the signal; "
-                "--columns names them."
-            )
     counts: Counter[str] = Counter()
     candidates = []
     for index, heading in enumerate(headings):
@@ -193,6 +191,8 @@ def read_numeric(path: Path) -> tuple[tuple[str, ...], np.ndarray]:
         raise SceneError(
             f"{table.name} has no heading; its first line must contain the names of the columns, as in t [s],x [mm]"
         )
+    if len(table.column_headings) < 2:
+        raise SceneError(f"{table.name} has only one column that is not empty; time and a variable are required")
     return table.column_headings, np.column_stack([parse_numbers(table, i) for i in range(len(table.column_headings))])
 
 
@@ -221,6 +221,8 @@ def find_time_column(table: Table, candidates: Sequence[Column], columns: Column
     if columns.time is not None:
         return find_column(columns.time, table, candidates)
     timed = find_time_columns(candidates)
+    if columns.rate and len(candidates) == 1:
+        return None
     if timed:
         signal = None if columns.position is None else find_column(columns.position, table, candidates)
         return next((part for part in reversed(timed) if signal and part.index < signal.index), timed[0])
@@ -234,8 +236,8 @@ def find_time_column(table: Table, candidates: Sequence[Column], columns: Column
     t = t[np.isfinite(t)]
     if len(t) < 2 or (np.diff(t) <= 0).any():
         return None
-    has_no_heading = not any(table.column_headings)
-    return None if has_no_heading and columns.time_unit is None and (t == np.round(t)).all() else first
+    may_be_index = not any(table.column_headings) and columns.time_unit is None and columns.rate is None
+    return None if may_be_index and (t == np.round(t)).all() else first
 
 
 def find_time_columns(candidates: Sequence[Column]) -> list[Column]:

@@ -11,7 +11,7 @@ from decays import decay_record
 from harness.analyses.decay.estimates import KnownParameters
 from harness.analyses.decay.identification import fit_decay
 from harness.errors import HarnessError, SceneError
-from harness.records.columns import ColumnOptions, read_record
+from harness.records.columns import ColumnOptions, read_numeric, read_record
 from harness.records.headings import split_heading
 from harness.records.record import Record, check_record
 from harness.records.text_table import find_headings
@@ -434,3 +434,21 @@ def test_a_record_has_at_least_twelve_samples():
 )
 def test_headings_are_the_last_rows_of_the_width_of_the_numbers(preceding, width, headings):
     assert find_headings(preceding, width) == headings
+
+
+def test_a_rate_replaces_the_times_and_the_column_of_times_is_not_the_signal(tmp_path):
+    path = tmp_path / "record.csv"
+    for head in ("", "t [ms],x [mm]\n", "n,x [mm]\n"):
+        path.write_text(head + "\n".join(f"{10 * i},{x:.9g}" for i, x in enumerate(1e3 * X)))
+        record = read_record(str(path), ColumnOptions(rate=50.0, unit="mm"), "record")
+        assert record.t == pytest.approx(2 * T)
+        assert record.x == pytest.approx(X, abs=1e-8)
+    path.write_text("t\n" + "\n".join(f"{x:.9g}" for x in X))
+    assert read_record(str(path), ColumnOptions(rate=100.0, unit="m"), "record").x == pytest.approx(X, abs=1e-8)
+
+
+def test_a_table_to_compare_needs_two_columns(tmp_path):
+    path = tmp_path / "record.csv"
+    path.write_text("x\n1\n2\n3\n")
+    with pytest.raises(SceneError, match="only one column that is not empty; time and a variable are required"):
+        read_numeric(path)

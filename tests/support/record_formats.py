@@ -329,6 +329,11 @@ FORMATS = (
         "measured.h5",
         lambda: hdf5({"run/time": T, "run/x": MM}, {"run/time": {"units": "s"}, "run/x": {"units": np.bytes_("mm")}}),
     ),
+    Format(
+        "HDF5 with named fields",
+        "fields.h5",
+        lambda: hdf5({"run": np.array(list(zip(T, MM, strict=True)), [("t", float), ("x_mm", float)])}, {}),
+    ),
     Format("Parquet with units of the fields", "fields.parquet", lambda: parquet(True)),
     Format("Parquet of a DataFrame, times as index", "frame.parquet", lambda: parquet(False)),
     Format(
