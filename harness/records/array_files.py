@@ -9,6 +9,7 @@ import json
 import re
 import warnings
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 from zipfile import ZipFile
 
@@ -25,11 +26,13 @@ TIME_KINDS = "mM"  # durations and times of the calendar
 MAX_DEPTH = 20  # of dictionaries
 
 
+@dataclass(frozen=True)
 class ArrayColumn:
-    """A column of an array file: heading and values, numbers or texts."""
+    """Name, values (numbers or texts) and unit of a column of an array file."""
 
-    def __init__(self, name: str, values: Any, unit: str | None) -> None:
-        self.name, self.values, self.unit = name, values, unit
+    name: str
+    values: Any
+    unit: str | None
 
     def heading(self, prefix: str) -> str:
         """Return the heading, with the unit in brackets."""
@@ -165,9 +168,8 @@ def read_json(text: str) -> dict[str, Any] | None:
         except ValueError:
             return None
     if isinstance(value, dict) and isinstance(value.get("columns"), list) and isinstance(value.get("data"), list):
-        value = [
-            dict(zip(map(str, value["columns"]), row, strict=True)) for row in value["data"]
-        ]  # as pandas splits it
+        names = [str(name) for name in value["columns"]]  # the orientation `split` of pandas
+        value = [dict(zip(names, row, strict=True)) for row in value["data"]]
     value = arrays_of_json(value)
     return value if isinstance(value, dict) else {"": value}
 
@@ -197,20 +199,20 @@ def list_columns(values: Mapping[str, Any], prefix: str = "", unit: str | None =
     """Return the columns of nested arrays by name, those in dictionaries as dictionary.name."""
     columns = []
     arrays = [key for key, value in values.items() if is_array(value)]
-    entry = next((value for key, value in values.items() if key.lower() in UNIT_KEYS), None)
+    common_unit = next((value for key, value in values.items() if key.lower() in UNIT_KEYS), None)
+    texts = unit_texts(common_unit)
     for key, value in values.items():
-        own = unit_text(values.get(f"{key}_unit", values.get(f"{key}_units")))
-        if isinstance(entry, Mapping):
-            own = own or unit_text(entry.get(key))
-        elif entry is not None and key in arrays:
-            texts = unit_texts(entry)
-            own = own or (texts[arrays.index(key)] if len(texts) == len(arrays) else None)
+        column_unit = unit_text(values.get(f"{key}_unit", values.get(f"{key}_units")))
+        if isinstance(common_unit, Mapping):
+            column_unit = column_unit or unit_text(common_unit.get(key))
+        elif key in arrays and len(texts) == len(arrays):
+            column_unit = column_unit or texts[arrays.index(key)]
         name = prefix.rstrip(".") if prefix and len(arrays) == 1 and key.lower() in VALUE_KEYS else prefix + key
         if isinstance(value, Mapping):
             if key.lower() not in UNIT_KEYS:
-                columns += list_columns(value, f"{prefix}{key}.", own)
+                columns += list_columns(value, f"{prefix}{key}.", column_unit)
         elif is_array(value):
-            columns += split_array(name, value, own or unit, unit_texts(values.get(f"{key}_units")))
+            columns += split_array(name, value, column_unit or unit, unit_texts(values.get(f"{key}_units")))
     return columns
 
 

@@ -125,30 +125,44 @@ def parse_record(table: Table, columns: ColumnOptions, name: str) -> Record:
         t, time_label = np.arange(len(x)) * (interval or 0.0), "the time"
     else:
         t, time_label = read_times(table, time_column, columns), time_column.heading
-        if columns.time is None and not (is_time_column(time_column) or notes):
+        if columns.time is None and any(table.column_headings) and not is_time_column(time_column):
             notes.append(f"{time_column.heading} is used as time; --time selects another column.")
-    has_cell = np.isfinite(t) | np.isfinite(x)
-    length = int(np.flatnonzero(has_cell)[-1]) + 1 if has_cell.any() else 0  # a run beside it may be longer
-    t, x = t[:length], x[:length]
-    empty = int((~np.isfinite(t) | ~np.isfinite(x)).sum())
-    if empty:
-        notes.append(f"{empty} of {length} rows have a missing cell and are skipped.")
-    for values, column in ((t, time_label), (x, label)):
-        notes += mark_sentinels(values, column)
-    is_complete = np.isfinite(t) & np.isfinite(x)
-    missing = int(length - is_complete.sum())
-    if missing > MAX_MISSING_SHARE * length or not length:
-        reason = "" if missing == empty else f": {notes[-1]}".rstrip(".")
-        raise SceneError(f"{table.name}: {missing} of {length} rows have no number for {time_label} or {label}{reason}")
-    t, rounding = undo_time_rounding(t)
-    notes += filter(None, (rounding, assumption))
-    t, x = t[is_complete], size * x[is_complete]
+    is_complete, gaps = find_complete_rows(t, x, (time_label, label), table.name)
+    t, rounding = undo_time_rounding(t[: len(is_complete)])
+    notes += filter(None, (*gaps, rounding, assumption))
+    t, x = t[is_complete], size * x[: len(is_complete)][is_complete]
     record = Record(name, t, x, base + RATE_SUFFIXES[order], order, base, tuple(notes)).select(
         columns.begin, columns.end
     )
     record = leave_out_saturated(record)
     check_record(record)
     return record
+
+
+def find_complete_rows(
+    t: np.ndarray, x: np.ndarray, labels: tuple[str, str], file: str
+) -> tuple[np.ndarray, list[str]]:
+    """Return which rows have a time and a value, up to the last with either, and notes on the others.
+
+    Marks of missing samples become NaN in `t` and `x`.
+
+    Raises
+    ------
+    SceneError
+        If too many rows have none.
+    """
+    is_used = np.isfinite(t) | np.isfinite(x)
+    length = int(np.flatnonzero(is_used)[-1]) + 1 if is_used.any() else 0  # a run beside it may be longer
+    empty = length - int((np.isfinite(t) & np.isfinite(x))[:length].sum())
+    notes = [f"{empty} of {length} rows have a missing cell and are skipped."] if empty else []
+    for values, label in zip((t, x), labels, strict=True):
+        notes += mark_sentinels(values[:length], label)
+    is_complete = (np.isfinite(t) & np.isfinite(x))[:length]
+    missing = length - int(is_complete.sum())
+    if missing > MAX_MISSING_SHARE * length or not length:
+        reason = "" if missing == empty else f": {notes[-1]}".rstrip(".")
+        raise SceneError(f"{file}: {missing} of {length} rows have no number for {' or '.join(labels)}{reason}")
+    return is_complete, notes
 
 
 def list_columns(table: Table) -> list[Column]:
@@ -220,12 +234,12 @@ def find_time_column(table: Table, candidates: Sequence[Column], columns: Column
     """
     if columns.time is not None:
         return find_column(columns.time, table, candidates)
-    timed = find_time_columns(candidates)
+    time_columns = find_time_columns(candidates)
     if columns.rate and len(candidates) == 1:
         return None
-    if timed:
+    if time_columns:
         signal = None if columns.position is None else find_column(columns.position, table, candidates)
-        return next((part for part in reversed(timed) if signal and part.index < signal.index), timed[0])
+        return next((part for part in reversed(time_columns) if signal and part.index < signal.index), time_columns[0])
     first = next((part for part in candidates if part.heading), None)
     if first is None or len(candidates) < 2 or (first.unit and find_unit(first.unit)):
         return None
@@ -255,11 +269,11 @@ def is_time_column(column: Column) -> bool:
 
 def runs_side_by_side(candidates: Sequence[Column], time_column: Column, motion_column: Column) -> list[str]:
     """Return a note if the table has several columns of times, each with signals after it."""
-    timed = find_time_columns(candidates)
-    ends = [*(part.index for part in timed[1:]), len(candidates)][: len(timed)]
+    time_columns = find_time_columns(candidates)
+    ends = [*(part.index for part in time_columns[1:]), len(candidates)][: len(time_columns)]
     runs = [
         (part, candidates[part.index + 1])
-        for part, end in zip(timed, ends, strict=True)
+        for part, end in zip(time_columns, ends, strict=True)
         if end > part.index + 1 and candidates[part.index + 1].heading
     ]
     others = [f"{part.heading} with {signal.heading}" for part, signal in runs if part is not time_column]

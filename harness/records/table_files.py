@@ -162,12 +162,14 @@ def table_from_rows(headings: list[str], rows: list[list[Any]], line: int, name:
     columns = zip(*(row if len(row) == width else [*row, *[""] * width][:width] for row in rows), strict=True)
     headings = [*headings, *[""] * (width - len(headings))]
     middle = slice(len(rows) // 2, len(rows) // 2 + text_table.SAMPLE_LINES)
-    used = [
+    headed_columns = [
         text_table.separate_units(heading, cells)
         for heading, cells in zip(headings, columns, strict=True)
         if any(cells if heading else cells[middle])
     ]
-    return Table(name, tuple(heading for heading, _ in used), tuple(cells for _, cells in used), line)
+    return Table(
+        name, tuple(heading for heading, _ in headed_columns), tuple(cells for _, cells in headed_columns), line
+    )
 
 
 def table_from_workbook(answer: dict[str, Any], name: str) -> Table:

@@ -226,7 +226,7 @@ def find_headings(preceding: list[list[str]], width: int) -> list[str]:
     last = candidates[-1]
     if len(candidates) > 1 and all(map(looks_like_unit, last)) and not all(map(looks_like_unit, candidates[-2])):
         last = add_units(candidates[-2], last)
-    labels = next((row[1:] for row in preceding if row[0].lower() == UNITS_ROW), [])
+    labels = next((row[1:] for row in preceding if row and row[0].lower() == UNITS_ROW), [])
     return add_units(last, ["", *labels, *[""] * width][:width])
 
 

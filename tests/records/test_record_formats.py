@@ -429,6 +429,7 @@ def test_a_record_has_at_least_twelve_samples():
         ([["t [ms]", "f(x)"], ["s", "mm"]], 2, ["t [ms]", "f(x) [mm]"]),
         ([["t", "x"], ["", "nan"]], 2, ["t", "x"]),
         ([["t", "x"], ["1", "2"]], 2, []),
+        ([[], ["Y_Unit_Label", "mm"], ["X_Value", "Laser"]], 2, ["X_Value", "Laser [mm]"]),
         ([], 2, []),
     ],
 )
