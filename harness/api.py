@@ -176,6 +176,7 @@ def identify_decay(
     drift: bool = False,
     begin: float | None = None,
     end: float | None = None,
+    rate: float | None = None,
     progress: Progress | None = None,
 ) -> "DecayIdentification":
     """Identify viscous damping, dry friction and quadratic drag from a free decay.
@@ -202,6 +203,8 @@ def identify_decay(
         Let the rest position drift at a constant rate.
     begin, end : float, optional
         The part of the record to use, in s.
+    rate : float, optional
+        Sampling rate in Hz, which replaces the times of a file or table.
     progress : callable, optional
         Called with the finished share of the fit.
 
@@ -229,11 +232,14 @@ def identify_decay(
 
     if k is not None and m is not None:
         raise SceneError("k and m are both given: leave one out, because the frequency determines it")
+    if rate is not None and not 0 < rate < inf:
+        raise SceneError(f"rate is {rate!r}: it must be a positive number of samples per second")
     columns = ColumnOptions(
         time=time,
         position=column,
         quantity=quantity,
         unit=unit,
+        rate=rate,
         begin=-inf if begin is None else begin,
         end=inf if end is None else end,
     )

@@ -93,6 +93,7 @@ def test_a_decay_is_identified_from_any_source(tmp_path):
         "run": {"record": run},
         "frame": {"record": run.to_pandas()},
         "columns": {"record": pandas.DataFrame({"t [s]": run.time, "x [m]": run["x"]})},
+        "positions": {"record": pandas.DataFrame({"x [m]": run["x"]}), "rate": 200.0},
         "arrays": {"record": run.time, "x": run["x"], "unit": "m"},
         "millimetres": {"record": run.time, "x": 1000 * run["x"], "unit": "mm"},
     }
@@ -113,6 +114,7 @@ def test_a_decay_is_identified_from_any_source(tmp_path):
         ({"record": [0.0, 1.0], "x": [1.0], "unit": "m"}, "equally long"),
         ({"record": "nowhere.csv"}, "cannot read nowhere.csv"),
         ({"record": np.arange(20.0), "x": np.arange(20.0), "unit": "m", "k": 1.0, "m": 1.0}, "leave one out"),
+        ({"record": "nowhere.csv", "rate": 0.0}, "rate is 0.0: it must be a positive number"),
     ],
 )
 def test_an_invalid_record_is_one_sentence(arguments, message):
