@@ -187,6 +187,15 @@ def ods() -> bytes:
     return file.getvalue()
 
 
+LIBRARIES = {  # of the extras records and test, by a part of the name of the file
+    ".xlsx": ("openpyxl", "python_calamine"),
+    ".ods": ("python_calamine",),
+    "timetable": ("matio", "pandas"),
+    "new.mat": ("h5py",),
+    "structure73": ("h5py",),
+    ".h5": ("h5py",),
+    ".parquet": ("pyarrow", "pandas"),
+}
 PLAIN = "{t:.2f},{x:.9g}"
 COMMAS = "t [s],x [mm]\n"
 CHARACTERS = np.array([[ord("m")], [ord("m")]], np.uint16)
