@@ -53,7 +53,7 @@ def test_an_immediate_event_is_handled_at_once_and_not_forever():
         update_discrete_states(lambda: (False, False, False, False, True, 2.0), 2.0)
 
 
-@pytest.mark.parametrize("declared", ["0", "-1"])
+@pytest.mark.parametrize("declared", ["0", "-1", "inf", "a tenth"])
 def test_an_impossible_step_size_is_treated_as_undeclared(declared):
     steps = []
 

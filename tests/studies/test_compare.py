@@ -18,6 +18,8 @@ from harness.studies.compare.difference import compare
 from harness.studies.compare.study import comparison_as_json
 from harness.studies.compare.trajectory_files import read_trajectory
 
+DECLARED_STEP = '<CoSimulation fixedInternalStepSize="0.1" '
+
 
 @pytest.fixture(scope="module")
 def external_fmu_folder():
@@ -71,6 +73,21 @@ def test_two_fmus_differ_as_their_closed_forms_do(harness, external_fmu_folder, 
     done = harness("compare", *arguments, "--within", 0.01, "--quiet")
     assert (done.returncode, done.stdout) == (1, "")
     assert "more than 0.01" in done.stderr
+
+
+@pytest.mark.parametrize("stop", [10, 9.95])
+def test_fmus_with_one_fixed_internal_step_agree_on_a_shared_grid(harness, external_fmu_folder, tmp_path, stop):
+    """FMI 3.0 can declare the step, FMI 2.0 cannot; each way round."""
+    declared = {"modelDescription.xml": lambda text: text.replace("<CoSimulation ", DECLARED_STEP)}
+    one = external_fmu_folder / "FixedStep.fmu"
+    two = external_fmus.edited_copy(external_fmu_folder / "Fmi3FixedStep.fmu", tmp_path / "Declared.fmu", declared)
+    for sources in ((one, two), (two, one)):
+        done = harness("compare", *sources, "--stop", stop, "--json")
+        assert (done.returncode, done.stderr) == (0, "")
+        comparison = json.loads(done.stdout)
+        assert not comparison["interpolated"]
+        assert comparison["times"] >= 100
+        assert [(variable["name"], variable["largest"]) for variable in comparison["variables"]] == [("x", 0.0)]
 
 
 @pytest.fixture

@@ -1,4 +1,4 @@
-"""Ten FMUs that do not come from this project: pythonfmu (FMI 2.0), pythonfmu3 (FMI 3.0) and C. Sources:
+"""Eleven FMUs that do not come from this project: pythonfmu (FMI 2.0), pythonfmu3 (FMI 3.0) and C. Sources:
 tests/external_fmus."""
 
 import os
@@ -15,6 +15,7 @@ SOURCES = Path(__file__).parents[1] / "external_fmus"
 SWEEP_AXES = {
     "Midpoint": "k=30:50:3",  # FMI 2.0: converges as its communication steps become shorter; no units
     "FixedStep": "k=0.5:1:3",  # has a fixed internal step
+    "Fmi3FixedStep": "k=0.5:1:3",  # FMI 3.0, has the same fixed internal step
     "Switching": "loss=0.1:0.2:3",  # Boolean, Integer and String outputs and parameters
     "Falling": "height=1:4:3",  # terminates the simulation
     "NonConforming": "k=30:50:3",  # violates the standard, but runs
@@ -27,7 +28,7 @@ SWEEP_AXES = {
 
 
 def build_external_fmus():
-    """Return the folder of all ten FMUs, built once per test run."""
+    """Return the folder of all eleven FMUs, built once per test run."""
     folder = build_cache.shared_folder / "foreign"
     with (build_cache.shared_folder / "foreign.lock").open("w") as lock:
         flock(lock, LOCK_EX)

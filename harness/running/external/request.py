@@ -12,7 +12,7 @@ RESULT_FILE, PROGRESS_FILE, OUTPUT_FILE, TIMEOUT_FILE, STRINGS_FILE = (
     "strings",
 )
 ROWS_PREFIX = "rows-"  # followed by the number of a run
-COARSEST_STEPS = 64  # communication steps
+COARSEST_STEPS = 64  # communication steps of the coarsest run by default
 
 
 @dataclass(frozen=True)
@@ -35,8 +35,9 @@ class ExternalRunRequest:
         Time limit of one FMI call in s.
     grid : float or None
         Communication step in s; None to refine it.
-    coarsest : int
-        Communication steps of the coarsest run.
+    coarsest_step : float or None
+        Communication step of the coarsest run in s; None for `COARSEST_STEPS` equal ones. The steps of all other runs
+        are whole fractions of it, so that every run has its communication points.
     values : dict
         Values to set, by variable name.
     outputs : dict
@@ -51,10 +52,15 @@ class ExternalRunRequest:
     tolerance: float
     timeout: float
     grid: float | None = None
-    coarsest: int = COARSEST_STEPS
+    coarsest_step: float | None = None
     values: dict[str, Any] = field(default_factory=dict)
     outputs: dict[str, list[int]] = field(default_factory=dict)
     inputs: dict[str, list[float]] = field(default_factory=dict)
+
+    @property
+    def longest_step(self) -> float:
+        """Return the communication step of the coarsest run in s."""
+        return self.coarsest_step or (self.stop - self.start) / COARSEST_STEPS
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,6 @@ from ..trajectory import Trajectory
 from ..unpacking import unpack
 from ..variable_values import convert_value, effective_value, variable_unit
 from .request import (
-    COARSEST_STEPS,
     OUTPUT_FILE,
     PROGRESS_FILE,
     RESULT_FILE,
@@ -77,7 +76,7 @@ def simulate(spec: RunSpec, description: Any, report: Callable[[float], None]) -
             tolerance=spec.tolerance,
             timeout=spec.timeout,
             grid=None if spec.follow else spec.grid,
-            coarsest=round((stop - start) / spec.grid) if spec.grid else COARSEST_STEPS,
+            coarsest_step=min(spec.grid, stop - start) if spec.grid else None,
             values=values,
             outputs={variable.name: list(shape) for variable, shape in chosen},
             inputs={name: np.asarray(column, dtype=float).tolist() for name, column in spec.inputs.items()},

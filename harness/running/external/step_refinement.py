@@ -37,12 +37,10 @@ def refine(request: ExternalRunRequest, description: Any, run: RunFunction) -> R
     """
     duration = request.stop - request.start
     if request.exchange:
-        return refine_tolerance(
-            request, request.grid or duration / (request.coarsest * ceil(MIN_OUTPUT_STEPS / request.coarsest)), run
-        )
-    fixed_step = float(description.coSimulation.fixedInternalStepSize or 0.0)
-    if fixed_step > 0.0:
-        result = run(fixed_step * ceil(duration / fixed_step / MAX_STEPS), solver_tolerance(request))
+        return refine_tolerance(request, request.grid or whole_fraction(request, MIN_OUTPUT_STEPS), run)
+    fixed_step = declared_step(description)
+    if fixed_step:
+        result = run(communication_step(fixed_step, duration), solver_tolerance(request))
         return accept_run(result, f"declared fixed internal step of {fixed_step:g} s, error unknown")
     if request.grid:
         result = run(request.grid, solver_tolerance(request))
@@ -57,6 +55,25 @@ def refine(request: ExternalRunRequest, description: Any, run: RunFunction) -> R
     return answer
 
 
+def declared_step(description: Any) -> float | None:
+    """Return the fixed internal step in s that an FMU declares for co-simulation, None without a possible one."""
+    try:
+        fixed_step = float(description.coSimulation.fixedInternalStepSize or 0.0)
+    except ValueError:
+        return None
+    return fixed_step if 0.0 < fixed_step < inf else None
+
+
+def communication_step(fixed_step: float, duration: float) -> float:
+    """Return the shortest multiple of a fixed internal step in s that makes at most `MAX_STEPS` steps."""
+    return fixed_step * ceil(duration / fixed_step / MAX_STEPS)
+
+
+def whole_fraction(request: ExternalRunRequest, steps: int) -> float:
+    """Return the longest whole fraction in s of the coarsest communication step that makes at least `steps` steps."""
+    return request.longest_step / ceil(steps * request.longest_step / (request.stop - request.start))
+
+
 def accept_run(result: RefinementRun, note: str) -> RefinementResult:
     """Select a run."""
     return RefinementResult(result.number, note, result.message)
@@ -69,25 +86,25 @@ def solver_tolerance(request: ExternalRunRequest) -> float:
 
 def refine_steps(request: ExternalRunRequest, run: RunFunction) -> RefinementResult:
     """Halve the communication step until two results agree at the times of the coarsest."""
-    duration, steps, difference = request.stop - request.start, request.coarsest, inf
+    duration, h, difference = request.stop - request.start, request.longest_step, inf
     previous: RefinementRun | None = None
-    while steps <= max(MAX_STEPS, 2 * request.coarsest):
-        current = run(duration / steps, solver_tolerance(request))
+    while h >= min(duration / MAX_STEPS, request.longest_step / 2):
+        current = run(h, solver_tolerance(request))
         if current.message and not (current.terminated or current.step_refused):
             return keep_longest_run(previous, current)
         if previous and not (current.step_refused or previous.step_refused):
             difference = max_difference(previous.rows, current.rows, request)
             if difference == 0.0:
-                return refine_solver_tolerance(request, duration / steps, current, run)
-            if difference <= request.tolerance and steps >= MIN_OUTPUT_STEPS:
-                h = duration / steps
+                return refine_solver_tolerance(request, h, current, run)
+            if difference <= request.tolerance and h <= duration / MIN_OUTPUT_STEPS:
                 return accept_run(
                     current, f"communication step {h:.4g} s; halving it changes no output by more than {difference:.2g}"
                 )
-        previous, steps = current, 2 * steps
+        previous, h = current, h / 2
     if current.step_refused:
         return keep_longest_run(None, current)
-    return no_agreement(f"the last halving, to {steps // 2} communication steps,", current, difference, request)
+    change = f"the last halving, to {round(duration / (2 * h))} communication steps,"
+    return no_agreement(change, current, difference, request)
 
 
 def no_agreement(
@@ -114,9 +131,10 @@ def refine_solver_tolerance(
     if not any(np.ptp(column) for column in current.rows.columns.values()):
         return accept_run(current, f"communication step {h:.4g} s; no output changes")
     tolerance = solver_tolerance(request)
+    short_step = min(whole_fraction(request, STEPS_TO_SEE_INTERNAL_STEP), request.longest_step / 4)
     for _ in range(3):
         tolerance = max(tolerance / 100, MIN_TOLERANCE)
-        refined = run((request.stop - request.start) / max(STEPS_TO_SEE_INTERNAL_STEP, 4 * request.coarsest), tolerance)
+        refined = run(short_step, tolerance)
         if refined.message and not refined.terminated:
             return keep_longest_run(current, refined)
         difference = max_difference(current.rows, refined.rows, request)
@@ -171,8 +189,9 @@ def refine_tolerance(request: ExternalRunRequest, h: float, run: RunFunction) ->
 def max_difference(first: SampleRows, second: SampleRows, request: ExternalRunRequest) -> float:
     """Return the largest difference of two runs at the coarsest times, relative to each variable's largest value."""
     end = min(each.time[-1] if len(each.time) else request.start for each in (first, second))
-    times = np.linspace(request.start, request.stop, request.coarsest + 1)
-    times = times[times <= end + 1e-9 * (request.stop - request.start)]
+    h, tolerance = request.longest_step, 1e-9 * (request.stop - request.start)
+    times = np.append(np.arange(request.start, request.stop - tolerance, h), request.stop)
+    times = times[times <= end + tolerance]
     if len(times) < 2:
         return inf
     largest = 0.0

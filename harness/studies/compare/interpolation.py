@@ -15,6 +15,7 @@ from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
 from ...running.signals import Signals
 from .units import is_rate_unit
 
+TIME_ROUNDING = 8 * np.finfo(float).eps  # times that differ by this fraction are equal but for rounding
 LARGE_VALUE, REDUCTION = 1e150, 2.0**-600  # larger values are scaled to avoid overflow
 RATE_TOLERANCE = 0.02  # allowed deviation from the integral of the rate, relative to the total variation
 N_PARTS, ROUNDING_FACTOR = 32, 1.01  # a coarse check over parts, with a factor for rounding
@@ -47,11 +48,13 @@ class SignalInterpolant:
             Time intervals in s, in each of which the variable jumps once.
         """
         t, y = self.path.time, self.path.columns[name]
+        index = self.sample_indices(at)
         if not np.isfinite(y).all():
-            held = y[np.searchsorted(t, at, "right") - 1]
-            held = np.where(np.isin(at, t), held, np.nan)  # unknown between samples
+            held = np.where(index < 0, np.nan, y[index])  # unknown between samples
             return ValueBounds(held, held)
-        if np.isin(at, t).all() or (y == np.rint(y)).all():
+        if (index >= 0).all():
+            smooth = y[index]
+        elif (y == np.rint(y)).all():
             smooth = y[np.searchsorted(t, at, "right") - 1]
         else:
             scale = REDUCTION if np.abs(y).max() > LARGE_VALUE else 1.0
@@ -70,6 +73,17 @@ class SignalInterpolant:
         for before in np.flatnonzero(np.diff(t) == 0).tolist():
             widen(t[before], t[before], before, before + 1)
         return ValueBounds(low, high)
+
+    def sample_indices(self, at: np.ndarray) -> np.ndarray:
+        """Return the indices (n,) of the samples at given times in s, -1 between samples; of a jump the second one.
+
+        The times of one grid may differ by rounding in two runs.
+        """
+        t = self.path.time
+        before = np.searchsorted(t, at, "right") - 1
+        after = np.minimum(before + 1, len(t) - 1)
+        nearest = np.where(np.abs(t[after] - at) < np.abs(t[before] - at), after, before)
+        return np.where(np.abs(t[nearest] - at) <= TIME_ROUNDING * np.abs(at), nearest, -1)
 
     def rate(self, name: str, scale: float) -> np.ndarray | None:
         """Return the recorded rate (n,) of a variable times `scale`, or None.

@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from ...errors import HarnessError, SceneError
-from ...running.description import read_description, resolve_stop
+from ...running.description import read_description, resolve_stop, resolve_time_span
+from ...running.external.step_refinement import communication_step, declared_step
 from ...running.fmi2 import ProgressCallback
 from ...running.run_spec import RunSpec, spec_from_scene
 from ...running.runner import DEFAULT_COMMUNICATION_STEPS, run
@@ -24,14 +25,16 @@ RUN_SUFFIXES = (".fmu", ".py", ".toml")  # sources that are run
 def load_both(sources: Sequence[str | Signals], options: RunSpec, report: ProgressCallback) -> tuple[Signals, Signals]:
     """Load the trajectories of two folders, files, FMUs or scenes; keep what is loaded already.
 
-    FMUs and scenes are run with the communication step of the other side, if it has one, and to the same stop time;
-    other options are in `options`.
+    Both sides share one time grid: FMUs and scenes are run with the communication step of the other side, if it has
+    one, or else with the fixed internal step that one of them declares, and to the same stop time. Other options are in
+    `options`.
     """
     recordings = [source if isinstance(source, Signals) else read_recorded(source) for source in sources]
     runs = [
         None if item else run_spec_for(str(source), options) for item, source in zip(recordings, sources, strict=True)
     ]
     grids = [grid_spacing(item.time) for item in recordings if item] + [item.grid for item in runs if item]
+    grids += [fixed_grid(item) for item in runs if item]
     grid = next(filter(None, grids), None)
     ends = [resolve_stop(item, read_description(item.fmu, item.lenient)) for item in runs if item]
     stops = {*ends, *(float(item.time[-1]) for item in recordings if item)}
@@ -86,6 +89,16 @@ def grid_spacing(time: np.ndarray) -> float | None:
     multiples = (time - time[0]) / h if h > 0 else np.full(len(time), np.nan)
     is_multiple = np.abs(multiples - np.rint(multiples)) < 1e-6 * np.maximum(multiples, 1)
     return h if is_multiple.mean() > 0.5 else None
+
+
+def fixed_grid(spec: RunSpec) -> float | None:
+    """Return the communication step in s that the fixed internal step of an FMU prescribes, None if there is none."""
+    description = read_description(spec.fmu, spec.lenient)
+    if description.coSimulation is None or spec.exchange:
+        return None
+    start, stop = resolve_time_span(spec, description)
+    fixed_step = declared_step(description)
+    return communication_step(fixed_step, stop - start) if fixed_step else None
 
 
 def common_span(one: Signals, two: Signals) -> tuple[float, float]:
