@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .errors import HarnessError, SceneError, format_value, optional, unknown_name_message
+from .errors import HarnessError, SceneError, format_value, optional, unknown_name_message, unknown_source_message
 
 if TYPE_CHECKING:
     import pandas
@@ -407,9 +407,8 @@ def run_spec(source: "str | Path") -> "RunSpec":
         from .scenes.scene import shipped_scenes
 
         names = sorted(list_models() | {file.stem for file in shipped_scenes()})
-        raise SceneError(
-            f"{unknown_name_message('model or scene', name, names)}, or the path of an FMU, a scene or a result"
-        ) from error
+        other = ", or the path of an FMU, a scene or a result"
+        raise SceneError(unknown_source_message("model or scene", name, names, other)) from error
     check_built(scene.file)
     return spec_from_scene(scene)
 

@@ -3,6 +3,7 @@
 from collections.abc import Collection, Iterable
 from difflib import get_close_matches
 from importlib import import_module
+from os.path import basename, exists, splitext
 from typing import Any
 
 MAX_VALUE_LENGTH = 100  # characters of a value in a message
@@ -52,6 +53,26 @@ def unknown_name_message(category: str, name: object, allowed: Iterable[str]) ->
     hint = f" (nearest: '{close[0]}')" if close else ""
     more = f" and {len(allowed_names) - MAX_LISTED_NAMES} more" if len(allowed_names) > MAX_LISTED_NAMES else ""
     return f"unknown {category} {quoted}{hint}; allowed: {', '.join(allowed_names[:MAX_LISTED_NAMES]) or 'none'}{more}"
+
+
+def unknown_source_message(category: str, source: str, allowed: Iterable[str], other: str = "") -> str:
+    """Return the message about a source that is no allowed name; it says so if there is no file of that name either.
+
+    Parameters
+    ----------
+    category, allowed
+        As in `unknown_name_message`.
+    source : str
+        The invalid name or path.
+    other : str
+        What else is allowed, as in ", or the path of a .toml file".
+    """
+    message = unknown_name_message(category, source, allowed) + other
+    if exists(source):
+        return message
+    is_path = bool(splitext(source)[1]) or basename(source) != source
+    quoted = format_value(source)
+    return f"{quoted} does not exist; {message}" if is_path else f"{message}; no file or folder {quoted} exists"
 
 
 def check_names(category: str, names: Iterable[str], allowed: Collection[str]) -> None:

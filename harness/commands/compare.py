@@ -6,7 +6,7 @@ from typing import Any
 
 import click
 
-from .terminal import FiniteFloat, Terminal, result_options, run_options
+from .terminal import FiniteFloat, Terminal, refuse_ignored_options, refuse_options, result_options, run_options
 
 
 @click.command()
@@ -21,8 +21,15 @@ from .terminal import FiniteFloat, Terminal, result_options, run_options
 )
 @click.option("--atol", type=FiniteFloat(min=0), help="Allowed difference on top, in the unit of the variable.")
 @result_options
+@click.pass_context
 def compare(
-    first: str, second: str, rtol: float | None, atol: float | None, terminal: Terminal, **options: Any
+    context: click.Context,
+    first: str,
+    second: str,
+    rtol: float | None,
+    atol: float | None,
+    terminal: Terminal,
+    **options: Any,
 ) -> None:
     """Compare A and B, variable by variable.  Each is an FMU (FMI 2.0 or 3.0), a scene, a result folder, or a file:
     CSV of fmpy, .csv or .mat of OpenModelica or Dymola, or any table whose first column is time.
@@ -39,8 +46,15 @@ def compare(
       python -m harness compare results/smd measured.csv --rtol 1e-3 --atol 1e-6
     """
     from ..running.run_spec import RunSpec
+    from ..scenes.fmu_files import find_fmu
     from ..studies.compare import study
+    from ..studies.compare.trajectory_sources import FMU_SUFFIXES, RUN_SUFFIXES
 
+    suffixes = [Path(source).suffix for source in (first, second)]
+    if all(Path(source).exists() for source in (first, second)) and not {*suffixes} & {*RUN_SUFFIXES}:
+        refuse_options(context, "on stored results and files", "stop")
+    fmus = [find_fmu(source) for source in (first, second) if Path(source).suffix in FMU_SUFFIXES]
+    refuse_ignored_options(context, fmus)
     with terminal.progress(1) as report:
         spec = RunSpec(Path(), **options)
         comparison, folder = study.run_comparison((first, second), spec, terminal.out, partial(report, "compare"))

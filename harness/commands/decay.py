@@ -5,7 +5,9 @@ from typing import Any
 
 import click
 
-from .terminal import POSITIVE, Terminal, result_options
+from .terminal import POSITIVE, Terminal, refuse_options, result_options
+
+COLUMN_OPTIONS = ("time", "position", "velocity", "quantity", "unit", "per_count", "time_unit", "names")  # of records
 
 
 @click.command()
@@ -31,7 +33,9 @@ from .terminal import POSITIVE, Terminal, result_options
 @click.option("--drag/--no-drag", default=True, show_default=True, help="Fit the models with quadratic drag as well.")
 @click.option("--drift", is_flag=True, help="Fit a linear drift of the rest position or sensor offset.")
 @result_options
+@click.pass_context
 def decay(
+    context: click.Context,
     source: str,
     velocity: str | None,
     k: float | None,
@@ -65,6 +69,8 @@ def decay(
     from ..studies.decay import study as decays
     from ..studies.decay.table import decay_table, summary_lines
 
+    if not decays.is_record_file(source):
+        refuse_options(context, "on a scene, whose FMU declares names and units", *COLUMN_OPTIONS)
     if k is not None and m is not None:
         raise click.UsageError("--k and --m: give only one of them; the other follows from the frequency")
     if velocity is not None:

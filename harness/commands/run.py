@@ -11,7 +11,7 @@ import click
 from click.core import ParameterSource
 
 from ..errors import HarnessError
-from .terminal import Terminal, result_options, run_options
+from .terminal import Terminal, refuse_ignored_options, result_options, run_options
 
 
 @click.command()
@@ -56,6 +56,7 @@ def run(
         fmu, scene = find_fmu(scene), None
     if fmu is None and scene and scene.endswith(".fmu"):
         fmu, scene = Path(scene), None
+    refuse_ignored_options(context, [fmu] if fmu else [])
     if fmu is not None and scene is None:
         run_fmu_file(fmu, values, options, terminal)
         return

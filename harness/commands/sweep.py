@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ..errors import MAX_VALUE_LENGTH, HarnessError
-from .terminal import Terminal, result_options, run_options
+from .terminal import Terminal, refuse_ignored_options, refuse_options, result_options, run_options
 
 if TYPE_CHECKING:
     from ..studies.sweep.result_files import SweepResult
@@ -39,7 +39,9 @@ WORKERS = click.IntRange(1, 1024)
 @click.option("--name", help="Name of the result folder.")
 @run_options
 @result_options
+@click.pass_context
 def sweep(
+    context: click.Context,
     model: str,
     vary: tuple[str, ...],
     values: tuple[str, ...],
@@ -69,10 +71,16 @@ def sweep(
         raise click.UsageError(
             f"--name {name[:MAX_VALUE_LENGTH]}: must be a single folder name that does not start with a dot"
         )
+    if random is None:
+        refuse_options(context, "without --random", "seed")
+    if scheduler is not None:
+        refuse_options(context, "with --scheduler: the cluster has its own workers", "workers")
     if find_spec("xarray") is None:  # checked before the runs: the figure needs it afterwards
         raise HarnessError("a sweep needs xarray: python -m pip install 'friction-fmus[sweep]'")
+    from ..scenes.fmu_files import find_fmu
     from ..studies.sweep import result_files as sweep_file
 
+    refuse_ignored_options(context, [find_fmu(model)])
     measures = tuple(dict.fromkeys(word.strip() for word in measure.split(","))) if measure is not None else ()
     request = sweep_file.SweepRequest(model, vary, values, random, seed, measures, name, options)
     with terminal.progress(1) as report:

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import click
+from click.core import ParameterSource
 
 from ..errors import HarnessError
 from ..process.interrupt import check_interrupt
@@ -91,6 +92,42 @@ EXTERNAL_FMU_OPTIONS = (  # for FMUs that do not expose their solver steps
         help="Seconds allowed for one FMI call.",
     ),
 )
+
+
+def is_given(context: click.Context, option: str) -> bool:
+    """Return whether an option is given on the command line."""
+    return context.get_parameter_source(option) is ParameterSource.COMMANDLINE
+
+
+def refuse_options(context: click.Context, reason: str, *options: str) -> None:
+    """Raise UsageError if one of the options, which have no effect here, is given on the command line."""
+    for parameter in context.command.params:
+        if parameter.name in options and is_given(context, parameter.name):
+            raise click.UsageError(f"{parameter.opts[0]} has no effect {reason}")
+
+
+def refuse_ignored_options(context: click.Context, fmus: Iterable[Path]) -> None:
+    """Raise UsageError for an option of the command line that applies to none of the FMUs to which options apply.
+
+    Parameters
+    ----------
+    context : click.Context
+    fmus : iterable of pathlib.Path
+        FMUs that are run with the options of the command line; scenes have their own.
+    """
+    from ..running.description import read_description
+    from ..running.runner import exposes_solver_steps
+
+    files = list(fmus)
+    if not files:
+        refuse_options(
+            context, "without an FMU; a scene sets it in its file", "tolerance", "exchange", "lenient", "timeout"
+        )
+    elif (is_given(context, "tolerance") or is_given(context, "timeout")) and not context.params["exchange"]:
+        lenient = context.params["lenient"]
+        if all(exposes_solver_steps(read_description(file, lenient)) for file in files):
+            reason = f"on {files[0].name}, which runs at the steps of its own solver (solver.rtol)"
+            refuse_options(context, reason, "tolerance", "timeout")
 
 
 def run_options(command: Callable[..., Any]) -> Callable[..., Any]:

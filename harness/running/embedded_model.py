@@ -14,6 +14,8 @@ import numpy as np
 from ..errors import HarnessError
 from ..scenes.fmu_files import check_built
 from .cached_by_mtime import cached_by_mtime
+from .description import read_description
+from .settings import REQUIRED_VARIABLES
 from .solution import Solution
 from .unpacking import SCRIPT_NAME_FILE, unpack
 
@@ -21,8 +23,17 @@ OK = 0  # status of the solver
 
 
 def load_model_class(fmu: Path) -> type:
-    """Return the model class of an FMU. Its package has a unique name, so several can be loaded at once."""
+    """Return the model class of an FMU. Its package has a unique name, so several can be loaded at once.
+
+    Raises
+    ------
+    HarnessError
+        If it is not an FMU of this project in Python.
+    """
     check_built(fmu)
+    names = {variable.name for variable in read_description(fmu, lenient=True).modelVariables}
+    if not names.issuperset(REQUIRED_VARIABLES):
+        raise HarnessError(f"{fmu.name} is not an FMU of this project, whose code is needed here; `run` runs any FMU")
     return import_model_class(fmu)
 
 
@@ -31,6 +42,10 @@ def import_model_class(fmu: Path) -> type:
     """Import the model class of an existing FMU."""
     with unpack(fmu) as directory:
         resources = directory / "resources"
+        if not (resources / SCRIPT_NAME_FILE).is_file():
+            raise HarnessError(
+                f"{fmu.name} is a native FMU; give the one in Python, which `python build_fmus.py` builds"
+            )
         package = (resources / SCRIPT_NAME_FILE).read_text(encoding="utf-8").removesuffix("_fmu")
         sys.path.insert(0, str(resources))
         try:

@@ -62,6 +62,9 @@ def parse_element(text: str) -> float | str:
 def convert_number(variable: Any, value: Any) -> float | int:
     """Convert a number and check the bounds of its variable and of its type."""
     is_integer = variable.type not in REAL_TYPES
+    if isinstance(value, str):
+        hint = "; write it without quotes" if isinstance(parse_element(value), float) else ""
+        raise SceneError(f"{variable.name} = {format_value(value)} is a text, not a number{hint}")
     low, high = find_bound(variable, "min"), find_bound(variable, "max")
     if is_integer:
         limits = np.iinfo({"Integer": "int32"}.get(variable.type, variable.type.lower()))

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from ..errors import HarnessError, SceneError, check_names
+from ..errors import HarnessError, SceneError, format_value, unknown_source_message
 
 FOLDERS = (Path("fmus"), Path(__file__).parents[2] / "fmus")
 
@@ -10,10 +10,14 @@ FOLDERS = (Path("fmus"), Path(__file__).parents[2] / "fmus")
 def find_fmu(name: str) -> Path:
     """Return the path of a model's FMU, built or not. A model is given by its name or by a .py or .fmu file."""
     if (path := Path(name)).suffix in (".py", ".fmu"):
-        return path.with_suffix(".fmu")
+        fmu = path.with_suffix(".fmu")
+        if not path.exists() and not fmu.exists() and path != fmu:
+            raise SceneError(f"{format_value(name)} does not exist: give an existing model file or FMU")
+        return fmu
     if not (names := list_models()):
         raise SceneError("no models found: run from the project directory, or set fmu = 'path/to/file.fmu'")
-    check_names("model", [name], names)
+    if name not in names:
+        raise SceneError(unknown_source_message("model", name, names))
     return next((file for folder in FOLDERS for file in folder.glob(f"{name}.fmu")), Path("fmus") / f"{name}.fmu")
 
 

@@ -32,7 +32,7 @@ from math import inf
 from pathlib import Path
 from typing import Annotated, Any
 
-from ..errors import SceneError, check_names, unknown_name_message
+from ..errors import SceneError, check_names, unknown_source_message
 from .fmu_files import find_fmu
 from .roles import ROLES, find_roles
 from .schema import (
@@ -153,7 +153,7 @@ def load_scene(scene: str | Path) -> Scene:
         path = SHIPPED / f"{scene}.toml"
         if path not in shipped_scenes():
             names = [file.stem for file in shipped_scenes()]
-            raise SceneError(f"{unknown_name_message('scene', scene, names)}, or the path of a .toml file")
+            raise SceneError(unknown_source_message("scene", str(scene), names, ", or the path of a .toml file"))
     source = path.stem if path.parent.resolve() == SHIPPED.resolve() else str(path.resolve())
     table = read_toml(path)
     try:

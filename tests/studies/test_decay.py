@@ -135,7 +135,7 @@ print(len(draws), [name for name in ("fmpy", "scipy", "harness.running", "harnes
     [
         (["decay", "stickslip"], 1, "not a free decay of one oscillator"),
         (["decay", "nosuch"], 2, "unknown scene 'nosuch'"),
-        (["decay", "nosuch.csv"], 2, "cannot read nosuch.csv"),
+        (["decay", "nosuch.csv"], 2, "'nosuch.csv' does not exist"),
         (["decay", "x.csv", "--k", "1", "--m", "1"], 2, "--k and --m"),
         (["decay", "x.csv", "--velocity", "v", "--position", "x"], 2, "--velocity: only one column is fitted"),
     ],

@@ -26,7 +26,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated
 
-from ...errors import SceneError, format_value, unknown_name_message
+from ...errors import SceneError, format_value, unknown_name_message, unknown_source_message
 from ..fmu_files import find_fmu
 from ..schema import NUMBER, POSITIVE, TEXT, TITLE, Constraint, is_names, is_number, parse_table, read_toml
 
@@ -176,9 +176,8 @@ def load_coupled_scene(source: str, models: Collection[str], stop: float | None 
     if path.suffix != ".toml":
         names = {file.stem: file for file in shipped_coupled_scenes()}
         if source not in names:
-            raise SceneError(
-                f"{unknown_name_message('coupled scene', source, names)}, or the path of a .toml or .ssp file"
-            )
+            other = ", or the path of a .toml or .ssp file"
+            raise SceneError(unknown_source_message("coupled scene", source, names, other))
         path = names[source]
     table = read_toml(path)
     try:

@@ -19,7 +19,8 @@ from ...scenes.scene import load_scene
 from .trajectory_files import read_trajectory
 
 FILE_SUFFIXES = (".csv", ".txt", ".mat", ".xlsx", ".ods", ".npz")
-RUN_SUFFIXES = (".fmu", ".py", ".toml")  # sources that are run
+FMU_SUFFIXES = (".fmu", ".py")
+RUN_SUFFIXES = (*FMU_SUFFIXES, ".toml")  # sources that are run
 
 
 def load_both(sources: Sequence[str | Signals], options: RunSpec, report: ProgressCallback) -> tuple[Signals, Signals]:
@@ -66,7 +67,7 @@ def display_names(sources: tuple[str, str]) -> list[str]:
 
 def run_spec_for(source: str, options: RunSpec) -> RunSpec:
     """Return the specification to run an FMU, the FMU of a model file, or a scene."""
-    if Path(source).suffix in (".fmu", ".py"):
+    if Path(source).suffix in FMU_SUFFIXES:
         return replace(options, fmu=find_fmu(source))
     scene = load_scene(source)
     check_built(scene.file)

@@ -4,6 +4,7 @@ import gc
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import asdict
+from os.path import exists
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ from ...analyses.decay.energy_loss import EnergyLoss, measure_energy_loss
 from ...analyses.decay.estimates import KnownParameters
 from ...analyses.decay.identification import DecayIdentification, fit_decay
 from ...analyses.decay.law import AMPLITUDE, T0
-from ...errors import HarnessError, SceneError
+from ...errors import HarnessError, SceneError, format_value
 from ...records.columns import ColumnOptions, read_record
 from ...records.record import Record, check_record
 from ...results import provenance
@@ -67,7 +68,9 @@ def load_record(
     path = Path(source)
     if source == "-":
         return read_record(source, columns, "stdin"), known, {"files": ()}
-    if path.suffix.lower() != ".toml" and (path.is_file() or path.is_fifo() or path.suffix):
+    if is_record_file(source):
+        if not exists(source):
+            raise SceneError(f"{format_value(source)} does not exist: give an existing record, or a scene")
         name = path.stem.encode("utf-8", "replace").decode()
         return read_record(source, columns, name), known, {"files": (path,)}
     if path.is_dir():
@@ -75,12 +78,18 @@ def load_record(
     return record_of_scene(source, columns, known, report)
 
 
+def is_record_file(source: str) -> bool:
+    """Return whether a source of the command decay is a record, not a scene."""
+    path = Path(source)
+    return source == "-" or (path.suffix.lower() != ".toml" and (path.is_file() or path.is_fifo() or bool(path.suffix)))
+
+
 def record_of_scene(
     source: str, columns: ColumnOptions, known: KnownParameters, report: Callable[[float], None]
 ) -> LoadedRecord:
     """Run a scene and return its position as a record."""
-    from ...running.fmi2 import simulate
     from ...running.run_spec import spec_from_scene
+    from ...running.runner import run as run_fmu
     from ...scenes.fmu_files import check_built
     from ...scenes.scene import load_scene
 
@@ -89,8 +98,16 @@ def record_of_scene(
     spec = spec_from_scene(scene)
     if "position" not in spec.motion_outputs:
         raise SceneError(f"scene {scene.name}: a decay needs the position among the outputs")
-    run = simulate(spec, report)
-    unit = run.units[spec.motion_outputs["position"]]
+    run = run_fmu(spec, report)
+    if run.failure:
+        raise HarnessError(f"scene {scene.name}: {run.failure}")
+    position = run.spec.motion_outputs["position"]
+    unit = run.units[position]
+    if not unit:
+        raise SceneError(
+            f"scene {scene.name}: {position} has no unit in {scene.file.name}: run the scene, and identify the decay "
+            "in its trajectory.csv with --unit"
+        )
     record = Record(scene.name, run.time, run.column_of_role("position"), unit, 0, unit).select(
         columns.begin, columns.end
     )

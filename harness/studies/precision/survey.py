@@ -14,7 +14,7 @@ from ...results.folder import check_same_source, replace_folder
 from ...results.provenance import write_provenance
 from ...running.description import declared_parameters
 from ...running.embedded_model import load_model_class
-from ...scenes.fmu_files import check_built, find_fmu
+from ...scenes.fmu_files import find_fmu
 from . import law_deviations, literature_problems
 from .advice import recommend
 from .study import QUICK, Point, Study, SweepSettings, study_model
@@ -48,7 +48,7 @@ def run_survey(
     """Study the models and write the results to out/precision; results of other models are kept."""
     files = list(map(find_fmu, models))
     for file in files:
-        check_built(file)
+        load_model_class(file)
         if extent == QUICK:
             check_same_source(out / FOLDER, QUICK_RUN, f"{file.stem}.json")
     existing = [path.name for path in (out / FOLDER).glob("*") if path.name.endswith(FILE_SUFFIXES)]

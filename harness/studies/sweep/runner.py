@@ -209,7 +209,7 @@ def open_runner(runs: SweepSpec, file: Path) -> Iterator[Runner]:
     """Open the runner of an FMU."""
     spec = run_spec_of(runs, file)
     fmu_description = read_description(file, spec.lenient)
-    if runner.exposes_solver_steps(fmu_description):
+    if runner.exposes_solver_steps(fmu_description) and not spec.exchange:
         with open_instance(spec) as (_, fmu, heard):
             yield OwnFmuRunner(runs, fmu_description, fmu, heard, spec)
     else:
