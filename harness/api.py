@@ -416,16 +416,16 @@ def run_spec(source: "str | Path") -> "RunSpec":
 def stored_spec(folder: Path) -> "RunSpec":
     """Return the run that made a stored result; HarnessError if its files have changed since."""
     from .results.provenance import load_verified_provenance
-    from .running.run_spec import RunSpec, spec_from_scene
+    from .running.run_spec import spec_from_provenance, spec_from_scene
     from .scenes.scene import scene_from_provenance
 
     scene = load_verified_provenance(folder)["scene"] or {}
     if "title" in scene:
         return spec_from_scene(scene_from_provenance(scene))
     try:
-        return RunSpec(**{**scene, "fmu": Path(scene["fmu"]), "outputs": tuple(scene["outputs"])})
-    except (KeyError, TypeError):
-        raise SceneError(f"{folder} does not hold the result of one run: name another folder") from None
+        return spec_from_provenance(scene)
+    except SceneError as error:
+        raise SceneError(f"{folder} does not hold the result of one run ({error}): name another folder") from None
 
 
 def exchange_of(interface: str | None) -> bool | None:
@@ -564,17 +564,19 @@ def stored_run(folder: Path) -> "Trajectory":
     from .results.provenance import load_provenance
     from .running.run_spec import RunSpec
     from .running.trajectory import SolverSteps, Trajectory
+    from .scenes.schema import is_text
     from .studies.compare.trajectory_files import read_trajectory
 
     found, origin = read_trajectory(folder), load_provenance(folder)
     parameters = {name: each["value"] for name, each in origin.get("parameters", {}).items()}
     units = found.units | {name: each["unit"] for name, each in origin.get("parameters", {}).items()}
     scene = origin.get("scene") or {}
-    fmu = Path(scene.get("fmu") or scene.get("file") or f"{folder.name}.fmu")
+    fmu = Path(str(next(filter(is_text, (scene.get("fmu"), scene.get("file"))), f"{folder.name}.fmu")))
     steps = None
     if (folder / "steps.csv").is_file():
         ends, sizes, rejected = read_numeric(folder / "steps.csv")[1].T
         steps = SolverSteps(np.append(found.time[0], ends), sizes, rejected.astype(int))
-    spec = RunSpec(fmu, outputs=tuple(found.columns), values=scene.get("values") or {})
+    values = scene.get("values")
+    spec = RunSpec(fmu, outputs=tuple(found.columns), values=values if isinstance(values, dict) else {})
     names = {name: name for name in found.columns}
     return Trajectory(spec, found.time, found.columns, units, names, parameters, steps, found.events)

@@ -1,6 +1,5 @@
 """run: one scene or one FMU."""
 
-import shlex
 import sys
 from dataclasses import replace
 from functools import partial
@@ -11,7 +10,16 @@ import click
 from click.core import ParameterSource
 
 from ..errors import HarnessError
-from .terminal import Terminal, refuse_ignored_options, result_options, run_options
+from .terminal import Terminal, build_arguments, refuse_ignored_options, result_options, run_options
+
+FOLDER_DEPTHS = {  # commands whose results can be repeated, and the levels from the result folder up to --out
+    "run": 1,
+    "compare": 2,
+    "couple": 2,
+    "decay": 2,
+    "stability": 1,
+    "sweep": 2,
+}
 
 
 @click.command()
@@ -72,7 +80,7 @@ def run(
         if not (folder_path / study.FILES[0]).is_file() or "title" not in (stored["scene"] or {}):
             if stored["command"] == PYTHON_API:
                 raise HarnessError(f"{scene} was written from Python: repeat its run by harness.simulate('{scene}')")
-            rerun_command(context, stored["command"])
+            repeat_call(context, folder_path, stored, terminal)
             return
         selected_scene = scene_from_provenance(stored["scene"])
         if context.get_parameter_source("out") is not ParameterSource.COMMANDLINE:
@@ -87,14 +95,20 @@ def run(
     terminal.print_result(outcome_as_json(outcome, terminal.out), table, *notes, folder=folder, failed=failed)
 
 
-def rerun_command(context: click.Context, command: str) -> None:
-    """Re-run the command that produced a result."""
-    root, sys.argv[1:] = (
-        context.find_root(),
-        shlex.split(command)[3:],
-    )  # recorded as the command
-    with root.command.make_context(root.info_name, sys.argv[1:]) as new_context:
-        root.command.invoke(new_context)
+def repeat_call(context: click.Context, folder: Path, stored: dict[str, Any], terminal: Terminal) -> None:
+    """Repeat the recorded call of a command; the recorded text of the command is for readers and is never run."""
+    root, call = context.find_root(), stored.get("call")
+    if call is None or call["name"] not in FOLDER_DEPTHS:
+        raise HarnessError(f"{folder} does not hold the run of one scene or FMU; its command was `{stored['command']}`")
+    command = root.command.commands[call["name"]]  # type: ignore[attr-defined]
+    out = folder.absolute().parents[FOLDER_DEPTHS[call["name"]] - 1]
+    if context.get_parameter_source("out") is ParameterSource.COMMANDLINE:
+        out = terminal.out
+    output = [f"--out={out}", *["--quiet"] * terminal.quiet, *["--json"] * terminal.as_json]
+    arguments = [*output, *build_arguments(command, call["options"])]
+    sys.argv[1:] = [call["name"], *arguments]  # recorded as the command
+    with command.make_context(call["name"], arguments, parent=root) as new_context:
+        command.invoke(new_context)
 
 
 def run_fmu_file(path: Path, values: tuple[str, ...], options: dict[str, Any], terminal: Terminal) -> None:

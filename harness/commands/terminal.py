@@ -6,7 +6,7 @@ Slow imports are local to functions, so that help and short commands start at on
 import os
 import sys
 import tempfile
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from functools import wraps
@@ -18,7 +18,7 @@ from typing import Any
 import click
 from click.core import ParameterSource
 
-from ..errors import HarnessError
+from ..errors import HarnessError, check_names
 from ..process.interrupt import check_interrupt
 from ..process.temporary_directory import temporary_root
 from .renamed_option import FORMER_TIMEOUT, RenamedOption
@@ -51,14 +51,52 @@ overwrite_option = click.option(
 )
 
 
+COMMON_OPTIONS = ("out", "quiet", "as_json", "overwrite")  # of every run of a command, not of its result
+
+
 def result_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """Add the options of all commands with results; the command receives them as `terminal`."""
 
     @wraps(command)
     def wrapper(out: Path, quiet: bool, as_json: bool, **others: Any) -> Any:
+        record_call(click.get_current_context())
         return command(terminal=Terminal(quiet, as_json, out), **others)
 
     return default_out_option(overwrite_option(quiet_option(json_option(wrapper))))
+
+
+def record_call(context: click.Context) -> None:
+    """Record the arguments and options of a command as data, for the provenance of its results."""
+    from ..results.provenance import CALL
+
+    given = {
+        name: [*value] if isinstance(value, tuple) else str(value) if isinstance(value, Path) else value
+        for name, value in context.params.items()
+        if is_given(context, name) and name not in COMMON_OPTIONS
+    }
+    CALL.set({"name": context.command.name, "options": given})
+
+
+def build_arguments(command: click.Command, options: Mapping[str, Any]) -> list[str]:
+    """Return the command line of recorded options; the command itself checks their values.
+
+    Raises
+    ------
+    SceneError
+        If the command has no such option.
+    """
+    parameters = {parameter.name or "": parameter for parameter in command.params}
+    check_names(f"option of {command.name} in provenance.json", options, parameters)
+    named, positional = [], []
+    for name, value in options.items():
+        parameter = parameters[name]
+        texts = [str(item) for item in (value if isinstance(value, list) else [value])]
+        if isinstance(parameter, click.Option):
+            switches = parameter.opts if value is True else parameter.secondary_opts
+            named += switches[:1] if isinstance(value, bool) else [f"{parameter.opts[0]}={text}" for text in texts]
+        else:
+            positional += texts
+    return [*named, "--", *positional]
 
 
 class FiniteFloat(click.FloatRange):

@@ -98,7 +98,7 @@ def check_same_source(folder: Path, source: str, file_name: str = FILE) -> None:
     """Raise HarnessError if a result of another source exists, unless OVERWRITE is set."""
     old = load_provenance(folder, file_name)
     if old.get("source", source) != source and not OVERWRITE.get():
-        origin = f"`{old['command']}`" + (f", from {old['source']}" if old["source"] else "")
+        origin = f"`{old['command']}`" + (f", from {old['source']}" if old.get("source") else "")
         raise HarnessError(
             f"{folder} holds the result of {origin}; choose another --out, or replace it with --overwrite"
         )

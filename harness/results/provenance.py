@@ -1,18 +1,25 @@
-"""Provenance of a result: a file in its folder with the command, versions, input files and parameters."""
+"""Provenance of a result: a file in its folder with the command, versions, input files and parameters.
+
+The file may be damaged or edited. It is validated like any other input, a new result never depends on that of an old
+one, and its `command` is text for readers, which is never run.
+"""
 
 import json
 import platform
 import shlex
 import sys
 from collections.abc import Iterable, Mapping
+from contextvars import ContextVar
+from dataclasses import dataclass, field
 from datetime import datetime
 from functools import cache
 from hashlib import sha256
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
-from ..errors import HarnessError
+from ..errors import HarnessError, SceneError
+from ..scenes.schema import Constraint, field_names, parse_table
 from .files import to_json
 
 FILE = "provenance.json"
@@ -27,7 +34,54 @@ IMPLIED_SCENE_KEYS = {
 }  # keys of a scene that follow from its parameters or input files
 PACKAGES = (HARNESS, "fmpy", "numpy", "scipy")
 
+MAX_DEPTH = 6  # of tables and lists within a scene
+
 Parameters = Mapping[str, tuple[object, str]]  # effective value and unit by name
+CALL: ContextVar[dict[str, Any] | None] = ContextVar("call", default=None)  # the command that is running, as data
+
+
+def is_shallow(value: object, depth: int = MAX_DEPTH) -> bool:
+    """Return whether tables and lists are nested in at most `depth` levels."""
+    items = value.values() if isinstance(value, dict) else value if isinstance(value, list) else None
+    return items is None or (depth > 0 and all(is_shallow(item, depth - 1) for item in items))
+
+
+STRING = Constraint(lambda value: isinstance(value, str), "a text")
+DIGEST = Constraint(lambda value: isinstance(value, str) and len(value) == 64, "a SHA-256 digest")
+VALUE = Constraint(lambda value: is_shallow(value, 3) and not isinstance(value, dict), "a value")
+SCENE = Constraint(lambda value: isinstance(value, dict | None) and is_shallow(value), "a table of settings, or null")
+
+
+@dataclass(frozen=True)
+class StoredParameter:
+    """Effective value and unit of a parameter."""
+
+    value: Annotated[Any, VALUE]
+    unit: Annotated[str, STRING]
+
+
+@dataclass(frozen=True)
+class StoredCall:
+    """Name of the command that made a result, and the values of its arguments and options."""
+
+    name: Annotated[str, STRING]
+    options: dict[str, Annotated[Any, VALUE]]
+
+
+@dataclass(frozen=True)
+class ProvenanceKeys:
+    """Keys of a provenance file; those with a default are missing in files of earlier versions."""
+
+    command: Annotated[str, STRING]
+    date: Annotated[str, STRING]
+    files: dict[str, Annotated[str, DIGEST]]
+    parameters: dict[str, StoredParameter]
+    scene: Annotated[Any, SCENE]
+    source: Annotated[str, STRING] = ""
+    platform: Annotated[str, STRING] = ""
+    versions: dict[str, Annotated[str, STRING]] = field(default_factory=dict)
+    replaced: Annotated[str, STRING] = ""
+    call: StoredCall | None = None
 
 
 def write_provenance(
@@ -59,6 +113,7 @@ def write_provenance(
     content = {
         "source": source,
         "command": shlex.join(["python", "-m", "harness", *sys.argv[1:]]) if command is None else command,
+        "call": CALL.get() if command is None else None,
         "date": datetime.now().astimezone().isoformat(timespec="seconds"),
         "versions": package_versions(),
         "platform": platform.platform(),
@@ -101,30 +156,39 @@ def package_version(package: str) -> str:
 
 
 def load_provenance(folder: Path, name: str = FILE) -> dict[str, Any]:
-    """Return the provenance of a result; empty if there is none or it is incomplete."""
+    """Return the provenance of a result; empty if there is none or it is not valid."""
     try:
-        content = json.loads((folder / name).read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError):
+        return read_provenance(folder / name)
+    except (OSError, SceneError):
         return {}
-    return content if isinstance(content, dict) and is_complete(content) else {}
 
 
-def is_complete(content: dict[str, Any]) -> bool:
-    """Return whether provenance has all required keys."""
-    texts = all(isinstance(content.get(name), str) for name in ("command", "date"))
-    tables = all(isinstance(content.get(name), dict) for name in ("files", "parameters")) and "scene" in content
-    return (
-        texts
-        and tables
-        and all(isinstance(parameter, dict) and len(parameter) == 2 for parameter in content["parameters"].values())
-    )
+def read_provenance(file: Path) -> dict[str, Any]:
+    """Read and validate a provenance file.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be read.
+    SceneError
+        If its content is not valid.
+    """
+    try:
+        content = json.loads(file.read_text(encoding="utf-8"))
+    except (ValueError, RecursionError):
+        raise SceneError("it is not JSON") from None
+    if not isinstance(content, dict):
+        raise SceneError("it is not a table")
+    content = {name: value for name, value in content.items() if name in field_names(ProvenanceKeys)}
+    parse_table(content, ProvenanceKeys)
+    return content
 
 
 def note_replaced_result(old_folder: Path, new_folder: Path, file: str) -> None:
     """Add a note to the provenance of a new result about the old one that it replaces.
 
     The note lists the settings in which they differ. If there are none, the note of a scene states whether the first
-    result file is identical.
+    result file is identical. There is no note about an old file that is not valid.
     """
     before, after = load_provenance(old_folder), load_provenance(new_folder)
     if not before or not after:
@@ -167,9 +231,11 @@ def load_verified_provenance(folder: Path) -> dict[str, Any]:
     HarnessError
         If there is no provenance, or if an input file is missing or has changed.
     """
-    content = load_provenance(folder)
-    if not content:
-        raise HarnessError(f"{folder} contains no result with a complete {FILE}: choose another one")
+    try:
+        content = read_provenance(folder / FILE)
+    except (OSError, SceneError) as error:
+        reason = f" ({error})" if isinstance(error, SceneError) else ""
+        raise HarnessError(f"{folder} contains no result with a complete {FILE}{reason}: choose another one") from None
     for name, stored_digest in content["files"].items():
         file = Path(name)
         if not file.is_file():
@@ -188,17 +254,16 @@ def summarize_provenance(file: Path) -> tuple[str, ...]:
 
     Raises
     ------
-    ValueError, KeyError, TypeError
-        If the file contains something else.
+    SceneError
+        If the content of the file is not valid.
     """
     if not file.is_file():
         return ()
-    content = json.loads(file.read_text(encoding="utf-8"))
+    content = read_provenance(file)
     files = [f"{Path(name).name} (sha256 {digest[:12]})" for name, digest in content["files"].items()]
-    versions = content["versions"]
-    versions_text = (
-        f"harness {versions[HARNESS]}, fmpy {versions['fmpy']}, Python {versions['python']}, {content['platform']}"
-    )
+    versions = dict.fromkeys((HARNESS, "fmpy", "python"), "unknown") | content.get("versions", {})
+    system = content.get("platform", "an unknown platform")
+    versions_text = f"harness {versions[HARNESS]}, fmpy {versions['fmpy']}, Python {versions['python']}, {system}"
     origin = (
         f"Made from {', '.join(files) or 'no file'} by {versions_text}, on {content['date'][:10]}: {content['command']}"
     )

@@ -3,11 +3,12 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 from ..errors import SceneError
 from ..scenes.roles import find_roles
-from ..scenes.scene import Scene
+from ..scenes.scene import NATURAL_NUMBER, REPEAT_COUNT, Scene
+from ..scenes.schema import FLAG, NAMES, NUMBER, POSITIVE, TABLE, TEXT, parse_table
 from .inputs import Inputs
 
 # Keys of a scene that set a variable of the FMU.
@@ -79,6 +80,32 @@ class RunSpec:
     def motion_outputs(self) -> dict[str, str]:
         """Return the recorded output of each role: position, velocity, acceleration."""
         return find_roles(self.outputs)
+
+
+@dataclass(frozen=True, kw_only=True)
+class StoredRunKeys:
+    """Keys of a specification in provenance.json, without those that are null."""
+
+    fmu: Annotated[str, TEXT]
+    outputs: Annotated[tuple[str, ...], NAMES]
+    values: Annotated[dict[str, Any], TABLE] = field(default_factory=dict)
+    inputs: dict[str, tuple[Annotated[float, NUMBER], ...]] = field(default_factory=dict)
+    start: Annotated[float | None, NUMBER] = None
+    stop: Annotated[float | None, NUMBER] = None
+    grid: Annotated[float | None, POSITIVE] = None
+    equal_steps: Annotated[int, NATURAL_NUMBER] = 0
+    follow: Annotated[bool, FLAG] = True
+    repeat: Annotated[int, REPEAT_COUNT] = 1
+    tolerance: Annotated[float, POSITIVE] = 1e-6
+    exchange: Annotated[bool, FLAG] = False
+    lenient: Annotated[bool, FLAG] = False
+    timeout: Annotated[float, POSITIVE] = 60.0
+
+
+def spec_from_provenance(stored: dict[str, Any]) -> RunSpec:
+    """Return the run specification in the provenance of a result; raise SceneError if it is not valid."""
+    keys = parse_table({name: value for name, value in stored.items() if value is not None}, StoredRunKeys)
+    return RunSpec(**vars(keys) | {"fmu": Path(keys.fmu)})
 
 
 def spec_from_scene(scene: Scene) -> RunSpec:

@@ -32,7 +32,7 @@ from math import inf
 from pathlib import Path
 from typing import Annotated, Any
 
-from ..errors import SceneError, check_names, unknown_source_message
+from ..errors import SceneError, check_names, format_value, unknown_source_message
 from .fmu_files import find_fmu
 from .roles import ROLES, find_roles
 from .schema import (
@@ -171,6 +171,8 @@ def scene_from_provenance(stored: dict[str, Any]) -> Scene:
         path, source, file = Path(stored["name"]), str(stored["source"]), Path(stored["file"])
     except (AttributeError, KeyError, TypeError):
         raise SceneError("its provenance.json contains no scene: run the command in it instead") from None
+    if path.name in ("", ".."):
+        raise SceneError(f"its provenance.json has the invalid scene name {format_value(stored['name'])}")
     return replace(build_scene(path, table, source), file=file, name=path.name)
 
 

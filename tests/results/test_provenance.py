@@ -4,6 +4,7 @@ import csv
 import json
 import re
 import shutil
+from contextlib import suppress
 from functools import partial
 from hashlib import sha256
 
@@ -15,7 +16,13 @@ from commands import UNPLOTTED
 from fmpy import read_model_description
 from models import MODELS
 
+from harness import load_result
+from harness.api import run_spec
+from harness.errors import HarnessError
+from harness.results.folder import replace_folder
+from harness.results.provenance import summarize_provenance
 from harness.scenes.scene import shipped_scenes
+from harness.studies.run.study import FILES
 
 COMMANDS = {  # that take seconds, and the folders of their results
     "run": (("run", "coulomb"), "coulomb"),
@@ -269,3 +276,90 @@ def test_a_folder_without_provenance_is_not_run_again(workspace, first_run):
         assert "results/smd contains no result with a complete provenance.json" in done.stderr
         if not content:
             assert harness(workspace, "run", "smd").returncode == 0
+
+
+HOSTILE = (None, 0, float("inf"), True, "", 'unbalanced "', "\ud800", [], {}, {"a": 1}, {"a": {"b": []}})
+DEEP = "[" * 900 + "]" * 900
+
+
+def key_paths(table, path=()):
+    """Yield the path of every key of a table, as a tuple."""
+    for name, value in table.items():
+        yield (*path, name)
+        if isinstance(value, dict):
+            yield from key_paths(value, (*path, name))
+
+
+def altered(provenance, path, value):
+    """Return provenance as JSON with another value at a path."""
+    table = part = json.loads(json.dumps(provenance))
+    for name in path[:-1]:
+        part = part[name]
+    part[path[-1]] = value
+    return json.dumps(table)
+
+
+def altered_files(provenance):
+    """Yield provenance with each key of each table replaced by each hostile value, or by a deeply nested list."""
+    for path in key_paths(provenance):
+        if path[0] != "parameters" or path[1:2] in ((), ("c",)):
+            yield from (altered(provenance, path, value) for value in HOSTILE)
+            yield altered(provenance, path, "deep").replace('"deep"', DEEP)
+
+
+def read_source(text):
+    """Return the source in provenance, with which a result may be replaced."""
+    table = json.loads(text)
+    source = table.get("source") if isinstance(table, dict) else ""
+    return source if isinstance(source, str) else ""
+
+
+def test_a_new_result_never_depends_on_the_provenance_of_an_old_one(tmp_path, first_run):
+    """Reading it, for the page or from Python, raises at most the project's own error."""
+    new, old = tmp_path / "new", tmp_path / "smd"
+    new.mkdir()
+    (new / "trajectory.csv").write_text("t [s],x [m]\n0,0.1\n1,0.2\n")
+    shutil.copy(first_run / "results/smd/provenance.json", new)
+    shutil.copytree(new, old)
+    for text in (DEEP, *altered_files(read_provenance(new))):
+        (old / "provenance.json").write_text(text)
+        for read in (load_result, run_spec, lambda folder: summarize_provenance(folder / "provenance.json")):
+            with suppress(HarnessError):
+                read(old)
+        with replace_folder(old, FILES, read_source(text)) as folder:
+            for file in new.iterdir():
+                shutil.copy(file, folder)
+        assert read_provenance(old)["files"] == read_provenance(new)["files"]
+
+
+@pytest.mark.parametrize("arguments", [("run", "--fmu", "fmus/smd.fmu", "--stop", "0.5"), ("run", "smd")])
+def test_an_edited_provenance_file_ends_a_repetition_in_one_sentence(workspace, arguments):
+    assert harness(workspace, *arguments).returncode == 0
+    file = workspace / "results/smd/provenance.json"
+    provenance = read_provenance(file.parent)
+    edits = [("files", "fmus/smd.fmu", 5), ("files", "fmus/smd.fmu", "0" * 64), ("date", []), ("call", "options", 5)]
+    if arguments == ("run", "smd"):
+        edits += [("scene", "title", ""), ("scene", "outputs", "x"), ("scene", "name", ".."), ("scene", "stop", [])]
+    else:
+        edits += [("call", "name", "build"), ("call", "options", {"nosuch": 1}), ("call", "options", {"fmu": [[1]]})]
+    for *path, value in edits:
+        file.write_text(altered(provenance, path, value))
+        done = harness(workspace, "run", "results/smd")
+        assert done.returncode in (1, 2)
+        assert done.stderr.count("Error: ") == 1
+        assert "Traceback" not in done.stderr
+
+
+def test_the_text_of_a_command_is_never_run(workspace):
+    (workspace / "mine.py").write_text("raise SystemExit('the text was run')")
+    assert harness(workspace, "run", "--fmu", "fmus/smd.fmu", "--stop", "0.5").returncode == 0
+    file = workspace / "results/smd/provenance.json"
+    provenance = read_provenance(file.parent) | {"command": "python -m harness build mine.py"}
+    file.write_text(json.dumps(provenance))
+    done = harness(workspace, "run", "results/smd")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "Results in" in done.stdout
+    file.write_text(json.dumps(provenance | {"call": None}))
+    done = harness(workspace, "run", "results/smd")
+    assert done.returncode == 1
+    assert "its command was `python -m harness build mine.py`" in done.stderr
