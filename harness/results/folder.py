@@ -14,18 +14,16 @@ import os
 import re
 import sys
 from collections.abc import Collection, Iterator, Sequence
-from contextlib import ExitStack, contextmanager, nullcontext, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from contextvars import ContextVar
 from pathlib import Path
+from secrets import token_hex
 from shutil import rmtree
-from tempfile import mkdtemp
 
 from ..errors import HarnessError
+from ..process.folder_lock import create_locked_folder, lock_folder
 from ..process.interrupt import defer_signals
 from .provenance import FILE, load_provenance, note_replaced_result
-
-if sys.platform != "win32":
-    import fcntl
 
 OVERWRITE = ContextVar("overwrite", default=False)  # whether a result of another source may be replaced
 FRESH, OLD = ".new", ".old"  # suffixes of temporary folders, after the result's name and eight characters
@@ -65,7 +63,7 @@ def replace_folder(folder: Path, own_files: Sequence[str], source: str = "") -> 
     new_folder, resources = None, ExitStack()
     try:
         with defer_signals():
-            new_folder = create_locked_folder(folder, resources)
+            new_folder = create_locked_folder(lambda: create_new_folder(folder), resources)
         yield new_folder
         note_replaced_result(folder, new_folder, own_files[0])
         swap_in(new_folder, folder)
@@ -104,31 +102,12 @@ def check_same_source(folder: Path, source: str, file_name: str = FILE) -> None:
         )
 
 
-def create_locked_folder(folder: Path, resources: ExitStack) -> Path:
-    """Create a new folder beside the result and lock it; `resources` holds the lock."""
-    while True:
-        # absolute: fmpy changes the working directory while it loads a library, and a signal may arrive then
-        new_folder = Path(mkdtemp(prefix=f".{folder.name}-", suffix=FRESH, dir=folder.parent.absolute()))
-        new_folder.chmod(0o755)  # mkdtemp creates it with 0o700
-        resources.enter_context(lock_folder(new_folder, wait=True))
-        if new_folder.exists():  # no other process removed it before it was locked
-            return new_folder
-        resources.close()
-
-
-@contextmanager
-def lock_folder(folder: Path, wait: bool = False) -> Iterator[None]:
-    """Lock a folder, where locks exist; raise OSError if another process has locked it and `wait` is false."""
-    if sys.platform == "win32":
-        yield
-        return
-    lock = os.open(folder, os.O_RDONLY)
-    try:
-        with suppress(OSError) if wait else nullcontext():  # file systems without locks
-            fcntl.flock(lock, fcntl.LOCK_EX if wait else fcntl.LOCK_EX | fcntl.LOCK_NB)
-        yield
-    finally:
-        os.close(lock)
+def create_new_folder(folder: Path) -> Path:
+    """Create a new folder beside the result; the umask determines its permissions."""
+    # absolute: fmpy changes the working directory while it loads a library, and a signal may arrive then
+    new_folder = folder.parent.absolute() / f".{folder.name}-{token_hex(4)}{FRESH}"
+    new_folder.mkdir()
+    return new_folder
 
 
 def clean_up(folder: Path, own_files: Collection[str]) -> None:

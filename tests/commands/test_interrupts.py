@@ -27,11 +27,11 @@ from harness.process.worker_pool import WorkerDiedError, WorkerPool
 SLOW = 'title = "t"\nmodel = "pacejka"\noutputs = ["x", "v"]\ngrid = 5e-6\n[values]\nx_m = 0.001\n'
 COMMANDS = {  # and a file or folder that exists once it has started
     "main": ([], "out/.*"),
-    "run": (["run", "slow.toml"], "temporary/fmu-*"),
+    "run": (["run", "slow.toml"], "temporary/friction-fmus-fmu-*"),
     "precision": (["precision", "pacejka"], "out/.precision-*"),
-    "stability": (["stability"], "temporary/bounded-*"),
+    "stability": (["stability"], "temporary/friction-fmus-bounded-*"),
     "bench": (["bench"], "out/.bench-*"),
-    "importers": (["importers"], "temporary/child-*"),
+    "importers": (["importers"], "temporary/friction-fmus-child-*"),
     "sweep": (["sweep", "pacejka", "--vary", "x_m=0.001:0.1:3000", "--workers", "1"], "out/sweep/.*.journal"),
 }
 

@@ -1,6 +1,7 @@
 """Result folders are replaced completely or not at all."""
 
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -104,6 +105,19 @@ def test_an_exchange_that_fails_half_way_keeps_the_previous_result(older, monkey
         pass
     assert contents(older) == {"a.csv": "old"}
     assert list(older.parent.iterdir()) == [older]
+
+
+@pytest.mark.parametrize("mask", [0o022, 0o077, 0o027])
+def test_the_umask_determines_the_permissions_of_a_result(tmp_path, mask):
+    before = os.umask(mask)
+    try:
+        with replace_folder(tmp_path / "results/case", OURS) as fresh:
+            (fresh / "a.csv").write_text("new")
+    finally:
+        os.umask(before)
+    for path in (tmp_path / "results", tmp_path / "results/case"):
+        assert path.stat().st_mode & 0o777 == 0o777 & ~mask
+    assert (tmp_path / "results/case/a.csv").stat().st_mode & 0o777 == 0o666 & ~mask
 
 
 KILLED = """
