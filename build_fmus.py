@@ -3,13 +3,28 @@
 import gc
 import sys
 from pathlib import Path
+from typing import Any
 
 if Path(sys.path[0]) != Path(__file__).parent:  # run by -m: a model in this folder may be called math.py
     sys.path += [str(Path(__file__).parent), sys.path.pop(0)]
 
-from contextlib import AbstractContextManager
+from harness.__main__ import run_command
+
+if __name__ == "__main__":
+
+    def load_command() -> Any:
+        from build_fmus import main  # where a signal is handled, because the imports take half a second
+
+        return main
+
+    run_command(load_command, Path(sys.argv[0]).name)
+    sys.exit()
+
+import os
+import tempfile
+from collections.abc import Iterator
+from contextlib import AbstractContextManager, contextmanager
 from hashlib import sha256
-from typing import Any
 
 import click
 
@@ -19,6 +34,7 @@ from fmus.packaging.equations.model_file import ModelFile
 from fmus.packaging.import_time import measure_import_time
 from fmus.packaging.lowering import LAWS, METHODS
 from fmus.packaging.model_lookup import find_model, model_names
+from harness.process.temporary_directory import temporary_directory
 
 HERE = Path(__file__).parent
 SCENES = HERE / "harness" / "scenes"
@@ -81,6 +97,7 @@ def main(
       python build_fmus.py --release dist
     """
     gc.disable()  # objects of a build live until its end; collecting garbage takes a tenth of the build time
+    click.get_current_context().with_resource(temporary_files())
     if web and (compiled or platforms or fmi == "3"):
         raise CommandLineError("--web writes a page, not FMUs: remove --native, --platform and --fmi 3.")
     if release is not None:
@@ -170,5 +187,16 @@ class CommandLineError(click.ClickException):
     exit_code = 2
 
 
-if __name__ == "__main__":
-    main()
+@contextmanager
+def temporary_files() -> Iterator[None]:
+    """Create all temporary files of a build in one directory, which is removed on exit.
+
+    The C compiler caches its own parts in the home directory, or in the temporary directory without one.
+    """
+    os.environ.setdefault("HOME", tempfile.gettempdir())
+    with temporary_directory("build-") as directory:
+        former, tempfile.tempdir = tempfile.tempdir, str(directory)
+        try:
+            yield
+        finally:
+            tempfile.tempdir = former

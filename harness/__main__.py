@@ -2,6 +2,7 @@
 
 import os
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 if Path(sys.path[0]) != Path(__file__).parents[1]:  # a model in the current directory may be named math.py
@@ -19,21 +20,39 @@ COMPLETION = "_FRICTION_FMUS_COMPLETE"  # the environment variable that click's 
 
 
 def main() -> None:
-    """Run the command line.
+    """Run the command line."""
+
+    def load_commands() -> click.Command:
+        from .commands import commands
+
+        if instruction := os.environ.get(COMPLETION):
+            sys.exit(shell_complete(commands, {}, SCRIPT, COMPLETION, instruction))
+        return commands
+
+    run_command(load_commands, COMMAND_NAME)
+
+
+def run_command(load: Callable[[], click.Command], name: str) -> None:
+    """Run a command with the arguments of this process, and exit as all commands of this project do.
 
     click's own main() is not used because it handles Ctrl-C differently.
+
+    Parameters
+    ----------
+    load : callable
+        Imports and returns the command; a signal may arrive meanwhile.
+    name : str
+        How the user calls it.
     """
     try:
         with interruptible():
-            from .commands import commands
+            command = load()
             from .commands.terminal import prepare_process
 
-            if instruction := os.environ.get(COMPLETION):
-                sys.exit(shell_complete(commands, {}, SCRIPT, COMPLETION, instruction))
             prepare_process()
             try:
-                with commands.make_context(COMMAND_NAME, sys.argv[1:]) as context:
-                    commands.invoke(context)
+                with command.make_context(name, sys.argv[1:]) as context:
+                    command.invoke(context)
             finally:
                 sys.stdout.flush()
     except click.ClickException as error:

@@ -78,7 +78,7 @@ class ModelFile:
             file,
         )
         sys.modules[module.__name__] = module
-        exec(compile(self.generated_source, file, "exec"), vars(module))
+        exec(compile(self.generated_source, file, "exec", optimize=0), vars(module))
         cls = vars(module)[self.class_name]
         self._check_start_values(cls())
         return cls
@@ -120,7 +120,7 @@ class ModelFile:
         module = ModuleType(f"{PACKAGE}.model_files.{self.name}")
         module.__file__ = str(self.path)
         try:
-            exec(compile(self.source, str(self.path), "exec"), vars(module))
+            exec(compile(self.source, str(self.path), "exec", optimize=0), vars(module))
         except ModelError:
             raise
         except SyntaxError as error:

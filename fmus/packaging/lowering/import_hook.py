@@ -83,7 +83,7 @@ class LoweredModuleFinder(MetaPathFinder, Loader):
                 node.end_lineno = node.end_col_offset = None
         module.__file__ = str(self.places.get(path, FMUS / path))
         vars(module)[TREE_NAME] = tree
-        exec(compile(tree, module.__file__, "exec"), vars(module))
+        exec(compile(tree, module.__file__, "exec", optimize=0), vars(module))
 
 
 def sibling_module(model: type[VariableOwner], path: str) -> Any:

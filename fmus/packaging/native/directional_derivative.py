@@ -63,7 +63,7 @@ def build_tangent_function(
     text = ast.unparse(ast.fix_missing_locations(ast.Module([function_around(body)], [])))
     module = sys.modules[model.__module__]
     names = vars(math) | vars(module) | {threshold_tangent.__name__: threshold_tangent, TREE_NAME: ast.parse(text)}
-    exec(compile(text, module.__file__ or "?", "exec"), names)
+    exec(compile(text, module.__file__ or "?", "exec", optimize=0), names)
     return tangent, names["propagate_tangent"]
 
 
