@@ -10,7 +10,7 @@ An FMU contains them as documentation/boundaries.toml; the source is a file besi
 
 import ast
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -23,10 +23,16 @@ from ...errors import HarnessError, first_line, format_value
 
 BOUNDARIES_FILE = "documentation/boundaries.toml"
 STOP = "t"
-FUNCTIONS = {"abs": np.abs, "sqrt": np.sqrt, "sin": np.sin, "cos": np.cos}
-ARITHMETIC = (ast.Expression, ast.Name, ast.Constant, ast.BinOp, ast.UnaryOp, ast.Call, ast.Load)
-OPERATORS = (ast.Add, ast.Sub, ast.Mult, ast.Div, ast.USub)
-MAX_LENGTH = 1000  # maximum length of a quantity in characters
+FUNCTIONS: dict[str, Callable[..., Any]] = {"abs": np.abs, "sqrt": np.sqrt, "sin": np.sin, "cos": np.cos}
+OPERATORS: dict[type[ast.AST], Callable[..., Any]] = {
+    ast.Add: np.add,
+    ast.Sub: np.subtract,
+    ast.Mult: np.multiply,
+    ast.Div: np.divide,
+}
+MAX_LENGTH, MAX_DEPTH = 1000, 50  # of a quantity, in characters and in nested operations
+
+Evaluation = Callable[[Mapping[str, Any]], Any]  # of parameter values by name
 
 
 @dataclass(frozen=True)
@@ -38,25 +44,62 @@ class Boundary:
     below: str
 
     @cached_property
-    def tree(self) -> ast.Expression:
+    def arithmetic(self) -> "Arithmetic":
         """Parse the expression; ValueError if it is not plain arithmetic."""
-        tree = ast.parse(self.quantity[:MAX_LENGTH], mode="eval")
-        for node in ast.walk(tree):
-            if not isinstance(node, ARITHMETIC + OPERATORS) or isinstance(getattr(node, "value", 0), str):
-                raise ValueError(f"{self.quantity} is not plain arithmetic")
-        return tree
+        return parse_arithmetic(self.quantity)
 
     @property
-    def parameters(self) -> set[str]:
+    def parameters(self) -> frozenset[str]:
         """Return the parameters on which the boundary depends."""
-        names = {node.id for node in ast.walk(self.tree) if isinstance(node, ast.Name)}
-        return names - {*FUNCTIONS, STOP}
+        return self.arithmetic.names - {STOP}
 
     def evaluate(self, space: Mapping[str, Any], stop: float) -> Any:
         """Evaluate the quantity for parameter values `space` (numbers or arrays) and a stop time in s."""
-        scope = {"__builtins__": {}} | FUNCTIONS | {STOP: stop} | dict(space)
         with np.errstate(all="ignore"):
-            return eval(compile(self.tree, "boundary", "eval"), scope)
+            return self.arithmetic.evaluate({STOP: stop} | dict(space))
+
+
+@dataclass(frozen=True)
+class Arithmetic:
+    """An expression: the names in it, and its evaluation."""
+
+    names: frozenset[str]
+    evaluate: Evaluation
+
+
+def parse_arithmetic(text: str) -> Arithmetic:
+    """Parse numbers, names, + - * /, parentheses and `FUNCTIONS`; the text is never run as Python.
+
+    Raises
+    ------
+    ValueError, SyntaxError
+        If the text is anything else, or too long or too deeply nested.
+    """
+    if len(text) > MAX_LENGTH:
+        raise ValueError(f"it has {len(text)} characters, more than {MAX_LENGTH}")
+    names: set[str] = set()
+
+    def convert(node: ast.expr, depth: int) -> Evaluation:
+        match node:
+            case ast.Constant(int() | float() as number) if not isinstance(number, bool) and depth:
+                value = float(number)
+                return lambda values: value
+            case ast.Name(name) if name not in FUNCTIONS and depth:
+                names.add(name)
+                return lambda values: values[name]
+            case ast.BinOp(left, operator, right) if type(operator) in OPERATORS and depth:
+                apply, one, two = OPERATORS[type(operator)], convert(left, depth - 1), convert(right, depth - 1)
+                return lambda values: apply(one(values), two(values))
+            case ast.UnaryOp(ast.USub(), operand) if depth:
+                negated = convert(operand, depth - 1)
+                return lambda values: np.negative(negated(values))
+            case ast.Call(ast.Name(name), [argument], []) if name in FUNCTIONS and depth:
+                function, inner = FUNCTIONS[name], convert(argument, depth - 1)
+                return lambda values: function(inner(values))
+        raise ValueError(f"{text} is not plain arithmetic of at most {MAX_DEPTH} nested operations")
+
+    evaluate = convert(ast.parse(text.strip(), mode="eval").body, MAX_DEPTH)
+    return Arithmetic(frozenset(names), evaluate)
 
 
 def read_boundaries(fmu: Path, varied: tuple[str, ...], others: Mapping[str, Any]) -> tuple[Boundary, ...]:
@@ -77,5 +120,5 @@ def read_boundaries(fmu: Path, varied: tuple[str, ...], others: Mapping[str, Any
         return tuple(
             boundary for boundary in boundaries if boundary.parameters & {*varied} and boundary.parameters <= names
         )
-    except (KeyError, TypeError, ValueError, SyntaxError, RecursionError) as error:
+    except (KeyError, TypeError, ValueError, SyntaxError, RecursionError, MemoryError, OverflowError) as error:
         raise HarnessError(f"{fmu.name}: {BOUNDARIES_FILE} is invalid: {format_value(first_line(error))}") from None
