@@ -302,7 +302,7 @@ def altered(provenance, path, value):
 def altered_files(provenance):
     """Yield provenance with each key of each table replaced by each hostile value, or by a deeply nested list."""
     for path in key_paths(provenance):
-        if path[0] != "parameters" or path[1:2] in ((), ("c",)):
+        if len(path) == 1 or path[:2] == ("parameters", "c") or path[-1] in ("values", "decay", "file", "outputs"):
             yield from (altered(provenance, path, value) for value in HOSTILE)
             yield altered(provenance, path, "deep").replace('"deep"', DEEP)
 
