@@ -14,6 +14,7 @@ from .cached_by_mtime import cached_by_mtime
 from .run_spec import RunSpec
 from .variable_values import effective_value, variable_unit
 
+DESCRIPTION_FILE = "modelDescription.xml"
 MAX_LISTED_FAULTS = 50  # violations listed in a message
 
 
@@ -93,6 +94,8 @@ def resolve_stop(spec: RunSpec, description: Any) -> float | None:
 
 
 def read_fmi_version(path: Path) -> str:
-    """Return the FMI version in the model description."""
-    with ZipFile(path) as archive, archive.open("modelDescription.xml") as file:
+    """Return the FMI version in the model description; raise ValueError if there are several."""
+    with ZipFile(path) as archive, archive.open(DESCRIPTION_FILE) as file:
+        if (count := archive.namelist().count(DESCRIPTION_FILE)) > 1:
+            raise ValueError(f"it holds {DESCRIPTION_FILE} {count} times, and which one counts is not defined")
         return next(ElementTree.iterparse(file, ["start"]))[1].get("fmiVersion", "")

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
+from math import prod
 from typing import Any
 
 from ..errors import HarnessError
@@ -14,6 +15,7 @@ from .settings import REQUIRED_VARIABLES
 from .trajectory import Trajectory
 
 DEFAULT_COMMUNICATION_STEPS = 512  # of a run without a communication step of its own
+MAX_DEFAULT_OUTPUTS = 1000  # values recorded at each point of a run that names no outputs
 
 
 def run(spec: RunSpec, report: ProgressCallback) -> Trajectory:
@@ -56,14 +58,23 @@ def default_outputs(description: Any, values: Mapping[str, Any] | None = None) -
     description : ModelDescription
     values : mapping, optional
         Values that are set. Structural parameters among them determine the shapes of arrays.
+
+    Raises
+    ------
+    HarnessError
+        If there are too many to record all of them.
     """
     for causality in ("output", "local"):
-        names = [
-            element
+        shapes = {
+            variable.name: external.array_shape(variable, values or {})
             for variable in description.modelVariables
             if variable.causality == causality and variable.variability != "constant" and variable.type in ROW_FORMATS
-            for element in element_names(variable.name, external.array_shape(variable, values or {}))
-        ]
-        if names:
-            return tuple(names)
+        }
+        if (count := sum(map(prod, shapes.values()))) > MAX_DEFAULT_OUTPUTS:
+            raise HarnessError(
+                f"{description.modelName} has {count} {causality}s, more than the {MAX_DEFAULT_OUTPUTS} that are "
+                "recorded by default: run it as a scene that names those to record, as in outputs = ['x']"
+            )
+        if count:
+            return tuple(element for name, shape in shapes.items() for element in element_names(name, shape))
     return ()

@@ -1,4 +1,6 @@
 import ctypes
+import os
+import signal
 import time
 
 from pythonfmu import DefaultExperiment, Fmi2Causality, Fmi2Slave, Fmi2Variability, Integer, Real
@@ -7,7 +9,7 @@ from pythonfmu import DefaultExperiment, Fmi2Causality, Fmi2Slave, Fmi2Variabili
 class Faulty(Fmi2Slave):
     """x = k t, for half a second; then the fault given by `kind` (0: none)."""
 
-    KINDS = ("nothing", "hangs", "crashes", "raises", "prints", "is lost", "fails")
+    KINDS = ("nothing", "hangs", "crashes", "raises", "prints", "is lost", "fails", "is stopped")
 
     def __init__(self, **kwargs):
         super().__init__(**kwargs)
@@ -33,4 +35,6 @@ class Faulty(Fmi2Slave):
             print(f"I am at {t + h}", flush=True)
         elif kind == "is lost":
             self.x = float("nan")
+        elif kind == "is stopped":
+            os.kill(os.getpid(), signal.SIGSTOP)
         return kind != "fails"

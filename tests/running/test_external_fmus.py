@@ -209,6 +209,7 @@ def test_an_fmu_that_terminates_is_reported_by_status_and_keeps_its_samples(run,
         (3, "fmi2DoStep returned Fatal at t = 0.5 s: "),
         (5, "x is nan at t = 0.515625 s"),
         (6, "it terminated the simulation: fmi2DoStep returned Discard with fmi2Terminated at t = 0.5 s"),
+        (7, "a call did not return within 1.5 s (--timeout sets the limit), after t = 0.5 s"),
     ],
 )
 def test_a_hang_crash_exception_or_nan_is_one_sentence_and_keeps_its_samples(run, kind, message):
@@ -343,6 +344,49 @@ def test_a_damaged_file_is_one_sentence(run, external_fmu_folder, tmp_path, name
     done, _ = run("damaged.fmu")
     assert done.returncode in (1, 2)
     assert_refused(done, done.returncode, "damaged.fmu", sentence)
+
+
+def repeat_variable(count, causality):
+    """Return a change of a model description of FMI 2.0: aliases of its first variable, which is x."""
+    variables = "".join(
+        f'<ScalarVariable name="alias{i}" valueReference="0" causality="{causality}"><Real/></ScalarVariable>'
+        for i in range(count)
+    )
+    return lambda text: text.replace("</ModelVariables>", f"{variables}</ModelVariables>")
+
+
+@pytest.mark.parametrize(("causality", "count"), [("output", 30_000), ("local", 10_000)])
+def test_an_fmu_with_many_variables_runs_or_is_refused(run, external_fmu_folder, tmp_path, causality, count):
+    """By default all outputs are recorded, but not the local variables of an FMU that has outputs."""
+    many = edited_description(repeat_variable(count, causality))
+    external_fmus.edited_copy(external_fmu_folder / "FixedStep.fmu", tmp_path / "many.fmu", many)
+    done, rows = run("many.fmu", "--lenient")
+    if causality == "output":
+        assert_refused(done, 1, f"has {count + 1} outputs, more than the 1000 that are recorded by default")
+        scene = 'title = "one of many"\nfmu = "many.fmu"\noutputs = ["x", "alias7"]\nlenient = true\nplots = []\n'
+        (tmp_path / "mine.toml").write_text(scene)
+        assert_succeeded(commands.harness(tmp_path, "run", "mine.toml"))
+        rows = table(tmp_path / "results/mine/trajectory.csv")
+        assert (rows["x"] == rows["alias7"]).all()
+    else:
+        assert_succeeded(done)
+        assert set(rows) == {"t [s]", "x"}
+
+
+def test_an_array_that_is_too_large_is_refused_before_its_elements_are_named(run, external_fmu_folder, tmp_path):
+    huge = edited_description(lambda text: text.replace('start="2"', 'start="1000000000"', 1))
+    external_fmus.edited_copy(external_fmu_folder / "Arrays.fmu", tmp_path / "huge.fmu", huge)
+    done, _ = run("huge.fmu")
+    assert_refused(done, 1, "outputs, more than the 1000 that are recorded by default")
+
+
+@pytest.mark.filterwarnings("ignore:Duplicate name")
+def test_a_second_model_description_is_refused(run, external_fmu_folder, tmp_path):
+    fmu = external_fmus.edited_copy(external_fmu_folder / "Midpoint.fmu", tmp_path / "two.fmu", {})
+    with ZipFile(fmu, "a") as archive:
+        archive.writestr("modelDescription.xml", archive.read("modelDescription.xml").replace(b'"x"', b'"y"'))
+    done, _ = run("two.fmu")
+    assert_refused(done, 1, "two.fmu cannot be read: it holds modelDescription.xml 2 times")
 
 
 def test_a_changed_file_is_read_again(external_fmu_folder, tmp_path):

@@ -19,7 +19,7 @@ SWEEP_AXES = {
     "Switching": "loss=0.1:0.2:3",  # Boolean, Integer and String outputs and parameters
     "Falling": "height=1:4:3",  # terminates the simulation
     "NonConforming": "k=30:50:3",  # violates the standard, but runs
-    "Faulty": "k=1:2:3",  # with kind=1 to 6 it hangs, crashes, raises, prints, returns NaN, fails
+    "Faulty": "k=1:2:3",  # with kind=1 to 7 it hangs, crashes, raises, prints, returns NaN, fails, stops its process
     "Fmi3Midpoint": "k=30:50:3",  # FMI 3.0, with units; terminates at `limit`
     "Arrays": "omega=1:3:3",  # FMI 3.0: arrays, an enumeration, a string
     "ModelExchangeOnly": "k=30:50:3",  # FMI 3.0, model exchange only

@@ -5,8 +5,9 @@ import signal
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import asdict, replace
-from math import inf
+from math import inf, prod
 from pathlib import Path
+from time import monotonic
 from typing import Any
 
 import fmpy
@@ -37,6 +38,9 @@ from .step_refinement import MAX_STEPS
 
 Values = dict[str, Any]  # by the name of the variable
 
+GRACE_PERIOD = 2.0  # s beyond the timeout, within which the child process ends itself
+MAX_START_TIME = 60.0  # s until the child process reports progress for the first time
+MAX_COLUMNS = 100_000  # recorded values at each point
 SETTABLE = ("parameter", "structuralParameter", "input")
 
 
@@ -143,8 +147,11 @@ def select_variables(spec: RunSpec, variables: Values, values: Values) -> list[S
     shapes = {
         name: array_shape(variable, values) for name, variable in variables.items() if variable.type in ROW_FORMATS
     }
-    owner = {element: name for name, shape in shapes.items() for element in (name, *element_names(name, shape))}
-    check_names("output", spec.outputs, owner)
+    named = {name if name in shapes else name.rpartition("[")[0] for name in spec.outputs} & {*shapes}
+    if (count := sum(prod(shapes[name]) for name in named)) > MAX_COLUMNS:
+        raise SceneError(f"{spec.fmu.name}: the outputs have {count} elements; record at most {MAX_COLUMNS}")
+    owner = {element: name for name in named for element in (name, *element_names(name, shapes[name]))}
+    check_names("output", [name for name in spec.outputs if name not in owner], shapes)
     chosen = dict.fromkeys(owner[name] for name in spec.outputs)
     return [(variables[name], shapes[name]) for name in chosen]
 
@@ -161,19 +168,49 @@ def check_library(fmu: Path, description: Any, exchange: bool, folder: Path) -> 
     raise HarnessError(f"{fmu.name} has no binary {platform}/{identifier} for this machine: {available}{sources}")
 
 
+class NoProgressError(Exception):
+    """The child process reports no progress, and does not end."""
+
+
+class ParentWatchdog:
+    """Raises NoProgressError if a progress file stays unchanged for a time in s.
+
+    The child process ends itself when a call exceeds its timeout, unless the process is stopped by a signal.
+    """
+
+    def __init__(self, progress_file: Path, timeout: float) -> None:
+        self.progress_file, self.timeout = progress_file, timeout
+        self.modified, self.since = 0, monotonic()
+
+    def check(self) -> None:
+        """Raise NoProgressError if the time is over."""
+        with suppress(OSError):  # the child process has not started yet
+            modified = self.progress_file.stat().st_mtime_ns
+            if modified != self.modified:
+                self.modified, self.since = modified, monotonic()
+        if monotonic() - self.since > (self.timeout if self.modified else max(self.timeout, MAX_START_TIME)):
+            raise NoProgressError
+
+
 def run_fmu_process(request: ExternalRunRequest, directory: Path, report: Callable[[float], None]) -> RefinementResult:
     """Run the child process and return its result, or the reason why there is none."""
+    stopped = f"a call did not return within {request.timeout:g} s (--timeout sets the limit)"
+    watchdog = ParentWatchdog(directory / PROGRESS_FILE, request.timeout + GRACE_PERIOD)
 
     def meanwhile() -> None:
         check_interrupt()
+        watchdog.check()
         with suppress(OSError, ValueError):  # the file is being written
             report(float((directory / PROGRESS_FILE).read_text()))
 
-    process = run_module(f"{__package__}.fmu_process", json.dumps(asdict(request)), meanwhile=meanwhile)
+    try:
+        process = run_module(f"{__package__}.fmu_process", json.dumps(asdict(request)), meanwhile=meanwhile)
+    except NoProgressError:
+        return RefinementResult(None, "", stopped)
     if (directory / RESULT_FILE).is_file():
         return RefinementResult(**json.loads((directory / RESULT_FILE).read_text(encoding="utf-8")))
     if read_lines(directory / TIMEOUT_FILE):
-        message = f"a call did not return within {request.timeout:g} s (--timeout sets the limit)"
+        message = stopped
     elif process.returncode < 0:
         message = f"its binary crashed ({signal.strsignal(-process.returncode)})"
     else:
