@@ -18,7 +18,7 @@ def normalized(name):
 
 def test_the_constraints_name_an_allowed_version_of_every_dependency_with_hashes():
     entries = {}
-    text = (ROOT / "constraints.txt").read_text(encoding="utf-8").replace("\\\n", "")
+    text = (ROOT / ".ci" / "constraints.txt").read_text(encoding="utf-8").replace("\\\n", "")
     for line in text.splitlines():
         requirement, *hashes = re.split(r"\s+--hash=", line)
         assert hashes
