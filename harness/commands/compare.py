@@ -34,10 +34,10 @@ def compare(
     """Compare A and B, variable by variable.  Each is an FMU (FMI 2.0 or 3.0), a scene, a result folder, or a file:
     CSV of fmpy, .csv or .mat of OpenModelica or Dymola, or any table whose first column is time.
 
-    Both sides share one time grid: FMUs and scenes are run at the times of the other side, and two FMUs with the fixed
-    internal step that one of them declares.  Between samples, a variable is interpolated with its rate
-    if the rate was recorded, otherwise monotonically; integers are held.  With --rtol or --atol, exit status 1 means
-    that a difference exceeds the tolerance, events do not match, or a run failed.
+    Both sides share one time grid: FMUs and scenes are run at the times of the other side, and two FMUs with the
+    fixed internal step that one of them declares.  Between samples, a variable is interpolated with its rate if the
+    rate was recorded, otherwise monotonically; integers are held.  With --rtol or --atol, exit status 1 means that a
+    difference exceeds the tolerance, events do not match, or a run failed.
 
     \b
     Examples:
