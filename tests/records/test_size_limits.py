@@ -16,6 +16,7 @@ from build_cache import ROOT
 from harness.errors import HarnessError, SceneError
 from harness.records import array_files, child_reader, size_limits
 from harness.records.columns import ColumnOptions, read_record
+from harness.studies.compare.trajectory_files import read_trajectory
 
 LIMIT = 100_000  # bytes, for these tests
 
@@ -118,8 +119,9 @@ def test_a_file_at_which_its_library_crashes_does_not_end_the_command(tmp_path):
     data = bytearray(record_formats.mat(t=record_formats.T, x=record_formats.MM))
     data[177] = 1
     (tmp_path / "damaged.mat").write_bytes(data)
-    with pytest.raises(SceneError, match=r"damaged.mat cannot be read: it is damaged"):
-        read_record(str(tmp_path / "damaged.mat"), ColumnOptions(), "record")
+    for read in (lambda path: read_record(str(path), ColumnOptions(), "record"), read_trajectory):
+        with pytest.raises(SceneError, match=r"damaged.mat cannot be read: it is damaged"):
+            read(tmp_path / "damaged.mat")
 
 
 def test_a_file_that_takes_too_long_is_refused(monkeypatch):

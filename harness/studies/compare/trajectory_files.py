@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import SceneError, first_line, format_value
+from ...records.child_reader import read_in_child
 from ...records.columns import read_numeric
 from ...records.headings import split_heading
 from ...records.table_files import read_content
@@ -131,6 +132,8 @@ def read_modelica(file: Path) -> Columns | None:
         return None
     from scipy.io import loadmat
 
+    if not is_modelica:
+        read_in_child(data, file.name, "mat")  # loadmat ends this process for some damaged files
     try:
         content_of: dict[str, Any] = loadmat(io.BytesIO(data), chars_as_strings=False)
         if "Aclass" not in content_of:
