@@ -14,7 +14,7 @@ import numpy as np
 
 from ..errors import SceneError, unknown_name_message
 from .headings import DATE_NAME, MAGNITUDE_NAME, TIME_NAME, order_from_name, split_heading
-from .missing_values import mark_sentinels
+from .missing_values import mark_dropouts, mark_sentinels
 from .record import QUANTITIES, Record, check_record
 from .saturation import leave_out_saturated
 from .table_files import Cells, Table, load_table
@@ -157,6 +157,7 @@ def find_complete_rows(
     notes = [f"{empty} of {length} rows have a missing cell and are skipped."] if empty else []
     for values, label in zip((t, x), labels, strict=True):
         notes += mark_sentinels(values[:length], label)
+    notes += mark_dropouts(x[:length], labels[1])
     is_complete = (np.isfinite(t) & np.isfinite(x))[:length]
     missing = length - int(is_complete.sum())
     if missing > MAX_MISSING_SHARE * length or not length:

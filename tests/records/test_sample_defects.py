@@ -10,7 +10,7 @@ from harness.analyses.decay.estimates import KnownParameters
 from harness.analyses.decay.identification import fit_decay
 from harness.errors import SceneError
 from harness.records.columns import ColumnOptions, read_record
-from harness.records.missing_values import mark_sentinels
+from harness.records.missing_values import mark_dropouts, mark_sentinels
 from harness.records.saturation import leave_out_saturated
 
 T = np.linspace(0.0, 12.0, 2401)
@@ -43,6 +43,19 @@ def test_marks_of_missing_samples_are_named_and_left_out(tmp_path, mark):
     fit = fit_decay(record, KnownParameters(), drag=False)
     assert fit["zeta"].value == pytest.approx(ZETA, rel=0.02)
     assert len(fit.t) > 0.98 * len(record.t)
+
+
+@pytest.mark.parametrize("mark", [0.0, -30.0, 59.0])
+def test_a_mark_within_the_range_of_the_signal_is_left_out(tmp_path, mark):
+    """As the zeros of a sensor that loses its target, singly and in a row."""
+    x = 1e3 * swing().x
+    missing = np.random.default_rng(2).choice(len(x), 24, replace=False)
+    x[missing] = x[500:510] = mark
+    record = read(tmp_path, T, x)
+    count = len({*missing.tolist(), *range(500, 510)})
+    assert f"{count} of 2401 values of x are {mark:.15g}, several times far from the samples" in record.notes[0]
+    assert len(record.t) == len(x) - count
+    assert zeta(record) == pytest.approx(ZETA, rel=0.02)
 
 
 def test_two_marks_and_a_mark_among_the_times_are_left_out(tmp_path):
@@ -96,16 +109,16 @@ def test_a_saturated_sensor_is_named_and_does_not_change_the_damping(tmp_path, l
 
 
 @pytest.mark.parametrize("order", [0, 1, 2])
-def test_a_rounded_or_held_motion_is_not_saturated(order):
+def test_a_rounded_or_held_motion_has_no_defects(order):
     rng = np.random.default_rng(order)
     for seed in range(60):
         step = 0.2 / rng.integers(3, 300)
         noise, turn = step * rng.choice([0, 0.1, 0.5]), rng.choice([0.0, 1.0])
         damping, times = 10 ** rng.uniform(-4, -1.3), np.linspace(0, rng.uniform(2, 40), 1000)
         record = decay_record(damping, a=0.1, step=step, t=times, turn=turn, noise=noise, seed=seed, order=order)
-        assert leave_out_saturated(record) is record
-        record = random_record(seed, order=order)[0]
-        assert leave_out_saturated(record) is record
+        for each in (record, random_record(seed, order=order)[0]):
+            assert leave_out_saturated(each) is each
+            assert mark_sentinels(each.x, "x") == mark_dropouts(each.x, "x") == []
 
 
 def test_the_largest_value_of_one_peak_or_of_no_motion_is_not_saturation():
