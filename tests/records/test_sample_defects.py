@@ -90,6 +90,36 @@ def test_coarse_values_are_no_marks(values):
     assert mark_sentinels(np.array(values), "x") == []
 
 
+@pytest.mark.parametrize(
+    ("rest", "mark", "is_mark"),
+    [
+        ([0.0, 1.0, 2.0, 3.0], 6.0, False),
+        ([0.0, 1.0, 2.0, 3.0], 6.1, True),
+        ([0.0, 0.5, 1.0, 2.0, 5.0], 9.0, False),
+        ([0.0, 0.5, 1.0, 2.0], -2.1, True),
+    ],
+)
+def test_a_mark_is_farther_from_the_others_than_these_from_each_other(rest, mark, is_mark):
+    for count in (1, 2):
+        assert bool(mark_sentinels(np.array([*rest, *[mark] * count]), "x")) == (is_mark and count == 2)
+
+
+@pytest.mark.parametrize(("jumps", "passes", "is_mark"), [(6, 0, True), (5, 0, False), (3, 12, True), (3, 13, False)])
+def test_a_mark_within_the_range_is_the_most_frequent_value_and_jumps(jumps, passes, is_mark):
+    """It jumps between two samples near 1, and passes between two of opposite sign."""
+    values = [1.001]
+    for i in range(80):
+        a = 1 - i / 1000
+        if i < jumps:
+            values += [0.0, a]
+        elif i < jumps + passes:
+            values += [a, 0.0, -a + 1e-6]
+        else:
+            values += [a]
+    notes = mark_dropouts(np.array(values), "x")
+    assert bool(notes) == is_mark
+
+
 def test_values_far_from_the_rest_only_as_the_rest_is_wide_are_no_marks():
     """Released from a displacement at which it was held, as long as all that follows is wide."""
     values = np.concatenate([np.full(50, 2.0), np.sin(np.arange(200.0))])
