@@ -229,7 +229,9 @@ class InternalStep:
             self.restart_after_event(model)
             for i in contact_indices:
                 if self.modes1[i] != STUCK:
-                    self.f1[slip_index[i]] = model.breakaway_acceleration(end, self.y1, self.modes1, i)
+                    a = model.breakaway_acceleration(end, self.y1, self.modes1, i)
+                    # rounding, as in update_end_rates(): the slip would end at once, again and again
+                    self.f1[slip_index[i]] = a if self.modes1[i] * a > 0.0 else 0.0
         else:
             self.t1, self.f1 = self.t_end, 0.0
         return OK

@@ -2,7 +2,8 @@
 
 from dataclasses import replace
 from itertools import pairwise
-from math import asin, atan, inf, log2, nan, pi, sin, tan
+from math import asin, atan, inf, log2, nan, pi, sin, sqrt, tan
+from random import Random
 
 import fmi3_fixtures
 import native_fmus
@@ -15,7 +16,9 @@ from row_comparison import assert_close, assert_identical
 from scipy.integrate import solve_ivp
 from worker_client import FmiError
 
+from fmus.packaging.lowering import lowered_model, sibling_module
 from fmus.packaging.model_lookup import find_model
+from fmus.runtime.codes import INITIALISING, OK
 
 DAMPING = {  # stiffness, damping
     "none": (157.9, 0.0),
@@ -104,6 +107,74 @@ def test_a_polynomial_force_is_exact_through_stick_and_slip_for_every_damping(la
 def test_a_polynomial_force_breaks_the_sled_away_on_time(launch, v_driver, k):
     fmu = launch("stickslip", {"v_driver": v_driver, "k": k}, stop=None)
     assert agree(fmu, Body(m=12.5, k=k, hold=HELD, slide=SLID, u=v_driver), DRAGGED, 10.0) >= 3
+
+
+def random_force(source, n, h, f, order):
+    """Return pieces of a force that varies at random around the friction force f: start time, value, derivatives."""
+    values = [0.0]
+    for _ in range(n):
+        values.append(0.8 * values[-1] + f * source.uniform(-1.2, 1.2))
+    return [
+        (i * h, u, (u_next - u) / h, *(f * source.uniform(-1.0, 1.0) / h**k for k in range(2, order + 1)))
+        for i, (u, u_next) in enumerate(pairwise(values))
+    ]
+
+
+def run_native(worker, path, values, pieces, h):
+    """Return rows of position and speed, and the number of events."""
+    fmu = worker.instantiate(path).begin(values, stop=len(pieces) * h)
+    calls = []
+    for t, force, *derivatives in pieces:
+        calls.append(["set", [{"F_ext": force}]])
+        calls += [["ramp", ["F_ext", value, order]] for order, value in enumerate(derivatives, 1)]
+        calls += [["step", [t, h]], ["get", [("x", "v")]]]
+    answers = worker.call(None, "batch", [[fmu.number, *call] for call in calls])
+    count = fmu.get("events.count")
+    fmu.free()
+    return answers[len(calls) // len(pieces) - 1 :: len(calls) // len(pieces)], count
+
+
+def run_lowered(model, values, pieces, h):
+    """Return the same for the lowered Python model, whose FMU cannot accept input derivatives."""
+    call_sequence, numbers = sibling_module(model, "runtime.call_sequence"), model()
+    run = call_sequence.RunState(numbers.tolerance)
+    vars(numbers).update(values)
+    call_sequence.set_experiment(run, 0.0, len(pieces) * h, 0.0)
+    run.phase = INITIALISING
+    assert call_sequence.exit_initialization(run, numbers) == OK
+    rows = []
+    for t, force, *derivatives in pieces:
+        call_sequence.note_change(run, numbers)
+        run.outputs_current = False
+        numbers.F_ext, numbers.F_ext_polynomial.order = force, len(derivatives)
+        numbers.F_ext_polynomial.derivatives[1 : 1 + len(derivatives)] = derivatives
+        assert call_sequence.do_step(run, numbers, t, h) == OK
+        assert call_sequence.update_outputs(run, numbers) == OK
+        rows.append([numbers.x, numbers.v])
+    call_sequence.update_statistics(numbers, False)
+    return rows, numbers.events.count
+
+
+@pytest.mark.parametrize("order", [1, 3])
+@pytest.mark.parametrize("damping_ratio", [0.0, 0.08, 1.0, 3.0])
+def test_random_input_derivatives_never_stall_the_closed_form(worker, fmus, damping_ratio, order):
+    """At a breakaway load and holding force differ by rounding errors, which may not start a slip the wrong way."""
+    model, h, path = lowered_model(replace(find_model("coulomb"), ramps=True)), 0.03, fmus / "coulomb.fmu"
+    events = 0
+    for seed in range(3):
+        source = Random(seed)
+        m, k, f = source.uniform(0.5, 2.0), source.uniform(20.0, 200.0), source.uniform(0.1, 0.4)
+        values = {"m": m, "k": k, "f": f, "c": 2.0 * damping_ratio * sqrt(k * m), "x0": 0.0}
+        pieces = random_force(source, 400, h, f, order)
+        rows, count = run_native(worker, path, values, pieces, h)
+        precise = values | {"solver.method": DOP853, "solver.rtol": 1e-11}
+        expected, expected_count = run_native(worker, path, precise, pieces, h)
+        assert_close(rows, expected, ("x", "v"), 1e-7)
+        python, python_count = run_lowered(model, values, pieces, h)
+        assert_identical(python, rows, ("x", "v"))
+        assert count == expected_count == python_count
+        events += count
+    assert events > 150
 
 
 # ---- methods with steps
