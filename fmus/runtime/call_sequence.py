@@ -93,18 +93,32 @@ def set_experiment(run, start, stop, tolerance):
     run.has_pending_changes, run.outputs_current = True, False
 
 
+def check_experiment(run):
+    """Check start and stop time.  Returns a status."""
+    if not isfinite(run.start_time):
+        return BAD_START
+    return OK if run.stop_time > run.start_time else BAD_STOP
+
+
 def check_values(run, model):
     """Check all values.  Returns a status."""
     if run.n_invalid_values > 0:
         return BAD_VALUE
-    if not isfinite(run.start_time):
-        return BAD_START
-    if not run.stop_time > run.start_time:
-        return BAD_STOP
+    status = check_experiment(run)
+    if status != OK:
+        return status
     rule = model.prepare()
     if rule == model.own_solver_rule and run.interface != CO_SIMULATION:
         return OK  # the importer uses its own solver
     return FIRST_RULE + rule if rule > 0 else OK
+
+
+def is_refusal(run, status):
+    """Return whether a status refuses the call of the importer: the instance stays as it was, and the run can go on.
+
+    A rule can also be violated later, while the run is computed; that is a failure.
+    """
+    return status == BAD_STEP or status == BAD_VALUE or (status > FIRST_RULE and run.has_pending_changes)
 
 
 # ---- run
@@ -126,12 +140,15 @@ def apply_changes(run, model, beginning):
 
 
 def exit_initialization(run, model):
-    """End the initialisation.  Returns a status."""
-    beginning = run.phase < RUNNING  # an importer may call this twice
+    """End the initialisation, unless the values are refused.  Returns a status."""
+    phase = run.phase
     run.phase = RUNNING
     if run.has_failed:
         return FAILED
-    return apply_changes(run, model, beginning)
+    status = apply_changes(run, model, phase < RUNNING)  # an importer may call this twice
+    if status != OK:
+        run.phase = phase
+    return status
 
 
 def prepare_to_step(run, model):

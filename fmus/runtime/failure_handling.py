@@ -26,16 +26,29 @@ class FailureHandling:
     model: Any
     run: RunState
     attribute_owners: list[tuple[object, str]]  # owner and attribute name of each variable
-    invalid_values: dict[str, str]  # name -> message, for rejected values
+    invalid_values: dict[str, str]  # name -> message, for rejected values; empty once a step was refused for it
     pending_exception: object  # weak reference that re-raises an exception of the host
 
     def fail_with_status(self, status: int, t: float = nan, h: float = nan) -> bool:
         """Fail with a status, in a communication step of size h from t; return False."""
         if status == FAILED:
             return False  # already reported
+        return self.fail(self.status_message(status, t, h))
+
+    def refuse_step(self, status: int, t: float, h: float) -> bool:
+        """Report why a communication step is refused; return False.
+
+        The instance stays as it was.  The messages of invalid values become empty, because they were reported.
+        """
+        self.report_error(self.status_message(status, t, h))
+        self.invalid_values = dict.fromkeys(self.invalid_values, "")
+        return False
+
+    def status_message(self, status: int, t: float, h: float) -> str:
+        """Return the message for a status."""
         if status == BAD_VALUE:
-            return self.fail(next(iter(self.invalid_values.values())))
-        return self.fail(messages.run_message(status, self.run, self.model, t, h))
+            return next(filter(None, self.invalid_values.values()))
+        return messages.run_message(status, self.run, self.model, t, h)
 
     def fail(self, message: str) -> bool:
         """Report a message and set all calculated variables to NaN; return False."""

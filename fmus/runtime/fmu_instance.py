@@ -2,7 +2,11 @@
 
 No exception may reach the host: the native layer of pythonfmu would release references that it still needs, and a host
 other than Python would abort.  Errors are reported in one message, in the log and on standard error; then do_step
-returns False and every calculated Real reads NaN.
+returns False and every calculated Real reads NaN.  A refused step also returns False, but changes nothing.
+
+The native layer can refuse a step only.  So an invalid value is remembered, and the next step is refused.  Every
+calculated Real reads NaN until the value is corrected or a later step succeeds, because some hosts ignore a refused
+step.  If the values are invalid when initialisation ends, the run fails.
 """
 
 from __future__ import annotations
@@ -11,7 +15,7 @@ from typing import Any
 from weakref import WeakSet
 
 from . import call_sequence
-from .codes import OK
+from .codes import BAD_STEP, BAD_VALUE, OK
 from .pythonfmu_workarounds import signal_safe
 from .saved_state import SavedStateAccess, attribute_tree
 from .variable_declarations import VariableOwner, variables
@@ -77,10 +81,23 @@ class FmuInstance(SavedStateAccess):
             run, model = self.run, self.model
             outputs_were_read = run.outputs_current
             status = call_sequence.do_step(run, model, current_time, step_size)
+            if status == BAD_VALUE and not any(self.invalid_values.values()):
+                status = self.step_without_invalid_values(current_time, step_size)
             if status != OK:
-                return self.fail_with_status(status, current_time, step_size)
+                refuse = call_sequence.is_refusal(run, status)
+                report = self.refuse_step if refuse else self.fail_with_status
+                return report(status, current_time, step_size)
             if outputs_were_read:  # the importer reads outputs at every step: computing them here saves calls
                 call_sequence.set_outputs(run, model)
             return True
         except BaseException as error:  # as above
             return self.handle_exception(error)
+
+    def step_without_invalid_values(self, t: float, h: float) -> Any:
+        """Do a step of size h from t, without the invalid values for which a step was refused; return a status."""
+        run, model = self.run, self.model
+        if not call_sequence.communication_step_end(run, model.solver, t, h) >= model.solver.t:
+            return BAD_STEP
+        self.invalid_values.clear()
+        run.n_invalid_values, run.outputs_current = 0, False
+        return call_sequence.do_step(run, model, t, h)

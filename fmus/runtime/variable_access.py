@@ -47,7 +47,7 @@ def make_setter(kind: str) -> Any:
                 if slave.has_type(kind, reference):
                     slave.set_value(reference, values[i])
                 # the value is not accessed: a string that is not UTF-8 is no Python object
-                elif UNKNOWN_NAME not in slave.invalid_values:
+                elif not slave.invalid_values.get(UNKNOWN_NAME):
                     slave.set_invalid(UNKNOWN_NAME, unknown_reference_message(kind, reference))
         except BaseException as error:  # as above
             slave.handle_exception(error)

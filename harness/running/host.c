@@ -7,8 +7,9 @@
  *     I getr REFERENCE...    I pass REFERENCE J TO   I save                  I restore             I reset
  *     I free                 I time REPEAT STOP STEPS WORD...                0 end                   0 unload
  *
- * I and J are indices of instances. step prints the status, getr the values; any other failure exits. end writes a NUL
- * to both output streams, which marks the end of the output of a request.
+ * I and J are indices of instances. step prints the status, getr the values. After a refused value all steps have its
+ * status, until the instance is reset. Any other failure exits. end writes a NUL to both output streams, which marks the
+ * end of the output of a request.
  *
  * time simulates from t = 0 to STOP in STEPS equal communication steps, REPEAT times. A word R=VALUE sets the Real with
  * value reference R before each run; a word R reads that Real at every point. It prints the run time of the fastest run
@@ -159,12 +160,14 @@ static void execute(const char *command, int i, char **words, int count, char **
 {
     static fmi2Component instances[INSTANCES];
     static fmi2FMUstate states[INSTANCES];
+    static fmi2Status refusals[INSTANCES];
     Reals read = {.count = 0};
     fmi2Component c = instances[i];
     fmi2Status status = fmi2OK;
 #define IS(name) (!strcmp(command, name))
     if (IS("new")) {
         fmi2Type type = count < 3 ? fmi2CoSimulation : fmi2ModelExchange;
+        refusals[i] = fmi2OK;
         instances[i] = fmi.Instantiate(words[0], type, host[2], host[3], &callbacks, fmi2False, count < 2);
         if (!instances[i]) die("new", "no instance");
     } else if (IS("begin")) {
@@ -172,11 +175,14 @@ static void execute(const char *command, int i, char **words, int count, char **
         if (status == fmi2OK) status = fmi.EnterInitializationMode(c);
         if (status == fmi2OK) fmi.ExitInitializationMode(c); /* an error here appears again in the steps */
     } else if (IS("step")) {
-        printf("status %d\n", fmi.DoStep(c, strtod(words[0], NULL), strtod(words[1], NULL), fmi2True));
+        status = refusals[i];
+        if (status == fmi2OK) status = fmi.DoStep(c, strtod(words[0], NULL), strtod(words[1], NULL), fmi2True);
+        printf("status %d\n", status);
+        return;
     } else if (IS("setr")) {
         add(&read, words[0]);
         read.values[0] = strtod(words[1], NULL);
-        status = fmi.SetReal(c, read.references, 1, read.values);
+        if (refusals[i] == fmi2OK) refusals[i] = fmi.SetReal(c, read.references, 1, read.values);
     } else if (IS("getr")) {
         for (int n = 0; n < count; n++) add(&read, words[n]);
         status = fmi.GetReal(c, read.references, read.count, read.values);
@@ -191,6 +197,7 @@ static void execute(const char *command, int i, char **words, int count, char **
     } else if (IS("calls")) {
         time_calls(c, strtoul(words[0], NULL, 10), strtoul(words[1], NULL, 10), atol(words[2]));
     } else if (IS("reset")) {
+        refusals[i] = fmi2OK;
         status = fmi.Reset(c);
     } else if (IS("free")) {
         fmi.FreeInstance(c);

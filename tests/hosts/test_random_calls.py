@@ -40,6 +40,7 @@ TIMES = st.sampled_from([0.0, -2.0, 1.0, 1e6, nan, inf])
 SIZES = st.sampled_from([1e-9, 1e-3, 0.01, 0.1, 0.3, 0.0, -0.1, nan, inf])
 STRANGE = st.sampled_from([10**6, 2**31 - 1, 2**31, 2**32 - 1])  # value references
 VALUES = {"Boolean": True, "String": "1"}  # a value of each FMI type; 1 for the others
+FAILURES = ("diverges", "stalls", "more than")  # words of messages that end a run; others refuse a call
 CHATTER = {"friction", "solver.method"}  # choices that may take arbitrarily many steps
 
 
@@ -123,16 +124,19 @@ class RandomCalls(RuleBasedStateMachine):
 
     @rule(h=SIZES, late=st.sampled_from([0.0, 0.0, 0.0, 1.0, -1e-3, nan]))
     def step(self, h, late):
+        before = None if self.changed or self.failed or self.phase != RUNNING else self.call("get", *self.outputs)
         answer = self.call("step", self.t + late, h)
-        self.changed = False
         if answer is worker_client.FmiError:
-            self.failed = self.failed or self.phase == RUNNING
+            failed = any(word in sentence for word in FAILURES for sentence in self.collect_messages())
+            self.failed = self.failed or (self.phase == RUNNING and failed)
             if self.failed:
                 self.broken()
+            elif before is not None:
+                assert str(self.call("get", *self.outputs)) == str(before)
         else:
             assert not self.failed
             assert h > 0.0
-            self.t = self.t + late + h
+            self.t, self.changed = self.t + late + h, False
             self.healthy()
 
     @precondition(lambda self: self.phase == RUNNING)

@@ -86,12 +86,13 @@ def find_member(state, path):
 def test_own_bytes_are_accepted_and_reproduced(name):
     slave_class, one = running_instance(name)
     other = slave_class(instance_name="other")
-    for spoil in ([], ["set"], ["set", "step"]):  # healthy, with an invalid value, failed
-        if spoil == ["set"]:
+    for state in ("healthy", "with an invalid value", "after a refused step", "failed"):
+        if state == "with an invalid value":
             one.set_invalid("m", "m = nan kg is refused: a sentence with a · and brackets [{")
-        if "step" in spoil:
-            one.do_step(0.3, 0.1)
-            assert one.run.has_failed
+        elif state == "after a refused step":
+            assert not one.do_step(0.3, 0.1)
+        elif state == "failed":
+            one.fail("")
         other._set_fmu_state(slave_class._fmu_state_from_bytes(own_bytes(slave_class, one)))
         assert own_bytes(slave_class, other) == own_bytes(slave_class, one)
 

@@ -5,7 +5,7 @@ compared with ==: whether the call was refused, the log, standard error, and the
 """
 
 import json
-from math import inf, nan
+from math import inf, isnan, nan
 
 import fmi3_fixtures
 import native_fmus
@@ -68,12 +68,22 @@ class MatchedCalls(RuleBasedStateMachine):
                 answers.append(getattr(instance, function)(*first_argument, *arguments))
             except worker_client.FmiError:
                 answers.append(worker_client.FmiError)
-        looks = [self.look(index) for index in BACKENDS]
-        assert looks[0] == looks[1], (function, arguments)
+        looks = self.compare(function, *arguments)
         refused = [answer is worker_client.FmiError for answer in answers]
         if function not in ("exit", "read_one"):  # which a Python FMU for FMI 2.0 cannot refuse
             assert refused[0] == refused[1], (function, arguments, looks)
         return answers
+
+    def compare(self, *call):
+        """Assert that the same is visible of both backends after a call; return it."""
+        looks = [self.look(index) for index in BACKENDS]
+        assert looks[0] == looks[1], call
+        return looks
+
+    def has_failed(self):
+        """Return whether the run has failed or cannot go on with the present values."""
+        name = next(name for name, one in self.declared.items() if one.causality == "output" and one.type == "Real")
+        return isnan(self.pairs[0][0].get(name))
 
     def look(self, index):
         """Return what is visible of one backend: values, standard error, and the log before and during reading (fmpy
@@ -92,10 +102,23 @@ class MatchedCalls(RuleBasedStateMachine):
     @precondition(lambda self: self.phase == NEW)
     @rule(start=TIMES, run=RUNS, tolerance=st.sampled_from([None, 1e-4, 0.0, 1.0, -1.0, nan]))
     def setup(self, start, run, tolerance):
+        """A Python FMU refuses wrong times when the initialisation ends."""
         self.t, self.stop = start, inf if run is None else start + run
-        for pair in self.pairs[0]:  # in FMI 3.0 it is passed with the next call
-            pair.setup(start, None if run is None else self.stop, tolerance)
-        self.enter()
+        python, other = self.pairs[0]
+        refuses = False
+        try:
+            other.setup(start, None if run is None else self.stop, tolerance)
+            other.enter()  # to which FMI 3.0 passes the times
+        except worker_client.FmiError:
+            refuses = True
+        python.setup(start, None if run is None else self.stop, tolerance)
+        python.enter()
+        self.phase = INITIALISING
+        if refuses:
+            python.exit()
+            (_, *messages), (_, *others) = (self.look(index) for index in BACKENDS)
+            assert messages == others
+            self.reset(False)
 
     @precondition(lambda self: self.phase == NEW)
     @rule()
@@ -106,8 +129,10 @@ class MatchedCalls(RuleBasedStateMachine):
     @precondition(lambda self: self.phase == INITIALISING)
     @rule()
     def exit(self):
-        self.both("exit")
+        """A refused call leaves an FMU in initialisation mode; the Python FMU cannot refuse it, and fails."""
         self.phase = RUNNING
+        if worker_client.FmiError in self.both("exit"):
+            self.reset(True)
 
     @precondition(lambda self: self.phase == RUNNING)
     @rule(again=st.booleans())
@@ -153,9 +178,30 @@ class MatchedCalls(RuleBasedStateMachine):
             self.set(name, data.draw(REALS if is_real else INTEGERS))
 
     def set(self, name, value):
+        """Set a value in both backends.
+
+        A Python FMU cannot refuse it.  If the other backend does, the next step of the Python FMU is refused with the
+        same message, and it goes on from its state before.
+        """
         if name in ("friction", "solver.method") and value not in (EXACT, HYBRID, 99):
             value = self.declared[name].start  # others may take arbitrarily many steps
-        self.both("set", {name: value})
+        python, other = self.pairs[0]
+        before = python.save()
+        python.set({name: value})
+        try:
+            other.set({name: value})
+        except worker_client.FmiError:
+            if self.phase == RUNNING and not self.has_failed():
+                with pytest.raises(worker_client.FmiError):
+                    python.step(self.t, 0.1)
+                python.restore(before)
+                self.compare("set", name, value)
+            else:
+                python.restore(before)
+                for index in BACKENDS:
+                    self.look(index)  # the Python FMU reports nothing
+        else:
+            self.compare("set", name, value)
 
     @precondition(lambda self: self.phase == RUNNING)
     @rule(kind=st.sampled_from(["Boolean", "String"]), reference=st.sampled_from([0, 3, 2**31, 2**32 - 1]))

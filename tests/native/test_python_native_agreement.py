@@ -2,13 +2,15 @@
 
 Both get the same random calls: parameters, tolerances and grids; inputs and tunables that change during a run; looks
 ahead; states saved, restored and transferred to another instance as bytes; invalid values and steps; runs that fail.
-Everything visible to an importer is compared with ==: values, counters, statuses, log messages, standard error.
+Everything visible to an importer is compared with ==: values, counters, statuses, log messages, standard error. The
+layer of the Python FMU can refuse steps only: an impossible step follows every setting, and both FMUs then continue
+from the state before it if the value is refused.
 """
 
 import json
 import random
 from contextlib import suppress
-from math import inf, nan
+from math import inf, isnan, nan
 
 import pytest
 from models import HYBRID, MODELS, declared, label, model_class, pairwise_cases, parameters, tunable
@@ -69,7 +71,11 @@ class LifeCycle:
         readings += fmu.get(*self.names)
         with suppress(FmiError):  # which a Python FMU cannot raise; both log what is wrong
             fmu.init()
-        return readings
+        messages = [text for instance in self.instances for *_, text in instance.messages()]
+        if messages:
+            fmu.reset()
+            fmu.init()
+        return readings, messages
 
     def step(self, h):
         t, self.t = self.t, self.t + h
@@ -86,7 +92,19 @@ class LifeCycle:
         self.instances[0].step(self.t + shift, h)
 
     def set(self, values):
-        self.instances[0].set(values)
+        fmu = self.instances[0]
+        for name, value in values.items():
+            if self.is_healthy():
+                before = fmu.save()
+                with suppress(FmiError):
+                    fmu.set({name: value})
+                    fmu.step(self.t, -1.0)
+                if not self.is_healthy():
+                    fmu.restore(before)
+
+    def is_healthy(self):
+        """Return whether all outputs can be calculated."""
+        return not any(isnan(value) for value in self.instances[0].get(*self.names))
 
     def look(self):
         return self.instances[0].get("solver.t_next")

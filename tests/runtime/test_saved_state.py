@@ -2,7 +2,6 @@
 
 import random
 from itertools import cycle
-from math import nan
 
 import pytest
 from models import CASES, counts, declared, label, outputs, push
@@ -71,6 +70,7 @@ def test_a_state_includes_parameters_not_yet_effective(launch, case):
 
 @pytest.mark.parametrize("case", CASES, ids=label)
 def test_a_restored_state_recovers_from_a_failure_and_restores_a_pending_one(launch, case):
+    """The load is so large that the motion overflows."""
     name, values, stop = case
     names, times = outputs(name) + counts(name), [0.0, 0.1 * stop, 0.2 * stop]
     force, _ = push(name)
@@ -79,7 +79,7 @@ def test_a_restored_state_recovers_from_a_failure_and_restores_a_pending_one(lau
     fmu = launch(name, values, stop=stop)
     fmu.run(times[:2], [])
     good = fmu.save()
-    fmu.set({force: nan})
+    fmu.set({force: 1e300, "m": 1e-300})
     bad = fmu.save()
     with pytest.raises(FmiError):
         fmu.step(times[1], 0.1)

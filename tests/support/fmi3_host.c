@@ -4,7 +4,7 @@
  *
  * A cycle is a run from time 0 to the stop, whose second half is repeated from a saved state and from a serialized
  * one; then a reset, and the run again.  All must end in the same values, bit for bit, and so must all cycles.
- * In a final one the PARAMETER is -1, which must be refused.
+ * In a final one the PARAMETER is set to -1, which must be refused and change nothing.
  *
  * Prints the POSITION and the SPEED (value references) at the stop, for co-simulation, then for model exchange; log
  * messages are written to standard error.  The exit status is 0 if all went well and the library could be unloaded.
@@ -153,15 +153,11 @@ static void check_error(const Task *task)
 {
     fmi3Instance c = instantiate(0, task);
     double invalid = -1.0, values[OUTPUTS];
-    ok(fmi.SetFloat64(c, &task->invalid, 1, &invalid, 1), "set");
-    ok(fmi.EnterInitializationMode(c, fmi3False, 0.0, 0.0, fmi3False, 0.0), "enter");
-    if (fmi.ExitInitializationMode(c) != fmi3Error) die("an invalid parameter was not refused");
-    if (step(c, 0.0, 1.0) != fmi3Error) die("a run continues that never began");
-    ok(fmi.GetFloat64(c, task->outputs, OUTPUTS, values, OUTPUTS), "values after a failure");
-    if (!isnan(values[0]) || !isnan(values[1])) die("a failed run gives numbers");
-    ok(fmi.Reset(c), "reset after a failure");
+    if (fmi.SetFloat64(c, &task->invalid, 1, &invalid, 1) != fmi3Error) die("an invalid parameter was not refused");
     begin(c, 0, task);
-    ok(step(c, 0.0, 1.0), "a step after a failure and a reset");
+    ok(step(c, 0.0, 1.0), "a step after a refused parameter");
+    ok(fmi.GetFloat64(c, task->outputs, OUTPUTS, values, OUTPUTS), "values after a refused parameter");
+    if (isnan(values[0]) || isnan(values[1])) die("a refused parameter changes values");
     fmi.FreeInstance(c);
 }
 

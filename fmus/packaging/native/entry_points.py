@@ -4,12 +4,12 @@ from typing import Any
 
 from ...runtime.variable_declarations import VariableOwner
 from ..lowering import sibling_module
-from .c_types import BOOL, FLOAT, CType, StructPointer
+from .c_types import BOOL, FLOAT, INT, CType, StructPointer
 
 ENTRY_POINTS = {  # module of the runtime -> its functions; callees come before their callers
     "call_sequence": (
-        *("is_in_range", "rejection_reason", "note_change", "set_experiment", "exit_initialization", "do_step"),
-        *("update_outputs", "update_statistics", "is_valid_state"),
+        *("is_in_range", "rejection_reason", "note_change", "set_experiment", "check_experiment", "is_refusal"),
+        *("exit_initialization", "do_step", "update_outputs", "update_statistics", "is_valid_state"),
     ),
     "model_exchange": (
         *("enable", "update_nominals", "begin", "prepare", "set_time", "set_continuous_states", "update_states"),
@@ -17,7 +17,7 @@ ENTRY_POINTS = {  # module of the runtime -> its functions; callees come before 
     ),
     "early_return": ("begin_step", "next_internal_step", "complete_event"),  # for FMI 3.0
 }
-# Parameters of type bool; run and model are structs, all others floats.
+# Parameters of type bool; run and model are structs, a status is an int, all others are floats.
 BOOL_PARAMETERS = ("calculated", "fixed", "allowed", "exchanges", "ahead", "defer_events")
 
 
@@ -25,7 +25,8 @@ def entry_point_types(
     model: type[VariableOwner], run: StructPointer, instance: StructPointer, fmi: str
 ) -> dict[Any, list[CType]]:
     """Return the entry points of a model with the types of their arguments, which follow from the parameter names."""
-    known_types: dict[str, CType] = {"run": run, "model": instance, **dict.fromkeys(BOOL_PARAMETERS, BOOL)}
+    known_types: dict[str, CType] = {"run": run, "model": instance, "status": INT}
+    known_types |= dict.fromkeys(BOOL_PARAMETERS, BOOL)
     types = {}
     for file in [file for file in ENTRY_POINTS if file != "early_return" or fmi == "3"]:
         functions = sibling_module(model, f"runtime.{file}")

@@ -53,10 +53,7 @@ fmi2Status fmi2SetupExperiment(fmi2Component component, fmi2Boolean toleranceDef
                                fmi2Real startTime, fmi2Boolean stopTimeDefined, fmi2Real stopTime)
 {
     REQUIRE_PHASE(component, IN_INSTANTIATED);
-    bool fault = false;
-    call_sequence_set_experiment(&self->state.run, startTime, stopTimeDefined ? stopTime : INFINITY, toleranceDefined ? tolerance : 0.0,
-                &fault);
-    return fmi2OK;
+    return set_experiment(self, startTime, stopTimeDefined ? stopTime : INFINITY, toleranceDefined ? tolerance : 0.0);
 }
 
 fmi2Status fmi2EnterInitializationMode(fmi2Component component)

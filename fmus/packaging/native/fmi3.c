@@ -81,9 +81,8 @@ fmi3Status fmi3EnterInitializationMode(fmi3Instance instance, fmi3Boolean tolera
                                        fmi3Float64 startTime, fmi3Boolean stopTimeDefined, fmi3Float64 stopTime)
 {
     REQUIRE_PHASE(instance, IN_INSTANTIATED);
-    bool fault = false;
-    call_sequence_set_experiment(&self->state.run, startTime, stopTimeDefined ? stopTime : INFINITY, toleranceDefined ? tolerance : 0.0,
-                &fault);
+    double stop = stopTimeDefined ? stopTime : INFINITY;
+    if (set_experiment(self, startTime, stop, toleranceDefined ? tolerance : 0.0)) return fmi3Error;
     self->state.run.phase = INITIALISING;
     return fmi3OK;
 }

@@ -1,9 +1,8 @@
 /* An instance of the model in model.h, for both versions of FMI.
  *
- * Every call behaves as in the Python FMU of the same model: it uses the same call sequence (call_sequence_... in model.h) and
- * the same messages. An invalid value is remembered and reported by the next step. A run that cannot start or continue
- * returns Error, and all calculated Reals read NaN from then on. In addition, calls in the wrong phase, invalid value
- * references and null pointers are refused and change nothing.
+ * Every call uses the same call sequence (call_sequence_... in model.h) and the same messages as the Python FMU of the
+ * model. A call that is wrong is refused: it returns Error and changes nothing, so that the next correct call works. A
+ * run that cannot continue fails: the call returns Error, and all calculated Reals read NaN from then on.
  *
  * An instance is one struct without shared data, so instances can run in parallel threads. The including file defines
  * Host, Status and log_to_host.
@@ -124,31 +123,19 @@ static void set_outputs_to_nan(Model *model)
 
 static bool is_model_exchange(const State *state) { return state->run.interface == MODEL_EXCHANGE; }
 
-/* Return the invalid value that was set first. */
-static const RejectedValue *first_rejection(const State *state)
-{
-    const RejectedValue *first = NULL, *end = state->rejected + VARIABLES;
-    for (const RejectedValue *rejected = state->rejected; rejected < end; rejected++) {
-        if (rejected->reason != OK && (!first || rejected->sequence < first->sequence)) first = rejected;
-    }
-    return first;
-}
-
-/* Fail the run and report why; t and h are the communication step, NaN outside of steps. */
+/* Refuse a call, or fail the run, and report why; t and h are the communication step, NaN outside of steps. */
 static COLD Status fail_run(Instance *self, int64_t status, double t, double h)
 {
     State *state = &self->state;
     TextBuffer text = {0};
+    bool fault = false;
     if (status == FAILED) return STATUS_ERROR; /* already reported */
-    if (status == BAD_VALUE) {
-        const RejectedValue *first = first_rejection(state);
-        append_value_message(&text, first->reason, &variables[first - state->rejected], first->value);
-    } else {
-        append_run_message(&text, status, &state->run, &state->model, t, h);
+    append_run_message(&text, status, &state->run, &state->model, t, h);
+    if (!call_sequence_is_refusal(&state->run, status, &fault)) {
+        state->run.has_failed = true;
+        state->run.outputs_current = false;
+        set_outputs_to_nan(&state->model);
     }
-    state->run.has_failed = true;
-    state->run.outputs_current = false;
-    set_outputs_to_nan(&state->model);
     report_error(self, &text);
     return STATUS_ERROR;
 }
@@ -212,32 +199,41 @@ static int64_t *input_order(State *state, const Variable *variable)
     return (int64_t *)((char *)&state->model + variable->order_offset);
 }
 
-/* Set a variable, or remember that the value is invalid. Returns false after a fault. */
-static bool write_value(Instance *self, uint32_t reference, double value)
+/* Return whether a variable already has the value; an input that follows a polynomial may only happen to have it. */
+static bool has_value(State *state, const Variable *variable, double value)
+{
+    bool is_constant = variable->order_offset == NO_OFFSET || *input_order(state, variable) == 0;
+    return is_constant && value == variable_value(&state->model, variable);
+}
+
+/* Refuse a value that the variable cannot have now. */
+static Status check_value(Instance *self, uint32_t reference, double value)
+{
+    const Variable *variable = &variables[reference];
+    TextBuffer text = {0};
+    bool allowed = is_allowed_value(variable, value), fault = false;
+    if (has_value(&self->state, variable, value)) return STATUS_OK;
+    int64_t reason = call_sequence_rejection_reason(&self->state.run, variable->is_calculated, variable->is_fixed,
+                                                    allowed, &fault);
+    if (reason == OK) return STATUS_OK;
+    append_value_message(&text, reason, variable, value);
+    report_error(self, &text);
+    return STATUS_ERROR;
+}
+
+/* Set a variable to a valid value. */
+static Status write_value(Instance *self, uint32_t reference, double value)
 {
     State *state = &self->state;
     const Variable *variable = &variables[reference];
-    RejectedValue *rejected = &state->rejected[reference];
-    bool allowed = is_allowed_value(variable, value), fault = false;
-    bool is_constant = variable->order_offset == NO_OFFSET || *input_order(state, variable) == 0;
-    if (is_constant && value == variable_value(&state->model, variable) && rejected->reason == OK) return true;
+    bool fault = false;
+    if (has_value(state, variable, value)) return STATUS_OK;
     state->run.outputs_current = false;
-    state->run.n_invalid_values -= rejected->reason != OK;
-    rejected->reason = call_sequence_rejection_reason(&state->run, variable->is_calculated, variable->is_fixed, allowed, &fault);
-    if (rejected->reason != OK) {
-        state->run.n_invalid_values++;
-        rejected->value = value;
-        rejected->sequence = ++state->rejection_count;
-        return true;
-    }
     call_sequence_note_change(&state->run, &state->model, &fault);
-    if (fault) {
-        fail_run(self, DIVERGED, NAN, NAN);
-        return false;
-    }
+    if (fault) return fail_run(self, DIVERGED, NAN, NAN);
     if (variable->is_real) *(double *)variable_address(&state->model, variable) = value;
     else *(int64_t *)variable_address(&state->model, variable) = (int64_t)value;
-    return true;
+    return STATUS_OK;
 }
 
 static double read_real(const Instance *self, uint32_t reference)
@@ -257,9 +253,14 @@ static int64_t read_integer(const Instance *self, uint32_t reference)
     for (size_t i = 0; i < (n); i++) value[i] = status ? (blank) : at(self, vr[i]); \
     return STATUS_OK
 
-#define WRITE_VALUES(self, type, vr, n, value)                                       \
-    if (check_references(self, type, vr, n, value, __func__)) return STATUS_ERROR;   \
-    for (size_t i = 0; i < (n) && write_value(self, vr[i], value[i]); i++) continue; \
+#define WRITE_VALUES(self, type, vr, n, value)                                     \
+    if (check_references(self, type, vr, n, value, __func__)) return STATUS_ERROR; \
+    for (size_t i = 0; i < (n); i++) {                                             \
+        if (check_value(self, vr[i], value[i])) return STATUS_ERROR;               \
+    }                                                                              \
+    for (size_t i = 0; i < (n); i++) {                                             \
+        if (write_value(self, vr[i], value[i])) return STATUS_ERROR;               \
+    }                                                                              \
     return STATUS_OK
 
 /* Body of the functions for a type without variables. */
@@ -317,6 +318,23 @@ static Status set_logging(Instance *self, bool logging, size_t n, const char *co
     return STATUS_OK;
 }
 
+/* Set start time, stop time (infinite if unknown) and tolerance (0 if unknown) of the run. */
+static Status set_experiment(Instance *self, double start, double stop, double tolerance)
+{
+    struct RunState run = self->state.run;
+    TextBuffer text = {0};
+    bool fault = false;
+    call_sequence_set_experiment(&run, start, stop, tolerance, &fault);
+    int64_t status = call_sequence_check_experiment(&run, &fault);
+    if (status == OK) {
+        self->state.run = run;
+        return STATUS_OK;
+    }
+    append_run_message(&text, status, &run, &self->state.model, NAN, NAN);
+    report_error(self, &text);
+    return STATUS_ERROR;
+}
+
 /* Start the run. If the importer handles events, it starts in event mode. */
 static Status begin_run(Instance *self, bool event_mode_used)
 {
@@ -324,7 +342,7 @@ static Status begin_run(Instance *self, bool event_mode_used)
     bool fault = false;
     int64_t status = call_sequence_exit_initialization(&state->run, &state->model, &fault);
     if (status == OK && !fault && is_model_exchange(state)) model_exchange_begin(&state->model, &fault);
-    if (event_mode_used) state->run.phase = EVENT;
+    if (event_mode_used && state->run.phase == RUNNING) state->run.phase = EVENT;
     return finish_call(self, status, fault, NAN, NAN);
 }
 

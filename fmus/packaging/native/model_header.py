@@ -56,8 +56,6 @@ static const Variable variables[VARIABLES] = {{
 typedef struct {{
     Model model;
     struct RunState run;
-    int64_t rejection_count; /* number of invalid values set so far */
-    RejectedValue rejected[VARIABLES];
 }} State;
 
 static const State initial = {{

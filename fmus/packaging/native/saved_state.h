@@ -1,8 +1,8 @@
 /* A saved FMU state: the State of an instance with the GUID of the FMU and a checksum.
  *
  * Serialized states come back from files and networks and may be damaged. A state is accepted only if it has the GUID
- * of this FMU, its checksum is right and its content is consistent: bools are 0 or 1, the invalid values match their
- * count, parameters are in their ranges and the current time lies within the internal step.
+ * of this FMU, its checksum is right and its content is consistent: bools are 0 or 1, parameters are in their ranges and
+ * the current time lies within the internal step.
  */
 #ifndef SAVED_STATE_H
 #define SAVED_STATE_H
@@ -92,7 +92,7 @@ static bool are_members_valid(const State *state)
     return true;
 }
 
-/* The model never holds a value out of range; such values are in State.rejected. */
+/* The model never holds a value out of range. */
 static bool are_values_valid(const Model *model)
 {
     for (const Variable *variable = variables; variable < variables + VARIABLES; variable++) {
@@ -102,26 +102,11 @@ static bool are_values_valid(const Model *model)
     return true;
 }
 
-static bool are_rejections_valid(const State *state)
-{
-    int64_t n_rejected = 0;
-    if (state->rejection_count < 0 || state->rejection_count > MAX_INTEGER) return false;
-    for (int i = 0; i < VARIABLES; i++) {
-        const RejectedValue *rejected = &state->rejected[i];
-        if (rejected->reason == OK) continue;
-        if (rejected->reason < CALCULATED || rejected->reason > OUT_OF_RANGE) return false;
-        if (rejected->sequence < 1 || rejected->sequence > state->rejection_count) return false;
-        if (!variables[i].is_real && !(fabs(rejected->value) <= 2147483648.0)) return false; /* fmi2Integer */
-        n_rejected++;
-    }
-    return n_rejected == state->run.n_invalid_values;
-}
-
 static bool is_state_valid(State *state)
 {
     bool fault = false;
     return are_members_valid(state) && !state->run.outputs_current && are_values_valid(&state->model) &&
-           are_rejections_valid(state) &&
+           state->run.n_invalid_values == 0 &&
            call_sequence_is_valid_state(&state->run, &state->model, state->run.interface == MODEL_EXCHANGE, &fault) && !fault;
 }
 

@@ -27,13 +27,6 @@ typedef struct {
     const int64_t *items, *items_end; /* values of an enumeration */
 } Variable;
 
-/* A value that was set and is invalid. The message reports the one that was set first. */
-typedef struct {
-    int64_t reason;   /* OK: the value of this variable is valid */
-    double value;
-    int64_t sequence; /* counts invalid values in the order of the calls */
-} RejectedValue;
-
 /* An int or a bool in State, for validation of saved states. */
 typedef struct {
     size_t offset;

@@ -225,7 +225,11 @@ def largest_difference(rows: list[list[float]], expected: list[list[float]]) -> 
 
 
 def check_failure(importer: Importer, request: ImporterRequest) -> str:
-    """Check a failing run: one message on standard error and in the log, NaN afterwards, success after a reset."""
+    """Check a failing run: a message on standard error and in the log, no result afterwards, success after a reset.
+
+    After a failure every value reads NaN.  A refused value changes nothing; a tool that ignores the refusal goes on
+    with the previous value, and only the message shows it.
+    """
     sentence = expected_message(request)
     try:
         run_instances = run_request(importer, request)
@@ -241,18 +245,21 @@ def check_failure(importer: Importer, request: ImporterRequest) -> str:
         f"({instance}.0.fmu): ",
     )  # the last one inside a container
     own_lines = [line for line in lines if any(name in line for name in names)]
-    if len(own_lines) != 1:
-        raise CheckFailedError(f"{len(own_lines)} lines on standard error instead of one")
-    if importer.shows_log and len(lines) != 2:
+    if not own_lines:
+        raise CheckFailedError("no message on standard error")
+    if importer.shows_log and len(lines) != 2 * len(own_lines):
         raise CheckFailedError("no message in the log")
     rows, accepted = run_instances.reply.rows, run_instances.reply.accepted
     if importer.checks_status and accepted == request.steps:
         raise CheckFailedError("every step was accepted")
-    if not (all(isnan(value) for value in rows[-1]) or (importer.checks_status and rows[-1] == rows[accepted])):
-        raise CheckFailedError(f"returns {rows[-1][0]!r} after the failure")
     expected = run_request(
         IMPORTERS[0], replace(request, values={}, midrun_changes={}, instances=["a"], rerun=False)
     ).reply.rows
+    if importer.checks_status:
+        if not (all(isnan(value) for value in rows[-1]) or rows[-1] == rows[accepted]):
+            raise CheckFailedError(f"returns {rows[-1][0]!r} after the failure")
+    elif not all(isnan(value) for value in rows[-1]):
+        largest_difference(rows, expected)
     largest_difference(run_instances.reply.rerun, expected)
     return "message"
 

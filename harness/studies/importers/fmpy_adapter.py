@@ -47,12 +47,16 @@ def run_instances(request: ImporterRequest, instances: list[Any], version: str) 
 def run(
     request: ImporterRequest, instances: list[Any], values: dict[str, float], midrun_changes: dict[str, float]
 ) -> tuple[list[list[float]], int]:
-    """Return the rows of one run and the number of accepted steps."""
+    """Return the rows of one run and the number of accepted steps; a refused value or step ends the run."""
     references = request.references
     output_references = [references[name] for name in request.outputs]
+    refused: list[FMICallException] = []
 
     def write(instance: Any, new: dict[str, float]) -> None:
-        instance.setReal([references[name] for name in new], list(new.values()))
+        try:
+            instance.setReal([references[name] for name in new], list(new.values()))
+        except FMICallException as error:
+            refused.append(error)
 
     def row() -> list[float]:
         return [value for instance in instances for value in instance.getReal(output_references)]
@@ -74,11 +78,11 @@ def run(
         if i == request.steps // 2:
             write(instances[0], midrun_changes)
         try:
-            for instance in instances:
+            for instance in instances if not refused else []:
                 instance.doStep(request.step * i, request.step)
-            accepted += 1
-        except FMICallException:
-            pass  # the tool logs it; the check reads the values from here on
+            accepted += not refused
+        except FMICallException as error:
+            refused.append(error)  # the tool logs it; the check reads the values from here on
         rows.append(row())
     return rows, accepted
 

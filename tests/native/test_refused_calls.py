@@ -1,0 +1,146 @@
+"""A refused call leaves the instance as it was: the next correct call works, and the run goes on bit for bit.
+
+The native FMUs refuse the call itself.  The layer of a Python FMU can refuse steps only; it refuses the step after a
+wrong setting.
+"""
+
+from math import inf, nan
+
+import fmi3_fixtures
+import native_fmus
+import pytest
+import worker_client
+from models import EXACT, declared
+from row_comparison import assert_identical
+from worker_client import FmiError
+
+WORKERS = {"python": worker_client.Worker, "native": worker_client.Worker, "FMI 3.0": fmi3_fixtures.Worker}
+STOP = 4.0
+INVALID_VALUES = [
+    *({"x": 0.2}, {"F_friction": 1.0}, {"energy": -1.0}, {"mode": 1}, {"solver.h": 1.0}, {"events.count": 7}),  # outputs
+    *({"x0": 0.5}, {"v0": nan}, {"solver.rtol": 1e-3}, {"solver.method": 3}, {"friction": 2}),  # fixed since the start
+    *({"m": 0.0}, {"m": -1.0}, {"k": -1e-3}, {"k": inf}, {"F_ext": nan}, {"F_ext": -inf}),  # out of range
+]
+INVALID_STEPS = [(0.0, 0.0), (0.0, -0.5), (0.0, nan), (0.0, inf), (0.1, 0.1), (-0.1, 0.1), (nan, 0.1), (0.0, 9.0)]
+INVALID_REFERENCES = [("Real", 10**6), ("Integer", 0), ("Boolean", 0), ("String", 2**32 - 1)]
+INVALID_REFERENCES3 = [("Float64", 10**6), ("Float32", 0), ("Int64", 0), ("Boolean", 0), ("String", 2**32 - 1)]
+
+
+@pytest.fixture(scope="module", params=WORKERS)
+def backend(request):
+    return request.param
+
+
+@pytest.fixture(scope="module")
+def own_worker(backend):
+    worker = WORKERS[backend]()
+    yield worker
+    assert worker.close() == 0
+
+
+@pytest.fixture
+def instance(backend, own_worker, fmus):
+    """Return a function that instantiates a model."""
+    folders = {"native": native_fmus.build_native_fmus, "FMI 3.0": fmi3_fixtures.build_fmi3_fmus}
+    folder = folders[backend]() if backend in folders else fmus
+    return lambda name: own_worker.instantiate(folder / f"{name}.fmu")
+
+
+def refused(fmu, backend, function, *arguments):
+    """Assert that a call is refused with one message."""
+    with pytest.raises(FmiError) as error:
+        getattr(fmu, function)(*arguments)
+    assert error.value.status == (2 if backend == "python" else 3), (function, arguments)
+    ((status, _, sentence),) = fmu.messages()
+    assert (status, fmu.worker.read_stderr().count(sentence)) == (3, 1)
+
+
+def wrong_settings(fmu, backend):
+    """Return a list of calls that set a wrong value; in the oscillator, reference 0 is the mass."""
+    references = INVALID_REFERENCES3 if backend == "FMI 3.0" else INVALID_REFERENCES
+    texts = {"Boolean": True, "String": "1"}
+    return [("set", values) for values in INVALID_VALUES] + [
+        ("write_one", kind, reference, texts.get(kind, 1)) for kind, reference in references
+    ]
+
+
+def wrong_calls(fmu, backend):
+    """Return a list of other calls that are wrong while the model runs."""
+    if backend == "python":  # whose layer knows no phases
+        return []
+    calls = [("enter",), ("exit",), ("output_rates", ["m"]), ("output_rates", ["x"], 2), ("deserialize", "00" * 99)]
+    if backend == "native":
+        calls += [("setup", 0.0, 1.0, None), ("ramp", "m", 1.0), ("ramp", "F_ext", nan), ("ramp", "F_ext", 1.0, 9)]
+    return calls
+
+
+def test_every_refused_call_leaves_a_run_as_it_was(instance, backend):
+    """Before and between the steps of a run with changes of the force, all wrong calls are made."""
+    names = [name for name in declared("coulomb") if name != "solver.t_next"]
+    rows = []
+    for is_disturbed in False, True:
+        fmu = instance("coulomb").begin({"k": 100.0}, stop=STOP)
+        rows.append([])
+        for t, force in ((0.0, 0.0), (0.3, 2.0), (0.9, -3.0), (2.0, 0.5)):
+            fmu.set({"F_ext": force})
+            for function, *arguments in wrong_settings(fmu, backend) if is_disturbed else []:
+                if backend == "python":
+                    getattr(fmu, function)(*arguments)
+                    refused(fmu, backend, "step", t, 0.1)
+                else:
+                    row = fmu.get(*names)
+                    refused(fmu, backend, function, *arguments)
+                    assert fmu.get(*names) == row, arguments
+            for offset, h in INVALID_STEPS if is_disturbed else []:
+                refused(fmu, backend, "step", t + offset, h)
+            for function, *arguments in wrong_calls(fmu, backend) if is_disturbed else []:
+                refused(fmu, backend, function, *arguments)
+            fmu.step(t, 0.25)
+            rows[-1].append(fmu.get(*names))
+            fmu.step(t + 0.25, {0.0: 0.05, 0.3: 0.35, 0.9: 0.85, 2.0: 1.0}[t])
+            rows[-1].append(fmu.get(*names))
+        assert fmu.messages() == []
+        fmu.free()
+    assert_identical(rows[1], rows[0], names)
+
+
+def test_values_that_contradict_each_other_are_refused_until_one_is_corrected(instance, backend):
+    other, fmu = (instance("stickslip").begin(stop=STOP) for _ in range(2))  # fmpy logs to the latter
+    for one in fmu, other:
+        one.step(0.0, 1.0)
+    fmu.set({"mu_d": 1.0})
+    for _ in range(2):
+        refused(fmu, backend, "step", 1.0, 0.5)
+    for one in fmu, other:
+        one.set({"mu_d": 0.5})
+        one.step(1.0, 0.5)
+    assert fmu.get("x", "v", "solver.steps") == other.get("x", "v", "solver.steps")
+    fmu.free()
+    other.free()
+
+
+def test_a_refused_start_can_be_corrected(instance, backend):
+    """Times, start values and their combinations; the layer of a Python FMU can refuse none of them."""
+    if backend == "python":
+        return
+    other, fmu = instance("stickslip"), instance("stickslip")  # fmpy logs to the latter
+    refused(fmu, backend, "set", {"m": -1.0})
+    for start, stop in ((nan, None), (1.0, 1.0), (0.0, -1.0)):
+        if backend == "native":
+            refused(fmu, backend, "setup", start, stop, None)
+        else:
+            fmu.setup(start, stop, None)
+            refused(fmu, backend, "enter")
+    fmu.setup(0.0, STOP, None)
+    fmu.set({"friction": 3, "solver.method": EXACT})
+    fmu.enter()
+    refused(fmu, backend, "exit")
+    refused(fmu, backend, "step", 0.0, 1.0)
+    fmu.set({"friction": 1})
+    fmu.exit()
+    other.begin(stop=STOP)
+    for one in fmu, other:
+        one.step(0.0, 1.0)
+    assert fmu.get("x", "v", "solver.steps") == other.get("x", "v", "solver.steps")
+    fmu.free()
+    other.free()
