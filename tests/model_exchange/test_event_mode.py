@@ -133,11 +133,62 @@ def test_the_motion_does_not_depend_on_the_steps_of_the_master(unpacked, name, o
             t, row = 0.0, []
             for i in range(1, 33):
                 while t < i * stop / 32:
-                    _, _, early, t = fmu.doStep(t, i * stop / 32 - t)
+                    event, _, early, t = fmu.doStep(t, i * stop / 32 - t)
+                    assert event <= bool(chosen.get("eventModeUsed"))
                     assert early <= bool(chosen.get("earlyReturnAllowed"))
+                    if event:
+                        handle(fmu)
                 row.append([read(variable) for variable in outputs(name)])
             rows.append(row)
     assert rows[0] == rows[1]
+
+
+@pytest.mark.parametrize("early", [True, False])
+@pytest.mark.parametrize("name", MODELS)
+def test_discrete_variables_change_in_event_mode_only_and_every_event_is_announced(unpacked, name, early):
+    """Modes, counts and the time of the last event; where no early return is allowed, a step passes many events."""
+    discrete = [v.name for v in unpacked(name)[1].modelVariables if v.variability == "discrete"]
+    stop, looks, announced = model_class(name).stop_time, [], 0
+
+    def read_all():
+        return [read(variable) for variable in discrete]
+
+    def look(*_):
+        looks.append(read_all())
+
+    options = {"eventModeUsed": True, "earlyReturnAllowed": early, "intermediateUpdate": look}
+    with master(unpacked, name, **options) as (fmu, read, _):
+        fmu.updateDiscreteStates()
+        fmu.enterStepMode()
+        t = 0.0
+        while t < stop:
+            before = read_all()
+            looks.clear()
+            event, _, _, t = fmu.doStep(t, min(t + 0.25 * stop, stop) - t)
+            assert all(row == before for row in [*looks, read_all()])
+            assert looks
+            announced += event
+            handle(fmu)
+            if "mode" in discrete:
+                assert event == (read("events.count") > before[discrete.index("events.count")])
+            assert read("solver.steps") >= before[discrete.index("solver.steps")]
+    assert (announced > 0) == (name in COUNTED)
+
+
+@pytest.mark.parametrize("name", COUNTED)
+def test_discrete_variables_do_not_change_in_intermediate_updates(unpacked, name):
+    """Without event mode they change at communication points."""
+    looks, stop = [], model_class(name).stop_time
+
+    def look(*_):
+        looks.append([read("mode"), read("events.count"), read("solver.steps")])
+
+    with master(unpacked, name, intermediateUpdate=look) as (fmu, read, _):
+        before = [read("mode"), read("events.count"), read("solver.steps")]
+        fmu.doStep(0.0, stop)
+        assert all(row == before for row in looks)
+        assert read("events.count") > 0
+        assert read("solver.steps") > 0
 
 
 @pytest.mark.parametrize("early", [True, False])

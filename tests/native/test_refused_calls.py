@@ -17,7 +17,14 @@ from worker_client import FmiError
 WORKERS = {"python": worker_client.Worker, "native": worker_client.Worker, "FMI 3.0": fmi3_fixtures.Worker}
 STOP = 4.0
 INVALID_VALUES = [
-    *({"x": 0.2}, {"F_friction": 1.0}, {"energy": -1.0}, {"mode": 1}, {"solver.h": 1.0}, {"events.count": 7}),  # outputs
+    *(
+        {"x": 0.2},
+        {"F_friction": 1.0},
+        {"energy": -1.0},
+        {"mode": 1},
+        {"solver.h": 1.0},
+        {"events.count": 7},
+    ),  # outputs
     *({"x0": 0.5}, {"v0": nan}, {"solver.rtol": 1e-3}, {"solver.method": 3}, {"friction": 2}),  # fixed since the start
     *({"m": 0.0}, {"m": -1.0}, {"k": -1e-3}, {"k": inf}, {"F_ext": nan}, {"F_ext": -inf}),  # out of range
 ]

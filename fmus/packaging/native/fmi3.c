@@ -93,6 +93,52 @@ fmi3Status fmi3ExitInitializationMode(fmi3Instance instance)
     return begin_run(self, self->host.event_mode_used);
 }
 
+/* ---- discrete variables
+ *
+ * They may change in event mode only, or at communication points if the importer does not use event mode. In between,
+ * they read their last values. */
+
+/* Store the values of the discrete variables. */
+static void store_discrete_values(Instance *self)
+{
+    State *state = &self->state;
+    bool fault = false;
+    int64_t status = OK;
+    if (!state->run.outputs_current && !state->run.has_failed) {
+        status = call_sequence_update_outputs(&state->run, &state->model, &fault);
+    }
+    if (status != OK || fault || state->run.has_failed) return; /* the next step reports it */
+    call_sequence_update_statistics(&state->model, false, &fault);
+    for (int i = 0; i < DISCRETE; i++) {
+        state->discrete_values[i] = variable_value(&state->model, &variables[discrete_variables[i]]);
+    }
+}
+
+/* Return the stored value of a discrete variable that may not change now, otherwise NULL. */
+static const double *stored_value(const Instance *self, uint32_t reference)
+{
+    const State *state = &self->state;
+    int64_t phase = state->run.phase;
+    bool between_events = self->host.event_mode_used && (phase == RUNNING || phase == TERMINATED);
+    if (state->run.has_failed || is_model_exchange(state) || !(between_events || phase == INTERMEDIATE)) return NULL;
+    for (int i = 0; i < DISCRETE; i++) {
+        if (discrete_variables[i] == reference) return &state->discrete_values[i];
+    }
+    return NULL;
+}
+
+static double read_float64(const Instance *self, uint32_t reference)
+{
+    const double *stored = stored_value(self, reference);
+    return stored ? *stored : read_real(self, reference);
+}
+
+static int64_t read_int64(const Instance *self, uint32_t reference)
+{
+    const double *stored = stored_value(self, reference);
+    return stored ? (int64_t)*stored : read_integer(self, reference);
+}
+
 /* ---- values */
 
 /* All variables are scalars. */
@@ -104,7 +150,7 @@ fmi3Status fmi3GetFloat64(fmi3Instance instance, const fmi3ValueReference valueR
 {
     REQUIRE_PHASE(instance, IN_READABLE_PHASE);
     REQUIRE_SCALARS;
-    READ_VALUES(self, &FLOAT64, valueReferences, nValueReferences, values, read_real, NAN);
+    READ_VALUES(self, &FLOAT64, valueReferences, nValueReferences, values, read_float64, NAN);
 }
 
 fmi3Status fmi3GetInt64(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,
@@ -112,7 +158,7 @@ fmi3Status fmi3GetInt64(fmi3Instance instance, const fmi3ValueReference valueRef
 {
     REQUIRE_PHASE(instance, IN_READABLE_PHASE);
     REQUIRE_SCALARS;
-    READ_VALUES(self, &INT64, valueReferences, nValueReferences, values, read_integer, 0);
+    READ_VALUES(self, &INT64, valueReferences, nValueReferences, values, read_int64, 0);
 }
 
 fmi3Status fmi3SetFloat64(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,
@@ -244,6 +290,7 @@ fmi3Status fmi3EnterStepMode(fmi3Instance instance)
 {
     REQUIRE_PHASE(instance, 1 << EVENT);
     if (is_model_exchange(&self->state)) return refuse(self, NOT_SUPPORTED, __func__, "");
+    store_discrete_values(self);
     self->state.run.phase = RUNNING;
     return fmi3OK;
 }
@@ -286,18 +333,21 @@ fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoi
         return status;
     }
     struct ModelExchange *exchange = &state->model.model_exchange;
+    bool event_passed = false;
+    if (!self->host.event_mode_used) store_discrete_values(self);
     int64_t status = early_return_begin_step(&state->run, &state->model, t, h, &fault);
     double end = exchange->step_end;
     if (status == OK && !fault) call_intermediate_update(self, false);
     while (status == OK && !fault && *now < exchange->step_end) {
         status = early_return_next_internal_step(&state->run, &state->model, self->host.event_mode_used, &fault);
         if (status != OK || fault) break;
+        event_passed = event_passed || exchange->event_reached;
         call_intermediate_update(self, true);
         if (exchange->event_reached && self->host.early_return_allowed) break;
     }
     *lastSuccessfulTime = *now;
     if (status == OK && !fault) {
-        *eventHandlingNeeded = self->host.event_mode_used && exchange->event_reached;
+        *eventHandlingNeeded = self->host.event_mode_used && event_passed;
         *earlyReturn = *now < end;
     }
     return finish_call(self, status, fault, t, h);

@@ -52,10 +52,16 @@ enum {{ VARIABLES = {count}, DECLARED = {declared}, T_NEXT = {ahead}, STATES = {
 static const Variable variables[VARIABLES] = {{
 {table}}};
 
+enum {{ DISCRETE = {count_of_discrete} }};
+
+/* Value references of the discrete variables. */
+static const uint32_t discrete_variables[DISCRETE] = {{{discrete}}};
+
 /* The state of an instance, which getting and setting FMU states copies. */
 typedef struct {{
     Model model;
     struct RunState run;
+    double discrete_values[DISCRETE]; /* where they may not change (FMI 3.0) */
 }} State;
 
 static const State initial = {{
@@ -130,6 +136,7 @@ def render_model_header(model: type[VariableOwner], fmi: str) -> str:
     members = [(path, ctype) for path, ctype in members if ctype in (INT, BOOL)]
     statuses = {status: message for status, message in RUN_MESSAGES.items() if status not in PYTHON_ONLY_STATUSES}
     violated_rules = dict(enumerate(instance.rules, FIRST_RULE + 1))
+    discrete = [i for i, (_, meaning) in enumerate(declared) if meaning.variability == "discrete"]
     rule_fields = {
         name: f"{'append_real' if ctype is FLOAT else 'append_integer'}(text, model->{name})"
         for name, ctype in layout.fields[type(instance)].items()
@@ -148,6 +155,8 @@ def render_model_header(model: type[VariableOwner], fmi: str) -> str:
         ahead=names.index("solver.t_next"),
         states=len(derivative_indices(declared)),
         indicators=len(event_indicator_indices(declared)),
+        discrete=", ".join(map(str, discrete)),
+        count_of_discrete=len(discrete),
         count_of_members=len(members),
         members="".join(f"    {{offsetof(State, {path}), {c_literal(ctype is BOOL)}}},\n" for path, ctype in members),
         table="".join(

@@ -102,11 +102,20 @@ static bool are_values_valid(const Model *model)
     return true;
 }
 
+static bool are_discrete_values_valid(const State *state)
+{
+    for (int i = 0; i < DISCRETE; i++) {
+        double value = state->discrete_values[i];
+        if (!(variables[discrete_variables[i]].is_real ? isfinite(value) : fabs(value) <= MAX_INTEGER)) return false;
+    }
+    return true;
+}
+
 static bool is_state_valid(State *state)
 {
     bool fault = false;
     return are_members_valid(state) && !state->run.outputs_current && are_values_valid(&state->model) &&
-           state->run.n_invalid_values == 0 &&
+           are_discrete_values_valid(state) && state->run.n_invalid_values == 0 &&
            call_sequence_is_valid_state(&state->run, &state->model, state->run.interface == MODEL_EXCHANGE, &fault) && !fault;
 }
 
