@@ -34,6 +34,14 @@ CPython 3.9 or newer, 64 bit, with its standard library; no other packages.
 Linux     libpython3 must be loaded in the process: start hosts other than Python with it in LD_PRELOAD.
 Windows   the folder of python3.dll must be in PATH.
 """
+USAGE_NOTE = """\
+<p>This FMU contains Python code. A host that is not Python must have the Python library in its process, or it cannot
+load the FMU: see <code>documentation/externalDependencies.txt</code>. The native FMU of the same model needs
+nothing.</p>
+<p>A step that is refused or fails returns Discard, because the native layer of PythonFMU cannot return Error. A wrong
+setting is refused by the next step. Hosts that check for Error only, such as fmusim, the FMU Compliance Checker and
+PyFMI, end such a run as if it had succeeded: use the native FMU in them.</p>
+"""
 PYTHONFMU = "pythonfmu"
 ENTRY_SCRIPT = """\
 from {package} import {model}, keep_reference
@@ -69,7 +77,7 @@ def build(
     sources = embedded_files(source, texts)
     code = digest(sources, ENTRY_SCRIPT)
     package = f"{name}_{code[:12]}"
-    entries = extra_files(cls, source.path, declared_variables(cls))
+    entries = extra_files(cls, source.path, declared_variables(cls), use=USAGE_NOTE)
     entries |= {f"resources/{package}/{path}": text.encode() for path, text in sources.items()}
     entries |= {
         "documentation/externalDependencies.txt": HOST_REQUIREMENTS.encode(),

@@ -19,8 +19,8 @@ USAGE = """\
 <p>Parameters can be changed at every communication point, those marked <i>fixed</i> only until initialization ends.
 The internal steps of the solver do not depend on the communication steps. To see every internal step and every event,
 step to <code>solver.t_next</code>.</p>
-<p>An invalid value or a failed run is reported in one sentence in the log and on standard error. <code>doStep</code>
-then fails, and all calculated Reals are NaN until reset.</p>
+<p>A wrong call is refused, and a run that cannot continue fails; both are reported in one sentence in the log and on
+standard error. A refused call changes nothing. After a failure all calculated Reals are NaN until reset.</p>
 """
 CAPABILITIES = """\
 | | in Python | native | native, FMI 3.0 |

@@ -34,7 +34,8 @@ USAGE_NOTE = """\
 <p>In model exchange the importer's solver integrates the model, and <code>solver.*</code> has no meaning. With dry
 friction, the mode changes at events, which the importer locates with the event indicators <code>events.to_rest</code>
 and <code>events.to_break_away</code>. In FMI 3.0 co-simulation the importer can handle events as well: a step returns
-early at stick and slip.</p>
+early at stick and slip, or asks for event handling at its end if early return is not allowed.</p>
+<p>This FMU needs no other software. A refused call and a failed run return Error.</p>
 """
 
 

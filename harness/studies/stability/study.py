@@ -45,6 +45,7 @@ from .run_with_timeout import run_with_timeout
 WORKERS = 2
 LIMIT = 120.0  # s; time limit of a run and of a reference
 FOLDER, FILES = "stability", ("stability.csv", "region.svg")
+REFUSED_STEP = "a communication step of"  # a refused step changes nothing
 
 
 def run_stability(
@@ -152,10 +153,10 @@ def judge_injections(case: StabilityCase, ending: RefusalSummary) -> CaseOutcome
 
 
 def judge_refusal(case: StabilityCase, ending: RefusedRun) -> CaseOutcome:
-    """Check that a rejection has the expected message, and that values read as NaN."""
+    """Check that a rejection has the expected message, and that values read as NaN after a failure."""
     if not ending.message:
         return CaseOutcome(case, WRONG, "refused without a message")
-    if not ending.all_nan:
+    if not ending.all_nan and REFUSED_STEP not in ending.message:
         return CaseOutcome(case, WRONG, f"refused, but values can still be read: {ending.message}")
     if not case.may_be_refused and (case.expected_message is None or case.expected_message not in ending.message):
         return CaseOutcome(case, WRONG, f"refused: {ending.message}")
