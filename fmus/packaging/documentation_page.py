@@ -27,7 +27,7 @@ CAPABILITIES = """\
 | FMI | 2.0 | 2.0 | 3.0 |
 | co-simulation; save, restore and serialize the state | yes | yes | yes |
 | model exchange: event indicators, time events, nominals | | yes | yes |
-| directional derivatives | | yes | yes, adjoint too |
+| partial derivatives, by start values and parameters too | | yes | yes, adjoint too |
 | derivatives of outputs (order 1) | | yes | yes |
 | derivatives of inputs up to order 8 | | yes | |
 | event mode, early return at stick and slip | | | yes |

@@ -6,13 +6,14 @@ Functions that do not depend on the FMI version are shared with model_descriptio
 
 from datetime import datetime
 from math import isfinite
-from typing import Any, cast
+from typing import Any
 from uuid import NAMESPACE_OID, uuid5
 from xml.etree.ElementTree import Element, SubElement, tostring
 
 from ..runtime.variable_access import SETTABLE_CAUSALITIES
-from ..runtime.variable_declarations import Output, VariableDeclaration, VariableOwner
+from ..runtime.variable_declarations import VariableDeclaration, VariableOwner
 from . import __version__, fmi_variables
+from .dependencies import output_dependencies
 from .fmi_variables import (
     DERIVATIVE_NAME,
     TIME,
@@ -22,7 +23,6 @@ from .fmi_variables import (
     event_indicator_indices,
     model_exchange_instance,
 )
-from .initial_dependencies import initial_dependencies
 from .units import UNITS, Unit, unit_of
 from .xml_output import xml_bytes
 
@@ -214,45 +214,41 @@ def mark_states(elements: list[Element], thing: Any, rates: dict[int, int], firs
         elements[list(rates.values())[list(thing.states).index(slip)]].set("reinit", "true")
 
 
-def continuous_dependencies(declared: Variables, rates: dict[int, int], place: int) -> list[int]:
-    """Return the indices of the states and inputs that an output or derivative depends on between events.
-
-    A state depends on itself, and the rate of a driver on no state or input.
-    """
-    name, meaning = declared[place]
-    states = list(rates.values())
-    inputs = [other for other, (_, known) in enumerate(declared) if known.causality == "input"]
-    if place in states:
-        return [place]
-    if name.startswith(DERIVATIVE_NAME[:4]):
-        return []
-    return states + inputs * cast(Output, meaning).direct
-
-
 DependencyTable = dict[int, list[int]]  # index of a variable -> indices of the variables that it depends on
 
 
-def dependency_tables(model: type[VariableOwner], declared: Variables, rates: dict[int, int]) -> list[DependencyTable]:
-    """Return the dependencies of outputs and of derivatives between events, and of both at initialization.
+def dependency_tables(
+    model: type[VariableOwner], declared: Variables, rates: dict[int, int], causalities: tuple[str, ...]
+) -> list[DependencyTable]:
+    """Return the dependencies of outputs and of derivatives after initialization, and of both at initialization.
 
     Without the last table importers must assume dependence on everything and find algebraic loops that do not exist.
+
+    Parameters
+    ----------
+    causalities
+        Those of the knowns after initialization, besides the states: inputs (FMI 2.0, section 2.2.8), in FMI 3.0 also
+        parameters (section 2.4.8).
     """
     places = {name: place for place, (name, _) in enumerate(declared)}
     outputs = [place for place, (_, meaning) in enumerate(declared) if meaning.causality == "output"]
-    known = initial_dependencies(model, declared) | {
-        DERIVATIVE_NAME.format(name): [one.rate] for name, one in declared if one.rate
-    }
-    at_first = {place: [places[one] for one in known[declared[place][0]]] for place in sorted({*outputs, *rates})}
-    between = [
-        {place: continuous_dependencies(declared, rates, place) for place in unknown} for unknown in (outputs, rates)
-    ]
-    return [*between, at_first]
+    driver_rates = {DERIVATIVE_NAME.format(name): [one.rate] for name, one in declared if one.rate}
+    later_knowns = {place for place, (_, meaning) in enumerate(declared) if meaning.causality in causalities}
+    tables = []
+    for unknowns, at_start, knowns in (
+        (outputs, False, later_knowns.union(rates.values())),
+        (rates, False, later_knowns.union(rates.values())),
+        (sorted({*outputs, *rates}), True, {*places.values()}),
+    ):
+        names = output_dependencies(model, declared, at_start) | driver_rates
+        tables.append({one: sorted({places[n] for n in names[declared[one][0]]} & knowns) for one in unknowns})
+    return tables
 
 
 def _add_structure(root: Element, model: type[VariableOwner], declared: Variables, rates: dict[int, int]) -> None:
     """Add ModelStructure: Outputs, Derivatives and InitialUnknowns with their dependencies."""
     structure = SubElement(root, "ModelStructure")
-    outputs, derivatives, at_first = dependency_tables(model, declared, rates)
+    outputs, derivatives, at_first = dependency_tables(model, declared, rates, ("input",))
     kinds = {"Outputs": outputs} | ({"Derivatives": derivatives} if rates else {}) | {"InitialUnknowns": at_first}
     for kind, unknown in kinds.items():
         element = SubElement(structure, kind)

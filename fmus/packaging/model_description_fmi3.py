@@ -3,10 +3,12 @@
 Declared variables keep their value references of FMI 2.0; the variables of fmi_variables.py follow.
 """
 
+from collections.abc import Sequence
 from datetime import datetime
 from typing import Any
 from xml.etree.ElementTree import Element, SubElement
 
+from ..runtime.variable_access import SETTABLE_CAUSALITIES
 from ..runtime.variable_declarations import VariableOwner
 from . import model_description as shared
 from .fmi_variables import (
@@ -79,14 +81,15 @@ def _add_structure(
 ) -> None:
     """Add ModelStructure with all dependencies; for smooth models also dependenciesKind constant or tunable."""
     structure, states = SubElement(root, "ModelStructure"), list(rates.values())
-    outputs, derivatives, at_first = shared.dependency_tables(model, declared, rates)
+    outputs, derivatives, at_first = shared.dependency_tables(model, declared, rates, SETTABLE_CAUSALITIES)
     for place, known in outputs.items():
         _add_unknown(structure, "Output", place, known)
     for place, known in derivatives.items():
         kind_of_factors = (
             "" if thing.has_dry_friction else "constant" if place in states else "tunable" if thing.is_linear else ""
         )
-        _add_unknown(structure, "ContinuousStateDerivative", place, known, kind_of_factors)
+        kinds = ["dependent" if declared[one][1].causality == "parameter" else kind_of_factors for one in known]
+        _add_unknown(structure, "ContinuousStateDerivative", place, known, kinds if kind_of_factors else [])
     for place, known in at_first.items():
         _add_unknown(structure, "InitialUnknown", place, known)
     places = {name: place for place, (name, _) in enumerate(declared)}
@@ -102,9 +105,7 @@ def _add_structure(
         _add_unknown(structure, "EventIndicator", place, known if name.startswith(TO_REST) else known + inputs)
 
 
-def _add_unknown(structure: Element, kind: str, reference: int, known: list[int], factors: str = "") -> None:
-    """Add an unknown with its dependencies and, if given, their kind."""
+def _add_unknown(structure: Element, kind: str, reference: int, known: list[int], factors: Sequence[str] = ()) -> None:
+    """Add an unknown with its dependencies and, if given, their kinds."""
     attributes = {"valueReference": str(reference), "dependencies": " ".join(map(str, known))}
-    SubElement(
-        structure, kind, attributes | ({"dependenciesKind": " ".join([factors] * len(known))} if factors else {})
-    )
+    SubElement(structure, kind, attributes | ({"dependenciesKind": " ".join(factors)} if factors else {}))

@@ -56,8 +56,8 @@ CALL_MESSAGES = {
     codes.BUFFER_TOO_SMALL: "{function} is refused: the buffer is too small for a state",
     codes.WRONG_TOKEN: "{function} is refused: the GUID or instantiation token must be {word}, as in "
     "modelDescription.xml",
-    codes.NO_PARTIAL_DERIVATIVE: "{function} is refused: value reference {reference} is neither a state nor an input "
-    "nor a variable that depends on them",
+    codes.NO_PARTIAL_DERIVATIVE: "{function} is refused: value reference {reference} has no such partial derivative; "
+    "knowns are Real states, inputs and parameters, unknowns are Real outputs and derivatives",
     codes.NO_OUTPUT_DERIVATIVE: "{function} is refused: value reference {reference} has no such derivative; outputs "
     "have derivatives of order 1",
     codes.NO_INPUT_DERIVATIVE: "{function} is refused: value reference {reference} accepts no such derivative; an "

@@ -1,4 +1,4 @@
-"""Initial dependencies in the model descriptions: which outputs depend on which parameters and inputs.
+"""Dependencies in the model descriptions: which outputs depend on which parameters and inputs.
 
 The build derives them from the equations; this test measures them on the built FMUs.
 """
@@ -9,10 +9,12 @@ from xml.etree import ElementTree
 from zipfile import ZipFile
 
 import fmi3_fixtures
+import fmpy
 import pytest
+from fmi3_as_fmi2 import Slave
 from models import MODELS, ROOT, declared, model_class, outputs, push
 
-from fmus.packaging.initial_dependencies import initial_dependencies
+from fmus.packaging.dependencies import output_dependencies
 from fmus.packaging.lowering import lowered_model
 from fmus.runtime.variable_declarations import variables
 
@@ -90,6 +92,48 @@ def test_initial_dependencies_are_exactly_as_declared(worker, fmus, at_the_start
 
 
 @EVERY_MODEL
+def test_fmi3_outputs_depend_on_exactly_the_declared_parameters_after_initialisation(tmp_path, name):
+    """As above, at a communication point. Laws are fixed then; FMI 2.0 declares no dependencies on parameters."""
+    path, draw = fmi3_fixtures.build_fmi3_fmus() / f"{name}.fmu", random.Random(name)
+    description, folder = fmpy.read_model_description(path), str(fmpy.extract(path, tmp_path))
+    fmu = Slave(guid=description.guid, modelIdentifier=name, unzipDirectory=folder, instanceName=name)
+    fmu.instantiate()
+    names, references = list(declared(name)), {v: i for i, v in enumerate(declared(name))}
+    knowns = [v for v, d in declared(name).items() if d.causality in ("parameter", "input")]
+    changed = [v for v in knowns if declared(name)[v].variability != "fixed"]
+    declared_dependencies = {
+        v: {names[one] for one in (k.valueReference for k in unknown.dependencies) if names[one] in changed}
+        for unknown in description.outputs
+        for v in [unknown.variable.name]
+    }
+    reals = [references[v] for v in declared_dependencies if declared(name)[v].type == "Real"]
+    modes = [references[v] for v in declared_dependencies if declared(name)[v].type != "Real"]
+    responses = {v: set() for v in declared_dependencies}
+    for _ in range(SITUATIONS):
+        values = situation(name, knowns, draw)
+        fmu.reset()
+        for v, value in values.items():
+            (fmu.setReal if declared(name)[v].type == "Real" else fmu.setInteger)([references[v]], [value])
+        fmu.setupExperiment()
+        fmu.enterInitializationMode()
+        before = [*fmu.getReal(reals), *fmu.getInteger(modes)]
+        if not all(map(isfinite, before)):
+            continue  # the values are inconsistent
+        fmu.exitInitializationMode()
+        state = fmu.getFMUstate()
+        for v in changed:
+            fmu.setFMUstate(state)
+            fmu.setReal([references[v]], [some(name, v, draw)])
+            after = [*fmu.getReal(reals), *fmu.getInteger(modes)]
+            if all(map(isfinite, after)):
+                for output, old, new in zip([*reals, *modes], before, after, strict=True):
+                    responses[names[output]] |= {v} if old != new else set()
+        fmu.freeFMUstate(state)
+    fmu.freeInstance()
+    assert responses == declared_dependencies
+
+
+@EVERY_MODEL
 def test_initial_feedthrough_implies_permanent_feedthrough(fmus, at_the_start, name):
     """Two FMUs coupled by such outputs never form an algebraic loop."""
     entry = push(name)[0]
@@ -115,6 +159,6 @@ def test_rare_dependencies_are_declared_too(tmp_path):
     more = '    depth = Output("1", "how far beyond the gap", choose(x > gap, log(x / gap), 0.0))\n'
     (tmp_path / "bumper.py").write_text(text + more, encoding="utf-8")
     model = lowered_model(tmp_path / "bumper.py")
-    dependencies = initial_dependencies(model, variables(model()))
+    dependencies = output_dependencies(model, variables(model()), at_start=True)
     assert {"gap", "s"} <= set(dependencies["a"])
     assert dependencies["depth"] == ["gap"]

@@ -47,7 +47,7 @@ CAPABILITIES = {  # names as they begin in the model descriptions of both versio
     "FMI": (".", "fmiVersion"),
     "co-simulation; save, restore and serialize the state": ("CoSimulation", "canSerializeFMU"),
     "model exchange: event indicators, time events, nominals": ("ModelExchange", "modelIdentifier"),
-    "directional derivatives": ("CoSimulation", "providesDirectional"),
+    "partial derivatives, by start values and parameters too": ("CoSimulation", "providesDirectional"),
     "derivatives of outputs (order 1)": ("CoSimulation", "maxOutputDerivativeOrder"),
     "derivatives of inputs up to order 8": (
         "CoSimulation",

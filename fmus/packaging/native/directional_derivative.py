@@ -1,8 +1,14 @@
-"""Directional derivatives: differentiates a model's `compute_outputs` statement by statement (forward mode).
+"""Directional derivatives: differentiates three functions of a model statement by statement (forward mode).
 
-For every calculated number z the generated function calculates its tangent _d_z, the change of z when states, driver
-and inputs change in a given direction. It takes the same branches as `compute_outputs`. Where friction sticks, the
-force equals the load, and their tangents are equal as well.
+For every calculated number z a generated function calculates its tangent _d_z, the change of z when states, driver,
+inputs and parameters change in a given direction:
+
+    propagate_start_tangent     of the states at the start, from initial_state: by parameters
+    propagate_constant_tangent  of the constants that prepare calculates: by parameters
+    propagate_tangent           of outputs and derivatives, from compute_outputs: by states, driver, inputs, parameters
+
+They take the same branches as the functions of the model. Where friction sticks, the force equals the load, and their
+tangents are equal as well.
 
 References
 ----------
@@ -12,6 +18,8 @@ A. Griewank, A. Walther, Evaluating Derivatives, chapter 3.
 import ast
 import math
 import sys
+from collections.abc import Iterable, Sequence
+from itertools import count
 from math import fabs
 from types import FunctionType
 from typing import Any
@@ -19,7 +27,7 @@ from typing import Any
 from ...runtime.variable_declarations import VariableOwner
 from ..equations.expression_printer import ExpressionPrinter
 from ..equations.expressions import FUNCTIONS, Expression, Term
-from ..fmi_variables import Variables
+from ..fmi_variables import DERIVATIVE_NAME, Variables
 from ..lowering import function_tree
 from ..lowering.import_hook import TREE_NAME, scalar_name
 
@@ -29,81 +37,190 @@ ARGUMENT = Expression()
 
 
 class Tangent:
-    """A direction and the resulting changes: one float per variable with a tangent."""
+    """A direction and the resulting changes: one float per variable with a tangent, and per constant of prepare."""
 
 
 def tangent_fields(declared: Variables) -> dict[str, str]:
     """Return the attribute of Tangent for each variable that has one."""
-    fields = {name: name for name, meaning in declared if "." not in name and has_tangent(meaning)}
-    return fields | {name: f"_rate_{number}" for number, (name, _) in enumerate(declared) if name.startswith("der(")}
+    fields = {name: name if name.isidentifier() else f"_{n}" for n, (name, _) in enumerate(declared)}
+    return {name: fields[name] for name, meaning in declared if has_tangent(name, meaning)}
 
 
-def has_tangent(meaning: Any) -> bool:
-    """Check whether a declared variable has a derivative: a Real input or output."""
-    return meaning.type == "Real" and meaning.causality in ("input", "output")
+def has_tangent(name: str, meaning: Any) -> bool:
+    """Check whether a declared variable has a derivative or others have one by it."""
+    is_real = meaning.type == "Real" and meaning.causality in ("input", "output", "parameter")
+    return is_real or name.startswith(DERIVATIVE_NAME[:4])
 
 
-def build_tangent_function(
+def build_tangent_functions(
     model: type[VariableOwner], instance: Any, declared: Variables
-) -> tuple[Tangent, FunctionType]:
-    """Build the function propagate_tangent(self, _tangent), and an empty Tangent to pass to it.
+) -> tuple[Tangent, dict[str, FunctionType]]:
+    """Build the functions, by name, and an empty Tangent to pass to them.
 
     `instance` is an object of the model for model exchange.
     """
-    tangent = Tangent()
-    for field in tangent_fields(declared).values():
-        setattr(tangent, field, 0.0)
-    observe: Any = model.__dict__["compute_outputs"]
-    tree = function_tree(observe)
     writer = TangentWriter(instance, declared)
-    known = {"t": "t"} | {name: scalar_name(instance, name) for name in (*instance.states, *instance.contacts)}
-    begin = [f"{name} = self.solver.{number}" for name, number in known.items()]
-    begin += [f"{PREFIX}{name} = {TANGENT}.{name}" for name in instance.states]
-    body = [ast.parse(line).body[0] for line in begin] + writer.differentiate(tree.body)
-    text = ast.unparse(ast.fix_missing_locations(ast.Module([function_around(body)], [])))
+    start, prepare, outputs = (
+        function_tree(model.__dict__[name]).body for name in ("initial_state", "prepare", "compute_outputs")
+    )
+    read = {node.attr for statement in outputs for node in ast.walk(statement) if isinstance(node, ast.Attribute)}
+    constants = [name for name in assigned_attributes(prepare) if name in read]
+    point = {"t": "t"} | {name: scalar_name(instance, name) for name in (*instance.states, *instance.contacts)}
+    begin = parse_statements(f"{name} = self.solver.{number}" for name, number in point.items())
+    bodies = {
+        "propagate_start_tangent": begin + writer.differentiate_start(start),
+        "propagate_constant_tangent": writer.differentiate_constants(prepare, constants),
+        "propagate_tangent": begin + writer.differentiate_outputs(outputs),
+    }
     module = sys.modules[model.__module__]
-    names = vars(math) | vars(module) | {threshold_tangent.__name__: threshold_tangent, TREE_NAME: ast.parse(text)}
-    exec(compile(text, module.__file__ or "?", "exec", optimize=0), names)
-    return tangent, names["propagate_tangent"]
+    names = vars(math) | vars(module) | {threshold_tangent.__name__: threshold_tangent}
+    functions = {}
+    for name, body in bodies.items():
+        text = ast.unparse(ast.fix_missing_locations(ast.Module([function_around(name, body)], [])))
+        own_names = names | {TREE_NAME: ast.parse(text)}
+        exec(compile(text, module.__file__ or "?", "exec", optimize=0), own_names)
+        functions[name] = own_names[name]
+    tangent = Tangent()
+    for field in (*tangent_fields(declared).values(), *constants):
+        setattr(tangent, field, 0.0)
+    return tangent, functions
 
 
-def function_around(body: list[ast.stmt]) -> ast.FunctionDef:
-    """Wrap statements in the function."""
-    function = ast.parse(
-        f'def propagate_tangent(self, {TANGENT}):\n    """Calculate the directional derivative."""'
-    ).body[0]
+def function_around(name: str, body: list[ast.stmt]) -> ast.FunctionDef:
+    """Wrap statements in a function."""
+    function = ast.parse(f'def {name}(self, {TANGENT}):\n    """Calculate the directional derivative."""').body[0]
     assert isinstance(function, ast.FunctionDef)
-    function.body += body
+    function.body += remove_unused(body)
     return function
 
 
+def assigned_attributes(statements: list[ast.stmt]) -> list[str]:
+    """Return the attributes of self that statements assign, in order of their first assignment."""
+    targets = [
+        target
+        for statement in statements
+        for node in ast.walk(statement)
+        if isinstance(node, ast.Assign)
+        for target in node.targets
+    ]
+    return list(dict.fromkeys(target.attr for target in targets if isinstance(target, ast.Attribute)))
+
+
+def remove_unused(statements: list[ast.stmt]) -> list[ast.stmt]:
+    """Remove assignments to local variables that nothing reads, and conditions without statements."""
+    while True:
+        parts = [node for statement in statements for node in ast.walk(statement)]
+        read = {node.id for node in parts if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load)}
+        fewer = keep_used(statements, read)
+        if len([node for statement in fewer for node in ast.walk(statement)]) == len(parts):
+            return statements
+        statements = fewer
+
+
+def keep_used(statements: list[ast.stmt], read: set[str]) -> list[ast.stmt]:
+    """Return statements without assignments to names that are not among those read."""
+    result: list[ast.stmt] = []
+    for node in statements:
+        match node:
+            case ast.Assign(targets=[ast.Name(id=name)]) if name not in read:
+                continue
+            case ast.If():
+                body, orelse = keep_used(node.body, read), keep_used(node.orelse, read)
+                if body or orelse:
+                    result.append(ast.If(node.test, body or [ast.Pass()], orelse))
+            case _:
+                result.append(node)
+    return result
+
+
 class TangentWriter:
-    """Differentiates the statements of `compute_outputs`; each derivative comes before its statement."""
+    """Differentiates the statements of a function; each derivative comes before its statement."""
 
     def __init__(self, instance: Any, declared: Variables) -> None:
-        inputs = [name for name, meaning in declared if meaning.causality == "input"]
-        drivers = [name for name, meaning in declared if meaning.rate]
-        self.seeds = {attribute: name for name in inputs for attribute in (name, f"{name}_polynomial")}
-        self.seeds |= dict(zip(["x_base"] * len(drivers), drivers, strict=True))
-        self.outputs = {name for name, meaning in declared if has_tangent(meaning)}
-        self.with_tangent = set(instance.states)  # local variables with a tangent
-        self.without_tangent = set(instance.contacts)  # local variables without one
+        fields = tangent_fields(declared)
+        self.states, self.contacts = list(instance.states), list(instance.contacts)
+        self.drivers = [name for name, meaning in declared if meaning.rate]
+        self.outputs: dict[str, str] = {}  # attribute -> tangent that a function calculates
+        self.seeds: dict[str, str] = {}  # attribute -> tangent that is given
+        for name, meaning in declared:
+            if meaning.causality == "output" and name in fields and meaning.role != "state":
+                self.outputs[name] = name
+            elif meaning.causality in ("input", "parameter") and name in fields:
+                self.seeds |= dict.fromkeys((name, f"{name}_polynomial"), fields[name])
+        self.driver_rates = {fields[DERIVATIVE_NAME.format(name)]: d.rate for name, d in declared if d.rate}
+        self.with_tangent: set[str] = set()  # local variables with a tangent
+        self.temporaries = count(1)
+        self.pending: list[ast.stmt] = []  # statements that the next assignment needs
 
-    def differentiate(self, statements: list[ast.stmt]) -> list[ast.stmt]:
-        """Return statements and their derivatives."""
-        result: list[ast.stmt] = []
+    def differentiate_start(self, statements: list[ast.stmt]) -> list[ast.stmt]:
+        """Return statements that add the changes of the states at the start to their tangents."""
+        return self.differentiate(statements, {}, self.states)
+
+    def differentiate_constants(self, statements: list[ast.stmt], constants: list[str]) -> list[ast.stmt]:
+        """Return the derivatives of some constants, by which the outputs are differentiated then."""
+        self.seeds |= {name: name for name in constants}
+        return self.differentiate(statements, {name: name for name in constants})
+
+    def differentiate_outputs(self, statements: list[ast.stmt]) -> list[ast.stmt]:
+        """Return the derivatives of the outputs and of the rate of the driver."""
+        begin = [f"{PREFIX}{name} = {TANGENT}.{name}" for name in self.states]
+        end = [f"{TANGENT}.{field} = {TANGENT}.{rate}" for field, rate in self.driver_rates.items()]
+        self.with_tangent |= {*self.states}
+        return parse_statements(begin) + self.differentiate(statements, self.outputs) + parse_statements(end)
+
+    def differentiate(
+        self, statements: list[ast.stmt], results: dict[str, str], returned: Sequence[str] = ()
+    ) -> list[ast.stmt]:
+        """Return statements and their derivatives.
+
+        Parameters
+        ----------
+        statements
+            Body of a function, or a part of it.
+        results
+            Attributes whose tangents are calculated, and the names of these tangents.
+        returned
+            Tangents to which the changes of the returned values are added.
+        """
+        lines: list[ast.stmt] = []
         for node in statements:
             match node:
-                case ast.Assign(targets=[ast.Name(id=name)], value=value) if name not in self.without_tangent:
-                    result += [self.assignment(f"{PREFIX}{name}", self.tangent_of(value)), node]
+                case ast.Assign(targets=[ast.Name(id=name)]) if name in self.drivers:  # a state of the importer
+                    lines += [self.assignment(f"{PREFIX}{name}", parse_expression(f"{TANGENT}.{name}")), node]
+                    self.with_tangent.add(name)
+                case ast.Assign(targets=[ast.Name(id=name)], value=value) if name not in self.contacts:
+                    lines += [*self.assign_tangent(f"{PREFIX}{name}", value), node]
                     self.with_tangent.add(name)
                 case ast.Assign(targets=[ast.Name()]):
-                    result.append(node)
-                case ast.Assign(targets=[ast.Attribute(attr=name)], value=value) if name in self.outputs:
-                    result.append(self.assignment(f"{TANGENT}.{name}", self.tangent_of(value)))
+                    lines.append(node)
+                case ast.Assign(targets=[ast.Attribute(attr=name)], value=value) if name in results:
+                    lines += self.assign_tangent(f"{TANGENT}.{results[name]}", value)
                 case ast.If():
-                    result.append(ast.If(node.test, self.differentiate(node.body), self.differentiate(node.orelse)))
-        return result
+                    branches = (self.differentiate(part, results, returned) for part in (node.body, node.orelse))
+                    lines.append(ast.If(node.test, *branches))
+                case ast.Return(value=value) if returned and value is not None:
+                    starts = value.elts if isinstance(value, ast.Tuple) else [value]
+                    for name, start in zip(returned, starts, strict=True):
+                        lines += self.assign_tangent(f"{TANGENT}.{name}", start, parse_expression(f"{TANGENT}.{name}"))
+                    lines.append(ast.Return())
+        return lines
+
+    def assign_tangent(self, target: str, value: ast.expr, before: ast.expr | None = None) -> list[ast.stmt]:
+        """Return the statements that assign the tangent of a value, added to the one before."""
+        tangent = add_terms(before, self.tangent_of(value))
+        lines, self.pending = [*self.pending, self.assignment(target, tangent)], []
+        return lines
+
+    def function_tangent(self, name: str, argument: ast.expr) -> ast.expr | None:
+        """Return the tangent of a function; zero if its argument does not change, even where its slope is infinite."""
+        change, slope = self.tangent_of(argument), derivative_factor(name, source_of(argument))
+        if change is None:
+            return None
+        if not isinstance(change, (ast.Name, ast.Attribute)):
+            local = f"{PREFIX}{next(self.temporaries)}"
+            self.pending.append(self.assignment(local, change))
+            change = ast.Name(local)
+        return parse_expression(f"({slope}) * {source_of(change)} if {source_of(change)} != 0.0 else 0.0")
 
     @staticmethod
     def assignment(target: str, value: ast.expr | None) -> ast.stmt:
@@ -134,7 +251,7 @@ class TangentWriter:
                     f"threshold_tangent({', '.join(map(source_of, (v, eps, load, hold)))}, {', '.join(changes)})"
                 )
             case ast.Call(func=ast.Name(id=name), args=[a]) if name in FUNCTIONS:
-                return multiply_terms(parse_expression(derivative_factor(name, source_of(a))), self.tangent_of(a))
+                return self.function_tangent(name, a)
         return None
 
     def binary_tangent(self, e: ast.expr, a: ast.expr, op: ast.operator, b: ast.expr) -> ast.expr | None:
@@ -164,6 +281,11 @@ def threshold_tangent(v, eps, load, hold, d_load, d_slide, d_hold):  # type: ign
     if fabs(v) >= eps:
         return d_slide if v > 0.0 else -d_slide
     return d_hold if load > hold else -d_hold if load < -hold else d_load
+
+
+def parse_statements(lines: Iterable[str]) -> list[ast.stmt]:
+    """Parse lines of source."""
+    return ast.parse("\n".join(lines)).body
 
 
 def parse_expression(text: str) -> ast.expr:

@@ -395,7 +395,7 @@ fmi3Status fmi3GetAdjointDerivative(fmi3Instance instance, const fmi3ValueRefere
     for (size_t j = 0; j < nKnowns; j++) {
         struct Tangent tangent = {0};
         *tangent_value(&tangent, knowns[j]) = 1.0;
-        fmi3Status status = evaluate_tangent(self, &tangent);
+        fmi3Status status = evaluate_tangent(self, &tangent, variables[knowns[j]].is_real_parameter);
         sensitivity[j] = status ? NAN : 0.0;
         for (size_t i = 0; i < nUnknowns; i++) sensitivity[j] += seed[i] * *tangent_value(&tangent, unknowns[i]);
         if (status) return status;

@@ -371,7 +371,7 @@ static double *tangent_value(struct Tangent *tangent, uint32_t reference)
     return (double *)((char *)tangent + variables[reference].tangent_offset);
 }
 
-/* Refuse a call unless all knowns are states or inputs and all unknowns depend on them. */
+/* Refuse a call unless all knowns are states, inputs or parameters and all unknowns depend on them. */
 static Status check_derivative_references(const Instance *self, const uint32_t unknowns[], size_t n,
                                           const uint32_t knowns[], size_t m, const double *seed,
                                           const double *sensitivity, const char *function)
@@ -383,20 +383,25 @@ static Status check_derivative_references(const Instance *self, const uint32_t u
         uint32_t reference = i < n ? unknowns[i] : knowns[i - n];
         const Variable *variable = reference < VARIABLES ? &variables[reference] : NULL;
         if (!variable || variable->tangent_offset == NO_OFFSET ||
-            !(i < n ? variable->is_calculated : variable->is_state_or_input)) {
+            !(i < n ? variable->is_calculated : variable->is_state_or_input || variable->is_real_parameter)) {
             return refuse_call(self, NO_PARTIAL_DERIVATIVE, &(Call){.function = function, .reference = reference});
         }
     }
     return STATUS_OK;
 }
 
-/* Calculate the directional derivative at the current point. Returns STATUS_DISCARD if values are missing. */
-static Status evaluate_tangent(Instance *self, struct Tangent *tangent)
+/* Calculate the directional derivative at the current point. Until initialisation ends, the states depend on the
+ * parameters. Returns STATUS_DISCARD if values are missing. */
+static Status evaluate_tangent(Instance *self, struct Tangent *tangent, bool along_parameters)
 {
     State *state = &self->state;
     bool fault = false;
     int64_t status = model_exchange_prepare(&state->run, &state->model, &fault);
     if (status != OK && state->run.phase >= RUNNING) return fail_run(self, status, NAN, NAN);
+    if (status == OK && along_parameters) {
+        if (state->run.phase < RUNNING) propagate_start_tangent(&state->model, tangent, &fault);
+        propagate_constant_tangent(&state->model, tangent, &fault);
+    }
     if (status == OK && !fault) propagate_tangent(&state->model, tangent, &fault);
     return status == OK && !fault ? STATUS_OK : STATUS_DISCARD;
 }
@@ -434,9 +439,13 @@ static Status get_directional_derivative(Instance *self, const uint32_t unknowns
                                          size_t m, const double seed[], double sensitivity[], const char *function)
 {
     struct Tangent tangent = {0};
+    bool along_parameters = false;
     if (check_derivative_references(self, unknowns, n, knowns, m, seed, sensitivity, function)) return STATUS_ERROR;
-    for (size_t j = 0; j < m; j++) *tangent_value(&tangent, knowns[j]) += seed[j];
-    Status status = evaluate_tangent(self, &tangent);
+    for (size_t j = 0; j < m; j++) {
+        *tangent_value(&tangent, knowns[j]) += seed[j];
+        along_parameters |= variables[knowns[j]].is_real_parameter;
+    }
+    Status status = evaluate_tangent(self, &tangent, along_parameters);
     for (size_t i = 0; i < n; i++) sensitivity[i] = status ? NAN : *tangent_value(&tangent, unknowns[i]);
     return status;
 }

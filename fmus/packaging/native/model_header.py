@@ -21,7 +21,7 @@ from ..lowering import sibling_module
 from ..reserved_names import c_comment, c_string_literal
 from .c_types import BOOL, FLOAT, INT, StructPointer, c_literal
 from .call_graph import CallGraph
-from .directional_derivative import Tangent, build_tangent_function, tangent_fields
+from .directional_derivative import Tangent, build_tangent_functions, tangent_fields
 from .entry_points import entry_point_types
 
 HEADER = """\
@@ -124,9 +124,10 @@ def render_model_header(model: type[VariableOwner], fmi: str) -> str:
     instance = model_exchange_instance(model)
     run = sibling_module(model, "runtime.call_sequence").RunState(instance.tolerance)
     declared = all_variables(instance)
-    tangent, propagate = build_tangent_function(model, instance, declared)
+    tangent, tangent_functions = build_tangent_functions(model, instance, declared)
     call_graph = CallGraph(instance, run, tangent)
-    call_graph.add_model_entry_point("propagate_tangent", propagate, StructPointer(Tangent))
+    for function_name, propagate in tangent_functions.items():
+        call_graph.add_model_entry_point(function_name, propagate, StructPointer(Tangent))
     for function, arg_types in entry_point_types(model, StructPointer(type(run)), call_graph.layout.model, fmi).items():
         call_graph.add_entry_point(function, arg_types)
     layout = call_graph.layout
@@ -199,6 +200,7 @@ def _variable_row(
         meaning.causality in CALCULATED_CAUSALITIES,
         "." in name,
         meaning.role == "state" or meaning.causality == "input",
+        meaning.type == "Real" and meaning.causality == "parameter",
     )
     bounds = (meaning.low, meaning.high, meaning.above, meaning.below)
     items = (

@@ -19,7 +19,8 @@ typedef struct {
     bool is_calculated, is_fixed;
     bool is_nan_after_failure;     /* reads NaN after the run has failed */
     bool is_updated_on_read;       /* solver and event statistics */
-    bool is_state_or_input;        /* allowed as a known in directional derivatives */
+    bool is_state_or_input;
+    bool is_real_parameter;        /* others have partial derivatives by it, as by states and inputs */
     /* Of an input that can be interpolated, in Model: its time derivative, the order of its polynomial and the
      * polynomial's derivatives; otherwise NO_OFFSET. */
     size_t rate_offset, order_offset, derivatives_offset;

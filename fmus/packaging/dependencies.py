@@ -1,4 +1,4 @@
-"""Dependencies of outputs at initialization: parameters and inputs in each equation after inserting start values.
+"""Dependencies of outputs on parameters, inputs and states, from the equations.
 
 The mode of a contact depends on its slip and, if it can stick, on its load, its holding limit and the rates of both,
 which decide ties.  For contacts that share bodies it depends on those of all these contacts.
@@ -13,8 +13,11 @@ from .equations.model_declaration import HYBRID, SIGN, THRESHOLD, Contact
 from .fmi_variables import Variables
 
 
-def initial_dependencies(model: type[VariableOwner], declared: Variables) -> dict[str, list[str]]:
-    """Return for every output the parameters and inputs that it depends on at initialization."""
+def output_dependencies(model: type[VariableOwner], declared: Variables, at_start: bool) -> dict[str, list[str]]:
+    """Return for every output the variables that it depends on: parameters, inputs, and states unless `at_start`.
+
+    At the start the states have the values of parameters.
+    """
     outputs = [name for name, meaning in declared if meaning.causality == "output"]
     if not outputs:
         return {}
@@ -25,9 +28,10 @@ def initial_dependencies(model: type[VariableOwner], declared: Variables) -> dic
         **dict.fromkeys(an.drivers, 0.0),
         **{s: s.start_expression for s in an.states},
     }
+    values = start if at_start else {}
 
     def among(*terms: Operand) -> set[Expression]:
-        return {leaf for e in terms for leaf in variables_in(substitute(e, start))}
+        return {leaf for e in terms for leaf in variables_in(substitute(e, values))}
 
     def of_mode(c: Contact) -> set[Expression]:
         contacts = [c] if c in an.independent_contacts else an.contacts
@@ -48,5 +52,6 @@ def initial_dependencies(model: type[VariableOwner], declared: Variables) -> dic
         return names | {"friction"} if contact_variables and laws[1:] else names
 
     equations = {e.name: follows(e) for e in an.declared if e.name in outputs}
-    known = [name for name, meaning in declared if meaning.causality in SETTABLE_CAUSALITIES]
-    return {output: [name for name in known if name in equations[output]] for output in outputs}
+    known = {name for name, meaning in declared if meaning.causality in SETTABLE_CAUSALITIES}
+    known |= set() if at_start else {name for name, meaning in declared if meaning.role == "state"}
+    return {output: [name for name, _ in declared if name in known & equations[output]] for output in outputs}
