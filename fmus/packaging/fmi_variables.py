@@ -6,6 +6,7 @@ They follow the declared variables, whose value references do not change.
 from copy import copy
 from typing import Any
 
+from ..runtime.codes import HYBRID
 from ..runtime.variable_declarations import Local, VariableDeclaration, VariableOwner, variables
 from .lowering import scalar_name, sibling_module
 
@@ -64,6 +65,11 @@ def name_contact(mode: VariableDeclaration, force: str) -> VariableDeclaration:
     named = copy(mode)
     named.text = f"mode of {force}: {mode.text}"
     return named
+
+
+def has_step_events(declared: Variables) -> bool:
+    """Return whether an importer must report its steps: friction laws without stick and slip change modes there."""
+    return any(value != HYBRID for name, meaning in declared if name == "friction" for _, value, _ in meaning.items)
 
 
 def integrated_states(declared: Variables) -> Variables:

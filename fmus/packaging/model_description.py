@@ -21,6 +21,7 @@ from .fmi_variables import (
     all_variables,
     derivative_indices,
     event_indicator_indices,
+    has_step_events,
     model_exchange_instance,
 )
 from .units import UNITS, Unit, unit_of
@@ -39,7 +40,6 @@ OUTPUT_DERIVATIVES = {"maxOutputDerivativeOrder": "1"}
 INPUT_INTERPOLATION = {"canInterpolateInputs": "true"}  # as polynomials
 EXCHANGE_CAPABILITIES = {  # for model exchange: the same without communication steps
     **{key: able for key, able in STEPPING_CAPABILITIES.items() if "Communication" not in key},
-    "completedIntegratorStepNotNeeded": "true",
     **DIRECTIONAL_DERIVATIVES,
 }
 EXPERIMENT_ATTRIBUTES = {"stopTime": "stop_time", "tolerance": "tolerance", "stepSize": "step_size"}
@@ -69,7 +69,8 @@ def describe(model: type[VariableOwner], name: str, code: str, date: datetime, e
     if exchanging:  # FMI 2.0 needs no time variable, and FMILibrary rejects one
         declared = [one for one in all_variables(thing) if one[0] != TIME]
         root.set("numberOfEventIndicators", str(len(event_indicator_indices(declared))))
-        SubElement(root, "ModelExchange", EXCHANGE_CAPABILITIES, modelIdentifier=name)
+        step_report = {} if has_step_events(declared) else {"completedIntegratorStepNotNeeded": "true"}
+        SubElement(root, "ModelExchange", EXCHANGE_CAPABILITIES | step_report, modelIdentifier=name)
     stepping = (
         STEPPING_CAPABILITIES
         | (DIRECTIONAL_DERIVATIVES | OUTPUT_DERIVATIVES if exchanging else {})

@@ -18,6 +18,7 @@ from .fmi_variables import (
     all_variables,
     derivative_indices,
     event_indicator_indices,
+    has_step_events,
     model_exchange_instance,
 )
 
@@ -30,7 +31,6 @@ COMMON_CAPABILITIES = {
     "providesDirectionalDerivatives": "true",
     "providesAdjointDerivatives": "true",
 }
-EXCHANGE_CAPABILITIES = {"needsCompletedIntegratorStep": "false"}
 STEPPING_CAPABILITIES = {
     "canHandleVariableCommunicationStepSize": "true",
     "hasEventMode": "true",
@@ -44,10 +44,11 @@ STEPPING_CAPABILITIES = {
 def describe(model: type[VariableOwner], name: str, code: str, date: datetime) -> bytes:
     """Return the FMI 3.0 model description of the FMU `name` as XML; the token is computed like the GUID of FMI 2.0."""
     root = shared.create_root(model, name, "3.0", "instantiationToken")
-    for interface, abilities in ("ModelExchange", EXCHANGE_CAPABILITIES), ("CoSimulation", STEPPING_CAPABILITIES):
-        SubElement(root, interface, {"modelIdentifier": name} | COMMON_CAPABILITIES | abilities)
     thing = model_exchange_instance(model)
     declared = all_variables(thing)
+    step_report = {"needsCompletedIntegratorStep": "true" if has_step_events(declared) else "false"}
+    for interface, abilities in ("ModelExchange", step_report), ("CoSimulation", STEPPING_CAPABILITIES):
+        SubElement(root, interface, {"modelIdentifier": name} | COMMON_CAPABILITIES | abilities)
     shared.add_units(root, declared)
     _add_types(root, declared)
     shared.add_log_categories_and_experiment(root, model, "fmi3")

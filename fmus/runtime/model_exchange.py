@@ -253,6 +253,10 @@ def handle_event(run, model):
         if update_modes(model, solver):
             exchange.states_changed = True
         exchange.t_next_event = next_breakaway(model, solver)
+    if model.has_other_laws and has_step_event(model):
+        solver.modes = model.law_modes(solver.t, solver.y)
+        solver.step.start_counters.n_events += 1
+        solver.step.start_counters.t_event = solver.t
     if model.has_conditions:
         conditions.check_limits(model, solver.t, solver.y, solver.modes)
         status = conditions.violation_status(model)
@@ -261,6 +265,18 @@ def handle_event(run, model):
     if model.has_dry_friction and not solver.step.has_consistent_modes:
         return NO_CONSISTENT_MODES
     return OK if sum_of(magnitude(solver.y)) < OVERFLOW_LIMIT else DIVERGED
+
+
+def has_step_event(model):
+    """Return whether a mode differs from that of a law without stick and slip, after a step of the importer's solver.
+
+    Such a law has no event indicators: where it chatters, a solver would find a zero of them in every step.
+    """
+    solver = model.solver
+    if model.has_other_laws and not solver.step.is_hybrid:
+        modes = model.law_modes(solver.t, solver.y)
+        return any_of(modes != solver.modes)
+    return False
 
 
 def update_modes(model, solver):

@@ -35,6 +35,7 @@ class Oscillator(VariableOwner):
     states: dict[str, str] = {"x": "v", "v": "a"}  # state -> its rate, which may be a state
     contacts: dict[str, str] = {}  # mode -> state that is the slip velocity of the contact
     has_dry_friction = False  # friction with modes (stick_slip.py)
+    has_other_laws = False  # friction laws without stick and slip: law_modes() is defined
     rests_when_stuck = False  # a single body: nothing moves while its contact sticks
     is_coupled = False  # a contact may stick while something moves (contact_lcp.py)
     has_variable_levers = False  # the lever of a contact force changes with the motion, and may vanish

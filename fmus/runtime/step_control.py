@@ -177,6 +177,8 @@ class InternalStep:
         else:
             status = self.advance_with_method(model)
         self.n_accepted += 1
+        if model.has_other_laws and not self.is_hybrid and status == OK:
+            self.update_law_modes(model)
         if model.has_conditions:
             conditions.select_sides(model, False)
         t = self.t0
@@ -204,6 +206,14 @@ class InternalStep:
             if status != OK and status != NEEDS_REPETITION:
                 break
         return status
+
+    def update_law_modes(self, model):
+        """Update the modes at t1 under a law without stick and slip, where a step ends without regard to them."""
+        self.modes1 = model.law_modes(self.t1, self.y1)
+        if any_of(self.modes1 != self.modes0):
+            self.event_at_end = True
+            if model.has_conditions:
+                phase_repetition.begin_phase(model, self)
 
     def count_event(self):
         """Count the change of mode at t1."""
@@ -441,6 +451,8 @@ class InternalStep:
     def update_end_modes(self, model, modes: ContactVector, tie_tolerance):
         """Determine the modes after t1, given the previous modes."""
         self.modes1, self.grazes_at_end, self.has_consistent_modes = STUCK, False, True
+        if model.has_other_laws and not self.is_hybrid:
+            self.modes1 = model.law_modes(self.t1, self.y1)
         if self.is_hybrid:
             if model.is_coupled:
                 self.y1, self.modes1, self.has_consistent_modes = model.resolve_at_start(

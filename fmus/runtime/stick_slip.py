@@ -22,7 +22,7 @@ from .vectors import (
 )
 
 HYBRID_LAW = ("hybrid", HYBRID, "stick and slip are modes; every change of mode is an event")
-SIGN_LAW = ("sign", SIGN, "sliding force times sign(v); no events, no sticking; chatters")
+SIGN_LAW = ("sign", SIGN, "sliding force times sign(v); no sticking; events are not located; chatters")
 THRESHOLD_LAW = ("threshold", THRESHOLD, "as sign, but friction balances the load below a small velocity; chatters")
 
 NO_CONSISTENT_MODES = FIRST_RULE + 2  # status: no modes satisfy the force balance (the second rule below)
@@ -49,6 +49,8 @@ class DryFriction(Oscillator):
         stick_load(t, states)           load on the contact at rest, its rate, and the holding limit
         load_magnitude(t, states)       sum of the absolute terms of the load, which scales its rounding error
         load_derivative(t, states, n)   n-th derivative of the load, if inputs have derivatives
+        law_modes(t, states)            direction of slip under the laws sign and threshold, if they are offered; the
+                                        forces of these laws do not depend on the modes
 
     At rest the load is linear in time, unless an input has a higher order.
     """

@@ -36,7 +36,7 @@ METHODS = (  # in addition to inherited ones
     *("initial_state", "rates", "jacobian", "applied_acceleration", "linear_coefficients"),
     *("stick_load", "load_magnitude", "compute_outputs"),
     *("applied_acceleration_derivative", "load_derivative", "set_input_rates", "has_higher_order"),
-    "update_conditions",
+    *("update_conditions", "law_modes"),
 )
 COUPLED_METHODS = ("slip_velocities", "slip_magnitudes", "contact_forces", "contact_rates", "apply_impulses")
 CLASSES = ("Solver", "Model", "Fmi3Slave")

@@ -18,7 +18,7 @@ from .expression_printer import INDENT
 from .generated_names import IMPORTS, MATH
 from .model_analysis import ModelAnalysis
 from .model_declaration import Contact, Fixed, Mode, Output, State, Variable
-from .output_method import observe_method
+from .output_method import law_modes_method, observe_method
 from .rate_methods import rate_methods
 from .setup_methods import setup_methods
 from .single_contact_methods import single_contact_methods
@@ -72,6 +72,7 @@ def model_source(an: ModelAnalysis, file: str) -> str:
                 *single_contact_methods(f),
                 *coupled_contact_methods(f),
                 *condition_methods(f),
+                *law_modes_method(f),
                 observe_method(f),
             ]
         ),
@@ -150,6 +151,7 @@ def class_attribute_lines(an: ModelAnalysis) -> list[str]:
         f"{word} = True"
         for word, holds in (
             ("is_linear", an.closed_form),
+            ("has_other_laws", an.laws[1:]),
             ("has_driver", an.drivers),
             ("has_input_derivatives", an.ramps),
             ("has_conditions", an.conditions),

@@ -58,17 +58,16 @@ def breakaway_method(f: CodegenContext, c: Contact) -> list[str]:
 
 
 def emit_friction_force(f: CodegenContext, s: ExpressionPrinter, c: Contact) -> None:
-    """Emit the friction force, and the mode under the selected law."""
-    load, mode, slip = f.an.load[c], c.mode.name, s.text(c.slip)
+    """Emit the friction force under the selected law."""
+    load, mode = f.an.load[c], c.mode.name
     stuck_force = s.local_variable(load) if isinstance(load, Term) else s.text(load)
     if THRESHOLD in c.laws:
-        with s.block(f"if {mode} != 0:"):
-            s.emit(f"{c.name} = {s.text(Term('*', c.mode, c.slide))}")
-        with s.block("elif self.friction == HYBRID:"):
-            s.emit(f"{c.name} = {stuck_force}")
-        with s.block("else:"):
+        with s.block("if self.friction != HYBRID:"):
             s.emit(f"{c.name} = {threshold_call(f, s, c)}")
-            s.emit(f"{mode} = sign({slip}) if fabs({slip}) >= {s.text(c.eps)} else 0")
+        with s.block(f"elif {mode} != 0:"):
+            s.emit(f"{c.name} = {s.text(Term('*', c.mode, c.slide))}")
+        with s.block("else:"):
+            s.emit(f"{c.name} = {stuck_force}")
     else:
         with s.block(f"if {mode} == 0{' and self.friction == HYBRID' if SIGN in c.laws else ''}:"):
             s.emit(f"{c.name} = {stuck_force}")

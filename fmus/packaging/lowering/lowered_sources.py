@@ -54,6 +54,7 @@ def model_layout(source: ModelFile, features: FeatureSelection, name_format: str
         )
     }
     flags["is_linear"] = EXACT in features.methods
+    flags["has_other_laws"] = any(law != "hybrid" for law in features.laws)
     states, contacts = (
         {name_format.format(name): other and name_format.format(other) for name, other in pairs.items()}
         for pairs in (model.states, model.contacts)

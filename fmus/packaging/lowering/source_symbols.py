@@ -26,6 +26,7 @@ class SourceSymbols:
             "kinematic_rates": [STATES],
             "apply_impulses": [STATES],
             "slip_velocities": [CONTACTS],
+            "law_modes": [CONTACTS],
             "slip_magnitudes": [CONTACTS],
             "contact_forces": [CONTACTS] * 3,
             "contact_rates": [CONTACTS] * 4,

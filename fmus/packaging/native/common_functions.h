@@ -50,7 +50,9 @@ Status FMI(CompletedIntegratorStep)(Handle instance, Boolean noSetFMUStatePriorT
     REQUIRE_ADDRESS(enterEventMode);
     REQUIRE_ADDRESS(terminateSimulation);
     (void)noSetFMUStatePriorToCurrentPoint;
-    *enterEventMode = *terminateSimulation = false;
+    bool fault = false;
+    *enterEventMode = model_exchange_has_step_event(&self->state.model, &fault);
+    *terminateSimulation = false;
     return STATUS_OK;
 }
 
