@@ -170,7 +170,7 @@ def test_a_value_set_since_the_last_event_restarts_the_solver(launch, name):
 
 
 @pytest.mark.parametrize(("name", "law"), [("coulomb", SIGN), ("pendulum", SIGN), ("stickslip", THRESHOLD)])
-def test_the_other_laws_have_no_events_and_no_method(launch, name, law):
+def test_the_other_laws_have_no_event_indicators_and_no_method(launch, name, law):
     values = {"friction": law}
     if any(value == EXACT for _, value, _ in declared(name)["solver.method"].items):
         values["solver.method"] = EXACT

@@ -14,6 +14,10 @@ from fmus.runtime.vectors import (
     velocity_indices,
 )
 
+CONTACT_RESULTS = (
+    *("slip_velocities", "slip_magnitudes", "contact_forces", "contact_rates", "apply_impulses", "law_modes"),
+)
+
 
 def to_array_model(model):
     """Return the model with all vectors stored as numpy arrays, as the vector form of the numerics expects.
@@ -46,6 +50,7 @@ def to_array_model(model):
         "compute_outputs",
         *(all_of_them if cls.is_coupled else ()),
         *(["update_conditions"] if cls.has_conditions else ()),
+        *(["law_modes"] if cls.has_other_laws else ()),
     ):
         about[name] = call_with_scalars(cls, name)
     for name in alone if modes and not cls.is_coupled else ():
@@ -87,7 +92,7 @@ def call_with_scalars(cls, name):
                 if is_dynamic[i]:
                     f_t[i], J[i] = next(result), [next(result) for _ in state_indices]
             return f_t, J
-        if name in ("slip_velocities", "slip_magnitudes", "contact_forces", "contact_rates", "apply_impulses"):
+        if name in CONTACT_RESULTS:
             result = np.array(result if isinstance(result, tuple) else (result,))
             parts = len(result) // (len(state_indices) if name == "apply_impulses" else len(contact_indices))
             return result if parts == 1 else np.split(result, parts)
