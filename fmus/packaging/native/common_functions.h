@@ -165,10 +165,12 @@ Status DESERIALIZE_FUNCTION(Handle instance, const Byte serializedState[], size_
 
 /* ---- functions that the FMU does not support, according to its model description */
 
-#define DEFINE_NOT_OFFERED(NAME, ...)                   \
-    Status FMI(NAME)(__VA_ARGS__)                       \
-    {                                                   \
-        REQUIRE_PHASE(instance, IN_ANY_PHASE);          \
+/* `unused` names the parameters after the instance, as ((void)a, (void)b). */
+#define DEFINE_NOT_OFFERED(NAME, unused, ...)             \
+    Status FMI(NAME)(__VA_ARGS__)                         \
+    {                                                     \
+        REQUIRE_PHASE(instance, IN_ANY_PHASE);            \
+        unused;                                           \
         return refuse(self, NOT_SUPPORTED, __func__, ""); \
     }
 

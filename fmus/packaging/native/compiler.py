@@ -20,10 +20,8 @@ LIBM = [function.__name__ for function in (*NEVER_RAISING, *MAY_RAISE) if functi
 BIT_EXACT = ("-O2", "-ffp-contract=off", *(f"-fno-builtin-{name}" for name in LIBM))
 # In the sources of large models, inlining takes half of the compile time and makes no run faster; it changes no bits.
 LARGE_SOURCE, LARGE_SOURCE_OPTIONS = 500_000, ("-fno-inline-functions",)  # characters in all files
-# Folded branches leave unused names behind.
-UNUSED_WARNINGS_OFF = ("-Wno-unused-parameter", "-Wno-unused-but-set-variable")
 FMI_HEADER_WARNINGS_OFF = ("-Wno-strict-prototypes",)  # the headers of FMI 3.0 declare functions without prototypes
-STRICT = ("-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror", *UNUSED_WARNINGS_OFF, *FMI_HEADER_WARNINGS_OFF)
+STRICT = ("-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror", *FMI_HEADER_WARNINGS_OFF)
 # Link only the libraries named explicitly: building the compiler's runtime takes longer than building the FMU.
 SHARED_LIBRARY = ("-shared", "-fPIC", "-fvisibility=hidden", "-nostdlib", "-Wl,-z,defs")
 

@@ -221,7 +221,7 @@ fmi2Status fmi2GetDirectionalDerivative(fmi2Component component, const fmi2Value
 
 /* ---- functions that this FMU does not support, according to its model description */
 
-DEFINE_NOT_OFFERED(CancelStep, Handle instance)
+DEFINE_NOT_OFFERED(CancelStep, (void)0, Handle instance)
 
 /* fmi2DoStep never returns fmi2Pending, so there is no status to report. */
 #define DEFINE_NO_STATUS(NAME, TYPE)                                                       \

@@ -416,28 +416,46 @@ fmi3Status fmi3GetOutputDerivatives(fmi3Instance instance, const fmi3ValueRefere
 
 typedef const fmi3ValueReference References[];
 
-DEFINE_NOT_OFFERED(EnterConfigurationMode, Handle instance)
-DEFINE_NOT_OFFERED(ExitConfigurationMode, Handle instance)
-DEFINE_NOT_OFFERED(GetNumberOfVariableDependencies, Handle instance, fmi3ValueReference valueReference,
-                   size_t *nDependencies)
-DEFINE_NOT_OFFERED(GetVariableDependencies, Handle instance, fmi3ValueReference dependent,
-                   size_t elementIndicesOfDependent[], fmi3ValueReference independents[],
-                   size_t elementIndicesOfIndependents[], fmi3DependencyKind dependencyKinds[], size_t nDependencies)
-DEFINE_NOT_OFFERED(GetIntervalDecimal, Handle instance, References valueReferences, size_t nValueReferences,
-                   fmi3Float64 intervals[], fmi3IntervalQualifier qualifiers[])
-DEFINE_NOT_OFFERED(GetIntervalFraction, Handle instance, References valueReferences, size_t nValueReferences,
-                   fmi3UInt64 counters[], fmi3UInt64 resolutions[], fmi3IntervalQualifier qualifiers[])
-DEFINE_NOT_OFFERED(GetShiftDecimal, Handle instance, References valueReferences, size_t nValueReferences,
-                   fmi3Float64 shifts[])
-DEFINE_NOT_OFFERED(GetShiftFraction, Handle instance, References valueReferences, size_t nValueReferences,
-                   fmi3UInt64 counters[], fmi3UInt64 resolutions[])
-DEFINE_NOT_OFFERED(SetIntervalDecimal, Handle instance, References valueReferences, size_t nValueReferences,
-                   const fmi3Float64 intervals[])
-DEFINE_NOT_OFFERED(SetIntervalFraction, Handle instance, References valueReferences, size_t nValueReferences,
-                   const fmi3UInt64 counters[], const fmi3UInt64 resolutions[])
-DEFINE_NOT_OFFERED(SetShiftDecimal, Handle instance, References valueReferences, size_t nValueReferences,
-                   const fmi3Float64 shifts[])
-DEFINE_NOT_OFFERED(SetShiftFraction, Handle instance, References valueReferences, size_t nValueReferences,
-                   const fmi3UInt64 counters[], const fmi3UInt64 resolutions[])
-DEFINE_NOT_OFFERED(ActivateModelPartition, Handle instance, fmi3ValueReference clockReference,
-                   fmi3Float64 activationTime)
+DEFINE_NOT_OFFERED(EnterConfigurationMode, (void)0, Handle instance)
+DEFINE_NOT_OFFERED(ExitConfigurationMode, (void)0, Handle instance)
+DEFINE_NOT_OFFERED(GetNumberOfVariableDependencies,
+                   ((void)valueReference, (void)nDependencies),
+                   Handle instance, fmi3ValueReference valueReference, size_t *nDependencies)
+DEFINE_NOT_OFFERED(GetVariableDependencies,
+                   ((void)dependent, (void)elementIndicesOfDependent, (void)independents,
+                    (void)elementIndicesOfIndependents, (void)dependencyKinds, (void)nDependencies),
+                   Handle instance, fmi3ValueReference dependent, size_t elementIndicesOfDependent[],
+                   fmi3ValueReference independents[], size_t elementIndicesOfIndependents[],
+                   fmi3DependencyKind dependencyKinds[], size_t nDependencies)
+DEFINE_NOT_OFFERED(GetIntervalDecimal,
+                   ((void)valueReferences, (void)nValueReferences, (void)intervals, (void)qualifiers),
+                   Handle instance, References valueReferences, size_t nValueReferences, fmi3Float64 intervals[],
+                   fmi3IntervalQualifier qualifiers[])
+DEFINE_NOT_OFFERED(GetIntervalFraction,
+                   ((void)valueReferences, (void)nValueReferences, (void)counters, (void)resolutions, (void)qualifiers),
+                   Handle instance, References valueReferences, size_t nValueReferences, fmi3UInt64 counters[],
+                   fmi3UInt64 resolutions[], fmi3IntervalQualifier qualifiers[])
+DEFINE_NOT_OFFERED(GetShiftDecimal,
+                   ((void)valueReferences, (void)nValueReferences, (void)shifts),
+                   Handle instance, References valueReferences, size_t nValueReferences, fmi3Float64 shifts[])
+DEFINE_NOT_OFFERED(GetShiftFraction,
+                   ((void)valueReferences, (void)nValueReferences, (void)counters, (void)resolutions),
+                   Handle instance, References valueReferences, size_t nValueReferences, fmi3UInt64 counters[],
+                   fmi3UInt64 resolutions[])
+DEFINE_NOT_OFFERED(SetIntervalDecimal,
+                   ((void)valueReferences, (void)nValueReferences, (void)intervals),
+                   Handle instance, References valueReferences, size_t nValueReferences, const fmi3Float64 intervals[])
+DEFINE_NOT_OFFERED(SetIntervalFraction,
+                   ((void)valueReferences, (void)nValueReferences, (void)counters, (void)resolutions),
+                   Handle instance, References valueReferences, size_t nValueReferences, const fmi3UInt64 counters[],
+                   const fmi3UInt64 resolutions[])
+DEFINE_NOT_OFFERED(SetShiftDecimal,
+                   ((void)valueReferences, (void)nValueReferences, (void)shifts),
+                   Handle instance, References valueReferences, size_t nValueReferences, const fmi3Float64 shifts[])
+DEFINE_NOT_OFFERED(SetShiftFraction,
+                   ((void)valueReferences, (void)nValueReferences, (void)counters, (void)resolutions),
+                   Handle instance, References valueReferences, size_t nValueReferences, const fmi3UInt64 counters[],
+                   const fmi3UInt64 resolutions[])
+DEFINE_NOT_OFFERED(ActivateModelPartition,
+                   ((void)clockReference, (void)activationTime),
+                   Handle instance, fmi3ValueReference clockReference, fmi3Float64 activationTime)

@@ -5,6 +5,7 @@ a check that returns from the function, at the point where Python raises the exc
 """
 
 import ast
+import re
 from collections.abc import Callable
 from types import FunctionType
 from typing import TYPE_CHECKING
@@ -17,6 +18,9 @@ from .expressions import FAULT_CHECK, UNARY, CExpression, ExpressionTranslator, 
 
 if TYPE_CHECKING:
     from .call_graph import CallGraph
+
+ASSIGNMENT = re.compile(r" *(const [\w ]+[ *])?(\w+) = (.*);")  # type of a constant, name, value
+CALL, NAME = re.compile(r"\w\("), re.compile(r"(?<![\w.>])[A-Za-z_]\w*")  # not the name of a field
 
 
 class FunctionTranslator(ExpressionTranslator):
@@ -49,14 +53,18 @@ class FunctionTranslator(ExpressionTranslator):
         leave = f"return {self.zero_result()};" if self.result else "return;"
         body = [line.format(leave=leave) if line.lstrip() == FAULT_CHECK else line for line in self.lines]
         given = ", ".join(parameters) or "void"
-        lines = [f"/* {about} */", f"static {head}({given})", "{", *self.declarations(), *body, "}"]
+        body = remove_unused_assignments(body, {*self.local_types} - {*self.parameters})
+        names = names_in_lines(body)
+        unused = [f"(void){name}" for name in (one.split()[-1].lstrip("*") for one in parameters) if name not in names]
+        about_unused = [f"    {', '.join(unused)};"] if unused else []
+        lines = [f"/* {about} */", f"static {head}({given})", "{", *self.declarations(names), *about_unused, *body, "}"]
         return "".join(f"{line}\n" for line in lines)
 
-    def declarations(self) -> list[str]:
-        """Declare the local variables, one line per type."""
+    def declarations(self, used: set[str]) -> list[str]:
+        """Declare the local variables that are used, one line per type."""
         names_by_type: dict[str, list[str]] = {}
         for name, ctype in self.local_types.items():
-            if name not in self.parameters:
+            if name not in self.parameters and name in used:
                 names_by_type.setdefault(c_spelling(ctype), []).append(name)
         return [f"    {declaration_list(c, names)}" for c, names in names_by_type.items()]
 
@@ -301,6 +309,27 @@ class FunctionTranslator(ExpressionTranslator):
     def visit_Continue(self, node: ast.Continue) -> bool:
         self.emit("continue;")
         return False
+
+
+def remove_unused_assignments(lines: list[str], local_variables: set[str]) -> list[str]:
+    """Remove assignments to local variables that no line reads; calls stay, because they may fault or have effects."""
+    while True:
+        read = names_in_lines([match[3] if (match := ASSIGNMENT.fullmatch(line)) else line for line in lines])
+        result = []
+        for line in lines:
+            match = ASSIGNMENT.fullmatch(line)
+            if match is None or match[2] in read or (not match[1] and match[2] not in local_variables):
+                result.append(line)
+            elif CALL.search(match[3]):
+                result.append(f"{line[: len(line) - len(line.lstrip())]}(void)({match[3]});")
+        if result == lines:
+            return lines
+        lines = result
+
+
+def names_in_lines(lines: list[str]) -> set[str]:
+    """Return the names in C statements, functions included."""
+    return {name for line in lines for name in NAME.findall(line)}
 
 
 def names_in(node: ast.expr) -> set[str]:
