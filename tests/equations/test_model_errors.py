@@ -114,6 +114,16 @@ WRONG = {
         17,
         "mode is the mode of 0 contacts: each Mode needs exactly one Contact",
     ),
+    "a law instead of the hybrid one": (
+        DRY.replace("slide=f", "slide=f, laws=(SIGN,)") + STUCK,
+        17,
+        "laws must be (HYBRID,), (HYBRID, SIGN) or (HYBRID, THRESHOLD), got ('sign',)",
+    ),
+    "three laws": (
+        DRY.replace("slide=f", "slide=f, laws=(HYBRID, SIGN, THRESHOLD), eps=f") + STUCK,
+        17,
+        "laws must be (HYBRID,), (HYBRID, SIGN) or (HYBRID, THRESHOLD), got ('hybrid', 'sign', 'threshold')",
+    ),
     "a threshold without eps": (
         DRY.replace("slide=f", "slide=f, laws=(HYBRID, THRESHOLD)") + STUCK,
         17,

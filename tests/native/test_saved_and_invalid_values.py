@@ -1,0 +1,123 @@
+"""Native instances: invalid values in the order of the calls, saved states byte by byte, categories of messages."""
+
+import subprocess
+from ctypes import string_at
+from struct import pack
+from zipfile import ZipFile
+
+import fmpy
+import pytest
+from fmpy.fmi1 import FMICallException
+from fmpy.fmi2 import FMU2Slave
+from native_fmus import build_native_fmus
+from native_host import compiler
+
+CHECKSUM_SIZE = 8
+PLACES = """
+#include "fmi2.c"
+int main(void)
+{
+    for (int i = 0; i < MEMBERS; i++) {
+        if (members[i].is_bool) printf("%zu\\n", offsetof(SavedState, state) + members[i].offset);
+    }
+}
+"""
+
+
+@pytest.fixture(scope="module")
+def unpacked(tmp_path_factory):
+    path = build_native_fmus() / "smd.fmu"
+    folder = str(fmpy.extract(path, tmp_path_factory.mktemp("smd")))
+    return fmpy.read_model_description(path), folder
+
+
+@pytest.fixture
+def fmu(unpacked):
+    """An initialised instance; reference(name) is a value reference."""
+    description, folder = unpacked
+    fmu = FMU2Slave(guid=description.guid, unzipDirectory=folder, modelIdentifier="smd", instanceName="smd")
+    references = {v.name: v.valueReference for v in description.modelVariables}
+    fmu.reference = references.__getitem__
+    fmu.instantiate()
+    fmu.setupExperiment(stopTime=1.0)
+    fmu.enterInitializationMode()
+    fmu.exitInitializationMode()
+    yield fmu
+    fmu.freeInstance()
+
+
+def checksum(content):
+    """Return the checksum of saved_state.h."""
+    total = len(content)
+    for i in range(0, len(content), 8):
+        word = int.from_bytes(content[i : i + 8].ljust(8, b"\0"), "little")
+        total = (total ^ word) * 0x9E3779B97F4A7C15 % 2**64
+        total ^= total >> 32
+    return total
+
+
+@pytest.mark.parametrize("first", ["m", "k"])
+def test_the_message_reports_the_value_that_was_set_first(fmu, capfd, first):
+    second = "k" if first == "m" else "m"
+    for name in (first, second):
+        fmu.setReal([fmu.reference(name)], [-1.0])
+    with pytest.raises(FMICallException):
+        fmu.doStep(0.0, 0.1)
+    assert f"{first} = -1.0" in capfd.readouterr().err
+
+
+def test_a_step_succeeds_once_all_invalid_values_are_replaced(fmu, capfd):
+    for name, values in {"m": (-1.0, -2.0, 1.0), "k": (-1.0, 2.0)}.items():
+        for value in values:
+            fmu.setReal([fmu.reference(name)], [value])
+    fmu.doStep(0.0, 0.1)
+    assert capfd.readouterr().err == ""
+
+
+@pytest.mark.parametrize("exponent", [-1017, -921, -808])
+def test_a_power_of_two_has_as_few_digits_as_in_python(fmu, capfd, exponent):
+    """The nearest decimal of 16 digits does not read back, but the next one does."""
+    fmu.setReal([fmu.reference("m")], [-(2.0**exponent)])
+    with pytest.raises(FMICallException):
+        fmu.doStep(0.0, 0.1)
+    assert f"m = {-(2.0**exponent)!r} kg is refused" in capfd.readouterr().err
+
+
+def test_a_saved_state_with_a_boolean_of_2_is_refused_though_its_checksum_is_right(fmu, tmp_path, capfd):
+    """A C program that includes the sources prints the places of all Booleans."""
+    with ZipFile(build_native_fmus() / "smd.fmu") as archive:
+        archive.extractall(tmp_path, [name for name in archive.namelist() if name.startswith("sources/")])
+    (tmp_path / "sources" / "places.c").write_text(PLACES)
+    subprocess.run([compiler(), "-o", "places", "places.c", "-lm"], cwd=tmp_path / "sources", check=True)
+    printed = subprocess.run([tmp_path / "sources" / "places"], capture_output=True, text=True, check=True).stdout
+    state = fmu.getFMUstate()
+    content = string_at(state.value, len(fmu.serializeFMUstate(state)))
+    assert checksum(content[CHECKSUM_SIZE:]).to_bytes(8, "little") == content[:CHECKSUM_SIZE]
+    assert printed
+    for place in map(int, printed.split()):
+        changed = content[CHECKSUM_SIZE:place] + b"\2" + content[place + 1 :]
+        with pytest.raises(FMICallException):
+            fmu.deSerializeFMUstate(pack("<Q", checksum(changed)) + changed)
+    assert "a saved state is refused" in capfd.readouterr().err
+    fmu.freeFMUstate(state)
+
+
+@pytest.mark.parametrize(
+    ("categories", "is_logged"),
+    [([], True), (["logAll"], True), (["logStatusError"], True), (["logStatusFatal"], False)],
+)
+def test_errors_are_logged_in_their_categories_only(unpacked, capfd, categories, is_logged):
+    description, folder = unpacked
+    lines = []
+    fmu = FMU2Slave(guid=description.guid, unzipDirectory=folder, modelIdentifier="smd", instanceName="smd")
+    callbacks = fmpy.fmi2.fmi2CallbackFunctions()
+    callbacks.logger = fmpy.fmi2.fmi2CallbackLoggerTYPE(lambda *message: lines.append(message[-1]))
+    callbacks.allocateMemory = fmpy.fmi2.fmi2CallbackAllocateMemoryTYPE(fmpy.calloc)
+    callbacks.freeMemory = fmpy.fmi2.fmi2CallbackFreeMemoryTYPE(fmpy.free)
+    fmu.instantiate(callbacks=callbacks)
+    fmu.setDebugLogging(True, categories)
+    with pytest.raises(FMICallException):
+        fmu.doStep(0.0, 0.1)
+    assert bool(lines) == is_logged
+    capfd.readouterr()
+    fmu.freeInstance()
