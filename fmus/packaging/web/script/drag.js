@@ -6,8 +6,8 @@ import { findVariable, valueAt } from "./state.js";
 const KICK_DURATION = 1 / 40; // of the run
 
 export class DragController {
-  // `page` has state, modelInfo and session, and the functions setVariable(variable, value), restartEdited(), play() and
-  // requestFrame().
+  // `page` has state, modelInfo and session, and the functions setVariable(variable, value), restartEdited(), play(),
+  // requestFrame() and redraw().
   constructor(page) {
     Object.assign(this, { page, active: null }); // active: the drag in progress
   }
@@ -52,6 +52,7 @@ export class DragController {
       addChange(state, body.input, restForce, Math.max(state.t, (last?.t ?? 0) + 1.01 * MIN_CHANGE_SPACING * state.stop));
       this.page.restartEdited();
     }
+    this.page.redraw();
     this.page.play();
   }
 
@@ -61,7 +62,7 @@ export class DragController {
     const { startVariable, body, target, restForce, stiffness } = this.active;
     if (target === undefined || !session.runs.main.hasReached(state.t)) return; // the last change is still being simulated
     if (startVariable) {
-      this.page.setVariable(startVariable, Number((target * startVariable.factor).toPrecision(3)) / startVariable.factor);
+      this.page.setVariable(startVariable, target);
       return;
     }
     const extension = target - session.runs.main.at(body.position, state.t);

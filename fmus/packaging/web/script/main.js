@@ -19,7 +19,7 @@ const $$ = (id) => document.getElementById(id);
 
 const data = JSON.parse($$("data").textContent);
 const session = new Session(data);
-const page = { session, state: null, modelInfo: null, playing: false, setVariable, restartEdited, play, requestFrame };
+const page = { session, state: null, modelInfo: null, playing: false, setVariable, restartEdited, play, requestFrame, redraw };
 const drag = new DragController(page);
 const mechanism = new Mechanism($$("mechanism"), drag);
 const diagrams = new Diagrams($$("panels"), seek);
@@ -146,6 +146,12 @@ function requestFrame() {
   requestAnimationFrame(frame);
 }
 
+// Draw the diagrams and the scale of the mechanism again.
+function redraw() {
+  stale.curves = true;
+  requestFrame();
+}
+
 function frame(now) {
   frameRequested = false;
   const elapsed = lastFrame ? Math.min((now - lastFrame) / 1000, 0.1) : 0;
@@ -248,7 +254,7 @@ for (const [id, action] of Object.entries({
 })) $$(id).addEventListener("click", action);
 $$("scrub").addEventListener("input", () => seek((page.state.stop * $$("scrub").value) / 1000));
 $$("live").addEventListener("change", showControls);
-$$("envelopes").addEventListener("change", () => { stale.curves = true; requestFrame(); });
+$$("envelopes").addEventListener("change", redraw);
 
 // Store the state in the address. A page embedded in another one leaves the address alone.
 function updateAddress() {

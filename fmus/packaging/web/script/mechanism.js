@@ -13,6 +13,9 @@ const WALL_X = 44;
 const REST_LENGTH = 190; // drawn length of a relaxed spring
 const [PIN_Y, ROD_LENGTH] = [34, 150];
 const [SMALLEST, LARGEST] = [1e-150, 1e150]; // limits of drawn values
+const SHORTEST_SPRING = 40; // drawn length to which a dragged block can compress its spring
+const SCALE_MARGIN = 40; // drawn length by which a motion may exceed the scale before the scale changes
+const DRAG_RESOLUTION = 0.1; // drawn length, or degrees
 const NAMESPACE = "http://www.w3.org/2000/svg";
 
 function element(name, attributes, parent) {
@@ -24,7 +27,7 @@ function element(name, attributes, parent) {
 export class Mechanism {
   // Calls `drag` while a body is dragged: grab(body), move(position), drop().
   constructor(host, drag) {
-    Object.assign(this, { host, drag, parts: [] });
+    Object.assign(this, { host, drag, parts: [], held: null }); // held: the part that is dragged
   }
 
   // Create the drawing of a model.
@@ -36,9 +39,11 @@ export class Mechanism {
     this.svg = element("svg", { viewBox: `0 ${top} ${WIDTH} ${height}`, role: "img", "aria-label": "" });
     this.host.replaceChildren(this.svg);
     this.host.hidden = !bodies.length;
+    this.held = null;
     this.parts = bodies.map((body, lane) => {
       const group = element("g", {}, this.svg);
-      return { body, group, ...(body.kind === "block" ? this.block(body, group, lane) : this.rotating(body, group, lane, lanes)) };
+      const part = body.kind === "block" ? this.block(body, group, lane) : this.rotating(body, group, lane, lanes);
+      return { body, group, pull: element("path", { class: "pull" }, group), ...part };
     });
     for (const part of this.parts) this.makeDraggable(part);
   }
@@ -98,11 +103,14 @@ export class Mechanism {
     return part;
   }
 
-  // Scale the drawing to the range of a run.
+  // Scale the drawing to the range of a run. A scale that still suits the run stays, and so does any while a body is
+  // dragged: otherwise the body would move away from the pointer.
   fit(run) {
+    if (this.held) return;
     for (const part of this.parts.filter(({ body }) => body.kind === "block")) {
       const names = [part.body.position, part.body.driver].filter(Boolean);
       const largest = clamp(Math.max(...names.map((name) => run.largestMagnitude(name))) || 1, SMALLEST);
+      if (part.pixels && largest > part.range / 3 && (largest - part.range) * part.pixels < SCALE_MARGIN) continue;
       const step = ticks(0, largest, 4).at(1);
       part.range = step * Math.ceil(largest / step - 1e-9);
       const movesForward = part.body.driver && run.columns[part.body.position].every((x) => x >= -0.05 * part.range);
@@ -135,8 +143,10 @@ export class Mechanism {
       const stuck = body.mode && value(body.mode) === 0;
       part.moving.classList.toggle("stuck", Boolean(stuck));
       part.position = position;
+      part.driverPosition = body.driver ? value(body.driver) : 0;
       if (body.kind === "block") this.moveBlock(part, position, limited);
       else this.rotate(part, position, limited);
+      part.pull.setAttribute("d", part === this.held && Number.isFinite(part.target) ? this.pullLine(part) : "");
       if (part.label && body.mode) part.label.textContent = stuck ? "sticks" : "slips";
     }
     this.svg?.setAttribute("aria-label", this.describe(value));
@@ -179,26 +189,63 @@ export class Mechanism {
     return `Mechanism: ${descriptions.join("; ")}`;
   }
 
+  // The line from a dragged body to the pointer; only a body that is pulled while it moves is not under the pointer.
+  pullLine({ body, x, pin, origin, pixels, middle, position, target }) {
+    if (body.kind === "block") return `M${origin + pixels * position} ${middle}H${origin + pixels * target}`;
+    const point = (angle) => `${(x + ROD_LENGTH * Math.sin(angle)).toFixed(1)} ${(pin + ROD_LENGTH * Math.cos(angle)).toFixed(1)}`;
+    return `M${point(position)}L${point(target)}`;
+  }
+
+  // The positions to which a block can be dragged: it stays in the picture and does not pass the ends of its spring.
+  dragRange({ body, origin, pixels, driverPosition }) {
+    const half = BLOCK.width / 2;
+    const left = !body.driver && (body.spring || body.dampers) ? WALL_X + SHORTEST_SPRING + half : half;
+    const driver = origin + half + REST_LENGTH + pixels * driverPosition - SHORTEST_SPRING - half;
+    const right = body.driver ? Math.min(driver, WIDTH - half) : WIDTH - half;
+    return [left, right].map((x) => (x - origin) / pixels);
+  }
+
+  // The position at the pointer, without rounding.
+  pointerPosition(part, event) {
+    const { x, y } = new DOMPoint(event.clientX, event.clientY).matrixTransform(this.svg.getScreenCTM().inverse());
+    return part.body.kind === "block" ? (x - part.origin) / part.pixels : Math.atan2(x - part.x, y - part.pin);
+  }
+
+  // The position to which the pointer drags a body, with the digits that the drawing resolves.
+  dragTarget(part, event, offset) {
+    const { factor } = findVariable(this.modelInfo, part.body.position);
+    let target = this.pointerPosition(part, event) - offset;
+    if (part.body.kind === "block") {
+      const [low, high] = this.dragRange(part);
+      target = Math.min(Math.max(target, low), high);
+    }
+    const resolution = part.body.kind === "block" ? (DRAG_RESOLUTION * factor) / part.pixels : DRAG_RESOLUTION;
+    const digits = Math.min(Math.max(Math.ceil(-Math.log10(resolution)), 0), 100);
+    return Number((target * factor).toFixed(digits)) / factor;
+  }
+
   // Let the pointer drag a body.
   makeDraggable(part) {
     const handle = part.moving;
-    const positionAt = (event) => {
-      const { x, y } = new DOMPoint(event.clientX, event.clientY).matrixTransform(this.svg.getScreenCTM().inverse());
-      if (part.body.kind === "block") return (x - part.origin) / part.pixels;
-      return Math.atan2(x - part.x, y - part.pin);
-    };
-    let offset = null;
+    let offset = 0;
     handle.addEventListener("pointerdown", (event) => {
+      if (this.held) return;
       handle.setPointerCapture(event.pointerId);
-      offset = positionAt(event) - part.position;
+      offset = this.pointerPosition(part, event) - part.position;
+      this.held = part;
       this.drag.grab(part.body);
       event.preventDefault();
     });
-    handle.addEventListener("pointermove", (event) => offset !== null && this.drag.move(positionAt(event) - offset));
+    handle.addEventListener("pointermove", (event) => {
+      if (this.held !== part) return;
+      part.target = this.dragTarget(part, event, offset);
+      this.drag.move(part.target);
+    });
     for (const end of ["pointerup", "pointercancel"]) {
       handle.addEventListener(end, () => {
-        if (offset !== null) this.drag.drop();
-        offset = null;
+        if (this.held !== part) return;
+        this.held = part.target = null;
+        this.drag.drop();
       });
     }
   }

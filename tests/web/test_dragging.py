@@ -1,0 +1,77 @@
+"""A dragged body stays under the pointer, whatever the pointer, the zoom and the model."""
+
+import pytest
+from models import MODELS
+
+TOLERANCE = 3  # CSS pixels
+PATH = (20, -20, 15)  # pixels from the point where the body is grabbed, twice that if wide
+CENTRE = (
+    "(b => [b.x + b.width / 2, b.y + b.height / 2])"
+    "(document.querySelector('#mechanism .body :is(rect, circle)').getBoundingClientRect())"
+)
+PIN = (
+    "(b => [b.x + b.width / 2, b.y + b.height / 2])(document.querySelector('#mechanism .pin').getBoundingClientRect())"
+)
+DRAWN = "new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))"
+
+
+def path_of_pointer(page):
+    """Return the points of a horizontal drag, for a pendulum along its arc, and where its body should be."""
+    x, y = page.run(CENTRE)
+    path = [step * (2 if page.run("innerWidth") > 1000 else 1) for step in PATH]
+    if page.run("app.session.models.get(app.state().model).bodies[0].kind") == "block":
+        return [(x + step, y) for step in path]
+    pin_x, pin_y = page.run(PIN)
+    radius = ((x - pin_x) ** 2 + (y - pin_y) ** 2) ** 0.5
+    across = [min(max(x + step - pin_x, -0.9 * radius), 0.9 * radius) for step in path]
+    return [(pin_x + dx, pin_y + (radius**2 - dx**2) ** 0.5) for dx in across]
+
+
+def send(page, touch, kind, x, y):
+    if not touch:
+        return page.browser.mouse(kind, x, y, buttons=int(kind != "Released"))
+    points = [] if kind == "Released" else [{"x": x, "y": y}]
+    kinds = {"Pressed": "touchStart", "Moved": "touchMove", "Released": "touchEnd"}
+    return page.browser.call("Input.dispatchTouchEvent", type=kinds[kind], touchPoints=points)
+
+
+@pytest.mark.parametrize(
+    ("width", "height", "zoom", "touch"), [(1280, 900, 1, False), (640, 450, 2, False), (360, 740, 2, True)]
+)
+@pytest.mark.parametrize("name", MODELS)
+def test_a_dragged_body_stays_under_the_pointer(page, name, width, height, zoom, touch):
+    metrics = {"width": width, "height": height, "deviceScaleFactor": zoom, "mobile": touch}
+    page.browser.call("Emulation.setDeviceMetricsOverride", **metrics)
+    page.browser.call("Emulation.setTouchEmulationEnabled", enabled=touch)
+    try:
+        page.open(f".model={name}&.stop=2")
+        page.run("document.querySelector('#mechanism').scrollIntoView({ block: 'center' })")
+        page.run(DRAWN)
+        points = path_of_pointer(page)
+        send(page, touch, "Pressed", *page.run(CENTRE))
+        for x, y in points:
+            send(page, touch, "Moved", x, y)
+            page.run(DRAWN)
+            body_x, body_y = page.run(CENTRE)
+            assert (body_x, body_y) == pytest.approx((x, y), abs=TOLERANCE)
+        held = page.run("app.state().t")
+        send(page, touch, "Released", *points[-1])
+        assert held == 0
+    finally:
+        page.browser.call("Emulation.setTouchEmulationEnabled", enabled=False)
+        page.browser.size(1280)
+
+
+def test_a_body_cannot_be_dragged_out_of_the_picture(page):
+    page.browser.size(1280)
+    page.open(".model=coulomb")
+    box = "(b => [b.left, b.right])(document.querySelector('#mechanism {}').getBoundingClientRect())"
+    left, right = page.run(box.format("svg"))
+    x, y = page.run(CENTRE)
+    page.browser.mouse("Pressed", x, y)
+    for target in (x + 2000, x - 2000):
+        page.browser.mouse("Moved", target, y)
+        page.run(DRAWN)
+        body = page.run(box.format(".body rect"))
+        assert left <= body[0] < body[1] <= right
+    page.browser.mouse("Released", x, y, buttons=0)
