@@ -117,6 +117,19 @@ def test_every_parameter_has_a_slider_and_a_field_with_its_start_value_and_unit(
             assert page.run(f"app.state().values[{variable!r}]") == pytest.approx(10.0 / factor)
 
 
+@pytest.mark.parametrize("name", MODELS)
+def test_the_default_run_shows_a_rest_that_begins_soon_after_the_default_stop_time(page, name):
+    page.open(f".model={name}")
+    stop = page.run("app.session.models.get(app.state().model).stop")
+    shown, rest = page.run("[app.state().stop, app.session.runs.main.restTime() ?? null]")
+    assert stop <= shown <= 1.2 * stop
+    if name == "coulomb":  # at rest after eight full swings
+        assert rest == pytest.approx(8 * 2 * pi / sqrt(157.9), abs=1e-9)
+        assert stop == 4 < rest < shown - 0.1
+    page.open(".preset=coulomb")
+    assert page.run("app.state().stop") == 4
+
+
 # ---- interaction
 
 
@@ -328,7 +341,7 @@ def test_a_link_stores_the_complete_setup(page):
     assert page.run("app.state().values.x_m") == 0.001
     wrong = "mu_d=0.3&solver.method=7&friction=1.5&c=&.stop=&.change=1 nothing 2&.change=x k 2"
     page.open(f".model=coulomb&k=100&{wrong}")
-    assert page.run("app.state()") | {"values": {"k": 100}, "changes": [], "stop": 4} == page.run("app.state()")
+    assert page.run("app.state()") | {"values": {"k": 100}, "changes": [], "stop": 4.3} == page.run("app.state()")
     result = "document.getElementById('status').textContent"
     page.wait(f"{result}.includes('unknown settings: mu_d, solver.method, friction, c, 1 nothing 2, x k 2. coulomb')")
     page.open(".model=nobody")

@@ -26,8 +26,9 @@ export class Form {
     ]);
   }
 
-  // Create the fields of a model; `typicalSize` estimates the size of variables that start at zero.
-  build(modelInfo, typicalSize) {
+  // Create the fields of a model; `stop` is its default stop time, and `typicalSize` estimates the size of variables that
+  // start at zero.
+  build(modelInfo, stop, typicalSize) {
     const { actions, fields } = this;
     fields.clear();
     const rows = { fields: [], "solver-fields": [] };
@@ -43,7 +44,7 @@ export class Form {
       const choice = new Choice(`field-${variable.name}`, variable.text, (value) => actions.choose(variable.name, Number(value)));
       addField(variable, { element: choice.element, show: (value) => choice.fill(itemOptions(variable), value) });
     }
-    const stopTime = { name: ".stop", symbol: "T", text: "stop time", display_unit: "s", factor: 1, unit: "s", above: 0, start: modelInfo.stop, allowed: "above 0" };
+    const stopTime = { name: ".stop", symbol: "T", text: "stop time", display_unit: "s", factor: 1, unit: "s", above: 0, start: stop, allowed: "above 0" };
     addField(stopTime, new Field(stopTime, 0, actions.setStopTime, actions.reportError));
     for (const [id, elements] of Object.entries(rows)) document.getElementById(id).replaceChildren(...elements);
   }

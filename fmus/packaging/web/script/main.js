@@ -49,6 +49,8 @@ async function showState(next, unknownKeys = []) {
   requestedState = next;
   await Promise.all([next.model, ...(next.comparison ? [next.comparison.model] : [])].map((name) => session.compile(name)));
   if (requestedState !== next) return; // another state was selected in the meantime
+  next.stop ??= session.stopTime(next.model);
+  next.t = Math.min(next.t, next.stop);
   const changed = next.model !== page.state?.model;
   page.state = next;
   page.modelInfo = session.models.get(next.model);
@@ -81,9 +83,10 @@ function buildControls() {
   $$("equations").innerHTML = modelInfo.text; // HTML from the build
   mechanism.build(modelInfo);
   $$("kick").hidden = !modelInfo.bodies.some((body) => body.input);
-  session.restart(defaultState(modelInfo));
+  const stop = session.stopTime(modelInfo.name);
+  session.restart({ ...defaultState(modelInfo), stop });
   session.runs.main.advance();
-  form.build(modelInfo, typicalSizes(session.runs.main));
+  form.build(modelInfo, stop, typicalSizes(session.runs.main));
   diagrams.clear();
 }
 

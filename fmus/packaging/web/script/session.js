@@ -13,6 +13,8 @@ import { comparisonSettings, findVariable } from "./state.js";
 import { load } from "./wasm.js";
 
 export const POINTS = 1600; // grid steps
+const REST_SEARCH = 1.1; // a rest that begins before this multiple of a model's stop time is shown
+const REST_SHOWN = 0.05; // at least this fraction of the stop time of it
 
 export class Session {
   constructor(data) {
@@ -20,6 +22,7 @@ export class Session {
     this.presets = new Map(data.presets.map((preset) => [preset.name, preset]));
     this.code = new Map(); // compiled modules by model
     this.fmus = new Map();
+    this.stopTimes = new Map();
     this.runs = {};
   }
 
@@ -33,6 +36,20 @@ export class Session {
     const key = `${name} ${role}`;
     if (!this.fmus.has(key)) this.fmus.set(key, new Fmu(this.models.get(name), this.code.get(name)));
     return this.fmus.get(key);
+  }
+
+  // The stop time of the default run in s: that of the model, or later if the model comes to rest soon after it. The model
+  // must be compiled.
+  stopTime(name) {
+    const modelInfo = this.models.get(name);
+    if (!this.stopTimes.has(name)) {
+      const { stop, bodies } = modelInfo;
+      const run = new Run(this.fmu(name, "stop time"), { values: {}, changes: [], stop: REST_SEARCH * stop, points: 0 });
+      run.advance();
+      const rest = bodies.some((body) => body.driver) ? undefined : run.restTime();
+      this.stopTimes.set(name, rest > stop ? roundUp(rest + REST_SHOWN * stop) : stop);
+    }
+    return this.stopTimes.get(name);
   }
 
   // Restart all runs. The models must be compiled.
@@ -71,6 +88,12 @@ export class Session {
     if (more) this.pointsShown = points;
     return more;
   }
+}
+
+// Round up to two digits.
+function roundUp(value) {
+  const unit = 10 ** (Math.floor(Math.log10(value)) - 1);
+  return Number((Math.ceil(value / unit - 1e-9) * unit).toPrecision(2));
 }
 
 // Whether the default method of a model is the closed form.

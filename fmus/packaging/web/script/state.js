@@ -3,8 +3,9 @@
 
 const COMPARISON_PREFIX = ".compare."; // of the variables of the comparison run
 
+// The default state of a model. A stop time of null is replaced when the model is compiled.
 export function defaultState(modelInfo) {
-  return { model: modelInfo.name, values: {}, changes: [], stop: modelInfo.stop, t: 0, body: 0, comparison: null, preset: "" };
+  return { model: modelInfo.name, values: {}, changes: [], stop: null, t: 0, body: 0, comparison: null, preset: "" };
 }
 
 export function findVariable(modelInfo, name) {
@@ -82,8 +83,8 @@ export function decodeState(hash, models) {
     }
   }
   state.changes.sort((a, b) => a.t - b.t);
-  state.stop = number(".stop", state.stop) > 0 ? number(".stop", state.stop) : modelInfo.stop;
-  state.t = Math.min(Math.max(number(".t", 0), 0), state.stop);
+  state.stop = number(".stop", 0) > 0 ? number(".stop", 0) : null;
+  state.t = Math.max(number(".t", 0), 0);
   state.body = modelInfo.bodies[number(".body", 0)] ? number(".body", 0) : 0;
   state.preset = parameters.get(".preset") ?? "";
   return { state, unknownKeys };
