@@ -218,6 +218,27 @@ def test_comparing_two_laws_shows_the_difference_and_the_counters(page):
     assert not page.run("document.getElementById('panel-.error').hidden")
 
 
+@pytest.mark.parametrize(
+    ("link", "role"),
+    [
+        (".model=stickslip&mu_d=0.9&.compare=pacejka", "second run (pacejka"),  # which needs mu_d below mu_s
+        (".model=coulomb&.compare=coulomb&.compare.friction=2&.compare.solver.method=2&.stop=20", "second run (coulomb"),
+        (".model=coulomb&friction=2&solver.method=2&.stop=20&.compare=coulomb", "run (coulomb"),
+    ],
+)
+def test_a_failed_run_of_a_comparison_is_named_and_has_no_error(page, link, role):
+    page.open(link)
+    page.wait("document.getElementById('tables').textContent.includes('fails')")
+    assert page.run("document.getElementById('alert').textContent").startswith(f"The {role}")
+    assert not any("difference" in row or "error" in row for row in page.table("Cost and accuracy"))
+    assert page.run("app.plots.get('.error')?.figure.hidden ?? true")
+    failed = "comparison" if "second" in role else "main"
+    *_, ends = page.run(f"[0, ...app.session.runs.{failed}.time]")
+    curve = "app.plots.get('x').panel.content.curves.find(curve => curve.colour === {!r})"
+    shown = page.run(f"{curve.format('b' if 'second' in role else 'a')}?.x.at(-1) ?? 0")
+    assert shown == ends < page.run("app.state().stop")
+
+
 def test_another_model_keeps_values_of_the_same_names(page):
     page.open(".model=stickslip&k=500&.compare=pacejka&.compare.x_m=0.005")
     assert page.run("app.session.runs.comparison.setting.values.k") == 500

@@ -190,7 +190,9 @@ function advanceCursor(elapsed) {
 // Show the error of a run. The diagrams of the last successful run remain, dimmed.
 function drawAlert() {
   const { main, comparison } = session.runs;
-  $$("alert").textContent = inputError || main.failure || comparison?.failure || "";
+  const failures = [["run", main], ["second run", comparison]].filter(([, run]) => run?.failure)
+    .map(([role, run]) => `The ${role} (${describeSettings(run)}) ${run.time.length ? `ends at ${formatNumber(run.time.at(-1))} s` : "does not start"}: ${run.failure}`);
+  $$("alert").textContent = inputError || failures.join(" ");
   $$("alert").hidden = !$$("alert").textContent;
   for (const id of ["panels", "mechanism"]) $$(id).classList.toggle("stale", !main.time.length);
 }

@@ -140,9 +140,11 @@ function phasePanel(session, body) {
   return { key: ".phase", title: `phase plane: ${v.name} in ${v.display_unit} against ${x.name}`, symbol: "", content, phase: [x, v] };
 }
 
-// Errors of the runs against the closed form, or else the difference between the two runs.
+// Errors of the runs against the closed form, or else the difference between the two runs. Null if a run has failed: an
+// error up to the failure would say little.
 function errorPanel(session, body, state) {
   const { main, comparison, reference } = session.runs;
+  if ([main, comparison, reference].some((run) => run?.failure)) return null;
   const { factor, display_unit } = main.fmu.variables.get(body.position);
   const sameModel = state.comparison?.model === state.model;
   const curve = (from, to, colour) => {
@@ -168,7 +170,7 @@ function errorPanel(session, body, state) {
 export function cursorReadings({ phase, name, factor }, { runs }, t) {
   const [points, readings] = [[], []];
   for (const [run, colour] of [[runs.main, "a"], [runs.comparison, "b"]]) {
-    if (!run?.time.length || !(phase ?? [{ name }]).every((variable) => run.columns[variable.name])) continue;
+    if (!run?.time.length || (run.failure && t > run.time.at(-1)) || !(phase ?? [{ name }]).every((variable) => run.columns[variable.name])) continue;
     const [x, y] = phase ? phase.map((variable) => run.at(variable.name, t) * variable.factor) : [t, run.at(name, t) * factor];
     points.push({ x, y, colour });
     if (!phase) readings.push({ text: formatNumber(y), colour });

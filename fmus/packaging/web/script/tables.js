@@ -51,10 +51,13 @@ export function costTable(session, state) {
     ...Object.entries(COUNTS).map(([name, label]) => [label, ...runs.map((run) => String(run.counts?.[name] ?? ""))]),
     ["run time, including grid points", ...runs.map((run) => `${formatNumber(1000 * run.seconds, 2)} ms`)],
   ];
+  const hasFailed = [main, comparison, reference].some((run) => run?.failure);
+  const failure = (run) => (!run.failure ? "" : run.time.length ? `at ${formatNumber(run.time.at(-1))} s` : "does not start");
+  if (runs.some((run) => run.failure)) rows.unshift(["fails", ...runs.map(failure)]);
   const largestError = (run) => (run === reference ? "closed form" : `${formatNumber(difference(reference, run, body.position).largest * factor, 3)} ${display_unit}`);
   const hasReference = (run) => run.fmu.modelInfo === reference?.fmu.modelInfo;
-  if (reference?.done) rows.push([`largest error of ${body.position} against the closed form`, ...runs.map((run) => (hasReference(run) ? largestError(run) : ""))]);
-  if (comparison?.columns[body.position] && comparison.columns[body.speed]) {
+  if (reference?.done && !hasFailed) rows.push([`largest error of ${body.position} against the closed form`, ...runs.map((run) => (hasReference(run) ? largestError(run) : ""))]);
+  if (!hasFailed && comparison?.columns[body.position] && comparison.columns[body.speed]) {
     const largestDifference = (name) => {
       const variable = main.fmu.variables.get(name);
       return `${formatNumber(difference(main, comparison, name).largest * variable.factor, 3)} ${variable.display_unit}`;
