@@ -28,6 +28,7 @@ MODULES = (
         "run",
         "state",
         "overrides",
+        "setting_lines",
         "measure",
         "session",
         "plot",

@@ -3,10 +3,12 @@
 const PLOT_WIDTH = 520; // CSS pixels
 const PLOT_HEIGHT = 240;
 const TITLE_HEIGHT = 26;
+const LINE_HEIGHT = 16;
+const TEXT_FONT = "12px system-ui, sans-serif";
 const RESOLUTION = 2; // image pixels per CSS pixel
 
-// The results of a run in SI units, or of two runs at the points of their common grid.
-export function toCsv(main, comparison) {
+// The results of a run in SI units, or of two runs at the points of their common grid. Begins with the settings as comments.
+export function toCsv(main, comparison, settings) {
   const column = (run, prefix) => (name) => {
     const variable = run.fmu.variables.get(name);
     return { head: `${prefix}${name}${variable.unit ? ` [${variable.unit}]` : ""}`, values: run.columns[name], run };
@@ -16,19 +18,33 @@ export function toCsv(main, comparison) {
   if (comparison) columns.push(...names(comparison).map(column(comparison, "compare.")));
   const rows = comparison ? Math.min(main.grid.length, comparison.grid.length) : main.time.length;
   const gridRow = (run, row) => (comparison ? run.grid[row] : row);
-  const lines = [["t [s]", ...columns.map(({ head }) => head)].join(",")];
+  const lines = [...settings.map((line) => `# ${line}`), ["t [s]", ...columns.map(({ head }) => head)].join(",")];
   for (let row = 0; row < rows; row++) {
     lines.push([main.time[gridRow(main, row)], ...columns.map(({ values, run }) => values[gridRow(run, row)])].join(","));
   }
   return `${lines.join("\n")}\n`;
 }
 
-// All diagrams [{plot, heading}] in one image, two in a row, each below its title.
-export function toPng(diagrams, title) {
+// Divide text into lines of a width in pixels.
+function wrap(context, text, width) {
+  const lines = [""];
+  for (const word of text.split(" ")) {
+    const longer = `${lines.at(-1)} ${word}`.trim();
+    if (context.measureText(longer).width <= width) lines[lines.length - 1] = longer;
+    else lines.push(word);
+  }
+  return lines;
+}
+
+// All diagrams [{plot, heading}] in one image, two in a row, each below its title, below the settings.
+export function toPng(diagrams, title, settings) {
   const canvas = document.createElement("canvas");
-  const rows = Math.ceil(diagrams.length / 2);
-  [canvas.width, canvas.height] = [RESOLUTION * 2 * PLOT_WIDTH, RESOLUTION * (rows * (PLOT_HEIGHT + TITLE_HEIGHT) + TITLE_HEIGHT)];
   const context = canvas.getContext("2d");
+  context.font = TEXT_FONT;
+  const text = settings.flatMap((line) => wrap(context, line, 2 * PLOT_WIDTH - 20));
+  const top = TITLE_HEIGHT + text.length * LINE_HEIGHT;
+  const rows = Math.ceil(diagrams.length / 2);
+  [canvas.width, canvas.height] = [RESOLUTION * 2 * PLOT_WIDTH, RESOLUTION * (rows * (PLOT_HEIGHT + TITLE_HEIGHT) + top + TITLE_HEIGHT / 2)];
   const style = getComputedStyle(document.documentElement);
   const drawText = (text, x, y, font) => {
     context.font = font;
@@ -41,9 +57,10 @@ export function toPng(diagrams, title) {
   context.fillStyle = style.getPropertyValue("--paper");
   context.fillRect(0, 0, 2 * PLOT_WIDTH, canvas.height);
   drawText(title, 10, 18, "bold 14px system-ui, sans-serif");
+  text.forEach((line, i) => drawText(line, 10, TITLE_HEIGHT + (i + 0.75) * LINE_HEIGHT, TEXT_FONT));
   diagrams.forEach(({ plot, heading }, i) => {
-    const [x, y] = [(i % 2) * PLOT_WIDTH, TITLE_HEIGHT + Math.floor(i / 2) * (PLOT_HEIGHT + TITLE_HEIGHT)];
-    drawText(heading.textContent, x + 10, y + 18, "12px system-ui, sans-serif");
+    const [x, y] = [(i % 2) * PLOT_WIDTH, top + Math.floor(i / 2) * (PLOT_HEIGHT + TITLE_HEIGHT)];
+    drawText(heading.textContent, x + 10, y + 18, TEXT_FONT);
     context.save();
     context.translate(x, y + TITLE_HEIGHT);
     plot.draw(context, PLOT_WIDTH, PLOT_HEIGHT);

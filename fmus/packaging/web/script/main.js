@@ -4,6 +4,7 @@ import { makeElement, typicalSizes } from "./controls.js";
 import { Session } from "./session.js";
 import { Diagrams } from "./diagrams.js";
 import { presetState, initialComparison, addChange, chooseItem, setValue } from "./overrides.js";
+import { settingLines } from "./setting_lines.js";
 import { Form } from "./form.js";
 import { DragController } from "./drag.js";
 import { Mechanism } from "./mechanism.js";
@@ -253,8 +254,8 @@ for (const [id, action] of Object.entries({
   kick: () => drag.kick(),
   reset: () => showState(defaultState(page.modelInfo)),
   print: () => print(),
-  csv: () => save(new Blob([toCsv(session.runs.main, session.runs.comparison)], { type: "text/csv" }), `${page.state.model}.csv`),
-  png: async () => save(await toPng(diagrams.visible(), describeSettings(session.runs.main)), `${page.state.model}.png`),
+  csv: () => save(new Blob([toCsv(session.runs.main, session.runs.comparison, settingLines(session, page.state))], { type: "text/csv" }), `${page.state.model}.csv`),
+  png: async () => save(await toPng(diagrams.visible(), describeSettings(session.runs.main), settingLines(session, page.state)), `${page.state.model}.png`),
   link: copyLink,
 })) $$(id).addEventListener("click", action);
 $$("scrub").addEventListener("input", () => seek((page.state.stop * $$("scrub").value) / 1000));
@@ -289,7 +290,11 @@ addEventListener("keydown", (event) => {
 
 // Print on white, also from a dark screen.
 for (const [event, paper] of [["beforeprint", true], ["afterprint", false]]) {
-  addEventListener(event, () => { document.documentElement.classList.toggle("paper", paper); diagrams.repaint(); });
+  addEventListener(event, () => { 
+    document.documentElement.classList.toggle("paper", paper);
+    $$("settings").replaceChildren(...settingLines(session, page.state).map((line) => makeElement("p", {}, line)));
+    diagrams.repaint();
+  });
 }
 for (const query of ["(prefers-color-scheme: dark)", "(forced-colors: active)"]) matchMedia(query).addEventListener("change", () => diagrams.repaint());
 

@@ -18,6 +18,7 @@ const REST_SHOWN = 0.05; // at least this fraction of the stop time of it
 
 export class Session {
   constructor(data) {
+    this.version = data.version;
     this.models = new Map(data.models.map((modelInfo) => [modelInfo.name, modelInfo]));
     this.presets = new Map(data.presets.map((preset) => [preset.name, preset]));
     this.code = new Map(); // compiled modules by model
