@@ -401,6 +401,50 @@ def test_a_refused_value_shows_the_message_of_the_fmu(page):
     assert "m = -1.0 kg is refused: mass of the sled must be above 0.0 kg" in page.run(f"{alert}.textContent")
 
 
+SLIDE = (
+    "(e => {{ e.value = {}; e.dispatchEvent(new Event('input')); return e.value }})"
+    "(document.querySelector('.field:has(#field-{}) input[type=range]'))"
+)
+
+
+def test_a_slider_stops_where_the_model_would_refuse_its_value_and_says_why(page):
+    page.open(".model=stickslip")
+    alert = "document.getElementById('alert')"
+    stopped = int(page.run(SLIDE.format(400, "mu_d")))
+    mu_d = page.when_done("app.state().values.mu_d")
+    assert 0.85 < mu_d <= 0.9
+    assert float(page.run("document.getElementById('field-mu_d').value")) == mu_d
+    text = page.run(f"{alert}.textContent")
+    for part in ("above mu_s = 0.9", "lower mu_d or raise mu_s", f"the slider stops at mu_d = {mu_d:.4g}"):
+        assert part in text
+    assert page.run("app.session.runs.main.failure") == ""
+    assert page.run(SLIDE.format(stopped - 20, "mu_d")) == str(stopped - 20)
+    assert page.when_done(f"{alert}.hidden")
+    page.run(SLIDE.format(0, "mu_s"))  # the other parameter of the condition stops likewise
+    assert page.when_done("app.state().values.mu_s >= app.state().values.mu_d")
+    page.open(".model=stickslip&mu_d=0.95")  # a refused state from a link is reported, and can be left
+    assert "above mu_s = 0.9" in page.run(f"{alert}.textContent")
+    page.type_number("mu_d", "0.94")
+    page.type_number("mu_s", "0.96")
+    assert page.run(f"{alert}.hidden")
+
+
+def test_pausing_keeps_the_values_in_force_and_changes_edit_those(page):
+    page.open(".model=smd")
+    page.click("#play")
+    page.wait("app.state().t > 0.1")
+    page.type_number("c", "20")
+    page.click("#play")
+    shown = "([field, slider]) => [Number(field.value), slider.getAttribute('aria-valuetext')]"
+    find = "[...document.querySelectorAll('.field:has(#field-c) input')]"
+    assert page.run(f"({shown})({find})") == [20, "20 N·s/m"]
+    page.type_number("c", "30")
+    assert page.run("[app.state().values, app.state().changes.map(({ value }) => value)]") == [{}, [30]]
+    page.seek(0)
+    page.run("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
+    assert page.run(f"({shown})({find})")[0] == declared("smd")["c"].start
+
+
 def test_an_invalid_number_is_reported_and_changes_nothing(page):
     page.open(".model=stickslip&m=20")
     field, alert = "document.getElementById('field-m').value", "document.getElementById('alert')"

@@ -58,9 +58,10 @@ export function typicalSizes(main) {
 }
 
 // One row of the form: symbol, description, number field, unit and slider. Calls onChange(value) with the value in SI
-// units, and onError(message) if the input is not a number.
+// units, onError(message) if the input is not a number, and onSlide(position, valueOf) if the slider moves; without it,
+// onChange.
 export class Field {
-  constructor(variable, typicalSize, onChange, onError) {
+  constructor(variable, typicalSize, onChange, onError, onSlide = (position, valueOf) => onChange(valueOf(position))) {
     const { name, text, display_unit, factor, symbol, allowed } = variable;
     Object.assign(this, { variable, range: sliderRange(variable, typicalSize) });
     const id = `field-${name}`;
@@ -69,7 +70,7 @@ export class Field {
     this.slider = makeElement("input", { type: "range", min: 0, max: SLIDER_STEPS, step: 1, "aria-label": `${name}: ${description}` });
     const label = makeElement("label", { for: id }, makeElement("b", { html: symbol }), ` ${text}`);
     this.element = makeElement("div", { class: "field" }, label, makeElement("span", { class: "entry" }, this.number, makeElement("span", { class: "unit" }, display_unit)), this.slider);
-    this.slider.addEventListener("input", () => this.changeTo(sliderValue(Number(this.slider.value), this.range, factor), onChange));
+    this.slider.addEventListener("input", () => onSlide(Number(this.slider.value), (position) => sliderValue(position, this.range, factor)));
     this.number.addEventListener("change", () => {
       const { value } = this.number; // "" if it is not a number
       if (value) return this.changeTo(value === this.initialText ? variable.start : Number(value) / factor, onChange);
@@ -93,7 +94,7 @@ export class Field {
     const { display_unit, factor } = this.variable;
     this.text = this.formatValue(value);
     if (this.number.value !== this.text) this.number.value = this.text;
-    this.slider.value = sliderPosition(value, this.range);
+    this.slider.value = this.position = sliderPosition(value, this.range);
     this.slider.setAttribute("aria-valuetext", `${formatNumber(value * factor)} ${display_unit}`);
   }
 }

@@ -12,7 +12,7 @@ const SOLVER_LISTS = { // id: variable, label, label for the comparison run
 
 export class Form {
   // `actions` has the functions to call on input: preset(name), choose(name, value), compare(values), body(index),
-  // setVariable(variable, value), setStopTime(seconds), clearChanges(), reportError(message).
+  // setVariable(variable, value), slideVariable(variable, position, valueOf), setStopTime(seconds), clearChanges(), reportError(message).
   constructor(models, presets, actions) {
     Object.assign(this, { models, presets, actions, fields: new Map() });
     const list = (id, text, onChange) => [id, new Choice(id, text, onChange)];
@@ -38,7 +38,8 @@ export class Form {
     };
     const variables = settableVariables(modelInfo).filter(({ name }) => !Object.values(SOLVER_LISTS).some(([listed]) => listed === name));
     for (const variable of variables.filter(({ type }) => type === "Real")) {
-      addField(variable, new Field(variable, typicalSize(variable), (value) => actions.setVariable(variable, value), actions.reportError));
+      const slide = (position, valueOf) => actions.slideVariable(variable, position, valueOf);
+      addField(variable, new Field(variable, typicalSize(variable), (value) => actions.setVariable(variable, value), actions.reportError, slide));
     }
     for (const variable of variables.filter(({ type }) => type !== "Real")) {
       const choice = new Choice(`field-${variable.name}`, variable.text, (value) => actions.choose(variable.name, Number(value)));
@@ -49,12 +50,11 @@ export class Form {
     for (const [id, elements] of Object.entries(rows)) document.getElementById(id).replaceChildren(...elements);
   }
 
-  // Show the values of a state, at the cursor time if `atCursor`.
-  show(state, atCursor) {
+  // Show the values of a state at the cursor time.
+  show(state) {
     const modelInfo = this.models.get(state.model);
     const values = effectiveValues(modelInfo, state.values);
-    if (atCursor) this.follow(modelInfo, state);
-    else for (const [name, field] of this.fields) field.show(name === ".stop" ? state.stop : values[name]);
+    this.follow(modelInfo, state);
     const { preset, comparison, body } = this.lists;
     preset.fill([["", "none (custom settings)"], ...[...this.presets.values()].map(({ name, title }) => [name, `${name}: ${title}`])], state.preset);
     body.fill(modelInfo.bodies.map(({ position }, i) => [i, position]), state.body);

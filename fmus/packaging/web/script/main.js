@@ -3,7 +3,7 @@
 import { makeElement, typicalSizes } from "./controls.js";
 import { Session } from "./session.js";
 import { Diagrams } from "./diagrams.js";
-import { presetState, initialComparison, addChange, chooseItem, setValue } from "./overrides.js";
+import { presetState, initialComparison, addChange, chooseItem, replaceValue } from "./overrides.js";
 import { settingLines } from "./setting_lines.js";
 import { Form } from "./form.js";
 import { DragController } from "./drag.js";
@@ -32,7 +32,8 @@ const form = new Form(session.models, session.presets, {
   setVariable,
   setStopTime,
   clearChanges: () => { page.state.changes = []; restartEdited(); },
-  reportError: (message) => { inputError = message; drawAlert(); },
+  slideVariable,
+  reportError: showError,
 });
 let requestedState = null; // the state shown last, possibly still compiling
 let linkWarning = ""; // unknown parts of a link
@@ -109,9 +110,42 @@ function restartEdited() {
 // Set a variable from a control or by dragging, from the start or from the cursor time on.
 function setVariable(variable, value) {
   const { state, modelInfo } = page;
+  const refusal = session.refusal(state, { [variable.name]: value });
+  if (refusal && !session.refusal(state)) { // a refused state, from a link, can be changed freely
+    form.follow(modelInfo, state);
+    showError(`${refusal.replace(/\.?$/, "")}; ${describeValue(variable, valueAt(modelInfo, state, variable.name, state.t))} remains.`);
+    return;
+  }
   if (!variable.fixed && changesAtCursor() && state.t > 0) addChange(state, variable.name, value, state.t);
-  else setValue(modelInfo, state.values, variable.name, value);
+  else replaceValue(modelInfo, state, variable.name, value, state.t);
   restartEdited();
+}
+
+// Set a variable by its slider, which stops at the last position that the model accepts. `valueOf(position)` is the value
+// at a position.
+function slideVariable(variable, position, valueOf) {
+  const { state, modelInfo } = page;
+  const isRefused = (at) => session.refusal(state, { [variable.name]: valueOf(at) });
+  const refusal = isRefused(position);
+  if (!refusal || session.refusal(state)) return setVariable(variable, valueOf(position));
+  let [accepted, refused] = [form.fields.get(variable.name).position, position];
+  while (Math.abs(refused - accepted) > 1) {
+    const middle = Math.round((accepted + refused) / 2);
+    if (isRefused(middle)) refused = middle;
+    else accepted = middle;
+  }
+  if (!isRefused(accepted)) setVariable(variable, valueOf(accepted)); // else the value in force lies beside its position
+  else form.follow(modelInfo, state);
+  showError(`${refusal.replace(/\.?$/, "")}; the slider stops at ${describeValue(variable, valueAt(modelInfo, state, variable.name, state.t))}.`);
+}
+
+function describeValue({ name, factor, display_unit }, value) {
+  return `${name} = ${formatNumber(value * factor)} ${display_unit}`.trim();
+}
+
+function showError(message) {
+  inputError = message;
+  drawAlert();
 }
 
 function setStopTime(seconds) {
@@ -138,7 +172,7 @@ function changesAtCursor() {
 
 function showControls() {
   const { state, modelInfo } = page;
-  form.show(state, changesAtCursor());
+  form.show(state);
   mechanism.showDampers(Object.fromEntries(Object.keys(effectiveValues(modelInfo, {})).map((name) => [name, valueAt(modelInfo, state, name, state.t)])));
 }
 
@@ -207,7 +241,7 @@ function drawCursor() {
   $$("scrub").value = Math.round((1000 * state.t) / state.stop);
   $$("clock").textContent = `${state.t.toFixed(state.stop < 10 ? 3 : 2)} s`;
   $$("scrub").setAttribute("aria-valuetext", $$("clock").textContent);
-  if (page.playing && state.changes.length) form.follow(modelInfo, state);
+  if (state.changes.length) form.follow(modelInfo, state);
 }
 
 // Update tables, link and status when nothing has changed for a while.
@@ -230,7 +264,6 @@ function scheduleSummary() {
 function seek(t) {
   page.state.t = t;
   stale.cursor = true;
-  if ($$("live").checked) showControls();
   scheduleSummary();
   requestFrame();
 }

@@ -10,6 +10,13 @@ export function setValue(modelInfo, values, name, value) {
   else values[name] = value;
 }
 
+// Set the value in force at t in s: that of the last change up to then, or else the value from the start.
+export function replaceValue(modelInfo, state, name, value, t) {
+  const last = state.changes.findLast((change) => change.name === name && change.t <= t);
+  if (last) last.value = value;
+  else setValue(modelInfo, state.values, name, value);
+}
+
 // Set a value from t in s on. Removes later changes of the variable and replaces one just before.
 export function addChange(state, name, value, t) {
   const remaining = state.changes.filter((change) => change.name !== name || change.t <= t);

@@ -7,9 +7,9 @@
 //   preview      the same values with the model's default law, method and tolerance: shown while a slow run is under way
 //   reference    the preview or main run, if the default method is exact
 
-import { Fmu } from "./fmu.js";
+import { Fmu, FmuError } from "./fmu.js";
 import { Run } from "./run.js";
-import { comparisonSettings, findVariable } from "./state.js";
+import { comparisonSettings, findVariable, settableVariables, valueAt } from "./state.js";
 import { load } from "./wasm.js";
 
 export const POINTS = 1600; // grid steps
@@ -51,6 +51,21 @@ export class Session {
       this.stopTimes.set(name, rest > stop ? roundUp(rest + REST_SHOWN * stop) : stop);
     }
     return this.stopTimes.get(name);
+  }
+
+  // The message with which a model refuses to start with the values in force at the cursor time, one of them replaced;
+  // empty if it accepts them.
+  refusal(state, replaced = {}) {
+    const modelInfo = this.models.get(state.model);
+    const names = settableVariables(modelInfo).map(({ name }) => name);
+    const values = Object.fromEntries(names.map((name) => [name, valueAt(modelInfo, state, name, state.t)]));
+    try {
+      this.fmu(state.model, "refusal").begin({ ...values, ...replaced }, state.stop);
+      return "";
+    } catch (error) {
+      if (!(error instanceof FmuError)) throw error;
+      return error.message;
+    }
   }
 
   // Restart all runs. The models must be compiled.
