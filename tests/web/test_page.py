@@ -6,6 +6,7 @@ import re
 from dataclasses import replace
 from html import escape
 from math import pi, sqrt
+from urllib.parse import parse_qsl, urlencode
 
 import native_fmus
 import pytest
@@ -373,6 +374,21 @@ def test_a_link_stores_the_complete_setup(page):
     page.run("Object.defineProperty(navigator, 'clipboard', { value: undefined })")
     page.click("#link")
     page.wait(f"{result}.includes('The link is in the address bar')")
+    assert "works on this computer only" in page.run(result)  # a local file
+
+
+def test_a_link_shows_the_same_when_defaults_have_changed_and_names_another_version(page):
+    page.open(".model=coulomb&f=0.25&.compare=pacejka")
+    page.wait("location.hash.includes('.version')")
+    link = dict(parse_qsl(page.run("location.hash.slice(1)")))
+    assert link[".version"] == page.run("app.session.version")
+    assert {*parameters("coulomb"), "F_ext", ".stop"} <= {*link}
+    assert {f".compare.{name}" for name in parameters("pacejka")} <= {*link}
+    page.run("for (const v of app.session.models.get('coulomb').variables) if (v.name === 'k') v.start = 1")
+    page.open(urlencode(link | {".version": "0.0.1"}))
+    assert page.run("app.session.runs.main.setting.values.k") == 157.9
+    page.wait("document.getElementById('status').textContent.includes('was made with version 0.0.1')")
+    page.open(anew=True)
 
 
 def test_a_link_opened_while_the_address_is_written_is_not_lost(page):

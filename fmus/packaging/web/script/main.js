@@ -45,8 +45,8 @@ let summaryTimer = 0;
 
 // ---- state
 
-// Show a state; `unknownKeys` are parts of a link that were ignored.
-async function showState(next, unknownKeys = []) {
+// Show a state; `unknownKeys` are parts of a link that were ignored, `version` is that of the page that made the link.
+async function showState(next, unknownKeys = [], version = null) {
   if (page.playing) play(false);
   requestedState = next;
   await Promise.all([next.model, ...(next.comparison ? [next.comparison.model] : [])].map((name) => session.compile(name)));
@@ -58,6 +58,7 @@ async function showState(next, unknownKeys = []) {
   page.modelInfo = session.models.get(next.model);
   if (changed) buildControls();
   linkWarning = unknownKeys.length ? `The link contains unknown settings: ${unknownKeys.join(", ")}. ` : "";
+  if (version && version !== session.version) linkWarning += `The link was made with version ${version}; this is version ${session.version}. `;
   restart();
 }
 
@@ -66,7 +67,7 @@ async function followLink(hash) {
   const decoded = decodeState(hash, session.models);
   const parameters = new URLSearchParams(hash.slice(1));
   const preset = parameters.get(".preset");
-  if (decoded) await showState(decoded.state, decoded.unknownKeys);
+  if (decoded) await showState(decoded.state, decoded.unknownKeys, decoded.version);
   else if (session.presets.has(preset)) await showState(stateOfPreset(preset));
   else await showState(defaultState(session.models.values().next().value), [parameters.get(".model")].filter(Boolean));
 }
@@ -295,9 +296,13 @@ $$("scrub").addEventListener("input", () => seek((page.state.stop * $$("scrub").
 $$("live").addEventListener("change", showControls);
 $$("envelopes").addEventListener("change", redraw);
 
+function currentLink() {
+  return encodeState(page.state, session.models, session.version);
+}
+
 // Store the state in the address. A page embedded in another one leaves the address alone.
 function updateAddress() {
-  if (!isEmbedded) history.replaceState(null, "", encodeState(page.state));
+  if (!isEmbedded) history.replaceState(null, "", currentLink());
 }
 
 async function copyLink() {
@@ -308,12 +313,13 @@ async function copyLink() {
   } catch {
     target = "in the address bar"; // the clipboard is unavailable or access is denied
   }
-  $$("status").textContent = `The link is ${target}; it contains all settings.`;
+  const reach = location.protocol === "file:" ? " It works on this computer only, because this page is a local file." : "";
+  $$("status").textContent = `The link is ${target}; it contains all settings.${reach}`;
 }
 
 addEventListener("hashchange", ({ newURL }) => { // the state may have replaced the address since
   const { hash } = new URL(newURL);
-  if (hash !== encodeState(page.state)) followLink(hash);
+  if (hash !== currentLink()) followLink(hash);
 });
 addEventListener("keydown", (event) => {
   if (event.key !== " " || event.target.closest("button, input, select, summary, a")) return;

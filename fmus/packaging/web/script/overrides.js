@@ -1,14 +1,9 @@
 // Changes of the state by the user: values, changes during playback, enumerations, comparison.
 
-import { defaultState, effectiveValues, findVariable } from "./state.js";
+import { defaultState, effectiveValues, findVariable, setValue } from "./state.js";
 
+const CHATTERING_RTOL = 1e-3; // the default of many solvers
 export const MIN_CHANGE_SPACING = 1 / 400; // of the run; closer changes of a variable replace each other
-
-// Set a value from the start.
-export function setValue(modelInfo, values, name, value) {
-  if (value === findVariable(modelInfo, name).start) delete values[name];
-  else values[name] = value;
-}
 
 // Set the value in force at t in s: that of the last change up to then, or else the value from the start.
 export function replaceValue(modelInfo, state, name, value, t) {
@@ -49,7 +44,8 @@ export function initialComparison(modelInfo, state, model) {
   const now = effectiveValues(modelInfo, state.values);
   const alternative = (name, excluded) => findVariable(modelInfo, name)?.items.find(({ label, value }) => label !== excluded && value !== now[name])?.value;
   const [law, method] = [alternative("friction"), alternative("solver.method", "exact")];
-  return { ...(law !== undefined && { friction: law }), ...(method !== undefined && { "solver.method": method }) };
+  const loose = { "solver.rtol": CHATTERING_RTOL }; // with another law the run may chatter at rest, at a tight tolerance for ever
+  return { ...(law !== undefined && { friction: law, ...loose }), ...(method !== undefined && { "solver.method": method }) };
 }
 
 // The state of a published case.

@@ -34,12 +34,12 @@ function describeRange({ content }, main) {
   return `from ${formatNumber(low, 3)} to ${formatNumber(high, 3)}, ${main.events.length} events`;
 }
 
-// A variable over time as {x, y}, in its display unit; null if the run does not have it. For long runs, grid points and
-// events are enough, except for the step size.
+// A variable over time as {x, y}, in its display unit; null if the run does not have it. For long runs, grid points,
+// events and the end are enough, except for the step size.
 function curveData(run, { name, factor }) {
   if (!run.columns[name]) return null;
   const isComplete = run.time.length < MAX_PLOTTED_ROWS || name === "solver.h";
-  const rows = isComplete ? null : [...run.grid, ...run.events.map(({ row }) => row)].sort((a, b) => a - b);
+  const rows = isComplete ? null : [...new Set([...run.grid, ...run.events.map(({ row }) => row), run.time.length - 1])].sort((a, b) => a - b);
   const [x, y] = [run.time, run.columns[name]].map((column) => (isComplete ? column : rows.map((row) => column[row])));
   return { x, y: factor === 1 ? y : y.map((value) => value * factor) };
 }

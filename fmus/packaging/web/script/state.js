@@ -39,9 +39,11 @@ export function comparisonSettings(models, state) {
   return { values: { ...Object.fromEntries(shared), ...state.comparison.values }, changes };
 }
 
-export function encodeState(state) {
-  const parameters = new URLSearchParams({ ".model": state.model });
-  for (const [name, value] of Object.entries(state.values)) parameters.set(name, value);
+// Encode a state as a link with all values, so that it shows the same in a version with other defaults.
+export function encodeState(state, models, version) {
+  const modelInfo = models.get(state.model);
+  const parameters = new URLSearchParams({ ".version": version, ".model": state.model });
+  for (const [name, value] of Object.entries(effectiveValues(modelInfo, state.values))) parameters.set(name, value);
   for (const { t, name, value } of state.changes) parameters.append(".change", `${t} ${name} ${value}`);
   parameters.set(".stop", state.stop);
   if (state.t) parameters.set(".t", state.t);
@@ -49,12 +51,13 @@ export function encodeState(state) {
   if (state.preset) parameters.set(".preset", state.preset);
   if (state.comparison) {
     parameters.set(".compare", state.comparison.model);
-    for (const [name, value] of Object.entries(state.comparison.values)) parameters.set(COMPARISON_PREFIX + name, value);
+    const { values } = comparisonSettings(models, state);
+    for (const [name, value] of Object.entries(effectiveValues(models.get(state.comparison.model), values))) parameters.set(COMPARISON_PREFIX + name, value);
   }
   return `#${parameters}`;
 }
 
-// Decode a link. Returns {state, unknownKeys}, or null if the link names no model.
+// Decode a link. Returns {state, unknownKeys, version}, the version being that of the page that made the link, or null if the link names no model.
 export function decodeState(hash, models) {
   const parameters = new URLSearchParams(hash.replace(/^#/, ""));
   const modelInfo = models.get(parameters.get(".model"));
@@ -78,14 +81,26 @@ export function decodeState(hash, models) {
       else unknownKeys.push(text);
     } else if (isComparison || !key.startsWith(".")) {
       const [owner, values, name] = isComparison ? [comparison, state.comparison?.values, key.slice(COMPARISON_PREFIX.length)] : [modelInfo, state.values, key];
-      if (owner && isValid(owner, name, text)) values[name] = Number(text);
-      else unknownKeys.push(key);
+      if (!owner || !isValid(owner, name, text)) unknownKeys.push(key);
+      else if (isComparison) values[name] = Number(text);
+      else setValue(owner, values, name, Number(text));
     }
+  }
+  if (comparison) { // keeps the values that differ from those it shares with the first run
+    const { values } = state.comparison;
+    const shared = effectiveValues(comparison, comparisonSettings(models, { ...state, comparison: { ...state.comparison, values: {} } }).values);
+    for (const name of Object.keys(values)) if (values[name] === shared[name]) delete values[name];
   }
   state.changes.sort((a, b) => a.t - b.t);
   state.stop = number(".stop", 0) > 0 ? number(".stop", 0) : null;
   state.t = Math.max(number(".t", 0), 0);
   state.body = modelInfo.bodies[number(".body", 0)] ? number(".body", 0) : 0;
   state.preset = parameters.get(".preset") ?? "";
-  return { state, unknownKeys };
+  return { state, unknownKeys, version: parameters.get(".version") };
+}
+
+// Set a value from the start. Values equal to the default are left out.
+export function setValue(modelInfo, values, name, value) {
+  if (value === findVariable(modelInfo, name).start) delete values[name];
+  else values[name] = value;
 }
