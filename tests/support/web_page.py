@@ -1,6 +1,7 @@
 """The interactive page, built once and opened in one browser."""
 
 import json
+import re
 
 import build_cache
 import commands
@@ -96,5 +97,7 @@ class Page:
 
 
 def number(text):
-    """Return the number at the beginning of a cell."""
-    return float(text.split()[0].replace("\N{MINUS SIGN}", "-"))
+    """Return the number at the beginning of a cell, such as 0.5 or 2.5·10⁻⁶."""
+    plain = text.split()[0].replace("\N{MINUS SIGN}", "-").translate(str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻", "0123456789-"))
+    sign, mantissa, exponent = re.fullmatch(r"(-?)(?:([\d.]+)·?)??(?:10(-?\d+))?", plain).groups()
+    return float(f"{sign}{mantissa or 1}e{exponent or 0}")

@@ -475,6 +475,53 @@ def test_an_invalid_number_is_reported_and_changes_nothing(page):
     assert page.run(f"{alert}.hidden")
 
 
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("0,25", 0.25),
+        ("0.25", 0.25),
+        ("2,5e-1", 0.25),
+        ("1.000,5", None),
+        ("1,000.5", None),
+        ("1,2,3", None),
+        ("2x", None),
+    ],
+)
+def test_a_decimal_comma_is_accepted_or_refused_but_never_read_as_another_number(page, text, value):
+    page.open(".model=coulomb&f=0.75", anew=True)
+    page.run("(e => { e.focus(); e.select() })(document.getElementById('field-f'))")
+    page.browser.call("Input.insertText", text=text)  # as typed, not as set by a script
+    page.run("document.getElementById('field-f').blur()")
+    assert page.when_done("app.state().values.f") == (value or 0.75)
+    assert page.run("document.getElementById('alert').hidden") == (value is not None)
+
+
+def test_numbers_have_the_digits_of_the_computation_and_typeset_powers(page):
+    page.open(".preset=stickslip&.compare=stickslip")
+    page.wait("document.querySelectorAll('#tables caption').length > 2")
+    text = page.run("document.body.innerText")
+    published = str(page.run("app.session.presets.get('stickslip').published"))  # shown as published
+    assert [number for number in re.findall(r"\d+\.\d{10,}", text) if number not in published] == []
+    assert not re.findall("\\de[-\N{MINUS SIGN}]\\d", text)
+    page.open(".model=coulomb&solver.method=2&solver.rtol=1e-5")
+    page.wait("document.getElementById('tables').textContent.includes('10⁻⁵')")
+    times = [cells[0] for cells in page.table("Events").values()]
+    assert max(len(t.replace(".", "").lstrip("0")) for t in times) == 5
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_summaries_of_diagrams_state_the_extremes_of_the_run(page, name):
+    page.open(f".model={name}")
+    x = page.run("app.session.models.get(app.state().model).bodies[0].position")
+    label, values, factor = page.run(
+        f"[app.plots.get('{x}').panel.content.description, app.session.runs.main.columns.{x},"
+        f"app.session.runs.main.fmu.variables.get('{x}').factor]"
+    )
+    low, high = re.search(r"from (\S+) to (\S+),", label).groups()
+    assert web_page.number(low) == pytest.approx(min(values) * factor, rel=5e-3)
+    assert web_page.number(high) == pytest.approx(max(values) * factor, rel=5e-3)
+
+
 @pytest.mark.parametrize("name", MODELS)
 def test_extreme_numbers_are_reported_or_drawn_and_never_shown_as_nan(page, name):
     page.open(f".model={name}")
@@ -520,10 +567,11 @@ def test_every_published_case_measures_the_same_as_the_terminal(page):
                 published_values == number if isinstance(number, str) else float(published_values.split()[0]) == number
             ), (name, figure)
             if figure != "run_time" and not (name == "stickslip-threshold" and "step" in figure):
-                size, *unit = measured.replace("\N{MIDDLE DOT}", ".").replace("²", "2").split()
+                size, *unit = measured.split()
+                unit = [text.replace("\N{MIDDLE DOT}", ".").replace("²", "2") for text in unit]
                 expected = quantities[figure]
                 value = expected.to_unit(*unit) if unit and unit != [expected.unit] else expected.value
-                assert float(size) == pytest.approx(value, rel=1e-3), (name, figure)
+                assert web_page.number(size) == pytest.approx(value, rel=1e-3), (name, figure)
     page.choose("preset", "")  # custom: values unchanged, but no published case any more
     assert page.run("[app.state().preset, app.state().model]") == ["", scene.model]
 

@@ -1,6 +1,6 @@
 // Sliders, number fields and drop-down lists for the variables of a model.
 
-import { formatNumber } from "./plot.js";
+import { formatNumber, formatPower } from "./plot.js";
 import { findVariable } from "./state.js";
 
 const SLIDER_STEPS = 400;
@@ -66,14 +66,14 @@ export class Field {
     Object.assign(this, { variable, range: sliderRange(variable, typicalSize) });
     const id = `field-${name}`;
     const description = `${text}${display_unit ? `, in ${display_unit}` : ""}`;
-    this.number = makeElement("input", { type: "number", step: "any", id, inputmode: "decimal", title: `${name}: ${allowed}` });
+    this.number = makeElement("input", { type: "text", autocomplete: "off", id, inputmode: "decimal", title: `${name}: ${allowed}` });
     this.slider = makeElement("input", { type: "range", min: 0, max: SLIDER_STEPS, step: 1, "aria-label": `${name}: ${description}` });
     const label = makeElement("label", { for: id }, makeElement("b", { html: symbol }), ` ${text}`);
     this.element = makeElement("div", { class: "field" }, label, makeElement("span", { class: "entry" }, this.number, makeElement("span", { class: "unit" }, display_unit)), this.slider);
     this.slider.addEventListener("input", () => onSlide(Number(this.slider.value), (position) => sliderValue(position, this.range, factor)));
     this.number.addEventListener("change", () => {
-      const { value } = this.number; // "" if it is not a number
-      if (value) return this.changeTo(value === this.initialText ? variable.start : Number(value) / factor, onChange);
+      const value = parseNumber(this.number.value);
+      if (!Number.isNaN(value)) return this.changeTo(value === Number(this.initialText) ? variable.start : value / factor, onChange);
       this.number.value = this.text;
       onError(`${name} must be a number; it remains ${`${this.text} ${display_unit}`.trim()}.`);
     });
@@ -117,13 +117,25 @@ export class Choice {
   }
 }
 
+// A tolerance with a power of ten, also where a number of its size would be written without one.
+export function formatTolerance(value) {
+  const [mantissa, exponent] = value.toExponential().split("e").map(Number);
+  return mantissa === 1 ? formatPower(exponent) : `${mantissa}·${formatPower(exponent)}`;
+}
+
+// Read a number as typed, with a point or a comma as decimal sign; NaN if it is not a number, or has separators of thousands.
+export function parseNumber(text) {
+  const plain = text.trim().replace("−", "-").replace(/^([^.,]*),([^.,]*)$/, "$1.$2");
+  const value = /^[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?$/i.test(plain) ? Number(plain) : NaN;
+  return Number.isFinite(value) ? value : NaN;
+}
+
 export const TOLERANCES = [1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11, 1e-12];
 
 // The options for a relative tolerance; zero is the default of the model.
 export function toleranceOptions(modelInfo, selected) {
   const all = selected && !TOLERANCES.includes(selected) ? [selected, ...TOLERANCES] : TOLERANCES;
-  const format = (value) => value.toExponential().replace("-", "−");
-  return [[0, `default, ${format(modelInfo.tolerance)}`], ...all.map((rtol) => [rtol, format(rtol)])];
+  return [[0, `default, ${formatTolerance(modelInfo.tolerance)}`], ...all.map((rtol) => [rtol, formatTolerance(rtol)])];
 }
 
 // The options for an enumeration.

@@ -30,7 +30,11 @@ export function buildPanels(session, state, options) {
 }
 
 function describeRange({ content }, main) {
-  const { low, high } = bounds([content.curves.at(-1)?.y ?? []], content.y.log);
+  let [low, high] = [Infinity, -Infinity];
+  for (const value of content.curves.at(-1)?.y ?? []) {
+    if (!Number.isFinite(value)) continue;
+    [low, high] = [Math.min(low, value), Math.max(high, value)];
+  }
   return `from ${formatNumber(low, 3)} to ${formatNumber(high, 3)}, ${main.events.length} events`;
 }
 

@@ -17,13 +17,22 @@ export function ticks(low, high, count = TICK_COUNT) {
   return Array.from({ length: last - first + 1 }, (_, i) => (first + i) * step);
 }
 
-// Format a number with at most `digits` digits, without trailing zeros, with a typographic minus sign.
+const SUPERSCRIPTS = { "-": "⁻", ...Object.fromEntries([..."⁰¹²³⁴⁵⁶⁷⁸⁹"].map((digit, i) => [String(i), digit])) };
+
+// A power of ten, as in 10⁻⁶.
+export function formatPower(exponent) {
+  return `10${[...String(exponent)].map((character) => SUPERSCRIPTS[character]).join("")}`;
+}
+
+// Format a number with at most `digits` digits, without trailing zeros, with a typographic minus sign; very large and small
+// ones with a power of ten, as in 2.5·10⁻⁶.
 export function formatNumber(value, digits = 4) {
   if (!Number.isFinite(value)) return "–";
   let text = String(Number(value.toPrecision(digits)));
   if (Math.abs(value) >= 1e5 || (value !== 0 && Math.abs(value) < 1e-3)) {
     const [mantissa, power] = value.toExponential(digits - 1).split("e");
-    text = `${Number(mantissa)}e${Number(power)}`;
+    const factor = Number(mantissa);
+    text = factor === 1 ? formatPower(Number(power)) : `${factor}·${formatPower(Number(power))}`;
   }
   return text.replace(/-/g, "−");
 }
@@ -161,7 +170,7 @@ export class Plot {
     if (y.hidden) rows.forEach((name, row) => context.fillText(name, LEFT - 6, TOP + (row + 0.5) * rowHeight, LEFT - 8));
     for (const value of y.hidden ? [] : y.log ? decades(y.low, y.high) : ticks(y.low, y.high)) {
       line(context, colours.line, 1, [LEFT, scale.y(value), right, scale.y(value)]);
-      context.fillText(y.log ? `1e${Math.round(Math.log10(value))}`.replace("-", "−") : formatNumber(value), LEFT - 6, scale.y(value));
+      context.fillText(y.log ? formatPower(Math.round(Math.log10(value))) : formatNumber(value), LEFT - 6, scale.y(value));
     }
     context.textAlign = "center";
     context.textBaseline = "alphabetic";

@@ -1,12 +1,14 @@
 // The tables below the diagrams.
 
-import { makeElement } from "./controls.js";
+import { formatTolerance, makeElement } from "./controls.js";
 import { COUNTS } from "./fmu.js";
 import { decayBetween, difference, frictionFromEnergy, measureQuantities, turningPoints } from "./measure.js";
 import { formatNumber } from "./plot.js";
 import { effectiveValues } from "./state.js";
 
 const MAX_LISTED_EVENTS = 60;
+const CLOSED_FORM_DIGITS = 9;
+const LEAST_DIGITS = 4;
 const UNITS = { ms: 1e-3, s: 1, deg: Math.PI / 180, "lbf.in": 0.45359237 * 9.80665 * 0.0254 };
 const QUANTITIES = { // name in scene files: label, unit
   steps: ["steps (time points)", ""],
@@ -33,11 +35,20 @@ function table(caption, headings, rows) {
     makeElement("table", {}, makeElement("caption", {}, caption), makeElement("thead", {}, head), makeElement("tbody", {}, ...body)));
 }
 
+// The digits of a result that its tolerance supports; CLOSED_FORM_DIGITS for a closed form.
+function significantDigits(run) {
+  const values = effectiveValues(run.fmu.modelInfo, run.setting.values);
+  const method = run.fmu.variables.get("solver.method")?.items.find(({ value }) => value === values["solver.method"]);
+  if (method?.label === "exact") return CLOSED_FORM_DIGITS;
+  const rtol = values["solver.rtol"] || run.fmu.modelInfo.tolerance;
+  return Math.min(Math.max(Math.ceil(-Math.log10(rtol)), LEAST_DIGITS), CLOSED_FORM_DIGITS);
+}
+
 // Model, friction law, method and tolerance of a run.
 export function describeSettings(run) {
   const values = effectiveValues(run.fmu.modelInfo, run.setting.values);
   const label = (name) => run.fmu.variables.get(name)?.items.find(({ value }) => value === values[name])?.label;
-  const rtol = values["solver.rtol"] ? `rtol ${values["solver.rtol"]}` : "";
+  const rtol = values["solver.rtol"] ? `rtol ${formatTolerance(values["solver.rtol"])}` : "";
   return [run.fmu.modelInfo.name, label("friction"), label("solver.method"), rtol].filter(Boolean).join(", ");
 }
 
@@ -74,17 +85,18 @@ export function publishedTable(session, state) {
   if (!preset || !run?.done || run.failure) return null;
   const modelInfo = session.models.get(state.model);
   const measured = measureQuantities(run, modelInfo.bodies[0], preset.decay, effectiveValues(modelInfo, state.values));
-  const rows = Object.entries(preset.published).filter(([name]) => name !== "source").map(([name, published]) => comparisonRow(name, published, measured[name]));
+  const rows = Object.entries(preset.published).filter(([name]) => name !== "source").map(([name, published]) => comparisonRow(name, published, measured[name], significantDigits(run)));
   return table(preset.title, ["", "this run", `published (${preset.published.source})`, "difference"], rows);
 }
 
-function comparisonRow(name, published, value) {
+function comparisonRow(name, published, value, resultDigits) {
   const [label, defaultUnit] = QUANTITIES[name] ?? [name, ""];
   const [number, unit] = Array.isArray(published) ? published : [published, defaultUnit];
   const factor = Array.isArray(published) ? UNITS[unit] : 1;
   if (value === undefined) return [label, "–", `${number} ${unit}`, ""];
-  const digits = Math.max(5, String(number).replace(".", "").replace(/^0+/, "").length);
   const isNumber = typeof number === "number";
+  const publishedDigits = isNumber ? String(number).replace(".", "").replace(/^0+/, "").length : 0;
+  const digits = Math.min(Math.max(5, publishedDigits), resultDigits);
   const [size, shownUnit] = !isNumber && defaultUnit === "s" && Math.abs(value) < 1 ? [1e3 * value, "ms"] : [value / factor, unit];
   const deviation = isNumber && name !== "run_time" ? `${formatNumber(100 * (value / factor / number - 1), 2)} %` : name === "run_time" ? "other computer" : "";
   return [label, `${formatNumber(size, digits)} ${shownUnit.replace(".", "·")}`, `${number} ${isNumber ? unit.replace(".", "·") : ""}`.trim(), deviation];
@@ -101,18 +113,19 @@ export function decayTable(session, state) {
   const [first, last] = [decreasing[0], decreasing.at(-1)];
   const decay = decreasing.length > 2 && decayBetween(Math.abs(first.x), Math.abs(last.x), (decreasing.length - 1) / 2);
   if (!decay) return null;
-  const size = (x) => `${formatNumber(Math.abs(x) * factor, 6)} ${display_unit}`;
+  const digits = Math.min(6, significantDigits(main));
+  const size = (x) => `${formatNumber(Math.abs(x) * factor, digits)} ${display_unit}`;
   const rows = [
     ["turning points", String(turning.length)],
     ["first, and last that is smaller than the one before", `${size(first.x)}, ${size(last.x)}`],
-    ["logarithmic decrement per cycle", formatNumber(decay.delta, 6)],
-    ["equivalent damping ratio", formatNumber(decay.zeta, 6)],
+    ["logarithmic decrement per cycle", formatNumber(decay.delta, digits)],
+    ["equivalent damping ratio", formatNumber(decay.zeta, digits)],
     ["amplitude loss per cycle", size(decay.loss)],
   ];
   const energy = modelInfo.variables.find(({ unit, causality }) => unit === "J" && causality === "output");
   if (energy) {
     const force = frictionFromEnergy(main, body, energy.name, decreasing);
-    rows.push(["mean friction from energy loss (all losses)", `${formatNumber(force, 6)} ${display_unit === "deg" ? "N·m" : "N"}`]);
+    rows.push(["mean friction from energy loss (all losses)", `${formatNumber(force, digits)} ${display_unit === "deg" ? "N·m" : "N"}`]);
   }
   return table("Decay", ["", "measured"], rows);
 }
@@ -124,7 +137,7 @@ export function eventTable(session, state) {
   if (!main.events.length) return null;
   const stateAfter = { "-1": "slides backward", 0: "sticks", 1: "slides forward" };
   const describe = ({ name, mode }) => (contacts.length > 1 ? `${name} ${stateAfter[mode]}` : stateAfter[mode]);
-  const rows = main.events.slice(0, MAX_LISTED_EVENTS).map(({ t, row }, i) => [String(i + 1), String(t), main.changedContacts(row).map(describe).join(", ")]);
+  const rows = main.events.slice(0, MAX_LISTED_EVENTS).map(({ t, row }, i) => [String(i + 1), formatNumber(t, significantDigits(main)), main.changedContacts(row).map(describe).join(", ")]);
   const more = main.events.length - rows.length;
   const eventList = table("Events", ["", "t in s", contacts.length > 1 ? "then" : "then it"], rows);
   eventList.classList.add("long");
