@@ -131,6 +131,82 @@ def test_the_default_run_shows_a_rest_that_begins_soon_after_the_default_stop_ti
     assert page.run("app.state().stop") == 4
 
 
+SHIFTS = (
+    "globalThis.shift = 0; new PerformanceObserver(list => { for (const entry of list.getEntries())"
+    "if (!entry.hadRecentInput) shift += entry.value }).observe({ type: 'layout-shift', buffered: true })"
+)
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+def test_nothing_shifts_while_the_page_appears(page, width):
+    page.browser.size(width)
+    script = page.browser.call("Page.addScriptToEvaluateOnNewDocument", source=SHIFTS)
+    page.open(".model=pendulum&.compare=pendulum", anew=True)
+    page.browser.call("Page.removeScriptToEvaluateOnNewDocument", **script)
+    page.wait("document.querySelector('#tables caption')")
+    page.run("new Promise(done => setTimeout(done, 100))")
+    assert page.run("shift") < 0.1
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_the_legend_explains_every_line_shading_and_mark(page, name):
+    page.open(f".model={name}&.compare={name}&.change=1 {'k' if 'k' in declared(name) else 'm'} 1")
+    page.check("envelopes", True)
+    page.run("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
+    legend = page.run("document.getElementById('legend').innerText")
+    drawn = page.run(
+        "[...app.plots.values()].filter(({ figure }) => !figure.hidden).flatMap(({ panel }) => panel.content.curves)"
+        ".filter(({ x }) => x.length).map(({ legend }) => legend ?? null)"
+    )
+    page.check("envelopes", False)
+    assert {"run", "second run", "without the changes"} <= {*drawn}
+    assert all(text in legend for text in drawn)
+    assert "change of a value" in legend
+    has_modes = page.run("app.session.models.get(app.state().model).contacts.length > 0")
+    assert ("sticks" in legend) == has_modes
+
+
+def test_friction_has_one_sign_in_diagram_arrow_and_titles(page):
+    """The arrow is the friction on the body, opposing the motion; the diagram shows its negative, and both say so."""
+    page.open(".model=coulomb")
+    page.seek(0.1)
+    page.run("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
+    force, speed = page.run("['F_friction', 'v'].map(name => app.session.runs.main.at(name, 0.1))")
+    arrow = page.run("document.querySelector('#mechanism .force').getAttribute('d')")
+    length = float(re.match(r"M\S+ \S+h(\S+)m", arrow)[1])
+    assert speed < 0
+    assert force == -0.5
+    assert length > 0
+    assert "the arrow is \N{MINUS SIGN}F_friction" in page.run("document.getElementById('panel-F_friction').innerText")
+    assert "\N{MINUS SIGN}F_friction" in page.run("document.getElementById('legend').innerText")
+
+
+def test_sticking_has_one_colour_and_slipping_another_in_mechanism_and_diagrams(page):
+    style = "getComputedStyle(document.documentElement).getPropertyValue({!r})"
+    body = "getComputedStyle(document.querySelector('#mechanism .body rect')).fill"
+    page.open(".model=coulomb")
+    for t, name in ((0.1, "--slip"), (4.2, "--stick")):
+        page.seek(t)
+        page.run("new Promise(done => setTimeout(done, 300))")  # the colour has a transition
+        colour = page.run(style.format(name)).lstrip("#")
+        assert page.run(body) == f"rgb({', '.join(str(int(colour[i : i + 2], 16)) for i in (0, 2, 4))})"
+
+
+@pytest.mark.parametrize("width", [360, 1280])
+def test_headings_of_tables_have_text_and_regions_that_scroll_take_the_focus(page, width):
+    """These two kinds were found by axe-core 4; its other rules found nothing."""
+    page.browser.size(width)
+    page.open(".model=coulomb&.compare=pacejka")
+    page.wait("document.querySelector('#tables caption')")
+    assert page.run("[...document.querySelectorAll('th')].filter(cell => !cell.textContent).length") == 0
+    regions = page.run(
+        "[...document.querySelectorAll('body *')].filter(e => /auto|scroll/.test(getComputedStyle(e).overflowX)"
+        " && e.scrollWidth > e.clientWidth + 1 && e.tabIndex < 0).map(e => e.id || e.className || e.tagName)"
+    )
+    page.browser.size(1280)
+    assert regions == []
+
+
 # ---- interaction
 
 
@@ -617,7 +693,7 @@ def test_a_printout_is_white_and_complete(page):
         "getComputedStyle(plot).getPropertyValue('--a').trim()) })"
     )
     assert page.browser.pdf().startswith(b"%PDF")
-    assert set(page.run("seen")) == {"#0064a8"}
+    assert set(page.run("seen")) == {"#1c2126"}
     page.browser.call("Emulation.setEmulatedMedia", media="print")
     shown = "[...document.querySelectorAll('canvas')].map(canvas => getComputedStyle(canvas).display)"
     assert page.run(shown) == ["block" if i % 2 == 0 else "none" for i in range(page.run(f"{shown}.length"))]

@@ -36,7 +36,7 @@ MODULES = (
         "drag",
         "controls",
     ),
-    *("panels", "diagrams", "form", "tables", "export", "main"),
+    *("legend", "panels", "diagrams", "form", "tables", "export", "main"),
 )
 
 

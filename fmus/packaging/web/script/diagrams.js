@@ -1,7 +1,8 @@
 // The diagrams on the page, each below its title.
 
 import { makeElement } from "./controls.js";
-import { buildPanels, cursorReadings } from "./panels.js";
+import { uniqueEntries } from "./legend.js";
+import { buildPanels, cursorReadings, legendOf } from "./panels.js";
 import { Plot, readColours } from "./plot.js";
 
 export class Diagrams {
@@ -48,6 +49,11 @@ export class Diagrams {
       plot.moveCursor(cursor);
       reading.replaceChildren(...readings.map(({ text, colour }) => makeElement("span", { class: colour }, text)));
     }
+  }
+
+  // The legend of all visible diagrams, and of the arrow of the mechanism.
+  legend() {
+    return uniqueEntries(this.visible().flatMap(({ panel }) => legendOf(panel)));
   }
 
   visible() {

@@ -1,5 +1,7 @@
 // Exports: results as CSV, diagrams as one PNG image.
 
+import { drawLegend } from "./legend.js";
+
 const PLOT_WIDTH = 520; // CSS pixels
 const PLOT_HEIGHT = 240;
 const TITLE_HEIGHT = 26;
@@ -36,13 +38,14 @@ function wrap(context, text, width) {
   return lines;
 }
 
-// All diagrams [{plot, heading}] in one image, two in a row, each below its title, below the settings.
-export function toPng(diagrams, title, settings) {
+// All diagrams [{plot, heading}] in one image, two in a row, each below its title, below the settings and the legend.
+export function toPng(diagrams, title, settings, legend) {
   const canvas = document.createElement("canvas");
   const context = canvas.getContext("2d");
   context.font = TEXT_FONT;
   const text = settings.flatMap((line) => wrap(context, line, 2 * PLOT_WIDTH - 20));
-  const top = TITLE_HEIGHT + text.length * LINE_HEIGHT;
+  const legendTop = TITLE_HEIGHT + (text.length + 0.5) * LINE_HEIGHT;
+  const top = legendTop + drawLegend(context, legend, 0, 0, 2 * PLOT_WIDTH - 20);
   const rows = Math.ceil(diagrams.length / 2);
   [canvas.width, canvas.height] = [RESOLUTION * 2 * PLOT_WIDTH, RESOLUTION * (rows * (PLOT_HEIGHT + TITLE_HEIGHT) + top + TITLE_HEIGHT / 2)];
   const style = getComputedStyle(document.documentElement);
@@ -58,6 +61,7 @@ export function toPng(diagrams, title, settings) {
   context.fillRect(0, 0, 2 * PLOT_WIDTH, canvas.height);
   drawText(title, 10, 18, "bold 14px system-ui, sans-serif");
   text.forEach((line, i) => drawText(line, 10, TITLE_HEIGHT + (i + 0.75) * LINE_HEIGHT, TEXT_FONT));
+  drawLegend(context, legend, 10, legendTop, 2 * PLOT_WIDTH - 20, (name) => style.getPropertyValue(`--${name}`));
   diagrams.forEach(({ plot, heading }, i) => {
     const [x, y] = [(i % 2) * PLOT_WIDTH, top + Math.floor(i / 2) * (PLOT_HEIGHT + TITLE_HEIGHT)];
     drawText(heading.textContent, x + 10, y + 18, TEXT_FONT);

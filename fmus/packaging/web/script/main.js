@@ -2,6 +2,7 @@
 
 import { makeElement, typicalSizes } from "./controls.js";
 import { Session } from "./session.js";
+import { showLegend } from "./legend.js";
 import { Diagrams } from "./diagrams.js";
 import { presetState, initialComparison, addChange, chooseItem, replaceValue } from "./overrides.js";
 import { settingLines } from "./setting_lines.js";
@@ -84,6 +85,7 @@ function buildControls() {
   $$("name").textContent = modelInfo.name;
   $$("title").textContent = modelInfo.title;
   $$("equations").innerHTML = modelInfo.text; // HTML from the build
+  for (const formulas of $$("equations").querySelectorAll("pre")) formulas.tabIndex = 0; // scrolls on narrow screens
   mechanism.build(modelInfo);
   $$("kick").hidden = !modelInfo.bodies.some((body) => body.input);
   const stop = session.stopTime(modelInfo.name);
@@ -193,6 +195,7 @@ function redraw() {
 
 function frame(now) {
   frameRequested = false;
+  document.body.classList.remove("starting"); // everything appears at once, so that nothing shifts
   const elapsed = lastFrame ? Math.min((now - lastFrame) / 1000, 0.1) : 0;
   lastFrame = now;
   if (page.playing) advanceCursor(elapsed);
@@ -203,6 +206,7 @@ function frame(now) {
   if (main.time.length && stale.curves) {
     mechanism.fit(main);
     diagrams.draw(session, page.state, { envelopes: $$("envelopes").checked });
+    showLegend($$("legend"), diagrams.legend());
   }
   if (main.time.length && (stale.curves || stale.cursor) && main.hasReached(page.state.t)) {
     drawCursor();
@@ -289,7 +293,7 @@ for (const [id, action] of Object.entries({
   reset: () => showState(defaultState(page.modelInfo)),
   print: () => print(),
   csv: () => save(new Blob([toCsv(session.runs.main, session.runs.comparison, settingLines(session, page.state))], { type: "text/csv" }), `${page.state.model}.csv`),
-  png: async () => save(await toPng(diagrams.visible(), describeSettings(session.runs.main), settingLines(session, page.state)), `${page.state.model}.png`),
+  png: async () => save(await toPng(diagrams.visible(), describeSettings(session.runs.main), settingLines(session, page.state), diagrams.legend()), `${page.state.model}.png`),
   link: copyLink,
 })) $$(id).addEventListener("click", action);
 $$("scrub").addEventListener("input", () => seek((page.state.stop * $$("scrub").value) / 1000));

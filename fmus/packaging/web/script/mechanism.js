@@ -142,6 +142,7 @@ export class Mechanism {
       const position = limited(body.position);
       const stuck = body.mode && value(body.mode) === 0;
       part.moving.classList.toggle("stuck", Boolean(stuck));
+      part.moving.classList.toggle("slipping", Boolean(body.friction) && !stuck);
       part.position = position;
       part.driverPosition = body.driver ? value(body.driver) : 0;
       if (body.kind === "block") this.moveBlock(part, position, limited);

@@ -51,10 +51,10 @@ function curveData(run, { name, factor }) {
 // One curve per run from curveOf(run). The main run comes last, so it is drawn on top.
 function runCurves({ main, comparison, unchanged, preview }, curveOf) {
   return [
-    unchanged && { ...curveOf(unchanged), colour: "ghost", dash: [4, 4], width: 1 },
-    preview && !main.done && { ...curveOf(preview), colour: "ghost", width: 1 },
-    comparison && { ...curveOf(comparison), colour: "b" },
-    { ...curveOf(main), colour: "a" },
+    unchanged && { ...curveOf(unchanged), colour: "ghost", dash: [4, 4], width: 1, legend: "without the changes" },
+    preview && !main.done && { ...curveOf(preview), colour: "ghost", width: 1, legend: "preview by the default method" },
+    comparison && { ...curveOf(comparison), colour: "b", legend: "second run" },
+    { ...curveOf(main), colour: "a", legend: "run" },
   ].filter((curve) => curve?.y);
 }
 
@@ -72,7 +72,10 @@ function timePanel(session, state, options, name, key = name, log = false) {
   const own = contacts.filter((contact) => contact.name === name);
   const shaded = own.length ? own : contacts.filter((contact) => body.contacts?.includes(contact.name));
   const content = { x, y, curves, ...stickingBands(main, shaded), marks: findMarks(main, state, name === body.position) };
-  return { key, name, title: `${text}${display_unit ? ` in ${display_unit}` : ""}`, symbol, factor, content };
+  const isFriction = name === body.friction || contacts.some((contact) => contact.name === name);
+  const arrow = name === body.friction && body.kind !== "none" ? `friction on the body, −${name}` : "";
+  const sign = isFriction ? `; the arrow is −${name}` : "";
+  return { key, name, title: `${text}${display_unit ? ` in ${display_unit}` : ""}${sign}`, symbol, factor, content, arrow };
 }
 
 // The intervals in which contacts stick as {bands, rows}: each of several contacts has a row with its name.
@@ -95,13 +98,13 @@ function stickingPanel(main, state) {
 // Additional curves with the position: the driver, and optionally envelopes and turning points.
 function positionCurves(main, body, options, factor) {
   const curves = [];
-  if (body.driver) curves.push({ ...curveData(main, { name: body.driver, factor }), colour: "soft", dash: [2, 3], width: 1 });
+  if (body.driver) curves.push({ ...curveData(main, { name: body.driver, factor }), colour: "soft", dash: [2, 3], width: 1, legend: "driver" });
   if (!options.envelopes) return curves;
   const turning = turningPoints(main.time, main.columns[body.position], main.columns[body.speed]);
   for (const envelope of envelopes(turning)) {
     for (const sign of [1, -1]) curves.push({ ...envelope, y: envelope.y.map((value) => sign * value * factor), colour: "event", width: 1 });
   }
-  const dots = { x: turning.map(({ t }) => t), y: turning.map(({ x }) => x * factor), colour: "event", dots: true };
+  const dots = { x: turning.map(({ t }) => t), y: turning.map(({ x }) => x * factor), colour: "event", dots: true, legend: "turning points" };
   return [...curves, dots];
 }
 
@@ -114,8 +117,8 @@ function envelopes(turning) {
   const fractions = Array.from({ length: ENVELOPE_POINTS + 1 }, (_, i) => i / ENVELOPE_POINTS);
   const x = fractions.map((s) => first.t + s * (last.t - first.t));
   return [
-    { x, y: fractions.map((s) => first.x + s * (last.x - first.x)), dash: [7, 4] },
-    { x, y: fractions.map((s) => first.x * (last.x / first.x) ** s), dash: [2, 3] },
+    { x, y: fractions.map((s) => first.x + s * (last.x - first.x)), dash: [7, 4], legend: "straight envelope: dry friction" },
+    { x, y: fractions.map((s) => first.x * (last.x / first.x) ** s), dash: [2, 4], legend: "exponential envelope: viscous damper" },
   ];
 }
 
@@ -153,7 +156,7 @@ function errorPanel(session, body, state) {
   const sameModel = state.comparison?.model === state.model;
   const curve = (from, to, colour) => {
     const { time, differences } = difference(from, to, body.position);
-    return { x: time, y: differences.map((value) => Math.abs(value) * factor), colour };
+    return { x: time, y: differences.map((value) => Math.abs(value) * factor), colour, legend: colour === "a" ? "run" : "second run" };
   };
   const curves = [];
   let title = `error of ${body.position} against the closed form`;
@@ -168,6 +171,17 @@ function errorPanel(session, body, state) {
   const y = { ...bounds(curves.map((each) => each.y), true), log: true };
   const x = { low: 0, high: state.stop, label: "t in s" };
   return { key: ".error", title: `${title}${display_unit ? ` in ${display_unit}` : ""}`, symbol: "", content: { x, y, curves } };
+}
+
+// The entries of the legend for a diagram.
+export function legendOf({ content, arrow }) {
+  const { curves, bands = [], marks = [] } = content;
+  const lines = curves.filter(({ legend }) => legend).map(({ colour, dash, dots, legend }) => ({ kind: dots ? "dots" : "line", colour, dash, text: legend }));
+  const isStuck = bands.length > 0 && [{ kind: "band", colour: "hold", text: "sticks" }];
+  const isEvent = marks.some(({ label }) => !label) && [{ kind: "mark", colour: "event", text: "event" }];
+  const isChange = marks.some(({ label }) => label) && [{ kind: "change", colour: "event", text: "change of a value" }];
+  const isArrow = arrow && [{ kind: "arrow", colour: "ink", text: arrow }];
+  return [...lines.reverse(), ...(isStuck || []), ...(isEvent || []), ...(isChange || []), ...(isArrow || [])];
 }
 
 // The cursor of a diagram and the values there: {cursor, readings [{text, colour}]}.

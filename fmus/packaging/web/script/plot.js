@@ -66,7 +66,7 @@ const colours = {}; // by name of the CSS variable
 // Read the current colours of the style sheet (light, dark or print).
 export function readColours() {
   const style = getComputedStyle(document.documentElement);
-  for (const name of ["a", "b", "ghost", "line", "soft", "stick", "event", "cursor"]) colours[name] = style.getPropertyValue(`--${name}`).trim();
+  for (const name of ["a", "b", "ghost", "line", "soft", "hold", "event", "cursor"]) colours[name] = style.getPropertyValue(`--${name}`).trim();
 }
 
 export class Plot {
@@ -158,7 +158,7 @@ export class Plot {
     const [right, bottom] = [width - RIGHT, height - BOTTOM];
     context.font = FONT;
     context.lineJoin = "round";
-    context.fillStyle = colours.stick;
+    context.fillStyle = colours.hold;
     const rowHeight = (bottom - TOP) / Math.max(rows.length, 1);
     const gap = rows.length > 1 ? Math.min(ROW_GAP, 0.2 * rowHeight) : 0;
     for (const { from, to, row } of bands) {

@@ -29,7 +29,7 @@ const QUANTITIES = { // name in scene files: label, unit
 };
 
 function table(caption, headings, rows) {
-  const head = makeElement("tr", {}, ...headings.map((text) => makeElement("th", { scope: "col" }, text)));
+  const head = makeElement("tr", {}, ...headings.map((text) => (text ? makeElement("th", { scope: "col" }, text) : makeElement("td"))));
   const body = rows.map(([first, ...cells]) => makeElement("tr", {}, makeElement("th", { scope: "row" }, first), ...cells.map((cell) => makeElement("td", {}, cell))));
   return makeElement("div", { class: "scroll", tabindex: 0, role: "region", "aria-label": caption },
     makeElement("table", {}, makeElement("caption", {}, caption), makeElement("thead", {}, head), makeElement("tbody", {}, ...body)));
