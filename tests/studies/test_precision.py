@@ -10,6 +10,7 @@ import commands
 import numpy as np
 import pytest
 from build_cache import build_user_model
+from matplotlib.figure import Figure
 from models import EXAMPLE_MODELS
 
 from harness.errors import HarnessError
@@ -20,6 +21,7 @@ from harness.results.provenance import write_provenance
 from harness.running.embedded_model import EmbeddedModel, load_model_class, method_numbers
 from harness.running.solution import Solution
 from harness.studies.precision import advice, law_deviations
+from harness.studies.precision.figure import OTHER, draw
 from harness.studies.precision.study import (
     FMI3_INTERFACES,
     FMPY,
@@ -152,6 +154,34 @@ def test_the_advice_is_derived_from_the_points():
     )
     nothing = Study("stickslip", (CASE["stickslip"],), points[:1])
     assert advice.recommend(nothing, []) == "stickslip: no method of the FMU reaches an error of 1e-6."
+
+
+def test_a_figure_labels_three_solvers_per_case_and_draws_the_others_in_grey(tmp_path, monkeypatch):
+    """The two fastest methods of the FMU and the fastest other solver; a law that chatters is grey."""
+    figures = []
+    monkeypatch.setattr(Figure, "savefig", lambda figure, path, **_: figures.append(figure))
+    points = (
+        make_point("ode23", 8e-3, 1e-7),
+        make_point("ode45", 2e-3, 1e-6),
+        make_point("rodas", 9e-3, 1e-8),
+        make_point("RK45", 2e-2, 1e-7, "scipy"),
+        make_point("Adams", 3e-2, 1e-7, "cvode"),
+        make_point("ode45", 4e-3, 1e-6, FMPY),
+        make_point("ode23", 1e-3, 1e-3, case="stickslip-threshold", beside_dry=5e-3),
+    )
+    draw(Study("stickslip", (CASE["stickslip"], CASE["stickslip-threshold"]), points), [], tmp_path / "figure.svg")
+    panels = figures[0].get_axes()
+    assert [text.get_text() for text in panels[1].get_legend().get_texts()] == [
+        "FMU: ode45",
+        "FMU: ode23",
+        "scipy: RK45",
+    ]
+    for axes in panels:
+        labelled = {line.get_color() for line in axes.lines if not line.get_label().startswith("_")}
+        others = {line.get_color() for line in axes.lines if line.get_label().startswith("_")}
+        assert len(labelled) == 3
+        assert others == {OTHER["color"]}
+    assert [len(axes.lines) for axes in panels] == [7, 6]  # fmpy evaluates as often as the FMU itself
 
 
 def test_no_advice_is_given_without_sufficient_evidence():

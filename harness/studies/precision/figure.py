@@ -1,4 +1,8 @@
-"""Work-precision figures: run time and right-hand side evaluations over the error, for every solver."""
+"""Work-precision figures: run time and right-hand side evaluations over the error.
+
+Three solvers of each case are coloured and labelled: the two fastest methods of the FMU and the fastest other solver at
+the error TARGET.  All others are grey; the CSV file of the study has the numbers of all.
+"""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -8,25 +12,21 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from ...references.certified_reference import ReferenceCase
-from ...results.style import GREY, METHOD_COLOURS, WIDTH, open_figure
+from ...results.style import BLUE, GREEN, GREY, LEGEND_ABOVE, ORANGE, WIDTH, open_figure
+from .advice import TARGET, format_power, rank_solvers
 from .law_deviations import LawDeviation
 from .study import CS, FMPY, FMU, ME, Study
 
-TOOLS: dict[str, dict[str, Any]] = {
-    FMU: {"linestyle": "-", "marker": "o", "markersize": 4},
-    FMPY: {"linestyle": ":", "marker": ".", "markersize": 4},
-    CS: {"linestyle": "", "marker": "P", "markersize": 8, "fillstyle": "none"},
-    ME: {"linestyle": "-.", "marker": "D", "markersize": 4},
-    "scipy": {"linestyle": "--", "marker": "s", "markersize": 4, "fillstyle": "none"},
-    "cvode": {"linestyle": "--", "marker": "^", "markersize": 5, "fillstyle": "none"},
-}
+Solver = tuple[str, str]  # tool and method
+
 COSTS = {"seconds": "run time [s]", "evaluations": "right-hand side and Jacobian evaluations"}
-CHATTERING: dict[str, Any] = {"linestyle": "-", "marker": "x", "markersize": 4, "linewidth": 0.7}
-FILL = {FMU: "full"}  # of the star marker for a closed form
-LEGEND = (
-    "FMU: code of the FMU in this process; fmpy: FMU through fmpy\n"
-    "FMI 3.0 through fmpy: co-simulation (CS) with default settings, model exchange (ME) with fmpy's CVode"
+LABELLED: tuple[dict[str, Any], ...] = (  # styles of the labelled solvers, in their order
+    {"color": BLUE, "linestyle": "-", "marker": "o"},
+    {"color": ORANGE, "linestyle": "-", "marker": "s"},
+    {"color": GREEN, "linestyle": "--", "marker": "^"},
 )
+OTHER: dict[str, Any] = {"color": "#cccccc", "linewidth": 0.8, "marker": ".", "markersize": 4, "zorder": 1}
+CAPTION = "labelled: the two fastest methods of the FMU and the fastest other solver at error {}; grey: all others"
 FLOOR = 2.0**-53  # smaller errors are drawn at this value
 
 
@@ -37,8 +37,8 @@ def draw(study: Study, laws: Sequence[LawDeviation], path: Path) -> None:
     """
     cases = [case for case in study.cases if not case.is_chattering]
     shortcuts = [case for case in study.cases if case.is_chattering]
-    with open_figure(path, 2 * WIDTH + 1.5, 0.8 + 3.6 * len(cases)) as figure:
-        figure.suptitle(f"{study.model}: work-precision\n{LEGEND}", fontsize=11)
+    with open_figure(path, 2 * WIDTH, 0.7 + 3.4 * len(cases)) as figure:
+        figure.suptitle(f"{study.model}: cost over error, lower left is better\n{CAPTION.format(format_power(TARGET))}")
         panels = figure.subplots(len(cases), 2, squeeze=False, sharex=True, sharey="col")
         for case, row in zip(cases, panels, strict=True):
             row_cases = [case, *(shortcuts if case is cases[0] else [])]
@@ -47,18 +47,32 @@ def draw(study: Study, laws: Sequence[LawDeviation], path: Path) -> None:
                     plot_curves(axes, study, row_case, cost)
                 for law in laws:
                     if law.largest and law.case in [row_case.name for row_case in row_cases]:
-                        axes.axvline(law.largest, color=GREY, linestyle="-.", label="error of the law")
-                axes.set_title(case.law)
+                        name_of_law = "the law" if law.case == case.name else f"the law '{law.law}'"
+                        mark_error(axes, law.largest, f"error of {name_of_law} ")
                 axes.set_ylabel(name)
                 axes.tick_params(labelbottom=True)
+            row[0].set_title(case.law)
+            add_legend(row[1])
         for axes in panels[-1]:
             axes.set_xlabel("largest error, relative to the largest value")
-        lines = {line.get_label(): line for axes in panels.flat for line in axes.lines}
-        figure.legend(lines.values(), lines.keys(), loc="outside right upper")
+
+
+def choose_labelled(study: Study, case: ReferenceCase) -> list[Solver]:
+    """Return the solvers to label, fastest first; those with the smallest error fill up if few reach TARGET."""
+    if case.is_chattering:
+        return []
+    ranks = [(point.tool, point.method) for point in rank_solvers(study, case, TARGET)]
+    own_solvers = [solver for solver in ranks if solver[0] == FMU]
+    peers = [solver for solver in ranks if solver[0] != FMU]
+    solvers = [solver for solver in study.solvers(case) if solver[0] not in (FMPY, CS, ME)]
+    errors = {solver: min((p.largest for p in study.curve(case, *solver)), default=np.inf) for solver in solvers}
+    rest = sorted(solvers, key=lambda solver: errors[solver])
+    return list(dict.fromkeys([*own_solvers[:2], *peers[:1], *ranks, *rest]))[: len(LABELLED)]
 
 
 def plot_curves(axes: Axes, study: Study, case: ReferenceCase, cost: str) -> None:
     """Plot every solver of a case, log-log; failed runs are gaps."""
+    labelled = choose_labelled(study, case)
     for tool, method in study.solvers(case):
         is_duplicate = tool in (FMPY, CS) and (
             cost != "seconds" or case.is_chattering
@@ -69,9 +83,23 @@ def plot_curves(axes: Axes, study: Study, case: ReferenceCase, cost: str) -> Non
         errors = [
             max(p.beside_dry if case.is_chattering and p.beside_dry is not None else p.largest, FLOOR) for p in points
         ]
-        style = CHATTERING if case.is_chattering else TOOLS[tool]
-        text = f"{method}, law '{case.law}'" if case.is_chattering else f"{tool}: {method}"
-        star = {"markersize": 9, "marker": "*", "fillstyle": FILL.get(tool, "none")}
-        shape = {**style, **(star if method == "exact" and tool != CS else {})}
         costs = [np.nan if p.failure else getattr(p, cost) for p in points]
-        axes.loglog(errors, costs, color=METHOD_COLOURS.get(method, GREY), label=text, **shape)
+        if (tool, method) in labelled:
+            style = LABELLED[labelled.index((tool, method))] | {"label": f"{tool}: {method}", "markersize": 5}
+        else:
+            style = OTHER | {"label": "_other"}
+        axes.loglog(errors, costs, **style)
+
+
+def mark_error(axes: Axes, error: float, text: str) -> None:
+    """Mark the error of a law against dry friction, which no solver of this law can reduce."""
+    axes.axvline(error, color=GREY, linestyle="-.", linewidth=0.8)
+    style: dict[str, Any] = {"rotation": 90, "ha": "right", "va": "top", "fontsize": 8, "color": GREY}
+    axes.text(error, 0.98, text, transform=axes.get_xaxis_transform(), **style)
+
+
+def add_legend(axes: Axes) -> None:
+    """Add a legend of the labelled solvers above a panel, fastest first."""
+    order = [style["color"] for style in LABELLED]
+    lines = [line for line in axes.lines if not str(line.get_label()).startswith("_")]
+    axes.legend(handles=sorted(lines, key=lambda line: order.index(line.get_color())), ncols=3, **LEGEND_ABOVE)
