@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 from base64 import b64encode
 from collections import Counter
 from collections.abc import Callable, Sequence
@@ -19,7 +20,13 @@ from ..results.quantity import format_interval as spelled_interval
 from ..results.step_sizes import step_size_quantities as step_sizes
 
 TRAJECTORY_FILE = "trajectory.csv"
+QUANTITIES_FILE = "quantities.csv"
+MAX_NUMBER_LENGTH = 32  # characters of a number with its interval; longer cells are texts
+NUMBER_STARTS = (*"0123456789+-<", "nan", "not finite")
 MIN_LENGTH = 12  # cells longer than this are shortened to four digits
+RUN_TIME = "run time"  # row of quantities.csv; a busy machine makes more than two of its digits meaningless
+FAILED = "wrong"  # outcome of a stability case that did not end as expected
+LOSSES = {"zeta": "viscous damping", "r": "dry friction", "b": "quadratic drag"}  # terms of a fitted decay
 
 
 @dataclass(frozen=True)
@@ -47,21 +54,32 @@ class TableCells:
     heads: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
 
+    def is_text(self, column: int) -> bool:
+        """Return whether a column has texts, which are set flush left."""
+        cells = [row[column] for row in self.rows if row[column]]
+        return not any(cell.startswith(NUMBER_STARTS) and len(cell) <= MAX_NUMBER_LENGTH for cell in cells)
+
 
 @dataclass(frozen=True)
 class SectionItem:
     """A piece of a section: heading, sentences, table and pictures if any, sentences on their origin, and data files.
 
-    `unreadable` marks results that could not be read; a sentence gives the reason.
+    `folded` are further tables by their titles, which the reader opens. `unreadable` marks results that could not be
+    read; a sentence gives the reason.
     """
 
     title: str
     sentences: tuple[str, ...] = ()
     grid: TableCells | None = None
     pictures: tuple[Picture, ...] = ()
+    folded: tuple[tuple[str, TableCells], ...] = ()
     unreadable: bool = False
     origin: tuple[str, ...] = ()
     files: tuple[Path, ...] = ()
+
+    @property
+    def has_results(self) -> bool:
+        return bool(self.grid or self.folded or self.pictures)
 
 
 @dataclass(frozen=True)
@@ -78,7 +96,7 @@ class Section:
 def build_sections(results: Path, scenes: Sequence[PublishedScene]) -> list[Section]:
     """Return all sections for the results in a folder, published scenes first."""
     sections = [
-        *(oscillators_section(scenes, results), runs_section(scenes, results)),
+        *(published_section(scenes, results), runs_section(scenes, results)),
         *(decay_section(results), steps_section(scenes, results)),
         *(precision_section(scenes, results), stability_section(results), importers_section(results)),
         *(sweeps_section(results), comparisons_section(results), coupled_section(results), bench_section(results)),
@@ -103,7 +121,7 @@ def read_item(path: Path, make: Callable[[Path], SectionItem]) -> SectionItem:
     """Return the item of a file or folder of results, or an item with the reason why it cannot be read."""
     try:
         part = make(path)
-        return replace(part, origin=read_origin(path), files=csv_files(path)) if part.grid or part.pictures else part
+        return replace(part, origin=read_origin(path), files=csv_files(path)) if part.has_results else part
     except Exception as error:  # the content may be truncated, of another version or of another program
         return SectionItem(
             path.name,
@@ -125,37 +143,54 @@ def csv_files(path: Path) -> tuple[Path, ...]:
     return tuple(sorted(path.glob("*.csv") if path.is_dir() else path.parent.glob(f"{path.stem}*.csv")))
 
 
-def oscillators_section(scenes: Sequence[PublishedScene], results: Path) -> Section:
+def published_section(scenes: Sequence[PublishedScene], results: Path) -> Section:
     parts, missing = [], []
     for scene in scenes:
         sentences = (scene.about,) if scene.about else ()
-        if (results / scene.name / "quantities.csv").is_file():
-            parts.append(read_item(results / scene.name, partial(oscillator_item, sentences)))
+        if (results / scene.name / QUANTITIES_FILE).is_file():
+            parts.append(read_item(results / scene.name, partial(published_item, sentences)))
         else:
             missing.append((scene.name, f"python -m harness run {scene.name}"))
-            parts += [SectionItem(scene.name, sentences)] if sentences else []
-    intro = "Each model with its measured quantities next to the published values."
-    return Section("oscillators", "The oscillators", intro, tuple(parts), tuple(missing))
+    intro = "Each published value with the measured one. Run times depend on the machine."
+    return Section("published", "Published cases", intro, tuple(parts), tuple(missing))
 
 
-def oscillator_item(sentences: tuple[str, ...], folder: Path) -> SectionItem:
+def published_item(sentences: tuple[str, ...], folder: Path) -> SectionItem:
+    """Return the item of a published case; quantities without a published value are folded."""
     picture = read_picture(folder / "figure.svg", f"{folder.name}: position, velocity and phase plane of the run")
-    return SectionItem(folder.name, sentences, read_table(folder / "quantities.csv", cut=False), picture)
+    measured = read_quantities(folder / QUANTITIES_FILE)
+    column = next(i for i, head in enumerate(measured.heads) if head.startswith("published"))
+    shown = tuple(row for row in measured.rows if row[column])
+    others = tuple(row[:column] for row in measured.rows if not row[column])
+    folded = (("Quantities without a published value", TableCells(measured.heads[:column], others)),) if others else ()
+    return SectionItem(folder.name, sentences, TableCells(measured.heads, shown), picture, folded)
+
+
+def read_quantities(file: Path) -> TableCells:
+    """Return the table of measured quantities, with two digits of the run time."""
+    cells = read_table(file, cut=False)
+    return TableCells(cells.heads, tuple(round_run_time(row) for row in cells.rows))
+
+
+def round_run_time(row: tuple[str, ...]) -> tuple[str, ...]:
+    """Return a row of quantities.csv; the measured value of a run time is rounded to two digits."""
+    name, value, *others = row
+    return (name, f"{float(f'{float(value):.2g}'):g}", *others) if name == RUN_TIME else row
 
 
 def runs_section(scenes: Sequence[PublishedScene], results: Path) -> Section:
     """Section of runs without published values: user scenes and FMUs."""
     cases = [scene.name for scene in scenes]
     folders = sorted(file.parent for file in results.glob(f"[!.]*/{TRAJECTORY_FILE}"))
-    others = [folder for folder in folders if folder.name not in cases or not (folder / "quantities.csv").is_file()]
+    others = [folder for folder in folders if folder.name not in cases or not (folder / QUANTITIES_FILE).is_file()]
     intro = "User scenes and FMUs, with first and last values."
     return Section("runs", "Other runs", intro, tuple(read_item(folder, run_item) for folder in others), ())
 
 
 def run_item(folder: Path) -> SectionItem:
-    quantities, trajectory = folder / "quantities.csv", read_table(folder / TRAJECTORY_FILE)
+    quantities, trajectory = folder / QUANTITIES_FILE, read_table(folder / TRAJECTORY_FILE)
     rows = tuple(zip(trajectory.heads, trajectory.rows[0], trajectory.rows[-1], strict=True))
-    grid = read_table(quantities, cut=False) if quantities.is_file() else TableCells(("", "first", "last"), rows)
+    grid = read_quantities(quantities) if quantities.is_file() else TableCells(("", "first", "last"), rows)
     return SectionItem(folder.name, (), grid, read_picture(folder / "figure.svg", f"{folder.name}: plots of the run"))
 
 
@@ -179,10 +214,27 @@ def decay_item(folder: Path) -> SectionItem:
         )
         for quantity in data["fit"]
     )
-    grid = TableCells(("", "whole signal", "turning points", "first and last peak", "unit"), rows)
-    summary = data["sentence"]
+    two_peaks = "first and last peak, if this loss acted alone"
+    grid = TableCells(("", "whole signal", "turning points", two_peaks, "unit"), rows)
+    summary, ranked, _ = data["sentence"].partition(" (BIC ")
+    summary += "." if ranked else ""
     text = f"Decay of {data['record']}: signal, turning points, envelope and fit, and residuals. {summary}"
-    return SectionItem(data["record"], (summary, *data["remarks"]), grid, read_picture(folder / "figure.svg", text))
+    picture = read_picture(folder / "figure.svg", text)
+    folded = (("Other combinations of losses", law_table(data["laws"], data["unit"])),)
+    return SectionItem(data["record"], (summary, *data["remarks"]), grid, picture, folded)
+
+
+def law_table(laws: list[dict[str, Any]], unit: str) -> TableCells:
+    """Return the table of fitted combinations of losses, best first."""
+    rows = (
+        (
+            ", ".join(LOSSES.get(term, term) for term in law["terms"]),
+            format_cell(law["bic"], ".1f"),
+            format_cell(law["residual"], ".3g"),
+        )
+        for law in laws
+    )
+    return TableCells(("losses", "BIC, smaller is better", f"rms residual [{unit}]"), tuple(rows))
 
 
 def steps_section(scenes: Sequence[PublishedScene], results: Path) -> Section:
@@ -219,7 +271,10 @@ def precision_section(scenes: Sequence[PublishedScene], results: Path) -> Sectio
             command = f"python build_fmus.py {model} --fmi 3 && python -m harness precision {model}"
             missing.append((f"{model} in model exchange", command))
     parts += read_items(folder, "anchors.csv", partial(table_item, "Problems from the literature"))
-    intro = "Error against run time and right-hand side evaluations; lower left is better. References are certified."
+    intro = (
+        "Error against run time and right-hand side evaluations; lower left is better. References are certified. FMU "
+        "is the code of the FMU in this process; scipy and cvode solve the same equations."
+    )
     return Section("precision", "Error against run time", intro, tuple(parts), tuple(missing))
 
 
@@ -230,8 +285,19 @@ def precision_item(path: Path) -> SectionItem:
         f"{path.name}: run time and right-hand side evaluations over the largest error, by method",
     )
     text, exchanged = path.with_suffix(".txt"), path.with_name(f"{path.name}-exchange.csv")
-    sentences = (text.read_text(encoding="utf-8").strip(),) if text.is_file() else ()
-    return SectionItem(path.name, sentences, read_table(exchanged) if exchanged.is_file() else None, picture)
+    sentence = text.read_text(encoding="utf-8").strip().removeprefix(f"{path.name}: ") if text.is_file() else ""
+    folded = (("Model exchange with fmpy's CVode", read_table(exchanged)),) if exchanged.is_file() else ()
+    return SectionItem(path.name, split_clauses(sentence), None, picture, folded)
+
+
+def split_clauses(text: str) -> tuple[str, ...]:
+    """Split a recommendation at its semicolons, except those in parentheses, into sentences.
+
+    >>> split_clauses("use exact (1e-15; ode45 2 times); no more.")
+    ('Use exact (1e-15; ode45 2 times).', 'No more.')
+    """
+    clauses = re.split(r"; (?![^()]*\))", text.rstrip("."))
+    return tuple(f"{clause[:1].upper()}{clause[1:]}." for clause in clauses if clause)
 
 
 def stability_section(results: Path) -> Section:
@@ -247,17 +313,28 @@ def stability_item(file: Path) -> SectionItem:
     kinds = sorted({ending for _, _, ending in counts})
     pairs = sorted({(model, method) for model, method, _ in counts})
     rows = tuple((*pair, *(str(counts[(*pair, kind)]) for kind in kinds)) for pair in pairs)
+    heads = ("model", "method", *("failed" if kind == FAILED else kind for kind in kinds))
+    failed = [row for row in cells.rows if row[column["ended"]] == FAILED]
+    reasons = tuple(tuple(row[column[name]] for name in ("model", "scene", "method", "sentence")) for row in failed)
     picture = read_picture(
         file.with_name("region.svg"),
         "Internal steps of each method over x_m, the speed of maximum friction",
     )
-    text = f"{len(cells.rows)} stiff and extreme cases; number of each outcome:"
-    return SectionItem("Outcomes", (text,), TableCells(("model", "method", *kinds), rows), picture)
+    outcomes = "Number of outcomes by model and method", TableCells(heads, rows)
+    n_passed = len(cells.rows) - len(failed)
+    text = f"{n_passed} of {len(cells.rows)} stiff and extreme cases ended as expected."
+    if not failed:
+        return SectionItem("Outcomes", (text,), outcomes[1], picture)
+    failures = TableCells(("model", "case", "method", "reason"), reasons)
+    return SectionItem("Outcomes", (text, "The other cases:"), failures, picture, (outcomes,))
 
 
 def importers_section(results: Path) -> Section:
     parts = read_items(results, "importers/importers.csv", partial(table_item, "Checks"))
-    intro = "The same FMUs in other tools, compared with fmpy."
+    intro = (
+        "The same FMUs in other tools. Numbers are the largest difference from fmpy, relative to the largest value; "
+        "message: the tool reports the error of the FMU; - : not offered by the tool."
+    )
     return make_section("importers", "Importers", intro, parts, "importers", "importers")
 
 
@@ -315,9 +392,40 @@ def coupled_item(folder: Path) -> SectionItem:
 
 
 def bench_section(results: Path) -> Section:
-    parts = read_items(results, "bench/bench.csv", partial(table_item, "Targets and measurements"))
-    intro = "Targets, measured values and baselines of the same run."
+    parts = read_items(results, "bench/bench.csv", bench_item)
+    intro = "Targets, measured values and baselines of the same run. Times depend on the machine and on its load."
     return make_section("bench", "Benchmarks", intro, parts, "benchmarks", "bench")
+
+
+def bench_item(file: Path) -> SectionItem:
+    """Return the item of the benchmarks; those that meet their target are folded."""
+    cells = read_table(file, cut=False)
+    met, name = cells.heads.index("met"), cells.heads.index("benchmark")
+    heads = without(cells.heads, met)
+    groups: dict[bool, list[tuple[str, ...]]] = {True: [], False: []}
+    for row in cells.rows:
+        groups[row[met] == "True"].append(tuple(map(round_cell, without(row, met))))
+    n_targets, n_met = (len({row[name] for row in rows}) for rows in (cells.rows, groups[True]))
+    text = f"{n_met} of {n_targets} targets met."
+    folded = (("Targets that are met", TableCells(heads, tuple(groups[True]))),) if groups[True] else ()
+    missed = TableCells(heads, tuple(groups[False]))
+    title = "Targets and measurements"
+    if not missed.rows:
+        return SectionItem(title, (text,), None, (), folded)
+    return SectionItem(title, (text, "Targets that are missed or not measured:"), missed, (), folded)
+
+
+def without(row: tuple[str, ...], column: int) -> tuple[str, ...]:
+    """Return a row without one of its columns."""
+    return row[:column] + row[column + 1 :]
+
+
+def round_cell(cell: str) -> str:
+    """Round a number to two digits."""
+    try:
+        return f"{float(cell):.2g}"
+    except ValueError:
+        return cell
 
 
 def table_item(title: str, file: Path) -> SectionItem:

@@ -2,6 +2,7 @@
 
 import re
 import shutil
+from base64 import b64decode
 from html.parser import HTMLParser
 from itertools import groupby
 
@@ -17,7 +18,7 @@ def report_run(fmus, tmp_path_factory):
     """A folder with results of several kinds, and the report on them."""
     folder = tmp_path_factory.mktemp("report")
     (folder / "fmus").symlink_to(fmus)
-    for scene in ("coulomb", "coulomb-sign"):
+    for scene in ("coulomb", "coulomb-sign", "coulomb-stop"):
         shutil.copytree(run_published_cases() / "results" / scene, folder / "results" / scene)
     for command in (
         ("decay", "coulomb"),
@@ -67,23 +68,26 @@ def test_existing_results_are_shown_and_missing_ones_listed_with_their_command(r
 def test_every_picture_has_alternative_text_and_nothing_is_loaded_from_elsewhere(page):
     tags = Tags(page)
     pictures = tags.of("img")
-    assert len(pictures) == 4
+    assert len(pictures) == 5
     for picture in pictures:
         assert len(picture["alt"]) > 20
         assert picture["src"].startswith("data:image/svg+xml;base64,")
-    assert not re.findall(r'src="(?!data:)', page)
+    assert not re.findall(r'(?:src|href)="(?!data:|#)', page)
     assert "url(" not in page
     assert tags.of("script") == []
 
 
-def test_every_link_leads_to_an_existing_anchor_or_file(report_run, page):
+def test_every_link_of_a_copied_report_leads_to_an_anchor_or_carries_its_file(report_run, page):
+    """No link leads out of the page; small files are in it, large ones are named."""
     tags = Tags(page)
     places = {attributes.get("id") for _, attributes in tags.elements}
-    links = {link["href"] for link in tags.of("a")}
-    files = {link for link in links if not link.startswith("#")}
-    assert {link[1:] for link in links - files} <= places
-    assert {"coulomb/trajectory.csv", "coulomb/events.csv", "coulomb-sign/steps.csv", "coulomb/figure.svg"} <= files
-    assert all((report_run[0] / "results" / file).is_file() for file in files)
+    links = tags.of("a")
+    data = {link["download"]: link["href"].partition("base64,")[2] for link in links if "download" in link}
+    assert {link["href"][1:] for link in links if "download" not in link} <= places
+    assert {"coulomb-quantities.csv", "coulomb-events.csv", "decay-coulomb-turning-points.csv"} <= set(data)
+    assert b64decode(data["coulomb-events.csv"]) == (report_run[0] / "results/coulomb/events.csv").read_bytes()
+    assert "coulomb-trajectory.csv" not in data
+    assert "coulomb/trajectory.csv" in page
 
 
 def test_text_from_results_is_escaped(report_run):
@@ -103,9 +107,9 @@ def test_a_report_with_only_users_models_begins_with_them(tmp_path):
     assert harness(tmp_path, "report", "--quiet").returncode == 0
     page = (tmp_path / "results/report.html").read_text(encoding="utf-8")
     headings = re.findall(r"<h[23]>(.*?)</h[23]>", page)
-    assert headings[:3] == ["Runs", "sleds", "What to use when"]
+    assert headings[:3] == ["Runs", "sleds", "What to use"]
     assert headings.count("sleds") == 1
-    assert "Five oscillators" not in page
+    assert "Oscillators as FMUs" not in page
 
 
 def test_without_results_there_is_no_report(tmp_path):
@@ -117,27 +121,76 @@ def test_without_results_there_is_no_report(tmp_path):
 
 @pytest.mark.parametrize("dark", [False, True])
 def test_a_browser_shows_it_without_errors_or_horizontal_scrolling(report_run, browser, dark):
+    """On a phone, figures keep a readable width and scroll on their own."""
     browser.dark(dark)
     browser.open((report_run[0] / "results/report.html").as_uri())
-    for width in (360, 1200):
+    for width, image_width in ((360, 736), (1200, 640)):
         browser.size(width)
         assert browser.run("document.documentElement.scrollWidth") <= width
-        assert browser.run("[...document.images].filter(i => i.naturalWidth && i.width <= innerWidth).length") == 4
+        assert browser.run(f"[...document.images].filter(i => i.naturalWidth && i.width >= {image_width}).length") == 5
     assert browser.console == []
     assert browser.pdf().startswith(b"%PDF")
 
 
-def test_it_begins_with_a_plot_of_the_computed_motion(report_run, page):
-    """The first drawing of the page is the position over time, with the same number of turning points."""
-    first = re.search(r'<svg viewBox="0 0 (\d+) (\d+)".*?<polyline points="([^"]+)"', page, re.S)
-    points = [tuple(map(float, pair.split(","))) for pair in first[3].split()]
-    assert page.index("<svg") < page.index("What to use when</h2>")
-    assert (points[0][0], points[-1][0]) == (6.0, float(first[1]) - 6.0)
-    turns_of_plot = [y for y, _ in groupby(y for _, y in points)]
+def test_the_navigation_stays_beside_the_text_on_a_wide_screen_only(report_run, browser):
+    browser.open((report_run[0] / "results/report.html").as_uri())
+    box = "document.querySelector('{}').getBoundingClientRect()"
+    navigation, text = box.format("nav"), box.format("main")
+    browser.size(1200)
+    browser.run("scrollTo(0, 2000)")
+    assert browser.run(f"{navigation}.right <= {text}.left && {navigation}.top >= 0 && {navigation}.top < innerHeight")
+    assert browser.run("getComputedStyle(document.querySelector('nav ul ul')).display") == "block"
+    browser.size(360)
+    browser.run("scrollTo(0, 2000)")
+    assert browser.run(f"{navigation}.bottom < 0 && {text}.width > 300")
+
+
+def test_it_begins_with_a_plot_of_the_computed_motion_to_its_stop(page):
+    """The first drawing is the position over time, with the same number of turning points; then the mass is stuck."""
+    width, lines = re.search(r'<svg viewBox="0 0 (\d+) \d+"(.*?)</svg>', page, re.S).groups()
+    (motion, rest) = (
+        [tuple(map(float, pair.split(","))) for pair in points.split()]
+        for points in re.findall(r'<polyline[^>]* points="([^"]+)"', lines)
+    )
+    assert page.index("<svg") < page.index("What to use</h2>")
+    begin, end = 6.0, float(width) - 6.0
+    assert (motion[0][0], motion[-1][0]) == (begin, end)
+    assert 'class="stuck"' in lines
+    assert rest[0] == (pytest.approx(begin + (end - begin) * 4.000173 / 5.0, abs=0.5), rest[1][1])
+    assert rest[1] == motion[-1]
+    swinging = [y for t, y in motion if t < rest[0][0]]
+    turns_of_plot = [y for y, _ in groupby(swinging)]
     turns = sum(
         (b - a) * (c - b) < 0 for a, b, c in zip(turns_of_plot, turns_of_plot[1:], turns_of_plot[2:], strict=False)
     )
     assert turns == 15  # of the 16 half swings
+
+
+def test_published_values_are_shown_and_other_quantities_folded(page):
+    part = re.search(r'<h3>coulomb-sign</h3>.*?<div class="figure"', page, re.S)[0]
+    shown, folded = part.split("<summary>Quantities without a published value</summary>")
+    assert [cell in shown for cell in ("friction force, 3 cycles", "smallest step")] == [True, False]
+    assert [cell in folded for cell in ("friction force, 3 cycles", "smallest step")] == [False, True]
+
+
+def test_run_times_have_two_digits_and_texts_no_backticks(page):
+    times = re.findall(r"<td[^>]*>run time</td><td[^>]*>([^<]+)</td>", page)
+    assert len(times) == 3
+    assert all(len(time.replace(".", "").strip("0")) <= 2 for time in times)
+    assert "`" not in page
+
+
+def test_a_decay_marks_what_holds_only_for_a_single_loss(page):
+    assert "first and last peak, if this loss acted alone</th>" in page
+    assert "Best described by dry friction.</p>" in page
+
+
+def test_missing_results_are_listed_once_at_the_end_and_have_no_section(page):
+    last = page[page.index('<details class="missing"') :]
+    assert "Not in this report: pacejka-0.001, " in last
+    assert "stability: <code>python -m harness stability</code>" in last
+    assert "<section" not in last
+    assert 'id="stability"' not in page
 
 
 def test_figures_follow_the_colour_scheme_and_keep_text_as_text(report_run, browser):
@@ -159,9 +212,9 @@ def test_an_existing_interactive_page_is_included_and_every_picture_links_to_it(
     bench = '<!doctype html><title>it\'s "here" &amp; <b></title><script>"x"</script>'
     (tmp_path / "fmus/web/index.html").write_text(bench)
     assert harness(tmp_path, "report", "--quiet").returncode == 0
-    report = tmp_path / "results/report.html"
-    tags = Tags(report.read_text(encoding="utf-8"))
-    assert [frame["srcdoc"] for frame in tags.of("iframe")] == [bench]
-    links = [link["href"] for link in tags.of("a")]
-    assert {"../fmus/web/index.html", "../fmus/web/index.html#.preset=coulomb"} <= set(links)
+    report = (tmp_path / "results/report.html").read_text(encoding="utf-8")
+    assert [frame["srcdoc"] for frame in Tags(report).of("iframe")] == [bench]
+    assert '<a href="#live">Live: coulomb-stop</a>' in report
+    assert "The file\nfmus/web/index.html is the same page" in report
+    assert 'href="../' not in report
     assert "index.html" not in (report_run[0] / "results/report.html").read_text(encoding="utf-8")
