@@ -21,6 +21,8 @@ from rich.console import Console
 from harness.commands import commands
 from harness.errors import HarnessError
 from harness.references.models import CASES, MODELS
+from harness.report.sections import round_run_time
+from harness.report.typeset import typeset
 from harness.scenes.coupled import scene as coupled
 from harness.scenes.scene import load_scene, shipped_scenes
 from harness.studies.bench.benchmark import Baseline, Benchmark
@@ -230,9 +232,14 @@ def page_of(workspace):
     return re.sub("<td[^>]*>", "<td>", text)
 
 
+def cell_on_page(text):
+    """A cell as the page shows it, where powers of ten are typeset."""
+    return html.unescape(str(typeset(text)))
+
+
 @pytest.mark.parametrize("scene", ["stickslip-threshold", "pendulum", "smd"])
 def test_a_quantity_is_formatted_alike_in_terminal_file_and_page(workspace, scene):
-    """Every measured quantity has the same digits and the same unit."""
+    """Every measured quantity has the same digits and the same unit; the page rounds run times."""
     output = harness(workspace, "run", scene, **PLAIN).stdout
     assert harness(workspace, "report").returncode == 0
     page = page_of(workspace)
@@ -244,13 +251,13 @@ def test_a_quantity_is_formatted_alike_in_terminal_file_and_page(workspace, scen
             rf"  {re.escape(row[''])} +{re.escape(row['measured'])}(?= ) *.*{re.escape(row['unit'])}", output
         )
         assert cell, row
-        cells = f"<td>{row['']}</td><td>{row['measured']}</td>"
-        assert cells in page, row
+        cells = round_run_time((row[""], row["measured"]))
+        assert "".join(f"<td>{cell_on_page(cell)}</td>" for cell in cells) in page, row
     steps = page.split('<section id="steps">')[1].split("</section>")[0]
     cell = dict(zip(*(re.findall(f"<{tag}[^>]*>([^<]*)</{tag}>", steps) for tag in ("th", "td")), strict=True))
     for row in rows:
         if row[""] in cell:
-            assert cell[row[""]] == f"{row['measured']} {row['unit']}".strip()
+            assert cell[row[""]] == cell_on_page(f"{row['measured']} {row['unit']}".strip())
     assert len(cell) == 6
 
 
@@ -263,4 +270,4 @@ def test_an_interval_is_formatted_alike_in_terminal_and_page(workspace):
     page = page_of(workspace)
     cells = re.findall(r"\S+ \u00b1 \S+|\S+ \(\S+ to \S+\)|< \S+", output.split("Best")[0])
     assert len(cells) > 4
-    assert all(f"<td>{item}</td>" in page for item in cells)
+    assert all(f"<td>{cell_on_page(item)}</td>" in page for item in cells)
