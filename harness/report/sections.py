@@ -8,6 +8,7 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import groupby
 from math import nan
 from pathlib import Path
 from typing import Any
@@ -159,9 +160,11 @@ def published_item(sentences: tuple[str, ...], folder: Path) -> SectionItem:
     """Return the item of a published case; quantities without a published value are folded."""
     picture = read_picture(folder / "figure.svg", f"{folder.name}: position, velocity and phase plane of the run")
     measured = read_quantities(folder / QUANTITIES_FILE)
-    column = next(i for i, head in enumerate(measured.heads) if head.startswith("published"))
-    shown = tuple(row for row in measured.rows if row[column])
-    others = tuple(row[:column] for row in measured.rows if not row[column])
+    column = next((i for i, head in enumerate(measured.heads) if head.startswith("published")), len(measured.heads))
+    shown = tuple(row for row in measured.rows if any(row[column:]))
+    others = tuple(row[:column] for row in measured.rows if not any(row[column:]))
+    if not shown:
+        return SectionItem(folder.name, sentences, measured, picture)
     folded = (("Quantities without a published value", TableCells(measured.heads[:column], others)),) if others else ()
     return SectionItem(folder.name, sentences, TableCells(measured.heads, shown), picture, folded)
 
@@ -398,26 +401,33 @@ def bench_section(results: Path) -> Section:
 
 
 def bench_item(file: Path) -> SectionItem:
-    """Return the item of the benchmarks; those that meet their target are folded."""
-    cells = read_table(file, cut=False)
-    met, name = cells.heads.index("met"), cells.heads.index("benchmark")
-    heads = without(cells.heads, met)
-    groups: dict[bool, list[tuple[str, ...]]] = {True: [], False: []}
-    for row in cells.rows:
-        groups[row[met] == "True"].append(tuple(map(round_cell, without(row, met))))
-    n_targets, n_met = (len({row[name] for row in rows}) for rows in (cells.rows, groups[True]))
-    text = f"{n_met} of {n_targets} targets met."
-    folded = (("Targets that are met", TableCells(heads, tuple(groups[True]))),) if groups[True] else ()
-    missed = TableCells(heads, tuple(groups[False]))
-    title = "Targets and measurements"
-    if not missed.rows:
-        return SectionItem(title, (text,), None, (), folded)
-    return SectionItem(title, (text, "Targets that are missed or not measured:"), missed, (), folded)
+    """Return the item of the benchmarks; those that meet their target or were not measured are folded."""
+    with file.open(encoding="utf-8", newline="") as text:
+        rows = list(csv.DictReader(text))
+    groups: dict[str, list[tuple[str, ...]]] = {"missed": [], "met": [], "not measured": []}
+    for _, same in groupby(rows, key=lambda row: row["benchmark"]):
+        baselines = list(same)
+        first = baselines[0]
+        outcome = "not measured" if first["measured"] == "nan" else "met" if first["met"] == "True" else "missed"
+        groups[outcome].append(bench_row(first, baselines))
+    n_measured = len(groups["met"]) + len(groups["missed"])
+    sentence = f"{len(groups['met'])} of {n_measured} targets met."
+    heads = ("benchmark", "measured", "target", "unit", "baselines")
+    missed = TableCells(heads, tuple(groups["missed"])) if groups["missed"] else None
+    titles = {"met": "Targets that are met", "not measured": "Not measured"}
+    folded = tuple((titles[name], TableCells(heads, tuple(groups[name]))) for name in titles if groups[name])
+    sentences = (sentence, "Targets that are missed:") if missed else (sentence,)
+    return SectionItem("Targets and measurements", sentences, missed, (), folded)
 
 
-def without(row: tuple[str, ...], column: int) -> tuple[str, ...]:
-    """Return a row without one of its columns."""
-    return row[:column] + row[column + 1 :]
+def bench_row(first: dict[str, str], baselines: list[dict[str, str]]) -> tuple[str, ...]:
+    """Return the row of a benchmark, with two digits of what was measured."""
+    unit = "" if first["unit"] == "1" else first["unit"]
+    compared = [f"{row['baseline']} {round_cell(row['baseline value'])}".strip() for row in baselines]
+    measured, target = (
+        "" if cell == "nan" else cell for cell in (round_cell(first["measured"]), shorten(first["target"]))
+    )
+    return first["benchmark"], measured, target, unit, "; ".join(compared)
 
 
 def round_cell(cell: str) -> str:

@@ -129,15 +129,22 @@ def test_failed_stability_cases_are_shown_first_with_their_reason(tmp_path):
     assert "scene 0" not in part
 
 
-def test_benchmarks_that_meet_their_target_are_folded(tmp_path):
+def test_missed_benchmarks_are_shown_and_others_folded(tmp_path):
     (tmp_path / "bench").mkdir()
     heads = ["benchmark", "measured", "unit", "target", "met", "baseline", "baseline value"]
-    rows = [("fast", 0.0012345, "s", 0.002, True, "a peer", 1.5), ("slow", 0.0034567, "s", 0.002, False, "a peer", 1.5)]
+    rows = [
+        ("fast", 0.0012345, "s", 0.00125, True, "a peer", 1.5),
+        ("slow", 0.0034567, "s", 0.00125, False, "a peer", 1.5678),
+        ("slow", 0.0034567, "s", 0.00125, False, "another", 2.5),
+        ("skipped", "nan", "1", "nan", False, "not found: a tool", ""),
+    ]
     write_csv_rows(tmp_path / "bench/bench.csv", heads, rows)
     page = write_report(tmp_path, []).path.read_text(encoding="utf-8")
-    shown, folded = page[page.index("1 of 2 targets met.") :].split("<summary>Targets that are met</summary>")
-    assert re.findall(r"<td[^>]*>(0\.00[^<]*)<", shown) == ["0.0035", "0.002"]
-    assert re.findall(r"<td[^>]*>(0\.00[^<]*)<", folded) == ["0.0012", "0.002"]
+    parts = re.split("<summary>(?:Targets that are met|Not measured)</summary>", page[page.index("1 of 2 targets") :])
+    shown, met, skipped = (re.findall(r"<td[^>]*>([^<]*)<", part) for part in parts)
+    assert shown == ["slow", "0.0035", "0.00125", "s", "a peer 1.6; another 2.5"]
+    assert met == ["fast", "0.0012", "0.00125", "s", "a peer 1.5"]
+    assert skipped == ["skipped", "", "", "", "not found: a tool"]
 
 
 @pytest.mark.parametrize(

@@ -68,7 +68,7 @@ def describe_cost(case: ReferenceCase, ranks: list[Point]) -> str:
     others = [(point.method, point) for point in own_points[1:2]]
     others += [(f"{point.tool} {point.method}", point) for point in peers[:1]]
     ratios = [(name, point.seconds / first.seconds) for name, point in others]
-    relative = [f"{name} {ratio:.2g}" + ", not a method of the FMU" * (ratio < 1) for name, ratio in ratios]
+    relative = [f"{name} {format_ratio(ratio)}" + ", not a method of the FMU" * (ratio < 1) for name, ratio in ratios]
     return text + (f"; relative run time at error {format_power(TARGET)}: {', '.join(relative)})" if relative else ")")
 
 
@@ -80,9 +80,14 @@ def describe_shortcut(study: Study, case: ReferenceCase) -> str:
     fastest = fastest_point(points, TARGET, beside_dry=True)
     if fastest and best:
         ratio = fastest.seconds / best[0].seconds
-        return f"the law '{case.law}' takes {ratio:.2g} times the run time at error {format_power(TARGET)}"
+        return f"the law '{case.law}' takes {format_ratio(ratio)} times the run time at error {format_power(TARGET)}"
     nearest = min((point.beside_dry for point in points if point.beside_dry is not None), default=float("nan"))
     return f"the law '{case.law}' does not get below an error of {nearest:.1g} against stick and slip"
+
+
+def format_ratio(value: float) -> str:
+    """Format a ratio with two digits and without an exponent: 140."""
+    return f"{float(f'{value:.2g}'):g}"
 
 
 def format_power(value: float) -> str:
