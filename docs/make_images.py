@@ -2,7 +2,7 @@
 
 `python docs/make_images.py [NAME...]` makes all pictures or those named (without the ending).  Pictures of results are
 the figures that the code blocks of the pages make; those that no command makes are drawn here.  The FMUs must be built;
-the picture of the live page needs chromium.
+the pictures of the live page and of the report need chromium.
 """
 
 import csv
@@ -201,25 +201,36 @@ def laws(folder: Path) -> None:
 
 def live(folder: Path) -> None:
     """The live page, as chromium shows it."""
-    chromium = next((found for word in ("chromium", "google-chrome") if (found := shutil.which(word))), None)
-    if chromium is None:
-        print("live: skipped, chromium is not installed")
-        return
     build = [sys.executable, "-m", "build_fmus", "stickslip", "--web", "--out", str(folder / "live")]
     environment = os.environ | {"PYTHONPATH": str(DOCS.parent)}
     subprocess.run(build, cwd=folder, check=True, env=environment, capture_output=True)
-    options = ["--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars", "--window-size=1200,900"]
+    photograph(folder / "live" / "index.html", IMAGES / "live.png", folder, 900)
+
+
+def report(folder: Path) -> None:
+    """The beginning of a report, as chromium shows it."""
+    for command in ("", "precision --quick", "stability stickslip", "decay coulomb", "report"):
+        harness(folder, command)
+    photograph(folder / "results" / "report.html", IMAGES / "report.png", folder, 1250)
+
+
+def photograph(page: Path, picture: Path, folder: Path, height: int) -> None:
+    """Save a picture of a page, as chromium shows it."""
+    chromium = next((found for word in ("chromium", "google-chrome") if (found := shutil.which(word))), None)
+    if chromium is None:
+        print(f"{picture.name}: skipped, chromium is not installed")
+        return
+    options = ["--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars", f"--window-size=1200,{height}"]
     options += [
         "--virtual-time-budget=8000",
-        f"--screenshot={folder / 'live.png'}",
+        f"--screenshot={folder / picture.name}",
         f"--user-data-dir={folder / 'profile'}",
     ]
-    page = (folder / "live" / "index.html").as_uri()
-    subprocess.run([chromium, *options, page], check=True, capture_output=True, timeout=120)
+    subprocess.run([chromium, *options, page.as_uri()], check=True, capture_output=True, timeout=120)
     from PIL import Image
 
-    picture = Image.open(folder / "live.png").convert("RGB")
-    picture.quantize(64).save(IMAGES / "live.png", optimize=True)
+    image = Image.open(folder / picture.name).convert("RGB")
+    image.quantize(64).save(picture, optimize=True)
 
 
 def notebook(folder: Path) -> None:
@@ -236,7 +247,13 @@ def notebook(folder: Path) -> None:
 
 
 INLINE = "module://matplotlib_inline.backend_inline"
-DRAWN: dict[str, Callable[[Path], None]] = {"stick": stick, "laws": laws, "live": live, "notebook": notebook}
+DRAWN: dict[str, Callable[[Path], None]] = {
+    "stick": stick,
+    "laws": laws,
+    "live": live,
+    "report": report,
+    "notebook": notebook,
+}
 
 
 def main() -> None:
