@@ -3,16 +3,20 @@
 import ast
 import re
 import traceback
+from pathlib import Path
 
 import pytest
 from internal_steps import array_steps, scalar_steps
 from models import CASES, MODELS, ROOT, label, model_class
 
-from fmus.packaging.lowering import LoweringError, lowered_files, lowered_model
-from fmus.packaging.lowering.emit_source import SourceEmitter
+from fmus.packaging.lowering import LoweringError, function_tree, lowered_files, lowered_model, select_features
+from fmus.packaging.lowering.dead_code import prune_assignment
+from fmus.packaging.lowering.emit_source import SourceEmitter, SourceLine
 from fmus.packaging.lowering.layout import ModelLayout
+from fmus.packaging.lowering.lowered_sources import lower_all
 from fmus.packaging.lowering.source_symbols import SourceSymbols
 from fmus.packaging.model_lookup import find_model
+from fmus.runtime import stick_slip
 
 NUMERICS = ("step_control.py", "stick_slip.py", "integrator.py")
 STEPS = 150  # of a run, enough for some events
@@ -112,3 +116,63 @@ def test_colliding_stage_names_are_refused():
 
 def test_a_model_is_lowered_only_once():
     assert lowered_model("smd") is lowered_model("smd")
+
+
+@EVERY_MODEL
+def test_every_compound_statement_keeps_the_number_of_its_source_line(name):
+    """Error messages and comments in C name these lines, also where lowering has rewritten the test."""
+    rewritten = 0
+    for path, lines in lower_all(find_model(name), select_features(find_model(name))).items():
+        if not path.startswith("runtime/"):
+            continue
+        source = (ROOT / "fmus" / path).read_text(encoding="utf-8").split("\n")
+        for line in lines:
+            word = line.split()[0].rstrip(":") if line.strip() else ""
+            if word in ("if", "while", "def", "class") and line.endswith(":"):
+                original = source[line.source - 1].split()[0].rstrip(":")
+                assert {word, original} <= {"if", "elif", "else", "for"} or word == original, (path, line)
+                rewritten += line.strip() != source[line.source - 1].strip()
+    assert rewritten > 5
+
+
+def test_the_tree_of_a_function_has_the_line_numbers_of_its_file():
+    source = Path(stick_slip.__file__).read_text(encoding="utf-8").split("\n")
+    for function in (stick_slip.threshold, stick_slip.DryFriction.resolve_mode):
+        tree = function_tree(function)
+        assert source[tree.lineno - 1].strip().startswith(f"def {function.__name__}(")
+        last = tree.body[-1]
+        assert source[last.lineno - 1].strip() == ast.unparse(last)
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("self.a = self.b = self.c = 0.0", "self.a = self.c = 0.0"),
+        ("self.a, self.b, self.c = 1.0, 2.0, 3.0", "self.a, self.c = 1.0, 3.0"),
+        ("self.a, self.b = 1.0, 2.0", "self.a = 1.0"),
+        ("self.b, self.a = 1.0, 2.0", "self.a = 2.0"),
+        ("self.b = 0.0  # unread", ""),
+    ],
+)
+def test_only_unread_attributes_are_removed_from_an_assignment(text, expected):
+    lines = [SourceLine.of(line, n) for n, line in enumerate(["def f(self):", f"    {text}", "    return 1"], 1)]
+    (node,) = (node for node in ast.walk(ast.parse("\n".join(lines))) if isinstance(node, ast.Assign))
+    prune_assignment(lines, node, {".a", ".c"})
+    assert [line.strip() for line in lines[1:-1]] == [expected] * bool(expected)
+
+
+def test_an_elif_becomes_an_if_where_the_branch_before_is_removed_and_other_tests_are_copied():
+    text = """
+def f(model, x):
+    if x < 1e-3:  # as it is written
+        return 0
+    if model.has_driver:
+        return 1
+    elif x > 1.0:
+        return 2
+    return 3
+"""
+    spec = ModelLayout({"x": "v", "v": "a"}, {"mode": "v"}, {"has_driver": False})
+    lines = SourceEmitter(spec, SourceSymbols([text]), "runtime/some.py", text, True).lines
+    assert lines[2:4] == ["    if x < 1e-3:  # as it is written", "        return 0"]
+    assert lines[4:] == ["    if x > 1.0:", "        return 2", "    return 3", ""]
