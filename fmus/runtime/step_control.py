@@ -105,6 +105,8 @@ class InternalStep:
         counters.t_event = t
         self.event_at_end = False
         self.modes0 = STUCK
+        if model.has_other_laws and not self.is_hybrid:
+            self.modes0 = model.law_modes(t, y)
         self.start_empty_step(model, t, y, self.modes0, ROUNDOFF_MARGIN)
 
     def start_empty_step(self, model, t, y: StateVector, modes: ContactVector, tie_tolerance):
@@ -452,7 +454,7 @@ class InternalStep:
         """Determine the modes after t1, given the previous modes."""
         self.modes1, self.grazes_at_end, self.has_consistent_modes = STUCK, False, True
         if model.has_other_laws and not self.is_hybrid:
-            self.modes1 = model.law_modes(self.t1, self.y1)
+            self.modes1 = modes  # they change at the ends of steps: see update_law_modes
         if self.is_hybrid:
             if model.is_coupled:
                 self.y1, self.modes1, self.has_consistent_modes = model.resolve_at_start(

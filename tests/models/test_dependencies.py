@@ -130,7 +130,9 @@ def test_fmi3_outputs_depend_on_exactly_the_declared_parameters_after_initialisa
                     responses[names[output]] |= {v} if old != new else set()
         fmu.freeFMUstate(state)
     fmu.freeInstance()
-    assert responses == declared_dependencies
+    for v, respond in responses.items():  # under some laws a mode responds at the next event only
+        is_real = declared(name)[v].type == "Real"
+        assert respond == declared_dependencies[v] if is_real else respond <= declared_dependencies[v]
 
 
 @EVERY_MODEL
