@@ -106,7 +106,8 @@ class InternalStep:
         self.event_at_end = False
         self.modes0 = STUCK
         if model.has_other_laws and not self.is_hybrid:
-            self.modes0 = model.law_modes(t, y)
+            self.y1 = y
+            self.modes0 = model.law_modes(t, self.y1)
         self.start_empty_step(model, t, y, self.modes0, ROUNDOFF_MARGIN)
 
     def start_empty_step(self, model, t, y: StateVector, modes: ContactVector, tie_tolerance):
