@@ -11,7 +11,7 @@ from harness.analyses.decay.identification import fit_decay
 from harness.errors import SceneError
 from harness.records.columns import ColumnOptions, read_record
 from harness.records.missing_values import mark_dropouts, mark_sentinels
-from harness.records.saturation import leave_out_saturated
+from harness.records.saturation import find_saturated, leave_out_saturated
 
 T = np.linspace(0.0, 12.0, 2401)
 ZETA = 0.0119
@@ -149,6 +149,30 @@ def test_a_rounded_or_held_motion_has_no_defects(order):
         for each in (record, random_record(seed, order=order)[0]):
             assert leave_out_saturated(each) is each
             assert mark_sentinels(each.x, "x") == mark_dropouts(each.x, "x") == []
+
+
+@pytest.mark.parametrize(
+    ("stays", "near", "peaks"),
+    [
+        ([10, 8], [0.9], 2),
+        ([10, 8], [0.9, 0.9], 0),
+        ([10, 5], [0.9], 2),
+        ([10, 4], [0.9], 0),
+        ([10, 8], [0.9, 0.86], 0),
+        ([10, 8], [0.9, 0.84], 2),
+        ([3, 3, 3], [0.9], 3),
+        ([6, 6, 2], [0.9], 2),
+        ([2, 2, 2, 2], [], 0),
+        ([10], [], 0),
+    ],
+)
+def test_saturation_is_long_stays_at_one_value_that_is_seldom_approached(stays, near, peaks):
+    x = [0.0, *near, 0.0]
+    for count in stays:
+        x += [*[1.0] * count, 0.0]
+    is_saturated, count = find_saturated(np.array(x))
+    assert count == peaks
+    assert is_saturated.sum() == (sum(stays) if peaks else 0)
 
 
 def test_the_largest_value_of_one_peak_or_of_no_motion_is_not_saturation():
