@@ -1,7 +1,6 @@
 """Writes the HTML page. All HTML of the harness is in page.html."""
 
 import os
-import platform
 from base64 import b64encode
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -86,7 +85,7 @@ def render_page(page_sections: list[Section], scenes: Sequence[PublishedScene], 
         choices=choices,
         live=LIVE_PAGE.as_posix() if has_live_page else "",
         live_content=LIVE_PAGE.read_text(encoding="utf-8", errors="replace") if has_live_page else "",
-        made=f"{date.today()}, {HARNESS} {package_version(HARNESS)}, {platform.platform()}",
+        made=f"{date.today()} by {HARNESS} {package_version(HARNESS)}",
     )
 
 

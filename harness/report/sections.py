@@ -223,7 +223,7 @@ def decay_item(folder: Path) -> SectionItem:
     summary += "." if ranked else ""
     text = f"Decay of {data['record']}: signal, turning points, envelope and fit, and residuals. {summary}"
     picture = read_picture(folder / "figure.svg", text)
-    folded = (("Other combinations of losses", law_table(data["laws"], data["unit"])),)
+    folded = (("Combinations of losses, best first", law_table(data["laws"], data["unit"])),)
     return SectionItem(data["record"], (summary, *data["remarks"]), grid, picture, folded)
 
 

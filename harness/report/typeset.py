@@ -5,6 +5,7 @@ import re
 from markupsafe import Markup, escape
 
 POWER = re.compile(r"(?<![\w.])(\d+(?:\.\d+)?)e([+-]\d+)\b")  # a number such as 1e-06
+PERCENT, NO_BREAK = re.compile(r"(?<=\d) (?=%)"), "\N{NO-BREAK SPACE}"  # a number and its percent sign
 SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
@@ -17,7 +18,7 @@ def typeset(text: str) -> Markup:
     parts = str(text).split("`")
     if len(parts) % 2 == 0:  # a backtick without its counterpart is literal
         parts[-2:] = ["`".join(parts[-2:])]
-    plain = (escape(POWER.sub(format_power, part)) for part in parts[::2])
+    plain = (escape(PERCENT.sub(NO_BREAK, POWER.sub(format_power, part))) for part in parts[::2])
     code = (Markup("<code>{}</code>").format(part) for part in parts[1::2])
     pieces = [piece for pair in zip(plain, [*code, ""], strict=True) for piece in pair]
     return Markup("").join(pieces)

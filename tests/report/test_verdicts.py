@@ -154,6 +154,7 @@ def test_missed_benchmarks_are_shown_and_others_folded(tmp_path):
         ("`a` and `b`", "<code>a</code> and <code>b</code>"),
         ("a lone ` stays", "a lone ` stays"),
         ("1e-06, 2.5e+10, 0e+00, x1e-3, 1e6", "10⁻⁶, 2.5·10¹⁰, 0, x1e-3, 1e6"),
+        ("+3.3 % of", "+3.3\N{NO-BREAK SPACE}% of"),
         ("<b>", "&lt;b&gt;"),
     ],
 )
