@@ -336,7 +336,7 @@ def importers_section(results: Path) -> Section:
     parts = read_items(results, "importers/importers.csv", partial(table_item, "Checks"))
     intro = (
         "The same FMUs in other tools. Numbers are the largest difference from fmpy, relative to the largest value; "
-        "message: the tool reports the error of the FMU; - : not offered by the tool."
+        "message: the tool reports the error of the FMU; - : not checked with this tool."
     )
     return make_section("importers", "Importers", intro, parts, "importers", "importers")
 
