@@ -104,7 +104,7 @@ def choose_method(points: Iterable[SolverPoint], accuracy: float, is_quick: bool
         return MethodChoice("", (f"no method; smallest error {own.error:.2g} with {own.name}" if own else "no method",))
     runner_up = next((point for point in fastest.values() if point is not best), None)
     if runner_up is None:
-        return MethodChoice(best.method, (format_time(best.seconds), "no other solver"))
+        return MethodChoice(best.method, (format_time(best.seconds), "no other solver reaches it"))
     factor = runner_up.seconds / best.seconds
     comparison = compare_times(factor, runner_up.name)
     if is_quick and 1 / CLEAR_FACTOR < factor < CLEAR_FACTOR:

@@ -80,7 +80,7 @@ CLOSE = [POINTS[1], SolverPoint(FMU, "rodas", 5e-3, 1e-8)]
     [
         (POINTS, 1e-3, False, "exact", ("1 ms", "2.6 times faster than scipy LSODA")),
         (POINTS, 1e-6, False, "exact", ("1 ms", "4 times faster than ode23")),
-        (POINTS, 1e-9, False, "exact", ("1 ms", "no other solver")),
+        (POINTS, 1e-9, False, "exact", ("1 ms", "no other solver reaches it")),
         (POINTS[1:], 1e-3, False, "ode23", ("4 ms", "scipy LSODA is 1.5 times faster")),
         (POINTS[1:], 1e-3, True, "ode23", ("4 ms", "scipy LSODA is 1.5 times faster")),
         (
@@ -115,7 +115,7 @@ def test_failed_runs_and_importers_are_not_compared_and_a_chattering_law_with_tr
     ]
     write_precision(tmp_path, points, values={"sled-sign": {"friction": 2}})
     sled, sign = read_method_choices(tmp_path)
-    assert [choice.notes for choice in sled.choices[:2]] == [("3 ms", "no other solver")] * 2
+    assert [choice.notes for choice in sled.choices[:2]] == [("3 ms", "no other solver reaches it")] * 2
     assert [choice.notes for choice in sign.choices] == [("no method; smallest error 0.02 with ode23",)] * 3
     assert [sled.is_chattering, sign.is_chattering] == [False, True]
 
