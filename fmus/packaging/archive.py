@@ -35,9 +35,9 @@ Linux     libpython3 must be loaded in the process: start hosts other than Pytho
 Windows   the folder of python3.dll must be in PATH.
 """
 USAGE_NOTE = """\
-<p>This FMU contains Python code. A host that is not Python must have the Python library in its process, or it cannot
-load the FMU: see <code>documentation/externalDependencies.txt</code>. The native FMU of the same model needs
-nothing.</p>
+<p>This FMU contains Python code. A host that is not Python must have the
+<a href='externalDependencies.txt'>Python library</a> in its process, or it cannot load the FMU. The native FMU of the
+same model needs nothing.</p>
 <p>A step that is refused or fails returns Discard, because the native layer of PythonFMU cannot return Error. A wrong
 setting is refused by the next step. Hosts that check for Error only, such as fmusim, the FMU Compliance Checker and
 PyFMI, end such a run as if it had succeeded: use the native FMU in them.</p>

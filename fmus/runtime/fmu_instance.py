@@ -15,7 +15,7 @@ from typing import Any
 from weakref import WeakSet
 
 from . import call_sequence
-from .codes import BAD_STEP, BAD_VALUE, OK
+from .codes import BAD_STEP, BAD_VALUE, OK, RUNNING
 from .pythonfmu_workarounds import signal_safe
 from .saved_state import SavedStateAccess, attribute_tree
 from .variable_declarations import VariableOwner, variables
@@ -84,8 +84,8 @@ class FmuInstance(SavedStateAccess):
             if status == BAD_VALUE and not any(self.invalid_values.values()):
                 status = self.step_without_invalid_values(current_time, step_size)
             if status != OK:
-                refuse = call_sequence.is_refusal(run, status)
-                report = self.refuse_step if refuse else self.fail_with_status
+                refuses = run.phase >= RUNNING and call_sequence.is_refusal(run, status)
+                report = self.refuse_step if refuses else self.fail_with_status
                 return report(status, current_time, step_size)
             if outputs_were_read:  # the importer reads outputs at every step: computing them here saves calls
                 call_sequence.set_outputs(run, model)

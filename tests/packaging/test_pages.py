@@ -13,9 +13,10 @@ import pytest
 from build_cache import ROOT
 from models import MODELS, declared, model_class, outputs
 
+from fmus.packaging import archive
 from fmus.packaging.documentation_page import documentation_page, typeset
 from fmus.packaging.model_description import declared_variables
-from fmus.packaging.native.fmu import USAGE_NOTE
+from fmus.packaging.native import fmu
 from fmus.packaging.svg_chart import tick_values
 from tests.packaging.test_packaging import entries
 
@@ -35,12 +36,14 @@ def content(fmus):
 
 
 @EVERY_MODEL
-def test_a_native_fmu_has_the_same_page_and_states_how_to_run_it(content, name):
+def test_a_native_fmu_has_the_same_page_and_each_states_which_hosts_run_it(content, name):
     files = {path: data for path, data in content(name).items() if path in (PAGE, ICON) or path.startswith(EXTRA)}
-    native = entries(native_fmus.build_native_fmus() / f"{name}.fmu")
+    others = entries(native_fmus.build_native_fmus() / f"{name}.fmu")
     assert len(files) == 1 + (name in WITH["png"]) + 2 * (name in WITH["csv"])
-    native[PAGE] = native[PAGE].replace(USAGE_NOTE.encode(), b"", 1)
-    assert files == {path: native.get(path) for path in files}
+    python_note, native_note = archive.USAGE_NOTE.encode(), fmu.USAGE_NOTE.encode()
+    assert python_note in files[PAGE]
+    files[PAGE] = files[PAGE].replace(python_note, native_note, 1)
+    assert files == {path: others.get(path) for path in files}
 
 
 CAPABILITIES = {  # names as they begin in the model descriptions of both versions; attributes that are not false
