@@ -61,6 +61,7 @@ class EventLocation:
         self.tolerance_factor, self.tolerance = 1.0, 0.0  # now; tolerance of the run, if the factor is less
         self.t_doubt = 0.0  # end of the step that was in doubt
         self.in_doubt = self.must_repeat = self.must_shorten = False
+        self.must_search = False  # inputs of higher order: no cubic polynomial resembles the motion
         self.load_series = PowerSeries()  # of a load, for inputs of higher order
         self.feature_width = inf  # slip velocity below which friction varies
 
@@ -175,6 +176,8 @@ def examine_cubic(location, step, j):
         location.in_doubt = True
     high = largest_of(start, early, late, end)
     if end > 0.0:
+        if location.must_search:
+            return UNKNOWN
         low = smallest_of(start, early, late, end)
         inside = late if start <= 0.0 or late < early else early  # a slip starts at zero
         return NO_ZERO if inside >= INTERPOLANT_SHARE * (high - low) else UNKNOWN

@@ -6,6 +6,7 @@ It decides whether an event function reaches zero where the error of the method 
 from math import inf
 
 from .step_limits import limit_first_step
+from .vectors import contact_indices
 
 REFINEMENT, SMALLEST_TOLERANCE = 1e-3, 1e-13  # factor of the tolerance where an event is in doubt; lower limit
 WORTHWHILE_REFINEMENT = 0.3
@@ -21,6 +22,12 @@ def begin_phase(model, step):
     restore_tolerance(model, step)
     location.in_doubt = location.must_repeat = False
     step.largest_slip = 0.0
+    if model.has_dry_friction and model.has_input_derivatives and not model.is_coupled:
+        location.must_search = model.has_higher_order()
+        if location.must_search:
+            step.largest_slip = inf  # every step is examined
+            for i in contact_indices:
+                location.peaks[i] = 0.0
     if model.is_coupled or model.has_conditions:
         for j in range(model.n_event_functions):
             location.peaks[j] = 0.0

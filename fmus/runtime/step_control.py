@@ -11,6 +11,7 @@ from . import conditions, event_location, phase_repetition, step_limits
 from .active_method import ActiveMethod
 from .codes import DIVERGED, EXACT, NEEDS_REPETITION, OK, STALLED, STUCK
 from .event_location import INTERPOLANT_SHARE, NEAR_ZERO_SHARE
+from .extrema import largest_of
 from .interpolant import Interpolant
 from .linear_closed_form import HIGHER_ORDER_INPUT
 from .rounding import EPSILON, ROUNDOFF_MARGIN
@@ -366,6 +367,8 @@ class InternalStep:
                 location.start[i], location.early[i], location.late[i], location.end[i] = start, early, late, end
                 if self.largest_slip < inf:
                     location.peaks[i] = self.largest_slip
+                else:
+                    location.peaks[i] = largest_of(total, start, end, location.peaks[i])
         if (model.has_dry_friction and self.is_hybrid) or model.has_conditions:
             if model.is_coupled or model.has_conditions:
                 event_location.evaluate_on_cubic(model, self)

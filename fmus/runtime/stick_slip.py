@@ -111,6 +111,8 @@ class DryFriction(Oscillator):
         A contact that holds more than its sliding force comes to rest.  Another one goes on slipping if it would break
         away again so soon that a velocity with the relative error `tie_tolerance` might not reach zero.  After s
         seconds the velocity grows as v = u (1 - cos(w s)), where the load has the rate m w^2 u.
+        A load that varies by itself can make u larger than any velocity of the motion.  So the velocity must also not
+        go further in the other direction than its error, which the largest slip velocity bounds, if it is known.
         """
         load, rate, limit = self.stick_load(t, y, i)
         if rate == 0.0:
@@ -120,7 +122,11 @@ class DryFriction(Oscillator):
         delay = (limit - modes[i] * load) / fabs(rate)
         _, J = self.jacobian(t, y, modes)
         stiffness = J[slip_index[i], position_index[i]]
-        return (stiffness < 0.0 or delay == 0.0) and -0.5 * stiffness * delay * delay < tie_tolerance
+        if not ((stiffness < 0.0 or delay == 0.0) and -0.5 * stiffness * delay * delay < tie_tolerance):
+            return False
+        largest_slip = self.event_location.peaks[i]
+        reversed_velocity = -0.5 * modes[i] * self.slip_acceleration(t, y, modes, i) * delay
+        return largest_slip == 0.0 or reversed_velocity < tie_tolerance * largest_slip
 
     def jumps_at_breakaway(self, t, y: StateVector, modes: ContactVector, i: ContactIndex):
         """Return whether the holding force exceeds the sliding force, except for rounding errors."""

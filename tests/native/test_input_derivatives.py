@@ -177,6 +177,22 @@ def test_random_input_derivatives_never_stall_the_closed_form(worker, fmus, damp
     assert events > 150
 
 
+@pytest.mark.parametrize("h_max", [0.0, 3.0])
+def test_a_load_that_varies_by_itself_hides_no_rest_from_any_method(worker, fmus, h_max):
+    """With nearly no spring: a rest is no touch, and a long step that stops and starts again is searched."""
+    for seed in range(25):
+        source = Random(seed)
+        h, f = source.choice([1.0, 2.0, 3.0]), source.uniform(0.5, 2.0)
+        values = {"m": source.uniform(0.5, 3.0), "k": 10.0 ** source.uniform(-6, -3), "f": f, "c": 0.0, "x0": 0.0}
+        values |= {"solver.h_max": h_max, "solver.rtol": 1e-6}
+        pieces = [(i * h, source.uniform(-2.0, 2.0), *(source.uniform(-5.0, 5.0) for _ in range(3))) for i in range(6)]
+        counts = [
+            run_native(worker, fmus / "coulomb.fmu", values | {"solver.method": method}, pieces, h)[1]
+            for method in (EXACT, ODE23, ODE45, DOP853, RODAS)
+        ]
+        assert len(set(counts)) == 1, (seed, counts)
+
+
 # ---- methods with steps
 
 STEPPING = {"ode23": 1e-8, "ode45": 1e-9, "dop853": 1e-10, "rodas": 1e-8}  # and their tolerances
