@@ -36,8 +36,12 @@ MODULES = (
         "drag",
         "controls",
     ),
-    *("legend", "panels", "diagrams", "form", "tables", "export", "main"),
+    *("legend", "panels", "diagrams", "form", "tables", "export"),
+    *("animation", "prose", "chart", "adjustable", "story_models", "story_bodies", "opening", "chatter_story", "story"),
+    *("stories", "main"),
 )
+CLAIM = "Real things stop. Most solvers can\N{RIGHT SINGLE QUOTATION MARK}t."
+STORY_MODELS = ("coulomb", "stickslip", "pacejka", "pendulum")
 
 
 def build(
@@ -67,7 +71,8 @@ def build(
         "models": models,
         "presets": read_presets(scenes, [source.name for source in sources]),
     }
-    return write(folder / FILE, render_page(data).encode())
+    is_complete = not methods and not laws and {source.name for source in sources}.issuperset(STORY_MODELS)
+    return write(folder / FILE, render_page(data, with_stories=is_complete).encode())
 
 
 def model_with_code(source: ModelFile, methods: Sequence[str], laws: Sequence[str]) -> ModelJson:
@@ -78,9 +83,14 @@ def model_with_code(source: ModelFile, methods: Sequence[str], laws: Sequence[st
     return described | {"guid": fromstring(description).attrib["guid"], "code": compile_to_base64(source.name, files)}
 
 
-def render_page(data: object) -> str:
-    """Return the HTML text of the page."""
-    style = (HERE / "style.css").read_text(encoding="utf-8")
+def render_page(data: object, with_stories: bool) -> str:
+    """Return the HTML text of the page, with the opening and the stories, which need STORY_MODELS, or without."""
+    style, stories, css = (
+        (HERE / name).read_text(encoding="utf-8") for name in ("style.css", "stories.html", "stories.css")
+    )
+    style += css if with_stories else ""
+    title = CLAIM if with_stories else "Dry friction, live"
+    heading = "<h2>Explore</h2>" if with_stories else f"<h1>{title}</h1>"
     code = bundle_script()
     policy = (
         f"default-src 'none'; script-src {csp_hash(code)} 'wasm-unsafe-eval'; style-src {csp_hash(style)}; "
@@ -88,7 +98,8 @@ def render_page(data: object) -> str:
     )
     text = json.dumps(data, ensure_ascii=False, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
     template = Template((HERE / "page.html").read_text(encoding="utf-8"))
-    return template.substitute(policy=policy, style=style, script=code, data=text)
+    parts = {"title": title, "heading": heading, "stories": stories if with_stories else ""}
+    return template.substitute(policy=policy, style=style, script=code, data=text, **parts)
 
 
 def bundle_script() -> str:

@@ -12,6 +12,7 @@ import { Mechanism } from "./mechanism.js";
 import { formatNumber } from "./plot.js";
 import { defaultState, effectiveValues, decodeState, valueAt, encodeState } from "./state.js";
 import { costTable, decayTable, describeSettings, eventTable, publishedTable } from "./tables.js";
+import { startStories } from "./stories.js";
 import { save, toCsv, toPng } from "./export.js";
 
 const SLICE = 8; // ms per frame for simulation
@@ -26,7 +27,7 @@ const drag = new DragController(page);
 const mechanism = new Mechanism($$("mechanism"), drag);
 const diagrams = new Diagrams($$("panels"), seek);
 const form = new Form(session.models, session.presets, {
-  preset: (name) => (session.presets.has(name) ? showState(stateOfPreset(name)) : restartEdited()),
+  preset: (name) => { isAddressUsed = true; return session.presets.has(name) ? showState(stateOfPreset(name)) : restartEdited(); },
   choose: (name, value) => { chooseItem(page.modelInfo, page.state.values, name, value); restartEdited(); },
   compare: setComparison,
   body: (number) => { page.state.body = number; restart(); },
@@ -36,6 +37,8 @@ const form = new Form(session.models, session.presets, {
   slideVariable,
   reportError: showError,
 });
+let isAddressUsed = /^#\./.test(location.hash); // an untouched page leaves its address alone, so that it opens as before
+let isExploreRequested = false; // by a link
 let requestedState = null; // the state shown last, possibly still compiling
 let linkWarning = ""; // unknown parts of a link
 let inputError = ""; // an invalid number
@@ -65,6 +68,8 @@ async function showState(next, unknownKeys = [], version = null) {
 
 // Show what a link contains: a state, a published case by its name, or else the first model.
 async function followLink(hash) {
+  isExploreRequested = hash.includes("=");
+  isAddressUsed ||= isExploreRequested;
   const decoded = decodeState(hash, session.models);
   const parameters = new URLSearchParams(hash.slice(1));
   const preset = parameters.get(".preset");
@@ -106,6 +111,7 @@ function restart() {
 
 // Restart after a change: the state is no longer a published case.
 function restartEdited() {
+  isAddressUsed = true;
   page.state.preset = linkWarning = "";
   restart();
 }
@@ -159,6 +165,7 @@ function setStopTime(seconds) {
 }
 
 async function setComparison({ model, ...values }) {
+  isAddressUsed = true;
   const { state, modelInfo } = page;
   if (model === "") state.comparison = null;
   else if (model) {
@@ -213,6 +220,8 @@ function frame(now) {
     stale.cursor = false;
   }
   stale.curves = !main.time.length;
+  if (isExploreRequested && $$("stories")) $$("explore").scrollIntoView({ behavior: "instant" });
+  isExploreRequested = false;
   if (page.playing || drag.active || !session.done) requestFrame();
   else lastFrame = 0;
   if (!session.done) scheduleSummary();
@@ -267,6 +276,7 @@ function scheduleSummary() {
 // ---- user actions
 
 function seek(t) {
+  isAddressUsed = true;
   page.state.t = t;
   stale.cursor = true;
   scheduleSummary();
@@ -306,10 +316,11 @@ function currentLink() {
 
 // Store the state in the address. A page embedded in another one leaves the address alone.
 function updateAddress() {
-  if (!isEmbedded) history.replaceState(null, "", currentLink());
+  if (!isEmbedded && isAddressUsed) history.replaceState(null, "", currentLink());
 }
 
 async function copyLink() {
+  isAddressUsed = true;
   updateAddress();
   let target = "copied to the clipboard";
   try {
@@ -323,10 +334,13 @@ async function copyLink() {
 
 addEventListener("hashchange", ({ newURL }) => { // the state may have replaced the address since
   const { hash } = new URL(newURL);
+  if (/^#[a-z]/.test(hash)) return; // a part of the page
   if (hash !== currentLink()) followLink(hash);
 });
 addEventListener("keydown", (event) => {
-  if (event.key !== " " || event.target.closest("button, input, select, summary, a")) return;
+  if (event.key !== " " || event.target.closest("button, input, select, summary, a, [role=slider]")) return;
+  const { top, bottom } = $$("stage").getBoundingClientRect();
+  if (bottom < 0 || top > innerHeight) return; // the space bar scrolls
   event.preventDefault();
   $$("play").click();
 });
@@ -347,9 +361,16 @@ $$("version").textContent = data.version;
 $$("link").hidden = isEmbedded;
 for (const [name, modelInfo] of session.models) {
   const choice = makeElement("input", { type: "radio", name: "model", value: name });
-  choice.addEventListener("change", () => showState(defaultState(modelInfo)));
+  choice.addEventListener("change", () => { isAddressUsed = true; showState(defaultState(modelInfo)); });
   $$("models").append(makeElement("label", {}, choice, name));
 }
 $$("choices").append(...Object.values(form.lists).map(({ element }) => element));
 globalThis.app = { session, plots: diagrams.plots, seek, state: () => page.state }; // for tests and the console
+$$("stories")?.addEventListener("click", (event) => { // in a page embedded in a report, a link would lead to the report
+  const link = event.target.closest("a");
+  if (!link || !isEmbedded) return;
+  event.preventDefault();
+  document.querySelector(link.getAttribute("href")).scrollIntoView();
+});
+if ($$("stories")) globalThis.app.stories = startStories(session);
 await followLink(location.hash);

@@ -1,0 +1,25 @@
+// Numbers in the prose of the stories.
+
+const NARROW_SPACE = "\u202f"; // between groups of three digits
+const MAX_DECIMALS = 8;
+
+function typographicMinus(text) {
+  return Number(text) === 0 ? text.replace("-", "") : text.replace("-", "−");
+}
+
+// A number with `count` significant digits, never with a power of ten.
+export function significant(value, count) {
+  if (!Number.isFinite(value)) return "–";
+  if (value === 0) return "0";
+  const decimals = Math.max(0, count - 1 - Math.floor(Math.log10(Math.abs(value)) + 1e-9));
+  return typographicMinus(value.toFixed(Math.min(decimals, MAX_DECIMALS)));
+}
+
+export function fixedDigits(value, decimals) {
+  return typographicMinus(value.toFixed(decimals));
+}
+
+// A whole number in groups of three digits.
+export function groupDigits(value) {
+  return String(Math.round(value)).replace(/\B(?=(\d{3})+$)/g, NARROW_SPACE);
+}

@@ -1,0 +1,155 @@
+"""The opening of the page and its five stories, as a visitor sees them."""
+
+import re
+
+import pytest
+import web_page
+from build_cache import ROOT
+
+STORIES = ("stops", "chatters", "squeaks", "creeps", "swings")
+DRAGGED = ("opening", "stops", "squeaks", "creeps", "swings")
+DRAWN = "new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))"
+TOLERANCE = 3  # CSS pixels
+SHIFTS = (
+    "globalThis.shift = 0; new PerformanceObserver(list => { for (const entry of list.getEntries())"
+    "if (!entry.hadRecentInput) shift += entry.value }).observe({ type: 'layout-shift', buffered: true })"
+)
+
+
+@pytest.fixture(autouse=True)
+def quiet(browser):
+    """No test may write to the console or request anything but the page itself."""
+    browser.console.clear()
+    yield
+    browser.call("Emulation.setEmulatedMedia", features=[])
+    assert browser.console == []
+    assert {
+        address.split("#")[0] for address in browser.requested_urls if not address.startswith(("data:", "blob:"))
+    } <= {address.split("#")[0] for address in browser.requested_urls[:1]}
+
+
+@pytest.fixture
+def still(page):
+    """The page for a visitor who prefers reduced motion: all results are there at once."""
+    page.browser.size(1280)
+    page.browser.call("Emulation.setEmulatedMedia", features=[{"name": "prefers-reduced-motion", "value": "reduce"}])
+    page.open(anew=True)
+    return page
+
+
+def text(page, selector):
+    return page.run(f"document.querySelector({selector!r}).textContent").replace("\u202f", "")
+
+
+def show(page, story):
+    """Scroll to a story and wait until it is computed."""
+    page.run(f"document.getElementById({story!r}).scrollIntoView({{ behavior: 'instant' }})")
+    page.wait(f"[...document.querySelectorAll('#{story} output')].every(each => /[0-9]/.test(each.textContent))")
+    page.run(DRAWN)
+
+
+def test_the_opening_claims_that_real_things_stop_and_counts_the_steps_of_both_masses(still):
+    assert text(still, "h1") == "Real things stop. Most solvers can\N{RIGHT SINGLE QUOTATION MARK}t."
+    still.wait("document.getElementById('opening-verdict').textContent.startsWith('The same')")
+    assert text(still, "#opening-true-count") == "17"
+    assert text(still, "#opening-sign-count") == "31999"
+    assert text(still, "#opening-true-clock").endswith("at rest")
+    assert text(still, "#opening-sign-clock").endswith("still slipping")
+
+
+def test_the_opening_plays_once_at_load_and_not_under_reduced_motion(page):
+    count = "Number(document.getElementById('opening-sign-count').textContent.replace(/\\D/g, ''))"
+    page.browser.size(1280)
+    page.open(anew=True)
+    page.wait(f"{count} > 100")
+    shown = page.run(f"new Promise(done => requestAnimationFrame(() => done({count})))")
+    assert shown < 31999  # the picture moves
+    page.browser.call("Emulation.setEmulatedMedia", features=[{"name": "prefers-reduced-motion", "value": "reduce"}])
+    page.open(anew=True)
+    page.run(
+        "globalThis.counts = new Set(); new MutationObserver(() => counts.add("
+        f"{count})).observe(document.getElementById('opening-sign-count'), {{ childList: true }})"
+    )
+    page.wait("document.getElementById('opening-verdict').textContent.startsWith('The same')")
+    assert set(page.run("[...counts]")) <= {0, 31999}  # only the end
+
+
+def test_every_story_has_a_picture_and_prose_with_numbers_to_drag(still):
+    for story in STORIES:
+        show(still, story)
+        assert still.run(f"document.querySelectorAll('#{story} .pull[role=slider]').length") >= 2
+        sentences = re.findall(r"[.?!](?=\s|$)", text(still, f"#{story} .prose p"))
+        assert 2 <= len(sentences) <= 4
+        painted = (
+            "(canvas => canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height).data.some(Boolean))"
+            f"(document.querySelector('#{story} canvas'))"
+        )
+        assert still.run(painted)
+
+
+def test_a_number_in_the_text_changes_the_results_by_pointer_and_by_keys(still):
+    show(still, "stops")
+    number = "document.querySelector('#stops .pull[data-key=f]')"
+    assert text(still, "#stops [data-out=loss]") == "12.7 mm"  # 4 f / k
+    x, y = still.run(f"(b => [b.x + b.width / 2, b.y + b.height / 2])({number}.getBoundingClientRect())")
+    still.browser.mouse("Pressed", x, y)
+    still.browser.mouse("Moved", x + 60, y)  # ten steps of 0.05 N
+    still.browser.mouse("Released", x + 60, y, buttons=0)
+    assert text(still, "#stops .pull[data-key=f]") == "1.00 N"
+    assert text(still, "#stops [data-out=loss]") == "25.3 mm"
+    still.run(f"{number}.dispatchEvent(new KeyboardEvent('keydown', {{ key: 'Home' }}))")
+    assert text(still, "#stops [data-out=loss]") == "12.7 mm"
+
+
+@pytest.mark.parametrize("width", [360, 1280])
+def test_bodies_of_the_opening_and_the_stories_stay_under_the_pointer(still, width):
+    still.browser.size(width, 740)
+    for section in DRAGGED:
+        if section != "opening":
+            show(still, section)
+        else:
+            still.run("scrollTo(0, 0)")
+            still.run(DRAWN)
+        body = f"#{section} .grip :is(rect, circle).body"
+        x, y = still.middle(body)
+        still.browser.mouse("Pressed", x, y)
+        for step in (20, -15):
+            still.browser.mouse("Moved", x + step, y)
+            still.run(DRAWN)
+            at_x, at_y = still.middle(body)
+            assert at_x == pytest.approx(x + step, abs=TOLERANCE), section
+            assert at_y == pytest.approx(y, abs=TOLERANCE), section
+        still.browser.mouse("Released", x, y, buttons=0)
+    still.browser.size(1280)
+
+
+@pytest.mark.parametrize("width", [360, 1280])
+def test_the_opening_fits_its_window_and_does_not_shift(page, width):
+    page.browser.size(width)
+    script = page.browser.call("Page.addScriptToEvaluateOnNewDocument", source=SHIFTS)
+    page.open(anew=True)
+    page.browser.call("Page.removeScriptToEvaluateOnNewDocument", **script)
+    page.run("new Promise(done => setTimeout(done, 600))")
+    assert page.run("shift") < 0.1
+    assert page.run("document.documentElement.scrollWidth") <= width
+    page.browser.size(1280)
+
+
+def test_a_link_shows_its_run_and_an_untouched_page_opens_with_the_claim_again(page):
+    top = "document.getElementById('explore').getBoundingClientRect().top"
+    page.open(".model=smd", anew=True)
+    assert abs(page.run(top)) < 5
+    page.open(anew=True)
+    page.wait("document.querySelector('#tables caption')")
+    assert page.run("[location.hash, scrollY]") == ["", 0]
+    page.run("document.querySelector('nav a').click()")
+    page.run("new Promise(done => setTimeout(done, 300))")
+    assert page.run("[app.state().model, location.hash]") == ["coulomb", "#stops"]
+
+
+def test_a_page_without_the_models_of_the_stories_opens_with_the_panel(browser):
+    file = ROOT / "tests" / "example_models" / "rotor_brake.py"
+    page = web_page.Page(browser, web_page.build_page("one", str(file), "--method", "ode45"))
+    page.open()
+    assert page.run("document.getElementById('stories')") is None
+    assert text(page, "h1") == "Dry friction, live"
