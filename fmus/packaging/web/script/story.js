@@ -52,12 +52,12 @@ export class Story {
     this.button.disabled = false;
     const text = this.section.querySelector(".prose p");
     let width = 0;
-    new ResizeObserver(() => { // space for one more line, so that the picture stays where it is while its numbers change
+    new ResizeObserver(() => requestAnimationFrame(() => { // space for one more line, so that the picture stays where it is
       if (text.offsetWidth === width) return;
       width = text.offsetWidth;
       text.style.minHeight = "0";
       text.style.minHeight = `${text.offsetHeight + parseFloat(getComputedStyle(text).lineHeight)}px`;
-    }).observe(text);
+    })).observe(text);
     new IntersectionObserver(([{ isIntersecting }], observer) => {
       if (!isIntersecting) return;
       observer.disconnect();

@@ -1,0 +1,64 @@
+"""The page works in Firefox as it does in Chromium."""
+
+import pytest
+import web_page
+from firefox import FIREFOX, Firefox
+from models import MODELS
+
+TOLERANCE = 3  # CSS pixels
+DRAWN = "new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))"
+CENTRE = (
+    "(b => [b.x + b.width / 2, b.y + b.height / 2])"
+    "(document.querySelector('{} :is(rect.body, circle.body, .body rect, .body circle)').getBoundingClientRect())"
+)
+NOTED = (
+    "document.documentElement.dataset.errors ?? ''"  # scripts of the test share the elements of the page, not its names
+)
+NOTE_ERRORS = (
+    "(() => { const note = text => (document.documentElement.dataset.errors = text);"
+    "addEventListener('error', ({ message }) => note(message));"
+    "addEventListener('unhandledrejection', ({ reason }) => note(String(reason))) })()"
+)
+
+
+@pytest.fixture(scope="module")
+def firefox():
+    if FIREFOX is None:
+        pytest.skip("there is no firefox here")
+    firefox = Firefox()
+    yield firefox
+    firefox.close()
+
+
+def drag(firefox, host):
+    """Drag the body in a host by some pixels and check that it follows."""
+    firefox.run(f"document.querySelector({host!r}).scrollIntoView({{ block: 'center', behavior: 'instant' }})")
+    firefox.run(DRAWN)
+    x, y = firefox.run(CENTRE.format(host))
+    firefox.pointer(("move", x, y), ("down",))
+    for step in (20, -15):
+        firefox.pointer(("move", x + step, y))
+        firefox.run(DRAWN)
+        at_x, _ = firefox.run(CENTRE.format(host))  # a pendulum leaves the height of the pointer
+        assert at_x == pytest.approx(x + step, abs=TOLERANCE), host
+    firefox.pointer(("up",))
+
+
+def test_every_model_runs_and_bodies_stay_under_the_pointer_in_firefox(firefox):
+    page = web_page.build_page("web")
+    firefox.size(1280)
+    for name in MODELS:
+        firefox.open(f"{page.as_uri()}#.model={name}")
+        firefox.run(web_page.READY)
+        firefox.run(NOTE_ERRORS)
+        assert firefox.run("[app.state().model, app.session.runs.main.failure]") == [name, ""]
+        drag(firefox, "#mechanism")
+        assert firefox.run(NOTED) == ""
+    firefox.open(page.as_uri())
+    firefox.run(web_page.READY)
+    firefox.run(NOTE_ERRORS)
+    ended = "document.getElementById('opening-verdict').textContent.startsWith('The same')"
+    firefox.run(f"new Promise(done => {{ const look = () => {ended} ? done(0) : setTimeout(look, 50); look() }})")
+    assert firefox.run("document.getElementById('opening-sign-count').textContent.replace(/[^0-9]/g, '')") == "31999"
+    drag(firefox, "#opening-true-body")
+    assert firefox.run(NOTED) == ""
