@@ -36,7 +36,7 @@ MODULES = (
         "drag",
         "controls",
     ),
-    *("legend", "panels", "diagrams", "form", "tables", "export"),
+    *("measurement", "legend", "panels", "diagrams", "form", "tables", "export"),
     *("animation", "prose", "chart", "adjustable", "story_models", "story_bodies", "opening", "chatter_story", "story"),
     *("stories", "main"),
 )

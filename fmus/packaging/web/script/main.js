@@ -10,8 +10,9 @@ import { Form } from "./form.js";
 import { DragController } from "./drag.js";
 import { Mechanism } from "./mechanism.js";
 import { formatNumber } from "./plot.js";
-import { defaultState, effectiveValues, decodeState, valueAt, encodeState } from "./state.js";
+import { defaultState, effectiveValues, decodeState, findVariable, valueAt, encodeState } from "./state.js";
 import { costTable, decayTable, describeSettings, eventTable, publishedTable } from "./tables.js";
+import { MeasurementError, readMeasurement } from "./measurement.js";
 import { startStories } from "./stories.js";
 import { save, toCsv, toPng } from "./export.js";
 
@@ -40,6 +41,7 @@ const form = new Form(session.models, session.presets, {
 let isAddressUsed = /^#\./.test(location.hash); // an untouched page leaves its address alone, so that it opens as before
 let isExploreRequested = false; // by a link
 let requestedState = null; // the state shown last, possibly still compiling
+let measurement = null; // of the visitor, drawn over the position of the body shown
 let linkWarning = ""; // unknown parts of a link
 let inputError = ""; // an invalid number
 let frameRequested = false;
@@ -61,6 +63,7 @@ async function showState(next, unknownKeys = [], version = null) {
   page.state = next;
   page.modelInfo = session.models.get(next.model);
   if (changed) buildControls();
+  if (changed && measurement) showMeasurement(null); // it belongs to another body
   linkWarning = unknownKeys.length ? `The link contains unknown settings: ${unknownKeys.join(", ")}. ` : "";
   if (version && version !== session.version) linkWarning += `The link was made with version ${version}; this is version ${session.version}. `;
   restart();
@@ -212,7 +215,7 @@ function frame(now) {
   if (stale.curves) drawAlert();
   if (main.time.length && stale.curves) {
     mechanism.fit(main);
-    diagrams.draw(session, page.state, { envelopes: $$("envelopes").checked });
+    diagrams.draw(session, page.state, { envelopes: $$("envelopes").checked, measurement });
     showLegend($$("legend"), diagrams.legend());
   }
   if (main.time.length && (stale.curves || stale.cursor) && main.hasReached(page.state.t)) {
@@ -298,6 +301,7 @@ function play(playing = true) {
 }
 
 for (const [id, action] of Object.entries({
+  "remove-measurement": () => { $$("measurement").value = ""; showMeasurement(null); },
   play: () => play(!page.playing),
   kick: () => drag.kick(),
   reset: () => showState(defaultState(page.modelInfo)),
@@ -313,6 +317,32 @@ $$("envelopes").addEventListener("change", redraw);
 function currentLink() {
   return encodeState(page.state, session.models, session.version);
 }
+
+function showMeasurement(next) {
+  measurement = next;
+  $$("remove-measurement").hidden = !next;
+  $$("status").textContent = next ? `${next.name}: ${next.count} points, drawn over the position. The file stays on this computer.` : "";
+  redraw();
+}
+
+async function openMeasurement(file) {
+  if (!file) return;
+  const { position } = page.modelInfo.bodies[page.state.body];
+  try {
+    showMeasurement(readMeasurement(file.name, await file.text(), findVariable(page.modelInfo, position).unit));
+    $$("panels").scrollIntoView({ block: "nearest" });
+  } catch (error) {
+    if (!(error instanceof MeasurementError)) throw error;
+    showError(error.message);
+  }
+}
+
+$$("measurement").addEventListener("change", ({ target }) => openMeasurement(target.files[0]));
+addEventListener("dragover", (event) => event.preventDefault());
+addEventListener("drop", (event) => {
+  event.preventDefault();
+  openMeasurement(event.dataTransfer.files[0]);
+});
 
 // Store the state in the address. A page embedded in another one leaves the address alone.
 function updateAddress() {

@@ -64,7 +64,7 @@ function timePanel(session, state, options, name, key = name, log = false) {
   const variable = main.fmu.variables.get(name);
   const { factor, display_unit, text, symbol } = variable;
   const body = main.fmu.modelInfo.bodies[state.body];
-  const extras = name === body.position ? positionCurves(main, body, options, factor) : [];
+  const extras = name === body.position ? positionCurves(main, body, options, factor, state.stop) : [];
   const curves = [...extras, ...runCurves(session.runs, (run) => curveData(run, variable))];
   const y = { ...bounds(curves.map((curve) => curve.y), log), log };
   const x = { low: 0, high: state.stop, label: "t in s" };
@@ -95,9 +95,14 @@ function stickingPanel(main, state) {
   return { key: ".sticking", title, symbol: "", content };
 }
 
-// Additional curves with the position: the driver, and optionally envelopes and turning points.
-function positionCurves(main, body, options, factor) {
+// Additional curves with the position: the driver, a measurement, and optionally envelopes and turning points.
+function positionCurves(main, body, options, factor, stop) {
   const curves = [];
+  if (options.measurement) {
+    const { name, time, position } = options.measurement;
+    const shown = time.map((t, i) => [t, position[i] * factor]).filter(([t]) => t >= 0 && t <= stop);
+    curves.push({ x: shown.map(([t]) => t), y: shown.map(([, y]) => y), colour: "measured", dots: true, legend: name });
+  }
   if (body.driver) curves.push({ ...curveData(main, { name: body.driver, factor }), colour: "soft", dash: [2, 3], width: 1, legend: "driver" });
   if (!options.envelopes) return curves;
   const turning = turningPoints(main.time, main.columns[body.position], main.columns[body.speed]);
