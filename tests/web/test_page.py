@@ -776,6 +776,49 @@ def test_several_contacts_are_shaded_and_named_each(browser):
     assert {"F1 sticks", "F2 sticks"} <= {*named}
 
 
+# ---- friction law and events
+
+
+@pytest.mark.parametrize("name", sorted({*MODELS} - {"smd"}))
+def test_the_friction_law_is_drawn_over_the_slip_speed_with_the_point_at_the_cursor(page, name):
+    page.open(f".model={name}&.t=0.3")
+    body = page.run("app.session.models.get(app.state().model).bodies[0]")
+    curves = page.run("app.plots.get('.law').panel.content.curves")
+    held = [curve for curve in curves if curve["colour"] == "stick"]
+    for curve in held:  # one vertical line
+        assert max(map(abs, curve["x"])) == 0
+    if name in ("coulomb", "stickslip"):  # level lines
+        d = {variable: meaning.start for variable, meaning in declared(name).items()}
+        force = d["f"] if name == "coulomb" else d["mu_d"] * d["m"] * d["g"]
+        assert held
+        for curve in curves:
+            if curve["colour"] == "slip":
+                assert {round(abs(value) / force, 9) for value in curve["y"]} == {1}
+    (point,) = page.run("app.plots.get('.law').plot.cursor.points")
+    at = "app.session.runs.main.at({!r}, 0.3) * app.session.runs.main.fmu.variables.get({!r}).factor"
+    assert [point["x"], point["y"]] == page.run(
+        f"[{at.format(body['slip'], body['slip'])}, {at.format(body['friction'], body['friction'])}]"
+    )
+
+
+def test_the_buttons_jump_to_the_next_and_the_previous_event(page):
+    page.open(".model=coulomb")
+    times = page.run("app.session.runs.main.events.map(({ t }) => t)")
+    seen = []
+    for _ in times:
+        page.click("#next-event")
+        seen.append(page.run("app.state().t"))
+    assert seen == times
+    page.wait("document.getElementById('next-event').disabled")
+    page.click("#previous-event")
+    assert page.run("app.state().t") == times[-2]
+
+
+def test_the_arrow_of_friction_has_its_value(page):
+    page.open(".model=coulomb&.t=0.1")
+    page.wait("document.querySelector('#mechanism .value').textContent === 'friction 0.5 N'")
+
+
 # ---- measurements of the visitor
 
 DROP = (

@@ -87,6 +87,7 @@ def body_json(analysis: ModelAnalysis, x: State) -> ModelJson:
         "spring": not is_nonlinear and not is_same_expression(restoring, 0.0) and bool(drives or not linked),
         "dampers": [] if depends_on(damping, (v,)) else scaling_parameters(damping),
         "friction": next((e.name for e in frictions), ""),
+        "slip": v.name if frictions and slips_with(frictions[0], v) else "",
         "contacts": [c.name for c in frictions if isinstance(c, Contact)],
         "mode": next((c.mode.name for c in frictions if isinstance(c, Contact)), ""),
         "start": x.start_expression.name if isinstance(x.start_expression, Fixed) else "",
@@ -100,6 +101,13 @@ def scaling_parameters(e: Operand) -> list[str]:
     return [
         leaf.name for leaf in variables_in(e) if isinstance(leaf, Parameter) and leaf.unit not in ("kg", "kg.m2", "m")
     ]
+
+
+def slips_with(friction: Contact | Output, v: State | Output) -> bool:
+    """Check whether the slip speed of a friction force is the speed v, so that the force can be drawn over v."""
+    if isinstance(friction, Contact):
+        return is_same_expression(friction.slip, v)
+    return {e.name for e in variables_in(friction.expression) if not isinstance(e, Parameter | Fixed)} == {v.name}
 
 
 def is_friction_force(e: Output, v: State | Output) -> bool:

@@ -39,7 +39,7 @@ export class Diagrams {
     const reading = makeElement("span", { class: "reading" });
     const host = makeElement("div", { class: "plot" });
     const figure = makeElement("figure", { id: `panel-${key}` }, makeElement("figcaption", {}, heading, reading), host);
-    return { plot: new Plot(host, key === ".phase" ? null : this.onSeek), figure, heading, reading };
+    return { plot: new Plot(host, [".phase", ".law"].includes(key) ? null : this.onSeek), figure, heading, reading };
   }
 
   // Move the cursor to a time in s.

@@ -256,6 +256,8 @@ function drawCursor() {
   diagrams.moveCursor(session, t);
   mechanism.move((name) => (main.modes.includes(name) ? main.columns[name][main.row(t)] : main.at(name, t)));
   $$("scrub").value = Math.round((1000 * state.t) / state.stop);
+  $$("previous-event").disabled = !(main.events[0]?.t < state.t);
+  $$("next-event").disabled = !(main.events.at(-1)?.t > state.t);
   $$("clock").textContent = `${state.t.toFixed(state.stop < 10 ? 3 : 2)} s`;
   $$("scrub").setAttribute("aria-valuetext", $$("clock").textContent);
   if (state.changes.length) form.follow(modelInfo, state);
@@ -286,6 +288,12 @@ function seek(t) {
   requestFrame();
 }
 
+// Stop at an event, which may be missing.
+function seekEvent(event) {
+  if (page.playing) play(false);
+  if (event) seek(event.t);
+}
+
 function play(playing = true) {
   const { state } = page;
   if (playing && state.t >= state.stop) state.t = 0;
@@ -304,6 +312,8 @@ for (const [id, action] of Object.entries({
   "remove-measurement": () => { $$("measurement").value = ""; showMeasurement(null); },
   play: () => play(!page.playing),
   kick: () => drag.kick(),
+  "previous-event": () => seekEvent(session.runs.main.events.findLast(({ t }) => t < page.state.t)),
+  "next-event": () => seekEvent(session.runs.main.events.find(({ t }) => t > page.state.t)),
   reset: () => showState(defaultState(page.modelInfo)),
   print: () => print(),
   csv: () => save(new Blob([toCsv(session.runs.main, session.runs.comparison, settingLines(session, page.state))], { type: "text/csv" }), `${page.state.model}.csv`),

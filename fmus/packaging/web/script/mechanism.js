@@ -70,6 +70,7 @@ export class Mechanism {
     if (!body.friction) for (const x of [-28, 28]) element("circle", { class: "wheel", cx: x, cy: y + FLOOR_Y - 5, r: 5 }, part.moving);
     part.label = element("text", { x: 0, y: top + BLOCK.height / 2 + 5 }, part.moving);
     if (body.friction) part.force = element("path", { class: "force" }, group);
+    if (body.friction) part.forceValue = element("text", { class: "value", y: y + FLOOR_Y - BLOCK.height - 8 }, group);
     return part;
   }
 
@@ -164,6 +165,10 @@ export class Mechanism {
     part.spring?.setAttribute("d", coil(from, to, middle - spacing));
     part.damper?.setAttribute("d", dashpot(from, to, middle + spacing));
     part.driver?.setAttribute("d", `M${driver} ${middle - 26}V${middle + 26}M${driver} ${middle}H${driver + 34}m-9 -6l9 6l-9 6`);
+    if (part.forceValue) {
+      part.forceValue.setAttribute("x", x);
+      part.forceValue.textContent = this.describeForce(body, value);
+    }
     if (part.force) part.force.setAttribute("d", arrow(x, part.y + FLOOR_Y - 6, -value(body.friction) / (this.largestForce || 1)));
   }
 
@@ -171,6 +176,12 @@ export class Mechanism {
     part.moving.setAttribute("transform", rotation(angle));
     part.driver?.setAttribute("transform", rotation(value(part.body.driver)));
     if (part.force) part.force.setAttribute("d", arc(part.body.kind === "pendulum" ? 34 : 86, -value(part.body.friction) / (this.largestForce || 1)));
+  }
+
+  // The friction on a body: the negative of the variable, in the direction of the arrow.
+  describeForce({ friction }, value) {
+    const { factor, display_unit } = findVariable(this.modelInfo, friction);
+    return `friction ${formatNumber(-value(friction) * factor, 3)} ${display_unit}`;
   }
 
   // Hide dampers with a coefficient of zero.

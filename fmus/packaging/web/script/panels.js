@@ -19,6 +19,7 @@ export function buildPanels(session, state, options) {
   const inputs = main.inputs.filter((name) => !names.includes(name) && main.largestMagnitude(name) > 0);
   const panels = names.map((name) => timePanel(session, state, options, name));
   panels.push(phasePanel(session, body));
+  if (body.slip) panels.push(lawPanel(session, body));
   panels.push(timePanel(session, state, options, "solver.h", ".step", true));
   if (energy) panels.push(timePanel(session, state, options, energy));
   panels.push(...[...forces, ...inputs].map((name) => timePanel(session, state, options, name)));
@@ -138,6 +139,34 @@ function findMarks(main, state, labelled) {
     return { x: t, label: labelled ? `${name} ${formatNumber(value * factor, 3)} ${display_unit}` : " ", colour: "event" };
   });
   return [...events, ...changes];
+}
+
+// Friction over slip speed; the cursor is the point at its time.
+function lawPanel({ runs }, body) {
+  const [slip, friction] = [body.slip, body.friction].map((name) => runs.main.fmu.variables.get(name));
+  const other = runs.comparison?.columns[slip.name] && runs.comparison.columns[friction.name] ? lawCurves(runs.comparison, body, slip, friction) : [];
+  const curves = [...other.map((curve) => ({ ...curve, colour: "b", legend: "second run" })), ...lawCurves(runs.main, body, slip, friction)];
+  const content = {
+    x: { ...bounds(curves.map((curve) => curve.x)), label: `${slip.name} in ${slip.display_unit}` },
+    y: bounds(curves.map((curve) => curve.y)), curves,
+  };
+  return { key: ".law", title: `friction law: ${friction.name} in ${friction.display_unit} against ${slip.name}`, symbol: "", content, phase: [slip, friction] };
+}
+
+// One curve for the forces that hold the body and one for each slip, so that no line joins the two.
+function lawCurves(run, body, slip, friction) {
+  const [x, y] = [slip, friction].map(({ name, factor }) => run.columns[name].map((value) => value * factor));
+  const modes = run.columns[body.mode];
+  const isStuck = (row) => modes?.[row] === 0;
+  const held = { x: [], y: [], colour: "stick", legend: "holds", width: 3 };
+  const slips = [];
+  for (let row = 0; row < x.length; row++) {
+    if (!isStuck(row) && (row === 0 || isStuck(row - 1) || modes?.[row] !== modes?.[row - 1])) slips.push({ x: [], y: [], colour: "slip", legend: "slips" });
+    const curve = isStuck(row) ? held : slips.at(-1);
+    curve.x.push(x[row]);
+    curve.y.push(y[row]);
+  }
+  return [held, ...slips].filter((curve) => curve.x.length);
 }
 
 // Speed over position.

@@ -66,7 +66,7 @@ const colours = {}; // by name of the CSS variable
 // Read the current colours of the style sheet (light, dark or print).
 export function readColours() {
   const style = getComputedStyle(document.documentElement);
-  for (const name of ["a", "b", "ghost", "line", "soft", "hold", "event", "cursor", "measured"]) colours[name] = style.getPropertyValue(`--${name}`).trim();
+  for (const name of ["a", "b", "ghost", "line", "soft", "hold", "event", "cursor", "measured", "stick", "slip"]) colours[name] = style.getPropertyValue(`--${name}`).trim();
 }
 
 export class Plot {
