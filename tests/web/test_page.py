@@ -819,6 +819,17 @@ def test_the_arrow_of_friction_has_its_value(page):
     page.wait("document.querySelector('#mechanism .value').textContent === 'friction 0.5 N'")
 
 
+@pytest.mark.parametrize("name", ["coulomb", "pendulum"])
+def test_the_value_of_a_force_that_jumps_is_never_between_its_values(page, name):
+    page.open(f".model={name}")
+    (friction,) = page.run("app.session.models.get(app.state().model).contacts.map(({ name }) => name)")
+    before = "app.session.runs.main.events.slice(1, -1).map(({ t }) => Math.abs(app.session.runs.main.at(F, t - 1e-5)))"
+    sizes = page.run(f"(F => {before})({friction!r})")
+    assert sizes
+    largest = page.run(f"app.session.runs.main.largestMagnitude({friction!r})")
+    assert all(size > 0.9 * largest for size in sizes)
+
+
 # ---- measurements of the visitor
 
 DROP = (

@@ -75,7 +75,7 @@ class OpeningLane {
     const { now, run } = this;
     this.body.moveTo(now.x, now.stuck);
     this.count.textContent = groupDigits(this.steps);
-    const state = now.stuck ? "at rest" : run.done ? "still slipping" : "slipping";
+    const state = now.stuck ? "at rest" : run.done ? "still slips" : "slipping";
     this.clock.textContent = `t = ${fixedDigits(now.t, 2)} s, ${state}`;
   }
 }
@@ -170,9 +170,10 @@ export async function showOpening(session) {
     const off = 1000 * Math.abs(sign.now.x - exact.now.x);
     const last = sign.points.filter((point) => point.t > stop - 0.2);
     const creep = (1e6 * Math.abs(last.at(-1).x - last[0].x)) / (last.at(-1).t - last[0].t);
+    const slowed = reducedMotion.matches ? "." : "; the counters are slowed down so that you can watch.";
     openingElement("verdict").textContent = `The same ${fixedDigits(stop, 1)} s: ${groupDigits(exact.steps)} step${exact.steps === 1 ? "" : "s"} against ${groupDigits(sign.steps)}. ` +
       `The lower mass ${off > 0.01 ? `ends ${significant(off, 2)} mm from where it should, and ` : ""}still creeps at ${significant(creep, 2)} µm/s. ` +
-      `This machine needed ${significant(exact.milliseconds, 1)} and ${significant(sign.milliseconds, 2)} ms; the counters are slowed down so that you can watch.`;
+      `This machine needed ${significant(exact.milliseconds, 1)} and ${significant(sign.milliseconds, 2)} ms${slowed}`;
   }
 
   // ---- charts
