@@ -200,8 +200,8 @@ def laws(folder: Path) -> None:
 
 
 def live(folder: Path) -> None:
-    """The live page, as chromium shows it."""
-    build = [sys.executable, "-m", "build_fmus", "stickslip", "--web", "--out", str(folder / "live")]
+    """The opening of the live page, as chromium shows it."""
+    build = [sys.executable, "-m", "build_fmus", "--web", "--out", str(folder / "live")]
     environment = os.environ | {"PYTHONPATH": str(DOCS.parent)}
     subprocess.run(build, cwd=folder, check=True, env=environment, capture_output=True)
     photograph(folder / "live" / "index.html", IMAGES / "live.png", folder, 900)
@@ -223,6 +223,7 @@ def photograph(page: Path, picture: Path, folder: Path, height: int) -> None:
     options = ["--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars", f"--window-size=1200,{height}"]
     options += [
         "--virtual-time-budget=8000",
+        "--force-prefers-reduced-motion",  # the opening of the live page at its end
         f"--screenshot={folder / picture.name}",
         f"--user-data-dir={folder / 'profile'}",
     ]

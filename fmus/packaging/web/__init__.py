@@ -4,6 +4,7 @@
     presets.py       published cases, from scene files
     wasm.py          compiles the native C sources for the browser
     html_page.py     combines page.html, style.css and script/*.js to one file
+    stories.html     the opening and the stories, with stories.css: on pages with the models that they need
 
 The modules in script/ are concatenated in the order of MODULES in html_page.py; each imports only from earlier ones.
 """

@@ -23,15 +23,15 @@ export class Chart {
   }
 
   size(w, h) {
-    const dense = Math.min(devicePixelRatio || 1, 3);
-    Object.assign(this, { w, h, dense });
-    [this.canvas.width, this.canvas.height] = [Math.round(w * dense), Math.round(h * dense)];
+    const ratio = Math.min(devicePixelRatio || 1, 3);
+    Object.assign(this, { w, h, ratio });
+    [this.canvas.width, this.canvas.height] = [Math.round(w * ratio), Math.round(h * ratio)];
     this.paint();
   }
 
   paint() {
     if (!this.w) return;
-    this.c.setTransform(this.dense, 0, 0, this.dense, 0, 0);
+    this.c.setTransform(this.ratio, 0, 0, this.ratio, 0, 0);
     this.c.clearRect(0, 0, this.w, this.h);
     this.c.lineJoin = "round";
     this.draw(this);

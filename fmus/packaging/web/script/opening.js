@@ -173,7 +173,7 @@ export async function showOpening(session) {
     const slowed = reducedMotion.matches ? "." : "; the counters are slowed down so that you can watch.";
     openingElement("verdict").textContent = `The same ${fixedDigits(stop, 1)} s: ${groupDigits(exact.steps)} step${exact.steps === 1 ? "" : "s"} against ${groupDigits(sign.steps)}. ` +
       `The lower mass ${off > 0.01 ? `ends ${significant(off, 2)} mm from where it should, and ` : ""}still creeps at ${significant(creep, 2)} µm/s. ` +
-      `This machine needed ${significant(exact.milliseconds, 1)} and ${significant(sign.milliseconds, 2)} ms${slowed}`;
+      (sign.milliseconds > 0 ? `This machine needed ${significant(exact.milliseconds, 1)} and ${significant(sign.milliseconds, 2)} ms${slowed}` : "");
   }
 
   // ---- charts
