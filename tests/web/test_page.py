@@ -480,6 +480,10 @@ def test_an_embedded_page_runs_without_an_address(page, tmp_path):
     page.browser.open(outer.as_uri())
     page.wait("frames[0].app?.session.done && frames[0].document.querySelector('#status').textContent")
     assert page.run("[frames[0].location.hash, frames[0].document.getElementById('link').hidden]") == ["", True]
+    page.run("frames[0].document.querySelector('#to-explore').click()")  # its links lead to parts of itself
+    page.run("new Promise(done => setTimeout(done, 300))")
+    assert page.run("frames[0].app.state().model") == "coulomb"
+    assert page.run("frames[0].location.href") == "about:srcdoc"
 
 
 def test_a_refused_value_shows_the_message_of_the_fmu(page):
