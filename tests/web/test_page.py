@@ -834,6 +834,28 @@ def test_the_value_of_a_force_that_jumps_is_never_between_its_values(page, name)
     assert all(size > 0.9 * largest for size in sizes)
 
 
+def test_the_projector_mode_shows_one_large_diagram_with_large_text(page):
+    page.browser.size(1280)
+    page.open(".model=coulomb")
+    fonts = (
+        "(() => { const { plot } = app.plots.get('x'); const sizes = new Set();"
+        "const context = document.createElement('canvas').getContext('2d');"
+        "context.fillText = () => sizes.add(parseFloat(context.font));"
+        "plot.draw(context, 900, 500); return [...sizes] })()"
+    )
+    shown = "[...document.querySelectorAll('figure')].filter(figure => figure.getBoundingClientRect().height).length"
+    height = "document.querySelector('.plot').getBoundingClientRect().height"
+    before = page.run(f"[{shown}, {height}]")
+    page.click("#projector")
+    page.wait(f"{shown} === 1")
+    assert page.run(height) > 1.5 * before[1]
+    assert page.run(fonts) == [18]
+    assert page.run("getComputedStyle(document.querySelector('figcaption')).fontSize") == "18px"
+    page.click("#projector")
+    page.wait(f"{shown} === {before[0]}")
+    assert page.run(fonts) == [11]
+
+
 # ---- measurements of the visitor
 
 DROP = (

@@ -288,6 +288,23 @@ function seek(t) {
   requestFrame();
 }
 
+// One large diagram on the full screen, where the browser allows it.
+async function showProjector(on) {
+  document.body.classList.toggle("projector", on);
+  $$("projector").setAttribute("aria-pressed", String(on));
+  diagrams.repaint();
+  try {
+    if (on) await document.documentElement.requestFullscreen();
+    else if (document.fullscreenElement) await document.exitFullscreen();
+  } catch {
+    // the window keeps its size
+  }
+}
+
+addEventListener("fullscreenchange", () => { // the key Escape leaves both
+  if (!document.fullscreenElement && document.body.classList.contains("projector")) showProjector(false);
+});
+
 // Stop at an event, which may be missing.
 function seekEvent(event) {
   if (page.playing) play(false);
@@ -312,6 +329,7 @@ for (const [id, action] of Object.entries({
   "remove-measurement": () => { $$("measurement").value = ""; showMeasurement(null); },
   play: () => play(!page.playing),
   kick: () => drag.kick(),
+  projector: () => showProjector(!document.body.classList.contains("projector")),
   "previous-event": () => seekEvent(session.runs.main.events.findLast(({ t }) => t < page.state.t)),
   "next-event": () => seekEvent(session.runs.main.events.find(({ t }) => t > page.state.t)),
   reset: () => showState(defaultState(page.modelInfo)),

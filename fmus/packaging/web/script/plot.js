@@ -1,12 +1,11 @@
 // A diagram: axes, curves, shaded intervals and marks on one canvas, the cursor on another on top.
 
-const LEFT = 58;
 const RIGHT = 10;
 const TOP = 8;
-const BOTTOM = 22;
+const FONT_SIZE = 11; // px, for which the margins at the texts of the axes are chosen
+const axisText = { size: FONT_SIZE, left: 58, bottom: 22 }; // the font size now, and the margins for it
 const TICK_COUNT = 5;
 const ROW_GAP = 4; // above and below a shaded row
-const FONT = "11px system-ui, sans-serif";
 
 // Round numbers from low to high, about `count` of them.
 export function ticks(low, high, count = TICK_COUNT) {
@@ -63,9 +62,11 @@ export function decimate(x, y, scale) {
 
 const colours = {}; // by name of the CSS variable
 
-// Read the current colours of the style sheet (light, dark or print).
+// Read the current colours of the style sheet (light, dark or print) and the font size.
 export function readColours() {
   const style = getComputedStyle(document.documentElement);
+  axisText.size = parseFloat(style.getPropertyValue("--plot-text")) || FONT_SIZE;
+  [axisText.left, axisText.bottom] = [58, 22].map((margin) => (margin * axisText.size) / FONT_SIZE);
   for (const name of ["a", "b", "ghost", "line", "soft", "hold", "event", "cursor", "measured", "stick", "slip"]) colours[name] = style.getPropertyValue(`--${name}`).trim();
 }
 
@@ -91,7 +92,7 @@ export class Plot {
     const seek = (event) => {
       const { left, width } = this.host.getBoundingClientRect();
       const { low, high } = this.content.x;
-      const fraction = (event.clientX - left - LEFT) / (width - LEFT - RIGHT);
+      const fraction = (event.clientX - left - axisText.left) / (width - axisText.left - RIGHT);
       onSeek(low + Math.min(Math.max(fraction, 0), 1) * (high - low));
     };
     this.host.addEventListener("pointerdown", (event) => {
@@ -117,7 +118,7 @@ export class Plot {
     const { width, height } = this;
     const context = this.prepareCanvas(this.cursorCanvas);
     const scale = this.scales(width, height);
-    if (cursor.x !== undefined) line(context, colours.cursor, 1, [scale.x(cursor.x), TOP, scale.x(cursor.x), height - BOTTOM]);
+    if (cursor.x !== undefined) line(context, colours.cursor, 1, [scale.x(cursor.x), TOP, scale.x(cursor.x), height - axisText.bottom]);
     for (const { x, y, colour } of cursor.points) dot(context, colours[colour], scale.x(x), scale.y(y), 3.5);
   }
 
@@ -146,8 +147,8 @@ export class Plot {
     const transform = y.log ? (value) => (value > 0 ? Math.log10(value) : NaN) : (value) => value;
     const [low, high] = [transform(y.low), transform(y.high)];
     return {
-      x: (value) => LEFT + ((value - x.low) / (x.high - x.low)) * (width - LEFT - RIGHT),
-      y: (value) => TOP + ((high - transform(value)) / (high - low)) * (height - TOP - BOTTOM),
+      x: (value) => axisText.left + ((value - x.low) / (x.high - x.low)) * (width - axisText.left - RIGHT),
+      y: (value) => TOP + ((high - transform(value)) / (high - low)) * (height - TOP - axisText.bottom),
     };
   }
 
@@ -155,8 +156,8 @@ export class Plot {
   draw(context, width, height) {
     const { x, y, curves, bands = [], rows = [], marks = [] } = this.content;
     const scale = this.scales(width, height);
-    const [right, bottom] = [width - RIGHT, height - BOTTOM];
-    context.font = FONT;
+    const [right, bottom] = [width - RIGHT, height - axisText.bottom];
+    context.font = `${axisText.size}px system-ui, sans-serif`;
     context.lineJoin = "round";
     context.fillStyle = colours.hold;
     const rowHeight = (bottom - TOP) / Math.max(rows.length, 1);
@@ -167,10 +168,10 @@ export class Plot {
     context.fillStyle = colours.soft;
     context.textAlign = "right";
     context.textBaseline = "middle";
-    if (y.hidden) rows.forEach((name, row) => context.fillText(name, LEFT - 6, TOP + (row + 0.5) * rowHeight, LEFT - 8));
+    if (y.hidden) rows.forEach((name, row) => context.fillText(name, axisText.left - 6, TOP + (row + 0.5) * rowHeight, axisText.left - 8));
     for (const value of y.hidden ? [] : y.log ? decades(y.low, y.high) : ticks(y.low, y.high)) {
-      line(context, colours.line, 1, [LEFT, scale.y(value), right, scale.y(value)]);
-      context.fillText(y.log ? formatPower(Math.round(Math.log10(value))) : formatNumber(value), LEFT - 6, scale.y(value));
+      line(context, colours.line, 1, [axisText.left, scale.y(value), right, scale.y(value)]);
+      context.fillText(y.log ? formatPower(Math.round(Math.log10(value))) : formatNumber(value), axisText.left - 6, scale.y(value));
     }
     context.textAlign = "center";
     context.textBaseline = "alphabetic";
@@ -184,7 +185,7 @@ export class Plot {
     context.fillText(x.label, width - 2, height - 6);
     context.save();
     context.beginPath();
-    context.rect(LEFT, TOP, right - LEFT, bottom - TOP);
+    context.rect(axisText.left, TOP, right - axisText.left, bottom - TOP);
     context.clip();
     for (const curve of curves) this.curve(context, curve, scale);
     for (const mark of marks) this.mark(context, mark, scale, right, bottom);
