@@ -22,6 +22,7 @@ DEGREE = 8  # of the polynomial through an event function; interpolants have deg
 INTERPOLANT_SHARE = 1.0 / 12.0
 NEAR_ZERO_SHARE = 0.002  # of the largest value since the last event; larger event functions are in no doubt
 MAX_SEARCH_STEPS, MAX_SECANTS, MAX_BISECTIONS = 1000, 200, 200
+MAX_DOUBLINGS = 9  # of the share of a step where a search begins
 START_OF_SLIP = 1e-3  # share of a step after which a slip that starts at zero is larger than its rounding error
 ERROR_FACTOR = 100.0  # bound on the error of an event function, in multiples of the tolerance and of its scale
 NO_ZERO, ONE_ZERO, UNKNOWN = 0, 1, 2  # what the cubic polynomial shows
@@ -198,6 +199,9 @@ def search_polynomial(model, step, j):
         largest_curvature += (k + 2.0) * (k + 1.0) * fabs(location.polynomial[k + 2])
     least = CONDITION_MARGIN * location.peaks[j]  # smaller values are rounding errors
     u = START_OF_SLIP if location.start[j] <= least else 0.0
+    error = ERROR_FACTOR * step.tolerance * location.peaks[j]
+    if location.start[j] <= error and location.early[j] > location.start[j]:
+        u = end_of_interpolation_error(location, least, error)
     for _ in range(MAX_SEARCH_STEPS):
         value = slope = 0.0
         for k in range(DEGREE + 1):
@@ -223,6 +227,22 @@ def search_polynomial(model, step, j):
     if location.end[j] > 0.0:
         return inf
     return find_root(model, step, step.t0, step.t1, location.start[j], location.end[j], j)
+
+
+def end_of_interpolation_error(location, least, error):
+    """Return where the polynomial of a slip that begins has become positive.
+
+    The slopes at the ends of the step show that it begins; the interpolant may fall below zero first, by its error.
+    """
+    u = START_OF_SLIP
+    for _ in range(MAX_DOUBLINGS):
+        value = 0.0
+        for k in range(DEGREE + 1):
+            value = location.polynomial[DEGREE - k] + value * u
+        if value > least or value < -error:
+            break
+        u *= 2.0
+    return u
 
 
 def fit_polynomial(model, step, j):
