@@ -5,7 +5,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-if Path(sys.path[0]) != Path(__file__).parent:  # run by -m: a model in this folder may be called math.py
+if __name__ == "__main__" and Path(sys.path[0]) != Path(__file__).parent:  # run by -m: a model may be called math.py
     sys.path += [str(Path(__file__).parent), sys.path.pop(0)]
 
 from harness.__main__ import run_command

@@ -5,7 +5,7 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-if Path(sys.path[0]) != Path(__file__).parents[1]:  # a model in the current directory may be named math.py
+if __name__ == "__main__" and Path(sys.path[0]) != Path(__file__).parents[1]:  # a model here may be named math.py
     sys.path += [str(Path(__file__).parents[1]), sys.path.pop(0)]
 
 import click
