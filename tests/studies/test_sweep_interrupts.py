@@ -24,7 +24,8 @@ from harness.studies.sweep.runner import SweepSpec  # noqa: E402
 from harness.studies.sweep.sampling import SweepPoints, parse_axis  # noqa: E402
 from harness.studies.sweep.study import WORKER_DIED, Sweep  # noqa: E402
 
-LONG = ("sweep", "stickslip", "--vary", "mu_d=0.3:0.8:100", "--measure", "peak_speed", "--workers", "1")
+SWEEP = ("sweep", "stickslip", "--vary", "mu_d=0.3:0.8:100", "--measure", "peak_speed")
+LONG = (*SWEEP, "--workers", "1")
 NOTE = """
 import sys
 def note(event, arguments):
@@ -155,7 +156,7 @@ def test_a_cluster_with_a_killed_worker_finishes(harness, undisturbed, tmp_path)
             thread = threading.Thread(target=end)
             thread.start()
             try:
-                done = harness(*LONG, "--scheduler", cluster.scheduler_address)
+                done = harness(*SWEEP, "--scheduler", cluster.scheduler_address)
             finally:
                 worker.kill()
                 thread.join()
