@@ -10,16 +10,14 @@ import shlex
 import sys
 from collections.abc import Iterable, Mapping
 from contextvars import ContextVar
-from dataclasses import dataclass, field
 from datetime import datetime
 from functools import cache
 from hashlib import sha256
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 from ..errors import HarnessError, SceneError
-from ..scenes.schema import Constraint, field_names, parse_table
 from .files import to_json
 
 FILE = "provenance.json"
@@ -34,54 +32,8 @@ IMPLIED_SCENE_KEYS = {
 }  # keys of a scene that follow from its parameters or input files
 PACKAGES = (HARNESS, "fmpy", "numpy", "scipy")
 
-MAX_DEPTH = 6  # of tables and lists within a scene
-
 Parameters = Mapping[str, tuple[object, str]]  # effective value and unit by name
 CALL: ContextVar[dict[str, Any] | None] = ContextVar("call", default=None)  # the command that is running, as data
-
-
-def is_shallow(value: object, depth: int = MAX_DEPTH) -> bool:
-    """Return whether tables and lists are nested in at most `depth` levels."""
-    items = value.values() if isinstance(value, dict) else value if isinstance(value, list) else None
-    return items is None or (depth > 0 and all(is_shallow(item, depth - 1) for item in items))
-
-
-STRING = Constraint(lambda value: isinstance(value, str), "a text")
-DIGEST = Constraint(lambda value: isinstance(value, str) and len(value) == 64, "a SHA-256 digest")
-VALUE = Constraint(lambda value: is_shallow(value, 3) and not isinstance(value, dict), "a value")
-SCENE = Constraint(lambda value: isinstance(value, dict | None) and is_shallow(value), "a table of settings, or null")
-
-
-@dataclass(frozen=True)
-class StoredParameter:
-    """Effective value and unit of a parameter."""
-
-    value: Annotated[Any, VALUE]
-    unit: Annotated[str, STRING]
-
-
-@dataclass(frozen=True)
-class StoredCall:
-    """Name of the command that made a result, and the values of its arguments and options."""
-
-    name: Annotated[str, STRING]
-    options: dict[str, Annotated[Any, VALUE]]
-
-
-@dataclass(frozen=True)
-class ProvenanceKeys:
-    """Keys of a provenance file; those with a default are missing in files of earlier versions."""
-
-    command: Annotated[str, STRING]
-    date: Annotated[str, STRING]
-    files: dict[str, Annotated[str, DIGEST]]
-    parameters: dict[str, StoredParameter]
-    scene: Annotated[Any, SCENE]
-    source: Annotated[str, STRING] = ""
-    platform: Annotated[str, STRING] = ""
-    versions: dict[str, Annotated[str, STRING]] = field(default_factory=dict)
-    replaced: Annotated[str, STRING] = ""
-    call: StoredCall | None = None
 
 
 def write_provenance(
@@ -179,9 +131,9 @@ def read_provenance(file: Path) -> dict[str, Any]:
         raise SceneError("it is not JSON") from None
     if not isinstance(content, dict):
         raise SceneError("it is not a table")
-    content = {name: value for name, value in content.items() if name in field_names(ProvenanceKeys)}
-    parse_table(content, ProvenanceKeys)
-    return content
+    from .provenance_schema import select_valid_keys  # only where a file is read: a new result needs no validation
+
+    return select_valid_keys(content)
 
 
 def note_replaced_result(old_folder: Path, new_folder: Path, file: str) -> None:
@@ -190,8 +142,9 @@ def note_replaced_result(old_folder: Path, new_folder: Path, file: str) -> None:
     The note lists the settings in which they differ. If there are none, the note of a scene states whether the first
     result file is identical. There is no note about an old file that is not valid.
     """
-    before, after = load_provenance(old_folder), load_provenance(new_folder)
-    if not before or not after:
+    before = load_provenance(old_folder)
+    after = load_provenance(new_folder) if before else {}
+    if not after:
         return
     differences = [
         format_parameter(name, **each)
