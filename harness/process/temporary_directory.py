@@ -63,7 +63,7 @@ def temporary_directory(prefix: str = "fmu-") -> Iterator[Path]:
 @cache
 def remove_abandoned_directories(root: Path) -> None:
     """Remove the temporary directories of this user's processes that were killed, once per process."""
-    if sys.platform == "win32":  # without locks, they cannot be told from those of running processes
+    if sys.platform == "win32":  # without locks, they cannot be distinguished from those of running processes
         return
     with suppress(OSError), os.scandir(root) as entries:
         for entry in entries:
