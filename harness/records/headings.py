@@ -38,10 +38,10 @@ def split_heading(heading: str) -> tuple[str, str | None]:
     bracketed = BRACKETS.search(name)  # followed by a run, as in x (mm) Run #1
     if bracketed and is_unit(bracketed[1]):
         around = name[: bracketed.start()].rstrip(), name[bracketed.end() :].lstrip()
-        return " ".join(filter(None, around)), bracketed[1]
+        return " ".join(filter(None, around)), bracketed[1].strip()
     words = WORD_BOUNDARY.split(name)
     for i in range(max(len(words) - MAX_UNIT_WORDS, 1), len(words)):
-        stem, suffix = " ".join(words[:i]).strip(), "/".join(words[i:])
+        stem, suffix = " ".join(words[:i]).strip(), "/".join(words[i:]).strip()
         if (
             time_unit_size(suffix)
             if TIME_NAME.search(stem)

@@ -28,6 +28,8 @@ def test_the_time_for_a_heading_is_proportional_to_its_length(text):
 @example("x (mm))")
 @example("x [(mm)")
 @example(",x mm")
+@example("( in )x")
+@example("x _\tmm")
 def test_name_and_unit_are_parts_of_the_heading(heading):
     name, unit = split_heading(heading)
     for part in (name, unit or ""):
