@@ -38,8 +38,7 @@ def compile_cached(name, *words, sanitizers=""):
         words = [f"-fsanitize={sanitizers}", "-fsanitize-undefined-trap-on-error", "-O0", *words]
 
     def make(folder):
-        # callbacks have the parameters that the standard requires
-        command = [compiler(), *STRICT, "-Wno-unused-parameter", "-g1", *map(str, words), "-o", str(folder / "made")]
+        command = [compiler(), *STRICT, "-g1", *map(str, words), "-o", str(folder / "made")]
         subprocess.run(command, check=True)
 
     return build_cache.cached_folder(f"{name} {sanitizers}".strip(), make) / "made"
