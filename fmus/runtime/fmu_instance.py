@@ -81,12 +81,13 @@ class FmuInstance(SavedStateAccess):
             run, model = self.run, self.model
             outputs_were_read = run.outputs_current
             status = call_sequence.do_step(run, model, current_time, step_size)
-            if status == BAD_VALUE and not any(self.invalid_values.values()):
-                status = self.step_without_invalid_values(current_time, step_size)
             if status != OK:
-                refuses = run.phase >= RUNNING and call_sequence.is_refusal(run, status)
-                report = self.refuse_step if refuses else self.fail_with_status
-                return report(status, current_time, step_size)
+                if status == BAD_VALUE and not any(self.invalid_values.values()):
+                    status = self.step_without_invalid_values(current_time, step_size)
+                if status != OK:
+                    refuses = run.phase >= RUNNING and call_sequence.is_refusal(run, status)
+                    report = self.refuse_step if refuses else self.fail_with_status
+                    return report(status, current_time, step_size)
             if outputs_were_read:  # the importer reads outputs at every step: computing them here saves calls
                 call_sequence.set_outputs(run, model)
             return True

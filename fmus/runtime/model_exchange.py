@@ -157,7 +157,10 @@ def update_rates(model):
         for i in state_indices:
             exchange.rates[i] = 0.0
     else:
-        f = model.rates(solver.t, y, solver.modes)
+        modes = solver.modes
+        if model.has_other_laws:
+            modes = solver.step.force_modes(modes)
+        f = model.rates(solver.t, y, modes)
         for i in state_indices:
             exchange.rates[i] = f[i]
     if model.has_driver:

@@ -211,6 +211,12 @@ class InternalStep:
                 break
         return status
 
+    def force_modes(self, modes: ContactVector) -> ContactVector:
+        """Return the modes that enter the friction force: zeros under a law without stick and slip."""
+        if not self.is_hybrid:
+            modes = STUCK * modes
+        return modes
+
     def update_law_modes(self, model):
         """Update the modes at t1 under a law without stick and slip, where a step ends without regard to them."""
         self.modes1 = model.law_modes(self.t1, self.y1)
@@ -302,6 +308,8 @@ class InternalStep:
     def advance_with_method(self, model):
         """Compute a step of the method that meets the tolerance; end it at a change of mode."""
         t, y, f, modes = self.t0, self.y0, self.f0, self.modes0
+        if model.has_other_laws and not self.is_hybrid:
+            modes = STUCK * modes  # as force_modes, without a call
         tolerance = self.tolerance
         # h_min: fabs(t) would take three times as long in every step
         h_min = 16.0 * EPSILON * (t if t > 0.0 else -t)
@@ -403,7 +411,10 @@ class InternalStep:
         if h <= step_limits.SHORTEST_STEP * self.h_max:
             return True
         y_end = self.state_at(model, end)
-        y2, f2, e = method.propose(model, self.modes0, self.t0, self.y0, self.f0, h)  # noqa: RUF059  named like y2
+        modes = self.modes0
+        if model.has_other_laws:
+            modes = self.force_modes(modes)
+        y2, f2, e = method.propose(model, modes, self.t0, self.y0, self.f0, h)  # noqa: RUF059  named like y2
         self.n_rhs += method.stages
         scale = magnitude(self.y0)
         scale = elementwise_max(method.error_scale_floor, scale)
@@ -476,7 +487,10 @@ class InternalStep:
         if model.rests_when_stuck and self.is_hybrid and all_of(self.modes1 == STUCK):
             self.f1 = 0.0
         else:
-            self.f1 = model.rates(self.t1, self.y1, self.modes1)
+            modes = self.modes1
+            if model.has_other_laws:
+                modes = self.force_modes(modes)
+            self.f1 = model.rates(self.t1, self.y1, modes)
             self.n_rhs += 1
             if model.has_dry_friction and not model.is_coupled:
                 for i in contact_indices:

@@ -110,9 +110,9 @@ class CodegenContext:
         return self.an.contacts[0] if self.an.waits else None
 
     def emit_sign_mode(self, s: ExpressionPrinter, c: Contact, targets: Sequence[Operand]) -> None:
-        """Emit the sign of the slip as mode where the law uses it, or mode is 0."""
+        """Emit the sign of the slip as mode where the law uses it and mode is 0."""
         if len(c.laws) > 1 and any(depends_on(e, (c.mode,)) for e in targets):
-            with s.block(f"if {c.mode.name} == 0 or self.friction != HYBRID:"):
+            with s.block(f"if {c.mode.name} == 0:"):
                 s.emit(f"{c.mode.name} = sign({s.text(c.slip)})")
 
     def return_lines(self, s: ExpressionPrinter, targets: Sequence[Operand]) -> list[str]:

@@ -27,8 +27,11 @@ def law_modes_method(f: CodegenContext) -> list[str]:
 def observe_method(f: CodegenContext) -> str:
     """Return the source of the output method."""
     an, s = f.an, f.printer()
-    for mode in an.modes:  # before a law without stick and slip replaces it
+    for mode in an.modes:
         s.emit(f"self.{mode.name} = {s.text(mode)}")
+    if any(len(c.laws) > 1 for c in an.contacts):
+        with s.block("if self.friction != HYBRID:"):  # as InternalStep.force_modes
+            s.emit(" = ".join([*(c.mode.name for c in an.contacts if len(c.laws) > 1), "0"]))
     f.emit_driver(s, [*an.drivers, *an.ramps])
     s.count_uses(*an.outputs, *an.outputs)
     s.count_uses(*an.load.values(), *an.load.values(), *(c.slide for c in an.contacts))

@@ -25,8 +25,7 @@ def rates_method(f: CodegenContext) -> str:
         f.emit_driver(s, [*targets, an.load[c]])
         s.count_uses(*targets, an.load[c], c.slide, c.slide, an.holding_limit[c])
         sliding = s.text(Term("*", c.mode, c.slide))
-        slides = f"{c.mode.name} != 0 and self.friction == HYBRID"
-        s.emit(f"{c.name} = {sliding} if {slides} else {threshold_call(f, s, c)}")
+        s.emit(f"{c.name} = {sliding} if {c.mode.name} != 0 else {threshold_call(f, s, c)}")
         s.bound_names[c] = c.name
         return method_source("rates", f.arguments, emit_return(s, targets))
     elif an.contacts:
@@ -55,8 +54,7 @@ def jacobian_method(f: CodegenContext) -> str:
         )
     targets = [an.derivative_while_sliding(law, by) for law in f.rate_expressions for by in directions]
     if THRESHOLD in c.laws:
-        is_held = f"({c.mode.name} == 0 or self.friction != HYBRID) and fabs({s.text(c.slip)}) < {s.text(c.eps)}"
-        with s.block(f"if {is_held}:"):
+        with s.block(f"if {c.mode.name} == 0 and fabs({s.text(c.slip)}) < {s.text(c.eps)}:"):
             inner = f.printer(s.depth)
             stuck = [an.derivative_while_stuck(law, by) for law in f.rate_expressions for by in directions]
             f.emit_driver(inner, [an.load[c], *stuck])

@@ -62,12 +62,12 @@ def emit_friction_force(f: CodegenContext, s: ExpressionPrinter, c: Contact) -> 
     load, mode = f.an.load[c], c.mode.name
     stuck_force = s.local_variable(load) if isinstance(load, Term) else s.text(load)
     if THRESHOLD in c.laws:
-        with s.block("if self.friction != HYBRID:"):
-            s.emit(f"{c.name} = {threshold_call(f, s, c)}")
-        with s.block(f"elif {mode} != 0:"):
+        with s.block(f"if {mode} != 0:"):
             s.emit(f"{c.name} = {s.text(Term('*', c.mode, c.slide))}")
-        with s.block("else:"):
+        with s.block("elif self.friction == HYBRID:"):
             s.emit(f"{c.name} = {stuck_force}")
+        with s.block("else:"):
+            s.emit(f"{c.name} = {threshold_call(f, s, c)}")
     else:
         with s.block(f"if {mode} == 0{' and self.friction == HYBRID' if SIGN in c.laws else ''}:"):
             s.emit(f"{c.name} = {stuck_force}")

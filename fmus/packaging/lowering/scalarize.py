@@ -35,6 +35,7 @@ class Scalarizer(ConstantFolder):
         super().__init__(spec, declared.constants)
         self.declared, self.path, self.has_vectors = declared, path, vectors
         self.vector_kinds: dict[str, str] = {}  # vector names -> what they run over
+        self.allocated_names: set[str] = set()  # of vectors that are filled by component
         self.loop_indices = dict(index or {})  # loop variables -> current value
         self.scalar_names: set[str] = set()  # names of scalars
         self.component_owner: dict[str, str] = {}  # name of a component -> its vector
@@ -312,6 +313,10 @@ class Scalarizer(ConstantFolder):
         if len(left) == len(right) and all(
             isinstance(one, ast.Call) and function_name(one) in ALLOCATORS for one in right
         ):
+            for one in left:
+                if isinstance(one, ast.Name) and one.id in self.vector_kinds and one.id not in self.allocated_names:
+                    raise self.error(one, f"would keep its values; write {one.id} = 0 * {one.id}")
+                self.allocated_names.add(ast.unparse(one))
             self.record_kinds(left, [self.vector_kind(one) for one in right])
             return []
         if (
