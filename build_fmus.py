@@ -73,6 +73,11 @@ FMUS = (
     type=click.Path(file_okay=False, path_type=Path),
     help="Write one zip file with the FMUs of every kind, the live page, references, licences and checksums.",
 )
+@click.option(
+    "--stages",
+    type=click.Path(file_okay=False, path_type=Path),
+    help="Write the texts of every stage from the equations to C into this folder, instead of FMUs.",
+)
 @click.version_option(__version__, prog_name="friction-fmus", message="%(prog)s %(version)s")
 def main(
     models: tuple[str, ...],
@@ -84,6 +89,7 @@ def main(
     platforms: tuple[str, ...],
     out: Path | None,
     release: Path | None,
+    stages: Path | None,
 ) -> None:
     """Build an FMU for each model NAME or model file FILE.py; without arguments, for all models of the project.
 
@@ -101,10 +107,14 @@ def main(
     if web and (compiled or platforms or fmi == "3"):
         raise CommandLineError("--web writes a page, not FMUs: remove --native, --platform and --fmi 3.")
     if release is not None:
-        if models or compiled or web or methods or laws or platforms or out or fmi == "3":
+        if models or compiled or web or methods or laws or platforms or out or stages or fmi == "3":
             raise CommandLineError("--release builds everything: remove the other options and models.")
         print_summary(release_archive(release))
         return
+    if stages is not None and (compiled or web or platforms or out or fmi == "3"):
+        raise CommandLineError(
+            "--stages writes texts, not FMUs: remove --native, --web, --platform, --out and --fmi 3."
+        )
     compiled, kind = compiled or fmi == "3", "native/fmi3" if fmi == "3" else "native" if compiled else ""
     try:
         sources = {model: find_model(model) for model in models or model_names()}
@@ -120,6 +130,15 @@ def main(
         with show_progress("writing the page"):
             path = build_page(list(sources.values()), web_folder, methods, laws)
         print_summary(path)
+        return
+    if stages is not None:
+        from fmus.packaging.stages import write_stages  # imported late, as the C compiler is
+
+        for source in sources.values():
+            try:
+                click.echo(write_stages(source, stages, methods, laws))
+            except BuildError as error:
+                raise click.ClickException(str(error)) from error
         return
     for model, source in sources.items():
         folder = out or (FMUS if model in model_names() else source.path.parent) / kind

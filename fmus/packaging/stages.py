@@ -1,0 +1,91 @@
+"""Writes the texts of a model at every stage of code generation, for readers who want to follow an equation.
+
+1-declared.py       the model file
+2-expressions.txt   the expressions that its equations build
+3-analysis.txt      what the structural analysis derives from them
+4-model.py          the generated class of scalars
+5-lowered/          this class and the numerics, lowered to the states of the model
+6-c/                the same as C, with the FMI functions
+"""
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from .equations.algebra import differentiate
+from .equations.expression_printer import ExpressionPrinter
+from .equations.expressions import Operand, Term
+from .equations.model_analysis import TIME, ModelAnalysis
+from .equations.model_declaration import Output, Variable
+from .equations.model_file import ModelFile
+from .lowering import lowered_files, lowered_model, select_features
+from .native.sources import collect_sources
+
+
+def write_stages(source: ModelFile, folder: Path, methods: Sequence[str] = (), laws: Sequence[str] = ()) -> Path:
+    """Write the texts of a model to `folder/<model>`, and return that path.
+
+    Parameters
+    ----------
+    source
+        Model file.
+    folder
+        Folder for all models; it is created if it does not exist.
+    methods, laws
+        Labels of the methods and friction laws to include; none: all.
+    """
+    features = select_features(source, methods, laws)
+    texts = {
+        "1-declared.py": source.source,
+        "2-expressions.txt": "".join(f"{line}\n" for line in expression_lines(source.analysis)),
+        "3-analysis.txt": "".join(f"{line}\n" for line in analysis_lines(source.analysis)),
+        "4-model.py": source.generated_source,
+    }
+    texts |= {f"5-lowered/{path}": text for path, text in lowered_files(source, features).items()}
+    texts |= {f"6-c/{name}": text for name, text in collect_sources(lowered_model(source, features), "2").items()}
+    for name, text in texts.items():
+        path = folder / source.name / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text, encoding="utf-8")
+    return folder / source.name
+
+
+def expression_lines(an: ModelAnalysis) -> Iterator[str]:
+    """Yield the expressions of outputs and friction forces, with operators in front of their operands."""
+    for e in an.outputs:
+        yield f"{e.name} = {prefix_form(e.expression)}"
+    for c in an.contacts:
+        parts = {"slip": c.slip, "slide": c.slide, "hold": c.hold}
+        for label, part in parts.items():
+            if part is not None:
+                yield f"{c.name}.{label} = {prefix_form(part)}"
+
+
+def prefix_form(e: Operand) -> str:
+    """Return an expression with each operator in front of its operands; variables stand for their expressions."""
+    if isinstance(e, Term):
+        return f"{e.op}({', '.join(map(prefix_form, e.args))})"
+    return e.name if isinstance(e, Variable) else repr(e)
+
+
+def analysis_lines(an: ModelAnalysis) -> Iterator[str]:
+    """Yield the roles of the variables and the derived expressions."""
+    names = {e: e.name for e in (TIME, *an.declared) if not isinstance(e, Output)}
+    text = ExpressionPrinter(names, (), (), 0).text
+    yield f"states: {', '.join(e.name for e in an.states)}"
+    for state, rate in an.rate.items():
+        yield f"d{state.name}/dt = {text(rate)}"
+    for contact in an.contacts:
+        yield f"{contact.name}: slip velocity {text(contact.slip)}, sliding force {text(contact.slide)}"
+        if contact in an.independent_contacts:
+            yield f"{contact.name}: load while stuck {text(an.load[contact])}"
+        yield f"{contact.name}: holding limit {text(an.holding_limit[contact])}"
+    for e in an.rate_outputs.values():
+        for by in (TIME, *an.states):
+            derivative = differentiate(e.expression, {by: 1.0})
+            yield f"d{e.name}/d{by.name} at constant friction force = {text(derivative)}"
+    if an.closed_form:
+        mass, damping, stiffness, speed = map(text, an.closed_form)
+        yield f"closed form: mass {mass}, damping {damping}, stiffness {stiffness}, speed of the resting point {speed}"
+    else:
+        yield "closed form: none"
+    yield f"methods: {', '.join(an.methods)}; friction laws: {', '.join(an.laws)}"
