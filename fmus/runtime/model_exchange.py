@@ -270,6 +270,19 @@ def handle_event(run, model):
     return OK if sum_of(magnitude(solver.y)) < OVERFLOW_LIMIT else DIVERGED
 
 
+def complete_step(run, model):
+    """Check the current point, which the importer's solver has accepted.  Returns a status.
+
+    Trial points without finite results are none of its solution; an accepted one is a run that diverges.
+    """
+    status = prepare(run, model)
+    if status != OK:
+        return status
+    if not sum_of(magnitude(model.solver.y)) < OVERFLOW_LIMIT:
+        return DIVERGED
+    return call_sequence.update_outputs(run, model)
+
+
 def has_step_event(model):
     """Return whether a mode differs from that of a law without stick and slip, after a step of the importer's solver.
 

@@ -77,6 +77,14 @@ def sled(mu_d, mu_s, **more):
     )
 
 
+def test_the_end_of_a_slip_has_the_steepness_of_the_closed_form():
+    """v = u (1 - cos(w s)) + d/w sin(w s) ends with the slope -d, where d = (hold - slide) / m."""
+    solution = solve(sled(0.5, 0.55))
+    u, w, d = 0.1, 10.0, 0.5
+    (_, rest, *_) = (t for t, _ in solution.events)
+    assert solution.steepness[rest] == pytest.approx(d / (u + np.hypot(u, d / w)), rel=1e-3)
+
+
 def test_a_slip_that_only_touches_zero_is_no_event():
     """With equal static and sliding friction the slip is v (1 - cos(w t)) and touches zero once in each period."""
     solution = solve(sled(0.3, 0.3, stop=3.0))

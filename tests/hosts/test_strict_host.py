@@ -1,4 +1,4 @@
-"""Exit status of a C host that ends runs like fmusim: by an error, or without one if a step answers Discard.
+"""Exit status of a C host that ends runs like fmusim: by an error, or without one if a step returns Discard.
 
 fmusim and the FMU Compliance Checker themselves are not available from package indices.
 """
@@ -15,6 +15,7 @@ from harness.running import c_host
 
 HOST = Path(__file__).parents[1] / "support" / "strict_host.c"
 STOP = 1.0
+STATES = 3  # of the sled in model exchange: position, speed, position of the driver
 
 pytestmark = pytest.mark.skipif(c_host.COMPILER is None, reason="there is no C compiler on this machine: install gcc")
 
@@ -37,8 +38,8 @@ FAILURES = {
 }
 
 
-def run(fmu, values=None, changes=None, step=(), **environment):
-    """Run the sled in the host; return the process."""
+def run(fmu, values=None, changes=None, step=(), exchange=(), **environment):
+    """Run the sled in the host, or let the host integrate it; return the process."""
     library = c_host.load_library(fmu)
     references = library.references | {"?": 10**6}
 
@@ -46,7 +47,7 @@ def run(fmu, values=None, changes=None, step=(), **environment):
         return [f"{references[name]}={value!r}" for name, value in settings.items()]
 
     program = c_host.compile_source(HOST, "strict_host", (), ("-ldl",))
-    command = [program, library.file, library.guid, library.resources, STOP, *words(values or {})]
+    command = [program, library.file, library.guid, library.resources, STOP, *exchange, *words(values or {})]
     command += ["during", *words(changes)] if changes else []
     command += ["step", *map(repr, step)] if step else []
     return subprocess.run(
@@ -66,9 +67,30 @@ def test_every_failure_of_a_native_fmu_is_an_error(failure):
     assert len(process.stderr.splitlines()) == 1
 
 
+@pytest.mark.parametrize("steps", ["euler", "completing"])
+@pytest.mark.parametrize("failure", [key for key, (_, _, step) in FAILURES.items() if not step])
+def test_every_failure_in_model_exchange_is_an_error(failure, steps):
+    process = run(native_fmus.build_native_fmus() / "stickslip.fmu", *FAILURES[failure], exchange=(steps, STATES))
+    assert process.returncode == 1, process.stdout
+    assert process.stdout.endswith(" 3\n")
+    assert len(process.stderr.splitlines()) == 1
+
+
+@pytest.mark.parametrize(("steps", "call"), [("euler", "Terminate"), ("completing", "CompletedIntegratorStep")])
+def test_a_solver_that_diverges_is_an_error_at_the_end_at_the_latest(steps, call):
+    """Trial points without finite results are no failure, so the FMU can refuse accepted ones only."""
+    fmu = native_fmus.build_native_fmus() / "stickslip.fmu"
+    process = run(fmu, {"k": 1e60, "x0": 1.0}, exchange=(steps, STATES))
+    assert (process.returncode, process.stdout) == (1, f"fmi2{call} 3\n")
+    assert "the solution diverges" in process.stderr
+
+
 def test_a_run_without_failure_ends_well(fmus):
-    for folder in fmus, native_fmus.build_native_fmus():
-        process = run(folder / "stickslip.fmu", {"m": 10.0}, {"F_ext": 5.0})
+    native = native_fmus.build_native_fmus()
+    ends = [run(fmu / "stickslip.fmu", {"m": 10.0}, {"F_ext": 5.0}) for fmu in (fmus, native)]
+    for steps in "euler", "completing":
+        ends.append(run(native / "stickslip.fmu", {"m": 10.0}, {"F_ext": 5.0}, exchange=(steps, STATES)))
+    for process in ends:
         assert (process.returncode, process.stdout, process.stderr) == (0, "", "")
 
 

@@ -131,6 +131,7 @@ class Solution:
 
     first_modes: tuple[int, ...] = ()
     events: list = field(default_factory=list)
+    steepness: dict = field(default_factory=dict)  # 1/s, by time of the event: slope of its guard relative to its size
     decisions: list[Decision] = field(default_factory=list)
     pieces: list[Series] = field(default_factory=list)
     samples: dict = field(default_factory=dict)
@@ -319,8 +320,14 @@ class _Run:
             at_event = True
             if any(a != b and not self.is_free(i) for i, (a, b) in enumerate(zip(before, self.modes, strict=True))):
                 self.solution.events.append((self.t, tuple(self.modes)))
+                self.solution.steepness[self.t] = min(self.steepness(g, end) for g in due)
                 if len(self.solution.events) > MAX_EVENTS:
                     raise UnsolvableError(f"more than {MAX_EVENTS} events until {self.t}")
+
+    def steepness(self, g, end):
+        """Return the slope of a guard at its zero, relative to its largest value so far."""
+        scale = self.largest_slip[g.contact] if g.kind == "slip" else g.scale
+        return abs(g.slope(end)) * end**g.power / scale
 
     def is_free(self, i):
         """Return whether a contact has no friction at present."""

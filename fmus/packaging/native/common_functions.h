@@ -22,8 +22,12 @@ Status FMI(SetDebugLogging)(Handle instance, Boolean loggingOn, size_t n, const 
 Status FMI(Terminate)(Handle instance)
 {
     REQUIRE_PHASE(instance, IN_SIMULATION);
+    const struct RunState *run = &self->state.run;
+    /* An importer that completes no steps learns only here that its solution diverged. */
+    bool is_open = is_model_exchange(&self->state) && !run->has_failed && !run->has_pending_changes;
+    Status status = is_open ? complete_step(self) : STATUS_OK;
     self->state.run.phase = TERMINATED;
-    return STATUS_OK;
+    return status;
 }
 
 Status FMI(Reset)(Handle instance)
@@ -51,9 +55,10 @@ Status FMI(CompletedIntegratorStep)(Handle instance, Boolean noSetFMUStatePriorT
     REQUIRE_ADDRESS(terminateSimulation);
     (void)noSetFMUStatePriorToCurrentPoint;
     bool fault = false;
-    *enterEventMode = model_exchange_has_step_event(&self->state.model, &fault);
-    *terminateSimulation = false;
-    return STATUS_OK;
+    *enterEventMode = *terminateSimulation = false;
+    Status status = complete_step(self);
+    if (status == STATUS_OK) *enterEventMode = model_exchange_has_step_event(&self->state.model, &fault);
+    return status;
 }
 
 Status FMI(SetTime)(Handle instance, double time)

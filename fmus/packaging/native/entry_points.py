@@ -14,7 +14,7 @@ ENTRY_POINTS = {  # module of the runtime -> its functions; callees come before 
     "model_exchange": (
         *("enable", "update_nominals", "begin", "prepare", "set_time", "set_continuous_states", "update_states"),
         *("update_rates", "update_input_rates", "update_indicators", "update_variables", "has_step_event"),
-        "handle_event",
+        *("complete_step", "handle_event"),
     ),
     "early_return": ("begin_step", "next_internal_step", "complete_event"),  # for FMI 3.0
 }

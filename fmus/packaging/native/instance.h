@@ -364,6 +364,15 @@ static Status handle_event(Instance *self)
     return finish_call(self, status, fault, NAN, NAN);
 }
 
+/* Check a point that the importer's solver has accepted. */
+static Status complete_step(Instance *self)
+{
+    State *state = &self->state;
+    bool fault = false;
+    int64_t status = model_exchange_complete_step(&state->run, &state->model, &fault);
+    return finish_call(self, status, fault, NAN, NAN);
+}
+
 /* ---- directional derivatives */
 
 static double *tangent_value(struct Tangent *tangent, uint32_t reference)
