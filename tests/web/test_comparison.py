@@ -71,3 +71,17 @@ def test_another_model_keeps_values_of_the_same_names(page):
     assert page.run("app.session.runs.comparison.setting.values.k") == 500
     assert page.run("app.session.runs.comparison.setting.values.x_m") == 0.005
     assert page.run("app.session.runs.comparison.columns.v.some((v, i) => i > 99 && v > 0 && v < 0.01)")  # it creeps
+
+
+def test_the_second_run_can_have_the_default_where_the_first_has_another_value(page):
+    page.open(".model=coulomb&friction=2&solver.method=2&solver.rtol=0.001&.stop=2&.compare=coulomb")
+    assert page.run("app.session.runs.comparison.setting.values.friction") == 2
+    page.choose("comparison-friction", 1)
+    page.choose("comparison-rtol", 0)
+    values = page.run("app.session.runs.comparison.setting.values")
+    assert (values["friction"], values["solver.rtol"]) == (1, 0)
+    shown = "['friction', 'rtol'].map(id => document.getElementById(`comparison-${id}`).value)"
+    assert page.run(shown) == ["1", "0"]
+    page.choose("comparison-method", 1)
+    assert page.run("app.session.runs.comparison.setting.values['solver.method']") == 1
+    assert page.run("app.session.runs.main.setting.values.friction") == 2

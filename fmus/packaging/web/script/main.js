@@ -4,7 +4,7 @@ import { makeElement, typicalSizes } from "./controls.js";
 import { Session } from "./session.js";
 import { showLegend } from "./legend.js";
 import { Diagrams } from "./diagrams.js";
-import { presetState, initialComparison, addChange, chooseItem, replaceValue } from "./overrides.js";
+import { presetState, initialComparison, addChange, chooseForComparison, chooseItem, replaceValue } from "./overrides.js";
 import { settingLines } from "./setting_lines.js";
 import { Form } from "./form.js";
 import { DragController } from "./drag.js";
@@ -174,7 +174,7 @@ async function setComparison({ model, ...values }) {
   else if (model) {
     await session.compile(model);
     state.comparison = { model, values: initialComparison(modelInfo, state, model) };
-  } else for (const [name, value] of Object.entries(values)) chooseItem(session.models.get(state.comparison.model), state.comparison.values, name, value);
+  } else for (const [name, value] of Object.entries(values)) chooseForComparison(session.models, state, name, value);
   restart();
 }
 
