@@ -116,3 +116,114 @@ def test_the_value_of_a_force_that_jumps_is_never_between_its_values(page, name)
     assert sizes
     largest = page.run(f"app.session.runs.main.largestMagnitude({friction!r})")
     assert all(size > 0.9 * largest for size in sizes)
+
+
+BANDS = "app.session.holdingBands.find(app.state(), app.session.models.get(app.state().model).bodies[0])"
+
+
+def test_the_band_in_which_friction_holds_follows_from_forces_and_stiffness(page):
+    d = {name: meaning.start for name, meaning in declared("coulomb").items()}
+    page.open(".model=coulomb&F_ext=2&friction=2&.change=1 F_ext 0&.change=2 f 0.8")
+    forces = [(2, d["f"]), (0, d["f"]), (0, 0.8)]
+    expected = [[(push - hold) / d["k"], (push + hold) / d["k"]] for push, hold in forces]
+    bands = page.run(BANDS)
+    assert [band["t"] for band in bands] == [0, 1, 2]
+    for band, edges in zip(bands, expected, strict=True):
+        assert [band["low"], band["high"]] == pytest.approx(edges, rel=1e-9)
+    d = {name: meaning.start for name, meaning in declared("stickslip").items()}
+    edge = d["mu_s"] * d["m"] * d["g"] / d["k"]
+    page.open(".model=stickslip")
+    (band,) = page.run(BANDS)
+    assert [band["low"], band["high"]] == pytest.approx([-edge, edge], rel=1e-9)
+    drawn = page.run("app.plots.get('x').panel.content.curves.slice(0, 2).map(({ y }) => y.at(-1))")
+    driver = page.run("app.session.runs.main.columns.x_driver.at(-1)")
+    assert drawn == pytest.approx([driver - edge, driver + edge])  # the band moves with the driver
+    page.open(".model=smd")
+    assert page.run(BANDS) is None
+
+
+@pytest.mark.parametrize("name", ["coulomb", "pendulum"])
+def test_a_body_that_starts_inside_the_band_stays_and_one_outside_moves(page, name):
+    page.open(f".model={name}")
+    start, x = page.run(
+        "(({ start, position }) => [start, position])(app.session.models.get(app.state().model).bodies[0])"
+    )
+    (band,) = page.run(BANDS)
+    moved = f"app.session.runs.main.columns.{x}.some((value, row, all) => value !== all[0])"
+    for edge in (band["low"], band["high"]):
+        for factor, moves in ((0.999, False), (1.001, True)):
+            page.open(f".model={name}&{start}={factor * edge!r}")
+            assert page.run(moved) == moves
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_the_heat_is_the_work_of_friction_and_damper(page, name):
+    """By another route than on the page: the integral of the force over the slip."""
+    push = "T_ext 0.002" if name == "pendulum" else "F_ext 1.5"
+    stiffen = f"&.change=1 k {1.3 * declared(name)['k'].start}" if "k" in declared(name) else ""
+    page.open(f".model={name}&.change=0.5 {push}{stiffen}")
+    body = page.run("app.session.models.get(app.state().model).bodies[0]")
+    force = body.get("friction") or "F_damper"
+    t, force, speed = page.run(
+        f"['', {force!r}, {body['speed']!r}].map(name => app.session.runs.main[name ? 'columns' : 'time'][name] ??"
+        " app.session.runs.main.time)"
+    )
+    power = [abs(f * v) for f, v in zip(force, speed, strict=True)]  # friction opposes the slip
+    work = sum((b - a) * (p + q) / 2 for a, b, p, q in zip(t, t[1:], power, power[1:], strict=False))
+    curves = {curve["legend"]: curve["y"] for curve in page.run("app.plots.get('energy').panel.content.curves")}
+    assert curves["heat"][-1] == pytest.approx(work, rel=2e-3)
+    page.open(f".model={name}")
+    curves = {curve["legend"]: curve["y"] for curve in page.run("app.plots.get('energy').panel.content.curves")}
+    total = curves["energy and heat together"]
+    assert (max(total) - min(total) < 1e-12 * total[0]) == ("driver" not in body)
+
+
+RANGES = (
+    "['x', 'v', '.phase'].map(key => app.plots.get(key).plot.content).map(({ x, y }) => [x.low, x.high, y.low, y.high])"
+)
+
+
+def test_a_rectangle_enlarges_a_diagram_and_the_times_of_all_and_a_double_click_shows_all(page):
+    page.browser.size(1280)
+    page.open(".model=coulomb", anew=True)
+    page.run("document.getElementById('panels').scrollIntoView({ behavior: 'instant' })")
+    whole = page.run(RANGES)
+    left, top = page.run("(b => [b.left, b.top])(app.plots.get('x').plot.host.getBoundingClientRect())")
+    start, end = (page.run(f"app.plots.get('x').plot.valuesAt({x}, {y})") for x, y in ((150, 60), (250, 90)))
+    page.browser.mouse("Pressed", left + 150, top + 60)
+    page.browser.mouse("Moved", left + 200, top + 80)
+    page.browser.mouse("Moved", left + 250, top + 90)
+    page.browser.mouse("Released", left + 250, top + 90, buttons=0)
+    x, v, phase = page.run(RANGES)
+    assert x == pytest.approx([start["x"], end["x"], end["y"], start["y"]], abs=1e-3)
+    assert v == [*x[:2], *whole[1][2:]]
+    assert phase == whole[2]
+    assert page.run("app.state().t") == 0  # a rectangle does not move the cursor
+    page.type_number("f", "0.6")
+    assert page.run(RANGES)[0] == x  # a changed run is shown in the same part
+    page.run("app.plots.get('v').plot.host.dispatchEvent(new MouseEvent('dblclick'))")
+    assert page.run(RANGES)[1] == page.run(
+        "(({ x, y }) => [x.low, x.high, y.low, y.high])(app.plots.get('v').panel.content)"
+    )
+    page.browser.mouse("Pressed", left + 150, top + 60)
+    page.browser.mouse("Released", left + 150, top + 60, buttons=0)
+    assert page.run("app.state().t") == pytest.approx(page.run("app.plots.get('x').plot.valuesAt(150, 60).x"), abs=0.02)
+
+
+def test_keys_enlarge_a_diagram_and_escape_shows_all(page):
+    page.open(".model=coulomb", anew=True)
+    key = (
+        "app.plots.get('.phase').plot.host.dispatchEvent(new KeyboardEvent('keydown', {{ key: {!r}, bubbles: true }}))"
+    )
+    whole = page.run(RANGES)[2]
+    page.run(key.format("+"))
+    part = page.run(RANGES)[2]
+    assert whole[0] < part[0] < part[1] < whole[1]
+    page.run(key.format("ArrowRight"))
+    assert page.run(RANGES)[2][0] > part[0]
+    page.run(key.format("-"))
+    page.run(key.format("Escape"))
+    assert page.run(RANGES)[2] == whole
+    page.run(key.format("+"))
+    page.click("#panel-\\.phase .show-all")
+    assert page.run(RANGES)[2] == whole
