@@ -2,7 +2,6 @@
 
 import pytest
 import web_page
-from firefox import FIREFOX, Firefox
 from models import MODELS
 
 TOLERANCE = 3  # CSS pixels
@@ -18,15 +17,6 @@ NOTE_ERRORS = (
     "addEventListener('error', ({ message }) => note(message));"
     "addEventListener('unhandledrejection', ({ reason }) => note(String(reason))) })()"
 )
-
-
-@pytest.fixture(scope="module")
-def firefox():
-    if FIREFOX is None:
-        pytest.skip("there is no firefox here")
-    firefox = Firefox()
-    yield firefox
-    firefox.close()
 
 
 def drag(firefox, host):

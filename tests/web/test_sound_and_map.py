@@ -48,7 +48,7 @@ def test_the_map_shows_how_often_each_run_slips_and_a_click_takes_its_values(pag
         "app.frictionMap.computeSlice = function () { slices++; slice.call(this) }"
     )
     page.run("document.getElementById('map-canvas').scrollIntoView({ behavior: 'instant' })")
-    page.wait("app.frictionMap.order?.length === 0")
+    page.wait("app.frictionMap.isComplete")
     counts = page.run("app.frictionMap.counts")
     assert min(counts) == 0
     assert max(counts) > 10

@@ -1,7 +1,6 @@
 // A map over sliding friction and speed of the driver: how often the body slips. Computed in small slices.
 
 import { formatNumber, ticks } from "./plot.js";
-import { FmuError } from "./fmu.js";
 import { Run } from "./run.js";
 import { effectiveValues, findVariable } from "./state.js";
 
@@ -16,7 +15,7 @@ const [PALEST, DARKEST] = [0.08, 0.95]; // opacity of one slip and of the most s
 export class FrictionMap {
   // Draws on a canvas; `onPick(values)` takes the values of a cell, `describe(text)` shows a sentence.
   constructor(session, canvas, onPick, describe) {
-    Object.assign(this, { session, canvas, onPick, describe, key: "", counts: [], isVisible: false, isRunning: false });
+    Object.assign(this, { session, canvas, onPick, describe, key: "", counts: [], order: [], isVisible: false, isRunning: false });
     new IntersectionObserver(([{ isIntersecting }]) => {
       this.isVisible = isIntersecting;
       this.resume();
@@ -28,6 +27,10 @@ export class FrictionMap {
     });
     canvas.addEventListener("pointermove", (event) => this.describeCell(this.cellAt(event.offsetX, event.offsetY)));
     canvas.addEventListener("pointerleave", () => this.describeCell(null));
+  }
+
+  get isComplete() {
+    return this.counts.length > 0 && !this.order.length;
   }
 
   // Whether a model has a map.
@@ -49,7 +52,7 @@ export class FrictionMap {
   }
 
   hide() {
-    Object.assign(this, { key: "", order: [] });
+    Object.assign(this, { key: "", counts: [], order: [] });
   }
 
   // The values in the middle of a cell, with three digits.
@@ -60,7 +63,7 @@ export class FrictionMap {
   }
 
   resume() {
-    if (this.isRunning || !this.isVisible || !this.order?.length) return;
+    if (this.isRunning || !this.isVisible || !this.order.length) return;
     this.isRunning = true;
     requestAnimationFrame(() => this.computeSlice());
   }
@@ -98,8 +101,12 @@ export class FrictionMap {
     const known = this.counts.filter(Number.isFinite);
     const slips = (count) => `${count} ${count === 1 ? "slip" : "slips"}`;
     const progress = known.length < this.counts.length ? ` Computed: ${Math.floor((100 * known.length) / this.counts.length)} %.` : "";
-    const range = known.length ? `from ${Math.min(...known)} to ${slips(Math.max(...known))} in ${formatNumber(this.stop)} s` : "";
-    if (cell === null || !Number.isFinite(this.counts[cell])) return this.describe(`The darker, the more slips: ${range}.${progress}`);
+    if (cell === null || !Number.isFinite(this.counts[cell])) {
+      const [least, most] = [Math.min(...known), Math.max(...known)];
+      const range = known.length ? `from ${least} to ${slips(most)} in ${formatNumber(this.stop)} s` : "";
+      const still = least === 0 ? " In the area of one colour at the left it never slips." : "";
+      return this.describe(`The stronger the colour, the more slips: ${range}.${still}${progress}`);
+    }
     const values = Object.entries(this.valuesOf(cell)).map(([name, value]) => `${name} = ${formatNumber(value)} ${findVariable(this.modelInfo, name).display_unit}`.trim());
     this.describe(`${values.join(", ")}: ${slips(this.counts[cell])}.${progress}`);
   }

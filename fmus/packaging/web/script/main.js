@@ -210,7 +210,8 @@ function playSound() {
   const { main } = session.runs;
   $$("sound").setAttribute("aria-pressed", "true");
   heardRuns = session.runs;
-  if (main.time.length) $$("status").textContent = sound.play(main, page.modelInfo.bodies[page.state.body]);
+  sound.play(main, page.modelInfo.bodies[page.state.body]);
+  $$("status").textContent = sound.text;
 }
 
 // Whether changes apply from the cursor time on.
@@ -309,8 +310,8 @@ function scheduleSummary() {
     $$("tables").replaceChildren(...tables.filter(Boolean));
     updateAddress();
     const summary = main.failure ? "" : `${describeSettings(main)}: ${main.events.length} events in ${formatNumber(state.stop)} s.`;
-    if (!page.playing) $$("status").textContent = linkWarning + summary;
     if (sound.isOn && heardRuns !== session.runs) playSound();
+    if (!page.playing) $$("status").textContent = linkWarning + (sound.isOn ? sound.text : summary);
     if (!$$("map").hidden) frictionMap.show(state);
   }, SUMMARY_DELAY);
 }
@@ -366,7 +367,11 @@ for (const [id, action] of Object.entries({
   "remove-measurement": () => { $$("measurement").value = ""; showMeasurement(null); },
   play: () => play(!page.playing),
   kick: () => drag.kick(),
-  sound: () => (sound.isOn ? silence() : playSound()),
+  sound: () => {
+    if (sound.isOn) silence();
+    else playSound();
+    scheduleSummary();
+  },
   projector: () => showProjector(!document.body.classList.contains("projector")),
   "previous-event": () => seekEvent(session.runs.main.events.findLast(({ t }) => t < page.state.t)),
   "next-event": () => seekEvent(session.runs.main.events.find(({ t }) => t > page.state.t)),
@@ -445,11 +450,17 @@ addEventListener("keydown", (event) => {
 for (const [event, paper] of [["beforeprint", true], ["afterprint", false]]) {
   addEventListener(event, () => { 
     document.documentElement.classList.toggle("paper", paper);
+    $$("map").classList.toggle("incomplete", !frictionMap.isComplete);
     $$("settings").replaceChildren(...settingLines(session, page.state).map((line) => makeElement("p", {}, line)));
-    diagrams.repaint();
+    repaint();
   });
 }
-for (const query of ["(prefers-color-scheme: dark)", "(forced-colors: active)"]) matchMedia(query).addEventListener("change", () => diagrams.repaint());
+for (const query of ["(prefers-color-scheme: dark)", "(forced-colors: active)"]) matchMedia(query).addEventListener("change", repaint);
+
+function repaint() {
+  diagrams.repaint();
+  frictionMap.draw();
+}
 
 // ---- start
 

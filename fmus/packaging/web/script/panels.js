@@ -7,6 +7,7 @@ import { bounds, formatNumber } from "./plot.js";
 const MAX_MARKS = 400; // event marks
 const ENVELOPE_POINTS = 200;
 const BAND_TEXT = "friction can hold it in between";
+const BAR_WIDTH = 4; // px
 const PHASE_BAND_TEXT = "friction can hold it here";
 const MAX_PLOTTED_ROWS = 8000; // longer runs are plotted at grid points and events only
 
@@ -194,20 +195,22 @@ function lawPanel({ runs }, body) {
   return { key: ".law", title: `friction law: ${friction.name} in ${friction.display_unit} against ${slip.name}`, symbol: "", content, phase: [slip, friction] };
 }
 
-// One curve for the forces that hold the body and one for each slip, so that no line joins the two.
+// One line for the forces that hold the body, as far as the run shows them, and one curve for each slip, so that no line
+// joins the two.
 function lawCurves(run, body, slip, friction) {
   const [x, y] = [slip, friction].map(({ name, factor }) => run.columns[name].map((value) => value * factor));
   const modes = run.columns[body.mode];
   const isStuck = (row) => modes?.[row] === 0;
-  const held = { x: [], y: [], colour: "stick", legend: "holds", width: 3 };
+  const largest = run.largestMagnitude(friction.name) * friction.factor;
+  const held = { x: [0, 0], y: [-largest, largest], colour: "stick", legend: "holds", width: 3 };
   const slips = [];
   for (let row = 0; row < x.length; row++) {
-    if (!isStuck(row) && (row === 0 || isStuck(row - 1) || modes?.[row] !== modes?.[row - 1])) slips.push({ x: [], y: [], colour: "slip", legend: "slips" });
-    const curve = isStuck(row) ? held : slips.at(-1);
-    curve.x.push(x[row]);
-    curve.y.push(y[row]);
+    if (isStuck(row)) continue;
+    if (row === 0 || isStuck(row - 1) || modes?.[row] !== modes?.[row - 1]) slips.push({ x: [], y: [], colour: "slip", legend: "slips" });
+    slips.at(-1).x.push(x[row]);
+    slips.at(-1).y.push(y[row]);
   }
-  return [held, ...slips].filter((curve) => curve.x.length);
+  return modes?.includes(0) ? [held, ...slips] : slips;
 }
 
 // Speed over position. The band in which friction can hold the body is a line at speed zero; one that moves is drawn with
@@ -221,7 +224,7 @@ function phasePanel(session, body, bands) {
     y: bounds(curves.map((curve) => curve.y)), curves,
   };
   const isFixed = bands?.length === 1 && !body.driver;
-  const line = { colour: "stick", width: 4 };
+  const line = { colour: "stick", width: BAR_WIDTH };
   if (isFixed) content.curves = [{ x: [bands[0].low * x.factor, bands[0].high * x.factor], y: [0, 0], ...line, legend: PHASE_BAND_TEXT }, ...curves];
   const movingBand = bands && !isFixed && ((run, t) => {
     const { low, high } = bands.findLast((band) => band.t <= t);
@@ -260,12 +263,12 @@ function errorPanel(session, body, state) {
 // The entries of the legend for a diagram.
 export function legendOf({ content, arrow, movingBand }) {
   const { curves, bands = [], marks = [] } = content;
-  const lines = curves.filter(({ legend }) => legend).map(({ colour, dash, dots, legend }) => ({ kind: dots ? "dots" : "line", colour, dash, text: legend }));
+  const lines = curves.filter(({ legend }) => legend).map(({ colour, dash, dots, width, legend }) => ({ kind: dots ? "dots" : width >= BAR_WIDTH ? "bar" : "line", colour, dash, text: legend }));
   const isStuck = bands.length > 0 && [{ kind: "band", colour: "hold", text: "sticks" }];
   const isEvent = marks.some(({ label }) => !label) && [{ kind: "mark", colour: "event", text: "event" }];
   const isChange = marks.some(({ label }) => label) && [{ kind: "change", colour: "event", text: "change of a value" }];
   const isArrow = arrow && [{ kind: "arrow", colour: "ink", text: arrow }];
-  if (movingBand) lines.push({ kind: "line", colour: "stick", text: PHASE_BAND_TEXT });
+  if (movingBand) lines.push({ kind: "bar", colour: "stick", text: PHASE_BAND_TEXT });
   return [...lines.reverse(), ...(isStuck || []), ...(isEvent || []), ...(isChange || []), ...(isArrow || [])];
 }
 

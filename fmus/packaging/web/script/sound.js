@@ -26,15 +26,16 @@ export function cycleStarts(time, force) {
 
 export class StickSlipSound {
   constructor() {
-    Object.assign(this, { isOn: false, context: null, source: null, samples: null });
+    Object.assign(this, { isOn: false, context: null, source: null, samples: null, text: "" });
   }
 
-  // Play the friction on a body, again and again for a moment. Returns a sentence about the sound.
+  // Play the friction on a body, again and again for a moment. `text` is a sentence about the sound.
   play(run, body) {
     this.stop();
     this.isOn = true;
+    this.text = "There is no sound: the run has no two whole cycles of stick and slip.";
     const starts = cycleStarts(run.time, run.columns[body.friction]);
-    if (starts.length < 2) return "There is no sound: the run has fewer than two whole cycles of stick and slip.";
+    if (starts.length < 2) return;
     const period = (starts.at(-1) - starts[0]) / (starts.length - 1);
     this.context ??= new AudioContext(); // at a click, as browsers demand
     const { context } = this;
@@ -54,7 +55,7 @@ export class StickSlipSound {
     this.source.start(now);
     this.source.stop(now + SECONDS);
     const tone = SPEED_UP / period;
-    return `Sound: the friction force, ${SPEED_UP} times faster. One slip every ${Number(period.toPrecision(3))} s becomes a tone of ${Number(tone.toPrecision(3))} Hz.`;
+    this.text = `Sound: the friction force, ${SPEED_UP} times faster. One slip every ${Number(period.toPrecision(3))} s becomes a tone of ${Number(tone.toPrecision(3))} Hz.`;
   }
 
   stop() {
