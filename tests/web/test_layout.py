@@ -17,6 +17,8 @@ def test_no_width_makes_it_scroll_sideways_and_every_control_has_a_name(page, na
     for width in WIDTHS:
         page.browser.size(width)
         assert page.run("document.documentElement.scrollWidth") <= width
+        cut = "[...document.querySelectorAll('.entry input')].filter(e => e.scrollWidth > e.clientWidth).length"
+        assert page.run(cut) == 0  # every number is shown in full
     tree = page.browser.call("Accessibility.getFullAXTree")["nodes"]
     controls = [node for node in tree if node.get("role", {}).get("value") in CONTROLS and not node["ignored"]]
     nameless = [node for node in controls if not node.get("name", {}).get("value", "").strip()]

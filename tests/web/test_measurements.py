@@ -43,7 +43,7 @@ def test_a_dropped_measurement_is_drawn_over_the_run_in_the_units_of_its_heading
     ],
 )
 def test_a_measurement_that_cannot_be_read_is_refused_with_the_reason(page, text, sentence):
-    page.open(".model=coulomb", anew=True)
+    page.open(".model=coulomb")
     page.run(DROP.format(json.dumps(text)))
     page.wait("!document.getElementById('alert').hidden")
     assert sentence in page.run("document.getElementById('alert').textContent")
