@@ -16,6 +16,7 @@ import fork_server
 import native_fmus
 import pytest
 from browser import CHROMIUM, Browser
+from firefox import FIREFOX, Firefox
 from worker_client import Worker, worker_fixtures
 
 
@@ -78,6 +79,15 @@ def browser():
     browser = Browser()
     yield browser
     browser.close()
+
+
+@pytest.fixture(scope="session")
+def firefox():
+    if FIREFOX is None:
+        pytest.skip("there is no firefox here")
+    firefox = Firefox()
+    yield firefox
+    firefox.close()
 
 
 @pytest.fixture

@@ -13,6 +13,8 @@ OWN_TOOL = "FMU"
 SOLVERS = (OWN_TOOL, "scipy", "cvode")  # compared as solvers, without an importer
 LAW_PARAMETER = "friction"  # set in the cases whose law chatters
 QUICK_RUN = "a quick run"
+NONE_REACHES = "none of the measured methods"  # reaches the accuracy
+NOT_MEASURED = "no method has been measured successfully"
 CLEAR_FACTOR = 1.5  # run times of a quick run that differ by less are not distinguished
 
 Row = Mapping[str, str]
@@ -101,7 +103,9 @@ def choose_method(points: Iterable[SolverPoint], accuracy: float, is_quick: bool
     best = next((point for point in fastest.values() if point.tool == OWN_TOOL), None)
     if best is None:
         own = min((point for point in points if point.tool == OWN_TOOL), key=lambda point: point.error, default=None)
-        return MethodChoice("", (f"no method; smallest error {own.error:.2g} with {own.name}" if own else "no method",))
+        if own is None:
+            return MethodChoice("", (NOT_MEASURED,))
+        return MethodChoice("", (NONE_REACHES, f"smallest error: {own.error:.2g}, with {own.name}"))
     runner_up = next((point for point in fastest.values() if point is not best), None)
     if runner_up is None:
         return MethodChoice(best.method, (format_time(best.seconds), "no other solver reaches it"))

@@ -7,7 +7,7 @@ from itertools import groupby
 from pathlib import Path
 
 from ..results.provenance import load_provenance
-from .method_choice import USUAL_ACCURACY, CaseChoices
+from .method_choice import NONE_REACHES, USUAL_ACCURACY, CaseChoices
 from .sections import FAILED, QUANTITIES_FILE, PublishedScene
 
 CHATTERING_LAWS = ("sign", "threshold")
@@ -89,7 +89,7 @@ def judge_methods(choices: Sequence[CaseChoices]) -> Verdict | None:
     details = []
     for model, cases in groupby(choices, key=lambda case: case.model):
         methods = dict.fromkeys(case.usual for case in cases if case.usual and not case.is_chattering)
-        details.append(f"{model}: {' or '.join(methods) or 'no method'}")
+        details.append(f"{model}: {' or '.join(methods) or f'{NONE_REACHES} reached it'}")
     return Verdict("Fastest methods", f"for an error of {USUAL_ACCURACY:.0e}", tuple(details), "use", True)
 
 

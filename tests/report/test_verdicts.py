@@ -63,6 +63,12 @@ def test_the_verdicts_are_the_number_reproduced_the_fastest_methods_and_the_case
     assert (stability.value, stability.is_good, stability.details) == ("2 of 3", False, ("1 failed",))
 
 
+def test_a_model_without_an_accurate_method_says_that_none_of_the_measured_ones_reached_the_accuracy(tmp_path):
+    write_precision(tmp_path, [point(FMU, "ode23", 1e-3, 2e-6), point(FMU, "rodas", 1e-3, 5e-6)], source="a quick run")
+    (methods,) = build_verdicts(tmp_path, [], read_method_choices(tmp_path))
+    assert methods.details == ("sled: none of the measured methods reached it",)
+
+
 def test_without_results_there_is_no_verdict(tmp_path):
     assert build_verdicts(tmp_path, SCENES, read_method_choices(tmp_path)) == []
 
@@ -97,8 +103,8 @@ CLOSE = [POINTS[1], SolverPoint(FMU, "rodas", 5e-3, 1e-8)]
             "ode23",
             ("4 ms", "rodas is about as fast (quick run)"),
         ),
-        (POINTS[1:], 1e-9, False, "", ("no method; smallest error 1e-07 with ode23",)),
-        (POINTS[2:], 1e-3, False, "", ("no method",)),
+        (POINTS[1:], 1e-9, False, "", ("none of the measured methods", "smallest error: 1e-07, with ode23")),
+        (POINTS[2:], 1e-3, False, "", ("no method has been measured successfully",)),
     ],
 )
 def test_a_method_is_chosen_by_time_and_compared_with_the_runner_up(points, accuracy, is_quick, method, notes):
@@ -116,7 +122,9 @@ def test_failed_runs_and_importers_are_not_compared_and_a_chattering_law_with_tr
     write_precision(tmp_path, points, values={"sled-sign": {"friction": 2}})
     sled, sign = read_method_choices(tmp_path)
     assert [choice.notes for choice in sled.choices[:2]] == [("3 ms", "no other solver reaches it")] * 2
-    assert [choice.notes for choice in sign.choices] == [("no method; smallest error 0.02 with ode23",)] * 3
+    assert [choice.notes for choice in sign.choices] == [
+        ("none of the measured methods", "smallest error: 0.02, with ode23")
+    ] * 3
     assert [sled.is_chattering, sign.is_chattering] == [False, True]
 
 

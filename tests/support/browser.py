@@ -107,6 +107,17 @@ class Browser:
         assert "exceptionDetails" not in result, result["exceptionDetails"]
         return result["result"].get("value")
 
+    def run_in_frame(self, script):
+        """Evaluate an expression in the only frame of the page, which is sandboxed and so a target of its own."""
+        page, self.session = self.session, None
+        try:
+            targets = self.call("Target.getTargets")["targetInfos"]
+            (frame,) = (target["targetId"] for target in targets if target["type"] == "iframe")
+            self.session = self.call("Target.attachToTarget", targetId=frame, flatten=True)["sessionId"]
+            return self.run(script)
+        finally:
+            self.session = page
+
     def size(self, width, height=900, touch=False):
         self.call("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=touch)
 

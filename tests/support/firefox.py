@@ -68,6 +68,15 @@ class Firefox:
         wrapped = f"const done = arguments[0]; Promise.resolve({script}).then(done)"
         return self.call("WebDriver:ExecuteAsyncScript", script=wrapped, args=[], sandbox=None)["value"]
 
+    def run_in_frame(self, script):
+        """Evaluate an expression in the only frame of the page."""
+        frame = self.call("WebDriver:FindElement", using="css selector", value="iframe")["value"]
+        self.call("WebDriver:SwitchToFrame", element=next(iter(frame.values())))
+        try:
+            return self.run(script)
+        finally:
+            self.call("WebDriver:SwitchToParentFrame")
+
     def size(self, width, height=900):
         self.call("WebDriver:SetWindowRect", width=width, height=height)
 

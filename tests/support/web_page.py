@@ -11,6 +11,11 @@ READY = "new Promise(done => { const wait = () => globalThis.app?.session.runs.m
 READY += ".every(run => run.done) ? requestAnimationFrame(() => done(true)) : setTimeout(wait, 5); wait() })"
 FOLLOWED = "new Promise(done => { const { runs } = app.session; location.hash = HASH;"
 FOLLOWED += "const look = () => app.session.runs === runs ? setTimeout(look, 1) : done(true); look() })"
+DRAWN = "new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))"  # the next picture is complete
+SHIFTS = (
+    "globalThis.shift = 0; new PerformanceObserver(list => { for (const entry of list.getEntries())"
+    "if (!entry.hadRecentInput) shift += entry.value }).observe({ type: 'layout-shift', buffered: true })"
+)
 
 
 def build_page(name, *words):

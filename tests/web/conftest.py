@@ -1,9 +1,27 @@
-"""The interactive page of the project's models."""
+"""The interactive page of the project's models, in a browser that notes what the page logs and loads."""
 
 import pytest
 import web_page
 
 
 @pytest.fixture(scope="session")
-def page(browser):
+def page_in_browser(browser):
     return web_page.Page(browser, web_page.build_page("web"))
+
+
+@pytest.fixture
+def quiet(browser):
+    """The browser; the test fails if the page writes to the console or requests anything but itself."""
+    browser.console.clear()
+    yield browser
+    browser.call("Emulation.setEmulatedMedia", media="", features=[])
+    assert browser.console == []
+    assert {
+        address.split("#")[0] for address in browser.requested_urls if not address.startswith(("data:", "blob:"))
+    } <= {address.split("#")[0] for address in browser.requested_urls[:1]}
+
+
+@pytest.fixture
+def page(page_in_browser, quiet):
+    """The page of the shipped models, opened once in a browser that all tests share."""
+    return page_in_browser

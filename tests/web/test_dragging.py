@@ -1,6 +1,7 @@
 """A dragged body stays under the pointer, whatever the pointer, the zoom and the model."""
 
 import pytest
+import web_page
 from models import MODELS
 
 TOLERANCE = 3  # CSS pixels
@@ -12,7 +13,6 @@ CENTRE = (
 PIN = (
     "(b => [b.x + b.width / 2, b.y + b.height / 2])(document.querySelector('#mechanism .pin').getBoundingClientRect())"
 )
-DRAWN = "new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))"
 
 
 def path_of_pointer(page):
@@ -46,12 +46,12 @@ def test_a_dragged_body_stays_under_the_pointer(page, name, width, height, zoom,
     try:
         page.open(f".model={name}&.stop=2")
         page.run("document.querySelector('#mechanism').scrollIntoView({ block: 'center' })")
-        page.run(DRAWN)
+        page.run(web_page.DRAWN)
         points = path_of_pointer(page)
         send(page, touch, "Pressed", *page.run(CENTRE))
         for x, y in points:
             send(page, touch, "Moved", x, y)
-            page.run(DRAWN)
+            page.run(web_page.DRAWN)
             body_x, body_y = page.run(CENTRE)
             assert (body_x, body_y) == pytest.approx((x, y), abs=TOLERANCE)
         held = page.run("app.state().t")
@@ -71,7 +71,7 @@ def test_a_body_cannot_be_dragged_out_of_the_picture(page):
     page.browser.mouse("Pressed", x, y)
     for target in (x + 2000, x - 2000):
         page.browser.mouse("Moved", target, y)
-        page.run(DRAWN)
+        page.run(web_page.DRAWN)
         body = page.run(box.format(".body rect"))
         assert left <= body[0] < body[1] <= right
     page.browser.mouse("Released", x, y, buttons=0)

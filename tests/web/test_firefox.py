@@ -2,11 +2,9 @@
 
 import pytest
 import web_page
-from firefox import FIREFOX, Firefox
 from models import MODELS
 
 TOLERANCE = 3  # CSS pixels
-DRAWN = "new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))"
 CENTRE = (
     "(b => [b.x + b.width / 2, b.y + b.height / 2])"
     "(document.querySelector('{} :is(rect.body, circle.body, .body rect, .body circle)').getBoundingClientRect())"
@@ -21,24 +19,15 @@ NOTE_ERRORS = (
 )
 
 
-@pytest.fixture(scope="module")
-def firefox():
-    if FIREFOX is None:
-        pytest.skip("there is no firefox here")
-    firefox = Firefox()
-    yield firefox
-    firefox.close()
-
-
 def drag(firefox, host):
     """Drag the body in a host by some pixels and check that it follows."""
     firefox.run(f"document.querySelector({host!r}).scrollIntoView({{ block: 'center', behavior: 'instant' }})")
-    firefox.run(DRAWN)
+    firefox.run(web_page.DRAWN)
     x, y = firefox.run(CENTRE.format(host))
     firefox.pointer(("move", x, y), ("down",))
     for step in (20, -15):
         firefox.pointer(("move", x + step, y))
-        firefox.run(DRAWN)
+        firefox.run(web_page.DRAWN)
         at_x, _ = firefox.run(CENTRE.format(host))  # a pendulum leaves the height of the pointer
         assert at_x == pytest.approx(x + step, abs=TOLERANCE), host
     firefox.pointer(("up",))

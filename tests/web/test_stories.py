@@ -8,24 +8,7 @@ from build_cache import ROOT
 
 STORIES = ("stops", "chatters", "squeaks", "creeps", "swings")
 DRAGGED = ("opening", "stops", "squeaks", "creeps", "swings")
-DRAWN = "new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))"
 TOLERANCE = 3  # CSS pixels
-SHIFTS = (
-    "globalThis.shift = 0; new PerformanceObserver(list => { for (const entry of list.getEntries())"
-    "if (!entry.hadRecentInput) shift += entry.value }).observe({ type: 'layout-shift', buffered: true })"
-)
-
-
-@pytest.fixture(autouse=True)
-def quiet(browser):
-    """No test may write to the console or request anything but the page itself."""
-    browser.console.clear()
-    yield
-    browser.call("Emulation.setEmulatedMedia", features=[])
-    assert browser.console == []
-    assert {
-        address.split("#")[0] for address in browser.requested_urls if not address.startswith(("data:", "blob:"))
-    } <= {address.split("#")[0] for address in browser.requested_urls[:1]}
 
 
 @pytest.fixture
@@ -45,7 +28,7 @@ def show(page, story):
     """Scroll to a story and wait until it is computed."""
     page.run(f"document.getElementById({story!r}).scrollIntoView({{ behavior: 'instant' }})")
     page.wait(f"[...document.querySelectorAll('#{story} output')].every(each => /[0-9]/.test(each.textContent))")
-    page.run(DRAWN)
+    page.run(web_page.DRAWN)
 
 
 def test_the_opening_claims_that_real_things_stop_and_counts_the_steps_of_both_masses(still):
@@ -109,13 +92,13 @@ def test_bodies_of_the_opening_and_the_stories_stay_under_the_pointer(still, wid
             show(still, section)
         else:
             still.run("scrollTo(0, 0)")
-            still.run(DRAWN)
+            still.run(web_page.DRAWN)
         body = f"#{section} .grip :is(rect, circle).body"
         x, y = still.middle(body)
         still.browser.mouse("Pressed", x, y)
         for step in (20, -15):
             still.browser.mouse("Moved", x + step, y)
-            still.run(DRAWN)
+            still.run(web_page.DRAWN)
             at_x, at_y = still.middle(body)
             assert at_x == pytest.approx(x + step, abs=TOLERANCE), section
             assert at_y == pytest.approx(y, abs=TOLERANCE), section
@@ -126,7 +109,7 @@ def test_bodies_of_the_opening_and_the_stories_stay_under_the_pointer(still, wid
 @pytest.mark.parametrize("width", [360, 1280])
 def test_the_opening_fits_its_window_and_does_not_shift(page, width):
     page.browser.size(width)
-    script = page.browser.call("Page.addScriptToEvaluateOnNewDocument", source=SHIFTS)
+    script = page.browser.call("Page.addScriptToEvaluateOnNewDocument", source=web_page.SHIFTS)
     page.open(anew=True)
     page.browser.call("Page.removeScriptToEvaluateOnNewDocument", **script)
     page.run("new Promise(done => setTimeout(done, 600))")
@@ -147,9 +130,9 @@ def test_a_link_shows_its_run_and_an_untouched_page_opens_with_the_claim_again(p
     assert page.run("[app.state().model, location.hash]") == ["coulomb", "#stops"]
 
 
-def test_a_page_without_the_models_of_the_stories_opens_with_the_panel(browser):
+def test_a_page_without_the_models_of_the_stories_opens_with_the_panel(quiet):
     file = ROOT / "tests" / "example_models" / "rotor_brake.py"
-    page = web_page.Page(browser, web_page.build_page("one", str(file), "--method", "ode45"))
+    page = web_page.Page(quiet, web_page.build_page("one", str(file), "--method", "ode45"))
     page.open()
     assert page.run("document.getElementById('stories')") is None
     assert text(page, "h1") == "Dry friction, live"

@@ -65,7 +65,11 @@ def list_bodies(analysis: ModelAnalysis) -> list[ModelJson]:
 
 
 def body_json(analysis: ModelAnalysis, x: State) -> ModelJson:
-    """Describe a body: `kind` is block, pendulum or rotor; the other items are names of variables."""
+    """Describe a body: `kind` is block, pendulum or rotor; the other items are names of variables.
+
+    `band_starts` are the start values of position and speed with which the band of positions where friction holds the
+    body can be found; it moves with the driver.
+    """
     v = analysis.rate[x]
     a = next((e for s, e in analysis.rate.items() if s is v), None)
     law: Operand = a.expression if isinstance(a, Output) else 0.0
@@ -76,6 +80,11 @@ def body_json(analysis: ModelAnalysis, x: State) -> ModelJson:
     ]
     linked = [y.name for y in analysis.positions if y is not x and depends_on(law, (y,))]
     drives = [d for d in analysis.drivers if depends_on(law, (d,))]
+    springs = [e for e in analysis.outputs for d in drives if is_spring_force(e, x, d)]
+    slip = v.name if frictions and slips_with(frictions[0], v) else ""
+    starts = [s.start_expression.name for s in (x, v) if isinstance(s, State) and isinstance(s.start_expression, Fixed)]
+    moves_with_driver = all(is_same_expression(differentiate(law, {x: 1.0, d: 1.0}), 0.0) for d in drives)
+    is_alone = len(analysis.contacts) == 1 and not linked
     items = {
         "kind": "pendulum" if is_angle and is_nonlinear else "rotor" if is_angle else "block",
         "position": x.name,
@@ -87,10 +96,12 @@ def body_json(analysis: ModelAnalysis, x: State) -> ModelJson:
         "spring": not is_nonlinear and not is_same_expression(restoring, 0.0) and bool(drives or not linked),
         "dampers": [] if depends_on(damping, (v,)) else scaling_parameters(damping),
         "friction": next((e.name for e in frictions), ""),
-        "slip": v.name if frictions and slips_with(frictions[0], v) else "",
+        "slip": slip,
         "contacts": [c.name for c in frictions if isinstance(c, Contact)],
         "mode": next((c.mode.name for c in frictions if isinstance(c, Contact)), ""),
         "start": x.start_expression.name if isinstance(x.start_expression, Fixed) else "",
+        "band_starts": starts if slip and is_alone and moves_with_driver and len(starts) == len((x, v)) else [],
+        "spring_force": springs[0].name if len(springs) == 1 else "",
         "input": next((e.name for e in analysis.inputs if depends_on(law, (e,))), ""),
     }
     return {key: value for key, value in items.items() if value}
@@ -107,7 +118,21 @@ def slips_with(friction: Contact | Output, v: State | Output) -> bool:
     """Check whether the slip speed of a friction force is the speed v, so that the force can be drawn over v."""
     if isinstance(friction, Contact):
         return is_same_expression(friction.slip, v)
-    return {e.name for e in variables_in(friction.expression) if not isinstance(e, Parameter | Fixed)} == {v.name}
+    return variables_of_motion(friction) == {v.name}
+
+
+def is_spring_force(e: Output, x: State, driver: State) -> bool:
+    """Check whether an output is a force or torque that depends on the distance of the position x from the driver."""
+    return (
+        e.unit in FORCES
+        and variables_of_motion(e) == {x.name, driver.name}
+        and is_same_expression(differentiate(e, {x: 1.0, driver: 1.0}), 0.0)
+    )
+
+
+def variables_of_motion(e: Output) -> set[str]:
+    """Return the names of the variables that an output depends on, except parameters."""
+    return {leaf.name for leaf in variables_in(e.expression) if not isinstance(leaf, Parameter | Fixed)}
 
 
 def is_friction_force(e: Output, v: State | Output) -> bool:

@@ -5,14 +5,20 @@ import { uniqueEntries } from "./legend.js";
 import { buildPanels, cursorReadings, legendOf } from "./panels.js";
 import { Plot, readColours } from "./plot.js";
 
+const SMALLEST_PART = 1e-9; // of an axis that can be enlarged
+
 export class Diagrams {
   constructor(host, onSeek) {
-    Object.assign(this, { host, onSeek, plots: new Map() }); // by key: {plot, figure, heading, reading, panel}
+    Object.assign(this, { host, onSeek, plots: new Map() }); // by key: {plot, figure, heading, reading, showAll, panel}
+    this.ranges = new Map(); // {x, y} of enlarged diagrams by key
+    this.timeRange = null; // of all diagrams over time, if they are enlarged
     readColours();
   }
 
   clear() {
     this.plots.clear();
+    this.ranges.clear();
+    this.timeRange = null;
     this.host.replaceChildren();
   }
 
@@ -28,18 +34,45 @@ export class Diagrams {
       if (diagram.panel?.title !== panel.title) {
         diagram.heading.innerHTML = panel.symbol ? `<b>${panel.symbol}</b> ` : ""; // HTML from the build
         diagram.heading.append(panel.title);
+        diagram.plot.host.setAttribute("aria-label", `Diagram: ${panel.title}`);
       }
       diagram.panel = panel;
-      diagram.plot.show(panel.content);
+      this.show(panel.key);
     }
+  }
+
+  // Show a diagram, or the part of it that is enlarged.
+  show(key) {
+    const { plot, panel: { content }, showAll } = this.plots.get(key);
+    const range = this.ranges.get(key);
+    const x = (isOverTime(key) ? this.timeRange : range?.x) ?? content.x;
+    plot.show({ ...content, x: { ...content.x, low: x.low, high: x.high }, y: { ...content.y, ...range?.y } });
+    showAll.hidden = x === content.x && !range?.y;
+  }
+
+  // Enlarge the ranges {x, y} of a diagram, either may be null; the times of all diagrams over time. Without ranges, show all.
+  zoom(key, ranges) {
+    const { content } = this.plots.get(key).panel;
+    const [x, y] = ["x", "y"].map((axis) => limitRange(ranges?.[axis], content[axis]));
+    const previous = this.ranges.get(key);
+    const isReset = !ranges;
+    if (isOverTime(key) && (isReset || ranges.x)) this.timeRange = x;
+    this.ranges.set(key, { x: isReset || ranges.x ? x : previous?.x, y: isReset || ranges.y ? y : previous?.y });
+    for (const [other, { figure }] of this.plots) if (!figure.hidden && (other === key || isOverTime(key))) this.show(other);
   }
 
   createDiagram(key) {
     const heading = makeElement("span");
     const reading = makeElement("span", { class: "reading" });
-    const host = makeElement("div", { class: "plot" });
-    const figure = makeElement("figure", { id: `panel-${key}` }, makeElement("figcaption", {}, heading, reading), host);
-    return { plot: new Plot(host, [".phase", ".law"].includes(key) ? null : this.onSeek), figure, heading, reading };
+    const showAll = makeElement("button", { type: "button", class: "show-all", hidden: true }, "Show all");
+    const host = makeElement("div", { class: "plot", role: "group", tabindex: 0, "aria-describedby": "zoom-help" });
+    const figure = makeElement("figure", { id: `panel-${key}` }, makeElement("figcaption", {}, heading, showAll, reading), host);
+    const plot = new Plot(host, isOverTime(key) ? this.onSeek : null, (ranges) => this.zoom(key, ranges));
+    showAll.addEventListener("click", () => {
+      this.zoom(key, null);
+      host.focus({ preventScroll: true }); // the button is hidden now
+    });
+    return { plot, figure, heading, reading, showAll };
   }
 
   // Move the cursor to a time in s.
@@ -65,4 +98,15 @@ export class Diagrams {
     readColours();
     for (const { plot } of this.plots.values()) plot.paint();
   }
+}
+
+function isOverTime(key) {
+  return key !== ".phase" && key !== ".law";
+}
+
+// A range within that of the whole axis; null for all of it.
+function limitRange(range, { low, high, hidden }) {
+  if (!range || hidden || !(range.high - range.low > SMALLEST_PART * (high - low))) return null;
+  const limited = { low: Math.max(range.low, low), high: Math.min(range.high, high) };
+  return limited.low < limited.high && (limited.low > low || limited.high < high) ? limited : null;
 }

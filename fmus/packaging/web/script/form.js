@@ -59,7 +59,7 @@ export class Form {
     preset.fill([["", "none (custom settings)"], ...[...this.presets.values()].map(({ name, title }) => [name, `${name}: ${title}`])], state.preset);
     body.fill(modelInfo.bodies.map(({ position }, i) => [i, position]), state.body);
     const comparable = [...this.models.values()].filter(({ bodies }) => bodies[0].position === modelInfo.bodies[0].position);
-    comparison.fill([["", "nothing"], ...comparable.map(({ name }) => [name, name === state.model ? `${name}, other settings` : name])], state.comparison?.model ?? "");
+    comparison.fill([["", "nothing"], ...comparable.map(({ name }) => [name, name === state.model ? "same model" : name])], state.comparison?.model ?? "");
     this.fillSolverLists("", modelInfo, values);
     const other = state.comparison && this.models.get(state.comparison.model);
     this.fillSolverLists("comparison-", other, other ? effectiveValues(other, comparisonSettings(this.models, state).values) : {});

@@ -8,13 +8,14 @@ const [SAMPLE_WIDTH, SAMPLE_HEIGHT] = [26, 12]; // of a sample, in CSS pixels
 // Paths of the samples by kind; lines are drawn, bands are filled.
 export const SAMPLES = {
   line: `M0 ${SAMPLE_HEIGHT / 2}H${SAMPLE_WIDTH}`,
+  bar: `M0 ${SAMPLE_HEIGHT / 2 - 2}h${SAMPLE_WIDTH}v4H0Z`,
   band: `M0 0H${SAMPLE_WIDTH}V${SAMPLE_HEIGHT}H0Z`,
   mark: `M${SAMPLE_WIDTH / 2} ${SAMPLE_HEIGHT / 2}V${SAMPLE_HEIGHT}`,
   change: `M${SAMPLE_WIDTH / 2} 0V${SAMPLE_HEIGHT}`,
   dots: `M${SAMPLE_WIDTH / 2 - 2} ${SAMPLE_HEIGHT / 2 - 2}h4v4h-4Z`,
   arrow: `M0 ${SAMPLE_HEIGHT / 2}H${SAMPLE_WIDTH}m-6 -4l6 4l-6 4`,
 };
-const FILLED = ["band", "dots"];
+const FILLED = ["bar", "band", "dots"];
 
 // Remove entries that look and read the same. An entry is {kind, colour, dash, text}.
 export function uniqueEntries(entries) {

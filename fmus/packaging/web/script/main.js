@@ -4,7 +4,7 @@ import { makeElement, typicalSizes } from "./controls.js";
 import { Session } from "./session.js";
 import { showLegend } from "./legend.js";
 import { Diagrams } from "./diagrams.js";
-import { presetState, initialComparison, addChange, chooseItem, replaceValue } from "./overrides.js";
+import { presetState, initialComparison, addChange, chooseForComparison, chooseItem, replaceValue } from "./overrides.js";
 import { settingLines } from "./setting_lines.js";
 import { Form } from "./form.js";
 import { DragController } from "./drag.js";
@@ -15,6 +15,8 @@ import { costTable, decayTable, describeSettings, eventTable, publishedTable } f
 import { MeasurementError, readMeasurement } from "./measurement.js";
 import { startStories } from "./stories.js";
 import { save, toCsv, toPng } from "./export.js";
+import { StickSlipSound } from "./sound.js";
+import { FrictionMap } from "./friction_map.js";
 
 const SLICE = 8; // ms per frame for simulation
 const SUMMARY_DELAY = 300; // ms without a change before tables, link and status are updated
@@ -27,6 +29,8 @@ const page = { session, state: null, modelInfo: null, playing: false, setVariabl
 const drag = new DragController(page);
 const mechanism = new Mechanism($$("mechanism"), drag);
 const diagrams = new Diagrams($$("panels"), seek);
+const sound = new StickSlipSound();
+const frictionMap = new FrictionMap(session, $$("map-canvas"), pickValues, (text) => { $$("map-status").textContent = text; });
 const form = new Form(session.models, session.presets, {
   preset: (name) => { isAddressUsed = true; return session.presets.has(name) ? showState(stateOfPreset(name)) : restartEdited(); },
   choose: (name, value) => { chooseItem(page.modelInfo, page.state.values, name, value); restartEdited(); },
@@ -48,6 +52,7 @@ let frameRequested = false;
 let stale = { curves: true, cursor: true };
 let lastFrame = 0; // time of the last frame in ms
 let summaryTimer = 0;
+let heardRuns = null; // whose sound has been played
 
 // ---- state
 
@@ -96,6 +101,10 @@ function buildControls() {
   for (const formulas of $$("equations").querySelectorAll("pre")) formulas.tabIndex = 0; // scrolls on narrow screens
   mechanism.build(modelInfo);
   $$("kick").hidden = !modelInfo.bodies.some((body) => body.input);
+  $$("sound").hidden = !(hasStickSlip() && globalThis.AudioContext);
+  if ($$("sound").hidden) silence();
+  $$("map").hidden = !FrictionMap.suits(modelInfo);
+  if ($$("map").hidden) frictionMap.hide();
   const stop = session.stopTime(modelInfo.name);
   session.restart({ ...defaultState(modelInfo), stop });
   session.runs.main.advance();
@@ -174,8 +183,35 @@ async function setComparison({ model, ...values }) {
   else if (model) {
     await session.compile(model);
     state.comparison = { model, values: initialComparison(modelInfo, state, model) };
-  } else for (const [name, value] of Object.entries(values)) chooseItem(session.models.get(state.comparison.model), state.comparison.values, name, value);
+  } else for (const [name, value] of Object.entries(values)) chooseForComparison(session.models, state, name, value);
   restart();
+}
+
+// Set values from the start, from the map.
+function pickValues(values) {
+  const { state, modelInfo } = page;
+  state.changes = state.changes.filter(({ name }) => !(name in values));
+  for (const [name, value] of Object.entries(values)) replaceValue(modelInfo, state, name, value, 0);
+  restartEdited();
+}
+
+// Whether the body shown has friction and is pulled by a driver.
+function hasStickSlip() {
+  const body = page.modelInfo.bodies[page.state.body] ?? page.modelInfo.bodies[0];
+  return Boolean(body.driver && body.friction);
+}
+
+function silence() {
+  sound.stop();
+  $$("sound").setAttribute("aria-pressed", "false");
+}
+
+function playSound() {
+  const { main } = session.runs;
+  $$("sound").setAttribute("aria-pressed", "true");
+  heardRuns = session.runs;
+  sound.play(main, page.modelInfo.bodies[page.state.body]);
+  $$("status").textContent = sound.text;
 }
 
 // Whether changes apply from the cursor time on.
@@ -274,7 +310,9 @@ function scheduleSummary() {
     $$("tables").replaceChildren(...tables.filter(Boolean));
     updateAddress();
     const summary = main.failure ? "" : `${describeSettings(main)}: ${main.events.length} events in ${formatNumber(state.stop)} s.`;
-    if (!page.playing) $$("status").textContent = linkWarning + summary;
+    if (sound.isOn && heardRuns !== session.runs) playSound();
+    if (!page.playing) $$("status").textContent = linkWarning + (sound.isOn ? sound.text : summary);
+    if (!$$("map").hidden) frictionMap.show(state);
   }, SUMMARY_DELAY);
 }
 
@@ -329,6 +367,11 @@ for (const [id, action] of Object.entries({
   "remove-measurement": () => { $$("measurement").value = ""; showMeasurement(null); },
   play: () => play(!page.playing),
   kick: () => drag.kick(),
+  sound: () => {
+    if (sound.isOn) silence();
+    else playSound();
+    scheduleSummary();
+  },
   projector: () => showProjector(!document.body.classList.contains("projector")),
   "previous-event": () => seekEvent(session.runs.main.events.findLast(({ t }) => t < page.state.t)),
   "next-event": () => seekEvent(session.runs.main.events.find(({ t }) => t > page.state.t)),
@@ -407,11 +450,17 @@ addEventListener("keydown", (event) => {
 for (const [event, paper] of [["beforeprint", true], ["afterprint", false]]) {
   addEventListener(event, () => { 
     document.documentElement.classList.toggle("paper", paper);
+    $$("map").classList.toggle("incomplete", !frictionMap.isComplete);
     $$("settings").replaceChildren(...settingLines(session, page.state).map((line) => makeElement("p", {}, line)));
-    diagrams.repaint();
+    repaint();
   });
 }
-for (const query of ["(prefers-color-scheme: dark)", "(forced-colors: active)"]) matchMedia(query).addEventListener("change", () => diagrams.repaint());
+for (const query of ["(prefers-color-scheme: dark)", "(forced-colors: active)"]) matchMedia(query).addEventListener("change", repaint);
+
+function repaint() {
+  diagrams.repaint();
+  frictionMap.draw();
+}
 
 // ---- start
 
@@ -423,7 +472,7 @@ for (const [name, modelInfo] of session.models) {
   $$("models").append(makeElement("label", {}, choice, name));
 }
 $$("choices").append(...Object.values(form.lists).map(({ element }) => element));
-globalThis.app = { session, plots: diagrams.plots, seek, state: () => page.state }; // for tests and the console
+globalThis.app = { session, plots: diagrams.plots, sound, frictionMap, seek, state: () => page.state }; // for tests and the console
 $$("stories")?.addEventListener("click", (event) => { // in a page embedded in a report, a link would lead to the report
   const link = event.target.closest("a");
   if (!link || !isEmbedded) return;

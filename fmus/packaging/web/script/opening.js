@@ -222,7 +222,7 @@ export async function showOpening(session) {
       chart.box(place - 0.7, high - 0.7, Math.max(1.4, (right - left) / STEP_BINS + 0.5), low - high + 1.4, palette.slip);
       previous = [place, low];
     }
-    chart.text(exact.steps === 1 ? "true sticking: one step" : "true sticking: a step for each half-swing, one for the rest", x(0.02 * stop), h(-0.6) + 12, { colour: palette.ink, size: 11.5 });
+    chart.text(exact.steps === 1 ? "true sticking: one step" : "true sticking: a step for each half-swing, one for the rest", x(0.02 * stop), h(-0.6) + 10, { colour: palette.ink, size: 11.5 });
     if (sign.ends.length > 20 && stop > 3) chart.text("sign(v): tiny at every turn", x(0.02 * stop), h(-5.2), { colour: palette.slip, size: 11.5 });
     const end = stop - TIME_AFTER_REST; // about where the true mass stops
     if (end > 2.5 && sign.now?.t > end + 0.1) chart.text("here it should stop: 10 µs", x(end) - 6, h(-5.2), { colour: palette.slip, size: 11.5, align: "right" });

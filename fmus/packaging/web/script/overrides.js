@@ -1,6 +1,6 @@
 // Changes of the state by the user: values, changes during playback, enumerations, comparison.
 
-import { defaultState, effectiveValues, findVariable, setValue } from "./state.js";
+import { comparisonSettings, defaultState, effectiveValues, findVariable, setValue } from "./state.js";
 
 const CHATTERING_RTOL = 1e-3; // the default of many solvers
 export const MIN_CHANGE_SPACING = 1 / 400; // of the run; closer changes of a variable replace each other
@@ -31,6 +31,17 @@ export function chooseItem(modelInfo, values, name, value) {
   if (exact === undefined || hybrid === undefined || now["solver.method"] !== exact || now.friction === hybrid) return;
   if (name === "friction") values["solver.method"] = method.items.find((item) => item.value !== exact)?.value ?? exact;
   else values.friction = hybrid;
+}
+
+// Set an enumeration of the second run. The choice is kept even if it is the default, which the first run may not have.
+export function chooseForComparison(models, state, name, value) {
+  const other = models.get(state.comparison.model);
+  const before = effectiveValues(other, comparisonSettings(models, state).values);
+  const values = { ...before };
+  chooseItem(other, values, name, value);
+  for (const [key, chosen] of Object.entries(effectiveValues(other, values))) {
+    if (key === name || chosen !== before[key]) state.comparison.values[key] = chosen;
+  }
 }
 
 // The value of an enumeration item by its label.

@@ -1,10 +1,14 @@
 // The content of the diagrams.
 
+import { heatOf } from "./energy_budget.js";
 import { difference, turningPoints } from "./measure.js";
 import { bounds, formatNumber } from "./plot.js";
 
 const MAX_MARKS = 400; // event marks
 const ENVELOPE_POINTS = 200;
+const BAND_TEXT = "friction can hold it in between";
+const BAR_WIDTH = 4; // px
+const PHASE_BAND_TEXT = "friction can hold it here";
 const MAX_PLOTTED_ROWS = 8000; // longer runs are plotted at grid points and events only
 
 // Return the diagrams as [{key, title, content}]. A diagram keeps its key from one state to the next. The key is the name
@@ -17,11 +21,12 @@ export function buildPanels(session, state, options) {
   const energy = modelInfo.variables.find(({ unit, causality }) => unit === "J" && causality === "output")?.name;
   const forces = [...new Set([body.friction, ...(body.contacts ?? [])].filter(Boolean))];
   const inputs = main.inputs.filter((name) => !names.includes(name) && main.largestMagnitude(name) > 0);
-  const panels = names.map((name) => timePanel(session, state, options, name));
-  panels.push(phasePanel(session, body));
+  const bands = session.holdingBands.find(state, body);
+  const panels = names.map((name) => timePanel(session, state, { ...options, bands }, name));
+  panels.push(phasePanel(session, body, bands));
   if (body.slip) panels.push(lawPanel(session, body));
   panels.push(timePanel(session, state, options, "solver.h", ".step", true));
-  if (energy) panels.push(timePanel(session, state, options, energy));
+  if (energy) panels.push(energyPanel(session, state, options, energy));
   panels.push(...[...forces, ...inputs].map((name) => timePanel(session, state, options, name)));
   if (modelInfo.contacts.length > 1) panels.push(stickingPanel(main, state));
   const error = errorPanel(session, body, state);
@@ -43,10 +48,14 @@ function describeRange({ content }, main) {
 // events and the end are enough, except for the step size.
 function curveData(run, { name, factor }) {
   if (!run.columns[name]) return null;
-  const isComplete = run.time.length < MAX_PLOTTED_ROWS || name === "solver.h";
-  const rows = isComplete ? null : [...new Set([...run.grid, ...run.events.map(({ row }) => row), run.time.length - 1])].sort((a, b) => a - b);
-  const [x, y] = [run.time, run.columns[name]].map((column) => (isComplete ? column : rows.map((row) => column[row])));
+  const { x, y } = plottedRows(run, run.columns[name], name === "solver.h");
   return { x, y: factor === 1 ? y : y.map((value) => value * factor) };
+}
+
+function plottedRows(run, values, isComplete = false) {
+  if (isComplete || run.time.length < MAX_PLOTTED_ROWS) return { x: run.time, y: values };
+  const rows = [...new Set([...run.grid, ...run.events.map(({ row }) => row), run.time.length - 1])].sort((a, b) => a - b);
+  return { x: rows.map((row) => run.time[row]), y: rows.map((row) => values[row]) };
 }
 
 // One curve per run from curveOf(run). The main run comes last, so it is drawn on top.
@@ -65,18 +74,51 @@ function timePanel(session, state, options, name, key = name, log = false) {
   const variable = main.fmu.variables.get(name);
   const { factor, display_unit, text, symbol } = variable;
   const body = main.fmu.modelInfo.bodies[state.body];
-  const extras = name === body.position ? positionCurves(main, body, options, factor, state.stop) : [];
+  const isPosition = name === body.position;
+  const extras = isPosition ? positionCurves(main, body, options, factor, state.stop) : options.extras ?? [];
   const curves = [...extras, ...runCurves(session.runs, (run) => curveData(run, variable))];
   const y = { ...bounds(curves.map((curve) => curve.y), log), log };
   const x = { low: 0, high: state.stop, label: "t in s" };
   const { contacts } = main.fmu.modelInfo;
   const own = contacts.filter((contact) => contact.name === name);
   const shaded = own.length ? own : contacts.filter((contact) => body.contacts?.includes(contact.name));
-  const content = { x, y, curves, ...stickingBands(main, shaded), marks: findMarks(main, state, name === body.position) };
+  const content = { x, y, curves, ...stickingBands(main, shaded), marks: findMarks(main, state, isPosition) };
+  if (isPosition && options.bands) content.curves = [...bandCurves(main, body, options.bands, factor, state.stop), ...curves]; // the axis ignores them
   const isFriction = name === body.friction || contacts.some((contact) => contact.name === name);
   const arrow = name === body.friction && body.kind !== "none" ? `friction on the body, −${name}` : "";
   const sign = isFriction ? `; the arrow is −${name}` : "";
   return { key, name, title: `${text}${display_unit ? ` in ${display_unit}` : ""}${sign}`, symbol, factor, content, arrow };
+}
+
+// The edges of the band in which friction can hold the body, over time.
+function bandCurves(run, body, bands, factor, stop) {
+  return ["low", "high"].map((edge) => {
+    const [x, y] = [[], []];
+    bands.forEach((band, i) => {
+      const end = bands[i + 1]?.t ?? stop;
+      const steps = body.driver ? run.grid.map((row) => run.time[row]).filter((t) => t > band.t && t < end) : [];
+      for (const t of [band.t, ...steps, end].filter((at) => run.hasReached(at))) {
+        x.push(t);
+        y.push((band[edge] + (body.driver ? run.at(body.driver, t) : 0)) * factor);
+      }
+    });
+    return { x, y, colour: "stick", dash: [6, 3], width: 1, legend: BAND_TEXT };
+  });
+}
+
+// Kinetic and potential energy, the heat, and both together, which change by work from outside only.
+function energyPanel(session, state, options, name) {
+  const { main } = session.runs;
+  const variable = main.fmu.variables.get(name);
+  const heat = heatOf(main, name, main.fmu.modelInfo.bodies);
+  if (!heat) return timePanel(session, state, options, name);
+  const sum = heat.map((joule, row) => joule + main.columns[name][row]);
+  const extras = [
+    { ...plottedRows(main, sum), colour: "soft", dash: [5, 3], width: 1, legend: "energy and heat together" },
+    { ...plottedRows(main, heat), colour: "heat", legend: "heat" },
+  ];
+  const panel = timePanel(session, state, { ...options, extras }, name);
+  return { ...panel, title: `${variable.text}, and heat, in ${variable.display_unit}` };
 }
 
 // The intervals in which contacts stick as {bands, rows}: each of several contacts has a row with its name.
@@ -153,24 +195,27 @@ function lawPanel({ runs }, body) {
   return { key: ".law", title: `friction law: ${friction.name} in ${friction.display_unit} against ${slip.name}`, symbol: "", content, phase: [slip, friction] };
 }
 
-// One curve for the forces that hold the body and one for each slip, so that no line joins the two.
+// One line for the forces that hold the body, as far as the run shows them, and one curve for each slip, so that no line
+// joins the two.
 function lawCurves(run, body, slip, friction) {
   const [x, y] = [slip, friction].map(({ name, factor }) => run.columns[name].map((value) => value * factor));
   const modes = run.columns[body.mode];
   const isStuck = (row) => modes?.[row] === 0;
-  const held = { x: [], y: [], colour: "stick", legend: "holds", width: 3 };
+  const largest = run.largestMagnitude(friction.name) * friction.factor;
+  const held = { x: [0, 0], y: [-largest, largest], colour: "stick", legend: "holds", width: 3 };
   const slips = [];
   for (let row = 0; row < x.length; row++) {
-    if (!isStuck(row) && (row === 0 || isStuck(row - 1) || modes?.[row] !== modes?.[row - 1])) slips.push({ x: [], y: [], colour: "slip", legend: "slips" });
-    const curve = isStuck(row) ? held : slips.at(-1);
-    curve.x.push(x[row]);
-    curve.y.push(y[row]);
+    if (isStuck(row)) continue;
+    if (row === 0 || isStuck(row - 1) || modes?.[row] !== modes?.[row - 1]) slips.push({ x: [], y: [], colour: "slip", legend: "slips" });
+    slips.at(-1).x.push(x[row]);
+    slips.at(-1).y.push(y[row]);
   }
-  return [held, ...slips].filter((curve) => curve.x.length);
+  return modes?.includes(0) ? [held, ...slips] : slips;
 }
 
-// Speed over position.
-function phasePanel(session, body) {
+// Speed over position. The band in which friction can hold the body is a line at speed zero; one that moves is drawn with
+// the cursor.
+function phasePanel(session, body, bands) {
   const [x, v] = [body.position, body.speed].map((name) => session.runs.main.fmu.variables.get(name));
   const has = (run) => run.columns[x.name] && run.columns[v.name];
   const curves = runCurves(session.runs, (run) => has(run) && { x: curveData(run, x).y, y: curveData(run, v).y, width: 1.2 });
@@ -178,7 +223,15 @@ function phasePanel(session, body) {
     x: { ...bounds(curves.map((curve) => curve.x)), label: `${x.name}${x.display_unit ? ` in ${x.display_unit}` : ""}` },
     y: bounds(curves.map((curve) => curve.y)), curves,
   };
-  return { key: ".phase", title: `phase plane: ${v.name} in ${v.display_unit} against ${x.name}`, symbol: "", content, phase: [x, v] };
+  const isFixed = bands?.length === 1 && !body.driver;
+  const line = { colour: "stick", width: BAR_WIDTH };
+  if (isFixed) content.curves = [{ x: [bands[0].low * x.factor, bands[0].high * x.factor], y: [0, 0], ...line, legend: PHASE_BAND_TEXT }, ...curves];
+  const movingBand = bands && !isFixed && ((run, t) => {
+    const { low, high } = bands.findLast((band) => band.t <= t);
+    const shift = body.driver ? run.at(body.driver, t) : 0;
+    return { x: [low, high].map((edge) => (edge + shift) * x.factor), y: [0, 0], ...line };
+  });
+  return { key: ".phase", title: `phase plane: ${v.name} in ${v.display_unit} against ${x.name}`, symbol: "", content, phase: [x, v], movingBand };
 }
 
 // Errors of the runs against the closed form, or else the difference between the two runs. Null if a run has failed: an
@@ -208,18 +261,19 @@ function errorPanel(session, body, state) {
 }
 
 // The entries of the legend for a diagram.
-export function legendOf({ content, arrow }) {
+export function legendOf({ content, arrow, movingBand }) {
   const { curves, bands = [], marks = [] } = content;
-  const lines = curves.filter(({ legend }) => legend).map(({ colour, dash, dots, legend }) => ({ kind: dots ? "dots" : "line", colour, dash, text: legend }));
+  const lines = curves.filter(({ legend }) => legend).map(({ colour, dash, dots, width, legend }) => ({ kind: dots ? "dots" : width >= BAR_WIDTH ? "bar" : "line", colour, dash, text: legend }));
   const isStuck = bands.length > 0 && [{ kind: "band", colour: "hold", text: "sticks" }];
   const isEvent = marks.some(({ label }) => !label) && [{ kind: "mark", colour: "event", text: "event" }];
   const isChange = marks.some(({ label }) => label) && [{ kind: "change", colour: "event", text: "change of a value" }];
   const isArrow = arrow && [{ kind: "arrow", colour: "ink", text: arrow }];
+  if (movingBand) lines.push({ kind: "bar", colour: "stick", text: PHASE_BAND_TEXT });
   return [...lines.reverse(), ...(isStuck || []), ...(isEvent || []), ...(isChange || []), ...(isArrow || [])];
 }
 
 // The cursor of a diagram and the values there: {cursor, readings [{text, colour}]}.
-export function cursorReadings({ phase, name, factor }, { runs }, t) {
+export function cursorReadings({ phase, name, factor, movingBand }, { runs }, t) {
   const [points, readings] = [[], []];
   for (const [run, colour] of [[runs.main, "a"], [runs.comparison, "b"]]) {
     if (!run?.time.length || (run.failure && t > run.time.at(-1)) || !(phase ?? [{ name }]).every((variable) => run.columns[variable.name])) continue;
@@ -227,5 +281,5 @@ export function cursorReadings({ phase, name, factor }, { runs }, t) {
     points.push({ x, y, colour });
     if (!phase) readings.push({ text: formatNumber(y), colour });
   }
-  return { cursor: { x: phase ? undefined : t, points }, readings };
+  return { cursor: { x: phase ? undefined : t, points, line: movingBand ? movingBand(runs.main, t) : null }, readings };
 }

@@ -6,6 +6,9 @@ const FONT_SIZE = 11; // px, for which the margins at the texts of the axes are 
 const axisText = { size: FONT_SIZE, left: 58, bottom: 22 }; // the font size now, and the margins for it
 const TICK_COUNT = 5;
 const ROW_GAP = 4; // above and below a shaded row
+const CURSOR_SIZE = 3.5; // px
+const LEAST_DRAG = 8; // px; a shorter one is a click
+const [KEY_ZOOM, KEY_PAN] = [0.7, 0.2]; // of the range shown
 
 // Round numbers from low to high, about `count` of them.
 export function ticks(low, high, count = TICK_COUNT) {
@@ -34,6 +37,13 @@ export function formatNumber(value, digits = 4) {
     text = factor === 1 ? formatPower(Number(power)) : `${factor}·${formatPower(Number(power))}`;
   }
   return text.replace(/-/g, "−");
+}
+
+// Format a tick with as many digits as distinguish it from its neighbours.
+function formatTick(value, all) {
+  const largest = Math.max(...all.map(Math.abs));
+  const digits = all.length > 1 ? Math.ceil(Math.log10(largest / (all[1] - all[0]))) + 1 : 0;
+  return formatNumber(value, Math.min(Math.max(digits, 4), 15));
 }
 
 // Reduce a curve to pixels [x, y, x, y, ...]: per column of pixels the first, lowest, highest and last point. `scale`
@@ -67,39 +77,91 @@ export function readColours() {
   const style = getComputedStyle(document.documentElement);
   axisText.size = parseFloat(style.getPropertyValue("--plot-text")) || FONT_SIZE;
   [axisText.left, axisText.bottom] = [58, 22].map((margin) => (margin * axisText.size) / FONT_SIZE);
-  for (const name of ["a", "b", "ghost", "line", "soft", "hold", "event", "cursor", "measured", "stick", "slip"]) colours[name] = style.getPropertyValue(`--${name}`).trim();
+  for (const name of ["a", "b", "ghost", "line", "soft", "hold", "event", "cursor", "measured", "heat", "stick", "slip"]) colours[name] = style.getPropertyValue(`--${name}`).trim();
 }
 
 export class Plot {
-  // Fills the element `host`. Calls onSeek(x) when a pointer moves the cursor.
-  constructor(host, onSeek) {
-    this.host = host;
+  // Fills the element `host`. Calls onZoom({x, y}) with the ranges of a rectangle that is drawn with the mouse, or
+  // onZoom(null) to show all; and onSeek(x), unless it is null, when a click or a finger moves the cursor.
+  constructor(host, onSeek, onZoom) {
+    Object.assign(this, { host, onSeek, onZoom });
     this.curveCanvas = host.appendChild(document.createElement("canvas"));
     this.curveCanvas.setAttribute("role", "img");
     this.cursorCanvas = host.appendChild(document.createElement("canvas"));
     this.cursorCanvas.setAttribute("aria-hidden", "true");
     this.paints = 0; // number of redraws, for tests
-    this.content = this.cursor = null;
+    this.content = this.cursor = this.rectangle = null;
     this.width = this.height = 0;
     new ResizeObserver(([{ contentRect: { width, height } }]) => { // reading clientWidth instead would force a layout
       Object.assign(this, { width, height });
       this.paint();
     }).observe(host);
-    if (onSeek) this.listen(onSeek);
+    this.listen();
+    host.addEventListener("keydown", (event) => this.pressKey(event));
   }
 
-  listen(onSeek) {
-    const seek = (event) => {
-      const { left, width } = this.host.getBoundingClientRect();
-      const { low, high } = this.content.x;
-      const fraction = (event.clientX - left - axisText.left) / (width - axisText.left - RIGHT);
-      onSeek(low + Math.min(Math.max(fraction, 0), 1) * (high - low));
+  listen() {
+    const at = (event) => {
+      const { left, top } = this.host.getBoundingClientRect();
+      const clamp = (value, low, high) => Math.min(Math.max(value, low), high);
+      return [clamp(event.clientX - left, axisText.left, this.width - RIGHT), clamp(event.clientY - top, TOP, this.height - axisText.bottom)];
+    };
+    const seek = (event) => this.onSeek?.(this.valuesAt(...at(event)).x);
+    const showRectangle = (rectangle) => {
+      this.rectangle = rectangle;
+      if (this.cursor) this.moveCursor(this.cursor);
     };
     this.host.addEventListener("pointerdown", (event) => {
+      if (event.button) return;
       this.host.setPointerCapture(event.pointerId);
-      seek(event);
+      if (event.pointerType === "mouse") showRectangle([at(event), at(event)]);
+      else seek(event);
     });
-    this.host.addEventListener("pointermove", (event) => event.buttons && seek(event));
+    this.host.addEventListener("pointermove", (event) => {
+      if (this.rectangle) showRectangle([this.rectangle[0], at(event)]);
+      else if (event.buttons && event.pointerType !== "mouse") seek(event);
+    });
+    this.host.addEventListener("pointerup", (event) => {
+      if (!this.rectangle) return;
+      const [from, to] = this.rectangle;
+      showRectangle(null);
+      const [start, end] = [from, to].map(([x, y]) => this.valuesAt(x, y));
+      const range = (key, i) => (Math.abs(to[i] - from[i]) >= LEAST_DRAG ? { low: Math.min(start[key], end[key]), high: Math.max(start[key], end[key]) } : null);
+      const [x, y] = [range("x", 0), range("y", 1)];
+      if (x || y) this.onZoom({ x, y });
+      else seek(event);
+    });
+    this.host.addEventListener("pointercancel", () => showRectangle(null));
+    this.host.addEventListener("dblclick", () => this.onZoom(null));
+    this.cancelRectangle = () => showRectangle(null);
+  }
+
+  // The keys + and - enlarge and reduce, arrows move the part shown, and Escape shows all.
+  pressKey(event) {
+    if (event.ctrlKey || event.metaKey || event.altKey || !this.content) return;
+    const pan = { ArrowLeft: [-KEY_PAN, 0], ArrowRight: [KEY_PAN, 0], ArrowDown: [0, -KEY_PAN], ArrowUp: [0, KEY_PAN] }[event.key] ?? [0, 0];
+    const factor = { "+": KEY_ZOOM, "=": KEY_ZOOM, "-": 1 / KEY_ZOOM }[event.key] ?? 1;
+    if (event.key === "Escape") [this.cancelRectangle(), this.onZoom(null)];
+    else if (factor === 1 && !pan.some(Boolean)) return;
+    else {
+      const [left, right, top, bottom] = [axisText.left, this.width - RIGHT, TOP, this.height - axisText.bottom];
+      const [x, y] = [(left + right) / 2 + pan[0] * (right - left), (top + bottom) / 2 - pan[1] * (bottom - top)];
+      const [across, down] = [right - left, bottom - top].map((size) => (factor * size) / 2);
+      const [start, end] = [this.valuesAt(x - across, y + down), this.valuesAt(x + across, y - down)];
+      this.onZoom({ x: { low: start.x, high: end.x }, y: { low: start.y, high: end.y } });
+    }
+    event.preventDefault();
+  }
+
+  // The values {x, y} at a point of the canvas.
+  valuesAt(px, py) {
+    const { x, y } = this.content;
+    const [low, high] = [y.low, y.high].map((value) => (y.log ? Math.log10(value) : value));
+    const value = high - ((py - TOP) / (this.height - TOP - axisText.bottom)) * (high - low);
+    return {
+      x: x.low + ((px - axisText.left) / (this.width - axisText.left - RIGHT)) * (x.high - x.low),
+      y: y.log ? 10 ** value : value,
+    };
   }
 
   // content: x and y {low, high, label, log, hidden}, curves [{x, y, colour, dash, dots}], shaded bands [{from, to, row}]
@@ -111,15 +173,27 @@ export class Plot {
     this.paint();
   }
 
-  // Draw the cursor: x, and points {x, y, colour} on the curves.
+  // Draw the cursor: x, points {x, y, colour} on the curves, and a line; and the rectangle that is being drawn.
   moveCursor(cursor) {
     this.cursor = cursor;
     if (!this.content || !this.width) return;
     const { width, height } = this;
     const context = this.prepareCanvas(this.cursorCanvas);
     const scale = this.scales(width, height);
+    context.save();
+    context.beginPath();
+    context.rect(axisText.left - CURSOR_SIZE, 0, width - axisText.left - RIGHT + 2 * CURSOR_SIZE, height - axisText.bottom + CURSOR_SIZE);
+    context.clip();
     if (cursor.x !== undefined) line(context, colours.cursor, 1, [scale.x(cursor.x), TOP, scale.x(cursor.x), height - axisText.bottom]);
-    for (const { x, y, colour } of cursor.points) dot(context, colours[colour], scale.x(x), scale.y(y), 3.5);
+    if (cursor.line) this.curve(context, cursor.line, scale);
+    for (const { x, y, colour } of cursor.points) dot(context, colours[colour], scale.x(x), scale.y(y), CURSOR_SIZE);
+    context.restore();
+    if (!this.rectangle) return;
+    const [[left, top], [right, bottom]] = this.rectangle;
+    context.strokeStyle = colours.cursor;
+    context.setLineDash([4, 3]);
+    context.strokeRect(left, top, right - left, bottom - top);
+    context.setLineDash([]);
   }
 
   paint() {
@@ -169,15 +243,18 @@ export class Plot {
     context.textAlign = "right";
     context.textBaseline = "middle";
     if (y.hidden) rows.forEach((name, row) => context.fillText(name, axisText.left - 6, TOP + (row + 0.5) * rowHeight, axisText.left - 8));
-    for (const value of y.hidden ? [] : y.log ? decades(y.low, y.high) : ticks(y.low, y.high)) {
+    const isDecade = y.log && y.high / y.low >= 10;
+    const values = y.hidden ? [] : isDecade ? decades(y.low, y.high) : ticks(y.low, y.high);
+    for (const value of values) {
       line(context, colours.line, 1, [axisText.left, scale.y(value), right, scale.y(value)]);
-      context.fillText(y.log ? formatPower(Math.round(Math.log10(value))) : formatNumber(value), axisText.left - 6, scale.y(value));
+      context.fillText(isDecade ? formatPower(Math.round(Math.log10(value))) : formatTick(value, values), axisText.left - 6, scale.y(value));
     }
     context.textAlign = "center";
     context.textBaseline = "alphabetic";
-    for (const value of ticks(x.low, x.high, width < 420 ? 4 : 8)) {
+    const times = ticks(x.low, x.high, width < 420 ? 4 : 8);
+    for (const value of times) {
       line(context, colours.line, 1, [scale.x(value), TOP, scale.x(value), bottom]);
-      const text = formatNumber(value);
+      const text = formatTick(value, times);
       const half = context.measureText(text).width / 2;
       if (scale.x(value) + half < width - context.measureText(x.label).width - 8) context.fillText(text, scale.x(value), height - 6);
     }

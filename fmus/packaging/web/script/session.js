@@ -8,6 +8,7 @@
 //   reference    the preview or main run, if the default method is exact
 
 import { Fmu, FmuError } from "./fmu.js";
+import { HoldingBands } from "./holding_band.js";
 import { Run } from "./run.js";
 import { comparisonSettings, findVariable, settableVariables, valueAt } from "./state.js";
 import { load } from "./wasm.js";
@@ -25,6 +26,7 @@ export class Session {
     this.fmus = new Map();
     this.stopTimes = new Map();
     this.runs = {};
+    this.holdingBands = new HoldingBands(this);
   }
 
   // Compile a model, unless it is compiled already.

@@ -1,0 +1,55 @@
+"""The file of the live page: its size, what it loads, and its script."""
+
+import re
+
+from commands import build
+
+from fmus.packaging.web.html_page import HERE, MODULES
+
+
+def test_five_models_take_less_than_600_kb_and_load_nothing(page):
+    text = page.file.read_text(encoding="utf-8")
+    assert len(text.encode()) < 600_000
+    assert "default-src 'none'" in text
+    assert not re.findall(r"(?:src|href)\s*=\s*[\"'](?!data:|#)", text)
+    page.open(anew=True)
+    refused = "fetch('data:text/plain,x').then(() => 'came', () => 'refused')"
+    assert page.run(refused) == "refused"
+    assert page.browser.console.pop()  # reported by the content security policy
+    assert len(page.browser.console) <= 1
+    page.browser.console.clear()
+
+
+def test_a_model_unsuitable_for_the_page_is_reported_in_one_sentence(tmp_path):
+    for words, sentence in (
+        (("--web", "--native"), "--web writes a page, not FMUs: remove --native, --platform and --fmi 3."),
+        (("--web", "nobody"), "There is no model 'nobody'"),
+        (("--web", "smd", "--law", "sign"), "smd has no friction law 'sign'"),
+    ):
+        done = build(*words, "--out", str(tmp_path))
+        assert done.returncode
+        assert sentence in done.stderr
+        assert "Traceback" not in done.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_every_module_imports_existing_names_from_earlier_modules_only():
+    exports = {}
+    assert {path.stem for path in (HERE / "script").glob("*.js")} == set(MODULES)
+    for name in MODULES:
+        text = (HERE / "script" / f"{name}.js").read_text(encoding="utf-8")
+        for names, source in re.findall(r'^import \{ ([^}]+) \} from "\./(\w+)\.js";$', text, re.M):
+            assert set(names.split(", ")) <= exports[source], (name, source)
+            body = re.sub(r"^import .*$", "", text, flags=re.M)
+            assert all(re.search(rf"\b{item}\b", body) for item in names.split(", ")), (name, names)
+        exports[name] = set(re.findall(r"^export (?:async )?(?:function|class|const) (\w+)", text, re.M))
+
+
+def test_only_one_model_is_compiled_before_the_first_picture(page):
+    count = "const { instantiate } = WebAssembly; globalThis.compiled = 0;"
+    count += "WebAssembly.instantiate = (...all) => (compiled++, instantiate(...all))"
+    script = page.browser.call("Page.addScriptToEvaluateOnNewDocument", source=count)
+    page.open(anew=True)
+    page.browser.call("Page.removeScriptToEvaluateOnNewDocument", **script)
+    assert page.run("compiled") == 1
+    assert page.run("app.plots.get('x').plot.paints") > 0

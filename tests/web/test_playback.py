@@ -1,0 +1,133 @@
+"""Playback of the live page: changes, pulls and kicks on the way, and jumps to events."""
+
+import pytest
+import web_page
+from models import MODELS, declared
+
+
+def test_a_change_during_playback_acts_from_then_on_only(page):
+    page.open(".model=smd")
+    positions = page.run("[...app.session.runs.main.columns.x]")
+    page.click("#play")
+    page.wait("app.state().t > 0.2")
+    page.type_number("c", "20")
+    page.click("#play")
+    (change,) = page.run("app.state().changes")
+    assert change["name"] == "c"
+    assert 0.2 < change["t"] < 4
+    assert page.run("app.state().values") == {}
+    now = page.when_done("({ t: app.session.runs.main.time, x: app.session.runs.main.columns.x })")
+    before = [x for t, x in zip(now["t"], now["x"], strict=True) if t < change["t"]]
+    assert before == positions[: len(before)]
+    assert max(map(abs, now["x"][-200:])) < 0.1 * max(map(abs, positions[-200:]))
+    assert page.run("app.session.runs.unchanged.columns.x.length") == len(positions)
+
+
+def test_playback_repaints_no_curve_and_a_curve_is_limited_by_the_pixels(page):
+    page.open(".model=pacejka&x_m=0.001&solver.method=2&solver.rtol=0.001&.t=1")
+    assert page.run("app.session.runs.main.time.length") > 60000
+    painted = "[...app.plots.values()].reduce((sum, { plot }) => sum + plot.paints, 0)"
+    before = page.run(painted)
+    page.click("#play")
+    page.wait("app.state().t > 1.2")
+    page.click("#play")
+    assert page.run(painted) == before
+    width = page.run("app.plots.get('.step').plot.host.clientWidth")
+    count = (
+        "(() => { const { plot, panel } = app.plots.get('.step'); const [curve] = panel.content.curves;"
+        "let points = 0; const context = { lineTo: () => points++ };"
+        "const all = new Proxy(context, { get: (it, key) => it[key] ?? (() => ({ width: 0 })) });"
+        "plot.curve(all, curve, plot.scales(plot.host.clientWidth, plot.host.clientHeight)); return points })()"
+    )
+    assert width < page.run(count) < 4 * width
+
+
+def test_pausing_keeps_the_values_in_force_and_changes_edit_those(page):
+    page.open(".model=smd")
+    page.click("#play")
+    page.wait("app.state().t > 0.1")
+    page.type_number("c", "20")
+    page.click("#play")
+    shown = "([field, slider]) => [Number(field.value), slider.getAttribute('aria-valuetext')]"
+    find = "[...document.querySelectorAll('.field:has(#field-c) input')]"
+    assert page.run(f"({shown})({find})") == [20, "20 N·s/m"]
+    page.type_number("c", "30")
+    assert page.run("[app.state().values, app.state().changes.map(({ value }) => value)]") == [{}, [30]]
+    page.seek(0)
+    page.run(web_page.DRAWN)
+    assert page.run(f"({shown})({find})")[0] == declared("smd")["c"].start
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_a_dragged_body_starts_where_it_is_released(page, name):
+    page.browser.size(1280)
+    page.open(f".model={name}")
+    body = page.run("app.session.models.get(app.state().model).bodies[0]")
+    x, y = page.middle("#mechanism .body")
+    page.browser.mouse("Pressed", x, y)
+    page.browser.mouse("Moved", x + 30, y)
+    page.browser.mouse("Moved", x + 60, y)
+    page.wait(f"app.state().values[{body['start']!r}] !== undefined")
+    start = page.run(f"app.state().values[{body['start']!r}]")
+    page.browser.mouse("Released", x + 60, y, buttons=0)
+    page.wait("app.state().t > 0")
+    page.click("#play")
+    assert start > declared(name)[body["start"]].start
+    assert page.when_done(f"app.session.runs.main.columns[{body['position']!r}][0]") == start
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_dragging_a_moving_body_applies_a_force_until_release(page, name):
+    page.browser.size(1280)
+    page.open(f".model={name}&.t=0.3")
+    body = page.run("app.session.models.get(app.state().model).bodies[0]")
+    x, y = page.middle("#mechanism .body")
+    page.browser.mouse("Pressed", x, y)
+    page.browser.mouse("Moved", x + 80, y)
+    page.wait("app.state().changes.length > 0")
+    page.browser.mouse("Released", x + 80, y, buttons=0)
+    page.click("#play")
+    changes = page.when_done("app.state().changes")
+    assert {change["name"] for change in changes} == {body["input"]}
+    assert any(change["value"] for change in changes)
+    assert changes[-1]["value"] == 0
+    apart = "app.session.runs.main.columns[p].at(-1) !== app.session.runs.unchanged.columns[p].at(-1)"
+    assert page.run(f"(p => {apart})({body['position']!r})")
+
+
+def test_dragging_with_a_slow_method_never_goes_back_in_time(page):
+    """The next force waits for the previous run."""
+    page.browser.size(1280)
+    page.open(".model=pacejka&x_m=0.001&solver.method=2&solver.rtol=0.001&.t=8")
+    x, y = page.middle("#mechanism .body")
+    page.browser.mouse("Pressed", x, y)
+    for way in (40, 80, 120):
+        page.browser.mouse("Moved", x + way, y)
+    page.wait("app.state().changes.length > 1")
+    page.browser.mouse("Released", x + 120, y, buttons=0)
+    page.click("#play")
+    first, *_, last = page.when_done("app.state().changes")
+    assert 8 <= first["t"] < last["t"] <= page.run("app.state().t") + 0.1
+    assert (first["name"], last["value"]) == ("F_ext", 0)
+
+
+def test_a_kick_is_a_push_of_finite_duration(page):
+    page.open(".model=stickslip&.t=1")
+    page.click("#kick")
+    first, last = page.when_done("app.state().changes")
+    assert (first["name"], first["t"], last["value"]) == ("F_ext", 1, 0)
+    assert 1 < last["t"] < 2
+    assert page.run("Math.max(...app.session.runs.main.columns.v.slice(100, 300))") > 0
+
+
+def test_the_buttons_jump_to_the_next_and_the_previous_event(page):
+    page.open(".model=coulomb")
+    times = page.run("app.session.runs.main.events.map(({ t }) => t)")
+    seen = []
+    for _ in times:
+        page.click("#next-event")
+        seen.append(page.run("app.state().t"))
+    assert seen == times
+    page.wait("document.getElementById('next-event').disabled")
+    page.click("#previous-event")
+    assert page.run("app.state().t") == times[-2]

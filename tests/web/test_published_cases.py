@@ -1,0 +1,46 @@
+"""Published cases on the live page."""
+
+from dataclasses import replace
+
+import native_fmus
+import pytest
+import web_page
+
+from harness.running.fmi2 import simulate
+from harness.running.run_spec import spec_from_scene
+from harness.scenes.scene import load_scene, shipped_scenes
+from harness.studies.run.study import ANALYSES
+
+
+def test_every_published_case_measures_the_same_as_the_terminal(page):
+    """Within 0.1 %, except where chatter makes the steps depend on rounding; the published values are shown as well."""
+    page.open()
+    names = page.run("[...app.session.presets.keys()]")
+    scenes = {scene.name: scene for scene in map(load_scene, shipped_scenes()) if scene.published}
+    assert sorted(names) == sorted(scenes)
+    for name, scene in scenes.items():
+        page.choose("preset", name)
+        native = native_fmus.build_native_fmus() / f"{scene.model}.fmu"  # runs while the page waits for more work
+        run = simulate(replace(spec_from_scene(scene), fmu=native, repeat=1))
+        page.wait(
+            f"app.state().preset === {name!r} && document.querySelector('#tables caption')?.textContent === "
+            "app.session.presets.get(app.state().preset).title"
+        )
+        rows = iter(page.table(scene.title).values())
+        quantities = {item.name: item for kind in scene.analyses for item in ANALYSES[kind](run, scene).quantities}
+        for figure, published in scene.published.items():
+            if figure == "source":
+                continue
+            measured, published_values, _ = next(rows)
+            number = published[0] if isinstance(published, tuple) else published
+            assert (
+                published_values == number if isinstance(number, str) else float(published_values.split()[0]) == number
+            ), (name, figure)
+            if figure != "run_time" and not (name == "stickslip-threshold" and "step" in figure):
+                size, *unit = measured.split()
+                unit = [text.replace("\N{MIDDLE DOT}", ".").replace("²", "2") for text in unit]
+                expected = quantities[figure]
+                value = expected.to_unit(*unit) if unit and unit != [expected.unit] else expected.value
+                assert web_page.number(size) == pytest.approx(value, rel=1e-3), (name, figure)
+    page.choose("preset", "")  # custom: values unchanged, but no published case any more
+    assert page.run("[app.state().preset, app.state().model]") == ["", scene.model]

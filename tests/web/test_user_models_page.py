@@ -1,0 +1,57 @@
+"""Models of users on a page of their own."""
+
+import web_page
+from build_cache import ROOT
+from models import EXAMPLE_MODELS, LARGER_MODELS
+
+from fmus.packaging.model_lookup import find_model
+from fmus.packaging.web.model_json import list_bodies
+
+
+def test_moving_bodies_of_any_model_are_read_from_its_declaration():
+    """For models that users might write: the kind of each body, and what acts on it."""
+    bodies_by_model = {path.stem: list_bodies(find_model(path).analysis) for path in (*EXAMPLE_MODELS, *LARGER_MODELS)}
+    kinds = {name: [body["kind"] for body in bodies_of_model] for name, bodies_of_model in bodies_by_model.items()}
+    assert kinds["viscous_pendulum"] == ["pendulum"]
+    assert kinds["rotor_brake"] == ["rotor"]
+    assert kinds["blocks"] == kinds["sleds"] == ["block", "block"]
+    assert kinds["clutch"] == ["none"]  # it has no position
+    assert {bodies_by_model[name][0]["friction"] for name in ("bumper", "lugre")} == {"F_drag", "F_friction"}  # smooth
+    assert bodies_by_model["sleds"][0]["linked"] == ["x2"]
+    assert bodies_by_model["viscous_pendulum"][0]["dampers"] == ["d"]
+
+
+def test_user_models_run_on_a_page_of_their_own(quiet):
+    files = [ROOT / "tests" / "example_models" / name for name in ("rotor_brake.py", "larger/blocks.py")]
+    page = web_page.Page(quiet, web_page.build_page("users", *map(str, files), "--method", "ode45"))
+    for path, count in zip(files, (1, 2), strict=True):
+        page.open(f".model={path.stem}")
+        assert page.run("[...document.getElementById('method').options].map(each => each.text)") == ["ode45"]
+        assert page.run("app.session.runs.main.failure") == ""
+        assert page.run("app.session.runs.main.events.length") > 2
+        assert page.run("document.querySelectorAll('#mechanism .body').length") == count
+        assert page.run("document.getElementById('body').parentElement.hidden") == (count == 1)
+    page.choose("body", 1)  # the plots of the motion come first here too
+    shown = "[...document.querySelectorAll('figure')].filter(each => !each.hidden).map(each => each.id).slice(0, 3)"
+    second = page.run("app.session.models.get('blocks').bodies[1]")
+    assert page.when_done(shown) == [f"panel-{second[name]}" for name in ("position", "speed", "acceleration")]
+
+
+def test_several_contacts_are_shaded_and_named_each(quiet):
+    """Bands, force panels and events of the lower block, on which two contacts act; its input is plotted if it acts."""
+    files = [ROOT / "tests" / "example_models" / name for name in ("rotor_brake.py", "larger/blocks.py")]
+    page = web_page.Page(quiet, web_page.build_page("users", *map(str, files), "--method", "ode45"))
+    page.open(".model=blocks&F_ext=3")
+    content = "app.plots.get({!r}).panel.content"
+    for key, rows in ((".sticking", ["F1", "F2"]), ("x1", ["F1", "F2"]), ("F1", ["F1"]), ("F2", ["F2"])):
+        assert page.run(f"{content.format(key)}.rows") == rows
+    sticks = page.run(f"{content.format('F2')}.bands")
+    speeds = "(({ time, columns: { v1, v2 } }) => time.map((t, i) => [t, v2[i] - v1[i]]))(app.session.runs.main)"
+    for t, slip in page.run(speeds):
+        if any(band["from"] < t < band["to"] for band in sticks):
+            assert abs(slip) < 1e-12
+    assert set(page.run(f"{content.format('F_ext')}.curves.at(-1).y")) == {3.0}
+    page.wait("[...document.querySelectorAll('caption')].some(each => each.textContent === 'Events')")
+    named = [cells[-1] for cells in page.table("Events").values()]
+    assert named[:2] == ["F1 slides forward", "F2 slides forward"]
+    assert {"F1 sticks", "F2 sticks"} <= {*named}
