@@ -1,25 +1,21 @@
 """No input ends a command in a traceback: it succeeds, or fails with one sentence and a specific exit status."""
 
-import io
 import os
 import random
 import re
 import subprocess
 import sys
 import threading
-from contextlib import chdir, redirect_stderr, redirect_stdout
-from functools import partial
+from contextlib import chdir
 from itertools import zip_longest
 from math import cos, exp
 from pathlib import Path
 
 import pytest
 from build_cache import ROOT
-from commands import stub_sheet
+from commands import blank_figures, harness
 
-from harness.commands import commands
 from harness.errors import HarnessError
-from harness.results.style import Figure
 from harness.scenes.scene import SceneKeys
 from harness.scenes.schema import field_names
 
@@ -98,16 +94,9 @@ SPANS = (
 
 
 def run_command(*arguments):
-    """Return exit status and output of a command run in this process; any unexpected exception fails the test."""
-    stderr, stdout = io.StringIO(), io.StringIO()
-    with redirect_stderr(stderr), redirect_stdout(stdout):
-        try:
-            commands.main([*map(str, arguments)], standalone_mode=True)
-        except HarnessError as error:
-            return error.status, str(error)
-        except SystemExit as end:
-            return end.code or 0, stderr.getvalue()
-    raise AssertionError("it does not end")
+    """Return exit status and error message of a command; any unexpected exception fails the test."""
+    done = harness(Path.cwd(), *arguments)
+    return done.returncode, done.stderr
 
 
 @pytest.fixture
@@ -175,7 +164,7 @@ def test_extreme_numbers_are_drawn_or_refused(workspace):
         check(*run_command("run", "mine.toml", "--quiet"), values)
 
 
-def test_any_table_content_is_compared_or_refused(workspace, monkeypatch):
+def test_any_table_content_is_compared_or_refused(workspace):
     names = []
     for i, text in enumerate(TABLES):
         (workspace / f"{i}.csv").write_text(text, encoding="utf-8", newline="")
@@ -184,12 +173,10 @@ def test_any_table_content_is_compared_or_refused(workspace, monkeypatch):
     (workspace / "\udcff$_{.csv").write_text("t [s],x [m]\n0,1\n1,2.5\n2,3\n")
     for name in (*names, "\udcff$_{.csv"):
         check(*run_command("compare", name, "good.csv", "--quiet"), (name, Path(name).read_text()[:200]))
-    monkeypatch.setattr(
-        "harness.studies.compare.figure.open_figure", partial(stub_sheet, Figure)
-    )  # the same tables are drawn
-    for name in names:
-        for pair in (("good.csv", name), (name, name)):
-            check(*run_command("compare", *pair, "--quiet"), (pair, Path(name).read_text()[:200]))
+    with blank_figures():  # the same tables are drawn
+        for name in names:
+            for pair in (("good.csv", name), (name, name)):
+                check(*run_command("compare", *pair, "--quiet"), (pair, Path(name).read_text()[:200]))
     check(*run_command("report", "--quiet"), "the report on all of these")
     assert (workspace / "results/report.html").stat().st_size > 1000
 
@@ -325,7 +312,8 @@ def test_a_record_is_read_from_a_named_pipe(tmp_path):
     os.mkfifo(tmp_path / "63")
     writer = threading.Thread(target=(tmp_path / "63").write_text, args=("t [s],x [m]\n0.5,1\n1.5,2\n",))
     writer.start()
-    assert run_command("decay", tmp_path / "63") == (2, "63 has 2 samples in this interval; at least 12 are required")
+    message = "Error: 63 has 2 samples in this interval; at least 12 are required\n"
+    assert run_command("decay", tmp_path / "63") == (2, message)
     writer.join()
 
 
