@@ -1,18 +1,12 @@
 """Fixtures: the FMUs, built once per test run, and a process that runs them."""
 
-import atexit
-import gc
 import os
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-if "PYTEST_XDIST_WORKER" in os.environ:
-    # Registered first, so called last: skip the teardown of a finished worker process, which takes seconds.
-    atexit.register(os._exit, 0)
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as in a command; must be set before numpy is imported
 
 import build_cache
-import fork_server
 import native_fmus
 import pytest
 from browser import CHROMIUM, Browser
@@ -27,18 +21,6 @@ def pytest_configure(config):
         folder = TemporaryDirectory()
         config.add_cleanup(folder.cleanup)
         build_cache.shared_folder = Path(folder.name)
-    fork_server.temporary_folder = build_cache.shared_folder
-
-
-def pytest_collection_finish():
-    """Exclude all existing objects from garbage collection; scanning them repeatedly takes seconds."""
-    gc.collect()
-    gc.freeze()
-
-
-def pytest_unconfigure():
-    """Exclude all objects again, because the interpreter would scan them five times at exit."""
-    pytest_collection_finish()
 
 
 @pytest.hookimpl(optionalhook=True)  # of pytest-xdist

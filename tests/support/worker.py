@@ -5,7 +5,6 @@ function, status]} if an FMI call does not return OK, or {"failed": traceback}.
 """
 
 import ctypes
-import inspect
 import itertools
 import json
 import os
@@ -24,18 +23,6 @@ from fmpy.fmi2 import (
     fmi2CallbackLoggerTYPE,
 )
 from fmpy.logging import addLoggerProxy
-
-
-def signature(thing, original=inspect.signature, cache={}, **how):  # noqa: B006 - used as a cache
-    """Cache inspect.signature, which fmpy calls for every method of every instance and which takes most of
-    instantiation."""
-    function = getattr(thing, "__func__", None)
-    if function is None or how:
-        return original(thing, **how)
-    return cache.get(function) or cache.setdefault(function, original(thing))
-
-
-inspect.signature = signature
 
 
 class Instance:
