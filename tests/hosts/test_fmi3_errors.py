@@ -1,6 +1,6 @@
 """Errors in FMI 3.0 co-simulation: status 3 (error) and one sentence."""
 
-from math import inf, isfinite, nan
+from math import isfinite, nan
 
 import fmi3_fixtures
 import pytest
@@ -9,41 +9,11 @@ from models import MODELS, ODE23, PUSHED, declared, model_class, outputs, push
 from row_comparison import assert_identical
 from worker_client import FmiError
 
-from tests.hosts import test_invalid_values
+from tests.hosts.test_invalid_values import test_an_impossible_step_is_refused_and_changes_nothing  # noqa: F401
 
 fmus, worker, _workers = fmi3_fixtures.FIXTURES
 fresh_worker = fmi3_fixtures.fresh_worker
 ERROR = 3
-assert_refused = test_invalid_values.assert_refused
-
-
-@pytest.fixture(autouse=True)
-def _as_fmi_3_refuses(monkeypatch):
-    monkeypatch.setattr(test_invalid_values, "REFUSED", ("fmi3DoStep", ERROR))
-
-
-STEPS = {
-    "of no size": (1.0, 0.0),
-    "backwards": (1.0, -0.5),
-    "of NaN": (1.0, nan),
-    "without end": (1.0, inf),
-    "from the past": (0.5, 0.1),
-    "from the future": (1.5, 0.1),
-    "from nowhere": (nan, 0.1),
-    "from a little too late": (1.0 + 3e-7, 0.1),
-    "from a little too early": (1.0 - 3e-7, 0.1),
-}
-
-
-@pytest.mark.parametrize("step", STEPS.values(), ids=STEPS)
-@pytest.mark.parametrize("name", MODELS)
-def test_an_impossible_step_is_refused_and_changes_nothing(launch, name, step):
-    fmu = launch(name)
-    fmu.step(0.0, 1.0)
-    row = fmu.get(*declared(name))
-    assert_refused(fmu, *step, "step", *(repr(part) for part in step), "1.0 s")
-    assert fmu.get(*declared(name)) == row
-    fmu.step(1.0, 0.1)
 
 
 @pytest.mark.parametrize("kind", ["Float64", "Float32", "Int32", "Int64", "UInt64", "Boolean", "String"])

@@ -16,6 +16,7 @@ class Worker(worker_client.Worker):
     """A process that runs FMI 3.0 FMUs."""
 
     script = "fmi3_worker.py"
+    refused_step = "fmi3DoStep", 3  # Error
 
     def exchange(self, path, name="test"):
         """Create an instance for model exchange."""
