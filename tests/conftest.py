@@ -10,7 +10,7 @@ import build_cache
 import native_fmus
 import pytest
 from browser import CHROMIUM, Browser
-from worker_client import Worker, worker_fixtures
+from worker_client import Worker
 
 
 def pytest_configure(config):
@@ -49,7 +49,29 @@ def user_folder(fmus, tmp_path_factory):
     return folder
 
 
-_workers, worker, fresh_worker = worker_fixtures(Worker, "session")
+@pytest.fixture(scope="session")
+def _workers():
+    workers = [Worker()]
+    yield workers
+    for worker in workers:
+        worker.close()
+
+
+@pytest.fixture
+def worker(_workers):
+    """A process that runs FMUs of FMI 2.0 and 3.0; replaced if the last test killed it."""
+    if not _workers[-1].alive:
+        _workers.append(Worker())
+    _workers[-1].read_stderr()
+    return _workers[-1]
+
+
+@pytest.fixture
+def fresh_worker():
+    """A separate process that must exit cleanly, because late memory errors show at the exit."""
+    worker = Worker()
+    yield worker
+    assert worker.close() == 0
 
 
 @pytest.fixture(scope="session")

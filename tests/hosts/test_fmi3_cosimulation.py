@@ -4,6 +4,7 @@ import build_cache
 import fmi3_fixtures
 import numpy as np
 import pytest
+import worker_client
 from models import CASES, MODELS, counts, declared, label, model_class, outputs
 from row_comparison import assert_identical
 
@@ -29,7 +30,7 @@ from tests.runtime.test_saved_state import (  # noqa: F401
     test_a_state_includes_parameters_not_yet_effective,
 )
 
-fmus, worker, _workers = fmi3_fixtures.FIXTURES
+fmus = fmi3_fixtures.fmus
 REACH = dict.fromkeys(MODELS, 1e-13) | {"pendulum": 1e-9, "pacejka": 1e-6}  # by default, relative
 
 
@@ -63,7 +64,7 @@ def test_time_and_indicators_are_readable_in_co_simulation(launch, name):
 @pytest.fixture(scope="module")
 def process():
     """A process that must exit cleanly."""
-    worker = fmi3_fixtures.Worker()
+    worker = worker_client.Worker()
     yield worker
     assert worker.close() == 0
 

@@ -4,38 +4,12 @@ from math import isfinite, nan
 
 import fmi3_fixtures
 import pytest
-from fmi3_fixtures import FmpyError
-from models import MODELS, ODE23, PUSHED, declared, model_class, outputs, push
-from row_comparison import assert_identical
-from worker_client import FmiError
+from models import MODELS, ODE23, PUSHED, declared, model_class, push
+from worker_client import FmpyError
 
 from tests.hosts.test_invalid_values import test_an_impossible_step_is_refused_and_changes_nothing  # noqa: F401
 
-fmus, worker, _workers = fmi3_fixtures.FIXTURES
-fresh_worker = fmi3_fixtures.fresh_worker
-ERROR = 3
-
-
-@pytest.mark.parametrize("kind", ["Float64", "Float32", "Int32", "Int64", "UInt64", "Boolean", "String"])
-def test_a_wrong_call_fails_without_ending_the_run(launch, kind):
-    """Each call returns Error with one sentence and changes nothing. In the sled, reference 0 is the mass."""
-    times, names = [0.0, 0.1, 0.2], outputs("stickslip")
-    expected, fmu = launch("stickslip").run(times, names), launch("stickslip")
-    rows = [fmu.get(*names)]
-    for t, reference in ((0.0, 0 if kind != "Float64" else 10**6), (0.1, 2**32 - 1)):
-        for function, arguments in (("read_one", []), ("write_one", [{"Boolean": True, "String": "1"}.get(kind, 1)])):
-            with pytest.raises(FmiError, match="returned status 3"):
-                getattr(fmu, function)(kind, reference, *arguments)
-            ((status, category, sentence),) = fmu.messages()
-            assert (status, category) == (ERROR, "logStatusError")
-            assert f"value reference {reference} is refused: this FMU has no such variable of type {kind}" in sentence
-            assert fmu.worker.read_stderr().splitlines() == [f"Stickslip (test): {sentence}"]
-        fmu.step(t, 0.1)
-        rows.append(fmu.get(*names))
-    assert_identical(rows, expected, names)
-
-
-# ---- as reported by fmpy
+fmus = fmi3_fixtures.fmus
 
 
 def failures(name):

@@ -19,7 +19,6 @@ BACKENDS = ("python", "native", "fmi3")
 FOLDER_NAMES = ("with  two", "Grüße, 世界", "a b/ü", "50% off", "d" * 200)
 
 run_script = partial(worker_client.run_script, "life_cycles.py")
-fresh_worker = fmi3_fixtures.fresh_worker
 
 
 def fmus_of(backend, python_fmus, names=MODELS):

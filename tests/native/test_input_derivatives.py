@@ -8,7 +8,6 @@ from random import Random
 import fmi3_fixtures
 import native_fmus
 import pytest
-import worker_client
 from fmpy import read_model_description
 from models import DOP853, EXACT, MODELS, ODE23, ODE45, RODAS, outputs, push
 from power_series_body import Body, sample_motion
@@ -40,10 +39,6 @@ POLYNOMIAL_PIECES = (
 DRAGGED = ((0.0, 0.0, 20.0, 60.0, -30.0), (3.0, 60.0, -400.0, 250.0), (6.0, -150.0, 0.0, 0.0, 90.0))
 HELD, SLID = 0.9 * 12.5 * 9.81, 0.6 * 12.5 * 9.81
 POUND, INCH = 0.45359237, 0.0254
-
-_workers, worker, fresh_worker = worker_client.worker_fixtures(
-    fmi3_fixtures.Worker, "module"
-)  # which also runs FMI 2.0 FMUs
 
 
 @pytest.fixture(scope="module")

@@ -10,7 +10,6 @@ import tempfile
 from pathlib import Path
 
 import build_cache
-import pytest
 
 TIMEOUT = 120.0  # s, per request
 
@@ -49,16 +48,17 @@ class FmiError(Exception):
         self.function, self.status = function, status
 
 
+class FmpyError(Exception):
+    """fmpy aborted a run."""
+
+
 class Worker:
     """A process that runs FMUs; `alive` until it is closed, crashes or hangs."""
-
-    script = "worker.py"
-    refused_step = "fmi2DoStep", 2  # function and status of a refused step of a Python FMU: Discard
 
     def __init__(self):
         self.stderr_file = tempfile.TemporaryFile("a+b")  # noqa: SIM115 - lives as long as the process
         self.process = subprocess.Popen(
-            isolated_python(self.script),
+            isolated_python("worker.py"),
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=self.stderr_file,
@@ -110,6 +110,21 @@ class Worker:
     def instantiate(self, path, name="test"):
         return Instance(self, self.call(None, "instantiate", str(path), name))
 
+    def exchange(self, path, name="test"):
+        """Create an instance for model exchange."""
+        return Instance(self, self.call(None, "exchange", str(path), name))
+
+    def simulate(self, path, kind, **options):
+        """Simulate with fmpy and return the columns; raise FmpyError if fmpy raises."""
+        return self.simulate_and_count(path, kind, **options)[0]
+
+    def simulate_and_count(self, path, kind, **options):
+        """Simulate with fmpy and return the columns and the number of derivative evaluations."""
+        answer = self.call(None, "simulate", str(path), {"fmi_type": kind, **options})
+        if "error" in answer:
+            raise FmpyError(answer["error"])
+        return answer["columns"], answer["evaluations"]
+
     def modules(self):
         return self.call(None, "modules")
 
@@ -159,31 +174,3 @@ class Instance:
     def free(self):
         self.freed = True
         self.worker.call(self.number, "free")
-
-
-def worker_fixtures(kind, scope):
-    """Return the fixtures `_workers`, `worker` and `fresh_worker` for a process class."""
-
-    @pytest.fixture(scope=scope)
-    def _workers():
-        workers = [kind()]
-        yield workers
-        for worker in workers:
-            worker.close()
-
-    @pytest.fixture
-    def worker(_workers):
-        """A process that runs FMUs; replaced if the last test killed it."""
-        if not _workers[-1].alive:
-            _workers.append(kind())
-        _workers[-1].read_stderr()
-        return _workers[-1]
-
-    @pytest.fixture
-    def fresh_worker():
-        """A separate process that must exit cleanly, because late memory errors show at the exit."""
-        worker = kind()
-        yield worker
-        assert worker.close() == 0
-
-    return _workers, worker, fresh_worker
