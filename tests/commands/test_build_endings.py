@@ -11,6 +11,8 @@ from itertools import product
 import pytest
 from build_cache import ROOT
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture
 def environment(tmp_path):

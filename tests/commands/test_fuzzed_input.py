@@ -120,6 +120,7 @@ def check(status, output, figures):
         assert output.strip(), figures
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("key", [*field_names(SceneKeys), "nosuch"])
 def test_any_scene_content_runs_or_is_refused(workspace, key):
     default = (
@@ -131,6 +132,7 @@ def test_any_scene_content_runs_or_is_refused(workspace, key):
         check(*run_command("run", "mine.toml", "--quiet"), text[:300])
 
 
+@pytest.mark.slow
 def test_any_file_content_is_a_scene_or_is_refused(workspace):
     for content in FILES:
         (workspace / "mine.toml").write_bytes(content)
@@ -158,12 +160,14 @@ def test_a_title_is_drawn_literally(workspace, title):
     assert (workspace / "results/mine/figure.svg").stat().st_size > 1000
 
 
+@pytest.mark.slow
 def test_extreme_numbers_are_drawn_or_refused(workspace):
     for values in ("x0 = 1e308", "x0 = 1e-308", "k = 1e300", "v0 = -1e300", "x0 = 5e-324\nv0 = 1e250", "m = 1e308"):
         (workspace / "mine.toml").write_text(f"{scene_text(SCENE | {'plots': PLOTS})}[values]\n{values}\n")
         check(*run_command("run", "mine.toml", "--quiet"), values)
 
 
+@pytest.mark.slow
 def test_any_table_content_is_compared_or_refused(workspace):
     names = []
     for i, text in enumerate(TABLES):
@@ -210,6 +214,7 @@ def test_numbers_on_the_command_line_are_finite_or_refused(workspace, option, wo
         check(*run_command("run", "--fmu", "fmus/smd.fmu", option, word, "--quiet"), word)
 
 
+@pytest.mark.slow
 def test_randomly_mutated_scenes_run_or_are_refused(workspace):
     """The shipped scenes with a few characters changed; the same ones every time."""
     dice = random.Random(10)
@@ -251,6 +256,7 @@ RESULTS = {
 }
 
 
+@pytest.mark.slow
 def test_the_report_survives_any_content_of_a_result(tmp_path):
     """The first content of each file, then the second of each, and so on; finally each is a folder."""
     good = tmp_path / "coulomb/quantities.csv"

@@ -42,6 +42,7 @@ def logging_goes_on():
     logging.disable(logging.NOTSET)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("command", "number"), [*product(COMMANDS, [signal.SIGINT]), ("run", signal.SIGTERM), ("sweep", signal.SIGTERM)]
 )

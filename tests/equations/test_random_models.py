@@ -102,6 +102,7 @@ def test_slips_and_rests_of_the_sled_have_their_closed_form(ratio):
 STRUCTURES, VALUES = (6, 20, 22, 33), range(2, 6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", STRUCTURES)
 def test_random_models_agree_with_an_independent_solver(worker, number):
     """Modes, events and states by every method at two tolerances, and all backends bit for bit."""

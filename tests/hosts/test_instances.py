@@ -14,6 +14,8 @@ from build_cache import ROOT
 from life_cycles import MODEL_EXCHANGE
 from models import MODELS, outputs
 
+pytestmark = pytest.mark.slow
+
 CO_SIMULATION = "CoSimulation"
 BACKENDS = ("python", "native", "fmi3")
 FOLDER_NAMES = ("with  two", "Grüße, 世界", "a b/ü", "50% off", "d" * 200)

@@ -15,6 +15,8 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, precondition, rule, run_state_machine_as_test
 from models import MODELS, declared, outputs
 
+pytestmark = pytest.mark.slow
+
 KINDS = {  # the folder of the FMUs, and the FMI types
     "python": (None, ("Real", "Integer", "Boolean", "String")),
     "native": (native_fmus.build_native_fmus, ("Real", "Integer", "Boolean", "String")),

@@ -16,6 +16,8 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, precondition, rule, run_state_machine_as_test
 from models import EXACT, HYBRID, MODELS, declared
 
+pytestmark = pytest.mark.slow
+
 OTHER_BACKENDS = {
     "native": native_fmus.build_native_fmus,
     "FMI 3.0": fmi3_fixtures.build_fmi3_fmus,

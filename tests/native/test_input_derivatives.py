@@ -150,6 +150,7 @@ def run_lowered(model, values, pieces, h):
     return rows, numbers.events.count
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("order", [1, 3])
 @pytest.mark.parametrize("damping_ratio", [0.0, 0.08, 1.0, 3.0])
 def test_random_input_derivatives_never_stall_the_closed_form(worker, fmus, damping_ratio, order):
@@ -396,6 +397,7 @@ def test_a_ramp_may_begin_before_the_run(worker, fmus):
 BUILT = {"FMI 2.0": native_fmus.build_native_fmus, "FMI 3.0": fmi3_fixtures.build_fmi3_fmus}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("version", BUILT)
 @pytest.mark.parametrize("name", MODELS)
 def test_output_derivatives_agree_with_differences(worker, name, version):

@@ -142,6 +142,7 @@ with folders.replace_folder(place, ("a.csv", "b.csv")) as fresh:
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("steps", ["one", "two"])
 def test_a_kill_at_any_moment_keeps_the_previous_or_the_new_result(older, steps):
     """Before every call of the operating system from the end of the writing on; the next run removes leftovers."""

@@ -156,6 +156,7 @@ def test_a_result_is_reproduced_from_its_folder_bit_for_bit(example_run):
         assert harness(workspace, "run", folder.relative_to(workspace), "--quiet").returncode == 0  # and again
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "scene", [path.stem for path in shipped_scenes() if path.stem not in ("coulomb", "pacejka-0.001")]
 )

@@ -26,6 +26,7 @@ def odd_folder(tmp_path, fmus):
     return folder
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "command",
     [

@@ -18,6 +18,8 @@ from fmus.runtime.linear_closed_form import GROWING, LinearClosedForm
 from harness.references.certification import certify
 from harness.studies.stability.study import grouped_cases, run_stability
 
+pytestmark = pytest.mark.slow
+
 ROUNDING = 1e-13  # relative to the largest term of the solution
 DIVERGES = "the solution diverges after t = "
 (FILE,) = (path for path in EXAMPLE_MODELS if path.stem == "unstable_body")
