@@ -2,7 +2,8 @@
 
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 if __name__ == "__main__" and Path(sys.path[0]) != Path(__file__).parents[1]:  # a model here may be named math.py
@@ -44,17 +45,28 @@ def run_command(load: Callable[[], click.Command], name: str) -> None:
     name : str
         How the user calls it.
     """
-    try:
-        with interruptible():
-            command = load()
-            from .commands.terminal import prepare_process
+    with exit_on_error(), interruptible():
+        command = load()
+        from .commands.terminal import prepare_process
 
-            prepare_process()
-            try:
-                with command.make_context(name, sys.argv[1:]) as context:
-                    command.invoke(context)
-            finally:
-                sys.stdout.flush()
+        prepare_process()
+        run_arguments(command, name, sys.argv[1:])
+
+
+def run_arguments(command: click.Command, name: str, arguments: list[str]) -> None:
+    """Run a command with these arguments; `name` is how the user calls it."""
+    try:
+        with command.make_context(name, arguments) as context:
+            command.invoke(context)
+    finally:
+        sys.stdout.flush()
+
+
+@contextmanager
+def exit_on_error() -> Iterator[None]:
+    """Print an error that a user can cause in one sentence, and exit with its status."""
+    try:
+        yield
     except click.ClickException as error:
         error.show()
         sys.exit(error.exit_code)

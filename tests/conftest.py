@@ -1,23 +1,17 @@
 """Fixtures: the FMUs, built once per test run, and a process that runs them."""
 
-import atexit
-import gc
 import os
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-if "PYTEST_XDIST_WORKER" in os.environ:
-    # Registered first, so called last: skip the teardown of a finished worker process, which takes seconds.
-    atexit.register(os._exit, 0)
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as in a command; must be set before numpy is imported
 
 import build_cache
-import fork_server
 import native_fmus
 import pytest
 from browser import CHROMIUM, Browser
 from firefox import FIREFOX, Firefox
-from worker_client import Worker, worker_fixtures
+from worker_client import Worker
 
 
 def pytest_configure(config):
@@ -28,18 +22,6 @@ def pytest_configure(config):
         folder = TemporaryDirectory()
         config.add_cleanup(folder.cleanup)
         build_cache.shared_folder = Path(folder.name)
-    fork_server.temporary_folder = build_cache.shared_folder
-
-
-def pytest_collection_finish():
-    """Exclude all existing objects from garbage collection; scanning them repeatedly takes seconds."""
-    gc.collect()
-    gc.freeze()
-
-
-def pytest_unconfigure():
-    """Exclude all objects again, because the interpreter would scan them five times at exit."""
-    pytest_collection_finish()
 
 
 @pytest.hookimpl(optionalhook=True)  # of pytest-xdist
@@ -68,7 +50,29 @@ def user_folder(fmus, tmp_path_factory):
     return folder
 
 
-_workers, worker, fresh_worker = worker_fixtures(Worker, "session")
+@pytest.fixture(scope="session")
+def _workers():
+    workers = [Worker()]
+    yield workers
+    for worker in workers:
+        worker.close()
+
+
+@pytest.fixture
+def worker(_workers):
+    """A process that runs FMUs of FMI 2.0 and 3.0; replaced if the last test killed it."""
+    if not _workers[-1].alive:
+        _workers.append(Worker())
+    _workers[-1].read_stderr()
+    return _workers[-1]
+
+
+@pytest.fixture
+def fresh_worker():
+    """A separate process that must exit cleanly, because late memory errors show at the exit."""
+    worker = Worker()
+    yield worker
+    assert worker.close() == 0
 
 
 @pytest.fixture(scope="session")

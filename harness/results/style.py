@@ -103,21 +103,26 @@ def open_figure(
         warnings.simplefilter("ignore")
         figure = Figure(figsize=(width, height), dpi=130, layout=layout)
         yield figure
-        for text in find_texts(figure):
-            text.set_parse_math(False)
-            text.set_text(UNWRITABLE.sub("\N{REPLACEMENT CHARACTER}", text.get_text()[:MAX_TEXT_LENGTH]))
-        for parent, texts in ((figure, figure.texts), *((axes, find_texts(axes)) for axes in figure.axes)):
-            extent = parent.get_window_extent()
-            for text in texts:
-                wrap_text(text, extent.height if text.get_rotation() == 90 else extent.width)
-        for axes in figure.axes:
-            for dense in filter(is_crowded, (*axes.lines, *axes.collections)):
-                dense.set_rasterized(True)
-        if engine := figure.get_layout_engine():
-            engine.execute(figure)
-            figure.set_layout_engine(None)  # otherwise everything is drawn twice
-        svg = StringIO()
-        figure.savefig(svg, format="svg", metadata={"Date": None, "Creator": None})
+        save_figure(figure, path)
+
+
+def save_figure(figure: Figure, path: Path) -> None:
+    """Lay out a figure and save it as SVG."""
+    for text in find_texts(figure):
+        text.set_parse_math(False)
+        text.set_text(UNWRITABLE.sub("\N{REPLACEMENT CHARACTER}", text.get_text()[:MAX_TEXT_LENGTH]))
+    for parent, texts in ((figure, figure.texts), *((axes, find_texts(axes)) for axes in figure.axes)):
+        extent = parent.get_window_extent()
+        for text in texts:
+            wrap_text(text, extent.height if text.get_rotation() == 90 else extent.width)
+    for axes in figure.axes:
+        for dense in filter(is_crowded, (*axes.lines, *axes.collections)):
+            dense.set_rasterized(True)
+    if engine := figure.get_layout_engine():
+        engine.execute(figure)
+        figure.set_layout_engine(None)  # otherwise everything is drawn twice
+    svg = StringIO()
+    figure.savefig(svg, format="svg", metadata={"Date": None, "Creator": None})
     rounded = re.sub(r' d="[^"]*"', lambda line: re.sub(r"(\.\d\d)\d+", r"\1", line[0]), svg.getvalue())
     path.write_text(rounded.replace("</style>", f"{DARK_STYLE}</style>", 1), encoding="utf-8")
 

@@ -7,6 +7,8 @@ from decays import random_record
 from harness.analyses.decay.estimates import KnownParameters
 from harness.analyses.decay.identification import fit_decay
 
+pytestmark = pytest.mark.slow
+
 RECORDS = 40
 
 

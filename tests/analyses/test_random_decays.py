@@ -9,6 +9,8 @@ from harness.analyses.decay.estimates import KnownParameters
 from harness.analyses.decay.identification import fit_decay
 from harness.analyses.decay.law import LAWS
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(
     scope="module",

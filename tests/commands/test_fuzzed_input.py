@@ -1,25 +1,21 @@
 """No input ends a command in a traceback: it succeeds, or fails with one sentence and a specific exit status."""
 
-import io
 import os
 import random
 import re
 import subprocess
 import sys
 import threading
-from contextlib import chdir, redirect_stderr, redirect_stdout
-from functools import partial
+from contextlib import chdir
 from itertools import zip_longest
 from math import cos, exp
 from pathlib import Path
 
 import pytest
 from build_cache import ROOT
-from commands import stub_sheet
+from commands import blank_figures, harness
 
-from harness.commands import commands
 from harness.errors import HarnessError
-from harness.results.style import Figure
 from harness.scenes.scene import SceneKeys
 from harness.scenes.schema import field_names
 
@@ -98,16 +94,9 @@ SPANS = (
 
 
 def run_command(*arguments):
-    """Return exit status and output of a command run in this process; any unexpected exception fails the test."""
-    stderr, stdout = io.StringIO(), io.StringIO()
-    with redirect_stderr(stderr), redirect_stdout(stdout):
-        try:
-            commands.main([*map(str, arguments)], standalone_mode=True)
-        except HarnessError as error:
-            return error.status, str(error)
-        except SystemExit as end:
-            return end.code or 0, stderr.getvalue()
-    raise AssertionError("it does not end")
+    """Return exit status and error message of a command; any unexpected exception fails the test."""
+    done = harness(Path.cwd(), *arguments)
+    return done.returncode, done.stderr
 
 
 @pytest.fixture
@@ -131,6 +120,7 @@ def check(status, output, figures):
         assert output.strip(), figures
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("key", [*field_names(SceneKeys), "nosuch"])
 def test_any_scene_content_runs_or_is_refused(workspace, key):
     default = (
@@ -142,6 +132,7 @@ def test_any_scene_content_runs_or_is_refused(workspace, key):
         check(*run_command("run", "mine.toml", "--quiet"), text[:300])
 
 
+@pytest.mark.slow
 def test_any_file_content_is_a_scene_or_is_refused(workspace):
     for content in FILES:
         (workspace / "mine.toml").write_bytes(content)
@@ -169,13 +160,15 @@ def test_a_title_is_drawn_literally(workspace, title):
     assert (workspace / "results/mine/figure.svg").stat().st_size > 1000
 
 
+@pytest.mark.slow
 def test_extreme_numbers_are_drawn_or_refused(workspace):
     for values in ("x0 = 1e308", "x0 = 1e-308", "k = 1e300", "v0 = -1e300", "x0 = 5e-324\nv0 = 1e250", "m = 1e308"):
         (workspace / "mine.toml").write_text(f"{scene_text(SCENE | {'plots': PLOTS})}[values]\n{values}\n")
         check(*run_command("run", "mine.toml", "--quiet"), values)
 
 
-def test_any_table_content_is_compared_or_refused(workspace, monkeypatch):
+@pytest.mark.slow
+def test_any_table_content_is_compared_or_refused(workspace):
     names = []
     for i, text in enumerate(TABLES):
         (workspace / f"{i}.csv").write_text(text, encoding="utf-8", newline="")
@@ -184,12 +177,10 @@ def test_any_table_content_is_compared_or_refused(workspace, monkeypatch):
     (workspace / "\udcff$_{.csv").write_text("t [s],x [m]\n0,1\n1,2.5\n2,3\n")
     for name in (*names, "\udcff$_{.csv"):
         check(*run_command("compare", name, "good.csv", "--quiet"), (name, Path(name).read_text()[:200]))
-    monkeypatch.setattr(
-        "harness.studies.compare.figure.open_figure", partial(stub_sheet, Figure)
-    )  # the same tables are drawn
-    for name in names:
-        for pair in (("good.csv", name), (name, name)):
-            check(*run_command("compare", *pair, "--quiet"), (pair, Path(name).read_text()[:200]))
+    with blank_figures():  # the same tables are drawn
+        for name in names:
+            for pair in (("good.csv", name), (name, name)):
+                check(*run_command("compare", *pair, "--quiet"), (pair, Path(name).read_text()[:200]))
     check(*run_command("report", "--quiet"), "the report on all of these")
     assert (workspace / "results/report.html").stat().st_size > 1000
 
@@ -223,6 +214,7 @@ def test_numbers_on_the_command_line_are_finite_or_refused(workspace, option, wo
         check(*run_command("run", "--fmu", "fmus/smd.fmu", option, word, "--quiet"), word)
 
 
+@pytest.mark.slow
 def test_randomly_mutated_scenes_run_or_are_refused(workspace):
     """The shipped scenes with a few characters changed; the same ones every time."""
     dice = random.Random(10)
@@ -264,6 +256,7 @@ RESULTS = {
 }
 
 
+@pytest.mark.slow
 def test_the_report_survives_any_content_of_a_result(tmp_path):
     """The first content of each file, then the second of each, and so on; finally each is a folder."""
     good = tmp_path / "coulomb/quantities.csv"
@@ -325,7 +318,8 @@ def test_a_record_is_read_from_a_named_pipe(tmp_path):
     os.mkfifo(tmp_path / "63")
     writer = threading.Thread(target=(tmp_path / "63").write_text, args=("t [s],x [m]\n0.5,1\n1.5,2\n",))
     writer.start()
-    assert run_command("decay", tmp_path / "63") == (2, "63 has 2 samples in this interval; at least 12 are required")
+    message = "Error: 63 has 2 samples in this interval; at least 12 are required\n"
+    assert run_command("decay", tmp_path / "63") == (2, message)
     writer.join()
 
 

@@ -1,5 +1,6 @@
 """Ctrl-C and SIGTERM end every command at once: exit status, one line, nothing left behind, no new work."""
 
+import concurrent.futures
 import logging
 import os
 import signal
@@ -10,15 +11,14 @@ import time
 from concurrent.futures import Future
 from contextlib import contextmanager, suppress
 from functools import partial
-from itertools import count, product
+from itertools import product
 from pathlib import Path
 
 import pytest
 from build_cache import ROOT
 
-import harness.process.interruptible_wait
 from harness.commands.terminal import progress
-from harness.process import interrupt
+from harness.process import interrupt, interruptible_wait
 from harness.process.interrupt import CommandInterruptedError, check_interrupt, defer_signals, interruptible
 from harness.process.interruptible_wait import wait_for_any
 from harness.process.subprocess_runner import SubprocessTimeoutError, run_subprocess
@@ -42,6 +42,7 @@ def logging_goes_on():
     logging.disable(logging.NOTSET)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("command", "number"), [*product(COMMANDS, [signal.SIGINT]), ("run", signal.SIGTERM), ("sweep", signal.SIGTERM)]
 )
@@ -142,37 +143,47 @@ def test_a_signal_during_a_protected_section_is_deferred_to_its_end(monkeypatch)
     assert begun == ["whole"]
 
 
-def test_a_signal_during_a_wait_leaves_no_lock_held(monkeypatch):
-    """Wherever it arrives in the waiting code or in the library; otherwise the awaited event could never end."""
-    monkeypatch.setattr(harness.process.interruptible_wait, "POLL_INTERVAL", 1e-4)
-    before, trace = signal.signal(signal.SIGINT, interrupt.handle_signal), sys.gettrace()
+@pytest.fixture
+def handled_sigint(monkeypatch):
+    """SIGINT, handled as in a command."""
+    monkeypatch.setattr(interrupt, "RECEIVED_SIGNALS", [])
+    before = signal.signal(signal.SIGINT, interrupt.handle_signal)
+    yield
+    signal.signal(signal.SIGINT, before)
 
-    def interrupted(line):
-        """Return whether the wait has this many lines; it is interrupted at the last one."""
-        monkeypatch.setattr(interrupt, "RECEIVED_SIGNALS", [])
-        pending, lines = Future(), iter(range(line))
 
-        def look(frame, event, _):
-            if event == "line" and not interrupt.RECEIVED_SIGNALS and next(lines, None) is None:
-                signal.raise_signal(signal.SIGINT)
-            return look
+def test_a_signal_during_a_wait_is_raised_after_it(handled_sigint, monkeypatch):
+    finished = []
 
-        with suppress(KeyboardInterrupt):
-            sys.settrace(look)
-            wait_for_any([pending])
-            sys.settrace(trace)  # before suppress, which is also Python code, continues
-        sys.settrace(trace)
-        other = threading.Thread(target=pending.cancel, daemon=True)
-        other.start()
-        other.join(timeout=10)
-        assert not other.is_alive()
-        return bool(interrupt.RECEIVED_SIGNALS)
+    def interrupted_wait(*arguments, **options):
+        signal.raise_signal(signal.SIGINT)
+        finished.append(concurrent.futures.wait(*arguments, **options))
+        return finished[0]
 
+    monkeypatch.setattr(interruptible_wait, "wait", interrupted_wait)
+    with pytest.raises(KeyboardInterrupt):
+        wait_for_any([Future()])
+    assert finished
+
+
+def test_signals_at_many_moments_of_a_wait_leave_no_lock_held(handled_sigint, monkeypatch):
+    """In the library they would, and the awaited event could never end."""
+    monkeypatch.setattr(interruptible_wait, "POLL_INTERVAL", 1e-4)
+    before = signal.signal(signal.SIGALRM, lambda *_: signal.raise_signal(signal.SIGINT))
     try:
-        assert next(line for line in count() if not interrupted(line)) > 100
+        for moment in range(300):
+            interrupt.RECEIVED_SIGNALS.clear()
+            pending = Future()
+            with suppress(KeyboardInterrupt):
+                signal.setitimer(signal.ITIMER_REAL, 1e-6 * (moment + 1))
+                while not interrupt.RECEIVED_SIGNALS:
+                    wait_for_any([pending])
+            other = threading.Thread(target=pending.cancel, daemon=True)
+            other.start()
+            other.join(timeout=10)
+            assert not other.is_alive()
     finally:
-        sys.settrace(trace)
-        signal.signal(signal.SIGINT, before)
+        signal.signal(signal.SIGALRM, before)
 
 
 def test_messages_larger_than_a_pipe_buffer_arrive_at_a_slow_reader():

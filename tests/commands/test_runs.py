@@ -1,4 +1,4 @@
-"""The harness on the built FMUs, through its command line, in child processes."""
+"""The harness on the built FMUs, through its command line."""
 
 import csv
 import json
@@ -22,7 +22,7 @@ BASE = 'title = "a title"\nmodel = "stickslip"\noutputs = ["x", "v"]\n'
 ENVIRONMENT = {"PYTHONPATH": str(ROOT), "PATH": "", "COLUMNS": "100"}
 TIME = r'"name": "run_time",\s+"value": [^,]+'
 NUMBER = r"-?\b\d+\.?\d*(?:e[-+]\d+)?"
-harness = partial(commands.harness, base=ENVIRONMENT, blank=commands.UNPLOTTED)  # published cases are drawn elsewhere
+harness = partial(commands.harness, blank=True, PATH="", COLUMNS="100")  # published cases are drawn elsewhere
 
 
 def python(folder, *arguments):
@@ -243,16 +243,13 @@ def test_an_invalid_scene_is_one_sentence_and_keeps_the_previous_result(scene, t
     assert [path.name for path in results.parent.iterdir()] == ["mine"]
 
 
-def test_a_failing_case_does_not_lose_the_others(fmus, tmp_path):
+def test_a_failing_case_does_not_lose_the_others(fmus, tmp_path, monkeypatch):
     (tmp_path / "fmus").symlink_to(fmus)
     run_published_cases = "\n[published]\nsource = 'me'\nrun_time = 1\n"
     for name, extra in (("bad", "[values]\nmu_d = 0.95"), ("good", "stop = 1")):
         (tmp_path / f"{name}.toml").write_text(BASE + extra + run_published_cases)
-    (tmp_path / "shipped.py").write_text(
-        "from pathlib import Path; import harness.scenes.scene as scene; from harness.__main__ import main\n"
-        f"scene.SHIPPED = Path({str(tmp_path)!r}); main()"
-    )
-    done = harness(tmp_path, "--out", tmp_path / "out", module="shipped")
+    monkeypatch.setattr("harness.scenes.scene.SHIPPED", tmp_path)
+    done = harness(tmp_path, "--out", tmp_path / "out")
     assert done.returncode == 1
     assert done.stderr.startswith("Error: scene bad: mu_d is 0.95")
     assert done.stderr.count("\n") == 1
@@ -286,19 +283,18 @@ PAIR = (
         ["report", "--help"],
     ],
 )
-def test_a_forked_process_behaves_like_a_fresh_one(fmus, tmp_path, arguments):
-    def done(fresh):
-        shutil.rmtree(tmp_path / "results", ignore_errors=True)  # otherwise the second run reports that nothing changed
-        return harness(tmp_path, *arguments, fresh=fresh)
-
+def test_a_command_runs_alike_in_a_process_of_its_own(fmus, tmp_path, arguments):
+    """Most tests run commands in the process of pytest."""
     (tmp_path / "fmus").symlink_to(fmus)
     (tmp_path / "mine.toml").write_text(BASE + "analyses = ['slip']\nplots = []")
     (tmp_path / "pair.toml").write_text(PAIR)
     rows = [f"{0.04 * i},{exp(-0.04 * i) * cos(0.48 * i)}" for i in range(50)]
     (tmp_path / "swing.csv").write_text("\n".join(["t [s],x [m]", *rows]))
-    fresh, forked = done(True), done(False)
-    assert (forked.returncode, forked.stderr) == (fresh.returncode, fresh.stderr)
-    outputs = [re.sub(TIME, "", done.stdout) for done in (forked, fresh)]
+    here = harness(tmp_path, *arguments)
+    shutil.rmtree(tmp_path / "results", ignore_errors=True)  # otherwise the second run reports that nothing changed
+    alone = commands.run_process(tmp_path, *arguments, PATH="", COLUMNS="100")
+    assert (here.returncode, here.stderr) == (alone.returncode, alone.stderr)
+    outputs = [re.sub(TIME, "", done.stdout) for done in (here, alone)]
     assert re.sub(NUMBER, "", outputs[0]) == re.sub(NUMBER, "", outputs[1])
     one, other = (list(map(float, re.findall(NUMBER, text))) for text in outputs)
     assert one == pytest.approx(other, rel=1e-6, abs=1e-9)  # sums of numpy depend on the memory alignment of an array
@@ -345,8 +341,10 @@ def test_a_scene_imports_only_the_modules_it_needs(user_folder, tmp_path):
 
 
 @pytest.mark.parametrize(("extra", "status"), [("grid = 1", 0), ("[values]\nmu_d = 0.95", 1)])
-def test_no_temporary_fmu_files_remain(scene, tmp_path, extra, status):
+def test_no_temporary_fmu_files_remain(user_folder, tmp_path, extra, status):
     temporary = tmp_path / "temporary"
     temporary.mkdir()
-    assert scene(BASE + extra, TMPDIR=str(temporary))[0].returncode == status
+    (tmp_path / "mine.toml").write_text(BASE + extra)
+    command = ("run", tmp_path / "mine.toml", "--out", tmp_path / "out")
+    assert commands.run_process(user_folder, *command, TMPDIR=str(temporary)).returncode == status
     assert list(temporary.iterdir()) == []

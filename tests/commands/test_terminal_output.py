@@ -35,7 +35,7 @@ from harness.studies.precision.study import FMU, ME, Point, Study
 
 WIDTH = 80
 PLAIN = {"COLUMNS": str(WIDTH), "PATH": ""}
-harness = partial(processes.harness, blank=processes.UNPLOTTED)
+harness = partial(processes.harness, blank=True)
 
 
 @pytest.fixture

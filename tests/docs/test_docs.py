@@ -35,6 +35,7 @@ def runnable(page):
 scripts = load("run_blocks")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("page", [page for page in PAGES if runnable(page)])
 def test_code_blocks_run(page, fmus, tmp_path):
     (tmp_path / "fmus").symlink_to(fmus)
@@ -79,6 +80,7 @@ def test_each_picture_is_used_and_small():
         assert picture.name in used or picture.name == "stick-dark.svg", f"no page shows {picture.name}"
 
 
+@pytest.mark.slow
 def test_notebook_runs(fmus, tmp_path):
     nbclient = pytest.importorskip("nbclient", reason="extra docs")
     nbformat = pytest.importorskip("nbformat", reason="extra docs")
@@ -88,6 +90,7 @@ def test_notebook_runs(fmus, tmp_path):
     client.execute(env=ENVIRONMENT)
 
 
+@pytest.mark.slow
 def test_site_builds_without_warnings(tmp_path):
     pytest.importorskip("mkdocs", reason="extra docs")
     command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet", "--site-dir", str(tmp_path)]

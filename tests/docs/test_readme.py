@@ -4,6 +4,8 @@ import re
 import subprocess
 import sys
 
+import pytest
+
 from tests.docs.test_docs import DOCS, ENVIRONMENT, ROOT
 
 README = ROOT / "README.md"
@@ -13,6 +15,7 @@ def test_readme_is_short():
     assert len(README.read_text(encoding="utf-8").splitlines()) <= 150
 
 
+@pytest.mark.slow
 def test_readme_code_blocks_run(fmus, tmp_path):
     (tmp_path / "fmus").symlink_to(fmus)
     (tmp_path / "docs").symlink_to(DOCS)

@@ -4,20 +4,17 @@ from functools import partial
 from itertools import pairwise
 from math import inf, pi
 
-import fmi3_fixtures
 import numpy as np
 import pytest
 from build_cache import build_user_model
-from fmi3_fixtures import FmpyError
 from fmpy import read_model_description
 from models import DOP853, ODE23, ODE45, RODAS
 from row_comparison import assert_identical
 from scipy.integrate import solve_ivp
-from worker_client import FmiError
+from worker_client import FmiError, FmpyError
 
 from fmus.packaging.model_lookup import find_model
 
-_, worker, _workers = fmi3_fixtures.FIXTURES  # this worker runs FMI 2.0 as well
 METHODS = (ODE23, ODE45, DOP853, RODAS)
 KINDS = {
     "": (),

@@ -1,7 +1,6 @@
 """Random models with dry friction, against an independent solver; random_campaign.py runs thousands of them."""
 
 import build_cache
-import fmi3_fixtures
 import numpy as np
 import pytest
 import random_campaign
@@ -9,8 +8,6 @@ from contact_references import reference_events
 from independent_contacts import Contact, Spring, System, solve
 from native_fmus import require_compiler
 from random_models import random_structure
-
-_workers, worker = fmi3_fixtures._workers, fmi3_fixtures.worker
 
 GRAVITY = 9.81
 LITERATURE = {
@@ -113,6 +110,7 @@ def test_slips_and_rests_of_the_sled_have_their_closed_form(ratio):
 STRUCTURES, VALUES = (6, 20, 22, 33), range(2, 6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", STRUCTURES)
 def test_random_models_agree_with_an_independent_solver(worker, number):
     """Modes, events and states by every method at two tolerances, and all backends bit for bit."""

@@ -6,7 +6,7 @@ from models import MODELS, model_class, outputs
 from native_host import FMI3_HOST_SOURCE, host_program, run_life_cycles
 
 LIVES, STEPS = 100, 20
-fmus, worker, _workers = fmi3_fixtures.FIXTURES
+fmus = fmi3_fixtures.fmus
 
 
 @pytest.mark.parametrize("name", MODELS)

@@ -1,9 +1,12 @@
 """FMI 3.0 co-simulation: the tests of the FMI 2.0 FMUs, repeated with the FMI 3.0 FMUs."""
 
+import build_cache
 import fmi3_fixtures
 import numpy as np
 import pytest
-from models import MODELS, model_class, outputs
+import worker_client
+from models import CASES, MODELS, counts, declared, label, model_class, outputs
+from row_comparison import assert_identical
 
 from harness.references.certified_reference import POINTS, load_reference, relative_errors
 from tests.references.test_references import test_the_built_fmu_agrees_with_the_reference  # noqa: F401
@@ -27,7 +30,7 @@ from tests.runtime.test_saved_state import (  # noqa: F401
     test_a_state_includes_parameters_not_yet_effective,
 )
 
-fmus, worker, _workers = fmi3_fixtures.FIXTURES
+fmus = fmi3_fixtures.fmus
 REACH = dict.fromkeys(MODELS, 1e-13) | {"pendulum": 1e-9, "pacejka": 1e-6}  # by default, relative
 
 
@@ -56,3 +59,26 @@ def test_time_and_indicators_are_readable_in_co_simulation(launch, name):
             assert to_rest == (mode * v + 1e-300 if mode else 1.0)  # never zero after event handling
             assert to_break_away > 0.0
             assert mode == 0 or to_break_away == 1.0
+
+
+@pytest.fixture(scope="module")
+def process():
+    """A process that must exit cleanly."""
+    worker = worker_client.Worker()
+    yield worker
+    assert worker.close() == 0
+
+
+@pytest.mark.parametrize("case", CASES, ids=label)
+def test_co_simulation_agrees_with_fmi2_bit_for_bit(process, fmus, case):
+    """On the same grid, with a change of the input during the run and without a stop time."""
+    name, values, stop = case
+    names, times = outputs(name) + counts(name), [stop * i / 100 for i in range(101)]
+    force = next(v for v, d in declared(name).items() if d.causality == "input")
+    changes = {times[30]: {force: 0.004 if name == "pendulum" else 3.0}, times[60]: {force: 0.0}}
+    rows = []
+    for folder in (fmus, build_cache.build_once("fmi2")):
+        fmu = process.instantiate(folder / f"{name}.fmu").begin(values)
+        rows.append(fmu.run_with_changes(times, names, changes))
+        fmu.free()
+    assert_identical(*rows, names)

@@ -1,71 +1,15 @@
 """Errors in FMI 3.0 co-simulation: status 3 (error) and one sentence."""
 
-from math import inf, isfinite, nan
+from math import isfinite, nan
 
 import fmi3_fixtures
 import pytest
-from fmi3_fixtures import FmpyError
-from models import MODELS, ODE23, PUSHED, declared, model_class, outputs, push
-from row_comparison import assert_identical
-from worker_client import FmiError
+from models import MODELS, ODE23, PUSHED, declared, model_class, push
+from worker_client import FmpyError
 
-from tests.hosts import test_invalid_values
+from tests.hosts.test_invalid_values import test_an_impossible_step_is_refused_and_changes_nothing  # noqa: F401
 
-fmus, worker, _workers = fmi3_fixtures.FIXTURES
-fresh_worker = fmi3_fixtures.fresh_worker
-ERROR = 3
-assert_refused = test_invalid_values.assert_refused
-
-
-@pytest.fixture(autouse=True)
-def _as_fmi_3_refuses(monkeypatch):
-    monkeypatch.setattr(test_invalid_values, "REFUSED", ("fmi3DoStep", ERROR))
-
-
-STEPS = {
-    "of no size": (1.0, 0.0),
-    "backwards": (1.0, -0.5),
-    "of NaN": (1.0, nan),
-    "without end": (1.0, inf),
-    "from the past": (0.5, 0.1),
-    "from the future": (1.5, 0.1),
-    "from nowhere": (nan, 0.1),
-    "from a little too late": (1.0 + 3e-7, 0.1),
-    "from a little too early": (1.0 - 3e-7, 0.1),
-}
-
-
-@pytest.mark.parametrize("step", STEPS.values(), ids=STEPS)
-@pytest.mark.parametrize("name", MODELS)
-def test_an_impossible_step_is_refused_and_changes_nothing(launch, name, step):
-    fmu = launch(name)
-    fmu.step(0.0, 1.0)
-    row = fmu.get(*declared(name))
-    assert_refused(fmu, *step, "step", *(repr(part) for part in step), "1.0 s")
-    assert fmu.get(*declared(name)) == row
-    fmu.step(1.0, 0.1)
-
-
-@pytest.mark.parametrize("kind", ["Float64", "Float32", "Int32", "Int64", "UInt64", "Boolean", "String"])
-def test_a_wrong_call_fails_without_ending_the_run(launch, kind):
-    """Each call returns Error with one sentence and changes nothing. In the sled, reference 0 is the mass."""
-    times, names = [0.0, 0.1, 0.2], outputs("stickslip")
-    expected, fmu = launch("stickslip").run(times, names), launch("stickslip")
-    rows = [fmu.get(*names)]
-    for t, reference in ((0.0, 0 if kind != "Float64" else 10**6), (0.1, 2**32 - 1)):
-        for function, arguments in (("read_one", []), ("write_one", [{"Boolean": True, "String": "1"}.get(kind, 1)])):
-            with pytest.raises(FmiError, match="returned status 3"):
-                getattr(fmu, function)(kind, reference, *arguments)
-            ((status, category, sentence),) = fmu.messages()
-            assert (status, category) == (ERROR, "logStatusError")
-            assert f"value reference {reference} is refused: this FMU has no such variable of type {kind}" in sentence
-            assert fmu.worker.read_stderr().splitlines() == [f"Stickslip (test): {sentence}"]
-        fmu.step(t, 0.1)
-        rows.append(fmu.get(*names))
-    assert_identical(rows, expected, names)
-
-
-# ---- as reported by fmpy
+fmus = fmi3_fixtures.fmus
 
 
 def failures(name):

@@ -8,6 +8,8 @@ from models import MODELS
 
 from harness.studies.importers.checks import IMPORTERS, describe_fmu, prepare, run_request, unavailable_reason
 
+pytestmark = pytest.mark.slow
+
 ECOS = next(importer for importer in IMPORTERS if importer.name == "Ecos")
 
 

@@ -21,6 +21,8 @@ from harness.studies.importers import checks, table
 from harness.studies.importers.checks import CHECKS, IMPORTERS, NOT_RUN, CheckFailedError
 from harness.studies.importers.request import END, ImporterReply, ImporterRequest
 
+pytestmark = pytest.mark.slow
+
 # Both backends of a model agree bit for bit (native/test_python_native_agreement.py), and the code specific to a
 # backend is the same for all models: each model is checked with one backend, the sled with both.
 CHECKED = {"python": sorted({*MODELS[::2], "stickslip"}), "native": sorted({*MODELS[1::2], "stickslip"})}

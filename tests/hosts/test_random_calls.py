@@ -15,11 +15,12 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, precondition, rule, run_state_machine_as_test
 from models import MODELS, declared, outputs
 
-KINDS = {  # the process, the folder of the FMUs, and the FMI types
-    "python": (worker_client.Worker, None, ("Real", "Integer", "Boolean", "String")),
-    "native": (worker_client.Worker, native_fmus.build_native_fmus, ("Real", "Integer", "Boolean", "String")),
+pytestmark = pytest.mark.slow
+
+KINDS = {  # the folder of the FMUs, and the FMI types
+    "python": (None, ("Real", "Integer", "Boolean", "String")),
+    "native": (native_fmus.build_native_fmus, ("Real", "Integer", "Boolean", "String")),
     "fmi3": (
-        fmi3_fixtures.Worker,
         fmi3_fixtures.build_fmi3_fmus,
         ("Float64", "Int32", "Int64", "UInt64", "Boolean", "String"),
     ),
@@ -47,7 +48,7 @@ CHATTER = {"friction", "solver.method"}  # choices that may take arbitrarily man
 class RandomCalls(RuleBasedStateMachine):
     """One instance that is called at random, and a second one that must be unaffected."""
 
-    process = folder = types = worker = None  # of the backend
+    folder = types = worker = None  # of the backend
 
     @initialize(name=st.sampled_from(MODELS))
     def instantiate(self, name):
@@ -55,7 +56,7 @@ class RandomCalls(RuleBasedStateMachine):
         reals = {v: d for v, d in self.declared.items() if d.type == "Real"}
         self.calculated = [v for v, d in reals.items() if d.causality in ("output", "local")]
         if self.worker is None or not self.worker.alive:
-            type(self).worker = self.process()
+            type(self).worker = worker_client.Worker()
         path = self.path = self.folder / f"{name}.fmu"
         self.neighbour = self.worker.instantiate(path).begin()
         self.neighbour.step(0.0, 0.1)
@@ -246,8 +247,8 @@ class RandomCalls(RuleBasedStateMachine):
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_no_call_sequence_crashes_or_fails_silently(fmus, kind):
-    process, built, types = KINDS[kind]
-    chosen = {"process": process, "folder": built() if built else fmus, "types": types}
+    built, types = KINDS[kind]
+    chosen = {"folder": built() if built else fmus, "types": types}
     machine = type("Machine", (RandomCalls,), chosen)
     run_state_machine_as_test(machine, settings=SHORT)
     assert machine.worker.close() == 0

@@ -8,7 +8,7 @@ from model_exchange_client import DRIVEN, handle_event_at, single_error
 from models import MODELS, PUSHED, declared, outputs, push
 from worker_client import FmiError
 
-fmus, worker, _workers, launch, launch_moving = model_exchange_client.FIXTURES
+fmus, launch, launch_moving = model_exchange_client.FIXTURES
 EVERY_MODEL = pytest.mark.parametrize("name", MODELS)
 
 

@@ -18,9 +18,9 @@ import independent_solution
 import numpy as np
 import pytest
 from build_cache import ROOT
-from fmi3_fixtures import FmpyError
 from independent_solution import ClosedFormMotion
 from models import MODELS, SIGN, declared, model_class, outputs
+from worker_client import FmpyError
 
 from fmus.runtime.codes import OUT_OF_RANGE
 from fmus.runtime.messages import value_message
@@ -28,7 +28,7 @@ from harness.references.certified_reference import POINTS, event_time_error, loa
 from harness.references.models import CASES
 from tests.runtime.test_parameter_changes import spans
 
-fmus, worker, _workers = fmi3_fixtures.FIXTURES
+fmus = fmi3_fixtures.fmus
 TOLERANCES = (1e-4, 1e-6, 1e-8, 1e-10)
 CERTIFIED = [name for name in MODELS if (ROOT / "fmus" / f"{name}.csv").is_file()]
 TRUTHS = {name: load_reference(name) for name in CERTIFIED}

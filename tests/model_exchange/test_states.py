@@ -8,7 +8,7 @@ from models import CASES, MODELS, counts, declared, label, model_class, outputs,
 from row_comparison import assert_identical
 from worker_client import FmiError
 
-fmus, worker, _workers, launch, launch_moving = model_exchange_client.FIXTURES
+fmus, launch, launch_moving = model_exchange_client.FIXTURES
 EVERY_MODEL = pytest.mark.parametrize("name", MODELS)
 
 

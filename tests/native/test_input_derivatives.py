@@ -8,7 +8,6 @@ from random import Random
 import fmi3_fixtures
 import native_fmus
 import pytest
-import worker_client
 from fmpy import read_model_description
 from models import DOP853, EXACT, MODELS, ODE23, ODE45, RODAS, outputs, push
 from power_series_body import Body, sample_motion
@@ -40,10 +39,6 @@ POLYNOMIAL_PIECES = (
 DRAGGED = ((0.0, 0.0, 20.0, 60.0, -30.0), (3.0, 60.0, -400.0, 250.0), (6.0, -150.0, 0.0, 0.0, 90.0))
 HELD, SLID = 0.9 * 12.5 * 9.81, 0.6 * 12.5 * 9.81
 POUND, INCH = 0.45359237, 0.0254
-
-_workers, worker, fresh_worker = worker_client.worker_fixtures(
-    fmi3_fixtures.Worker, "module"
-)  # which also runs FMI 2.0 FMUs
 
 
 @pytest.fixture(scope="module")
@@ -155,6 +150,7 @@ def run_lowered(model, values, pieces, h):
     return rows, numbers.events.count
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("order", [1, 3])
 @pytest.mark.parametrize("damping_ratio", [0.0, 0.08, 1.0, 3.0])
 def test_random_input_derivatives_never_stall_the_closed_form(worker, fmus, damping_ratio, order):
@@ -401,6 +397,7 @@ def test_a_ramp_may_begin_before_the_run(worker, fmus):
 BUILT = {"FMI 2.0": native_fmus.build_native_fmus, "FMI 3.0": fmi3_fixtures.build_fmi3_fmus}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("version", BUILT)
 @pytest.mark.parametrize("name", MODELS)
 def test_output_derivatives_agree_with_differences(worker, name, version):

@@ -26,6 +26,8 @@ from fmus.packaging.native.compiler import DEFAULT_PLATFORMS, PLATFORMS, STRICT,
 from fmus.packaging.native.sources import FMI_HEADERS, MAIN_SOURCE, OWN_HEADERS
 from tests.packaging.test_packaging import entries
 
+pytestmark = pytest.mark.slow
+
 SYSTEM = {
     "linux64": {"libc.so.6", "libm.so.6"},
     "aarch64-linux": {"libc.so.6", "libm.so.6"},

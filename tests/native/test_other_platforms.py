@@ -31,6 +31,8 @@ from fmus.packaging import native
 from fmus.packaging.native.compiler import PLATFORMS, compile_binaries, find_compiler
 from fmus.packaging.native.sources import MAIN_SOURCE
 
+pytestmark = pytest.mark.slow
+
 ROWS = 50
 ARM = "/usr/aarch64-linux-gnu"  # where Debian installs the C library
 PLACES = ("usr/lib*/wine", "usr/lib/*/wine", "opt/wine*/lib*/wine")

@@ -3,7 +3,10 @@
 import importlib.util
 import random
 
+import pytest
 from compiled_methods import PAIRS, CompiledMethods, assert_same_as_python
+
+pytestmark = pytest.mark.slow
 
 
 class Draw:

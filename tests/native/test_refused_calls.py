@@ -14,7 +14,7 @@ from models import EXACT, declared
 from row_comparison import assert_identical
 from worker_client import FmiError
 
-WORKERS = {"python": worker_client.Worker, "native": worker_client.Worker, "FMI 3.0": fmi3_fixtures.Worker}
+BACKENDS = ("python", "native", "FMI 3.0")
 STOP = 4.0
 INVALID_VALUES = [
     *(
@@ -29,18 +29,20 @@ INVALID_VALUES = [
     *({"m": 0.0}, {"m": -1.0}, {"k": -1e-3}, {"k": inf}, {"F_ext": nan}, {"F_ext": -inf}),  # out of range
 ]
 INVALID_STEPS = [(0.0, 0.0), (0.0, -0.5), (0.0, nan), (0.0, inf), (0.1, 0.1), (-0.1, 0.1), (nan, 0.1), (0.0, 9.0)]
-INVALID_REFERENCES = [("Real", 10**6), ("Integer", 0), ("Boolean", 0), ("String", 2**32 - 1)]
-INVALID_REFERENCES3 = [("Float64", 10**6), ("Float32", 0), ("Int64", 0), ("Boolean", 0), ("String", 2**32 - 1)]
+REAL = {"python": "Real", "native": "Real", "FMI 3.0": "Float64"}
+OTHER_TYPES = dict.fromkeys(("python", "native"), ("Integer", "Boolean", "String"))
+OTHER_TYPES["FMI 3.0"] = ("Float32", "Int32", "Int64", "UInt64", "Boolean", "String")
+TEXTS = {"Boolean": True, "String": "1"}  # a value of each type; 1 for the others
 
 
-@pytest.fixture(scope="module", params=WORKERS)
+@pytest.fixture(scope="module", params=BACKENDS)
 def backend(request):
     return request.param
 
 
 @pytest.fixture(scope="module")
 def own_worker(backend):
-    worker = WORKERS[backend]()
+    worker = worker_client.Worker()
     yield worker
     assert worker.close() == 0
 
@@ -54,21 +56,33 @@ def instance(backend, own_worker, fmus):
 
 
 def refused(fmu, backend, function, *arguments):
-    """Assert that a call is refused with one message."""
+    """Assert that a call is refused with one message; return it."""
     with pytest.raises(FmiError) as error:
         getattr(fmu, function)(*arguments)
     assert error.value.status == (2 if backend == "python" else 3), (function, arguments)
-    ((status, _, sentence),) = fmu.messages()
-    assert (status, fmu.worker.read_stderr().count(sentence)) == (3, 1)
+    ((status, category, sentence),) = fmu.messages()
+    assert (status, category) == (3, "logStatusError")
+    (line,) = fmu.worker.read_stderr().splitlines()
+    assert line.endswith(f" (test): {sentence}")
+    return sentence
 
 
-def wrong_settings(fmu, backend):
-    """Return a list of calls that set a wrong value; in the oscillator, reference 0 is the mass."""
-    references = INVALID_REFERENCES3 if backend == "FMI 3.0" else INVALID_REFERENCES
-    texts = {"Boolean": True, "String": "1"}
+def wrong_references(backend):
+    """Return type and reference of variables that do not exist; reference 0 is the mass."""
+    missing = [(kind, 0) for kind in OTHER_TYPES[backend]] + [(REAL[backend], 10**6)]
+    return missing + [(kind, 2**32 - 1) for kind in (REAL[backend], *OTHER_TYPES[backend])]
+
+
+def wrong_settings(backend):
+    """Return a list of calls that set a wrong value."""
     return [("set", values) for values in INVALID_VALUES] + [
-        ("write_one", kind, reference, texts.get(kind, 1)) for kind, reference in references
+        ("write_one", kind, reference, TEXTS.get(kind, 1)) for kind, reference in wrong_references(backend)
     ]
+
+
+def wrong_reads(backend):
+    """Return a list of calls that read a wrong variable; test_invalid_values.py has those of Python FMUs."""
+    return [] if backend == "python" else [("read_one", *wrong) for wrong in wrong_references(backend)]
 
 
 def wrong_calls(fmu, backend):
@@ -90,14 +104,19 @@ def test_every_refused_call_leaves_a_run_as_it_was(instance, backend):
         rows.append([])
         for t, force in ((0.0, 0.0), (0.3, 2.0), (0.9, -3.0), (2.0, 0.5)):
             fmu.set({"F_ext": force})
-            for function, *arguments in wrong_settings(fmu, backend) if is_disturbed else []:
+            wrong = wrong_settings(backend) + wrong_reads(backend) if is_disturbed else []
+            for function, *arguments in wrong:
                 if backend == "python":
                     getattr(fmu, function)(*arguments)
-                    refused(fmu, backend, "step", t, 0.1)
+                    sentence = refused(fmu, backend, "step", t, 0.1)
                 else:
                     row = fmu.get(*names)
-                    refused(fmu, backend, function, *arguments)
+                    sentence = refused(fmu, backend, function, *arguments)
                     assert fmu.get(*names) == row, arguments
+                if function != "set":
+                    kind, reference, *_ = arguments
+                    missing = f"value reference {reference} is refused: this FMU has no such variable of type {kind}"
+                    assert missing in sentence
             for offset, h in INVALID_STEPS if is_disturbed else []:
                 refused(fmu, backend, "step", t + offset, h)
             for function, *arguments in wrong_calls(fmu, backend) if is_disturbed else []:

@@ -13,6 +13,8 @@ from models import MODELS
 from native_fmus import build_native_fmus
 from native_host import SANITIZER_ENVIRONMENT, SANITIZERS, compile_sanitized
 
+pytestmark = pytest.mark.slow
+
 STATES = 75_000  # damaged ones, over all models
 SENTENCE = (
     "a saved state is refused: another FMU wrote it or it has been changed; "

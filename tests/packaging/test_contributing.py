@@ -57,6 +57,7 @@ def test_an_addition_is_a_diff_of_one_file(what):
     assert len({name for kind, name, _ in BLOCK.findall(part) if kind != "sh"}) == 1
 
 
+@pytest.mark.slow
 def test_each_example_does_what_the_page_says(project):
     files, commands = set(), []
     for kind, name, content in BLOCK.findall(PAGE):

@@ -12,6 +12,8 @@ from fmpy import read_model_description
 import build_fmus
 from fmus.packaging import __version__, release
 
+pytestmark = pytest.mark.slow
+
 SCENES = sorted((ROOT / "harness" / "scenes").glob("*.toml"))
 
 

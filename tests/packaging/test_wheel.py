@@ -17,6 +17,8 @@ from fmus.packaging import __date__
 from fmus.packaging.native.compiler import DEFAULT_PLATFORMS, PLATFORMS
 from tests.packaging.test_packaging import entries
 
+pytestmark = pytest.mark.slow
+
 LIBRARIES = Path(numpy.__file__).parents[1]  # the dependencies, which are not installed again
 
 

@@ -44,6 +44,7 @@ def test_a_unit_in_brackets_at_the_end_is_found_after_any_name(name, unit):
         assert split_heading(f"{name} {opening}{unit}{closing}") == (name.strip(), unit)
 
 
+@pytest.mark.slow
 @given(HEADINGS, HEADINGS)
 @settings(max_examples=100, deadline=None)
 def test_any_headings_give_a_record_or_a_message(tmp_path_factory, first, second):

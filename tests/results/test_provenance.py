@@ -12,7 +12,6 @@ import commands
 import numpy as np
 import pytest
 from build_cache import run_published_cases
-from commands import UNPLOTTED
 from fmpy import read_model_description
 from models import MODELS
 
@@ -32,7 +31,7 @@ COMMANDS = {  # that take seconds, and the folders of their results
     "sweep": (("sweep", "coulomb", "--vary", "f=0.25,0.5", "--workers", "1", "--name", "f"), "sweep/f"),
 }
 DRAWN = "decay/coulomb"  # the others are not drawn; test_figures.py checks that the same drawing gives the same file
-harness = partial(commands.harness, blank=UNPLOTTED)  # each of these is plotted by a test of its study
+harness = partial(commands.harness, blank=True)  # each of these is drawn by a test of its study
 
 
 @pytest.fixture
@@ -47,7 +46,7 @@ def example_run(request, fmus, tmp_path_factory):
     """A folder in which one of the commands was run, its arguments, and its result."""
     workspace, (arguments, folder) = tmp_path_factory.mktemp("made"), COMMANDS[request.param]
     (workspace / "fmus").symlink_to(fmus)
-    done = commands.harness(workspace, *arguments, blank=folder != DRAWN and UNPLOTTED)
+    done = commands.harness(workspace, *arguments, blank=folder != DRAWN)
     assert (done.returncode, done.stderr) == (0, "")
     return workspace, arguments, workspace / "results" / folder
 
@@ -147,9 +146,7 @@ def files(folder):
 def test_a_result_is_reproduced_from_its_folder_bit_for_bit(example_run):
     workspace, (command, *_), folder = example_run
     before, account = files(folder), read_provenance(folder)
-    done = commands.harness(
-        workspace, "run", folder.relative_to(workspace), blank=not folder.match(DRAWN) and UNPLOTTED
-    )
+    done = commands.harness(workspace, "run", folder.relative_to(workspace), blank=not folder.match(DRAWN))
     assert (done.returncode, done.stderr) == (0, "")
     assert files(folder) == before
     for key in ("files", "parameters", "scene", "source"):
@@ -159,6 +156,7 @@ def test_a_result_is_reproduced_from_its_folder_bit_for_bit(example_run):
         assert harness(workspace, "run", folder.relative_to(workspace), "--quiet").returncode == 0  # and again
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "scene", [path.stem for path in shipped_scenes() if path.stem not in ("coulomb", "pacejka-0.001")]
 )

@@ -7,7 +7,7 @@ from zipfile import ZipFile
 
 import pytest
 from build_cache import ROOT
-from commands import UNPLOTTED, harness
+from commands import harness, run_process
 
 from harness.errors import HarnessError
 from harness.process import temporary_directory as rooms
@@ -26,6 +26,7 @@ def odd_folder(tmp_path, fmus):
     return folder
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "command",
     [
@@ -41,7 +42,7 @@ def test_paths_of_temporary_files_fmus_and_results_may_contain_any_character(odd
     temporary.mkdir()
     scene = (ROOT / "harness/scenes/coupled/two-masses.toml").read_text()
     (odd_folder / "pair.toml").write_text(re.sub("(?m)^steps = .*$", "steps = [0.01]", scene))
-    done = harness(odd_folder, *command, "--out", odd_folder / "out", "--quiet", blank=UNPLOTTED, TMPDIR=str(temporary))
+    done = run_process(odd_folder, *command, "--out", odd_folder / "out", "--quiet", TMPDIR=str(temporary))
     assert (done.returncode, done.stderr) == (0, "")
     assert list(temporary.iterdir()) == []
     assert any((odd_folder / "out").rglob("*.svg")) or any((odd_folder / "out").rglob("*.csv"))

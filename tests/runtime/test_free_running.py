@@ -30,6 +30,7 @@ def following(launch, cache):
     return following
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("pushed", [False, True], ids=["free", "pushed"])
 @pytest.mark.parametrize("case", CASES, ids=label)
 def test_any_two_communication_grids_agree(launch, following, case, pushed):

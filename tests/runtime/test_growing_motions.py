@@ -5,9 +5,7 @@ from collections import namedtuple
 from itertools import pairwise
 from math import copysign, inf
 
-import fmi3_fixtures
 import pytest
-import worker_client
 from build_cache import ROOT, build_user_model
 from fmpy import simulate_fmu
 from independent_solution import ClosedFormMotion, LinearSegment, System, stickslip
@@ -20,6 +18,8 @@ from fmus.runtime.linear_closed_form import GROWING, LinearClosedForm
 from harness.references.certification import certify
 from harness.studies.stability.study import grouped_cases, run_stability
 
+pytestmark = pytest.mark.slow
+
 ROUNDING = 1e-13  # relative to the largest term of the solution
 DIVERGES = "the solution diverges after t = "
 (FILE,) = (path for path in EXAMPLE_MODELS if path.stem == "unstable_body")
@@ -31,8 +31,6 @@ LIMITS = [  # tiny values, negative zeros, and nearly equal roots
     *[(-0.0, -2.0), (-0.0, -0.0), (-40.0, -0.0), (1e-12, -2.0), (-1e-12, -2.0), (-1e-12, 2.0), (-1e-12, -0.0)],
     *[(40.0, -1e-12), (-40.0, -1e-12), (-40.0, 1e-12), (0.0, -1e-12), (-5e-324, 1e3), (-1e-20, -1e-20)],
 ]
-
-_workers, worker, fresh_worker = worker_client.worker_fixtures(fmi3_fixtures.Worker, "module")
 
 Coefficients = namedtuple("Coefficients", "m c k rate")
 Start = namedtuple("Start", "c k x v p q drift")

@@ -8,6 +8,8 @@ from build_cache import build_user_model
 from models import DOP853, EXACT, ODE23, ODE45, RODAS
 from native_fmus import build_native_fmus
 
+pytestmark = pytest.mark.slow
+
 RESOLUTION = 100.0  # the slip is accurate to this multiple of the tolerance, relative to the largest slip of the phase
 NATIVE = ("--native", "--platform", "linux64")
 MODES = {"belt": ["mode"], "sled": ["mode"], "stack": ["mode1", "mode2"]}

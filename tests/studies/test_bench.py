@@ -29,6 +29,8 @@ from harness.studies.bench.speed import time_communication_step, time_in_process
 from harness.studies.bench.study import FILE, FOLDER, all_benchmarks, run_benchmarks
 from harness.studies.bench.table import benchmark_table, format_baseline
 
+pytestmark = pytest.mark.slow
+
 FAST = Benchmark("a step", 2e-6, "s", 3e-6, (Baseline("theirs", 5e-6), Baseline("absent is not installed")))
 
 

@@ -16,6 +16,8 @@ from harness.references.literature_problems import (
 from harness.running.embedded_model import EmbeddedModel, method_numbers
 from harness.studies.precision import literature_problems
 
+pytestmark = pytest.mark.slow
+
 BELT = (-0.2992525, -0.6308870)  # position in m and speed in m/s after 50 s, as published
 
 

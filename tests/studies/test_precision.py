@@ -44,7 +44,7 @@ SMOOTH = [case for case in CASES if not case.is_chattering]
 
 def command(user_folder, *arguments):
     """Run `python -m harness precision` in a folder and return the finished process."""
-    return commands.harness(user_folder, "precision", *arguments, base={}, PATH="", COLUMNS="100")
+    return commands.harness(user_folder, "precision", *arguments, PATH="", COLUMNS="100")
 
 
 @pytest.mark.parametrize("name", ["smd", "coulomb", "stickslip"])

@@ -24,6 +24,8 @@ from harness.studies.sweep.runner import SweepSpec  # noqa: E402
 from harness.studies.sweep.sampling import SweepPoints, parse_axis  # noqa: E402
 from harness.studies.sweep.study import WORKER_DIED, Sweep  # noqa: E402
 
+pytestmark = pytest.mark.slow
+
 SWEEP = ("sweep", "stickslip", "--vary", "mu_d=0.3:0.8:100", "--measure", "peak_speed")
 LONG = (*SWEEP, "--workers", "1")
 NOTE = """

@@ -1,6 +1,6 @@
-"""The FMI 3.0 FMUs and the processes that run them, as fixtures with the names of those for FMI 2.0.
+"""The FMI 3.0 FMUs, built once per test run.
 
-A test module selects them by assignment: `fmus, worker, _workers = fmi3_fixtures.FIXTURES`; `launch` then uses them.
+A test module runs them instead of the Python FMUs by `fmus = fmi3_fixtures.fmus`; `launch` then uses them.
 """
 
 from functools import cache
@@ -8,33 +8,7 @@ from functools import cache
 import build_cache
 import commands
 import pytest
-import worker_client
 from native_fmus import require_compiler
-
-
-class Worker(worker_client.Worker):
-    """A process that runs FMI 3.0 FMUs."""
-
-    script = "fmi3_worker.py"
-
-    def exchange(self, path, name="test"):
-        """Create an instance for model exchange."""
-        return worker_client.Instance(self, self.call(None, "exchange", str(path), name))
-
-    def simulate(self, path, kind, **options):
-        """Simulate with fmpy and return the columns; raise FmpyError if fmpy raises."""
-        return self.simulate_and_count(path, kind, **options)[0]
-
-    def simulate_and_count(self, path, kind, **options):
-        """Simulate with fmpy and return the columns and the number of derivative evaluations."""
-        answer = self.call(None, "simulate", str(path), {"fmi_type": kind, **options})
-        if "error" in answer:
-            raise FmpyError(answer["error"])
-        return answer["columns"], answer["evaluations"]
-
-
-class FmpyError(Exception):
-    """fmpy aborted a run."""
 
 
 @cache
@@ -63,8 +37,5 @@ def build_reduced_fmu(name):
 
 @pytest.fixture(scope="module")
 def fmus():
+    """The folder of the FMI 3.0 FMUs."""
     return build_fmi3_fmus()
-
-
-_workers, worker, fresh_worker = worker_client.worker_fixtures(Worker, "module")
-FIXTURES = fmus, worker, _workers

@@ -1,6 +1,8 @@
 """Many life cycles of FMUs in one process: a test names a function of this file and its arguments; the result is JSON.
 
 python life_cycles.py FUNCTION '[ARGUMENTS]'
+
+An FMU is given as [path, interface]. The interface is CO_SIMULATION or, for FMI 3.0, MODEL_EXCHANGE.
 """
 
 import ctypes
@@ -10,6 +12,7 @@ import multiprocessing
 import os
 import sys
 import threading
+from ctypes import c_double
 from functools import cache
 from itertools import pairwise
 from shutil import rmtree
@@ -17,22 +20,30 @@ from shutil import rmtree
 from fmpy import extract, read_model_description
 from fmpy.fmi2 import FMU2Slave
 
-TIMES = [0.25 * i for i in range(9)]
+sys.path.insert(0, os.path.dirname(__file__))  # an isolated Python does not search the folder of its script
 
+import fmi3_as_fmi2
+
+TIMES = [0.25 * i for i in range(9)]
+MODEL_EXCHANGE = "ModelExchange"
 
 describe = cache(read_model_description)
 
 
 class LifeCycle:
-    """An instance of the FMU in a folder."""
+    """An instance for co-simulation of an unpacked FMU: its folder and interface."""
 
-    def __init__(self, folder, name="life"):
+    def __init__(self, fmu, name="life"):
+        folder, interface = fmu
         description = describe(folder)
-        self.fmu = FMU2Slave(
+        kind = FMU2Slave if description.fmiVersion == "2.0" else fmi3_as_fmi2.Slave
+        if interface == MODEL_EXCHANGE:
+            kind = fmi3_as_fmi2.Model
+        self.fmu = kind(
             guid=description.guid, unzipDirectory=folder, modelIdentifier=description.modelName, instanceName=name
         )
-        declared = description.modelVariables
-        self.outputs = [v.valueReference for v in declared if v.causality == "output" and v.type == "Real"]
+        outputs = [v for v in description.modelVariables if v.causality == "output"]
+        self.outputs = [v.valueReference for v in outputs if v.type in ("Real", "Float64")]
         self.fmu.instantiate()
 
     def begin(self):
@@ -56,6 +67,41 @@ class LifeCycle:
         self.fmu.freeInstance()
 
 
+class ModelExchangeLifeCycle(LifeCycle):
+    """An instance for model exchange of an FMI 3.0 FMU; a step is one Euler step followed by an event."""
+
+    def begin(self):
+        super().begin()
+        self.fmu.updateDiscreteStates()
+        self.fmu.enterContinuousTimeMode()
+        return self
+
+    def step(self, t, ahead):
+        size = self.fmu.getNumberOfContinuousStates()
+        states, rates = (c_double * size)(), (c_double * size)()
+        self.fmu.getContinuousStates(states, size)
+        self.fmu.getContinuousStateDerivatives(rates, size)
+        for i, rate in enumerate(rates):
+            states[i] += (ahead - t) * rate
+        self.fmu.setTime(ahead)
+        self.fmu.setContinuousStates(states, size)
+        self.fmu.enterEventMode()
+        self.fmu.updateDiscreteStates()
+        self.fmu.enterContinuousTimeMode()
+        return self.read()
+
+
+def instantiate(fmu, name="life"):
+    """Create an instance of an unpacked FMU."""
+    return (ModelExchangeLifeCycle if fmu[1] == MODEL_EXCHANGE else LifeCycle)(fmu, name)
+
+
+def unpack(fmu):
+    """Unpack an FMU; return its folder and interface."""
+    path, interface = fmu
+    return extract(path), interface
+
+
 class Heap(ctypes.Structure):
     """The result of mallinfo(3) of glibc."""
 
@@ -73,20 +119,20 @@ def memory():
     return (tell().mapped + tell().used + 64 * sys.getallocatedblocks()) / 1000
 
 
-def run_in_turn(paths, number):
+def run_in_turn(fmus, number):
     """Create, run, reset, run and free one FMU after another.
 
     Returns the number of distinct runs, the memory after a tenth of the life cycles and after all, and additions to
     sys.path.
     """
-    folders, before, after = [extract(path) for path in paths], list(sys.path), []
-    rows = {folder: set() for folder in folders}
+    unpacked, before, after = [unpack(fmu) for fmu in fmus], list(sys.path), []
+    rows = {fmu: set() for fmu in unpacked}
     for i in range(number):
-        folder = folders[i % len(folders)]
-        life = LifeCycle(folder)
-        rows[folder].add(repr(life.begin().run()))
+        fmu = unpacked[i % len(unpacked)]
+        life = instantiate(fmu)
+        rows[fmu].add(repr(life.begin().run()))
         life.fmu.reset()
-        rows[folder].add(repr(life.begin().run()))
+        rows[fmu].add(repr(life.begin().run()))
         life.end()
         if i + 1 in (number // 10, number):
             after.append(memory())
@@ -94,14 +140,14 @@ def run_in_turn(paths, number):
     return {"runs": [len(runs) for runs in rows.values()], "memory": after, "path": path}
 
 
-def run_interleaved(paths, number):
+def run_interleaved(fmus, number):
     """Step all instances in turn while all exist; return the number of distinct runs and the memory per instance."""
-    folders = [extract(path) for path in paths]
-    fleet = [[LifeCycle(folder, str(i)).begin() for i in range(5)] for folder in folders]
+    unpacked = [unpack(fmu) for fmu in fmus]
+    fleet = [[instantiate(fmu, str(i)).begin() for i in range(5)] for fmu in unpacked]
     before = memory()
-    for instances, folder in zip(fleet, folders, strict=True):
-        instances += [LifeCycle(folder, str(i)).begin() for i in range(number)]
-    per_instance = (memory() - before) / (number * len(paths))
+    for instances, fmu in zip(fleet, unpacked, strict=True):
+        instances += [instantiate(fmu, str(i)).begin() for i in range(number)]
+    per_instance = (memory() - before) / (number * len(fmus))
     rows = {}
     for t, ahead in pairwise(TIMES):
         for name, instances in enumerate(fleet):
@@ -112,15 +158,15 @@ def run_interleaved(paths, number):
     return {"runs": max(map(len, rows.values())), "each": per_instance}
 
 
-def unpack_for_every_run(path, number):
+def unpack_for_every_run(fmu, number):
     """Unpack, run and delete repeatedly, as fmpy.simulate_fmu does; return early and late memory, libraries and
     sys.path."""
     before, after = list(sys.path), []
     for i in range(number):
-        folder = extract(path)
-        LifeCycle(folder).begin().end()
+        unpacked = unpack(fmu)
+        instantiate(unpacked).begin().end()
         describe.cache_clear()
-        rmtree(folder)
+        rmtree(unpacked[0])
         if i + 1 in (number // 10, number):
             after.append(memory())
     with open("/proc/self/maps") as maps:
@@ -128,19 +174,19 @@ def unpack_for_every_run(path, number):
     return {"memory": after, "libraries": libraries, "path": [entry for entry in sys.path if entry not in before]}
 
 
-def run_in_threads(paths, threads, turns):
+def run_in_threads(fmus, threads, turns):
     """Run life cycles of every FMU in several threads; return the number of distinct runs."""
-    folders = [extract(path) for path in paths]
-    for folder in folders:
+    unpacked = [unpack(fmu) for fmu in fmus]
+    for folder, _ in unpacked:
         describe(folder)  # now, because the XML parser occasionally fails in two threads at once
-    rows, errors = {folder: set() for folder in folders}, []
+    rows, errors = {fmu: set() for fmu in unpacked}, []
 
     def work():
         try:
             for _ in range(turns):
-                for folder in folders:
-                    life = LifeCycle(folder)
-                    rows[folder].add(repr(life.begin().run()))
+                for fmu in unpacked:
+                    life = instantiate(fmu)
+                    rows[fmu].add(repr(life.begin().run()))
                     life.end()
         except BaseException as error:
             errors.append(repr(error))
@@ -153,21 +199,19 @@ def run_in_threads(paths, threads, turns):
     return {"runs": [len(runs) for runs in rows.values()], "errors": errors}
 
 
-def continue_instances(instances, folders):
+def continue_instances(instances, unpacked):
     """Return the next step of the given instances, and a complete run of each FMU."""
-    return [life.step(TIMES[1], TIMES[2]) for life in instances], [
-        LifeCycle(folder).begin().run() for folder in folders
-    ]
+    return [life.step(TIMES[1], TIMES[2]) for life in instances], [instantiate(fmu).begin().run() for fmu in unpacked]
 
 
 def run_in_child(answers, *arguments):
     answers.put(continue_instances(*arguments))
 
 
-def run_in_processes(paths, method):
+def run_in_processes(fmus, method):
     """Carry instances into two forked children, or none into a spawned one; compare the children with the parent."""
-    folders = [extract(path) for path in paths]
-    instances = [LifeCycle(folder).begin() for folder in folders]
+    unpacked = [unpack(fmu) for fmu in fmus]
+    instances = [instantiate(fmu).begin() for fmu in unpacked]
     for life in instances:
         life.step(TIMES[0], TIMES[1])
     if method == "spawn":
@@ -175,18 +219,18 @@ def run_in_processes(paths, method):
     context = multiprocessing.get_context(method)
     answers = context.Queue()
     children = [
-        context.Process(target=run_in_child, args=(answers, instances, folders)) for _ in range(2 if instances else 1)
+        context.Process(target=run_in_child, args=(answers, instances, unpacked)) for _ in range(2 if instances else 1)
     ]
     for child in children:
         child.start()
     results = [answers.get(timeout=60) for _ in children]
     for child in children:
         child.join(60)
-    expected = continue_instances(instances, folders)
+    expected = continue_instances(instances, unpacked)
     return {"same": all(answer == expected for answer in results), "codes": [child.exitcode for child in children]}
 
 
-def run_beside_sources(root, paths):
+def run_beside_sources(root, built):
     """Run the FMUs in a host that has imported the sources and another pythonfmu; return the files of their code."""
     sys.path.insert(0, root)
     import pythonfmu
@@ -196,23 +240,24 @@ def run_beside_sources(root, paths):
     assert fmus.runtime.slave.Fmi2Slave is pythonfmu.fmi2slave.Fmi2Slave
     pythonfmu.fmi2slave.Fmi2Slave.do_step = None  # any use of it by an FMU would fail
     loaded_before = set(sys.modules)
-    rows = run_each(paths)
+    rows = run_each(built)
     new = {getattr(sys.modules[name], "__file__", None) for name in set(sys.modules) - loaded_before}
     places = (os.path.join(root, "fmus", ""), os.path.join(os.path.dirname(pythonfmu.__file__), ""))
     return {"rows": rows, "foreign": [file for file in new if file and file.startswith(places)]}
 
 
-def run_in_folder(path, folder):
+def run_in_folder(fmu, folder):
     """Run the FMU unpacked into this folder."""
-    life = LifeCycle(extract(path, folder))
+    path, interface = fmu
+    life = instantiate((extract(path, folder), interface))
     rows = life.begin().run()
     life.end()
     return rows
 
 
-def run_each(paths):
+def run_each(fmus):
     """Run each FMU once."""
-    return [run_in_folder(path, None) for path in paths]
+    return [run_in_folder(fmu, None) for fmu in fmus]
 
 
 if __name__ == "__main__":

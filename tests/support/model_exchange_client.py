@@ -67,4 +67,4 @@ def single_error(fmu):
     return text
 
 
-FIXTURES = *fmi3_fixtures.FIXTURES, launch, launch_moving
+FIXTURES = fmi3_fixtures.fmus, launch, launch_moving

@@ -1,18 +1,11 @@
 """The native FMUs, built once per test run."""
 
-import tempfile
 from functools import cache
 
 import build_cache
 import pytest
 
 from fmus.packaging.native.compiler import PLATFORMS
-
-
-@cache
-def temporary_folder():
-    """Return a folder that lasts as long as the tests."""
-    return tempfile.TemporaryDirectory()
 
 
 def require_compiler():

@@ -29,11 +29,10 @@ from dataclasses import dataclass, field
 from math import inf, isnan
 from pathlib import Path
 
-import fmi3_fixtures
 import numpy as np
 from independent_contacts import solve
 from random_models import STOP, perturb, random_structure, random_values, to_system, write_model
-from worker_client import FmiError
+from worker_client import FmiError, Worker
 
 ROOT = Path(__file__).resolve().parents[2]
 METHODS = {2: "ode23", 3: "ode45", 4: "dop853", 5: "rodas"}
@@ -334,7 +333,7 @@ def run_case(worker, paths, structure, seed, reference, backends=("native",), sl
                     path = paths[structure.seed, backend]
                     results[backend] = run(worker, path, structure, values, method, rtol, reference.times)
                 except AssertionError as error:
-                    worker = fmi3_fixtures.Worker()
+                    worker = Worker()
                     failures.append(
                         Failure(structure.seed, seed, backend, method, rtol, "died", 0.0, str(error)[-200:])
                     )
@@ -406,7 +405,7 @@ def main():
     parser.add_argument("--rtol", type=float, default=1e-6)
     arguments = parser.parse_args()
     folder = arguments.folder
-    worker = fmi3_fixtures.Worker()
+    worker = Worker()
     if arguments.show:
         structure = random_structure(arguments.show[0])
         paths, _ = build([structure], folder, ("native",), arguments.root)

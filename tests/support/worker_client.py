@@ -4,11 +4,12 @@ import itertools
 import json
 import os
 import select
+import subprocess
+import sys
 import tempfile
 from pathlib import Path
 
-import pytest
-from fork_server import ForkedProcess, pipe
+import build_cache
 
 TIMEOUT = 120.0  # s, per request
 
@@ -23,16 +24,20 @@ def run_script(script, function, *arguments, **how):
 
 def run_script_with_stderr(script, function, *arguments, folder=None, timeout=300):
     """Return the result and standard error of a function of a support script."""
-    words = [Path(__file__).with_name(script), function, json.dumps(arguments, default=str)]
-    with open(os.devnull) as nothing, tempfile.TemporaryFile("w+") as out, tempfile.TemporaryFile("w+") as err:
-        process = ForkedProcess(words, nothing, out, err, folder)
-        try:
-            status = process.wait(timeout)
-        finally:
-            process.kill()
-        answer, stderr = (file.seek(0) or file.read() for file in (out, err))
-    assert status == 0, f"exit status {status}: {stderr}"
-    return json.loads(answer), stderr
+    command = [*isolated_python(script), function, json.dumps(arguments, default=str)]
+    done = subprocess.run(command, cwd=folder, env=environment(), capture_output=True, text=True, timeout=timeout)
+    assert done.returncode == 0, f"exit status {done.returncode}: {done.stderr}"
+    return json.loads(done.stdout), done.stderr
+
+
+def isolated_python(script):
+    """Return the command that runs a support script, without the folders of the project on the path."""
+    return [sys.executable, "-I", str(Path(__file__).with_name(script))]
+
+
+def environment():
+    """Return the environment of a process: the folder of the test run holds its temporary files, as it may crash."""
+    return os.environ | {"TMPDIR": str(build_cache.shared_folder)}
 
 
 class FmiError(Exception):
@@ -43,20 +48,24 @@ class FmiError(Exception):
         self.function, self.status = function, status
 
 
+class FmpyError(Exception):
+    """fmpy aborted a run."""
+
+
 class Worker:
     """A process that runs FMUs; `alive` until it is closed, crashes or hangs."""
 
-    script = "worker.py"
-
     def __init__(self):
         self.stderr_file = tempfile.TemporaryFile("a+b")  # noqa: SIM115 - lives as long as the process
-        script, (requests, self.asking), (self.answers, answering) = (
-            Path(__file__).with_name(self.script),
-            pipe(),
-            pipe(),
+        self.process = subprocess.Popen(
+            isolated_python("worker.py"),
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=self.stderr_file,
+            bufsize=0,
+            cwd=tempfile.gettempdir(),
+            env=environment(),
         )
-        with requests, answering:
-            self.process = ForkedProcess([script], requests, answering, self.stderr_file, tempfile.gettempdir())
         self.stderr_position, self.pending = 0, b""
 
     @property
@@ -66,7 +75,7 @@ class Worker:
     def call(self, instance, function, *arguments):
         """Send a request and return its value; raise FmiError if an FMI call fails, AssertionError otherwise."""
         try:
-            self.asking.write(json.dumps([instance, function, arguments]).encode() + b"\n")
+            self.process.stdin.write(json.dumps([instance, function, arguments]).encode() + b"\n")
             answer = json.loads(self._line(function))
         except BrokenPipeError:
             raise AssertionError(self._death_message(function)) from None
@@ -76,7 +85,7 @@ class Worker:
         return answer["value"]
 
     def _line(self, function):
-        out = self.answers.fileno()
+        out = self.process.stdout.fileno()
         while b"\n" not in self.pending:
             if not select.select([out], [], [], TIMEOUT)[0]:
                 self.process.kill()
@@ -101,6 +110,21 @@ class Worker:
     def instantiate(self, path, name="test"):
         return Instance(self, self.call(None, "instantiate", str(path), name))
 
+    def exchange(self, path, name="test"):
+        """Create an instance for model exchange."""
+        return Instance(self, self.call(None, "exchange", str(path), name))
+
+    def simulate(self, path, kind, **options):
+        """Simulate with fmpy and return the columns; raise FmpyError if fmpy raises."""
+        return self.simulate_and_count(path, kind, **options)[0]
+
+    def simulate_and_count(self, path, kind, **options):
+        """Simulate with fmpy and return the columns and the number of derivative evaluations."""
+        answer = self.call(None, "simulate", str(path), {"fmi_type": kind, **options})
+        if "error" in answer:
+            raise FmpyError(answer["error"])
+        return answer["columns"], answer["evaluations"]
+
     def modules(self):
         return self.call(None, "modules")
 
@@ -110,9 +134,9 @@ class Worker:
 
     def close(self):
         """End the process and return its exit code."""
-        self.asking.close()
+        self.process.stdin.close()
         code = self.process.wait(30)
-        self.answers.close()
+        self.process.stdout.close()
         self.stderr_file.close()
         return code
 
@@ -150,31 +174,3 @@ class Instance:
     def free(self):
         self.freed = True
         self.worker.call(self.number, "free")
-
-
-def worker_fixtures(kind, scope):
-    """Return the fixtures `_workers`, `worker` and `fresh_worker` for a process class."""
-
-    @pytest.fixture(scope=scope)
-    def _workers():
-        workers = [kind()]
-        yield workers
-        for worker in workers:
-            worker.close()
-
-    @pytest.fixture
-    def worker(_workers):
-        """A process that runs FMUs; replaced if the last test killed it."""
-        if not _workers[-1].alive:
-            _workers.append(kind())
-        _workers[-1].read_stderr()
-        return _workers[-1]
-
-    @pytest.fixture
-    def fresh_worker():
-        """A separate process that must exit cleanly, because late memory errors show at the exit."""
-        worker = kind()
-        yield worker
-        assert worker.close() == 0
-
-    return _workers, worker, fresh_worker
