@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .errors import HarnessError, SceneError, format_value, optional, unknown_name_message, unknown_source_message
+from .errors import HarnessError, SceneError, format_value, optional, unknown_name_message
 
 if TYPE_CHECKING:
     import pandas
@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 
     from .analyses.decay.identification import DecayIdentification
     from .records.record import Record
-    from .running.run_spec import RunSpec
     from .running.trajectory import Trajectory
+    from .scenes.run_spec import RunSpec
     from .studies.compare.difference import Comparison
 
 Progress = Callable[[float], None]  # takes the finished share, from 0 to 1
@@ -91,8 +91,9 @@ def simulate(
     >>> sled["x"][-1]  # doctest: +SKIP
     """
     from .running import runner
+    from .running.resolve import resolve
 
-    spec = run_spec(source)
+    spec = resolve(source)
     if values:
         spec = replace(spec, values={**spec.values, **values})
     if inputs is not None:
@@ -138,9 +139,9 @@ def compare(
     HarnessError
         If the two have no variable or no time in common.
     """
-    from .running.run_spec import RunSpec
     from .running.signals import signals_from_trajectory
     from .running.trajectory import Trajectory
+    from .scenes.run_spec import RunSpec
     from .studies.compare.difference import compare as difference
     from .studies.compare.trajectory_sources import display_names, load_both
 
@@ -386,48 +387,6 @@ def load_result(folder: "str | Path") -> "Trajectory | xarray.Dataset | dict[str
 # ---- what the functions above share
 
 
-def run_spec(source: "str | Path") -> "RunSpec":
-    """Return the run that a source describes."""
-    from .running.run_spec import DEFAULT_EQUAL_STEPS, RunSpec, spec_from_scene
-    from .scenes.fmu_files import check_built, find_fmu, list_models
-    from .scenes.scene import load_scene
-
-    path, name = Path(source), str(source)
-    if path.suffix in (".fmu", ".py") or (name in list_models() and not path.is_dir()):
-        fmu = find_fmu(name)
-        check_built(fmu)
-        return RunSpec(fmu, equal_steps=DEFAULT_EQUAL_STEPS)
-    if path.is_dir():
-        return stored_spec(path)
-    try:
-        scene = load_scene(source)
-    except SceneError as error:
-        if path.suffix == ".toml":
-            raise
-        from .scenes.scene import shipped_scenes
-
-        names = sorted(list_models() | {file.stem for file in shipped_scenes()})
-        other = ", or the path of an FMU, a scene or a result"
-        raise SceneError(unknown_source_message("model or scene", name, names, other)) from error
-    check_built(scene.file)
-    return spec_from_scene(scene)
-
-
-def stored_spec(folder: Path) -> "RunSpec":
-    """Return the run that made a stored result; HarnessError if its files have changed since."""
-    from .results.provenance import load_verified_provenance
-    from .running.run_spec import spec_from_provenance, spec_from_scene
-    from .scenes.scene import scene_from_provenance
-
-    scene = load_verified_provenance(folder)["scene"] or {}
-    if "title" in scene:
-        return spec_from_scene(scene_from_provenance(scene))
-    try:
-        return spec_from_provenance(scene)
-    except SceneError as error:
-        raise SceneError(f"{folder} does not hold the result of one run ({error}): name another folder") from None
-
-
 def exchange_of(interface: str | None) -> bool | None:
     """Whether an interface is model exchange; None if none is named."""
     if interface is None:
@@ -486,7 +445,7 @@ def fine_step(spec: "RunSpec", interval: float) -> float:
     from math import ceil
 
     from .running.description import read_description, resolve_time_span
-    from .running.run_spec import DEFAULT_EQUAL_STEPS
+    from .scenes.run_spec import DEFAULT_EQUAL_STEPS
 
     start, stop = resolve_time_span(spec, read_description(spec.fmu, spec.lenient))
     return interval / ceil(interval * DEFAULT_EQUAL_STEPS / (stop - start))
@@ -503,7 +462,7 @@ def at_interval(run: "Trajectory", interval: float) -> "Trajectory":
     return replace(run, time=run.time[keep], columns={name: column[keep] for name, column in run.columns.items()})
 
 
-def table_of(inputs: Any) -> dict[str, list[float]]:
+def table_of(inputs: Any) -> dict[str, tuple[float, ...]]:
     """Return the columns of a mapping or a DataFrame; the index of a DataFrame may be its time."""
     import numpy as np
 
@@ -516,7 +475,7 @@ def table_of(inputs: Any) -> dict[str, list[float]]:
     for name, column in columns.items():
         if column.ndim != 1 or column.dtype.kind not in "fiub":
             raise SceneError(f"inputs: {name} must be a row of numbers")
-    return {name: column.astype(float).tolist() for name, column in columns.items()}
+    return {name: tuple(column.astype(float).tolist()) for name, column in columns.items()}
 
 
 def record_from(source: Any, x: Any, columns: Any) -> "Record":
@@ -562,21 +521,21 @@ def stored_run(folder: Path) -> "Trajectory":
 
     from .records.columns import read_numeric
     from .results.provenance import load_provenance
-    from .running.run_spec import RunSpec
     from .running.trajectory import SolverSteps, Trajectory
+    from .scenes.run_spec import RunSpec
     from .scenes.schema import is_text
     from .studies.compare.trajectory_files import read_trajectory
 
     found, origin = read_trajectory(folder), load_provenance(folder)
     parameters = {name: each["value"] for name, each in origin.get("parameters", {}).items()}
     units = found.units | {name: each["unit"] for name, each in origin.get("parameters", {}).items()}
-    scene = origin.get("scene") or {}
-    fmu = Path(str(next(filter(is_text, (scene.get("fmu"), scene.get("file"))), f"{folder.name}.fmu")))
+    run = origin.get("run") or origin.get("scene") or {}
+    fmu = Path(str(next(filter(is_text, (run.get("fmu"), run.get("file"))), f"{folder.name}.fmu")))
     steps = None
     if (folder / "steps.csv").is_file():
         ends, sizes, rejected = read_numeric(folder / "steps.csv")[1].T
         steps = SolverSteps(np.append(found.time[0], ends), sizes, rejected.astype(int))
-    values = scene.get("values")
+    values = run.get("values")
     spec = RunSpec(fmu, outputs=tuple(found.columns), values=values if isinstance(values, dict) else {})
     names = {name: name for name in found.columns}
     return Trajectory(spec, found.time, found.columns, units, names, parameters, steps, found.events)

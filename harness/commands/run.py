@@ -82,7 +82,7 @@ def run(
                 raise HarnessError(f"{scene} was written from Python: repeat its run by harness.simulate('{scene}')")
             repeat_call(context, folder_path, stored, terminal)
             return
-        selected_scene = scene_from_provenance(stored["scene"])
+        selected_scene = scene_from_provenance(stored)
         if context.get_parameter_source("out") is not ParameterSource.COMMANDLINE:
             terminal = replace(terminal, out=folder_path.parent)
     else:
@@ -114,8 +114,8 @@ def repeat_call(context: click.Context, folder: Path, stored: dict[str, Any], te
 def run_fmu_file(path: Path, values: tuple[str, ...], options: dict[str, Any], terminal: Terminal) -> None:
     """Run one FMU and print the first and last value of each output."""
     from ..results.files import column_heading
-    from ..running.run_spec import DEFAULT_EQUAL_STEPS, RunSpec
     from ..scenes.assignments import parse_assignment
+    from ..scenes.run_spec import DEFAULT_EQUAL_STEPS, RunSpec
     from ..studies.run.study import run_fmu
 
     with terminal.progress(1) as report:

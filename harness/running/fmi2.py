@@ -21,14 +21,14 @@ from fmpy import fmi2
 from fmpy.fmi1 import FMICallException as FMICallException  # re-exported for callers that step by themselves
 
 from ..errors import HarnessError, SceneError, first_line
+from ..scenes.run_spec import RunSpec
 from .contacts import find_contacts
 from .description import read_description, resolve_time_span
 from .inputs import InputSignals, check_inputs
-from .run_spec import RunSpec
 from .settings import check_fmu, resolve_settings
 from .trajectory import ModeChanges, SolverSteps, Statistics, Trajectory
 from .unpacking import unpack
-from .variable_values import enumeration_labels, variable_unit
+from .variable_values import effective_value, enumeration_labels, variable_unit
 
 ProgressCallback = Callable[[float], None]  # receives the progress of a run, from 0 to 1
 
@@ -214,6 +214,8 @@ def run_repeats(plan: RunPlan, fmu: Any, report: ProgressCallback) -> Trajectory
     """Run the plan `repeat` times on one instance; return the last run with the fastest time."""
     repeat = plan.spec.repeat
     values = resolve_settings(plan.spec, plan.variables)
+    stored = {variable.name: effective_value(variable, value) for variable, value in values}
+    plan = replace(plan, spec=replace(plan.spec, values=stored))
     seconds = []
     for repeat_index in range(repeat):
         if repeat_index:

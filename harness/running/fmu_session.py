@@ -17,8 +17,8 @@ from fmpy.fmi1 import FMICallException
 from ..errors import HarnessError
 from ..scenes.fmu_files import find_fmu
 from ..scenes.roles import find_roles
+from ..scenes.run_spec import RunSpec
 from .fmi2 import LogCapture, initialize, load_instance, read_own_description, set_variable
-from .run_spec import RunSpec
 from .unpacking import unpack_once
 from .variable_values import enumeration_labels
 

@@ -6,11 +6,11 @@ from math import prod
 from typing import Any
 
 from ..errors import HarnessError
+from ..scenes.run_spec import RunSpec
 from .description import read_description
 from .external import simulation as external
 from .external.sample_rows import ROW_FORMATS, element_names
 from .fmi2 import ProgressCallback, simulate
-from .run_spec import RunSpec
 from .settings import REQUIRED_VARIABLES
 from .trajectory import Trajectory
 

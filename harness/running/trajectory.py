@@ -10,8 +10,8 @@ import numpy as np
 from ..errors import HarnessError, check_names, optional
 from ..results.files import write_csv, write_signals
 from ..results.quantity import Quantity
+from ..scenes.run_spec import RunSpec
 from .contacts import choose_outputs, contact_of_mode
-from .run_spec import RunSpec
 
 if TYPE_CHECKING:
     import pandas
@@ -272,9 +272,9 @@ class Trajectory:
                 fresh,
                 [fmu],
                 self.effective_parameters,
-                self.spec,
                 source=describe_sources(str(fmu)),
                 command=PYTHON_API,
+                run=self.spec,
             )
 
     def column_of_role(self, role: str) -> np.ndarray:

@@ -11,15 +11,13 @@ from ...errors import HarnessError, SceneError
 from ...running.description import read_description, resolve_stop, resolve_time_span
 from ...running.external.step_refinement import communication_step, declared_step
 from ...running.fmi2 import ProgressCallback
-from ...running.run_spec import RunSpec, spec_from_scene
+from ...running.resolve import FMU_SUFFIXES, resolve
 from ...running.runner import DEFAULT_COMMUNICATION_STEPS, run
 from ...running.signals import Signals, signals_from_trajectory
-from ...scenes.fmu_files import check_built, find_fmu
-from ...scenes.scene import load_scene
+from ...scenes.run_spec import RunSpec
 from .trajectory_files import read_trajectory
 
 FILE_SUFFIXES = (".csv", ".txt", ".mat", ".xlsx", ".ods", ".npz")
-FMU_SUFFIXES = (".fmu", ".py")
 RUN_SUFFIXES = (*FMU_SUFFIXES, ".toml")  # sources that are run
 
 
@@ -32,7 +30,8 @@ def load_both(sources: Sequence[str | Signals], options: RunSpec, report: Progre
     """
     recordings = [source if isinstance(source, Signals) else read_recorded(source) for source in sources]
     runs = [
-        None if item else run_spec_for(str(source), options) for item, source in zip(recordings, sources, strict=True)
+        None if item else resolve(str(source), options, scenes_first=True)
+        for item, source in zip(recordings, sources, strict=True)
     ]
     grids = [grid_spacing(item.time) for item in recordings if item] + [item.grid for item in runs if item]
     grids += [fixed_grid(item) for item in runs if item]
@@ -63,15 +62,6 @@ def display_names(sources: tuple[str, str]) -> list[str]:
     one, two = (each.parts for each in (paths if alike else plain))
     apart = next((k for k, ends in enumerate(zip(one[::-1], two[::-1], strict=False), 1) if ends[0] != ends[1]), 1)
     return ["/".join(parts[-apart:]) for parts in (one, two)]
-
-
-def run_spec_for(source: str, options: RunSpec) -> RunSpec:
-    """Return the specification to run an FMU, the FMU of a model file, or a scene."""
-    if Path(source).suffix in FMU_SUFFIXES:
-        return replace(options, fmu=find_fmu(source))
-    scene = load_scene(source)
-    check_built(scene.file)
-    return spec_from_scene(scene)
 
 
 def read_recorded(source: str) -> Signals | None:

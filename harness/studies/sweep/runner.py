@@ -26,10 +26,10 @@ from ...running.fmi2 import (
     read_parameters,
     record_run,
 )
-from ...running.run_spec import RunSpec
 from ...running.settings import resolve_settings
 from ...running.variable_values import variable_unit
 from ...scenes.roles import find_roles
+from ...scenes.run_spec import RunSpec
 from .measures import (
     DEFAULT_MEASURES,
     FINAL_MEASURES,
