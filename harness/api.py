@@ -104,7 +104,7 @@ def simulate(
     done = runner.run(spec, progress or QUIET)
     if done.failure:
         raise HarnessError(done.failure)
-    return done if interval is None else at_interval(done, interval)
+    return done
 
 
 def compare(
@@ -139,7 +139,6 @@ def compare(
     HarnessError
         If the two have no variable or no time in common.
     """
-    from .running.signals import signals_from_trajectory
     from .running.trajectory import Trajectory
     from .scenes.run_spec import RunSpec
     from .studies.compare.difference import compare as difference
@@ -149,16 +148,16 @@ def compare(
     if rtol is not None:
         how = replace(how, tolerance=rtol)
     first, second = load_both(
-        tuple(signals_from_trajectory(each) if isinstance(each, Trajectory) else str(each) for each in (a, b)),
+        tuple(each if isinstance(each, Trajectory) else str(each) for each in (a, b)),
         how,
         progress or QUIET,
     )
     paths = [each for each in (a, b) if not isinstance(each, Trajectory)]
     if len(paths) == 2:
         one, two = display_names((str(a), str(b)))
-        first, second = replace(first, name=one), replace(second, name=two)
+        first, second = replace(first, label=one), replace(second, label=two)
     elif first.name == second.name:
-        first, second = replace(first, name=f"{first.name} (a)"), replace(second, name=f"{second.name} (b)")
+        first, second = replace(first, label=f"{first.name} (a)"), replace(second, label=f"{second.name} (b)")
     return difference(first, second)
 
 
@@ -433,6 +432,7 @@ def with_options(
         tolerance=tolerance,
         stop=spec.stop if stop is None else float(stop),
         grid=spec.grid if interval is None else float(interval),
+        interval=spec.interval if interval is None else float(interval),
         follow=True if interval is not None else spec.follow,
         outputs=spec.outputs if outputs is None else tuple(outputs),
         exchange=spec.exchange if exchange is None else exchange,
@@ -449,17 +449,6 @@ def fine_step(spec: "RunSpec", interval: float) -> float:
 
     start, stop = resolve_time_span(spec, read_description(spec.fmu, spec.lenient))
     return interval / ceil(interval * DEFAULT_EQUAL_STEPS / (stop - start))
-
-
-def at_interval(run: "Trajectory", interval: float) -> "Trajectory":
-    """Keep the points of a run at multiples of an interval in s, and its last one."""
-    import numpy as np
-
-    start = run.time[0]
-    near = 1e-9 * interval
-    keep = np.abs(start + np.rint((run.time - start) / interval) * interval - run.time) <= near
-    keep[-1] = True
-    return replace(run, time=run.time[keep], columns={name: column[keep] for name, column in run.columns.items()})
 
 
 def table_of(inputs: Any) -> dict[str, tuple[float, ...]]:
@@ -523,19 +512,18 @@ def stored_run(folder: Path) -> "Trajectory":
     from .results.provenance import load_provenance
     from .running.trajectory import SolverSteps, Trajectory
     from .scenes.run_spec import RunSpec
-    from .scenes.schema import is_text
     from .studies.compare.trajectory_files import read_trajectory
 
     found, origin = read_trajectory(folder), load_provenance(folder)
     parameters = {name: each["value"] for name, each in origin.get("parameters", {}).items()}
     units = found.units | {name: each["unit"] for name, each in origin.get("parameters", {}).items()}
-    run = origin.get("run") or origin.get("scene") or {}
-    fmu = Path(str(next(filter(is_text, (run.get("fmu"), run.get("file"))), f"{folder.name}.fmu")))
+    try:
+        spec = RunSpec.from_json(origin.get("run") or {})
+    except SceneError:  # of an earlier version, or of another tool
+        spec = RunSpec(Path(f"{folder.name}.fmu"), outputs=tuple(found.columns))
     steps = None
     if (folder / "steps.csv").is_file():
         ends, sizes, rejected = read_numeric(folder / "steps.csv")[1].T
         steps = SolverSteps(np.append(found.time[0], ends), sizes, rejected.astype(int))
-    values = run.get("values")
-    spec = RunSpec(fmu, outputs=tuple(found.columns), values=values if isinstance(values, dict) else {})
     names = {name: name for name in found.columns}
     return Trajectory(spec, found.time, found.columns, units, names, parameters, steps, found.events)

@@ -53,8 +53,8 @@ def read_stored_run(folder: Path) -> RunSpec:
     stored = load_verified_provenance(folder)
     scene = stored["scene"] or {}
     try:
-        if "run" in stored or "title" not in scene:
-            return RunSpec.from_json(stored.get("run") or scene)
-        return scene_from_provenance(stored).run
+        if "title" in scene and not stored.get("run"):  # of an earlier version
+            return scene_from_provenance(stored).run
+        return RunSpec.from_json(stored.get("run") or scene)
     except SceneError as error:
         raise SceneError(f"{folder} does not hold the result of one run ({error}): name another folder") from None

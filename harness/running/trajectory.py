@@ -99,11 +99,12 @@ class Statistics:
 
 @dataclass(frozen=True)
 class Trajectory:
-    """Result of one run.
+    """Result of one run, or signals over time that were read from a file.
 
     Attributes
     ----------
     spec : RunSpec
+        The run as it was done; of signals from a file, the file stands in place of the FMU.
     time : numpy.ndarray
         Time (n,) in s.
     columns : dict
@@ -120,6 +121,8 @@ class Trajectory:
         Estimated accuracy.
     failure : str
         Reason why the run is incomplete; empty if it is complete.
+    label : str
+        Name for display; empty for that of the model.
     """
 
     spec: RunSpec
@@ -133,6 +136,17 @@ class Trajectory:
     statistics: Statistics | None = None
     note: str = ""
     failure: str = ""
+    label: str = ""
+
+    @property
+    def name(self) -> str:
+        """Return the name for display."""
+        return self.label or self.spec.model
+
+    @property
+    def accuracy(self) -> str:
+        """Return the estimated accuracy, or the settings of the solver of an FMU of this project."""
+        return self.note or (f"solver: {self.settings_label}" if self.settings_label else "")
 
     @property
     def settings_label(self) -> str:

@@ -38,6 +38,8 @@ class RunSpec:
         Communication step in s.
     equal_steps : int
         Number of equal communication steps if there is no `grid`.
+    interval : float or None
+        Time in s between the points to keep, multiples of it and the last point; None to keep every point.
     follow : bool
         Whether to step to the ends of internal steps as well. An external FMU does not expose them; its communication
         steps are refined instead until two results agree to the `tolerance`.
@@ -61,6 +63,7 @@ class RunSpec:
     stop: Annotated[float | None, NUMBER] = None
     grid: Annotated[float | None, POSITIVE] = None
     equal_steps: Annotated[int, NATURAL_NUMBER] = 0
+    interval: Annotated[float | None, POSITIVE] = None
     follow: Annotated[bool, FLAG] = True
     repeat: Annotated[int, REPEAT_COUNT] = 1
     tolerance: Annotated[float, POSITIVE] = 1e-6
@@ -74,6 +77,11 @@ class RunSpec:
         return parse_table({name: value for name, value in stored.items() if value is not None}, cls)
 
     @property
+    def options(self) -> dict[str, Any]:
+        """Return everything but the FMU, for commands that run several."""
+        return {name: value for name, value in vars(self).items() if name != "fmu"}
+
+    @property
     def model(self) -> str:
         """Return the name of the model."""
         return self.fmu.stem
@@ -84,5 +92,5 @@ class RunSpec:
         return find_roles(self.outputs)
 
 
-# keys of a scene file that are those of its run; the FMU has other keys, and the number of equal steps is implied
-SCENE_KEYS = tuple(name for name in get_annotations(RunSpec) if name not in ("fmu", "equal_steps"))
+# keys of a scene file that are those of its run; the FMU has other keys, and a scene keeps every point
+SCENE_KEYS = tuple(name for name in get_annotations(RunSpec) if name not in ("fmu", "equal_steps", "interval"))

@@ -16,7 +16,6 @@ from ...results.provenance import describe_sources, write_provenance
 from ...results.quantity import Quantity
 from ...running import runner
 from ...running.contacts import choose_outputs
-from ...running.signals import Signals, signals_from_trajectory
 from ...running.trajectory import Trajectory
 from ...scenes.fmu_files import check_built
 from ...scenes.run_spec import RunSpec
@@ -143,18 +142,17 @@ def run_scenes(names: Iterable[str], out: Path, report: Callable[[str, float], N
             yield SceneOutcome(name, None, None, (), str(error))
 
 
-def run_fmu(wanted: RunSpec, out: Path, report: Callable[[float], None]) -> tuple[Signals, Path]:
+def run_fmu(wanted: RunSpec, out: Path, report: Callable[[float], None]) -> tuple[Trajectory, Path]:
     """Run one FMU and write its outputs to out/<name of the FMU>."""
     from .figure import draw
 
     folder, source = out / wanted.model, describe_sources(str(wanted.fmu))
     with replace_folder(folder, FILES, source) as new_folder:
         trajectory = runner.run(wanted, report)
-        signals = signals_from_trajectory(trajectory)
         trajectory.write_tables(new_folder)
         draw(wanted.fmu.name, choose_plots(trajectory), trajectory, {}, new_folder / "figure.svg")
-        write_provenance(new_folder, [wanted.fmu], signals.parameters, source=source, run=trajectory.spec)
-    return signals, folder
+        write_provenance(new_folder, [wanted.fmu], trajectory.effective_parameters, source=source, run=trajectory.spec)
+    return trajectory, folder
 
 
 def choose_plots(run: Trajectory) -> tuple[str, ...]:
