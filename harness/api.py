@@ -144,7 +144,7 @@ def compare(
     from .studies.compare.difference import compare as difference
     from .studies.compare.trajectory_sources import display_names, load_both
 
-    how = with_options(RunSpec(Path()), stop, None, None, None, None, interface, timeout)
+    how = with_options(RunSpec(Path()), stop=stop, interface=interface, timeout=timeout)
     if rtol is not None:
         how = replace(how, tolerance=rtol)
     first, second = load_both(
@@ -310,39 +310,23 @@ def sweep(
     """
     from contextlib import nullcontext
 
-    import numpy as np
-
     from .process.temporary_directory import temporary_directory
-    from .studies.sweep import result_files
+    from .scenes.fmu_files import find_fmu
+    from .scenes.run_spec import RunSpec
+    from .studies.sweep.result_files import run_sweep
+    from .studies.sweep.runner import SweepSpec
+    from .studies.sweep.sampling import SweepPoints, axis_from_numbers
 
     library = optional("xarray", "a sweep", "sweep")
     if not grid:
         raise SceneError("grid is empty: name at least one parameter and its values, as in {'mu_d': [0.3, 0.6]}")
-    options: dict[str, Any] = {"stop": stop, "tolerance": rtol, "exchange": exchange_of(interface), "timeout": timeout}
-    axes = []
-    for name, column in grid.items():
-        try:
-            numbers = [repr(each) for each in np.ravel(np.asarray(column, dtype=float)).tolist()]
-        except (TypeError, ValueError):
-            raise SceneError(f"grid: {name} = {format_value(column)} must be numbers") from None
-        if not numbers:
-            raise SceneError(f"grid: {name} has no values: give at least one")
-        if samples is not None and len(numbers) != 2:
-            raise SceneError(f"{name} has {len(numbers)} values: with samples give its lower and its upper bound")
-        single = f"{numbers[0]}:{numbers[0]}:1" if len(numbers) == 1 else ",".join(numbers)
-        axes.append(f"{name}={single if samples is None else ':'.join(numbers)}")
-    request = result_files.SweepRequest(
-        model=str(source),
-        vary=tuple(axes),
-        values=tuple(f"{name}={value}" for name, value in (values or {}).items()),
-        random=samples,
-        seed=seed,
-        measures=tuple(measures),
-        name=None,
-        options={name: value for name, value in options.items() if value is not None},
-    )
+    run = with_options(RunSpec(find_fmu(str(source)), follow=False), stop=stop, interface=interface, timeout=timeout)
+    run = replace(run, values=dict(values or {}), tolerance=run.tolerance if rtol is None else rtol)
+    axes = tuple(axis_from_numbers(name, column, samples is not None) for name, column in grid.items())
+    points = SweepPoints(axes, samples, seed)
+    spec = SweepSpec(run, points.names, tuple(measures))
     with temporary_directory("sweep-") if folder is None else nullcontext(Path(folder)) as directory:
-        result = result_files.run_sweep(request, directory, scheduler, workers, progress or QUIET)
+        result = run_sweep(spec, points, None, directory, scheduler, workers, progress or QUIET)
         with library.open_dataset(result.folder / "sweep.nc") as data:
             loaded: xarray.Dataset = data.load()
     return loaded
@@ -397,13 +381,13 @@ def exchange_of(interface: str | None) -> bool | None:
 
 def with_options(
     spec: "RunSpec",
-    stop: float | None,
-    interval: float | None,
-    outputs: Sequence[str] | None,
-    method: str | int | None,
-    rtol: float | None,
-    interface: str | None,
-    timeout: float | None,
+    stop: float | None = None,
+    interval: float | None = None,
+    outputs: Sequence[str] | None = None,
+    method: str | int | None = None,
+    rtol: float | None = None,
+    interface: str | None = None,
+    timeout: float | None = None,
 ) -> "RunSpec":
     """Return a run with the options that are not None."""
     from .running.description import read_description

@@ -8,7 +8,6 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from ctypes import c_double, c_int, c_void_p
 from dataclasses import dataclass, replace
-from pathlib import Path
 from time import perf_counter
 from typing import Any
 
@@ -44,14 +43,11 @@ from .measures import (
 
 @dataclass(frozen=True)
 class SweepSpec:
-    """Common data of the runs of a sweep: `varied` names, other `values`, `measures` (empty: the default ones), and
-    `options` of a Specification by name."""
+    """What the runs of a sweep share: the `run` without the `varied` values, and `measures` (empty: default ones)."""
 
-    model: str
+    run: RunSpec
     varied: tuple[str, ...]
-    values: tuple[tuple[str, float | str], ...]
-    measures: tuple[str, ...]
-    options: tuple[tuple[str, Any], ...] = ()
+    measures: tuple[str, ...] = ()
 
 
 class OwnFmuRunner:
@@ -60,7 +56,7 @@ class OwnFmuRunner:
     `columns` are the measured columns; `stop` is the stop time in s.
     """
 
-    def __init__(self, runs: SweepSpec, fmu_description: Any, fmu: Any, log: LogCapture, spec: RunSpec) -> None:
+    def __init__(self, runs: SweepSpec, fmu_description: Any, fmu: Any, log: LogCapture) -> None:
         self.fmu, self.component, self.heard = fmu, c_void_p(fmu.component), log
         self.variables = {variable.name: variable for variable in fmu_description.modelVariables}
         measures = select_measures(runs, self.variables, ours=True)
@@ -70,7 +66,7 @@ class OwnFmuRunner:
             outputs = tuple(
                 name for name in runner.default_outputs(fmu_description) if self.variables[name].type == "Real"
             )
-        self.plan = plan_run(replace(spec, outputs=outputs), fmu_description)
+        self.plan = plan_run(replace(runs.run, outputs=outputs), fmu_description)
         self.stop = self.plan.stop
         ends = [name for name in measures if name in FINAL_MEASURES]
         self.along = [
@@ -159,21 +155,21 @@ def check_status(function: str, status: int) -> None:
 class ExternalFmuRunner:
     """Runs an FMU that does not expose its internal steps, in a separate process for each run."""
 
-    def __init__(self, runs: SweepSpec, fmu_description: Any, wanted: RunSpec) -> None:
+    def __init__(self, runs: SweepSpec, fmu_description: Any) -> None:
         self.varied, self.stop = runs.varied, 0.0
         self.variables = {variable.name: variable for variable in fmu_description.modelVariables}
         self.measures = select_measures(runs, self.variables, ours=False)
         texts = {name for name, variable in self.variables.items() if variable.type == "String"}
         outputs = tuple(name for name in runner.default_outputs(fmu_description) if name not in texts)
-        self.wanted = replace(wanted, outputs=outputs)
+        self.shared = replace(runs.run, outputs=outputs, follow=True)
         self.columns = measure_columns(self.measures, self.variables, outputs)
         self.parameters_used: dict[str, tuple[object, str]] = {}
 
     def run(self, point: Sequence[float]) -> list[float] | str:
-        values = {**self.wanted.values, **dict(zip(self.varied, point, strict=True))}
+        values = {**self.shared.values, **dict(zip(self.varied, point, strict=True))}
         start = perf_counter()
         try:
-            trajectory = runner.run(replace(self.wanted, values=values), lambda share: None)
+            trajectory = runner.run(replace(self.shared, values=values), lambda share: None)
         except HarnessError as error:
             return str(error)
         seconds = perf_counter() - start
@@ -194,23 +190,17 @@ Runner = OwnFmuRunner | ExternalFmuRunner
 
 def select_measures(runs: SweepSpec, variables: dict[str, Any], ours: bool) -> tuple[str, ...]:
     """Return the measures of a sweep; SceneError if one is not available."""
-    available = available_measures(variables, ours, dict(runs.values))
-    check_names(f"measure of {runs.model}", runs.measures, available)
+    available = available_measures(variables, ours, runs.run.values)
+    check_names(f"measure of {runs.run.model}", runs.measures, available)
     return runs.measures or tuple(name for name in DEFAULT_MEASURES if name in available)
 
 
-def run_spec_of(runs: SweepSpec, file: Path) -> RunSpec:
-    """Return the specification that all runs share."""
-    return RunSpec(file, values=dict(runs.values), follow=False, **dict(runs.options))
-
-
 @contextmanager
-def open_runner(runs: SweepSpec, file: Path) -> Iterator[Runner]:
-    """Open the runner of an FMU."""
-    spec = run_spec_of(runs, file)
-    fmu_description = read_description(file, spec.lenient)
-    if runner.exposes_solver_steps(fmu_description) and not spec.exchange:
-        with open_instance(spec) as (_, fmu, heard):
-            yield OwnFmuRunner(runs, fmu_description, fmu, heard, spec)
+def open_runner(runs: SweepSpec) -> Iterator[Runner]:
+    """Open the runner of the FMU."""
+    fmu_description = read_description(runs.run.fmu, runs.run.lenient)
+    if runner.exposes_solver_steps(fmu_description) and not runs.run.exchange:
+        with open_instance(runs.run) as (_, fmu, heard):
+            yield OwnFmuRunner(runs, fmu_description, fmu, heard)
     else:
-        yield ExternalFmuRunner(runs, fmu_description, replace(spec, follow=True))
+        yield ExternalFmuRunner(runs, fmu_description)
