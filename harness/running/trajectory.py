@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from itertools import pairwise
+from math import nan
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -82,12 +83,28 @@ class ModeChanges:
 
 @dataclass(frozen=True)
 class Statistics:
-    """Accepted and rejected steps, evaluations of the right-hand side, run time in s of the fastest repetition."""
+    """Counts of a run.
+
+    Attributes
+    ----------
+    steps, rejected : int
+        Accepted and rejected steps of the solver.
+    evaluations : int
+        Evaluations of the right-hand side.
+    seconds : float
+        Run time in s of the fastest repetition.
+    events : int
+        Changes of mode.
+    last_event : float
+        Time of the last change of mode in s; that of the start without any, NaN if the FMU does not expose it.
+    """
 
     steps: int
     rejected: int
     evaluations: int
     seconds: float
+    events: int = 0
+    last_event: float = nan
 
     @property
     def quantities(self) -> tuple[Quantity, ...]:
