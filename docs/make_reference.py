@@ -19,7 +19,7 @@ MODELS = ("smd", "coulomb", "stickslip", "pacejka", "pendulum")
 
 SCENE_TEXTS = {
     "title": "One line that describes the scene.",
-    "outputs": "The output variables to record.",
+    "outputs": "The output variables to record, at least one.",
     "model": "A model of this project by name: `smd` means `fmus/smd.fmu`. Give either `model` or `fmu`.",
     "fmu": "The path of an FMU, relative to the scene file.",
     "start": "Start time in s. Default: that of the FMU.",
@@ -30,7 +30,8 @@ SCENE_TEXTS = {
     "atol": "Value of `solver.atol`, in SI units.",
     "h_max": "Value of `solver.h_max`, in s.",
     "grid": "Communication step in s.",
-    "follow": "Also visit the end of every internal step of the solver. Without `grid`, visit these only.",
+    "follow": "Also visit the end of every internal step of the solver. Without `grid`, visit these only. "
+    "Default: `true` without `grid`, `false` with it.",
     "repeat": "Time the run this many times and report the fastest.",
     "tolerance": "Relative tolerance for an FMU that does not show its internal steps.",
     "exchange": "Run such an FMU by model exchange, if it offers both interfaces.",
@@ -41,6 +42,8 @@ SCENE_TEXTS = {
     "plots": "Panels of the figure: `position`, `velocity`, `acceleration`, `phase`, `steps`, or the name of an "
     "output, which takes precedence; `[]` for no figure. Default: the first six outputs and the phase plane.",
     "values": "Parameters and inputs by name, in SI units; enumerations by name.",
+    "inputs": "Input signals: the times `time` in s and a list of values for each input, in SI units; linear between "
+    "two times, and a time that occurs twice is a jump.",
     "decay": "Settings of the analysis `decay`, see below.",
     "published": "Published numbers to compare with, see below.",
 }
@@ -148,10 +151,12 @@ def schema_within(schema: Any, key: str) -> Any:
     return next((part for part in get_args(annotation) if is_dataclass(part)), annotation)
 
 
-def keys(schema: Any, texts: dict[str, str]) -> str:
-    """The keys of a dataclass that is a schema."""
+def keys(texts: dict[str, str], *schemas: Any) -> str:
+    """The keys with a text, which are fields of the dataclasses that are the schema."""
+    declared = {each.name.rstrip("_"): each for schema in schemas for each in fields(schema)}
     rows = []
-    for each in fields(schema):
+    for name, text in texts.items():
+        each = declared[name]
         words = next(iter(constraints(each.type)), "a table")
         inner = [text for part in get_args(each.type) for text in constraints(part)]
         if words == "a table" and inner:
@@ -162,13 +167,18 @@ def keys(schema: Any, texts: dict[str, str]) -> str:
         default = each.default
         if needed:
             shown = "**required**"
-        elif default is None or default is MISSING or default in ((), ""):
+        elif default is None or default is MISSING or default in ((), "") or "Default:" in text:
             shown = ""
         else:
             shown = f"`{str(default).lower() if isinstance(default, bool) else default}`"
-        name = each.name.rstrip("_")
-        rows.append((f"`{name}`", words, shown, texts[name]))
+        rows.append((f"`{name}`", words, shown, text))
     return table(("key", "value", "default", "meaning"), rows)
+
+
+def coupled_keys(schema: Any) -> str:
+    """The keys of a table of a coupled scene."""
+    names = [each.name.rstrip("_") for each in fields(schema)]
+    return keys({name: COUPLED_TEXTS[name] for name in names}, schema)
 
 
 def result_files(fmus: Path) -> str:
@@ -266,6 +276,7 @@ def parts(fmus: Path) -> dict[str, Callable[[], str]]:
     """What generates each part, by its name."""
     from harness.scenes import scene
     from harness.scenes.coupled import scene as coupled
+    from harness.scenes.run_spec import RunSpec
 
     return {
         **{f"variables-{model}": lambda model=model: variables(fmus, model) for model in MODELS},
@@ -273,12 +284,12 @@ def parts(fmus: Path) -> dict[str, Callable[[], str]]:
         "command-texts": command_texts,
         "variables-common": lambda: common_variables(fmus),
         "enumerations": lambda: enumerations(fmus),
-        "scene-keys": lambda: keys(scene.SceneKeys, SCENE_TEXTS),
-        "scene-decay": lambda: keys(schema_within(scene.SceneKeys, "decay"), DECAY_TEXTS),
-        "coupled-keys": lambda: keys(coupled.CoupledKeys, COUPLED_TEXTS),
-        "coupled-parts": lambda: keys(schema_within(coupled.CoupledKeys, "parts"), COUPLED_TEXTS),
-        "coupled-springs": lambda: keys(schema_within(coupled.CoupledKeys, "springs"), COUPLED_TEXTS),
-        "coupled-connections": lambda: keys(schema_within(coupled.CoupledKeys, "connections"), COUPLED_TEXTS),
+        "scene-keys": lambda: keys(SCENE_TEXTS, RunSpec, scene.SceneKeys),
+        "scene-decay": lambda: keys(DECAY_TEXTS, schema_within(scene.SceneKeys, "decay")),
+        "coupled-keys": lambda: coupled_keys(coupled.CoupledKeys),
+        "coupled-parts": lambda: coupled_keys(schema_within(coupled.CoupledKeys, "parts")),
+        "coupled-springs": lambda: coupled_keys(schema_within(coupled.CoupledKeys, "springs")),
+        "coupled-connections": lambda: coupled_keys(schema_within(coupled.CoupledKeys, "connections")),
         "result-files": lambda: result_files(fmus),
         "record-formats": record_formats,
     }

@@ -45,10 +45,11 @@ def compare(
       python -m harness compare fmus/coulomb.fmu other.fmu --stop 2
       python -m harness compare results/smd measured.csv --rtol 1e-3 --atol 1e-6
     """
-    from ..running.run_spec import RunSpec
+    from ..running.resolve import FMU_SUFFIXES
     from ..scenes.fmu_files import find_fmu
+    from ..scenes.run_spec import RunSpec
     from ..studies.compare import study
-    from ..studies.compare.trajectory_sources import FMU_SUFFIXES, RUN_SUFFIXES
+    from ..studies.compare.trajectory_sources import RUN_SUFFIXES
 
     suffixes = [Path(source).suffix for source in (first, second)]
     if all(Path(source).exists() for source in (first, second)) and not {*suffixes} & {*RUN_SUFFIXES}:

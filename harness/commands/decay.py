@@ -7,7 +7,17 @@ import click
 
 from .terminal import POSITIVE, Terminal, refuse_options, result_options
 
-COLUMN_OPTIONS = ("time", "position", "velocity", "quantity", "unit", "per_count", "time_unit", "names")  # of records
+COLUMN_OPTIONS = (
+    "time",
+    "position",
+    "velocity",
+    "quantity",
+    "unit",
+    "per_count",
+    "time_unit",
+    "names",
+    "rate",
+)  # of records
 
 
 @click.command()

@@ -20,7 +20,7 @@ def list_(as_json: bool) -> None:
     from ..scenes.scene import load_scene, shipped_scenes
     from ..scenes.schema import parse_table, read_toml
 
-    rows = [("run", scene.name, scene.file.stem, scene.title) for scene in map(load_scene, shipped_scenes())]
+    rows = [("run", scene.name, scene.run.fmu.stem, scene.title) for scene in map(load_scene, shipped_scenes())]
     for file in coupled.shipped_coupled_scenes():
         keys = parse_table(read_toml(file), coupled.CoupledKeys)
         models = ", ".join(part.model for part in keys.parts.values())

@@ -26,7 +26,7 @@ def report(out: Path, quiet: bool, as_json: bool) -> None:
     from ..scenes.scene import load_scene, shipped_scenes
 
     scenes = [scene for scene in map(load_scene, shipped_scenes()) if scene.published]
-    page = write_report(out, [PublishedScene(scene.name, scene.file.stem, scene.about) for scene in scenes])
+    page = write_report(out, [PublishedScene(scene.name, scene.run.fmu.stem, scene.about) for scene in scenes])
     if as_json:
         print_json({"page": str(page.path), "missing": [name for name, _ in page.missing]})
     elif not quiet:

@@ -82,7 +82,7 @@ def run(
                 raise HarnessError(f"{scene} was written from Python: repeat its run by harness.simulate('{scene}')")
             repeat_call(context, folder_path, stored, terminal)
             return
-        selected_scene = scene_from_provenance(stored["scene"])
+        selected_scene = scene_from_provenance(stored)
         if context.get_parameter_source("out") is not ParameterSource.COMMANDLINE:
             terminal = replace(terminal, out=folder_path.parent)
     else:
@@ -114,33 +114,39 @@ def repeat_call(context: click.Context, folder: Path, stored: dict[str, Any], te
 def run_fmu_file(path: Path, values: tuple[str, ...], options: dict[str, Any], terminal: Terminal) -> None:
     """Run one FMU and print the first and last value of each output."""
     from ..results.files import column_heading
-    from ..running.run_spec import DEFAULT_EQUAL_STEPS, RunSpec
     from ..scenes.assignments import parse_assignment
+    from ..scenes.run_spec import DEFAULT_EQUAL_STEPS, RunSpec
     from ..studies.run.study import run_fmu
 
     with terminal.progress(1) as report:
         spec = RunSpec(path, values=dict(map(parse_assignment, values)), equal_steps=DEFAULT_EQUAL_STEPS, **options)
-        signals, folder = run_fmu(spec, terminal.out, partial(report, path.stem))
-    ends = {name: column[[0, -1]].tolist() for name, column in signals.columns.items()}
+        trajectory, folder = run_fmu(spec, terminal.out, partial(report, path.stem))
+    ends = {name: column[[0, -1]].tolist() for name, column in trajectory.columns.items()}
     final = {name: last for name, (_, last) in ends.items()}
-    data = {"fmu": signals.name, "note": signals.note, "failed": signals.failure, "final": final, "folder": folder}
+    data = {
+        "fmu": trajectory.name,
+        "note": trajectory.accuracy,
+        "failed": trajectory.failure,
+        "final": final,
+        "folder": folder,
+    }
     lines = [
-        f"{column_heading(name, signals.units[name])}: from {format_value(first)} to {format_value(last)}"
+        f"{column_heading(name, trajectory.units[name])}: from {format_value(first)} to {format_value(last)}"
         for name, (first, last) in ends.items()
     ]
-    if signals.events:
+    if trajectory.events:
         stuck = {
-            contact: sum(end - begin for begin, end in signals.events.sticking(contact, float(signals.time[-1])))
-            for contact in signals.events.modes
+            contact: sum(end - begin for begin, end in trajectory.events.sticking(contact, float(trajectory.time[-1])))
+            for contact in trajectory.events.modes
         }
-        changes = {contact: len(signals.events.changes(contact)[0]) - 1 for contact in stuck}
+        changes = {contact: len(trajectory.events.changes(contact)[0]) - 1 for contact in stuck}
         data["contacts"] = {contact: {"changes": changes[contact], "stuck": stuck[contact]} for contact in stuck}
         lines += [
             f"{contact}: {changes[contact]} change{'s' * (changes[contact] != 1)} of mode, sticks for {duration:.6g} s"
             for contact, duration in stuck.items()
         ]
-    failed = failure_message(signals.failure, folder)
-    terminal.print_result(data, *lines, *filter(None, [signals.note]), folder=folder, failed=failed)
+    failed = failure_message(trajectory.failure, folder)
+    terminal.print_result(data, *lines, *filter(None, [trajectory.accuracy]), folder=folder, failed=failed)
 
 
 def failure_message(message: str | None, folder: Path) -> list[str]:

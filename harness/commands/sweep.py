@@ -77,14 +77,20 @@ def sweep(
         refuse_options(context, "with --scheduler: the cluster has its own workers", "workers")
     if find_spec("xarray") is None:  # checked before the runs: the figure needs it afterwards
         raise HarnessError("a sweep needs xarray: python -m pip install 'friction-fmus[sweep]'")
+    from ..scenes.assignments import parse_assignment
     from ..scenes.fmu_files import find_fmu
-    from ..studies.sweep import result_files as sweep_file
+    from ..scenes.run_spec import RunSpec
+    from ..studies.sweep.result_files import run_sweep
+    from ..studies.sweep.runner import SweepSpec
+    from ..studies.sweep.sampling import SweepPoints, parse_axis
 
     refuse_ignored_options(context, [find_fmu(model)])
     measures = tuple(dict.fromkeys(word.strip() for word in measure.split(","))) if measure is not None else ()
-    request = sweep_file.SweepRequest(model, vary, values, random, seed, measures, name, options)
+    run = RunSpec(find_fmu(model), values=dict(map(parse_assignment, values)), follow=False, **options)
+    points = SweepPoints(tuple(parse_axis(text, random is not None) for text in vary), random, seed)
     with terminal.progress(1) as report:
-        result = sweep_file.run_sweep(request, terminal.out, scheduler, workers, partial(report, model))
+        spec, progress = SweepSpec(run, points.names, measures), partial(report, model)
+        result = run_sweep(spec, points, name, terminal.out, scheduler, workers, progress)
     n_new = result.runs - result.n_resumed
     output = [f"{result.runs} runs, {result.n_resumed} of them resumed, {result.failed} failed"]
     if result.damaged:

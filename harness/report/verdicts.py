@@ -67,8 +67,9 @@ def judge_published(results: Path, scenes: Sequence[PublishedScene]) -> Verdict 
 
 def explain(deviation: Deviation, results: Path) -> str:
     """Return why the steps of a law that chatters cannot be reproduced; empty for other deviations."""
-    scene = load_provenance(results / deviation.case).get("scene") or {}
-    is_explained = scene.get("law") in CHATTERING_LAWS and deviation.quantity in STEP_QUANTITIES
+    parameters = load_provenance(results / deviation.case).get("parameters", {})
+    law = parameters.get("friction", {}).get("value")
+    is_explained = law in CHATTERING_LAWS and deviation.quantity in STEP_QUANTITIES
     return "; its friction chatters, so its steps depend on rounding" * is_explained
 
 

@@ -24,12 +24,8 @@ FILE = "provenance.json"
 PYTHON_API = "harness.simulate"  # recorded as the command of results that Trajectory.save writes
 HARNESS = "friction-fmus"
 REPLACED = "replaced"
-IMPLIED_SCENE_KEYS = {
-    "values",
-    "name",
-    "file",
-    "source",
-}  # keys of a scene that follow from its parameters or input files
+# options of a result that follow from its parameters or input files
+IMPLIED_OPTIONS = {"values", "name", "fmu", "file", "source", "equal_steps"}
 PACKAGES = (HARNESS, "fmpy", "numpy", "scipy")
 
 Parameters = Mapping[str, tuple[object, str]]  # effective value and unit by name
@@ -44,6 +40,7 @@ def write_provenance(
     name: str = FILE,
     source: str = "",
     command: str | None = None,
+    run: object = None,
 ) -> None:
     """Write the provenance of a result.
 
@@ -56,11 +53,15 @@ def write_provenance(
     parameters : mapping, optional
         Effective value and unit by name.
     scene : object, optional
-        The scene that was run.
+        What was analysed and plotted, or the options of a study.
     name : str
         Name of the file.
     source : str
         Source of the result, as given on the command line.
+    command : str, optional
+        What made the result, if no command did.
+    run : RunSpec, optional
+        The run, as it was done.
     """
     content = {
         "source": source,
@@ -71,6 +72,7 @@ def write_provenance(
         "platform": platform.platform(),
         "files": {str(file): file_digest(file) for file in files if file.is_file()},
         "parameters": {name: {"value": value, "unit": unit} for name, (value, unit) in (parameters or {}).items()},
+        "run": run,
         "scene": scene,
     }
     (folder / name).write_text(to_json(content) + "\n", encoding="utf-8")
@@ -139,7 +141,7 @@ def read_provenance(file: Path) -> dict[str, Any]:
 def note_replaced_result(old_folder: Path, new_folder: Path, file: str) -> None:
     """Add a note to the provenance of a new result about the old one that it replaces.
 
-    The note lists the settings in which they differ. If there are none, the note of a scene states whether the first
+    The note lists the settings in which they differ. If there are none, the note of a run states whether the first
     result file is identical. There is no note about an old file that is not valid.
     """
     before = load_provenance(old_folder)
@@ -151,13 +153,13 @@ def note_replaced_result(old_folder: Path, new_folder: Path, file: str) -> None:
         for name, each in before["parameters"].items()
         if each != after["parameters"].get(name)
     ]
-    scene, new_scene = before["scene"] or {}, after["scene"] or {}
-    unchanged = [name for name in scene if name in IMPLIED_SCENE_KEYS or scene[name] == new_scene.get(name)]
-    differences += [format_option(name, value) for name, value in scene.items() if name not in unchanged]
+    options, new_options = ((each.get("run") or {}) | (each["scene"] or {}) for each in (before, after))
+    unchanged = [name for name in options if name in IMPLIED_OPTIONS or options[name] == new_options.get(name)]
+    differences += [format_option(name, value) for name, value in options.items() if name not in unchanged]
     differences += [f"another {name}" for name, value in before["files"].items() if value != after["files"].get(name)]
     if differences:
         sentence = f"It replaces the result of {before['date']}, which had {', '.join(sorted(differences))}."
-    elif scene:
+    elif options:
         same = (old_folder / file).is_file() and file_digest(old_folder / file) == file_digest(new_folder / file)
         comparison = "the same, bit for bit" if same else "not the same bit for bit"
         sentence = f"The result of {before['date']} was {comparison}."

@@ -17,7 +17,7 @@ def is_shallow(value: object, depth: int = MAX_DEPTH) -> bool:
 STRING = Constraint(lambda value: isinstance(value, str), "a text")
 DIGEST = Constraint(lambda value: isinstance(value, str) and len(value) == 64, "a SHA-256 digest")
 VALUE = Constraint(lambda value: is_shallow(value, 3) and not isinstance(value, dict), "a value")
-SCENE = Constraint(lambda value: isinstance(value, dict | None) and is_shallow(value), "a table of settings, or null")
+SETTINGS = Constraint(lambda value: isinstance(value, dict | None) and is_shallow(value), "a table, or null")
 
 
 @dataclass(frozen=True)
@@ -44,10 +44,11 @@ class ProvenanceKeys:
     date: Annotated[str, STRING]
     files: dict[str, Annotated[str, DIGEST]]
     parameters: dict[str, StoredParameter]
-    scene: Annotated[Any, SCENE]
+    scene: Annotated[Any, SETTINGS]
     source: Annotated[str, STRING] = ""
     platform: Annotated[str, STRING] = ""
     versions: dict[str, Annotated[str, STRING]] = field(default_factory=dict)
+    run: Annotated[Any, SETTINGS] = None
     replaced: Annotated[str, STRING] = ""
     call: StoredCall | None = None
 

@@ -10,8 +10,8 @@ from fmpy.model_description import ValidationError
 
 from ..errors import HarnessError, SceneError, first_line
 from ..scenes.fmu_files import check_built
+from ..scenes.run_spec import RunSpec
 from .cached_by_mtime import cached_by_mtime
-from .run_spec import RunSpec
 from .variable_values import effective_value, variable_unit
 
 DESCRIPTION_FILE = "modelDescription.xml"

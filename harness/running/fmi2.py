@@ -7,7 +7,7 @@ ends, so following it records every internal step and event through the standard
 import io
 import os
 from array import array
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager, redirect_stderr, suppress
 from ctypes import byref, c_double, c_int, c_uint, c_void_p
 from dataclasses import dataclass, field, replace
@@ -21,14 +21,14 @@ from fmpy import fmi2
 from fmpy.fmi1 import FMICallException as FMICallException  # re-exported for callers that step by themselves
 
 from ..errors import HarnessError, SceneError, first_line
+from ..scenes.run_spec import RunSpec
 from .contacts import find_contacts
 from .description import read_description, resolve_time_span
 from .inputs import InputSignals, check_inputs
-from .run_spec import RunSpec
 from .settings import check_fmu, resolve_settings
 from .trajectory import ModeChanges, SolverSteps, Statistics, Trajectory
 from .unpacking import unpack
-from .variable_values import enumeration_labels, variable_unit
+from .variable_values import effective_value, enumeration_labels, variable_unit
 
 ProgressCallback = Callable[[float], None]  # receives the progress of a run, from 0 to 1
 
@@ -214,6 +214,8 @@ def run_repeats(plan: RunPlan, fmu: Any, report: ProgressCallback) -> Trajectory
     """Run the plan `repeat` times on one instance; return the last run with the fastest time."""
     repeat = plan.spec.repeat
     values = resolve_settings(plan.spec, plan.variables)
+    stored = {variable.name: effective_value(variable, value) for variable, value in values}
+    plan = replace(plan, spec=replace(plan.spec, values=stored))
     seconds = []
     for repeat_index in range(repeat):
         if repeat_index:
@@ -335,9 +337,6 @@ def build_trajectory(plan: RunPlan, fmu: Any, trace: RecordedSamples, seconds: f
         rows = np.append(0, at)
         modes = {contact: samples[mode][rows] for contact, mode in find_contacts(variables).items()}
         events = ModeChanges(np.append(time[0], samples["events.t_last"][at]), modes)
-    accepted, rejected, evaluations = (
-        read_integer(plan, fmu, f"solver.{name}") for name in ("steps", "rejected", "evaluations")
-    )
     return Trajectory(
         spec=spec,
         time=time,
@@ -347,8 +346,19 @@ def build_trajectory(plan: RunPlan, fmu: Any, trace: RecordedSamples, seconds: f
         parameters=effective,
         steps=steps,
         events=events,
-        statistics=Statistics(accepted, rejected, evaluations, seconds),
+        statistics=read_statistics(fmu, variables, seconds),
     )
+
+
+def read_statistics(fmu: Any, variables: Mapping[str, Any], seconds: float) -> Statistics:
+    """Return the counts of a run that has ended; `seconds` is its run time in s."""
+    names = ("steps", "rejected", "evaluations")
+    steps, rejected, evaluations = (read_integer(fmu, variables[f"solver.{name}"]) for name in names)
+    if "events.count" not in variables:
+        return Statistics(steps, rejected, evaluations, seconds)
+    (last_event,) = fmu.getReal([variables["events.t_last"].valueReference])
+    events = read_integer(fmu, variables["events.count"])
+    return Statistics(steps, rejected, evaluations, seconds, events, last_event)
 
 
 def read_parameters(plan: RunPlan, fmu: Any) -> dict[str, float | str]:
@@ -357,12 +367,12 @@ def read_parameters(plan: RunPlan, fmu: Any) -> dict[str, float | str]:
     for name, variable in plan.variables.items():
         if variable.causality == "parameter":
             if variable.type == "Enumeration":
-                values[name] = enumeration_labels(variable)[read_integer(plan, fmu, name)]
+                values[name] = enumeration_labels(variable)[read_integer(fmu, variable)]
             else:
                 values[name] = fmu.getReal([variable.valueReference])[0]
     return values
 
 
-def read_integer(plan: RunPlan, fmu: Any, name: str) -> int:
+def read_integer(fmu: Any, variable: Any) -> int:
     """Return the present value of an integer or enumeration."""
-    return fmu.getInteger([plan.variables[name].valueReference])[0]
+    return fmu.getInteger([variable.valueReference])[0]

@@ -17,10 +17,11 @@ from fmpy.fmi1 import FMICallException
 from ..errors import HarnessError
 from ..scenes.fmu_files import find_fmu
 from ..scenes.roles import find_roles
-from .fmi2 import LogCapture, initialize, load_instance, read_own_description, set_variable
-from .run_spec import RunSpec
+from ..scenes.run_spec import RunSpec
+from .fmi2 import LogCapture, initialize, load_instance, read_own_description, read_statistics, set_variable
+from .trajectory import Trajectory
 from .unpacking import unpack_once
-from .variable_values import enumeration_labels
+from .variable_values import enumeration_labels, variable_unit
 
 CommunicationSteps = list[tuple[float, float]]  # communication steps as (start, size) in s
 ScheduledChanges = dict[float, dict[str, float]]  # values to set, by time in s
@@ -41,49 +42,6 @@ class FmuInfo:
         return {
             name: self.enumerations[name][value] if isinstance(value, str) else value for name, value in values.items()
         }
-
-
-@dataclass(frozen=True)
-class InitialValues:
-    """Values to set before a run; `stop` is None if the importer does not provide it."""
-
-    model: str
-    values: dict[str, float]
-    start: float = 0.0
-    stop: float | None = None
-
-
-@dataclass(frozen=True)
-class RunCounts:
-    """Changes of mode, accepted and rejected steps, and evaluations of the right-hand side."""
-
-    events: int
-    steps: int
-    rejected: int
-    evaluations: int
-
-
-@dataclass(frozen=True)
-class CompletedRun:
-    """Completed run.
-
-    Attributes
-    ----------
-    x, v, energy : numpy.ndarray
-        Position, velocity and energy (n,) after each communication step, start included; no energy if the FMU has none.
-    t_last : float
-        Time of the last event in s; the start time without events.
-    counts : RunCounts
-    seconds : float
-        Run time in s.
-    """
-
-    x: np.ndarray
-    v: np.ndarray
-    energy: np.ndarray | None
-    t_last: float
-    counts: RunCounts
-    seconds: float
 
 
 @dataclass(frozen=True)
@@ -131,10 +89,10 @@ class FmuSession:
             raise HarnessError(f"{description.modelName}: no output is declared as the derivative of a position")
         self.outputs = (motion["position"], motion["velocity"], *(["energy"] if "energy" in self.variables else []))
 
-    def initialize(self, setting: InitialValues) -> None:
+    def initialize(self, spec: RunSpec) -> None:
         """Set values and initialize the instance."""
-        values = ((self.variables[name], value) for name, value in setting.values.items())
-        initialize(self.fmu, values, setting.start, setting.stop)
+        values = ((self.variables[name], value) for name, value in spec.values.items())
+        initialize(self.fmu, values, spec.start or 0.0, spec.stop)
 
     def set_values(self, values: dict[str, float]) -> None:
         """Set variables by name."""
@@ -153,10 +111,6 @@ class FmuSession:
         """Return the values of Reals by name."""
         return self.fmu.getReal([self.variables[name].valueReference for name in names])
 
-    def get_count(self, name: str) -> int:
-        """Return an Integer; 0 if the FMU has no such variable."""
-        return self.fmu.getInteger([self.variables[name].valueReference])[0] if name in self.variables else 0
-
     def read_refusal(self) -> RefusedRun:
         """Return the error message of the FMU and the state of its outputs."""
         return RefusedRun(self.log.error_message, all(map(isnan, self.get_reals(self.find_reals("output", "local")))))
@@ -168,60 +122,61 @@ class FmuSession:
 
 
 @contextmanager
-def open_session(model: str) -> Iterator[FmuSession]:
-    """Instantiate a model's FMU and capture its messages."""
-    spec = RunSpec(find_fmu(model))
+def open_session(spec: RunSpec) -> Iterator[FmuSession]:
+    """Instantiate an FMU and capture its messages."""
     description = read_own_description(spec)
     with load_instance(spec, description, unpack_once(spec.fmu)) as (fmu, log):
         yield FmuSession(description, fmu, log)
 
 
-def run_steps(
-    setting: InitialValues, calls: CommunicationSteps, changes: ScheduledChanges
-) -> CompletedRun | RefusedRun:
-    """Run communication steps and record states after each.
+def run_steps(spec: RunSpec, steps: CommunicationSteps, changes: ScheduledChanges) -> Trajectory | RefusedRun:
+    """Run communication steps and record position, velocity and energy, if the FMU has one, after each.
 
     Parameters
     ----------
-    setting : InitialValues
-    calls : list of (float, float)
+    spec : RunSpec
+        FMU, values, start and stop. Without a stop, the FMU does not receive any.
+    steps : list of (float, float)
         Communication steps as (start, size) in s.
     changes : dict
         Values to set at a time in s, by time.
     """
-    with open_session(setting.model) as session:
+    with open_session(spec) as session:
         started = perf_counter()
         try:
-            session.initialize(setting)
+            session.initialize(spec)
             rows = [session.get_reals(session.outputs)]
-            for t, h in calls:
+            for t, h in steps:
                 session.set_values(changes.get(t, {}))
                 session.fmu.doStep(t, h)
                 rows.append(session.get_reals(session.outputs))
         except FMICallException:
             return session.read_refusal()
         seconds = perf_counter() - started
-        x, v, *energy = np.array(rows).T
-        t_last = session.get_reals(["events.t_last"])[0] if "events.t_last" in session.variables else setting.start
-        counts = [
-            session.get_count(name)
-            for name in ("events.count", "solver.steps", "solver.rejected", "solver.evaluations")
-        ]
-        return CompletedRun(x, v, energy[0] if energy else None, t_last, RunCounts(*counts), seconds)
+        recorded = [session.variables[name] for name in session.outputs]
+        return Trajectory(
+            replace(spec, outputs=session.outputs),
+            np.array([spec.start or 0.0, *(t + h for t, h in steps)]),
+            dict(zip(session.outputs, np.array(rows).T, strict=True)),
+            {variable.name: variable_unit(variable) for variable in recorded},
+            {variable.name: variable.description or variable.name for variable in recorded},
+            {},
+            statistics=read_statistics(session.fmu, session.variables, seconds),
+        )
 
 
-def inject_nonfinite(setting: InitialValues) -> RefusalSummary:
+def inject_nonfinite(spec: RunSpec) -> RefusalSummary:
     """Set NaN and both infinities in every settable Real, before and during a run, one at a time.
 
     The FMU must refuse each with a message that starts with the variable's name, and must run again after a reset.
     """
     failures, n_tried = [], 0
-    with open_session(setting.model) as session:
+    with open_session(spec) as session:
         for name, value, in_run in product(session.find_reals("parameter", "input"), (nan, inf, -inf), (False, True)):
             n_tried += 1
             session.reset()
             try:
-                session.initialize(setting if in_run else replace(setting, values={**setting.values, name: value}))
+                session.initialize(spec if in_run else replace(spec, values={**spec.values, name: value}))
                 session.fmu.doStep(0.0, 0.01)
                 if in_run:
                     session.set_values({name: value})
@@ -232,6 +187,6 @@ def inject_nonfinite(setting: InitialValues) -> RefusalSummary:
                 if not (refusal.message.startswith(f"{name} = ") and refusal.all_nan):
                     failures.append(f"{name} = {value}: {refusal.message or 'no sentence'}")
         session.reset()
-        session.initialize(setting)
+        session.initialize(spec)
         session.fmu.doStep(0.0, 0.01)
     return RefusalSummary(n_tried, tuple(failures))

@@ -5,12 +5,14 @@ from dataclasses import replace
 from math import prod
 from typing import Any
 
+import numpy as np
+
 from ..errors import HarnessError
+from ..scenes.run_spec import RunSpec
 from .description import read_description
 from .external import simulation as external
 from .external.sample_rows import ROW_FORMATS, element_names
 from .fmi2 import ProgressCallback, simulate
-from .run_spec import RunSpec
 from .settings import REQUIRED_VARIABLES
 from .trajectory import Trajectory
 
@@ -37,7 +39,17 @@ def run(spec: RunSpec, report: ProgressCallback) -> Trajectory:
     if not spec.outputs:
         raise HarnessError(f"{spec.fmu.name} has no outputs or locals to record")
     is_own = exposes_solver_steps(description) and not spec.exchange
-    return simulate(spec, report) if is_own else external.simulate(spec, description, report)
+    trajectory = simulate(spec, report) if is_own else external.simulate(spec, description, report)
+    return trajectory if spec.interval is None else keep_interval(trajectory, spec.interval)
+
+
+def keep_interval(run: Trajectory, interval: float) -> Trajectory:
+    """Keep the points of a run at multiples of an interval in s, and its last one."""
+    start = run.time[0]
+    near = 1e-9 * interval
+    keep = np.abs(start + np.rint((run.time - start) / interval) * interval - run.time) <= near
+    keep[-1] = True
+    return replace(run, time=run.time[keep], columns={name: column[keep] for name, column in run.columns.items()})
 
 
 def exposes_solver_steps(description: Any) -> bool:

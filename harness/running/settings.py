@@ -3,7 +3,8 @@
 from typing import Any
 
 from ..errors import SceneError, check_names, format_value
-from .run_spec import SHORT_KEYS, RunSpec
+from ..scenes.run_spec import RunSpec
+from ..scenes.scene import SHORT_KEYS
 from .variable_values import convert_value
 
 REQUIRED_VARIABLES = ("solver.t_next", "solver.steps", "solver.rejected", "solver.evaluations")

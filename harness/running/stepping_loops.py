@@ -9,8 +9,8 @@ from pathlib import Path
 
 import fmpy
 
+from ..scenes.run_spec import RunSpec
 from .fmi2 import open_instance, read_own_description, simulate
-from .run_spec import RunSpec
 from .timing import time_fastest_call
 
 COMMUNICATION_STEPS = 1600

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from itertools import pairwise
+from math import nan
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,8 +11,8 @@ import numpy as np
 from ..errors import HarnessError, check_names, optional
 from ..results.files import write_csv, write_signals
 from ..results.quantity import Quantity
+from ..scenes.run_spec import RunSpec
 from .contacts import choose_outputs, contact_of_mode
-from .run_spec import RunSpec
 
 if TYPE_CHECKING:
     import pandas
@@ -82,12 +83,28 @@ class ModeChanges:
 
 @dataclass(frozen=True)
 class Statistics:
-    """Accepted and rejected steps, evaluations of the right-hand side, run time in s of the fastest repetition."""
+    """Counts of a run.
+
+    Attributes
+    ----------
+    steps, rejected : int
+        Accepted and rejected steps of the solver.
+    evaluations : int
+        Evaluations of the right-hand side.
+    seconds : float
+        Run time in s of the fastest repetition.
+    events : int
+        Changes of mode.
+    last_event : float
+        Time of the last change of mode in s; that of the start without any, NaN if the FMU does not expose it.
+    """
 
     steps: int
     rejected: int
     evaluations: int
     seconds: float
+    events: int = 0
+    last_event: float = nan
 
     @property
     def quantities(self) -> tuple[Quantity, ...]:
@@ -99,11 +116,12 @@ class Statistics:
 
 @dataclass(frozen=True)
 class Trajectory:
-    """Result of one run.
+    """Result of one run, or signals over time that were read from a file.
 
     Attributes
     ----------
     spec : RunSpec
+        The run as it was done; of signals from a file, the file stands in place of the FMU.
     time : numpy.ndarray
         Time (n,) in s.
     columns : dict
@@ -120,6 +138,8 @@ class Trajectory:
         Estimated accuracy.
     failure : str
         Reason why the run is incomplete; empty if it is complete.
+    label : str
+        Name for display; empty for that of the model.
     """
 
     spec: RunSpec
@@ -133,6 +153,17 @@ class Trajectory:
     statistics: Statistics | None = None
     note: str = ""
     failure: str = ""
+    label: str = ""
+
+    @property
+    def name(self) -> str:
+        """Return the name for display."""
+        return self.label or self.spec.model
+
+    @property
+    def accuracy(self) -> str:
+        """Return the estimated accuracy, or the settings of the solver of an FMU of this project."""
+        return self.note or (f"solver: {self.settings_label}" if self.settings_label else "")
 
     @property
     def settings_label(self) -> str:
@@ -272,9 +303,9 @@ class Trajectory:
                 fresh,
                 [fmu],
                 self.effective_parameters,
-                self.spec,
                 source=describe_sources(str(fmu)),
                 command=PYTHON_API,
+                run=self.spec,
             )
 
     def column_of_role(self, role: str) -> np.ndarray:

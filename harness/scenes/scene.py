@@ -20,6 +20,7 @@
                               an output that has one of these names takes precedence;
                               default: the first six outputs and the phase plane
     [values]                  parameters and inputs by name, SI units; enumerations by label
+    [inputs]                  input signals: time = [...] in s, and a list of values for each input
     [decay]                   gives = "zeta", "f" or "T_f"; first = peaks to skip; cycles = cycles to use (all)
     [published]               source = "..."; published quantities: a number, [number, "unit"] or a text
 
@@ -27,33 +28,36 @@ Required are title, outputs, and either model or fmu.
 """
 
 from collections.abc import Collection
-from dataclasses import dataclass, field, fields, replace
-from math import inf
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any
 
-from ..errors import SceneError, check_names, format_value, unknown_source_message
+from ..errors import SceneError, check_names, format_value, unknown_name_message, unknown_source_message
 from .fmu_files import find_fmu
 from .roles import ROLES, find_roles
+from .run_spec import DEFAULT_EQUAL_STEPS, NATURAL_NUMBER, SCENE_KEYS, RunSpec
 from .schema import (
-    FLAG,
     NAMES,
-    NUMBER,
     POSITIVE,
-    TABLE,
     TEXT,
     TITLE,
     Constraint,
+    field_names,
     is_number,
     is_text,
-    is_whole,
     parse_table,
     read_toml,
 )
 
 SHIPPED = Path(__file__).parent
-MAX_REPEATS = 1000
 MAX_DEFAULT_PLOTS = 6  # time plots by default
+SHORT_KEYS = {  # keys that set a variable of the FMU
+    "method": "solver.method",
+    "law": "friction",
+    "rtol": "solver.rtol",
+    "atol": "solver.atol",
+    "h_max": "solver.h_max",
+}
 
 # Available analyses and plots, and the roles that they need among the outputs.
 ANALYSES: dict[str, tuple[str, ...]] = {"decay": ("position", "velocity"), "slip": ("velocity",), "steps": ()}
@@ -72,9 +76,7 @@ def is_published(value: Any) -> bool:
     return pair or is_number(value) or is_text(value)
 
 
-REPEAT_COUNT = Constraint(lambda value: is_whole(value, 1, MAX_REPEATS), f"a whole number from 1 to {MAX_REPEATS}")
 DECAY_RESULT = Constraint(lambda value: value in ("zeta", "f", "T_f"), "'zeta', 'f' or 'T_f'")
-NATURAL_NUMBER = Constraint(lambda value: is_whole(value, 0, inf), "a whole number of at least 0")
 CYCLE_COUNT = Constraint(
     lambda value: POSITIVE.accepts(value) and (2.0 * value) % 1 == 0, "a whole or half number above 0"
 )
@@ -92,47 +94,50 @@ class DecayOptions:
 
 @dataclass(frozen=True, kw_only=True)
 class SceneKeys:
-    """Keys of a scene file; None stands for the default of the FMU."""
+    """Keys of a scene file besides those of its run (`run_spec.SCENE_KEYS`)."""
 
     title: Annotated[str, TITLE]
-    outputs: Annotated[tuple[str, ...], NAMES]
+    about: Annotated[str, TITLE] = ""
     model: Annotated[str | None, TEXT] = None
     fmu: Annotated[str | None, TEXT] = None
-    start: Annotated[float | None, NUMBER] = None
-    stop: Annotated[float | None, NUMBER] = None
     method: Annotated[str | None, TEXT] = None
     law: Annotated[str | None, TEXT] = None
     rtol: Annotated[float | None, POSITIVE] = None
     atol: Annotated[float | None, POSITIVE] = None
     h_max: Annotated[float | None, POSITIVE] = None
-    grid: Annotated[float | None, POSITIVE] = None
-    follow: Annotated[bool | None, FLAG] = None
-    repeat: Annotated[int, REPEAT_COUNT] = 1
-    tolerance: Annotated[float, POSITIVE] = 1e-6
-    exchange: Annotated[bool, FLAG] = False
-    lenient: Annotated[bool, FLAG] = False
-    timeout: Annotated[float, POSITIVE] = 60.0
-    about: Annotated[str, TITLE] = ""
     analyses: Annotated[tuple[str, ...], NAMES] = ()
     plots: Annotated[tuple[str, ...] | None, NAMES] = None
-    values: Annotated[dict[str, Any], TABLE] = field(default_factory=dict)
     decay: DecayOptions = field(default_factory=DecayOptions)
     published: dict[str, Annotated[Any, PUBLISHED_VALUE]] = field(default_factory=dict)
 
 
-@dataclass(frozen=True, kw_only=True)
-class Scene(SceneKeys):
-    """Scene with its name, its FMU, and its source: the path of the scene file, or its name if it is built in."""
+@dataclass(frozen=True)
+class Scene:
+    """Scene: the run, and what to analyse, plot and compare.
+
+    Attributes
+    ----------
+    name : str
+        Name of the result folder.
+    source : str
+        Path of the scene file, or the name of a scene that is built in.
+    run : RunSpec
+    title, about : str
+    analyses, plots : tuple of str
+    decay : DecayOptions
+    published : dict
+        Published quantities by name, and their source.
+    """
 
     name: str
     source: str
-    file: Path
+    run: RunSpec
+    title: str
+    about: str
+    analyses: tuple[str, ...]
     plots: tuple[str, ...]
-
-    @property
-    def follows_solver_steps(self) -> bool:
-        """Return whether the run steps to the ends of internal steps."""
-        return self.grid is None if self.follow is None else self.follow
+    decay: DecayOptions
+    published: dict[str, Any]
 
 
 def shipped_scenes() -> list[Path]:
@@ -163,28 +168,58 @@ def load_scene(scene: str | Path) -> Scene:
 
 
 def scene_from_provenance(stored: dict[str, Any]) -> Scene:
-    """Return the scene of a stored result; raise SceneError if the result has none."""
+    """Return the scene of a stored result, with its run.
+
+    Parameters
+    ----------
+    stored : dict
+        Provenance of the result. In results of earlier versions, the keys of the run are among those of the scene.
+
+    Raises
+    ------
+    SceneError
+        If the result has no valid scene.
+    """
     try:
-        stored = {"timeout": stored.get("patience")} | stored  # results of earlier versions
-        table = {each.name: stored[each.name] for each in fields(SceneKeys) if stored[each.name] not in (None, "")}
-        table["decay"] = {name: value for name, value in stored["decay"].items() if value is not None}
-        path, source, file = Path(stored["name"]), str(stored["source"]), Path(stored["file"])
-    except (AttributeError, KeyError, TypeError):
+        scene, run = dict(stored["scene"]), stored.get("run")
+        path, source, file = Path(scene["name"]), str(scene["source"]), Path((run or scene)["fmu" if run else "file"])
+        scene["decay"] = {name: value for name, value in scene["decay"].items() if value is not None}
+        if run is None:
+            scene |= {"timeout": scene.get("timeout", scene.get("patience")), "fmu": str(file), "model": None}
+    except (AttributeError, KeyError, TypeError, ValueError):
         raise SceneError("its provenance.json contains no scene: run the command in it instead") from None
     if path.name in ("", ".."):
-        raise SceneError(f"its provenance.json has the invalid scene name {format_value(stored['name'])}")
-    return replace(build_scene(path, table, source), file=file, name=path.name)
+        raise SceneError(f"its provenance.json has the invalid scene name {format_value(scene['name'])}")
+    keys = [*field_names(SceneKeys), *(SCENE_KEYS if run is None else ())]
+    table = {name: scene[name] for name in keys if scene.get(name) not in (None, "")}
+    return replace(build_scene(path, table, source, RunSpec.from_json(run) if run else None), name=path.name)
 
 
-def build_scene(path: Path, table: dict[str, Any], source: str) -> Scene:
-    """Build a scene from the table in its file."""
-    keys = parse_table(table, SceneKeys)
-    plots = default_plots(keys.outputs) if keys.plots is None else keys.plots
+def build_scene(path: Path, table: dict[str, Any], source: str, run: RunSpec | None = None) -> Scene:
+    """Build a scene from the table in its file, or from that without the keys of the run and from the run."""
+    allowed = {*field_names(SceneKeys), *SCENE_KEYS}
+    if unknown := {*table} - allowed:
+        raise SceneError(unknown_name_message("key", min(unknown), allowed))
+    keys = parse_table({name: value for name, value in table.items() if name not in SCENE_KEYS}, SceneKeys)
+    run = run or build_run(locate_fmu(path, keys), keys, table)
+    plots = default_plots(run.outputs) if keys.plots is None else keys.plots
     check_names("name in analyses", keys.analyses, ANALYSES)
-    check_names("name in plots", plots, (*PLOTS, *keys.outputs))
-    scene = Scene(**vars(keys) | {"name": path.stem, "source": source, "file": locate_fmu(path, keys), "plots": plots})
+    check_names("name in plots", plots, (*PLOTS, *run.outputs))
+    scene = Scene(path.stem, source, run, keys.title, keys.about, keys.analyses, plots, keys.decay, keys.published)
     check_requirements(scene)
     return scene
+
+
+def build_run(fmu: Path, keys: SceneKeys, table: dict[str, Any]) -> RunSpec:
+    """Build the run of a scene from the keys of its file."""
+    run = RunSpec.from_json({name: table[name] for name in SCENE_KEYS if name in table} | {"fmu": str(fmu)})
+    by_key = {name: getattr(keys, key) for key, name in SHORT_KEYS.items() if getattr(keys, key) is not None}
+    for name in by_key:
+        if name in run.values:
+            raise SceneError(f"{name} is set twice, in [values] and by its key: remove one")
+    if "follow" not in table:
+        run = replace(run, follow="grid" not in table, equal_steps=DEFAULT_EQUAL_STEPS)
+    return replace(run, values=by_key | run.values)
 
 
 def is_panel(name: str, outputs: Collection[str]) -> bool:
@@ -203,19 +238,19 @@ def default_plots(outputs: tuple[str, ...], chosen: tuple[str, ...] = ()) -> tup
 
 def check_requirements(scene: Scene) -> None:
     """Check that the keys of a scene are consistent."""
-    motion = find_roles(scene.outputs)
-    if not scene.outputs:
+    run, motion = scene.run, scene.run.motion_outputs
+    if not run.outputs:
         raise SceneError("outputs is empty; give at least one, as in outputs = ['x', 'v']")
-    panels = tuple(name for name in scene.plots if is_panel(name, scene.outputs))
+    panels = tuple(name for name in scene.plots if is_panel(name, run.outputs))
     for category, names, required_roles in ("analysis", scene.analyses, ANALYSES), ("plot", panels, PLOTS):
         for name in names:
             for role in required_roles.get(name, ()):
                 if role not in motion:
                     candidates = " or ".join(ROLES[role])
                     raise SceneError(f"the {category} '{name}' needs the {role}: add {candidates} to the outputs")
-            if name == "steps" and not scene.follows_solver_steps:
+            if name == "steps" and not run.follow:
                 raise SceneError(f"the {category} 'steps' needs follow = true, or no grid")
-    if not scene.follows_solver_steps and scene.grid is None:
+    if not run.follow and run.grid is None:
         raise SceneError("follow = false needs a grid: set the communication step, as in grid = 0.01")
     if ("decay" in scene.analyses) != (scene.decay.gives is not None):
         raise SceneError(

@@ -97,9 +97,11 @@ def make_checked_hook(constraint: Constraint, convert: Hook) -> Hook:
 
 
 def make_value_hook(annotation: Any) -> Hook:
-    """Return a hook that keeps a value; a list becomes a tuple."""
+    """Return a hook that keeps a value; a list becomes a tuple, and a text becomes a path if the type is a path."""
     constraint = find_constraint(annotation)
     assert constraint is not None
+    if get_args(annotation)[0] is Path:
+        return make_checked_hook(constraint, lambda value, _: Path(value))
     return make_checked_hook(constraint, lambda value, _: tuple(value) if isinstance(value, list) else value)
 
 

@@ -50,6 +50,7 @@ def test_a_stored_run_loads_bit_for_bit():
     for name in run.columns:
         assert np.array_equal(loaded[name], run[name])
     assert loaded.parameters == run.parameters
+    assert loaded.spec == run.spec
     assert loaded.units == run.units
     assert np.array_equal(loaded.events.t, run.events.t)
     assert np.array_equal(loaded.steps.t, run.steps.t)

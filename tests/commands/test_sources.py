@@ -56,6 +56,7 @@ OWN = "fmus/smd.fmu"
         (["sweep", "smd", "--vary", "m=1,2", "--scheduler", "tcp://127.0.0.1:1", "--workers", 5], "--workers"),
         (["decay", "coulomb", "--unit", "mm"], "--unit"),
         (["decay", "coulomb", "--columns", "t,x"], "--columns"),
+        (["decay", "coulomb", "--rate", 100], "--rate"),
     ],
 )
 def test_an_option_without_effect_is_refused(fmus, tmp_path, arguments, option):

@@ -223,7 +223,7 @@ def test_the_json_list_is_accepted_by_the_commands(workspace):
     for item in listing:
         if item["command"] == "run":
             scene = load_scene(item["scene"])
-            assert (item["title"], item["model"]) == (scene.title, scene.file.stem)
+            assert (item["title"], item["model"]) == (scene.title, scene.run.fmu.stem)
 
 
 def page_of(workspace):

@@ -16,10 +16,10 @@ from fmpy import read_model_description
 from models import MODELS
 
 from harness import load_result
-from harness.api import run_spec
 from harness.errors import HarnessError
 from harness.results.folder import replace_folder
 from harness.results.provenance import summarize_provenance
+from harness.running.resolve import resolve
 from harness.scenes.scene import shipped_scenes
 from harness.studies.run.study import FILES
 
@@ -94,11 +94,12 @@ def test_a_comparison_records_the_parameters_of_both_sides(workspace):
 def test_the_scene_is_stored_as_it_was_run(workspace):
     (workspace / "mine.toml").write_text('title = "a title"\nmodel = "smd"\noutputs = ["x"]\n[values]\nc = 3.0\n')
     assert harness(workspace, "run", "mine.toml").returncode == 0
-    scene = read_provenance(workspace / "results/mine")["scene"]
-    assert (scene["name"], scene["title"], scene["outputs"], scene["values"]) == ("mine", "a title", ["x"], {"c": 3.0})
+    provenance = read_provenance(workspace / "results/mine")
+    scene, run = provenance["scene"], provenance["run"]
+    assert (scene["name"], scene["title"], run["outputs"], run["values"]) == ("mine", "a title", ["x"], {"c": 3.0})
     with (workspace / "results/mine/trajectory.csv").open() as file:
         times = [float(row[0]) for row in list(csv.reader(file))[1:]]
-    assert (scene["start"], scene["stop"]) == (times[0], times[-1])
+    assert (run["start"], run["stop"]) == (times[0], times[-1])
 
 
 def test_the_report_shows_the_provenance_of_its_results(first_run):
@@ -149,7 +150,7 @@ def test_a_result_is_reproduced_from_its_folder_bit_for_bit(example_run):
     done = commands.harness(workspace, "run", folder.relative_to(workspace), blank=not folder.match(DRAWN))
     assert (done.returncode, done.stderr) == (0, "")
     assert files(folder) == before
-    for key in ("files", "parameters", "scene", "source"):
+    for key in ("files", "parameters", "run", "scene", "source"):
         assert read_provenance(folder)[key] == account[key]
     if command == "run":
         assert "the same, bit for bit" in done.stdout
@@ -300,7 +301,7 @@ def altered(provenance, path, value):
 def altered_files(provenance):
     """Yield provenance with each key of each table replaced by each hostile value, or by a deeply nested list."""
     for path in key_paths(provenance):
-        if len(path) == 1 or path[:2] == ("parameters", "c") or path[-1] in ("values", "decay", "file", "outputs"):
+        if len(path) == 1 or path[:2] == ("parameters", "c") or path[-1] in ("values", "decay", "fmu", "outputs"):
             yield from (altered(provenance, path, value) for value in HOSTILE)
             yield altered(provenance, path, "deep").replace('"deep"', DEEP)
 
@@ -321,7 +322,7 @@ def test_a_new_result_never_depends_on_the_provenance_of_an_old_one(tmp_path, fi
     shutil.copytree(new, old)
     for text in (DEEP, *altered_files(read_provenance(new))):
         (old / "provenance.json").write_text(text)
-        for read in (load_result, run_spec, lambda folder: summarize_provenance(folder / "provenance.json")):
+        for read in (load_result, resolve, lambda folder: summarize_provenance(folder / "provenance.json")):
             with suppress(HarnessError):
                 read(old)
         with replace_folder(old, FILES, read_source(text)) as folder:
@@ -337,7 +338,7 @@ def test_an_edited_provenance_file_ends_a_repetition_in_one_sentence(workspace, 
     provenance = read_provenance(file.parent)
     edits = [("files", "fmus/smd.fmu", 5), ("files", "fmus/smd.fmu", "0" * 64), ("date", []), ("call", "options", 5)]
     if arguments == ("run", "smd"):
-        edits += [("scene", "title", ""), ("scene", "outputs", "x"), ("scene", "name", ".."), ("scene", "stop", [])]
+        edits += [("scene", "title", ""), ("run", "outputs", "x"), ("scene", "name", ".."), ("run", "stop", [])]
     else:
         edits += [("call", "name", "build"), ("call", "options", {"nosuch": 1}), ("call", "options", {"fmu": [[1]]})]
     for *path, value in edits:

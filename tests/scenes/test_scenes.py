@@ -28,13 +28,13 @@ def test_every_shipped_scene_loads_and_names_its_source(path):
 
 def test_omitted_keys_are_left_to_the_fmu(tmp_path):
     scene = load_scene(write(tmp_path))
-    assert {scene.method, scene.law, scene.rtol, scene.start, scene.stop, scene.grid} == {None}
-    assert (scene.analyses, scene.values, scene.follow, scene.follows_solver_steps) == ((), {}, None, True)
+    assert {scene.run.start, scene.run.stop, scene.run.grid} == {None}
+    assert (scene.analyses, scene.run.values, scene.run.follow) == ((), {}, True)
 
 
 def test_a_grid_follows_the_solver_only_on_request(tmp_path):
-    assert not load_scene(write(tmp_path, grid="0.1")).follows_solver_steps
-    assert load_scene(write(tmp_path, grid="0.1", follow="true")).follows_solver_steps
+    assert not load_scene(write(tmp_path, grid="0.1")).run.follow
+    assert load_scene(write(tmp_path, grid="0.1", follow="true")).run.follow
 
 
 @pytest.mark.parametrize(
@@ -63,6 +63,9 @@ def test_a_scene_without_plots_shows_its_outputs(tmp_path, outputs, plots):
         ({"model": None}, "set either model"),
         ({"fmu": '"x.fmu"'}, "set either model"),
         ({"outputs": "[]"}, "outputs is empty"),
+        ({"outputs": None}, "outputs is empty"),
+        ({"equal_steps": "10"}, "unknown key 'equal_steps'"),
+        ({"method": "'ode23'", "extra": "[values]\n'solver.method' = 'ode45'"}, "solver.method is set twice"),
         ({"outputs": '["x", "x"]'}, "is not a list of distinct names"),
         ({"stop": '"soon"'}, "stop = 'soon' is not a finite number"),
         ({"stop": "inf"}, "stop = inf is not a finite number"),

@@ -3,6 +3,7 @@
 import json
 from itertools import combinations
 from math import cos, sqrt
+from pathlib import Path
 
 import commands
 import external_fmus
@@ -12,8 +13,8 @@ from build_cache import run_published_cases
 from scipy.io import savemat
 
 from harness.errors import HarnessError
-from harness.running.signals import Signals
-from harness.running.trajectory import ModeChanges
+from harness.running.trajectory import ModeChanges, Trajectory
+from harness.scenes.run_spec import RunSpec
 from harness.studies.compare.difference import compare
 from harness.studies.compare.study import comparison_as_json
 from harness.studies.compare.trajectory_files import read_trajectory
@@ -117,7 +118,7 @@ def test_a_scene_and_its_fmu_are_run_to_the_same_times(harness):
         (["fmus/smd.fmu", "nosuch.csv"], 2, "nosuch.csv does not exist"),
         (["fmus/smd.fmu", "nosuch.fmu"], 2, "there is no nosuch.fmu"),
         (["fmus", "fmus/smd.fmu"], 2, "trajectory.csv is missing"),
-        (["nosuch", "fmus/smd.fmu"], 2, "unknown scene 'nosuch'"),
+        (["nosuch", "fmus/smd.fmu"], 2, "unknown model or scene 'nosuch'"),
     ],
 )
 def test_an_impossible_comparison_is_one_sentence(harness, arguments, status, sentence):
@@ -136,8 +137,12 @@ def mode_changes(rows, contacts=("mode",)):
     return ModeChanges(t, dict(zip(contacts, modes, strict=True)))
 
 
+def signals(name, times, columns, units, events=None):
+    return Trajectory(RunSpec(Path(name)), times, columns, units, {}, {}, events=events)
+
+
 def path(name, times, events=None, **columns):
-    return Signals(name, times, columns, {name: UNITS.get(name, "") for name in columns}, events)
+    return signals(name, times, columns, {name: UNITS.get(name, "") for name in columns}, events)
 
 
 def test_interpolation_follows_the_rate_or_stays_between_neighbours():
@@ -178,7 +183,7 @@ def test_a_jump_is_compared_as_a_jump(late):
         since = np.where(t >= at, t - at, 0.0)
         columns = {"a": np.where(t >= at, 2.0, 0.0), "v": 2 * since, "x": since**2}
         units = {"a": "m/s2", "v": "m/s", "x": "m"}
-        return Signals(name, t, columns, units, mode_changes([[0, 0], [at, 1]]))
+        return signals(name, t, columns, units, mode_changes([[0, 0], [at, 1]]))
 
     comparison = compare(
         motion("one", np.linspace(0, 2, 101), 1.0), motion("two", np.linspace(0, 1.99, 57), 1.0 + late)
@@ -202,8 +207,8 @@ def test_a_repeated_time_holds_both_sides_of_a_jump(tmp_path):
 
 def test_unmatched_variables_and_missing_units_are_reported():
     t = np.arange(20.0)
-    one = Signals("one", t, {"x": t, "a": t, "F": t}, {"x": "m", "a": "m/s²", "F": "N"})
-    two = Signals("two", t, {"x": t, "a": t, "E": t}, {"x": "", "a": "m/s^2", "E": "J"})
+    one = signals("one", t, {"x": t, "a": t, "F": t}, {"x": "m", "a": "m/s²", "F": "N"})
+    two = signals("two", t, {"x": t, "a": t, "E": t}, {"x": "", "a": "m/s^2", "E": "J"})
     comparison = compare(one, two)
     assert [difference.name for difference in comparison.differences] == ["x", "a"]
     assert comparison.left_out == (
@@ -255,8 +260,8 @@ def test_results_without_a_common_variable_are_refused():
 )
 def test_events_are_matched_by_kind_and_time(second, sentence, shift):
     t = np.arange(20.0)
-    one = Signals("one", t, {"x": t}, {"x": "m"}, mode_changes([[0, 0], [1, 1], [2, 0]]))
-    two = Signals("two", t, {"x": t}, {"x": "m"}, mode_changes([[0, 0], *second]))
+    one = signals("one", t, {"x": t}, {"x": "m"}, mode_changes([[0, 0], [1, 1], [2, 0]]))
+    two = signals("two", t, {"x": t}, {"x": "m"}, mode_changes([[0, 0], *second]))
     pairs = compare(one, two).pairs
     assert pairs.summary(("one", "two")) == sentence
     assert pairs.shift == pytest.approx(shift, nan_ok=True)
@@ -267,9 +272,9 @@ def test_events_of_several_contacts_are_matched_per_contact_and_named():
     t = np.arange(20.0)
     names = ("F_lower", "F_upper")
     rows = [[0, 0, 0], [1, 1, 0], [2, 1, 1], [3, 0, 1]]
-    one = Signals("one", t, {"x": t}, {"x": "m"}, mode_changes(rows, names))
+    one = signals("one", t, {"x": t}, {"x": "m"}, mode_changes(rows, names))
     swapped = [[0, 0, 0], [1.5, 0, 1], [1.75, 1, 1]]
-    two = Signals("two", t, {"x": t}, {"x": "m"}, mode_changes(swapped, names))
+    two = signals("two", t, {"x": t}, {"x": "m"}, mode_changes(swapped, names))
     comparison = compare(one, two)
     assert comparison.events == (
         "2 changes of mode in both, at most 0.75 s apart; only in one: F_lower to 0 at t = 3 s"
@@ -280,9 +285,9 @@ def test_events_of_several_contacts_are_matched_per_contact_and_named():
 def test_a_distant_event_match_hides_no_difference():
     """The other one jumps back in between, so that the values in between belong to no jump."""
     t = np.linspace(0, 3, 301)
-    one = Signals("one", t, {"y": (t >= 1) + 0.5}, {"y": "m"}, mode_changes([[0, 0], [1, 1]]))
+    one = signals("one", t, {"y": (t >= 1) + 0.5}, {"y": "m"}, mode_changes([[0, 0], [1, 1]]))
     step = (t >= 0.5) & (t < 0.8) | (t >= 2)
-    two = Signals("two", t, {"y": step + 0.5}, {"y": "m"}, mode_changes([[0, 0], [0.5, 2], [0.8, 0], [2, 1]]))
+    two = signals("two", t, {"y": step + 0.5}, {"y": "m"}, mode_changes([[0, 0], [0.5, 2], [0.8, 0], [2, 1]]))
     assert compare(one, two).differences[0].largest == 1.0
 
 
@@ -305,7 +310,7 @@ def test_a_distant_event_match_hides_no_difference():
 def test_units_have_one_spelling_and_are_converted_or_refused(remaining, right, factor):
     t = np.arange(20.0)
     pair = (
-        Signals(name, t, {"y": t, "x": t}, {"y": unit, "x": "m"}) for name, unit in (("one", remaining), ("two", right))
+        signals(name, t, {"y": t, "x": t}, {"y": unit, "x": "m"}) for name, unit in (("one", remaining), ("two", right))
     )
     comparison = compare(*pair)
     if factor is None:
@@ -449,7 +454,7 @@ def test_a_nonfinite_value_on_either_side_is_an_infinite_difference(lost, where,
     remaining = {"a": good, "x": bad if where != "right" else np.cos(t), "z": good}
     right = {"a": good, "x": bad if where != "left" else np.cos(t), "z": good}
     units = dict.fromkeys(remaining, "m")
-    comparison = compare(Signals("one", t, remaining, units), Signals("two", t + shift, right, units))
+    comparison = compare(signals("one", t, remaining, units), signals("two", t + shift, right, units))
     assert np.isnan(comparison.worst)
     assert not comparison.worst <= 1e300
 
@@ -469,7 +474,7 @@ def test_within_fails_on_nan(tmp_path):
 def test_a_difference_is_relative_to_the_larger_side(turned):
     t = np.linspace(0, 1, 20)
     small, large = ({"x": np.full(20, size)} for size in (1.0, 4.0))
-    pair = [Signals(name, t, columns, {"x": "m"}) for name, columns in (("small", small), ("large", large))]
+    pair = [signals(name, t, columns, {"x": "m"}) for name, columns in (("small", small), ("large", large))]
     (difference,) = compare(*(reversed(pair) if turned else pair)).differences
     assert difference.relative == 0.75
     assert difference.largest == 3.0
@@ -478,5 +483,5 @@ def test_a_difference_is_relative_to_the_larger_side(turned):
 def test_differences_near_overflow_have_a_relative_value():
     t = np.linspace(0, 1, 20)
     one, two = ({"x": np.full(20, value)} for value in (1e308, -1e308))
-    comparison = compare(Signals("one", t, one, {"x": "m"}), Signals("two", t, two, {"x": "m"}))
+    comparison = compare(signals("one", t, one, {"x": "m"}), signals("two", t, two, {"x": "m"}))
     assert comparison.worst == 2.0

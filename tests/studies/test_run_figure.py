@@ -39,7 +39,8 @@ def covered(axes):
 for name in sys.argv[1:]:
     figures, runs = [], []
     Figure.savefig = lambda figure, file, **how: figures.append(figure)
-    study.run_scene(replace(load_scene(name), repeat=1), Path("results"), lambda share: None)
+    scene = load_scene(name)
+    study.run_scene(replace(scene, run=replace(scene.run, repeat=1)), Path("results"), lambda share: None)
     figures[0].draw_without_rendering()
     events = runs[0].events
     summaries[name] = {

@@ -8,6 +8,7 @@ import sys
 import time
 from dataclasses import replace
 from math import nan
+from pathlib import Path
 
 import commands
 import independent_pendulum
@@ -21,7 +22,9 @@ from harness.errors import HarnessError
 from harness.references.models.pacejka import MagicFormula
 from harness.references.reference_trajectory import CommunicationGrid, ReferenceTrajectory, compute_reference
 from harness.results.provenance import load_provenance
-from harness.running.fmu_session import CompletedRun, RefusalSummary, RefusedRun, RunCounts
+from harness.running.fmu_session import RefusalSummary, RefusedRun
+from harness.running.trajectory import Statistics, Trajectory
+from harness.scenes.run_spec import RunSpec
 from harness.studies.stability.cases import StabilityCase, expand_scene, load_scenes, value_spans
 from harness.studies.stability.run_with_timeout import run_with_timeout
 from harness.studies.stability.study import (
@@ -171,35 +174,48 @@ def test_a_worker_process_is_reused_and_replaced_after_a_crash(tmp_path, monkeyp
 
 
 CASE = StabilityCase(
-    "rest", "coulomb", "exact", setting=None, grid=CommunicationGrid(0.0, 1.0, 2), spans=[], max_error=1e-3
+    "rest",
+    "coulomb",
+    "exact",
+    run=RunSpec(Path("coulomb.fmu")),
+    grid=CommunicationGrid(0.0, 1.0, 2),
+    spans=[],
+    max_error=1e-3,
 )
 REST = ReferenceTrajectory(np.array([0.0, 0.5, 1.0]), np.ones(3), np.zeros(3), ((0.5, 0),))
-GOOD = CompletedRun(np.ones(3), np.zeros(3), np.zeros(3), 0.5, RunCounts(1, 2, 0, 3), 0.1)
+GOOD = {"x": np.ones(3), "v": np.zeros(3), "energy": np.zeros(3)}
+COUNTS = Statistics(2, 0, 3, 0.1, events=1, last_event=0.5)
+
+
+def motion(columns=None, **counts):
+    """Return the correct motion with other columns or other counts."""
+    columns = GOOD | (columns or {})
+    return Trajectory(CASE.run, REST.times, columns, {}, {}, {}, statistics=replace(COUNTS, **counts))
 
 
 @pytest.fixture
 def case():
     """A case without input."""
-    return replace(CASE, setting=type("Setting", (), {"values": {}})())
+    return CASE
 
 
 def test_a_correct_motion_is_finished(case):
-    assert judge_solution(case, GOOD, REST).ended == FINISHED
+    assert judge_solution(case, motion(), REST).ended == FINISHED
 
 
 @pytest.mark.parametrize(
     ("changed", "message"),
     [
-        ({"x": np.array([1.0, 1.0, 1.01])}, "error 0.01"),
-        ({"v": np.array([0.0, nan, 0.0])}, "error nan"),
-        ({"energy": np.array([1.0, 0.5, 0.6])}, "energy rises by 0.1"),
-        ({"t_last": 0.6}, "error 0.1"),
-        ({"counts": RunCounts(2, 2, 0, 3)}, "2 events, not 1"),
+        ({"columns": {"x": np.array([1.0, 1.0, 1.01])}}, "error 0.01"),
+        ({"columns": {"v": np.array([0.0, nan, 0.0])}}, "error nan"),
+        ({"columns": {"energy": np.array([1.0, 0.5, 0.6])}}, "energy rises by 0.1"),
+        ({"last_event": 0.6}, "error 0.1"),
+        ({"events": 2}, "2 events, not 1"),
     ],
     ids=["far", "not a number", "energy out of nothing", "late", "one event too many"],
 )
 def test_a_plausible_wrong_motion_is_wrong(case, changed, message):
-    row = judge_solution(case, replace(GOOD, **changed), REST)
+    row = judge_solution(case, motion(**changed), REST)
     assert row.ended == WRONG
     assert not row.passed
     assert message in row.text
@@ -216,7 +232,7 @@ def test_a_refusal_needs_its_message_and_no_values(case):
 
 def test_the_slope_is_that_of_the_stiff_end(case):
     rows = [
-        CaseOutcome(replace(case, region=x), FINISHED, "", motion=replace(GOOD, counts=RunCounts(0, n, 0, 0)))
+        CaseOutcome(replace(case, region=x), FINISHED, "", motion=motion(steps=n))
         for x, n in ((1e-4, 1000), (1e-3, 100), (1e-2, 50))
     ]
     (region,) = stability_regions(rows)

@@ -13,6 +13,7 @@ from sweep_results import open_sweep, sweep_folder
 pandas = pytest.importorskip("pandas", reason="the extra 'sweep' is not installed")
 
 from harness.errors import SceneError  # noqa: E402
+from harness.scenes.run_spec import RunSpec  # noqa: E402
 from harness.studies.sweep.runner import SweepSpec, open_runner  # noqa: E402
 from harness.studies.sweep.sampling import SweepPoints, parse_axis  # noqa: E402
 
@@ -63,14 +64,14 @@ def test_an_invalid_axis_is_refused(text, random):
 def test_a_reset_instance_gives_the_same_results_as_a_fresh_one(fmus):
     """Also after a failed run."""
     measures = ("final", "events", "slips", "period", "peak_speed", "stuck")
-    runs = SweepSpec("stickslip", ("mu_d", "v_driver"), (), measures)
+    runs = SweepSpec(RunSpec(fmus / "stickslip.fmu", follow=False), ("mu_d", "v_driver"), measures)
     spots = [[0.6, 0.034], [0.95, 0.034], [0.3, 0.1], [0.6, 0.034]]
-    with open_runner(runs, fmus / "stickslip.fmu") as rerun:
+    with open_runner(runs) as rerun:
         rows = [rerun.run(spot) for spot in spots]
     assert rows[0] == rows[3]
     assert rows[1].startswith("mu_d is 0.95, above mu_s = 0.9")
     for spot, row in zip(spots, rows, strict=True):
-        with open_runner(runs, fmus / "stickslip.fmu") as rerun:
+        with open_runner(runs) as rerun:
             assert rerun.run(spot) == row
     omega, x_d = sqrt(742.5 / 12.5), 0.3 * 12.5 * 9.81 / 742.5
     peak = 0.034 + omega * sqrt(x_d**2 + (0.034 / omega) ** 2)
@@ -78,11 +79,11 @@ def test_a_reset_instance_gives_the_same_results_as_a_fresh_one(fmus):
 
 
 def test_decay_measures_match_the_parameters(fmus):
-    with open_runner(SweepSpec("coulomb", ("f",), (), ("rest", "f_over_k")), fmus / "coulomb.fmu") as rerun:
+    with open_runner(SweepSpec(RunSpec(fmus / "coulomb.fmu", follow=False), ("f",), ("rest", "f_over_k"))) as rerun:
         rest, ratio = rerun.run([2.0])
     assert ratio == pytest.approx(2 / 157.9, rel=1e-3)
     assert abs(rest) <= 2 / 157.9
-    with open_runner(SweepSpec("smd", ("c",), (), ("zeta",)), fmus / "smd.fmu") as rerun:
+    with open_runner(SweepSpec(RunSpec(fmus / "smd.fmu", follow=False), ("c",), ("zeta",))) as rerun:
         assert rerun.run([1.0]) == pytest.approx([1 / (2 * sqrt(157.9))], rel=1e-5)
 
 

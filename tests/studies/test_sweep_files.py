@@ -2,6 +2,7 @@
 
 import ast
 import tracemalloc
+from pathlib import Path
 from zipfile import ZipFile
 
 import numpy as np
@@ -13,6 +14,7 @@ from sweep_results import open_sweep, xarray
 from harness.errors import HarnessError
 from harness.results.netcdf import NetCDFVariable, NetCDFWriter
 from harness.running.description import read_description
+from harness.scenes.run_spec import RunSpec
 from harness.studies.sweep import figure
 from harness.studies.sweep import result_files as writing
 from harness.studies.sweep.boundaries import Boundary, read_boundaries
@@ -28,7 +30,7 @@ def test_memory_use_does_not_grow_with_the_number_of_runs(monkeypatch, tmp_path)
     peaks = []
     for many in (20, 200):
         axes = parse_axis(f"a=0:1:{many}", False), parse_axis("b=0:1:100", False)
-        sweep = Sweep(SweepSpec("many", ("a", "b"), (), ()), SweepPoints(axes), b"", 1)
+        sweep = Sweep(SweepSpec(RunSpec(Path("many.fmu")), ("a", "b")), SweepPoints(axes), b"", 1)
         labels = dict.fromkeys(("a", "b"), ("m", ""))
         about = writing.SweepDescription(labels, (writing.MeasureColumn("c", "s", "some"),), {}, 1.0, ())
         folder = tmp_path / str(many)

@@ -18,6 +18,7 @@ from sweep_results import sweep_folder
 distributed = pytest.importorskip("distributed", reason="the extra 'sweep' is not installed")
 
 from harness.errors import HarnessError  # noqa: E402
+from harness.scenes.run_spec import RunSpec  # noqa: E402
 from harness.studies.sweep import study  # noqa: E402
 from harness.studies.sweep.journal import Journal  # noqa: E402
 from harness.studies.sweep.runner import SweepSpec  # noqa: E402
@@ -178,7 +179,9 @@ def test_an_unresponsive_scheduler_is_reported(monkeypatch):
 def test_a_run_that_kills_its_worker_is_reported_and_the_others_finish(monkeypatch):
     """In any block, and with any other work in progress."""
     monkeypatch.setattr(study, "run_block", killed_worker.run_block)
-    sweep = Sweep(SweepSpec("deadly", ("a",), (), ()), SweepPoints((parse_axis("a=0:39:40", False),)), b"", 1)
+    sweep = Sweep(
+        SweepSpec(RunSpec(Path("deadly.fmu")), ("a",)), SweepPoints((parse_axis("a=0:39:40", False),)), b"", 1
+    )
     counts = {}
     with study.open_workers(None, 2, 40) as hands:
         for block in study.Dispatcher(sweep, hands, [(0, 40)]).completed_blocks():

@@ -2,12 +2,14 @@
 
 from dataclasses import replace
 from functools import partial
+from pathlib import Path
 
 import commands
 import numpy as np
 import pytest
 
 from harness.errors import HarnessError
+from harness.scenes.run_spec import RunSpec
 from harness.studies.sweep.journal import Journal, JournalBlock
 from harness.studies.sweep.runner import SweepSpec
 from harness.studies.sweep.sampling import SweepAxis, SweepPoints, parse_axis
@@ -23,7 +25,7 @@ def harness(fmus, tmp_path):
 
 
 def test_the_fmu_is_part_of_the_identity_of_a_sweep():
-    runs = SweepSpec("smd", ("m",), (), ("final",))
+    runs = SweepSpec(RunSpec(Path("smd.fmu")), ("m",), ("final",))
     one, two = (Sweep(runs, SweepPoints((SweepAxis("m", (1.0, 2.0)),)), fmu, 2) for fmu in (b"a", b"b"))
     assert one.key != two.key
     assert one.key == replace(two, fmu=b"a").key
@@ -64,8 +66,8 @@ def test_a_damaged_journal_is_reported_and_its_runs_are_repeated(harness, tmp_pa
     assert harness(*arguments, "--out", "whole", blank=True).returncode == 0
     (tmp_path / "results/sweep").mkdir(parents=True)
     points = SweepPoints((parse_axis("m=1:2:4", False),))
-    defaults = ("exchange", False), ("lenient", False), ("stop", None), ("timeout", 60.0), ("tolerance", 1e-6)
-    sweep = Sweep(SweepSpec("smd", ("m",), (), (), defaults), points, (tmp_path / "fmus/smd.fmu").read_bytes(), 3)
+    runs = SweepSpec(RunSpec(tmp_path / "fmus/smd.fmu", follow=False), ("m",))
+    sweep = Sweep(runs, points, runs.run.fmu.read_bytes(), 3)
     sweep.journal(tmp_path / "results/sweep").path.write_bytes(b"garbage\n" + line(0, [[1.0]], {}))
     done = harness(*arguments, blank=True)
     assert (done.returncode, done.stderr) == (0, "")

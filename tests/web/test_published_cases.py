@@ -7,7 +7,6 @@ import pytest
 import web_page
 
 from harness.running.fmi2 import simulate
-from harness.running.run_spec import spec_from_scene
 from harness.scenes.scene import load_scene, shipped_scenes
 from harness.studies.run.study import ANALYSES
 
@@ -20,8 +19,8 @@ def test_every_published_case_measures_the_same_as_the_terminal(page):
     assert sorted(names) == sorted(scenes)
     for name, scene in scenes.items():
         page.choose("preset", name)
-        native = native_fmus.build_native_fmus() / f"{scene.model}.fmu"  # runs while the page waits for more work
-        run = simulate(replace(spec_from_scene(scene), fmu=native, repeat=1))
+        native = native_fmus.build_native_fmus() / f"{scene.run.model}.fmu"  # runs while the page waits for more work
+        run = simulate(replace(scene.run, fmu=native, repeat=1))
         page.wait(
             f"app.state().preset === {name!r} && document.querySelector('#tables caption')?.textContent === "
             "app.session.presets.get(app.state().preset).title"

@@ -17,9 +17,9 @@ from ...errors import MAX_VALUE_LENGTH, HarnessError, SceneError, check_names
 from ...process.interrupt import check_interrupt
 from ...process.subprocess_runner import run_module
 from ...process.temporary_directory import temporary_directory
+from ...scenes.run_spec import RunSpec
 from ..description import resolve_time_span
 from ..inputs import check_inputs
-from ..run_spec import RunSpec
 from ..trajectory import Trajectory
 from ..unpacking import unpack
 from ..variable_values import convert_value, effective_value, variable_unit
@@ -249,7 +249,9 @@ def build_trajectory(
                 effective_value(variable, set_values.get(alias_key(variable), variable.start)),
                 variable_unit(variable),
             )
-    return Trajectory(replace(spec, outputs=tuple(columns)), rows.time, columns, units, descriptions, parameters)
+    stored = {name: effective_value(variables[name], value) for name, value in values.items()}
+    as_done = replace(spec, outputs=tuple(columns), values=stored)
+    return Trajectory(as_done, rows.time, columns, units, descriptions, parameters)
 
 
 def alias_key(variable: Any) -> tuple[str, int]:

@@ -15,8 +15,9 @@ from ...references.ode_problem import OdeProblem
 from ...references.piecewise_linear import mp
 from ...references.reference_trajectory import CommunicationGrid, compute_reference
 from ...running.embedded_model import EmbeddedModel, load_model_class
-from ...running.fmu_session import CompletedRun, FmuInfo, InitialValues, read_info, run_steps
+from ...running.fmu_session import FmuInfo, RefusedRun, read_info, run_steps
 from ...scenes.fmu_files import find_fmu
+from ...scenes.run_spec import RunSpec
 from .benchmark import SETTINGS, Baseline, Benchmark
 
 POINTS = 1600
@@ -46,20 +47,27 @@ def accuracy_benchmarks() -> list[Callable[[], Benchmark]]:
     ]
 
 
-def run_through_times(setting: InitialValues, times: list[float]) -> CompletedRun:
-    """Run with communication points at `times`; HarnessError with the message of the FMU if it fails."""
-    outcome = run_steps(setting, [(t, ahead - t) for t, ahead in pairwise(times)], {})
-    if not isinstance(outcome, CompletedRun):
-        raise HarnessError(f"{setting.model}: {outcome.message}")
-    return outcome
+def run_through_times(spec: RunSpec, times: list[float]) -> tuple[np.ndarray, np.ndarray]:
+    """Return positions and velocities (n,) at the communication points `times` (n,) in s.
+
+    Raises
+    ------
+    HarnessError
+        With the message of the FMU, if the run fails.
+    """
+    outcome = run_steps(spec, [(t, ahead - t) for t, ahead in pairwise(times)], {})
+    if isinstance(outcome, RefusedRun):
+        raise HarnessError(f"{spec.model}: {outcome.message}")
+    x, v, *_ = outcome.columns.values()
+    return x, v
 
 
 def max_error(model: str, read_info: FmuInfo, chosen: dict[str, float | str]) -> float:
     """Return the largest error of the default experiment, relative to the largest value."""
     values = read_info.resolve_labels({**read_info.start_values, **chosen})
     answer = compute_reference(model, [(0.0, read_info.stop, values)], CommunicationGrid(0.0, read_info.stop, POINTS))
-    motion = run_through_times(InitialValues(model, values, stop=read_info.stop), answer.times.tolist())
-    return answer.error(motion.x, motion.v)
+    spec = RunSpec(find_fmu(model), values=values, stop=read_info.stop)
+    return answer.error(*run_through_times(spec, answer.times.tolist()))
 
 
 def exact_run_error(model: str, read_info: FmuInfo) -> Benchmark:
@@ -127,10 +135,10 @@ def between_grids(model: str, read_info: FmuInfo) -> Benchmark:
     uniform = [read_info.stop * i / 200 for i in range(201)]
     random = Random(model)
     both = sorted({*uniform, *(random.uniform(0.0, read_info.stop) for _ in range(777))})
-    setting = InitialValues(model, read_info.start_values, stop=read_info.stop)
-    one, other = run_through_times(setting, uniform), run_through_times(setting, both)
+    spec = RunSpec(find_fmu(model), values=read_info.start_values, stop=read_info.stop)
+    one, other = run_through_times(spec, uniform), run_through_times(spec, both)
     shared = np.searchsorted(both, uniform)
-    parts = ((one.x, other.x), (one.v, other.v))
+    parts = zip(one, other, strict=True)
     largest_error = max(float(np.abs(a - b[shared]).max() / np.abs(a).max()) for a, b in parts)
     return Benchmark(
         f"{model}, default: difference between two grids", largest_error, "1", 1e-12, (Baseline("each other"),)
@@ -139,8 +147,8 @@ def between_grids(model: str, read_info: FmuInfo) -> Benchmark:
 
 def stuck_drift(model: str, read_info: FmuInfo, chosen: dict[str, float]) -> Benchmark:
     """Measure the displacement of a stuck body."""
-    setting = InitialValues(model, {**read_info.start_values, **chosen}, stop=1e6)
-    x = run_through_times(setting, [1e4 * i for i in range(101)]).x
+    spec = RunSpec(find_fmu(model), values={**read_info.start_values, **chosen}, stop=1e6)
+    x, _ = run_through_times(spec, [1e4 * i for i in range(101)])
     displacement = float(np.abs(x - x[0]).max())
     return Benchmark(f"{model}, stuck for 1e6 s: displacement", displacement, equations_of(model).unit, 0.0, ())
 

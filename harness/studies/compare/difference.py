@@ -7,7 +7,7 @@ from math import isnan
 import numpy as np
 
 from ...errors import HarnessError
-from ...running.signals import Signals
+from ...running.trajectory import Trajectory
 from .event_pairs import EventPairs, match_events, stack_events
 from .interpolation import SignalInterpolant, ValueBounds
 from .trajectory_sources import common_span
@@ -54,8 +54,8 @@ class Difference:
 class Comparison:
     """Comparison of two trajectories at `time` (n,) in s; `pairs` holds their matched events if they are known."""
 
-    one: Signals
-    two: Signals
+    one: Trajectory
+    two: Trajectory
     time: np.ndarray
     interpolated: bool
     differences: tuple[Difference, ...]
@@ -94,7 +94,7 @@ class Comparison:
         return self.pairs.summary((self.one.name, self.two.name)) if self.pairs else ""
 
 
-def compare(one: Signals, two: Signals) -> Comparison:
+def compare(one: Trajectory, two: Trajectory) -> Comparison:
     """Compare the common variables over the common time span.
 
     Raises
@@ -131,7 +131,7 @@ def compare(one: Signals, two: Signals) -> Comparison:
     return Comparison(one, two, time, interpolated, tuple(differences), tuple(left_out), pairs)
 
 
-def units(one: Signals, two: Signals, name: str) -> tuple[str | None, float, str]:
+def units(one: Trajectory, two: Trajectory, name: str) -> tuple[str | None, float, str]:
     """Return the unit of comparison (None if impossible), the factor from the second unit to it, and a remark."""
     left, right = (side.units[name] for side in (one, two))
     if is_string(one, name) != is_string(two, name):
@@ -146,11 +146,11 @@ def units(one: Signals, two: Signals, name: str) -> tuple[str | None, float, str
     return left, factor, "" if factor == 1.0 else f"{name} is in {right} in {two.name}; compared in {left}"
 
 
-def is_string(path: Signals, name: str) -> bool:
+def is_string(path: Trajectory, name: str) -> bool:
     return path.columns[name].dtype.kind == "U"
 
 
-def encode_strings(one: Signals, two: Signals) -> Iterator[SignalInterpolant]:
+def encode_strings(one: Trajectory, two: Trajectory) -> Iterator[SignalInterpolant]:
     """Yield interpolants of both trajectories, with strings replaced by numbers."""
     texts = [name for name in one.columns if name in two.columns and is_string(one, name) and is_string(two, name)]
     values = {name: np.unique(np.concatenate([side.columns[name] for side in (one, two)])) for name in texts}
@@ -178,7 +178,7 @@ def difference(name: str, unit: str, time: np.ndarray, left: np.ndarray, right: 
     return Difference(name, unit, relative * size, float(time[i]), rms * size, relative, size, left, right)
 
 
-def times(one: Signals, two: Signals, begin: float, end: float) -> tuple[np.ndarray, bool]:
+def times(one: Trajectory, two: Trajectory, begin: float, end: float) -> tuple[np.ndarray, bool]:
     """Return the times of comparison (n,) and whether one side is interpolated.
 
     These are the common times if there are enough of them, otherwise the times of the coarser side.
@@ -194,7 +194,7 @@ def times(one: Signals, two: Signals, begin: float, end: float) -> tuple[np.ndar
 
 
 def events(
-    one: Signals, two: Signals, begin: float, end: float
+    one: Trajectory, two: Trajectory, begin: float, end: float
 ) -> tuple[EventPairs | None, tuple[np.ndarray, np.ndarray]]:
     """Match the events of both sides, and return the time intervals (k, 2) in s in which each side jumps.
 

@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
 
-from ...running.signals import Signals
+from ...running.trajectory import Trajectory
 from .units import is_rate_unit
 
 TIME_ROUNDING = 8 * np.finfo(float).eps  # times that differ by this fraction are equal but for rounding
@@ -33,7 +33,7 @@ class ValueBounds:
 class SignalInterpolant:
     """Interpolates a trajectory between its samples."""
 
-    path: Signals
+    path: Trajectory
 
     def bounds_at(self, name: str, at: np.ndarray, jumps: np.ndarray) -> ValueBounds:
         """Return the bounds of a variable at given times.

@@ -12,7 +12,7 @@ from ...results.files import to_json
 from ...results.folder import replace_folder
 from ...results.provenance import describe_sources, prefix_parameters, write_provenance
 from ...running.fmi2 import ProgressCallback
-from ...running.run_spec import RunSpec
+from ...scenes.run_spec import RunSpec
 from . import trajectory_sources
 from .difference import Comparison, compare
 
@@ -27,18 +27,18 @@ def run_comparison(
     folder = out / "compare" / "-".join(names).replace("/", "-")
     with replace_folder(folder, ("compare.json", "figure.svg"), describe_sources(*sources)) as new_folder:
         one, two = (
-            replace(side, name=name)
+            replace(side, label=name)
             for side, name in zip(trajectory_sources.load_both(sources, options, report), names, strict=True)
         )
         comparison = compare(one, two)
         (new_folder / "compare.json").write_text(to_json(comparison_as_json(comparison)) + "\n", encoding="utf-8")
         draw(comparison, new_folder / "figure.svg")
-        values = prefix_parameters({"one": one.parameters, "two": two.parameters})
+        values = prefix_parameters({"one": one.effective_parameters, "two": two.effective_parameters})
         write_provenance(
             new_folder,
-            [side.file for side in (one, two) if side.file],
+            [side.spec.fmu for side in (one, two)],
             values,
-            options,
+            options.options,
             source=describe_sources(*sources),
         )
     return comparison, folder
@@ -47,8 +47,8 @@ def run_comparison(
 def comparison_as_json(comparison: Comparison) -> dict[str, Any]:
     """Return the comparison for JSON output."""
     return {
-        "one": {"name": comparison.one.name, "note": comparison.one.note},
-        "two": {"name": comparison.two.name, "note": comparison.two.note},
+        "one": {"name": comparison.one.name, "note": comparison.one.accuracy},
+        "two": {"name": comparison.two.name, "note": comparison.two.accuracy},
         "times": len(comparison.time),
         "interpolated": comparison.interpolated,
         "variables": [
@@ -93,7 +93,7 @@ def difference_table(comparison: Comparison) -> Table:
 def summary_lines(comparison: Comparison) -> list[str]:
     """Return notes on both sides, on the times of comparison, and on events."""
     grid = "those of the coarser side; the other one is interpolated" if comparison.interpolated else "common to both"
-    notes = [f"{variable.name}: {variable.note}" for variable in (comparison.one, comparison.two) if variable.note]
+    notes = [f"{side.name}: {side.accuracy}" for side in (comparison.one, comparison.two) if side.accuracy]
     nonfinite = [variable for variable in comparison.differences if isnan(variable.largest)]
     return [
         *notes,

@@ -17,8 +17,8 @@ from ...records.headings import split_heading
 from ...records.table_files import read_content
 from ...records.units import TIMES
 from ...running.external.sample_rows import element_names
-from ...running.signals import Signals
-from ...running.trajectory import ModeChanges
+from ...running.trajectory import ModeChanges, Trajectory
+from ...scenes.run_spec import RunSpec
 
 MAX_TIME = 1e100  # s; largest absolute time
 ELEMENT = re.compile(r".*\[\d+(,\d+)*\]")  # name of an array element; its brackets do not contain a unit
@@ -27,7 +27,7 @@ BOOLEANS = {"True": 1.0, "False": 0.0, "true": 1.0, "false": 0.0}
 Columns = dict[str, np.ndarray]
 
 
-def read_trajectory(path: Path) -> Signals:
+def read_trajectory(path: Path) -> Trajectory:
     """Read the trajectory in a file or a result folder.
 
     Raises
@@ -53,7 +53,7 @@ def read_trajectory(path: Path) -> Signals:
         if name in columns or name == parse_heading(clock)[0]:
             raise SceneError(f"{file.name}: two columns are named {format_value(name)}")
         columns[name], units[name] = parse_column, unit
-    return Signals(path.stem, time, columns, units, read_events(path), file=file)
+    return Trajectory(RunSpec(file), time, columns, units, {}, {}, events=read_events(path), label=path.stem)
 
 
 def read_events(path: Path) -> ModeChanges | None:

@@ -11,28 +11,29 @@ from ...errors import HarnessError, SceneError
 from ...running.description import read_description, resolve_stop, resolve_time_span
 from ...running.external.step_refinement import communication_step, declared_step
 from ...running.fmi2 import ProgressCallback
-from ...running.run_spec import RunSpec, spec_from_scene
+from ...running.resolve import FMU_SUFFIXES, resolve
 from ...running.runner import DEFAULT_COMMUNICATION_STEPS, run
-from ...running.signals import Signals, signals_from_trajectory
-from ...scenes.fmu_files import check_built, find_fmu
-from ...scenes.scene import load_scene
+from ...running.trajectory import Trajectory
+from ...scenes.run_spec import RunSpec
 from .trajectory_files import read_trajectory
 
 FILE_SUFFIXES = (".csv", ".txt", ".mat", ".xlsx", ".ods", ".npz")
-FMU_SUFFIXES = (".fmu", ".py")
 RUN_SUFFIXES = (*FMU_SUFFIXES, ".toml")  # sources that are run
 
 
-def load_both(sources: Sequence[str | Signals], options: RunSpec, report: ProgressCallback) -> tuple[Signals, Signals]:
+def load_both(
+    sources: Sequence[str | Trajectory], options: RunSpec, report: ProgressCallback
+) -> tuple[Trajectory, Trajectory]:
     """Load the trajectories of two folders, files, FMUs or scenes; keep what is loaded already.
 
     Both sides share one time grid: FMUs and scenes are run with the communication step of the other side, if it has
     one, or else with the fixed internal step that one of them declares, and to the same stop time. Other options are in
     `options`.
     """
-    recordings = [source if isinstance(source, Signals) else read_recorded(source) for source in sources]
+    recordings = [source if isinstance(source, Trajectory) else read_recorded(source) for source in sources]
     runs = [
-        None if item else run_spec_for(str(source), options) for item, source in zip(recordings, sources, strict=True)
+        None if item else resolve(str(source), options, scenes_first=True)
+        for item, source in zip(recordings, sources, strict=True)
     ]
     grids = [grid_spacing(item.time) for item in recordings if item] + [item.grid for item in runs if item]
     grids += [fixed_grid(item) for item in runs if item]
@@ -49,7 +50,7 @@ def load_both(sources: Sequence[str | Signals], options: RunSpec, report: Progre
                 equal_steps=DEFAULT_COMMUNICATION_STEPS,
                 stop=stop if options.stop is None else options.stop,
             )
-            item = signals_from_trajectory(run(spec, report))
+            item = run(spec, report)
         assert item
         sides.append(item)
     return sides[0], sides[1]
@@ -65,16 +66,7 @@ def display_names(sources: tuple[str, str]) -> list[str]:
     return ["/".join(parts[-apart:]) for parts in (one, two)]
 
 
-def run_spec_for(source: str, options: RunSpec) -> RunSpec:
-    """Return the specification to run an FMU, the FMU of a model file, or a scene."""
-    if Path(source).suffix in FMU_SUFFIXES:
-        return replace(options, fmu=find_fmu(source))
-    scene = load_scene(source)
-    check_built(scene.file)
-    return spec_from_scene(scene)
-
-
-def read_recorded(source: str) -> Signals | None:
+def read_recorded(source: str) -> Trajectory | None:
     """Read the trajectory of a folder or file; None for sources that are run."""
     path = Path(source)
     if path.exists() and path.suffix not in RUN_SUFFIXES:
@@ -102,7 +94,7 @@ def fixed_grid(spec: RunSpec) -> float | None:
     return communication_step(fixed_step, stop - start) if fixed_step else None
 
 
-def common_span(one: Signals, two: Signals) -> tuple[float, float]:
+def common_span(one: Trajectory, two: Trajectory) -> tuple[float, float]:
     """Return the common time span in s; HarnessError if there is none."""
     begin, end = max(one.time[0], two.time[0]), min(one.time[-1], two.time[-1])
     if not end > begin:

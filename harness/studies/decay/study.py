@@ -26,7 +26,7 @@ FOLDER = "decay"
 FILES = ("decay.json", "turning-points.csv", "fit.csv", "figure.svg")
 
 
-LoadedRecord = tuple[Record, KnownParameters, dict[str, Any]]  # with provenance: files, parameters, scene
+LoadedRecord = tuple[Record, KnownParameters, dict[str, Any]]  # with provenance: files, parameters, run
 
 
 def identify_decay(
@@ -40,13 +40,13 @@ def identify_decay(
 ) -> tuple[DecayIdentification, Path]:
     """Identify the decay of a record file or a scene, and write the results to out/decay/<name>."""
     record, properties, provenance_data = load_record(source, columns, known, report)
-    scene = provenance_data.pop("scene", {}) | vars(columns) | vars(known) | {"drag": drag, "drift": drift}
+    options = vars(columns) | vars(known) | {"drag": drag, "drift": drift}
     folder = out / FOLDER / record.name
     named = provenance.describe_sources(source)
     with replace_folder(folder, FILES, named) as new_folder:  # before the fit, so that conflicts are reported at once
         identified = fit_decay(record, properties, drag, drift, report)
         write_results(identified, new_folder)
-        provenance.write_provenance(new_folder, **provenance_data, scene=scene, source=named)
+        provenance.write_provenance(new_folder, **provenance_data, scene=options, source=named)
     return identified, folder
 
 
@@ -88,31 +88,29 @@ def record_of_scene(
     source: str, columns: ColumnOptions, known: KnownParameters, report: Callable[[float], None]
 ) -> LoadedRecord:
     """Run a scene and return its position as a record."""
-    from ...running.run_spec import spec_from_scene
     from ...running.runner import run as run_fmu
     from ...scenes.fmu_files import check_built
     from ...scenes.scene import load_scene
 
     scene = load_scene(source)
-    check_built(scene.file)
-    spec = spec_from_scene(scene)
-    if "position" not in spec.motion_outputs:
+    check_built(scene.run.fmu)
+    if "position" not in scene.run.motion_outputs:
         raise SceneError(f"scene {scene.name}: a decay needs the position among the outputs")
-    run = run_fmu(spec, report)
+    run = run_fmu(scene.run, report)
     if run.failure:
         raise HarnessError(f"scene {scene.name}: {run.failure}")
     position = run.spec.motion_outputs["position"]
     unit = run.units[position]
     if not unit:
         raise SceneError(
-            f"scene {scene.name}: {position} has no unit in {scene.file.name}: run the scene, and identify the decay "
+            f"scene {scene.name}: {position} has no unit in {run.spec.fmu.name}: run the scene, and identify the decay "
             "in its trajectory.csv with --unit"
         )
     record = Record(scene.name, run.time, run.column_of_role("position"), unit, 0, unit).select(
         columns.begin, columns.end
     )
     check_record(record)
-    provenance_data = {"files": (scene.file,), "parameters": run.effective_parameters, "scene": vars(scene)}
+    provenance_data = {"files": (run.spec.fmu,), "parameters": run.effective_parameters, "run": run.spec}
     if known.k is None and known.m is None:
         with suppress(HarnessError):  # a model without stiffness has no friction force
             known = KnownParameters(k=stiffness(run, unit == "rad", "the decay of a scene"), pendulum=unit == "rad")

@@ -25,10 +25,10 @@ from ...references.ode_problem import UnspecifiedProblem
 from ...running import fmi3
 from ...running.embedded_model import EmbeddedModel, load_model_class, method_numbers
 from ...running.fmi2 import simulate
-from ...running.run_spec import RunSpec
 from ...running.solution import Solution
 from ...running.timing import time_call
 from ...scenes.fmu_files import find_fmu
+from ...scenes.run_spec import RunSpec
 
 MAX_REPEATS = 20  # maximum number of timed runs per point
 

@@ -16,10 +16,9 @@ from ...results.provenance import describe_sources, write_provenance
 from ...results.quantity import Quantity
 from ...running import runner
 from ...running.contacts import choose_outputs
-from ...running.run_spec import RunSpec, spec_from_scene
-from ...running.signals import Signals, signals_from_trajectory
 from ...running.trajectory import Trajectory
 from ...scenes.fmu_files import check_built
+from ...scenes.run_spec import RunSpec
 from ...scenes.scene import MAX_DEFAULT_PLOTS, Scene, default_plots, is_panel, load_scene, shipped_scenes
 from .table import SceneOutcome, write_quantities
 
@@ -71,8 +70,8 @@ def run_scene(scene: Scene, out: Path, report: Callable[[float], None]) -> Scene
 
 def run_and_write(scene: Scene, folder: Path, report: Callable[[float], None]) -> SceneOutcome:
     """Run and analyse a scene, and write the results to an empty folder."""
-    check_built(scene.file)
-    run = runner.run(spec_from_scene(scene), report)
+    check_built(scene.run.fmu)
+    run = runner.run(scene.run, report)
     check_steps(scene, run)
     results: dict[str, Any] = {}
     for name in () if run.failure else scene.analyses:
@@ -82,10 +81,12 @@ def run_and_write(scene: Scene, folder: Path, report: Callable[[float], None]) -
     if not run.failure:
         check_published(scene, quantities)
     run.write_tables(folder)
-    stop = scene.stop if run.failure else float(run.time[-1])
-    follow = scene.follow if run.spec.grid is None else run.spec.follow
-    scene_as_run = replace(scene, start=float(run.time[0]), stop=stop, grid=run.spec.grid, follow=follow)
-    write_provenance(folder, [scene.file], run.effective_parameters, scene_as_run, source=scene.source)
+    stop = scene.run.stop if run.failure else float(run.time[-1])
+    run_as_done = replace(run.spec, outputs=scene.run.outputs, start=float(run.time[0]), stop=stop)
+    presentation = {name: value for name, value in vars(scene).items() if name != "run"}
+    write_provenance(
+        folder, [scene.run.fmu], run.effective_parameters, presentation, source=scene.source, run=run_as_done
+    )
     if results:
         write_quantities(quantities, scene.published, folder / "quantities.csv")
     if scene.plots:
@@ -97,10 +98,10 @@ def run_and_write(scene: Scene, folder: Path, report: Callable[[float], None]) -
 
 def check_steps(scene: Scene, run: Trajectory) -> None:
     """Check that the FMU exposes its solver steps if the scene needs them."""
-    panels = [name for name in scene.plots if is_panel(name, scene.outputs)]
+    panels = [name for name in scene.plots if is_panel(name, scene.run.outputs)]
     if run.steps is None and "steps" in (*scene.analyses, *panels):
         raise SceneError(
-            f"'steps' in analyses or plots: {scene.file.name} does not expose its solver steps; remove 'steps'"
+            f"'steps' in analyses or plots: {scene.run.fmu.name} does not expose its solver steps; remove 'steps'"
         )
 
 
@@ -126,7 +127,7 @@ def published_scene_names() -> list[str]:
     """Return the names of the shipped scenes with published values; HarnessError if an FMU is not built."""
     scenes = [scene for scene in map(load_scene, shipped_scenes()) if scene.published]
     for scene in scenes:
-        check_built(scene.file)
+        check_built(scene.run.fmu)
     return [scene.name for scene in scenes]
 
 
@@ -141,18 +142,17 @@ def run_scenes(names: Iterable[str], out: Path, report: Callable[[str, float], N
             yield SceneOutcome(name, None, None, (), str(error))
 
 
-def run_fmu(wanted: RunSpec, out: Path, report: Callable[[float], None]) -> tuple[Signals, Path]:
+def run_fmu(wanted: RunSpec, out: Path, report: Callable[[float], None]) -> tuple[Trajectory, Path]:
     """Run one FMU and write its outputs to out/<name of the FMU>."""
     from .figure import draw
 
     folder, source = out / wanted.model, describe_sources(str(wanted.fmu))
     with replace_folder(folder, FILES, source) as new_folder:
         trajectory = runner.run(wanted, report)
-        signals = signals_from_trajectory(trajectory)
         trajectory.write_tables(new_folder)
         draw(wanted.fmu.name, choose_plots(trajectory), trajectory, {}, new_folder / "figure.svg")
-        write_provenance(new_folder, [wanted.fmu], signals.parameters, wanted, source=source)
-    return signals, folder
+        write_provenance(new_folder, [wanted.fmu], trajectory.effective_parameters, source=source, run=trajectory.spec)
+    return trajectory, folder
 
 
 def choose_plots(run: Trajectory) -> tuple[str, ...]:

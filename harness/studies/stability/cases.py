@@ -8,7 +8,9 @@ from typing import Any
 
 from ...references.reference_trajectory import CommunicationGrid
 from ...references.segments import ParameterSpan
-from ...running.fmu_session import FmuInfo, InitialValues
+from ...running.fmu_session import FmuInfo
+from ...scenes.fmu_files import find_fmu
+from ...scenes.run_spec import RunSpec
 
 FILE = Path(__file__).with_name("stability.toml")
 RTOL = 1e-6
@@ -25,7 +27,7 @@ class StabilityCase:
     title: str
     model: str
     method: str
-    setting: InitialValues
+    run: RunSpec
     grid: CommunicationGrid
     spans: list[ParameterSpan]
     calls: list[tuple[float, float]] | None = None
@@ -50,7 +52,7 @@ class StabilityCase:
 
     @property
     def rtol(self) -> float:
-        return self.setting.values["solver.rtol"]
+        return self.run.values["solver.rtol"]
 
 
 def load_scenes(file: Path = FILE) -> tuple[list[dict[str, Any]], dict[str, float]]:
@@ -131,7 +133,7 @@ def make_case(scene: dict[str, Any], card: FmuInfo, method: str, finish: float) 
         title=scene["title"],
         model=scene["model"],
         method=method,
-        setting=InitialValues(scene["model"], values, start, stop),
+        run=RunSpec(find_fmu(scene["model"]), values=values, start=start, stop=stop),
         grid=CommunicationGrid(start, stop, points, tuple(changes), scene.get("at_events", False)),
         spans=value_spans(start, stop, values, changes),
         calls=[(t, h) for t, h in scene["calls"]] if "calls" in scene else None,

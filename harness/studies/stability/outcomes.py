@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...running.fmu_session import CompletedRun
+from ...running.trajectory import Trajectory
 from .cases import StabilityCase
 
 FINISHED, REFUSED, WRONG = "finished", "refused", "wrong"
@@ -23,7 +23,12 @@ class CaseOutcome:
     text: str
     error: float = math.nan
     energy_rise: float = math.nan
-    motion: CompletedRun | None = None
+    motion: Trajectory | None = None
+
+    @property
+    def steps(self) -> int:
+        """Return the number of accepted steps of the run."""
+        return self.motion.statistics.steps if self.motion and self.motion.statistics else 0
 
     @property
     def expected(self) -> str:

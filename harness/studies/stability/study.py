@@ -6,7 +6,7 @@ limit in a separate process.
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import astuple, replace
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -29,7 +29,6 @@ from ...results.provenance import prefix_parameters, write_provenance
 from ...running.description import declared_parameters
 from ...running.embedded_model import load_model_class
 from ...running.fmu_session import (
-    CompletedRun,
     FmuInfo,
     RefusalSummary,
     RefusedRun,
@@ -37,6 +36,7 @@ from ...running.fmu_session import (
     read_info,
     run_steps,
 )
+from ...running.trajectory import Trajectory
 from ...scenes.fmu_files import check_built, find_fmu
 from .cases import StabilityCase, generic_scenes, load_scenes, scene_cases
 from .outcomes import FINISHED, REFUSED, WRONG, CaseOutcome, StabilityRegion
@@ -123,7 +123,7 @@ def run_group(group: Iterable[StabilityCase]) -> Iterator[CaseOutcome]:
     for case in group:
         try:
             if case.inject_nonfinite:
-                yield judge_injections(case, run_with_timeout(LIMIT, inject_nonfinite, case.setting))
+                yield judge_injections(case, run_with_timeout(LIMIT, inject_nonfinite, case.run))
                 continue
             if case.expected_message is None and reference is None and not reference_error:
                 solve_reference = compute_reference if case.model in MODELS else compute_by_two_methods
@@ -135,7 +135,7 @@ def run_group(group: Iterable[StabilityCase]) -> Iterator[CaseOutcome]:
                     reference_error = str(error)  # the run may reject such values
             times = reference.times.tolist() if reference else case.grid.times(())
             calls = case.calls or [(t, ahead - t) for t, ahead in pairwise(times)]
-            outcome = run_with_timeout(LIMIT, run_steps, case.setting, calls, case.changes)
+            outcome = run_with_timeout(LIMIT, run_steps, case.run, calls, case.changes)
             if isinstance(outcome, RefusedRun):
                 yield judge_refusal(case, outcome)
             elif reference is None or case.expected_message is not None:
@@ -163,20 +163,22 @@ def judge_refusal(case: StabilityCase, ending: RefusedRun) -> CaseOutcome:
     return CaseOutcome(case, REFUSED, ending.message)
 
 
-def judge_solution(case: StabilityCase, motion: CompletedRun, reference: ReferenceTrajectory) -> CaseOutcome:
+def judge_solution(case: StabilityCase, motion: Trajectory, reference: ReferenceTrajectory) -> CaseOutcome:
     """Check events, error and energy of a finished run."""
     assert case.max_error is not None
-    error = reference.error(motion.x, motion.v)
-    energy_rise = math.nan
-    conserves, energy = not case.is_driven and motion.energy is not None, motion.energy
-    if conserves and energy is not None:
+    x, v, *energies = motion.columns.values()
+    statistics = motion.statistics
+    assert statistics is not None  # FMUs of this project provide them
+    error, energy_rise = reference.error(x, v), math.nan
+    conserves = not case.is_driven and bool(energies)
+    for energy in energies if conserves else ():
         energy_rise = float((energy - np.minimum.accumulate(energy)).max() / (energy.max() or 1.0))
     reasons = []
     if case.events == "all" or case.events == case.method:
-        if motion.counts.events != len(reference.events):
-            reasons.append(f"{motion.counts.events} events, not {len(reference.events)}")
+        if statistics.events != len(reference.events):
+            reasons.append(f"{statistics.events} events, not {len(reference.events)}")
         elif reference.events:
-            delay = abs(motion.t_last - reference.events[-1][0])
+            delay = abs(statistics.last_event - reference.events[-1][0])
             error = max_or_nan(error, delay / (case.grid.stop - case.grid.start))
     if not error <= case.max_error:
         reasons.append(f"error {error:.2g}, more than {case.max_error:g}")
@@ -190,7 +192,7 @@ def stability_regions(rows: Iterable[CaseOutcome]) -> list[StabilityRegion]:
     points_by_method: dict[str, list[tuple[float, int]]] = {}
     for row in rows:
         if row.case.region is not None and row.motion is not None:
-            points_by_method.setdefault(row.case.method, []).append((row.case.region, row.motion.counts.steps))
+            points_by_method.setdefault(row.case.method, []).append((row.case.region, row.steps))
     regions = []
     for method, points in points_by_method.items():
         stiff, steps = np.array(sorted(points, reverse=True), float).T
@@ -209,5 +211,8 @@ def write_table(rows: list[CaseOutcome], path: Path) -> None:
 def table_line(row: CaseOutcome) -> list[Any]:
     """Return the cells of one case in stability.csv."""
     case, motion = row.case, row.motion
-    counts = (*astuple(motion.counts), motion.seconds) if motion else ("", "", "", "", math.nan)
+    counts: tuple[Any, ...] = ("", "", "", "", math.nan)
+    if motion and motion.statistics:
+        done = motion.statistics
+        counts = (done.events, done.steps, done.rejected, done.evaluations, done.seconds)
     return [case.name, case.title, case.method, row.expected, row.ended, row.error, row.energy_rise, *counts, row.text]

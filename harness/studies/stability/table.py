@@ -14,7 +14,7 @@ def error_table(rows: Iterable[CaseOutcome]) -> Table:
     """Return the table of largest error and internal steps of all runs that should finish."""
     table = empty_table("largest relative error, and internal steps below")
     rows = [row for row in rows if row.case.max_error is not None]
-    method_numbers = {row.case.method: row.case.setting.values["solver.method"] for row in rows}
+    method_numbers = {row.case.method: row.case.run.values["solver.method"] for row in rows}
     methods = sorted(method_numbers, key=lambda method: method_numbers[method])
     for method in methods:
         table.add_column(method, justify="right", no_wrap=True)
@@ -40,7 +40,7 @@ def format_cell(row: CaseOutcome) -> Text:
         return Text("refused")
     if not row.passed or row.motion is None:
         return Text("wrong", style="bold red")
-    return Text(f"{f'{row.error:.0e}' if row.error else '0'}\n{row.motion.counts.steps}")
+    return Text(f"{f'{row.error:.0e}' if row.error else '0'}\n{row.steps}")
 
 
 def refusal_table(rows: Iterable[CaseOutcome]) -> Table:

@@ -29,33 +29,18 @@ from ...results.netcdf import NetCDFVariable, NetCDFWriter
 from ...results.provenance import describe_sources, write_provenance
 from ...running.description import read_description
 from ...running.variable_values import REAL_TYPES, variable_unit
-from ...scenes.assignments import parse_assignment
-from ...scenes.fmu_files import check_built, find_fmu
+from ...scenes.fmu_files import check_built
 from .boundaries import Boundary, read_boundaries
 from .journal import Journal, JournalBlock
 from .measures import MeasureColumn
-from .runner import SweepSpec, open_runner, run_spec_of
-from .sampling import SweepPoints, parse_axis
+from .runner import SweepSpec, open_runner
+from .sampling import SweepPoints
 from .study import Sweep, run_pending
 
 FOLDER = "sweep"
 FILES = ("sweep.nc", "sweep.csv", "figure.svg")
 NOT_NUMBERS = ("String", "Binary", "Clock")
 NUMBER = re.compile(r"-?\b\d+\.?\d*(e[-+]?\d+)?")
-
-
-@dataclass(frozen=True)
-class SweepRequest:
-    """User request: `vary` and `values` are strings such as m=1:2:11 and k=100; `options` belong to a Specification."""
-
-    model: str
-    vary: tuple[str, ...]
-    values: tuple[str, ...]
-    random: int | None
-    seed: int
-    measures: tuple[str, ...]
-    name: str | None
-    options: dict[str, Any]
 
 
 @dataclass(frozen=True)
@@ -125,46 +110,52 @@ class SweepDescription:
 
 
 def run_sweep(
-    request: SweepRequest, out: Path, scheduler: str | None, workers: int | None, report: Callable[[float], None]
+    runs: SweepSpec,
+    points: SweepPoints,
+    name: str | None,
+    out: Path,
+    scheduler: str | None,
+    workers: int | None,
+    report: Callable[[float], None],
 ) -> SweepResult:
     """Run the sweep and write its files to out/sweep/<name>."""
-    check_built(file := find_fmu(request.model))
-    axes = tuple(parse_axis(text, request.random is not None) for text in request.vary)
-    names = tuple(item.name for item in axes)
-    if len(set(names)) < len(names):
-        raise SceneError("--vary names a parameter twice")
-    points = SweepPoints(axes, request.random, request.seed)
-    values, options = map(parse_assignment, request.values), sorted(request.options.items())
-    runs = SweepSpec(file.stem, names, tuple(values), request.measures, tuple(options))
-    about = describe(runs, points, file)
+    file = runs.run.fmu
+    check_built(file)
+    about = describe(runs, points)
     sweep = Sweep(runs, points, file.read_bytes(), len(about.columns))
     journal = sweep.journal(out / FOLDER)
     n_resumed = journal.n_done
-    folder = out / FOLDER / (request.name or "-".join((runs.model, *names, sweep.key[:8])))
+    folder = out / FOLDER / (name or "-".join((runs.run.model, *runs.varied, sweep.key[:8])))
     source = describe_sources(str(file))
+    options = runs.run.options | {
+        "vary": {axis.name: str(axis) for axis in points.axes},
+        "random": points.random,
+        "seed": points.seed,
+        "measures": runs.measures,
+    }
     with replace_folder(folder, FILES, source) as new_folder:  # before the runs, so that conflicts are reported at once
         seconds = run_pending(sweep, journal, scheduler, workers, report)
         failures = write_files(sweep, journal, about, new_folder)
-        write_provenance(new_folder, [file], about.constants, request, source=source)
+        write_provenance(new_folder, [file], about.constants, options, source=source)
     journal.delete()
     return SweepResult(len(points), folder, n_resumed, journal.damaged, failures, seconds)
 
 
-def describe(runs: SweepSpec, points: SweepPoints, file: Path) -> SweepDescription:
+def describe(runs: SweepSpec, points: SweepPoints) -> SweepDescription:
     """Return the data of the FMU for a sweep; SceneError if the sweep is invalid.
 
     Up to three test runs detect problems before workers are started.
     """
-    fmu_description = read_description(file, run_spec_of(runs, file).lenient)
+    fmu_description = read_description(runs.run.fmu, runs.run.lenient)
     variables = {variable.name: variable for variable in fmu_description.modelVariables}
     settable = [name for name, variable in variables.items() if is_settable(variable)]
     check_names("parameter to vary", runs.varied, settable)
     for axis in points.axes:
-        if axis.name in dict(runs.values):
+        if axis.name in runs.run.values:
             raise SceneError(f"{axis.name} is both varied and set; remove one of them")
         if variables[axis.name].type not in REAL_TYPES and any(value % 1 for value in axis.values):
             raise SceneError(f"{axis.name} is an enumeration; vary it over integers, as in {axis.name}=1,2")
-    with open_runner(runs, file) as runner:
+    with open_runner(runs) as runner:
         for number in (len(points) - 1, len(points) // 2, 0):
             (point,) = points.coordinates(number, number + 1).tolist()
             measured = runner.run(point)
@@ -176,7 +167,7 @@ def describe(runs: SweepSpec, points: SweepPoints, file: Path) -> SweepDescripti
         varied = {name: (variable_unit(variables[name]), variables[name].description or name) for name in runs.varied}
         numbers = {name: value for name, (value, _) in constants.items() if isinstance(value, float)}
         return SweepDescription(
-            varied, runner.columns, constants, runner.stop, read_boundaries(file, runs.varied, numbers)
+            varied, runner.columns, constants, runner.stop, read_boundaries(runs.run.fmu, runs.varied, numbers)
         )
 
 
@@ -205,8 +196,8 @@ def write_files(sweep: Sweep, journal: Journal, about: SweepDescription, folder:
     attributes_of = {"long_name": "error message of a failed run, otherwise empty", "_Encoding": "utf-8"}
     variables.append(NetCDFVariable("error", (*dimensions, text_dimension), attributes_of | coordinates, longest))
     attributes: dict[str, str | float] = {
-        "title": f"{sweep.runs.model} over {', '.join(names)}",
-        "model": sweep.runs.model,
+        "title": f"{sweep.runs.run.model} over {', '.join(names)}",
+        "model": sweep.runs.run.model,
         "fmu_sha256": sweep.digest,
         "stop_time": about.stop,
         "parameters": json.dumps({name: value for name, (value, _) in about.constants.items()}, sort_keys=True),

@@ -1,35 +1,23 @@
 """Repeated runs of one FMU, in a worker of a sweep.
 
-An FMU of this project is instantiated once and reset before each run, with preallocated buffers: a run by closed form
-takes 40 microseconds.  Other FMUs are run as by `run --fmu`, with step refinement.
+An FMU of this project is instantiated once and reset before each run.  Other FMUs are run as by `run --fmu`, with step
+refinement.
 """
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from ctypes import c_double, c_int, c_void_p
 from dataclasses import dataclass, replace
-from pathlib import Path
 from time import perf_counter
 from typing import Any
 
 from ...errors import HarnessError, check_names
 from ...running import runner
 from ...running.description import read_description
-from ...running.fmi2 import (
-    WARNING,
-    FMICallException,
-    LogCapture,
-    build_trajectory,
-    make_buffer,
-    open_instance,
-    plan_run,
-    read_parameters,
-    record_run,
-)
-from ...running.run_spec import RunSpec
-from ...running.settings import resolve_settings
+from ...running.fmi2 import FMICallException, LogCapture, open_instance, plan_run, read_parameters
+from ...running.repeated_runs import RepeatedRuns
 from ...running.variable_values import variable_unit
 from ...scenes.roles import find_roles
+from ...scenes.run_spec import RunSpec
 from .measures import (
     DEFAULT_MEASURES,
     FINAL_MEASURES,
@@ -44,25 +32,21 @@ from .measures import (
 
 @dataclass(frozen=True)
 class SweepSpec:
-    """Common data of the runs of a sweep: `varied` names, other `values`, `measures` (empty: the default ones), and
-    `options` of a Specification by name."""
+    """What the runs of a sweep share: the `run` without the `varied` values, and `measures` (empty: default ones)."""
 
-    model: str
+    run: RunSpec
     varied: tuple[str, ...]
-    values: tuple[tuple[str, float | str], ...]
-    measures: tuple[str, ...]
-    options: tuple[tuple[str, Any], ...] = ()
+    measures: tuple[str, ...] = ()
 
 
 class OwnFmuRunner:
-    """Runs an FMU of this project by direct calls of its library, because calls through fmpy take as long as a run.
+    """Runs an FMU of this project in one instance.
 
     `columns` are the measured columns; `stop` is the stop time in s.
     """
 
-    def __init__(self, runs: SweepSpec, fmu_description: Any, fmu: Any, log: LogCapture, spec: RunSpec) -> None:
-        self.fmu, self.component, self.heard = fmu, c_void_p(fmu.component), log
-        self.variables = {variable.name: variable for variable in fmu_description.modelVariables}
+    def __init__(self, runs: SweepSpec, fmu_description: Any, fmu: Any, log: LogCapture) -> None:
+        self.log, self.variables = log, {variable.name: variable for variable in fmu_description.modelVariables}
         measures = select_measures(runs, self.variables, ours=True)
         motion = find_roles(self.variables)
         outputs = tuple(motion[role] for role in ("position", "velocity") if role in motion)
@@ -70,110 +54,75 @@ class OwnFmuRunner:
             outputs = tuple(
                 name for name in runner.default_outputs(fmu_description) if self.variables[name].type == "Real"
             )
-        self.plan = plan_run(replace(spec, outputs=outputs), fmu_description)
-        self.stop = self.plan.stop
+        plan = plan_run(replace(runs.run, outputs=outputs), fmu_description)
+        self.stop = plan.stop
         ends = [name for name in measures if name in FINAL_MEASURES]
         self.along = [
             name for name in measures if name in TRAJECTORY_MEASURES or (name in OUTPUT_MEASURES and name != "final")
         ]
         if self.along:
-            grid = (self.stop - self.plan.start) / N_STEPS
-            self.plan = plan_run(replace(self.plan.spec, grid=grid, follow=True), fmu_description)
-        self.n_real, self.real_at, self.real = make_buffer(self.variables, list(outputs), c_double)
-        self.n_whole, self.whole_at, self.whole = make_buffer(
-            self.variables, [FINAL_MEASURES[name][1] for name in ends], c_int
-        )
+            plan = plan_run(replace(plan.spec, grid=(plan.stop - plan.start) / N_STEPS, follow=True), fmu_description)
+        self.runs = RepeatedRuns(plan, fmu, runs.varied, outputs, [FINAL_MEASURES[name][1] for name in ends])
         self.columns = measure_columns(measures, self.variables, outputs)
         read = [
             each.name for each in measure_columns(["final", *ends, "run_time", *self.along], self.variables, outputs)
         ]
         self.order = [read.index(column.name) for column in self.columns]
-        self.slots: list[tuple[Any, int, type]] = []
-        self.calls = self.prepare_calls(resolve_settings(self.plan.spec, self.variables), runs.varied)
-
-    def prepare_calls(
-        self, fixed: list[tuple[Any, float]], varied: Sequence[str]
-    ) -> list[tuple[str, Any, tuple[Any, ...]]]:
-        """Return the calls that reset, set and initialise; `slots` holds buffer, index and type per varied value."""
-        values = {variable.name: value for variable, value in fixed}
-        calls: list[tuple[Any, ...]] = [("fmi2Reset",)]
-        slots = {}
-        for function, kind, number in (("fmi2SetReal", c_double, float), ("fmi2SetInteger", c_int, int)):
-            names = [name for name in (*values, *varied) if (self.variables[name].type == "Real") is (number is float)]
-            n, at, held = make_buffer(self.variables, names, kind)
-            for i, name in enumerate(names):
-                held[i], slots[name] = values.get(name, 0), (held, i, number)
-            calls += [(function, at, n, held)] if n else []
-        self.slots = [slots[name] for name in varied]
-        calls += [("fmi2SetupExperiment", 0, 0.0, self.plan.start, 1, self.stop)]
-        calls += [("fmi2EnterInitializationMode",), ("fmi2ExitInitializationMode",)]
-        return [(name, getattr(self.fmu.dll, name), (self.component, *rest)) for name, *rest in calls]
 
     def run(self, point: Sequence[float]) -> list[float] | str:
         """Return the measures at a point of the varied values, or the error message."""
-        self.heard.clear()
+        self.log.clear()
         try:
             return self.measure_run(point)
         except FMICallException as error:
-            return self.heard.error_message or str(error)
+            return self.log.error_message or str(error)
         except HarnessError as error:
             return str(error)
 
     def measure_run(self, point: Sequence[float]) -> list[float]:
         """Return the measures; raise an exception if the run fails."""
-        for (held, i, number), value in zip(self.slots, point, strict=True):
-            held[i] = number(value)
-        for name, function, arguments in self.calls:
-            check_status(name, function(*arguments))
-        start, dll = self.plan.start, self.fmu.dll
-        start_time, trajectory_values = perf_counter(), []
+        self.runs.start(point)
+        start_time, along = perf_counter(), []
         if self.along:
-            run = build_trajectory(self.plan, self.fmu, record_run(self.plan, self.fmu, lambda share: None, 0), 0.0)
+            trajectory = self.runs.record_to_stop()
             for name in self.along:
-                trajectory_values += (
-                    measure_outputs(name, run.columns)
+                along += (
+                    measure_outputs(name, trajectory.columns)
                     if name in OUTPUT_MEASURES
-                    else [TRAJECTORY_MEASURES[name].measure(run)]
+                    else [TRAJECTORY_MEASURES[name].measure(trajectory)]
                 )
         else:
-            check_status("fmi2DoStep", dll.fmi2DoStep(self.component, start, self.stop - start, 1))
+            self.runs.step_to_stop()
         seconds = perf_counter() - start_time
-        check_status("fmi2GetReal", dll.fmi2GetReal(self.component, self.real_at, self.n_real, self.real))
-        check_status("fmi2GetInteger", dll.fmi2GetInteger(self.component, self.whole_at, self.n_whole, self.whole))
-        values = [*self.real, *self.whole, seconds, *trajectory_values]
+        values = [*self.runs.read(), seconds, *along]
         return [values[i] for i in self.order]
 
     def constants(self) -> dict[str, tuple[object, str]]:
         """Return value and unit of every parameter in the last run."""
         return {
             name: (value, variable_unit(self.variables[name]))
-            for name, value in read_parameters(self.plan, self.fmu).items()
+            for name, value in read_parameters(self.runs.plan, self.runs.fmu).items()
         }
-
-
-def check_status(function: str, status: int) -> None:
-    if status > WARNING:
-        raise FMICallException(function, status)
 
 
 class ExternalFmuRunner:
     """Runs an FMU that does not expose its internal steps, in a separate process for each run."""
 
-    def __init__(self, runs: SweepSpec, fmu_description: Any, wanted: RunSpec) -> None:
+    def __init__(self, runs: SweepSpec, fmu_description: Any) -> None:
         self.varied, self.stop = runs.varied, 0.0
         self.variables = {variable.name: variable for variable in fmu_description.modelVariables}
         self.measures = select_measures(runs, self.variables, ours=False)
         texts = {name for name, variable in self.variables.items() if variable.type == "String"}
         outputs = tuple(name for name in runner.default_outputs(fmu_description) if name not in texts)
-        self.wanted = replace(wanted, outputs=outputs)
+        self.shared = replace(runs.run, outputs=outputs, follow=True)
         self.columns = measure_columns(self.measures, self.variables, outputs)
         self.parameters_used: dict[str, tuple[object, str]] = {}
 
     def run(self, point: Sequence[float]) -> list[float] | str:
-        values = {**self.wanted.values, **dict(zip(self.varied, point, strict=True))}
+        values = {**self.shared.values, **dict(zip(self.varied, point, strict=True))}
         start = perf_counter()
         try:
-            trajectory = runner.run(replace(self.wanted, values=values), lambda share: None)
+            trajectory = runner.run(replace(self.shared, values=values), lambda share: None)
         except HarnessError as error:
             return str(error)
         seconds = perf_counter() - start
@@ -194,23 +143,17 @@ Runner = OwnFmuRunner | ExternalFmuRunner
 
 def select_measures(runs: SweepSpec, variables: dict[str, Any], ours: bool) -> tuple[str, ...]:
     """Return the measures of a sweep; SceneError if one is not available."""
-    available = available_measures(variables, ours, dict(runs.values))
-    check_names(f"measure of {runs.model}", runs.measures, available)
+    available = available_measures(variables, ours, runs.run.values)
+    check_names(f"measure of {runs.run.model}", runs.measures, available)
     return runs.measures or tuple(name for name in DEFAULT_MEASURES if name in available)
 
 
-def run_spec_of(runs: SweepSpec, file: Path) -> RunSpec:
-    """Return the specification that all runs share."""
-    return RunSpec(file, values=dict(runs.values), follow=False, **dict(runs.options))
-
-
 @contextmanager
-def open_runner(runs: SweepSpec, file: Path) -> Iterator[Runner]:
-    """Open the runner of an FMU."""
-    spec = run_spec_of(runs, file)
-    fmu_description = read_description(file, spec.lenient)
-    if runner.exposes_solver_steps(fmu_description) and not spec.exchange:
-        with open_instance(spec) as (_, fmu, heard):
-            yield OwnFmuRunner(runs, fmu_description, fmu, heard, spec)
+def open_runner(runs: SweepSpec) -> Iterator[Runner]:
+    """Open the runner of the FMU."""
+    fmu_description = read_description(runs.run.fmu, runs.run.lenient)
+    if runner.exposes_solver_steps(fmu_description) and not runs.run.exchange:
+        with open_instance(runs.run) as (_, fmu, heard):
+            yield OwnFmuRunner(runs, fmu_description, fmu, heard)
     else:
-        yield ExternalFmuRunner(runs, fmu_description, replace(spec, follow=True))
+        yield ExternalFmuRunner(runs, fmu_description)

@@ -3,10 +3,11 @@
 from dataclasses import dataclass
 from functools import cached_property
 from math import isfinite, log, prod
+from typing import Any
 
 import numpy as np
 
-from ...errors import MAX_VALUE_LENGTH, SceneError
+from ...errors import MAX_VALUE_LENGTH, SceneError, format_value
 
 MAX_RUNS = 10_000_000  # runs
 VARY_HELP = "as in m=1:2:11, k=10:1000:31:log, mu=0.1,0.2,0.4 or, with --random, m=1:2"
@@ -19,6 +20,10 @@ class SweepAxis:
     name: str
     values: tuple[float, ...]
     log: bool = False
+
+    def __str__(self) -> str:
+        """Describe the axis for readers; `sweep.nc` holds all values."""
+        return f"{len(self.values)} values, {self.values[0]!r} to {self.values[-1]!r}{', logarithmic' * self.log}"
 
 
 def parse_axis(text: str, random: bool) -> SweepAxis:
@@ -44,9 +49,29 @@ def parse_axis(text: str, random: bool) -> SweepAxis:
         raise invalid
     if is_log and not min(values) > 0:
         raise SceneError(f"--vary {text}: a logarithmic axis needs bounds above 0")
+    return SweepAxis(name, check_distinct(values, f"--vary {text}"), is_log)
+
+
+def axis_from_numbers(name: str, column: Any, random: bool) -> SweepAxis:
+    """Return the axis of a parameter from an array of its values; SceneError if it is invalid."""
+    try:
+        values = tuple(np.ravel(np.asarray(column, dtype=float)).tolist())
+    except (TypeError, ValueError):
+        raise SceneError(f"grid: {name} = {format_value(column)} must be numbers") from None
+    if not values:
+        raise SceneError(f"grid: {name} has no values: give at least one")
+    if not all(map(isfinite, values)):
+        raise SceneError(f"grid: {name} has a value that is not a finite number")
+    if random and (len(values) != 2 or not values[0] < values[1]):
+        raise SceneError(f"{name} has {len(values)} values: with samples give its lower and its upper bound")
+    return SweepAxis(name, check_distinct(values, f"grid: {name}"))
+
+
+def check_distinct(values: tuple[float, ...], what: str) -> tuple[float, ...]:
+    """Return the values; SceneError if one of them occurs twice."""
     if len(set(values)) < len(values):
-        raise SceneError(f"--vary {text}: a value occurs twice")
-    return SweepAxis(name, values, is_log)
+        raise SceneError(f"{what}: a value occurs twice")
+    return values
 
 
 def evenly_spaced(low: float, high: float, count: int, ratio: bool) -> tuple[float, ...]:
@@ -72,8 +97,15 @@ class SweepPoints:
     seed: int = 1
 
     def __post_init__(self) -> None:
+        if len({axis.name for axis in self.axes}) < len(self.axes):
+            raise SceneError("--vary names a parameter twice")
         if len(self) > MAX_RUNS:
             raise SceneError(f"{len(self)} runs exceed the maximum of {MAX_RUNS}; reduce the number of values")
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Return the names of the varied parameters."""
+        return tuple(axis.name for axis in self.axes)
 
     def __len__(self) -> int:
         return prod(len(axis.values) for axis in self.axes) if self.random is None else self.random

@@ -54,7 +54,8 @@ class Sweep:
     @cached_property
     def key(self) -> str:
         """Return a key that identifies the sweep."""
-        identity = [asdict(self.runs), asdict(self.points), self.digest]
+        run = self.runs.run.options | {"model": self.runs.run.model}  # wherever the FMU is
+        identity = [run, self.runs.varied, self.runs.measures, asdict(self.points), self.digest]
         return sha256(json.dumps(identity, sort_keys=True).encode()).hexdigest()[:16]
 
     def journal(self, folder: Path) -> Journal:

@@ -1,7 +1,7 @@
 """Worker of a sweep: runs blocks of points with a loaded FMU instance."""
 
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from threading import Lock
 from time import perf_counter
 
@@ -11,7 +11,7 @@ from ...process.temporary_directory import temporary_directory
 from .runner import Runner, SweepSpec, open_runner
 
 BUSY = Lock()  # a pythonfmu FMU must be used by one thread at a time
-LOADED: dict[tuple[SweepSpec, str], Runner] = {}  # the runner of the current sweep
+LOADED: dict[tuple[str, str], Runner] = {}  # the runner of the current sweep, by its specification and FMU
 RESOURCES = ExitStack()  # its resources
 
 
@@ -37,7 +37,7 @@ class BlockResult:
 def run_block(points: np.ndarray, runs: SweepSpec, digest: str, fmu: bytes) -> BlockResult | None:
     """Run a block with the FMU of a digest; return None if the FMU is neither loaded nor passed."""
     with BUSY:
-        runner = LOADED.get((runs, digest))
+        runner = LOADED.get((repr(runs), digest))
         if not runner:
             if not fmu:
                 return None
@@ -56,9 +56,10 @@ def run_block(points: np.ndarray, runs: SweepSpec, digest: str, fmu: bytes) -> B
 def load(runs: SweepSpec, digest: str, fmu: bytes) -> Runner:
     """Load the runner of another sweep and free the previous one."""
     free()
-    file = RESOURCES.enter_context(temporary_directory("sweep-")) / f"{runs.model}.fmu"
+    file = RESOURCES.enter_context(temporary_directory("sweep-")) / f"{runs.run.model}.fmu"
     file.write_bytes(fmu)
-    LOADED[runs, digest] = runner = RESOURCES.enter_context(open_runner(runs, file))
+    local = replace(runs, run=replace(runs.run, fmu=file))
+    LOADED[repr(runs), digest] = runner = RESOURCES.enter_context(open_runner(local))
     return runner
 
 

@@ -1,0 +1,11 @@
+"""The public Python API: functions that take plain arguments and return results.
+
+Each function imports what it needs when it is called, so that importing `harness` stays fast.
+"""
+
+from .decay import identify_decay
+from .results import load_result
+from .runs import compare, simulate
+from .sweeps import sweep
+
+__all__ = ["compare", "identify_decay", "load_result", "simulate", "sweep"]

@@ -1,0 +1,143 @@
+"""The decay of a record from Python: `identify_decay`."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ..errors import SceneError
+from .options import QUIET, Progress
+
+if TYPE_CHECKING:
+    import pandas
+    from numpy.typing import ArrayLike
+
+    from ..analyses.decay.identification import DecayIdentification
+    from ..records.record import Record
+    from ..running.trajectory import Trajectory
+
+
+def identify_decay(
+    record: "str | Path | pandas.DataFrame | Trajectory | ArrayLike",
+    x: "ArrayLike | None" = None,
+    *,
+    unit: str | None = None,
+    quantity: str | None = None,
+    time: str | None = None,
+    column: str | None = None,
+    k: float | None = None,
+    m: float | None = None,
+    pendulum: bool = False,
+    drag: bool = True,
+    drift: bool = False,
+    begin: float | None = None,
+    end: float | None = None,
+    rate: float | None = None,
+    progress: Progress | None = None,
+) -> "DecayIdentification":
+    """Identify viscous damping, dry friction and quadratic drag from a free decay.
+
+    Parameters
+    ----------
+    record : str, path, DataFrame, Trajectory or array_like
+        A file with columns, a table, a trajectory, or the times (n,) in s of the samples `x`.
+    x : array_like, optional
+        The samples (n,), if `record` holds their times.
+    unit : str, optional
+        Unit of the samples, as ``"mm"``, ``"deg/s"`` or ``"g"``; required for arrays, otherwise that of the heading.
+    quantity : {"position", "velocity", "acceleration"}, optional
+        What was measured, if neither its unit nor its name says so.
+    time, column : str, optional
+        Headings of the time and of the samples, if the table has several.
+    k, m : float, optional
+        Stiffness in N/m or mass in kg (N.m/rad or kg.m2 for a rotation), one of them: gives forces in N.
+    pendulum : bool
+        The restoring torque is k sin(theta).
+    drag : bool
+        Also try laws with quadratic drag.
+    drift : bool
+        Let the rest position drift at a constant rate.
+    begin, end : float, optional
+        The part of the record to use, in s.
+    rate : float, optional
+        Sampling rate in Hz, which replaces the times of a file or table.
+    progress : callable, optional
+        Called with the finished share of the fit.
+
+    Returns
+    -------
+    DecayIdentification
+        Estimates with 95 % intervals (`estimates`), the fitted laws and remarks.
+
+    Raises
+    ------
+    SceneError
+        If the record cannot be read.
+    HarnessError
+        If the record is not the free decay of one oscillator.
+
+    References
+    ----------
+    J. W. Liang, B. F. Feeny, Nonlinear Dynamics 16 (1998) 337-347.
+    """
+    from math import inf
+
+    from ..analyses.decay.estimates import KnownParameters
+    from ..analyses.decay.identification import fit_decay
+    from ..records.columns import ColumnOptions, read_record
+
+    if k is not None and m is not None:
+        raise SceneError("k and m are both given: leave one out, because the frequency determines it")
+    if rate is not None and not 0 < rate < inf:
+        raise SceneError(f"rate is {rate!r}: it must be a positive number of samples per second")
+    columns = ColumnOptions(
+        time=time,
+        position=column,
+        quantity=quantity,
+        unit=unit,
+        rate=rate,
+        begin=-inf if begin is None else begin,
+        end=inf if end is None else end,
+    )
+    if isinstance(record, str | Path):
+        source = str(record)
+        loaded = read_record(source, columns, Path(source).stem)
+    else:
+        loaded = record_from(record, x, columns)
+    return fit_decay(loaded, KnownParameters(k, m, pendulum), drag, drift, progress or QUIET)
+
+
+def record_from(source: Any, x: Any, columns: Any) -> "Record":
+    """Return the record in a DataFrame, a trajectory or two arrays."""
+    import numpy as np
+
+    from ..records.columns import parse_record
+    from ..records.table_files import Table
+    from ..results.files import column_heading
+    from ..running.trajectory import Trajectory
+
+    name = "the record"
+    if isinstance(source, Trajectory):
+        heads = {"time": "t [s]"} | {each: column_heading(each, source.units[each]) for each in source.columns}
+        table, name = {"time": source.time, **source.columns}, source.spec.model
+        if columns.position is None and columns.quantity is None:
+            if "position" not in source.spec.motion_outputs:
+                raise SceneError(f"{name} records no position: add it to the outputs, or name a column")
+            columns = replace(columns, position=source.spec.motion_outputs["position"])
+    elif hasattr(source, "columns"):
+        frame = source if source.index.name is None else source.reset_index()
+        units = frame.attrs.get("units", {})
+        table = {str(each): np.asarray(frame[each]) for each in frame.columns}
+        heads = {each: column_heading(each, units.get(each, "")) for each in table}
+    else:
+        if x is None:
+            raise SceneError("x is missing: identify_decay takes a file, a table, or times and samples, as in (t, x)")
+        if columns.unit is None:
+            raise SceneError("unit is missing: name the unit of the samples, as in unit='mm'")
+        table, heads = {"t": np.asarray(source), "x": np.asarray(x)}, {"t": "t [s]", "x": "signal"}
+        columns = replace(columns, position="signal")
+    cells = []
+    for each, column in table.items():
+        if column.ndim != 1 or len(column) != len(next(iter(table.values()))):
+            raise SceneError(f"{each} has the shape {column.shape}: times and samples must be equally long rows")
+        cells.append(column.astype(float) if column.dtype.kind in "fiub" else [str(cell) for cell in column])
+    return parse_record(Table(name, tuple(heads.values()), tuple(cells)), columns, name)

@@ -1,0 +1,71 @@
+"""Stored results from Python: `load_result`."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ..errors import SceneError, optional
+
+if TYPE_CHECKING:
+    import xarray
+
+    from ..running.trajectory import Trajectory
+
+
+def load_result(folder: "str | Path") -> "Trajectory | xarray.Dataset | dict[str, Any]":
+    """Read a stored result.
+
+    Parameters
+    ----------
+    folder : path
+        A result folder, as a command or `Trajectory.save` writes it.
+
+    Returns
+    -------
+    Trajectory, xarray.Dataset or dict
+        The trajectory of a run, the dataset of a sweep, or the numbers of a decay or a comparison.
+
+    Raises
+    ------
+    SceneError
+        If the folder holds no result.
+    """
+    import json
+
+    path = Path(folder)
+    if (path / "sweep.nc").is_file():
+        library = optional("xarray", "to read a sweep", "sweep")
+        with library.open_dataset(path / "sweep.nc") as data:
+            loaded: xarray.Dataset = data.load()
+        return loaded
+    for name in ("decay.json", "compare.json"):
+        if (path / name).is_file():
+            numbers: dict[str, Any] = json.loads((path / name).read_text(encoding="utf-8"))
+            return numbers
+    if not (path / "trajectory.csv").is_file():
+        raise SceneError(f"{folder} holds no result: name a folder with trajectory.csv, sweep.nc or decay.json")
+    return stored_run(path)
+
+
+def stored_run(folder: Path) -> "Trajectory":
+    """Read the run in a result folder."""
+    import numpy as np
+
+    from ..records.columns import read_numeric
+    from ..results.provenance import load_provenance
+    from ..running.trajectory import SolverSteps, Trajectory
+    from ..scenes.run_spec import RunSpec
+    from ..studies.compare.trajectory_files import read_trajectory
+
+    found, origin = read_trajectory(folder), load_provenance(folder)
+    parameters = {name: each["value"] for name, each in origin.get("parameters", {}).items()}
+    units = found.units | {name: each["unit"] for name, each in origin.get("parameters", {}).items()}
+    try:
+        spec = RunSpec.from_json(origin.get("run") or {})
+    except SceneError:  # of an earlier version, or of another tool
+        spec = RunSpec(Path(f"{folder.name}.fmu"), outputs=tuple(found.columns))
+    steps = None
+    if (folder / "steps.csv").is_file():
+        ends, sizes, rejected = read_numeric(folder / "steps.csv")[1].T
+        steps = SolverSteps(np.append(found.time[0], ends), sizes, rejected.astype(int))
+    names = {name: name for name in found.columns}
+    return Trajectory(spec, found.time, found.columns, units, names, parameters, steps, found.events)

@@ -1,0 +1,178 @@
+"""Runs and comparisons from Python: `simulate` and `compare`."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ..errors import HarnessError, SceneError
+from .options import QUIET, Progress, with_options
+
+if TYPE_CHECKING:
+    import pandas
+    from numpy.typing import ArrayLike
+
+    from ..running.trajectory import Trajectory
+    from ..scenes.run_spec import RunSpec
+    from ..studies.compare.difference import Comparison
+
+
+def simulate(
+    source: "str | Path",
+    values: Mapping[str, float | str] | None = None,
+    *,
+    stop: float | None = None,
+    interval: float | None = None,
+    outputs: Sequence[str] | None = None,
+    method: str | int | None = None,
+    rtol: float | None = None,
+    interface: str | None = None,
+    inputs: "Mapping[str, ArrayLike] | pandas.DataFrame | None" = None,
+    timeout: float | None = None,
+    progress: Progress | None = None,
+) -> "Trajectory":
+    """Run a model, a scene, an FMU or a stored result once.
+
+    Parameters
+    ----------
+    source : str or path
+        The name of a model (``"stickslip"``), the path of an FMU, the name or path of a scene (``"my_scene.toml"``),
+        or the folder of a stored result, whose run is repeated.
+    values : mapping, optional
+        Parameters and start values by name, in the units of the FMU; enumerations by label or number.
+    stop : float, optional
+        Stop time in s; by default that of the source.
+    interval : float, optional
+        Time between two recorded points in s. By default 4096 intervals and every step and event of the solver are
+        recorded.
+    outputs : sequence of str, optional
+        Variables to record; by default all outputs of a model or FMU, and those that a scene names.
+    method : str or int, optional
+        Integration method of an FMU of this project, as ``"exact"`` or ``"dop853"``.
+    rtol : float, optional
+        Relative tolerance: of the solver in an FMU of this project. Any other FMU is run with ever shorter
+        communication steps until two results agree to this tolerance.
+    interface : {"CoSimulation", "ModelExchange"}, optional
+        Interface to use where the FMU offers both; co-simulation by default.
+    inputs : mapping or DataFrame, optional
+        Input signals: the column ``time`` in s and a column for each input. Values between two rows are interpolated;
+        a time that occurs twice is a jump. In co-simulation an input is constant within a communication step, at its
+        value in the middle of the step.
+    timeout : float, optional
+        Seconds allowed for one call of an FMU that is not of this project; 60 by default.
+    progress : callable, optional
+        Called with the finished share of the run.
+
+    Returns
+    -------
+    Trajectory
+        Time, columns by name, units, events, statistics and the parameters in force.
+
+    Raises
+    ------
+    SceneError
+        If the source or an argument is not valid.
+    HarnessError
+        If the run fails; the message is that of the FMU.
+
+    Examples
+    --------
+    >>> sled = simulate("stickslip", {"mu_s": 0.8}, stop=8.0)  # doctest: +SKIP
+    >>> sled["x"][-1]  # doctest: +SKIP
+    """
+    from ..running import runner
+    from ..running.resolve import resolve
+
+    spec = resolve(source)
+    if values:
+        spec = replace(spec, values={**spec.values, **values})
+    if inputs is not None:
+        spec = replace(spec, inputs={str(name): column for name, column in table_of(inputs).items()})
+    spec = with_options(spec, stop, interval, outputs, method, rtol, interface, timeout)
+    if interval is not None and spec.inputs:
+        spec = replace(spec, grid=fine_step(spec, interval))
+    done = runner.run(spec, progress or QUIET)
+    if done.failure:
+        raise HarnessError(done.failure)
+    return done
+
+
+def compare(
+    a: "str | Path | Trajectory",
+    b: "str | Path | Trajectory",
+    *,
+    stop: float | None = None,
+    rtol: float | None = None,
+    interface: str | None = None,
+    timeout: float | None = None,
+    progress: Progress | None = None,
+) -> "Comparison":
+    """Compare two trajectories variable by variable and event by event.
+
+    Parameters
+    ----------
+    a, b : Trajectory, str or path
+        Trajectories, result folders, files (fmpy, OpenModelica, Dymola, any table with the time in its first column),
+        FMUs or scenes. What has to be run is run to the times of the other one.
+    stop, rtol, interface, timeout
+        Options for FMUs that have to be run, as in `simulate`.
+    progress : callable, optional
+        Called with the finished share.
+
+    Returns
+    -------
+    Comparison
+        The largest and root-mean-square difference of each variable, and the matched events.
+
+    Raises
+    ------
+    HarnessError
+        If the two have no variable or no time in common.
+    """
+    from ..running.trajectory import Trajectory
+    from ..scenes.run_spec import RunSpec
+    from ..studies.compare.difference import compare as difference
+    from ..studies.compare.trajectory_sources import display_names, load_both
+
+    how = with_options(RunSpec(Path()), stop=stop, interface=interface, timeout=timeout)
+    if rtol is not None:
+        how = replace(how, tolerance=rtol)
+    first, second = load_both(
+        tuple(each if isinstance(each, Trajectory) else str(each) for each in (a, b)),
+        how,
+        progress or QUIET,
+    )
+    paths = [each for each in (a, b) if not isinstance(each, Trajectory)]
+    if len(paths) == 2:
+        one, two = display_names((str(a), str(b)))
+        first, second = replace(first, label=one), replace(second, label=two)
+    elif first.name == second.name:
+        first, second = replace(first, label=f"{first.name} (a)"), replace(second, label=f"{second.name} (b)")
+    return difference(first, second)
+
+
+def fine_step(spec: "RunSpec", interval: float) -> float:
+    """Return a communication step in s for input signals: a whole part of the interval, at most 1/4096 of the run."""
+    from math import ceil
+
+    from ..running.description import read_description, resolve_time_span
+    from ..scenes.run_spec import DEFAULT_EQUAL_STEPS
+
+    start, stop = resolve_time_span(spec, read_description(spec.fmu, spec.lenient))
+    return interval / ceil(interval * DEFAULT_EQUAL_STEPS / (stop - start))
+
+
+def table_of(inputs: Any) -> dict[str, tuple[float, ...]]:
+    """Return the columns of a mapping or a DataFrame; the index of a DataFrame may be its time."""
+    import numpy as np
+
+    if not isinstance(inputs, Mapping) and not hasattr(inputs, "columns"):
+        raise SceneError("inputs must be a mapping or a DataFrame with the column 'time' and one for each input")
+    names = inputs.columns if hasattr(inputs, "columns") else inputs
+    columns = {str(name): np.atleast_1d(np.asarray(inputs[name])) for name in names}
+    if "time" not in columns and getattr(getattr(inputs, "index", None), "name", None) == "time":
+        columns = {"time": np.asarray(inputs.index)} | columns
+    for name, column in columns.items():
+        if column.ndim != 1 or column.dtype.kind not in "fiub":
+            raise SceneError(f"inputs: {name} must be a row of numbers")
+    return {name: tuple(column.astype(float).tolist()) for name, column in columns.items()}

@@ -1,0 +1,60 @@
+"""Finds the run that a user names by a model, an FMU, a scene or a stored result."""
+
+from dataclasses import replace
+from pathlib import Path
+
+from ..errors import SceneError, unknown_source_message
+from ..results.provenance import load_verified_provenance
+from ..scenes.fmu_files import check_built, find_fmu, list_models
+from ..scenes.run_spec import DEFAULT_EQUAL_STEPS, RunSpec
+from ..scenes.scene import load_scene, scene_from_provenance, shipped_scenes
+
+FMU_SUFFIXES = (".fmu", ".py")
+
+
+def resolve(source: str | Path, options: RunSpec | None = None, scenes_first: bool = False) -> RunSpec:
+    """Return the run that a user names.
+
+    Parameters
+    ----------
+    source : str or path
+        The path of an FMU or of a model file, the name of a model, the name or path of a scene, or the folder of a
+        stored result.
+    options : RunSpec, optional
+        Options of the run of an FMU or a model; scenes and stored results have their own.
+    scenes_first : bool
+        Whether a name that a scene and a model have in common is that of the scene.
+
+    Raises
+    ------
+    HarnessError
+        If there is no such source, or if the files of a stored result have changed since.
+    """
+    path, name = Path(source), str(source)
+    scenes = {file.stem for file in shipped_scenes()} if scenes_first else set()
+    if path.suffix in FMU_SUFFIXES or (name in list_models() - scenes and not path.is_dir()):
+        return replace(options or RunSpec(Path(), equal_steps=DEFAULT_EQUAL_STEPS), fmu=find_fmu(name))
+    if path.is_dir() and name not in scenes:
+        return read_stored_run(path)
+    try:
+        scene = load_scene(source)
+    except SceneError as error:
+        if path.suffix == ".toml":
+            raise
+        names = sorted(list_models() | {file.stem for file in shipped_scenes()})
+        other = ", or the path of an FMU, a scene or a result"
+        raise SceneError(unknown_source_message("model or scene", name, names, other)) from error
+    check_built(scene.run.fmu)
+    return scene.run
+
+
+def read_stored_run(folder: Path) -> RunSpec:
+    """Return the run that made a stored result; HarnessError if its files have changed since."""
+    stored = load_verified_provenance(folder)
+    scene = stored["scene"] or {}
+    try:
+        if "title" in scene and not stored.get("run"):  # of an earlier version
+            return scene_from_provenance(stored).run
+        return RunSpec.from_json(stored.get("run") or scene)
+    except SceneError as error:
+        raise SceneError(f"{folder} does not hold the result of one run ({error}): name another folder") from None

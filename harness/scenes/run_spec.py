@@ -1,0 +1,96 @@
+"""Specification of a run: the FMU, values to set, outputs to record."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from inspect import get_annotations
+from math import inf
+from pathlib import Path
+from typing import Annotated, Any
+
+from .roles import find_roles
+from .schema import FLAG, NAMES, NUMBER, POSITIVE, TABLE, TEXT, Constraint, is_whole, parse_table
+
+DEFAULT_EQUAL_STEPS = 4096  # communication steps of a run that names neither a grid nor whether to follow the solver
+MAX_REPEATS = 1000
+NATURAL_NUMBER = Constraint(lambda value: is_whole(value, 0, inf), "a whole number of at least 0")
+REPEAT_COUNT = Constraint(lambda value: is_whole(value, 1, MAX_REPEATS), f"a whole number from 1 to {MAX_REPEATS}")
+
+
+@dataclass(frozen=True)
+class RunSpec:
+    """Specification of one run of an FMU.
+
+    Scenes, options of commands, arguments of the Python API, points of sweeps and stability cases are run from it. Its
+    JSON is stored in the provenance of a result, and `from_json` reads it back.
+
+    Attributes
+    ----------
+    fmu : pathlib.Path
+    outputs : tuple of str
+        Outputs to record.
+    values : dict
+        Values to set by variable name; enumerations by label or number.
+    inputs : dict
+        Table of input signals: the column "time" in s and one column for each input.
+    start, stop : float or None
+        Start and stop in s; None for those of the FMU.
+    grid : float or None
+        Communication step in s.
+    equal_steps : int
+        Number of equal communication steps if there is no `grid`.
+    interval : float or None
+        Time in s between the points to keep, multiples of it and the last point; None to keep every point.
+    follow : bool
+        Whether to step to the ends of internal steps as well. An external FMU does not expose them; its communication
+        steps are refined instead until two results agree to the `tolerance`.
+    repeat : int
+        Number of timed repetitions.
+    tolerance : float
+        Tolerance of the step refinement of external FMUs.
+    exchange : bool
+        Whether to use model exchange; automatic if the FMU offers nothing else. External FMUs only.
+    lenient : bool
+        Whether to run an FMU that violates the standard.
+    timeout : float
+        Time limit in s of one FMI call of an external FMU.
+    """
+
+    fmu: Annotated[Path, TEXT]
+    outputs: Annotated[tuple[str, ...], NAMES] = ()
+    values: Annotated[dict[str, Any], TABLE] = field(default_factory=dict)
+    inputs: dict[str, tuple[Annotated[float, NUMBER], ...]] = field(default_factory=dict)
+    start: Annotated[float | None, NUMBER] = None
+    stop: Annotated[float | None, NUMBER] = None
+    grid: Annotated[float | None, POSITIVE] = None
+    equal_steps: Annotated[int, NATURAL_NUMBER] = 0
+    interval: Annotated[float | None, POSITIVE] = None
+    follow: Annotated[bool, FLAG] = True
+    repeat: Annotated[int, REPEAT_COUNT] = 1
+    tolerance: Annotated[float, POSITIVE] = 1e-6
+    exchange: Annotated[bool, FLAG] = False
+    lenient: Annotated[bool, FLAG] = False
+    timeout: Annotated[float, POSITIVE] = 60.0
+
+    @classmethod
+    def from_json(cls, stored: Mapping[str, Any]) -> "RunSpec":
+        """Return the specification in a table, where null stands for a default; SceneError if it is invalid."""
+        return parse_table({name: value for name, value in stored.items() if value is not None}, cls)
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """Return everything but the FMU, for commands that run several."""
+        return {name: value for name, value in vars(self).items() if name != "fmu"}
+
+    @property
+    def model(self) -> str:
+        """Return the name of the model."""
+        return self.fmu.stem
+
+    @property
+    def motion_outputs(self) -> dict[str, str]:
+        """Return the recorded output of each role: position, velocity, acceleration."""
+        return find_roles(self.outputs)
+
+
+# keys of a scene file that are those of its run; the FMU has other keys, and a scene keeps every point
+SCENE_KEYS = tuple(name for name in get_annotations(RunSpec) if name not in ("fmu", "equal_steps", "interval"))
