@@ -98,7 +98,8 @@ def complex_factorization_lines(w: str, re: str, im: str, spec: ModelLayout) -> 
         slopes = {j: spec.jacobian_entry(row, n) for n, j in enumerate(names) if (row, n) not in spec.zeros}
         for j in [j for j in own if (i, j) in nonzero]:
             through = [slopes[p] for p, q in moved.items() if q == j and p in slopes]
-            real = " + ".join([slopes[j]] * (j in slopes) + [f"{w}_re * {one}" for one in through]) or "0.0"
+            terms = [slopes[j]] if j in slopes else []
+            real = " + ".join(terms + [f"{w}_re * {one}" for one in through]) or "0.0"
             imaginary = " + ".join(f"{w}_im * {one}" for one in through) or "0.0"
             lines.append(f"{w}_{i}_{j}_re = {re if i == j else ''} - ({real})")
             lines.append(f"{w}_{i}_{j}_im = {im if i == j else ''} - ({imaginary})")
