@@ -138,20 +138,30 @@ class Radau9:
         self.t0, self.f_start = t, f
 
         ratio = h / self.h_last if self.h_last > 0.0 else 0.0
-        q = C1 * ratio
-        s = 1.0 + q
-        z1 = dynamic_part(q * (self.p1 - s * (self.p2 + s * (self.p3 - q * (self.p4 + s * self.p5)))))
-        q = C2 * ratio
-        s = 1.0 + q
-        z2 = dynamic_part(q * (self.p1 - s * (self.p2 + s * (self.p3 - q * (self.p4 + s * self.p5)))))
-        q = C3 * ratio
-        s = 1.0 + q
-        z3 = dynamic_part(q * (self.p1 - s * (self.p2 + s * (self.p3 - q * (self.p4 + s * self.p5)))))
-        q = C4 * ratio
-        s = 1.0 + q
-        z4 = dynamic_part(q * (self.p1 - s * (self.p2 + s * (self.p3 - q * (self.p4 + s * self.p5)))))
-        s = 1.0 + ratio
-        z5 = dynamic_part(ratio * (self.p1 - s * (self.p2 + s * (self.p3 - ratio * (self.p4 + s * self.p5)))))
+        ahead = C1 * ratio
+        place = 1.0 + ahead
+        z1 = dynamic_part(
+            ahead * (self.p1 - place * (self.p2 + place * (self.p3 - ahead * (self.p4 + place * self.p5))))
+        )
+        ahead = C2 * ratio
+        place = 1.0 + ahead
+        z2 = dynamic_part(
+            ahead * (self.p1 - place * (self.p2 + place * (self.p3 - ahead * (self.p4 + place * self.p5))))
+        )
+        ahead = C3 * ratio
+        place = 1.0 + ahead
+        z3 = dynamic_part(
+            ahead * (self.p1 - place * (self.p2 + place * (self.p3 - ahead * (self.p4 + place * self.p5))))
+        )
+        ahead = C4 * ratio
+        place = 1.0 + ahead
+        z4 = dynamic_part(
+            ahead * (self.p1 - place * (self.p2 + place * (self.p3 - ahead * (self.p4 + place * self.p5))))
+        )
+        place = 1.0 + ratio
+        z5 = dynamic_part(
+            ratio * (self.p1 - place * (self.p2 + place * (self.p3 - ratio * (self.p4 + place * self.p5))))
+        )
         w1 = S11 * z1 + S12 * z2 + S13 * z3 + S14 * z4 + S15 * z5
         w2 = S21 * z1 + S22 * z2 + S23 * z3 + S24 * z4 + S25 * z5
         w3 = S31 * z1 + S32 * z2 + S33 * z3 + S34 * z4 + S35 * z5
@@ -181,7 +191,7 @@ class Radau9:
         scale = elementwise_max(control.error_scale_floor, scale)
         tolerance = NEWTON_TOLERANCE * step.tolerance
         has_converged, last_change, quotient, share, iterations = False, 1.0, 1.0, 1.0, 0
-        for k in range(MAX_ITERATIONS):
+        for turn in range(MAX_ITERATIONS):
             y1 = select_kinematic(
                 y
                 + h
@@ -281,7 +291,7 @@ class Radau9:
             change = max_of(u1) / tolerance
             if not change < LARGE:  # also for NaN
                 break
-            if k > 0:
+            if turn > 0:
                 quotient = change / last_change
                 if quotient > 0.99:
                     quotient = 0.99
@@ -291,7 +301,7 @@ class Radau9:
             if share * change <= 1.0:
                 has_converged = True
                 break
-            if k > 0 and share * change * quotient ** (MAX_ITERATIONS - 2.0 - k) > HOPELESS:
+            if turn > 0 and share * change * quotient ** (MAX_ITERATIONS - 2.0 - turn) > HOPELESS:
                 break
             last_change = change
         control.stages = STAGES * iterations
