@@ -21,10 +21,11 @@ class ActiveMethod:
             setattr(self, label, Method())
         self.method_number = self.stages = self.extra = 0
         self.power = self.safety = self.shrink = self.grow = 0.0
+        self.shrink_after_rejection = 1.0  # of a step that is accepted after a rejection
 
     def select(self, method):
         """Select a method by its number; the closed form has no step-size control."""
-        self.method_number = method
+        self.method_number, self.shrink_after_rejection = method, 1.0
         for _, file, _ in methods:
             if method == file.NUMBER:
                 self.stages, self.extra = file.STAGES, file.EXTRA

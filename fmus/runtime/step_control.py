@@ -354,6 +354,8 @@ class InternalStep:
         if attempts == 0:
             grow = method.safety * error**-method.power if error > 1e-9 else method.grow
             h_new = h * (grow if grow < method.grow else method.grow)
+        else:
+            h_new = h * method.shrink_after_rejection
         self.h_next = h_new
         self.h_full = h
         self.t1, self.y1, self.f1 = self.t_end if last else t + h, y1, f1

@@ -83,6 +83,11 @@ def select_kinematic(a, b):
     return np.where(is_dynamic, b, a)
 
 
+def dynamic_part(a):
+    """Return a, with zeros for states whose rate is a state."""
+    return np.where(is_dynamic, a, 0.0)
+
+
 def kinematic_rates(y):
     """Return, for states whose rate is a state, that rate."""
     return np.array([y[i] for i in rate_index])
@@ -144,3 +149,51 @@ def solve_factored(system, r):
         if not is_dynamic[p]:
             k[p] = g * (r[p] + h * k[rate_index[p]])
     return k
+
+
+def factorize_complex(re, im, J):
+    """Factorize re + i im - J, after the elimination of states whose rate is a state; see elimination.py."""
+    n = len(J)
+    w, inverse = np.zeros((n, n, 2)), np.full((n, 2), np.nan)
+    computed = [i for i in state_indices if is_dynamic[i]]
+    g_re = 1.0 / (re + im * (im / re))  # reciprocal of the shift
+    g_im = -(im / re) * g_re
+    for i in computed:
+        for j in computed:
+            a, b = J[i, j], 0.0
+            for p in state_indices:
+                if not is_dynamic[p] and rate_index[p] == j:
+                    a, b = a + g_re * J[i, p], b + g_im * J[i, p]
+            w[i, j] = (re - a, im - b) if i == j else (-a, -b)
+    for n, k in enumerate(computed):
+        a, b = w[k, k]
+        size = a * a + b * b
+        others = [w[i, k, 0] * w[i, k, 0] + w[i, k, 1] * w[i, k, 1] for i in computed[n + 1 :]]
+        if size != 0.0 and all(size > SMALL * SMALL * other for other in others):
+            inverse[k] = a / size, -b / size
+        for i in computed[n + 1 :]:
+            w[i, k] = complex_product(w[i, k], inverse[k])
+            for j in computed[n + 1 :]:
+                w[i, j] = w[i, j] - complex_product(w[i, k], w[k, j])
+    return w, inverse
+
+
+def solve_complex(system, r, q):
+    """Solve for a right-hand side r + i q that is zero for states whose rate is a state; return both parts of the
+    solution, for the other states only."""
+    w, inverse = system
+    computed, u = [i for i in state_indices if is_dynamic[i]], np.zeros((len(r), 2))
+    for n, i in enumerate(computed):
+        u[i] = r[i], q[i]
+        for j in computed[:n]:
+            u[i] = u[i] - complex_product(w[i, j], u[j])
+    for n, i in reversed(list(enumerate(computed))):
+        for j in computed[n + 1 :]:
+            u[i] = u[i] - complex_product(w[i, j], u[j])
+        u[i] = complex_product(u[i], inverse[i])
+    return u[:, 0], u[:, 1]
+
+
+def complex_product(a, b):
+    """Multiply two complex numbers, each a pair of numbers."""
+    return np.array([a[0] * b[0] - a[1] * b[1], a[0] * b[1] + a[1] * b[0]])

@@ -32,7 +32,7 @@ METHOD_COLOURS = {
     **dict.fromkeys(("ode23", "RK23"), BLUE),
     **dict.fromkeys(("ode45", "RK45"), ORANGE),
     **dict.fromkeys(("dop853", "DOP853"), GREEN),
-    **dict.fromkeys(("rodas", "Radau"), "#CC79A7"),
+    **dict.fromkeys(("rodas", "radau9", "Radau"), "#CC79A7"),
     "LSODA": "#56B4E9",
     **dict.fromkeys(("Adams", "BDF", "fmpy's CVode"), "#E69F00"),
 }

@@ -150,7 +150,7 @@ def test_methods_laws_and_folders_are_selected_for_a_file_as_for_a_name(tmp_path
     assert [item.name for item in chosen["solver.method"].declaredType.items] == ["rodas"]
     assert [item.name for item in chosen["friction"].declaredType.items] == ["hybrid"]
     refused = command(path, "--method", "exact", cwd=tmp_path)
-    assert refused.stderr == "Error: rotor_brake has no method 'exact'; it has ode23, ode45, dop853, rodas.\n"
+    assert refused.stderr == "Error: rotor_brake has no method 'exact'; it has ode23, ode45, dop853, rodas, radau9.\n"
 
 
 @pytest.fixture

@@ -1,11 +1,16 @@
-"""The linear system of rodas, solved by elimination without pivoting, or refused; alike on arrays and in scalars."""
+"""The linear systems of rodas and radau9, solved without pivoting, or refused; alike on arrays and in scalars."""
 
 from math import fabs, nan
 
 import numpy as np
 import pytest
 
-from fmus.packaging.lowering.elimination import factorization_lines, solution_lines
+from fmus.packaging.lowering.elimination import (
+    complex_factorization_lines,
+    complex_solution_lines,
+    factorization_lines,
+    solution_lines,
+)
 from fmus.packaging.lowering.layout import ModelLayout
 from fmus.runtime import vectors
 
@@ -30,11 +35,16 @@ def in_scalars(spec, g, h, J, r):
     return [namespace[f"k_{name}"] for name in names]
 
 
-def on_arrays(spec, g, h, J, r):
+def set_layout(spec):
+    """Fill the indices of the states."""
     names, rates = list(spec.states), list(spec.states.values())
     vectors.state_indices[:] = range(len(names))
     vectors.is_dynamic[:] = [i in spec.dynamic_states for i in range(len(names))]
     vectors.rate_index[:] = [-1 if i in spec.dynamic_states else names.index(rate) for i, rate in enumerate(rates)]
+
+
+def on_arrays(spec, g, h, J, r):
+    set_layout(spec)
     with np.errstate(all="ignore"):
         return vectors.solve_factored(vectors.factorize(g, h, J), np.array(r))
 
@@ -85,3 +95,44 @@ def test_entries_that_are_always_zero_are_left_out_and_change_no_number(order):
         assert np.isfinite(k).all()
         assert k == in_scalars(dense, 0.25, h, J, r)
         assert np.array_equal(k, on_arrays(spec, 0.25, h, J, r))
+
+
+@pytest.mark.parametrize("undamped", [False, True])
+@pytest.mark.parametrize("bodies", BODIES)
+def test_a_complex_system_is_solved_alike_on_arrays_and_in_scalars(bodies, undamped):
+    """The right-hand side is zero for states whose rate is a state; numpy solves the whole system."""
+    spec, draw = ModelLayout(BODIES[bodies], {}), np.random.default_rng(6)
+    if undamped:  # no rate depends on its own state
+        spec = ModelLayout(BODIES[bodies], {}, zeros=frozenset((i, i) for i in spec.dynamic_states))
+    names, rates, n = list(spec.states), list(spec.states.values()), len(spec.states)
+    own = spec.dynamic_states
+    lines = [
+        *complex_factorization_lines("s", "re", "im", spec),
+        *complex_solution_lines("k", "m", "s", "r", "q", spec),
+    ]
+    for _ in range(300):
+        h, J = 10.0 ** draw.uniform(-4.0, 0.0), draw.normal(0.0, 1.0, (n, n)) * 10.0 ** draw.uniform(-3.0, 3.0, (n, 1))
+        for i in set(range(n)) - {*own}:
+            J[i] = np.eye(n)[names.index(rates[i])]
+        for place in spec.zeros:
+            J[place] = 0.0
+        re, im, r, q = 3.7 / h, -6.5 / h, np.zeros(n), np.zeros(n)
+        r[own], q[own] = draw.normal(size=len(own)), draw.normal(size=len(own))
+        namespace = {"re": re, "im": im, "nan": nan}
+        namespace |= {f"{a}_{name}": b[i] for a, b in (("r", r), ("q", q)) for i, name in enumerate(names)}
+        namespace |= {f"{rates[i]}_{name}": J[i, j] for i in own for j, name in enumerate(names)}
+        exec("\n".join(lines), namespace)
+        scalars = np.array([complex(namespace[f"k_{names[i]}"], namespace[f"m_{names[i]}"]) for i in own])
+        set_layout(spec)
+        k, m = vectors.solve_complex(vectors.factorize_complex(re, im, J), r, q)
+        assert np.array_equal(scalars, k[own] + 1j * m[own])
+        truth = np.linalg.solve(complex(re, im) * np.eye(n) - J, r + 1j * q)[own]
+        assert np.abs(scalars - truth).max() <= 1e-7 * np.abs(truth).max()
+
+
+def test_a_complex_system_with_a_vanishing_pivot_is_refused():
+    spec, J = ModelLayout(BODIES["three rates"], {}), np.zeros((3, 3))
+    J[0, 0], J[1, 0] = 2.0, 1.0
+    set_layout(spec)
+    k, _ = vectors.solve_complex(vectors.factorize_complex(2.0, 0.0, J), np.ones(3), np.zeros(3))
+    assert np.isnan(k).any()

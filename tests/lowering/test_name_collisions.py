@@ -75,7 +75,7 @@ def test_names_used_inside_the_numerics_change_nothing(tmp_path, text):
 
 def test_author_choices_named_like_an_unavailable_method_or_law_are_kept(tmp_path):
     path, labels = tmp_path / "mine.py", [*METHODS, *LAWS]
-    items, cases = (", ".join(item.format(*pair) for pair in zip(labels, "12345678", strict=True)) for item in CHOSEN)
+    items, cases = (", ".join(item.format(*pair) for pair in zip(labels, "123456789", strict=True)) for item in CHOSEN)
     text = SLED.replace("import Contact", "import Choice, Contact").replace("- F)", f"* kind.choose({cases}) - F)")
     path.write_text(text.replace("    m =", f'    kind = Choice("kind", {items})\n    m ='))
     source = find_model(path)

@@ -42,7 +42,7 @@ OUTPUTS = {
     "pendulum": "theta omega alpha T_friction energy mode",
 }
 STOP = {"smd": 4.0, "coulomb": 4.0, "stickslip": 16.0, "pacejka": 16.0, "pendulum": 5.0}
-METHODS = {"exact": 1, "ode23": 2, "ode45": 3, "dop853": 4, "rodas": 5}
+METHODS = {"exact": 1, "ode23": 2, "ode45": 3, "dop853": 4, "rodas": 5, "radau9": 6}
 UNITS = {
     **dict.fromkeys(("m", "solver"), "kg"),
     **dict.fromkeys(("x", "x0", "x_driver", "a_pin", "r"), "m"),

@@ -58,7 +58,7 @@ def test_a_reduced_fmu_carries_one_method_and_runs_alike(lean, launch, worker, c
         page = archive.read("documentation/index.html").decode()
     shown = {label for label in (*METHODS, *LAWS) if f"<b>{label}</b>" in page}
     assert shown == set(options.values())
-    methods = {"linear_closed_form.py", "ode23.py", "ode45.py", "dop853.py", "rodas.py"}
+    methods = {"linear_closed_form.py", "ode23.py", "ode45.py", "dop853.py", "rodas.py", "radau9.py"}
     assert files & methods == {f"{options['--method']}.py".replace("exact", "linear_closed_form")}
     times = [stop * i / 40 for i in range(41)]
     names = outputs(name) + counts(name)
@@ -87,7 +87,7 @@ def test_a_reduced_build_is_reproducible_and_differs_from_the_full_one(lean, tmp
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (("pacejka", "--method", "exact"), ("pacejka", "exact", "ode23, ode45, dop853, rodas")),
+        (("pacejka", "--method", "exact"), ("pacejka", "exact", "ode23, ode45, dop853, rodas, radau9")),
         (("smd", "--law", "sign"), ("smd", "sign", "none")),
         (("stickslip", "--law", "sign"), ("stickslip", "sign", "hybrid, threshold")),
         (("coulomb", "--law", "sign", "--method", "exact"), ("coulomb", "exact", "hybrid")),

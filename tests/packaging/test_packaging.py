@@ -19,6 +19,7 @@ import pytest
 from build_cache import ROOT
 from commands import build as command
 from fmpy.validation import validate_fmu
+from models import declared
 
 from fmus.packaging import BuildError
 from fmus.packaging.archive import write
@@ -140,7 +141,7 @@ def test_every_real_has_a_unit_and_every_angle_is_displayed_in_degrees(fmu, name
 def test_enumerations_list_their_items(fmu, name):
     root = description_of(fmu(name))
     types = {kind.get("name"): kind for kind in root.findall("TypeDefinitions/SimpleType")}
-    choices = {variable: meaning for variable, meaning in variables(find_model(name).model()) if meaning.items}
+    choices = {variable: meaning for variable, meaning in declared(name).items() if meaning.items}
     assert "solver.method" in choices
     for variable, meaning in choices.items():
         value = root.find(f"ModelVariables/ScalarVariable[@name='{variable}']/Enumeration")

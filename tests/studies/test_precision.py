@@ -63,7 +63,9 @@ def test_every_method_of_the_fmu_approaches_the_reference_of_its_law(fmus, case)
         0.02 if case.reference_source == "stickslip-threshold" else 2e-3
     )  # the position of rest below eps is arbitrary
     for method in method_numbers(model):
-        if (case.name == "pacejka-0.0001" and method != "rodas") or (case.is_chattering and method == "exact"):
+        if (case.name == "pacejka-0.0001" and method not in ("rodas", "radau9")) or (
+            case.is_chattering and method == "exact"
+        ):
             continue  # seconds of explicit steps; refused
         answer = EmbeddedModel.create(model, case.values, method, 1e-6).solve(truth.times.tolist())
         assert compute_errors(answer, truth).largest < within

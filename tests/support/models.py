@@ -17,7 +17,7 @@ BODIES = [
 ]  # position and speed are all their states
 EXAMPLE_MODELS = sorted((ROOT / "tests" / "example_models").glob("*.py"))  # as users write them, in files of their own
 LARGER_MODELS = sorted((ROOT / "tests" / "example_models" / "larger").glob("*.py"))  # with more states or more contacts
-EXACT, ODE23, ODE45, DOP853, RODAS = 1, 2, 3, 4, 5
+EXACT, ODE23, ODE45, DOP853, RODAS, RADAU9 = 1, 2, 3, 4, 5, 6
 HYBRID, SIGN, THRESHOLD = 1, 2, 3
 
 
@@ -34,7 +34,7 @@ def runtime(name, part):
 @cache
 def declared(name):
     """Return name and declaration of every variable of a model, in the order of the XML."""
-    return dict(variables(find_model(name).model()))
+    return dict(variables(lowered_model(name)()))
 
 
 def outputs(name):
@@ -84,8 +84,9 @@ def experiment(name, values):
     """
     stop, method = find_model(name).model.stop_time, values["solver.method"]
     if values.get("friction", HYBRID) == HYBRID:
-        stiff = declared(name)["solver.method"].start == RODAS != method
-        return name, values if method == EXACT else {**values, "solver.rtol": 1e-5}, 0.4 * stop if stiff else stop
+        is_stiff = declared(name)["solver.method"].start in (RODAS, RADAU9)
+        short = is_stiff and method not in (RODAS, RADAU9)
+        return name, values if method == EXACT else {**values, "solver.rtol": 1e-5}, 0.4 * stop if short else stop
     return name, {**values, "solver.rtol": 1e-3, "solver.atol": 1e-6}, 0.4 * stop
 
 

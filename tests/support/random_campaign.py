@@ -35,7 +35,7 @@ from random_models import STOP, perturb, random_structure, random_values, to_sys
 from worker_client import FmiError, Worker
 
 ROOT = Path(__file__).resolve().parents[2]
-METHODS = {2: "ode23", 3: "ode45", 4: "dop853", 5: "rodas"}
+METHODS = {2: "ode23", 3: "ode45", 4: "dop853", 5: "rodas", 6: "radau9"}
 TOLERANCES = (1e-6, 1e-11)
 STATE_TOLERANCE = 100.0  # times rtol: allowed error of states and changes of values of the reference
 MARGIN = 1000.0  # times rtol: decisions with smaller margins are not compared

@@ -12,6 +12,7 @@ from sys import float_info
 from typing import Any
 
 from ...runtime.active_method import EXACT_ITEM, METHOD_ITEMS
+from ...runtime.method_registry import methods
 from ..reserved_names import is_reserved_in_c
 from .algebra import (
     build_term,
@@ -40,6 +41,8 @@ STEEP_FUNCTIONS = ("exp", "tanh", "atan", "sinh", "cosh", "/")
 LARGEST_FLOAT = float_info.max
 SMALLEST_DIVISOR = 1e-100  # in place of an inverse mass that vanishes; its square is not zero
 METHODS = [label for label, _, _ in (EXACT_ITEM, *METHOD_ITEMS)]
+# methods for some models only, with the default methods of these models
+OFFERED_WITH = {label: file.OFFERED_WITH for label, file, _ in methods if hasattr(file, "OFFERED_WITH")}
 TIME = Expression()
 TIME.name = "t"
 
@@ -558,7 +561,12 @@ class ModelAnalysis:
 
     @property
     def methods(self) -> list[str]:
-        """Labels of the integration methods of the model."""
+        """Labels of the integration methods that an FMU of the model includes by default."""
+        return [label for label in self.available_methods if self.method in OFFERED_WITH.get(label, (self.method,))]
+
+    @property
+    def available_methods(self) -> list[str]:
+        """Labels of all integration methods that can solve the model."""
         return METHODS if self.closed_form else METHODS[1:]
 
     @property

@@ -43,13 +43,16 @@ class FeatureSelection:
 
 
 def select_features(source: ModelFile, methods: Sequence[str] = (), laws: Sequence[str] = ()) -> FeatureSelection:
-    """Select methods and laws, by default all of the model; raise BuildError for those that it does not have."""
+    """Select methods and laws, by default all that the model offers; raise BuildError for those that it cannot have."""
     an, chosen = source.analysis, []
-    for word, has, requested in ("method", an.methods, methods), ("friction law", an.laws, laws):
+    for word, default, has, requested in (
+        ("method", an.methods, an.available_methods, methods),
+        ("friction law", an.laws, an.laws, laws),
+    ):
         for label in requested:
             if label not in has:
                 raise BuildError(f"{source.name} has no {word} {label!r}; it has {', '.join(has) or 'none to choose'}.")
-        chosen.append(tuple(label for label in has if label in requested or not requested))
+        chosen.append(tuple(label for label in has if label in (requested or default)))
     kept, ruling = chosen
     if ruling and HYBRID not in ruling:  # the closed form requires the hybrid law
         kept = tuple(label for label in kept if label != EXACT)

@@ -50,6 +50,10 @@ class ModelLayout:
         """Indices of the states that are rates of other states."""
         return [place for place, state in enumerate(self.states) if state in self.states.values()]
 
+    def rate_place(self, state: int) -> int:
+        """Return the index of the state that is the rate of a state."""
+        return list(self.states).index(list(self.states.values())[state])
+
     def slip(self, contact: int) -> int:
         """Return the index of the slip of a contact among the states; -1 if it is an expression."""
         name = list(self.contacts.values())[contact]

@@ -7,7 +7,12 @@ from collections.abc import Sequence
 from .. import BuildError
 from ..syntax_trees import all_nodes, is_same_tree, replace_fields
 from .constant_folding import ConstantFolder
-from .elimination import factorization_lines, solution_lines
+from .elimination import (
+    complex_factorization_lines,
+    complex_solution_lines,
+    factorization_lines,
+    solution_lines,
+)
 from .layout import NAMED_VECTOR, STATES, ModelLayout
 from .source_symbols import SourceSymbols, annotated_kind
 
@@ -16,6 +21,7 @@ ELEMENTWISE = {
     "elementwise_max": "{0} if {0} > {1} else {1}",
 }  # component by component
 REDUCTIONS = {"max_of": ">", "min_of": "<"}  # reductions to one component
+SELECTIONS = ("select_kinematic", "dynamic_part", "kinematic_rates")  # of components by the kind of their rates
 ALLOCATORS = ("state_vector", "contact_vector")
 LOOP_RANGES = ("state_indices", "velocity_indices", "contact_indices")  # iterables of loops
 METHOD_LOOP = "methods"  # iterable of (label, module, class)
@@ -73,7 +79,7 @@ class Scalarizer(ConstantFolder):
 
     def is_elementwise(self, node: ast.AST) -> bool:
         """Return whether a call works on vectors component by component."""
-        names = {*ELEMENTWISE, *self.declared.elementwise, "select_kinematic"}
+        names = {*ELEMENTWISE, *self.declared.elementwise, *SELECTIONS}
         return isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in names
 
     def result_kinds(self, call: ast.Call) -> list[str | None]:
@@ -122,6 +128,10 @@ class Scalarizer(ConstantFolder):
                 return ast.Compare(self.component(left, place), ops, [self.component(right, place)])
             case ast.Call(func=ast.Name(id="select_kinematic"), args=[moved, other]):
                 return self.component(other if place in self.spec.dynamic_states else moved, place)
+            case ast.Call(func=ast.Name(id="dynamic_part"), args=[one]):
+                return self.component(one, place) if place in self.spec.dynamic_states else ast.Constant(0.0)
+            case ast.Call(func=ast.Name(id="kinematic_rates"), args=[one]):
+                return self.component(one, self.spec.rate_place(place))
             case ast.Call(func=ast.Name(id=name), args=args) if name in ELEMENTWISE:
                 if not all(isinstance(one, (ast.Name, ast.Attribute)) for one in args):
                     raise self.error(node, "would evaluate its argument twice; assign the argument to a name first")
@@ -280,7 +290,23 @@ class Scalarizer(ConstantFolder):
             ):
                 self.record_kinds([to], [STATES])
                 system, right = ast.unparse(s), ast.unparse(r)
-                return ast.parse("\n".join(solution_lines(k, system, right, *self.systems[system], self.spec))).body
+                lines = solution_lines(k, system, right, *self.systems[system], self.spec, self.known_zeros)
+                return ast.parse("\n".join(lines)).body
+            case ast.Assign(
+                targets=[ast.Name(id=s)], value=ast.Call(func=ast.Name(id="factorize_complex"), args=[shift, turn, _])
+            ):
+                return ast.parse(
+                    "\n".join(complex_factorization_lines(s, ast.unparse(shift), ast.unparse(turn), self.spec))
+                ).body
+            case ast.Assign(
+                targets=[ast.Tuple(elts=[ast.Name(id=k), ast.Name(id=m)] as to)],
+                value=ast.Call(func=ast.Name(id="solve_complex"), args=[s, r, q]),
+            ):
+                self.record_kinds(to, [STATES, STATES])
+                moved = [i for i in self.all_indices(STATES) if i not in self.spec.dynamic_states]
+                self.known_zeros |= {self.spec.component_name(name, STATES, i) for name in (k, m) for i in moved}
+                system, right, other = (ast.unparse(one) for one in (s, r, q))
+                return ast.parse("\n".join(complex_solution_lines(k, m, system, right, other, self.spec))).body
             case ast.Assign():
                 return self.lower_assignment(node)
         return [self.visit(node)]

@@ -23,7 +23,6 @@ class SourceSymbols:
         self.result_kinds: dict[str, list[str | None]] = {
             "initial_state": [STATES],
             "rates": [STATES],
-            "kinematic_rates": [STATES],
             "apply_impulses": [STATES],
             "slip_velocities": [CONTACTS],
             "law_modes": [CONTACTS],
@@ -31,6 +30,7 @@ class SourceSymbols:
             "contact_forces": [CONTACTS] * 3,
             "contact_rates": [CONTACTS] * 4,
             "solve_factored": [STATES],
+            "solve_complex": [STATES] * 2,
             "state_vector": [STATES],
             "contact_vector": [CONTACTS],
         }

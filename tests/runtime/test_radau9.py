@@ -1,0 +1,269 @@
+"""The method radau9: its coefficients, its iteration, and its accuracy on stiff friction."""
+
+from math import fabs, isnan
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from models import DOP853, RADAU9, RODAS, model_class, runtime
+from scipy.integrate import solve_ivp
+
+STAGES = range(1, 6)
+
+
+def table(letter):
+    """Return a matrix of coefficients of the method; missing ones are zero."""
+    numbers = vars(runtime("pacejka", "radau9"))
+    return np.array([[numbers.get(f"{letter}{i}{j}", 0.0) for j in STAGES] for i in STAGES])
+
+
+def row(letter):
+    numbers = vars(runtime("pacejka", "radau9"))
+    return np.array([numbers.get(f"{letter}{i}", 1.0) for i in STAGES])
+
+
+@pytest.fixture(scope="module")
+def numbers():
+    return runtime("pacejka", "radau9")
+
+
+def test_the_stages_are_collocation_points_of_radau():
+    """Each row of A integrates polynomials of degree 4 up to its node, and the last one those of degree 8."""
+    A, c = table("A"), row("C")
+    for degree in range(5):
+        assert A @ c**degree == pytest.approx(c ** (degree + 1) / (degree + 1), abs=1e-15)
+    for degree in range(9):
+        assert A[4] @ c**degree == pytest.approx(1.0 / (degree + 1), abs=1e-15)
+
+
+def test_the_transformation_diagonalizes_the_inverse_of_the_matrix(numbers):
+    A, T, S = table("A"), table("T"), table("S")
+    T[4] = 1.0, 1.0, 0.0, 1.0, 0.0
+    assert np.abs(S @ T - np.eye(5)).max() < 1e-13
+    blocks = np.zeros((5, 5))
+    blocks[0, 0] = 1.0 / numbers.GAMMA
+    for first, re, im in (1, numbers.ALPHA1, numbers.BETA1), (3, numbers.ALPHA2, numbers.BETA2):
+        blocks[first : first + 2, first : first + 2] = [[re, -im], [im, re]]
+    assert T @ blocks @ S @ A == pytest.approx(np.eye(5), abs=1e-13)
+
+
+def test_the_polynomial_of_the_interpolant_passes_through_the_stages():
+    H, c = table("H"), row("C")
+    H[0] = 0.0, 0.0, 0.0, 0.0, 1.0
+    r = 1.0 - c
+    basis = np.array([c, c * r, c * r * c, c * r * c * r, c * r * c * r * c]).T
+    assert basis @ H == pytest.approx(np.eye(5), abs=1e-13)
+
+
+def test_the_error_estimate_and_the_end_slope_are_those_of_collocation():
+    """With slopes k, z = h A k: the estimate is k0 + Q k, zero up to degree 4, and the slope at the end is k5."""
+    A, Q, c = table("A"), row("Q"), row("C")
+    assert row("E") @ A == pytest.approx(Q, abs=1e-14)
+    assert [Q @ c**degree for degree in range(5)] == pytest.approx([-1.0, 0.0, 0.0, 0.0, 0.0], abs=1e-14)
+    assert fabs(Q @ c**5) > 1e-3
+    assert row("L") @ A == pytest.approx([0.0, 0.0, 0.0, 0.0, 1.0], abs=1e-14)
+
+
+# ---- one step
+
+
+class Damped:
+    """x'' = spring x + damper v, with a count of its evaluations."""
+
+    def __init__(self, spring=0.0, damper=0.0):
+        self.spring, self.damper, self.evaluations = spring, damper, 0
+
+    def rates(self, t, x, v):
+        self.evaluations += 1
+        return self.spring * x + self.damper * v
+
+    def jacobian(self, t, x, v):
+        return 0.0, self.spring, self.damper
+
+
+def propose(model, x, v, h, tolerance=1e-10):
+    """Return new states and rate, error estimates, and the evaluations that the method reports."""
+    step = runtime("pacejka", "step_control").InternalStep()
+    step.tolerance = tolerance
+    step.active_method.error_scale_floor_x = step.active_method.error_scale_floor_v = 1.0
+    model.solver = SimpleNamespace(step=step)
+    a = model.rates(0.0, x, v)
+    model.evaluations = 0
+    method = runtime("pacejka", "radau9").Radau9()
+    return method.propose(model, 0.0, x, v, a, h), step.active_method.stages
+
+
+def test_it_is_l_stable():
+    for damper in 10.0 ** np.arange(4, 15, 2):
+        (_, v, *_), _ = propose(Damped(damper=-damper), 0.0, 1.0, 1.0)
+        assert fabs(v) < 30.0 / damper
+
+
+def test_it_never_amplifies_an_undamped_oscillator():
+    for w in np.geomspace(1e-2, 1e6, 60):
+        (x, v, *_), _ = propose(Damped(spring=-w * w), 1.0, 0.0, 1.0)
+        assert x * x + (v / w) ** 2 <= 1.0 + 1e-9
+
+
+def test_it_reports_all_evaluations():
+    model = Damped(spring=-4.0, damper=-0.6)
+    _, reported = propose(model, 1.0, -0.3, 0.1)
+    assert reported == model.evaluations > 0
+
+
+def test_a_linear_system_takes_two_iterations():
+    model = Damped(spring=-4.0, damper=-600.0)
+    _, reported = propose(model, 1.0, -0.3, 0.1, tolerance=1e-6)
+    assert reported in (10, 11)  # one more where the error is estimated again
+
+
+class Growing(Damped):
+    """Its rates exceed what a step can follow."""
+
+    def rates(self, t, x, v):
+        self.evaluations += 1
+        return v * v * v + 1e3
+
+    def jacobian(self, t, x, v):
+        return 0.0, 0.0, 0.0
+
+
+def test_a_divergent_iteration_is_refused_after_few_evaluations():
+    model = Growing()
+    (*_, e_x, e_v), _ = propose(model, 0.0, 1.0, 1.0)
+    assert isnan(e_x)
+    assert isnan(e_v)
+    assert model.evaluations <= 35
+
+
+# ---- runs of stiff friction
+
+
+def run(name, values, stop, points=400):
+    """Return the states of a lowered model at equal times."""
+    model = model_class(name)()
+    for variable, value in values.items():
+        owner = model.solver if variable.startswith("solver.") else model
+        setattr(owner, variable.removeprefix("solver."), value)
+    assert model.prepare() == 0
+    solver = model.solver
+    start = model.initial_state(0.0)
+    solver.start(model, 0.0, *(start if isinstance(start, tuple) else (start,)), stop, model.tolerance)
+    rows = []
+    for i in range(1, points + 1):
+        assert solver.advance(model, stop * i / points) == 0
+        rows.append([getattr(solver, state) for state in model.states])
+    solver.report(model.events)
+    return np.array(rows), solver
+
+
+def relative_error(rows, truth):
+    return float((np.abs(rows - truth) / np.abs(truth).max(0)).max())
+
+
+@pytest.fixture(scope="module")
+def truth():
+    """Return the motion of the sled for a width of the friction curve, by scipy's Radau (order 5) at 1e-11."""
+    found = {}
+
+    def solve(x_m):
+        if x_m not in found:
+            model = model_class("pacejka")()
+            model.x_m = x_m
+            assert model.prepare() == 0
+            model.initial_state(0.0)
+            found[x_m] = solve_ivp(
+                lambda t, y: (y[1], model.rates(t, *y)),
+                (0.0, 6.0),
+                (0.0, 0.0),
+                "Radau",
+                np.linspace(0.0, 6.0, 401)[1:],
+                rtol=1e-11,
+                atol=(1e-14, 1e-11 * x_m),
+                jac=lambda t, y: ((0.0, 1.0), model.jacobian(t, *y)[1:]),
+            ).y.T
+        return found[x_m]
+
+    return solve
+
+
+@pytest.mark.parametrize("x_m", [1e-2, 1e-4])
+@pytest.mark.parametrize("rtol", [1e-2, 1e-4, 1e-6, 1e-8])
+def test_the_error_is_below_the_tolerance_at_every_width_of_the_friction_curve(truth, x_m, rtol):
+    rows, _ = run("pacejka", {"x_m": x_m, "solver.method": RADAU9, "solver.rtol": rtol}, 6.0)
+    assert relative_error(rows, truth(x_m)) < max(3.0 * rtol, 1e-9)
+
+
+@pytest.mark.parametrize("x_m", [1e-4, 1e-5])
+def test_no_step_passes_a_stop_because_a_steep_jacobian_hides_the_error(x_m):
+    """The predicted fourth stage may lie where friction is steep, although the step begins where it is not."""
+    reference, _ = run("pacejka", {"x_m": x_m, "solver.method": RADAU9, "solver.rtol": 1e-9}, 16.0)
+    for rtol in 10.0 ** -np.arange(1.5, 5.1, 0.25):
+        rows, _ = run("pacejka", {"x_m": x_m, "solver.method": RADAU9, "solver.rtol": rtol}, 16.0)
+        assert relative_error(rows, reference) < 10.0 * rtol, rtol
+
+
+@pytest.mark.parametrize("rtol", [1e-3, 1e-6, 1e-9])
+def test_it_takes_fewer_steps_than_rodas_for_a_smaller_error(truth, rtol):
+    (rows, steps), (others, more) = (
+        (rows, solver.steps + solver.rejected)
+        for rows, solver in (
+            run("pacejka", {"x_m": 1e-3, "solver.method": method, "solver.rtol": rtol}, 6.0)
+            for method in (RADAU9, RODAS)
+        )
+    )
+    assert steps < more
+    assert relative_error(rows, truth(1e-3)) < relative_error(others, truth(1e-3))
+
+
+# ---- friction with a kink
+
+
+@pytest.fixture(scope="module")
+def lugre(tmp_path_factory):
+    """Return the path of a block with LuGre friction, whose rates have a kink at standstill."""
+    path = tmp_path_factory.mktemp("bristles") / "bristles.py"
+    path.write_text(LUGRE)
+    return path
+
+
+LUGRE = '''
+"""Block with LuGre friction."""
+
+from fmus import Model, Output, Parameter, State, exp, fabs
+
+
+class Bristles(Model):
+    """Block with LuGre friction, drawn by a spring."""
+
+    m = Parameter(1.0, "kg", "mass", above=0.0)
+    k = Parameter(2.0, "N/m", "stiffness of the spring")
+    f_s = Parameter(1.5, "N", "friction force at rest")
+    f_d = Parameter(1.0, "N", "friction force at high speed", above=0.0)
+    s_0 = Parameter(1e5, "N/m", "stiffness of the bristles")
+    s_1 = Parameter(316.22776601683796, "N.s/m", "damping of the bristles")
+    s_2 = Parameter(0.4, "N.s/m", "viscous friction")
+    v_s = Parameter(1e-3, "m/s", "Stribeck speed", above=0.0)
+    v_driver = Parameter(0.1, "m/s", "speed of the driver")
+    x = State("m", "position")
+    v = State("m/s", "speed", rate_of=x, nominal_velocity=v_s)
+    z = State("m", "deflection of the bristles")
+    x_driver = State("m", "position of the driver, zero at the start", rate=v_driver)
+    ratio = v / v_s
+    curve = f_d + (f_s - f_d) * exp(-ratio * ratio)
+    u = Output("m/s", "speed of the bristles", v - s_0 * fabs(v) * z / curve, rate_of=z)
+    a = Output("m/s2", "acceleration", (k * (x_driver - x) - s_0 * z - s_1 * u - s_2 * v) / m, rate_of=v)
+    stop_time, step_size, method = 40.0, 0.025, "radau9"
+'''
+
+
+def test_a_kink_of_the_rates_costs_less_than_ten_tolerances(lugre):
+    """LuGre, three stops and restarts; the reference is an explicit method of order 8.
+
+    The absolute tolerance resolves the bristles, which deflect by 1e-5 m.
+    """
+    reference, _ = run(lugre, {"solver.method": DOP853, "solver.rtol": 1e-11}, 22.0)
+    for rtol in 10.0 ** -np.arange(2, 10, 1.0):
+        values = {"solver.method": RADAU9, "solver.rtol": rtol, "solver.atol": 1e-5 * rtol}
+        rows, _ = run(lugre, values, 22.0)
+        assert relative_error(rows[:, :2], reference[:, :2]) < 10.0 * rtol, rtol
