@@ -33,7 +33,7 @@ from fmus.packaging.archive import build
 from fmus.packaging.equations.model_file import ModelFile
 from fmus.packaging.import_time import measure_import_time
 from fmus.packaging.lowering import LAWS, METHODS
-from fmus.packaging.model_lookup import find_model, model_names
+from fmus.packaging.model_lookup import find_model, model_names, more_model_names
 from harness.process.temporary_directory import temporary_directory
 
 HERE = Path(__file__).parent
@@ -47,6 +47,7 @@ FMUS = (
 @click.argument("models", metavar="[NAME | FILE.py]...", nargs=-1)
 @click.option("--fmi", type=click.Choice(["2", "3"]), default="2", help="FMI version; 3 implies --native.")
 @click.option("--native", "compiled", is_flag=True, help="Compile to machine code; the FMU contains no Python.")
+@click.option("--more", is_flag=True, help="Build the models of fmus/more.")
 @click.option(
     "--web", is_flag=True, help="Write a page that runs the models in a browser, web/index.html, instead of FMUs."
 )
@@ -83,6 +84,7 @@ def main(
     models: tuple[str, ...],
     fmi: str,
     compiled: bool,
+    more: bool,
     web: bool,
     methods: tuple[str, ...],
     laws: tuple[str, ...],
@@ -91,7 +93,8 @@ def main(
     release: Path | None,
     stages: Path | None,
 ) -> None:
-    """Build an FMU for each model NAME or model file FILE.py; without arguments, for all models of the project.
+    """Build an FMU for each model NAME or model file FILE.py; without arguments, for the five models
+    of fmus.  FMUs of fmus/more are written there.
 
     Prints file size, import time in Python, and SHA-256 digest.
 
@@ -99,6 +102,7 @@ def main(
     Examples:
       python build_fmus.py
       python build_fmus.py stickslip --out elsewhere
+      python build_fmus.py --more
       python build_fmus.py cart.py --native --platform linux64
       python build_fmus.py --release dist
     """
@@ -108,7 +112,7 @@ def main(
     if web and (compiled or platforms or fmi == "3"):
         raise CommandLineError("--web writes a page, not FMUs: remove --native, --platform and --fmi 3.")
     if release is not None:
-        if models or compiled or web or methods or laws or platforms or out or stages or fmi == "3":
+        if models or more or compiled or web or methods or laws or platforms or out or stages or fmi == "3":
             raise CommandLineError("--release builds everything: remove the other options and models.")
         print_summary(release_archive(release))
         return
@@ -118,7 +122,8 @@ def main(
         )
     compiled, kind = compiled or fmi == "3", "native/fmi3" if fmi == "3" else "native" if compiled else ""
     try:
-        sources = {model: find_model(model) for model in models or model_names()}
+        names = models if models and not more else (*models, *(more_model_names() if more else model_names()))
+        sources = {model: find_model(model) for model in names}
     except BuildError as error:
         raise CommandLineError(str(error)) from error
     for source in sources.values():
@@ -126,7 +131,7 @@ def main(
         if (out or web) and len(same_name) > 1:
             raise CommandLineError(f"{' and '.join(same_name)} have the same name: build them into separate folders.")
     if web:
-        is_project_model = any(model in model_names() for model in sources)
+        is_project_model = any(model in model_names() + more_model_names() for model in sources)
         web_folder = out or (FMUS if is_project_model else next(iter(sources.values())).path.parent) / "web"
         with show_progress("writing the page"):
             path = build_page(list(sources.values()), web_folder, methods, laws)
@@ -142,7 +147,7 @@ def main(
                 raise click.ClickException(str(error)) from error
         return
     for model, source in sources.items():
-        folder = out or (FMUS if model in model_names() else source.path.parent) / kind
+        folder = out or default_folder(model, source) / kind
         try:
             if compiled:
                 with show_progress(
@@ -156,6 +161,13 @@ def main(
         except BuildError as error:
             raise click.ClickException(str(error)) from error
         print_summary(path, weight)
+
+
+def default_folder(model: str, source: ModelFile) -> Path:
+    """Return the folder of the FMUs of a model: that of the project, or that of its file."""
+    if model in more_model_names():
+        return FMUS / "more"
+    return FMUS if model in model_names() else source.path.parent
 
 
 def show_progress(what: str) -> AbstractContextManager[Any]:

@@ -1,8 +1,8 @@
 """Make the pictures of the documentation in docs/images, and the outputs of its notebook.
 
 `python docs/make_images.py [NAME...]` makes all pictures or those named (without the ending).  Pictures of results are
-the figures that the code blocks of the pages make; those that no command makes are drawn here.  The FMUs must be built;
-the pictures of the live page and of the report need chromium.
+the figures that the code blocks of the pages make; those that no command makes are drawn here.  The FMUs must be built,
+for friction-laws those of fmus/more, too; the pictures of the live page and of the report need chromium.
 """
 
 import csv
@@ -199,6 +199,37 @@ def laws(folder: Path) -> None:
     plt.close(figure)
 
 
+def friction_laws(folder: Path) -> None:
+    """Speed in a slip under four laws, and the displacement under a load below the limit."""
+    sys.path.insert(0, str(DOCS.parent))
+    import harness as api
+
+    names = {"stickslip": "hybrid", "pacejka": "magic formula", "lugre": "LuGre", "elastoplastic": "elasto-plastic"}
+    weight = {"g": 10.0, "mu_s": 0.15, "mu_d": 0.1}
+    colours = dict(zip(names, ("#0072B2", "#009E73", "#D55E00", "#CC79A7"), strict=True))
+    load = {"time": [0, 10, 10, 20, 20, 30, 30, 40], "F_ext": [0.5, 0.5, 0, 0, 0.5, 0.5, 0, 0]}
+    style = {"font.size": 9, "svg.fonttype": "path", "svg.hashsalt": "friction", "axes.titlelocation": "left"}
+    style |= {"axes.titlesize": 9, "axes.grid": True, "grid.color": "#dddddd"}
+    with plt.rc_context(style):
+        figure, (slip, held) = plt.subplots(1, 2, figsize=(8.0, 3.0), layout="constrained")
+        for name, label in names.items():
+            values = weight if name in ("stickslip", "pacejka") else {"sigma_2": 0.0}
+            values |= {"x_m": 0.001} if name == "pacejka" else {}
+            fmu = FMUS / ("more" if "sigma_2" in values else "") / f"{name}.fmu"
+            run = api.simulate(fmu, values | {"m": 1.0, "k": 2.0, "v_driver": 0.1}, stop=10.0, rtol=1e-6)
+            near = run.time > 7.2
+            look = {"color": colours[name], "label": label}
+            slip.plot(run.time[near], run.columns["v"][near], **look)
+            free = values | {"m": 1.0, "k": 0.0, "v_driver": 0.0}
+            run = api.simulate(fmu, free, stop=40.0, interval=0.1, inputs=load, rtol=1e-8)
+            held.plot(run.time, 1e6 * np.asarray(run.columns["x"]), **look)
+        slip.set(title="The first slip", xlabel="time, s", ylabel="speed, m/s")
+        slip.legend(fontsize=8)
+        held.set(title="Under 0.5 N, on and off", xlabel="time, s", ylabel="displacement, µm", ylim=(-0.5, 12.0))
+        figure.savefig(IMAGES / "friction-laws.svg", metadata={"Date": None})
+    plt.close(figure)
+
+
 def live(folder: Path) -> None:
     """The opening of the live page, as chromium shows it."""
     build = [sys.executable, "-m", "build_fmus", "--web", "--out", str(folder / "live")]
@@ -251,6 +282,7 @@ INLINE = "module://matplotlib_inline.backend_inline"
 DRAWN: dict[str, Callable[[Path], None]] = {
     "stick": stick,
     "laws": laws,
+    "friction-laws": friction_laws,
     "live": live,
     "report": report,
     "notebook": notebook,

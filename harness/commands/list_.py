@@ -8,7 +8,9 @@ from .terminal import Terminal, json_option
 @click.command("list")
 @json_option
 def list_(as_json: bool) -> None:
-    """List the scenes that come with the harness: single FMUs for `run`, coupled FMUs for `couple`.
+    """List what comes with the harness: scenes and models for `run`, coupled FMUs for `couple`.
+
+    A model whose name is also the scene has no scene file; `run` uses its defaults, once it is built by name.
 
     \b
     Example:
@@ -17,6 +19,7 @@ def list_(as_json: bool) -> None:
     from rich.table import Table
 
     from ..scenes.coupled import scene as coupled
+    from ..scenes.fmu_files import model_title, more_model_files
     from ..scenes.scene import load_scene, shipped_scenes
     from ..scenes.schema import parse_table, read_toml
 
@@ -25,6 +28,7 @@ def list_(as_json: bool) -> None:
         keys = parse_table(read_toml(file), coupled.CoupledKeys)
         models = ", ".join(part.model for part in keys.parts.values())
         rows.append(("couple", file.stem, models, keys.title))
+    rows += [("run", file.stem, file.stem, model_title(file)) for file in more_model_files()]
     table = Table(*HEADINGS, box=None, padding=(0, 1, 0, 0))
     for row in rows:
         table.add_row(*row)

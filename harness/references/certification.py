@@ -1,8 +1,8 @@
 """Certified results for any model: its default run by two methods that share no formula, if they agree.
 
-Models with an independent implementation in models/ get more accurate results from generation.py.  A result is
-written next to the file of the model, under its name, and packaged into the FMU at the next build.  A second file has
-the changes of mode.
+Models with an independent implementation in models/ get more accurate results from generation.py, those of fmus/more
+from event_located.py.  A result is written next to the file of the model, under its name, and packaged into the FMU at
+the next build.  A second file has the changes of mode.
 """
 
 from dataclasses import dataclass
@@ -16,6 +16,7 @@ from ..results.files import column_heading, write_csv_rows
 from ..running.embedded_model import EmbeddedModel, load_model_class, method_numbers
 from ..scenes.fmu_files import find_fmu
 from .certified_reference import ERROR_LABEL, FOLDER, POINTS, CertifiedReference, max_relative_difference
+from .event_located import PROBLEMS, certify_by_two_routes
 from .models import CASES
 from .reference_trajectory import CommunicationGrid, ReferenceTrajectory, require_reference_packages
 from .segments import ParameterSpan, ParameterValues
@@ -52,6 +53,9 @@ def certify(file: Path) -> list[CertifiedFile]:
 
 def generate_all(file: Path) -> dict[str, CertifiedReference]:
     """Return the references of all laws of a model by name; none if it has no independent implementation."""
+    if file.resolve().parent == FOLDER / "more" and file.stem in PROBLEMS:
+        require_reference_packages()
+        return {file.stem: certify_by_two_routes(file.stem)}
     cases = {case.reference_source: case for case in CASES if FOLDER / f"{case.model}.py" == file.resolve()}
     if not cases:
         return {}

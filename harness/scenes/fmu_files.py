@@ -1,10 +1,13 @@
 """Locations of built FMUs."""
 
+import ast
 from pathlib import Path
 
 from ..errors import HarnessError, SceneError, format_value, unknown_source_message
 
-FOLDERS = (Path("fmus"), Path(__file__).parents[2] / "fmus")
+PROJECT = Path(__file__).parents[2] / "fmus"
+FOLDERS = (Path("fmus"), PROJECT)
+MORE = (Path("fmus") / "more", PROJECT / "more")  # folders of models that are not built by default
 
 
 def find_fmu(name: str) -> Path:
@@ -18,21 +21,44 @@ def find_fmu(name: str) -> Path:
         raise SceneError("no models found: run from the project directory, or set fmu = 'path/to/file.fmu'")
     if name not in names:
         raise SceneError(unknown_source_message("model", name, names))
-    return next((file for folder in FOLDERS for file in folder.glob(f"{name}.fmu")), Path("fmus") / f"{name}.fmu")
+    folders, unbuilt = (MORE, MORE[0]) if name in list_more_models() else (FOLDERS, FOLDERS[0])
+    return next((file for folder in folders for file in folder.glob(f"{name}.fmu")), unbuilt / f"{name}.fmu")
 
 
 def list_models() -> set[str]:
     """Return the names of all models, built or not."""
-    return {file.stem for folder in FOLDERS for pattern in ("*.fmu", "[!_]*.py") for file in folder.glob(pattern)}
+    return _names_in(FOLDERS) | list_more_models()
+
+
+def list_more_models() -> set[str]:
+    """Return the names of the models that are not built by default."""
+    return _names_in(MORE) - _names_in(FOLDERS)
+
+
+def more_model_files() -> list[Path]:
+    """Return the files of the models that are not built by default, sorted by name."""
+    return sorted(MORE[1].glob("[!_]*.py"))
+
+
+def model_title(file: Path) -> str:
+    """Return the title of a model: the first line of its file, without the full stop."""
+    return (ast.get_docstring(ast.parse(file.read_text(encoding="utf-8"))) or "").partition("\n")[0].rstrip(".")
+
+
+def _names_in(folders: tuple[Path, ...]) -> set[str]:
+    return {file.stem for folder in folders for pattern in ("*.fmu", "[!_]*.py") for file in folder.glob(pattern)}
 
 
 def check_built(fmu: Path, error: type[HarnessError] = HarnessError) -> None:
     """Check that the FMU exists."""
     if not fmu.is_file():
         model = fmu.with_suffix(".py")
-        object_name, argument = (
-            ("it", f" {model}") if model.is_file() and fmu.parent not in FOLDERS else ("the FMUs", "")
-        )
+        if fmu.parent in MORE:
+            object_name, argument = "it", f" {fmu.stem}"
+        elif model.is_file() and fmu.parent not in FOLDERS:
+            object_name, argument = "it", f" {model}"
+        else:
+            object_name, argument = "the FMUs", ""
         raise error(
             f"there is no {fmu}: build {object_name} with `python build_fmus.py{argument}`, or specify another file"
         )

@@ -18,12 +18,14 @@ import pytest
 from build_cache import ROOT
 from rich.console import Console
 
+from fmus.packaging.model_lookup import more_model_names
 from harness.commands import commands
 from harness.errors import HarnessError
 from harness.references.models import CASES, MODELS
 from harness.report.sections import round_run_time
 from harness.report.typeset import typeset
 from harness.scenes.coupled import scene as coupled
+from harness.scenes.fmu_files import find_fmu
 from harness.scenes.scene import load_scene, shipped_scenes
 from harness.studies.bench.benchmark import Baseline, Benchmark
 from harness.studies.bench.table import benchmark_table
@@ -216,12 +218,17 @@ def test_the_versions_are_printed(tmp_path):
 
 def test_the_json_list_is_accepted_by_the_commands(workspace):
     listing = json.loads(harness(workspace, "list", "--json").stdout)
-    assert [item["scene"] for item in listing if item["command"] == "run"] == [file.stem for file in shipped_scenes()]
+    assert [item["scene"] for item in listing if item["command"] == "run"] == [
+        *(file.stem for file in shipped_scenes()),
+        *more_model_names(),
+    ]
     assert [item["scene"] for item in listing if item["command"] == "couple"] == [
         file.stem for file in coupled.shipped_coupled_scenes()
     ]
     for item in listing:
-        if item["command"] == "run":
+        if item["scene"] in more_model_names():  # a model without a scene
+            assert item["model"] == find_fmu(item["scene"]).stem
+        elif item["command"] == "run":
             scene = load_scene(item["scene"])
             assert (item["title"], item["model"]) == (scene.title, scene.run.fmu.stem)
 

@@ -25,7 +25,7 @@ from fmus.packaging import BuildError
 from fmus.packaging.archive import write
 from fmus.packaging.embedded_modules import embedded_files, installed_package
 from fmus.packaging.model_description import describe
-from fmus.packaging.model_lookup import find_model, model_names
+from fmus.packaging.model_lookup import find_model, model_names, more_model_names
 from fmus.runtime.variable_declarations import Fixed, Output, Parameter, VariableOwner, variables
 
 EVERY_MODEL = pytest.mark.parametrize("name", model_names())
@@ -253,7 +253,7 @@ def test_the_source_date_changes_only_the_date(fmu, tmp_path):
 def test_an_unknown_name_is_refused_with_the_known_ones_before_any_build(arguments, tmp_path):
     run = command(*arguments, "--out", tmp_path)
     assert (run.returncode, run.stdout) == (2, "")
-    known = ", ".join(model_names())
+    known = ", ".join(model_names() + more_model_names())
     assert run.stderr == f"Error: There is no model 'bogus'; choose one of {known}, or give the path of a .py file.\n"
     assert list(tmp_path.iterdir()) == []
 

@@ -56,7 +56,7 @@ def test_a_scene_without_plots_shows_its_outputs(tmp_path, outputs, plots):
     ("keys", "sentence"),
     [
         ({"mehtod": '"ode23"'}, "unknown key 'mehtod' (nearest: 'method'); allowed: about, analyses, "),
-        ({"model": '"stikslip"'}, "unknown model 'stikslip' (nearest: 'stickslip'); allowed: coulomb, "),
+        ({"model": '"stikslip"'}, "unknown model 'stikslip' (nearest: 'stickslip'); allowed: belt, clutch, coulomb, "),
         ({"analyses": '["decy"]'}, "unknown name in analyses 'decy' (nearest: 'decay'); allowed: decay, slip, steps"),
         ({"plots": '["phse"]'}, "unknown name in plots 'phse' (nearest: 'phase')"),
         ({"title": None}, "the key 'title' is missing"),

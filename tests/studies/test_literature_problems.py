@@ -35,25 +35,25 @@ def rows(user_folder, monkeypatch):
 
 def test_the_reference_end_of_the_block_is_the_published_one():
     x, v = literature_problems.BLOCK
-    assert (round(x + 0.2 * 50.0, 7), round(v + 0.2, 7)) == BELT
+    assert (round(x, 7), round(v, 7)) == BELT
 
 
 def test_the_reference_end_of_the_block_agrees_with_two_methods():
     for method, rtol in (("DOP853", 3e-14), ("Radau", 1e-11)):
         answer = peer_solvers.solve("scipy", method, BeltBlock(), np.array([0.0, 50.0]), rtol, 1e-3 * rtol)
-        assert answer.states[-1] == pytest.approx(literature_problems.BLOCK, abs=2e-11)
+        assert answer.states[-1] == pytest.approx(literature_problems.BLOCK_ON_BELT, abs=2e-11)
 
 
 @pytest.mark.parametrize("method", ["ode23", "ode45", "dop853", "rodas"])
 def test_every_method_of_the_runtime_reaches_the_end_of_the_block(rows, method):
-    assert method in method_numbers(literature_problems.block_model())
+    assert method in method_numbers(literature_problems.load_more_model("belt"))
     row = next(row for row in rows("block on a belt", literature_problems.RUNTIME) if row.method == method)
     assert row.error < 200 * row.rtol
     assert row.evaluations < 10_000
 
 
 def test_the_block_sticks_and_slips_in_the_order_of_the_peer():
-    run = EmbeddedModel.create(literature_problems.block_model(), {}, "dop853", 1e-11)
+    run = EmbeddedModel.create(literature_problems.load_more_model("belt"), {}, "dop853", 1e-11)
     truth = peer_solvers.solve("scipy", "DOP853", BeltBlock(), np.array([0.0, 50.0]), 1e-12, 1e-15).events
     events = run.find_mode_changes(50.0)
     assert [mode for _, mode in events] == [mode for _, mode in truth] == [0, -1] * 4
@@ -78,6 +78,27 @@ def test_no_peer_finishes_with_the_plain_sign_law(rows):
     plain = rows("chattering classic", "scipy, plain sign(v)")
     assert [row.method for row in plain] == ["RK23", "RK45", "LSODA", "Radau"]
     assert all(row.failure and row.evaluations is None and np.isnan(row.error) for row in plain)
+
+
+@pytest.mark.parametrize(
+    ("problem", "bound"),
+    {
+        "stick-slip in closed form": 10,
+        "stick-slip with LuGre friction": 10,
+        "forced motion without stops": 10,
+        "forced motion with stops": 10,
+        "two sleds in a row": 10,
+    }.items(),
+)
+def test_every_method_of_the_runtime_reaches_the_certified_answer(rows, problem, bound):
+    found = rows(problem, literature_problems.RUNTIME)
+    assert {"ode23", "ode45", "dop853", "rodas"} <= {row.method for row in found}
+    assert all(row.error < bound * row.rtol for row in found)
+
+
+def test_lugre_is_right_to_nine_digits(rows):
+    (row,) = [row for row in rows("stick-slip with LuGre friction", "this runtime") if row.method == "dop853"]
+    assert row.error < 1e-10
 
 
 def test_the_two_forms_of_each_problem_are_equivalent():

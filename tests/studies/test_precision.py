@@ -250,5 +250,5 @@ def test_a_user_model_is_studied_by_its_path_or_that_of_its_fmu(path, ending):
 def test_an_unknown_model_is_one_sentence(user_folder, tmp_path):
     done = command(user_folder, "stikslip", "--out", tmp_path)
     assert (done.returncode, done.stdout) == (2, "")
-    assert done.stderr.startswith("Error: unknown model 'stikslip' (nearest: 'stickslip'); allowed: coulomb, ")
+    assert done.stderr.startswith("Error: unknown model 'stikslip' (nearest: 'stickslip'); allowed: belt, clutch, ")
     assert not list(tmp_path.iterdir())

@@ -1,16 +1,19 @@
-"""Two problems from the literature, solved by the runtime and by peer solvers.
+"""Problems from the literature, solved by the runtime; the first two by peer solvers, too.
 
 1. Block on a belt with friction that decreases with the relative speed (R. I. Leine, Bifurcations in Discontinuous
    Mechanical Systems of Filippov-Type, 2000).
 2. Chattering: friction so strong that the mass stops for good within half a second.  With sign(v) no solver finishes;
    with modes it is a single event.
+3. Stick-slip in closed form (E. Rabinowicz, Friction and Wear of Materials, chapter 4).
+4. Stick-slip with LuGre friction, a stiff problem with a kink (C. Canudas de Wit et al., 1995).
+5. Steady forced motion, with and without stops (J. P. Den Hartog, 1931).
+6. Two sleds in a row, each with stick and slip.
 """
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cache, partial
-from math import sqrt
-from pathlib import Path
+from math import pi, sqrt
 
 import numpy as np
 
@@ -18,6 +21,8 @@ from ...errors import HarnessError
 from ...process.subprocess_runner import run_module
 from ...process.temporary_directory import temporary_directory
 from ...references import peer_solvers
+from ...references.certified_reference import FOLDER, load_reference
+from ...references.den_hartog import SteadyMotion, steady_motion_with_stops, steady_motion_without_stops
 from ...references.literature_problems import (
     BeltBlock,
     ChatteringOscillator,
@@ -35,7 +40,7 @@ RUNTIME, EVENTS = "this runtime", "events"
 
 @dataclass(frozen=True)
 class LiteratureRun:
-    """One solver: `error` is the larger of the final errors of position (m) and speed (m/s); or the failure."""
+    """One solver: `error` is the largest of the final errors of positions (m) and speeds (m/s); or the failure."""
 
     problem: str
     solver: str
@@ -46,21 +51,25 @@ class LiteratureRun:
     failure: str = ""
 
 
-# Final state of the block in the frame of the belt.  Two methods at 1e-12 agree in these digits; the published values,
-# x = -0.2992525 and v = -0.6308870 in the fixed frame, agree in all their digits.
-BLOCK = (-0.29925249924 - 50.0 * 0.2, -0.63088695537 - 0.2)
+# Final state of the block.  Two methods at 1e-12 agree in these digits; the published values, x = -0.2992525 and
+# v = -0.6308870, agree in all their digits.
+BLOCK = (-0.29925249924, -0.63088695537)
+BLOCK_ON_BELT = (BLOCK[0] - 50.0 * 0.2, BLOCK[1] - 0.2)  # in the frame of the belt
+SLIDING = {"m": 1.0, "k": 100.0, "f": 2.0, "P": 10.0, "Omega": 8.0}  # forced motion without stops
+STOPPING = {"m": 1.0, "k": 100.0, "f": 6.0, "P": 10.0, "Omega": 5.0}  # and with two in each period
+PERIODS = 20  # of the forced motion
 CLASSIC = (sqrt(125.0) - 10.0, 0.0)  # x = -10 + 10 cos t + 5 sin t until its first turning point
 TIGHT = {"RK23": 1e-6, "ode23": 1e-6, "DOP853": 1e-10, "dop853": 1e-10}  # 1e-8 for the others
 
 
 def solve_all() -> Iterator[LiteratureRun]:
-    """Solve both problems with every method of the runtime, then with the peer solvers."""
+    """Solve all problems with every method of the runtime, the first two with the peer solvers as well."""
     name = "block on a belt"
-    yield from runtime_runs(name, block_model(), {}, BeltBlock.stop, BLOCK)
+    yield from runtime_runs(name, load_more_model("belt"), {}, BeltBlock.stop, BLOCK)
     yield from peer_runs(
-        name, BeltBlock(), BLOCK, EVENTS, {"scipy": ("RK23", "RK45", "DOP853", "LSODA"), "cvode": ("Adams",)}
+        name, BeltBlock(), BLOCK_ON_BELT, EVENTS, {"scipy": ("RK23", "RK45", "DOP853", "LSODA"), "cvode": ("Adams",)}
     )
-    yield from peer_runs(name, SmoothedBeltBlock(), BLOCK, "arctan(1e6 v)", {"scipy": ("RK45", "LSODA")})
+    yield from peer_runs(name, SmoothedBeltBlock(), BLOCK_ON_BELT, "arctan(1e6 v)", {"scipy": ("RK45", "LSODA")})
     name, values = "chattering classic", {"m": 1.0, "k": 1.0, "f": 10.0, "x0": 0.0, "v0": 5.0}
     yield from runtime_runs(name, load_model_class(find_fmu("coulomb")), values, ChatteringOscillator.stop, CLASSIC)
     yield from peer_runs(name, ChatteringOscillator(), CLASSIC, EVENTS, {"scipy": ("RK23", "RK45", "LSODA")})
@@ -68,19 +77,37 @@ def solve_all() -> Iterator[LiteratureRun]:
         name, ChatteringOscillatorSign(), CLASSIC, "plain sign(v)", {"scipy": ("RK23", "RK45", "LSODA", "Radau")}
     )
 
+    yield from certified_runs("stick-slip in closed form", load_model_class(find_fmu("stickslip")), "stickslip")
+    yield from certified_runs("stick-slip with LuGre friction", load_more_model("lugre"), "more/lugre")
+    yield from forced_runs("forced motion without stops", steady_motion_without_stops(**SLIDING), SLIDING)
+    yield from forced_runs("forced motion with stops", steady_motion_with_stops(**STOPPING), STOPPING)
+    yield from certified_runs("two sleds in a row", load_more_model("sleds"), "more/sleds")
+
+
+def certified_runs(name: str, model: type, reference: str) -> Iterator[LiteratureRun]:
+    """Solve the default run of a model with every method, and compare it with its certified result."""
+    truth = load_reference(reference, FOLDER)
+    yield from runtime_runs(name, model, {}, float(truth.times[-1]), tuple(truth.motion[-1]))
+
+
+def forced_runs(name: str, steady: SteadyMotion, values: dict[str, float]) -> Iterator[LiteratureRun]:
+    """Solve forced motion with every method over some periods, from its largest displacement on."""
+    values, stop = values | {"x0": steady.amplitude, "angle0": steady.phase}, 2.0 * PERIODS * pi / values["Omega"]
+    yield from runtime_runs(name, load_more_model("forced"), values, stop, (steady.amplitude, 0.0))
+
 
 @cache
-def block_model() -> type:
-    """Build the FMU of block.py and return the model class in it."""
-    with temporary_directory("block-") as folder:
-        done = run_module("build_fmus", "", str(Path(__file__).with_name("block.py")), "--out", str(folder))
+def load_more_model(name: str) -> type:
+    """Build the FMU of a model of fmus/more and return the model class in it."""
+    with temporary_directory(f"{name}-") as folder:
+        done = run_module("build_fmus", "", name, "--out", str(folder))
         if done.returncode:
-            raise HarnessError(f"cannot build the block on a belt: {(done.stderr.splitlines() or ['?'])[-1]}")
-        return load_model_class(folder / "block.fmu")
+            raise HarnessError(f"cannot build {name}: {(done.stderr.splitlines() or ['?'])[-1]}")
+        return load_model_class(folder / f"{name}.fmu")
 
 
 def runtime_runs(
-    name: str, model: type, values: dict[str, float], stop: float, end: tuple[float, float]
+    name: str, model: type, values: dict[str, float], stop: float, end: tuple[float, ...]
 ) -> Iterator[LiteratureRun]:
     """Solve a model with every method of the runtime, up to the stop time in s."""
     for method in method_numbers(model):
@@ -111,7 +138,7 @@ def peer_runs(
 
 
 def make_run(
-    begin: Callable[..., LiteratureRun], solve: Callable[[], Solution], end: tuple[float, float]
+    begin: Callable[..., LiteratureRun], solve: Callable[[], Solution], end: tuple[float, ...]
 ) -> LiteratureRun:
     """Return one row of the table."""
     try:

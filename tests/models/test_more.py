@@ -1,0 +1,158 @@
+"""The models of fmus/more: certified results, events, packaging, and the same bits from every kind of FMU."""
+
+from pathlib import Path
+
+import commands
+import fmi3_fixtures
+import numpy as np
+import pytest
+from build_cache import ROOT, build_once
+from fmpy.validation import validate_fmu
+from independent_contacts import Contact, Spring, System
+from independent_contacts import solve as solve_by_taylor_series
+from models import DOP853
+from native_fmus import require_compiler
+from row_comparison import assert_identical
+from worker_client import worker_fixtures
+
+from fmus.packaging.model_lookup import find_model, more_model_names
+from fmus.runtime.variable_declarations import Output, variables
+from harness.errors import HarnessError
+from harness.references import event_located
+from harness.references.certified_reference import event_time_error, load_reference, relative_errors
+from harness.scenes.fmu_files import check_built
+
+MORE = ROOT / "fmus" / "more"
+CERTIFIED = sorted(event_located.PROBLEMS)
+KINDS = {"python": (), "native": ("--native",), "fmi3": ("--fmi", "3")}
+_workers, worker, fresh_worker = worker_fixtures(fmi3_fixtures.Worker, "module")  # which also runs FMI 2.0 FMUs
+LAWS = {"hyperbola": (1, event_located.Belt), "stribeck": (2, event_located.StribeckBelt)}
+LAWS |= {"coulomb": (3, event_located.CoulombBelt)}
+
+
+def built(name, kind="python"):
+    """Return the FMU of a model of fmus/more."""
+    platform = []
+    if kind != "python":
+        require_compiler()
+        platform = ["--platform", "linux64"]
+    return build_once(f"more-{kind}", "--more", *KINDS[kind], *platform, timeout=600) / f"{name}.fmu"
+
+
+def states(name):
+    """Return the names of the states that the solver integrates."""
+    return [*find_model(name).model().states]
+
+
+def follow_events(fmu, names, stop):
+    """Return time and modes of every change of mode, stepping to every internal step."""
+    t, events = 0.0, []
+    while t < stop:
+        ahead = min(fmu.get("solver.t_next"), stop)
+        fmu.step(t, ahead - t)
+        t = ahead
+        count, *event = fmu.get("events.count", "events.t_last", *names)
+        if count > len(events):
+            events.append(event)
+    return events
+
+
+def mode_names(name):
+    """Return the names of the modes of the contacts."""
+    return [*find_model(name).model().contacts]
+
+
+def test_every_model_has_an_icon_and_a_certified_result():
+    assert set(CERTIFIED) == set(more_model_names()) - {"spring"}  # which only couples FMUs
+    for name in CERTIFIED:
+        assert MORE.joinpath(f"{name}.png").read_bytes()[:4] == b"\x89PNG"
+        assert load_reference(name, MORE).estimated_error < 1e-10
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("name", more_model_names())
+def test_fmpy_validates_each_kind(name, kind):
+    assert validate_fmu(str(built(name, kind))) == []
+
+
+@pytest.mark.parametrize("name", CERTIFIED)
+def test_the_default_run_reproduces_the_certified_result(worker, name):
+    """Within ten times the tolerance at 1e-6, and to 1e-9 at a tight one."""
+    truth = load_reference(name, MORE)
+    for values, bound in (({"solver.rtol": 1e-6}, 1e-4), ({"solver.rtol": 1e-12}, 1e-9)):
+        fmu = worker.instantiate(built(name)).begin(values, stop=truth.times[-1])
+        rows = fmu.run(truth.times.tolist(), states(name))
+        fmu.free()
+        assert relative_errors(np.array(rows), truth.motion).max() < bound
+
+
+@pytest.mark.parametrize("name", [name for name in CERTIFIED if event_located.PROBLEMS[name].first])
+def test_events_are_those_of_the_second_formulation(worker, name):
+    problem = event_located.PROBLEMS[name]()
+    _, truth = event_located.solve(problem, [0.0, problem.stop], "DOP853", 3e-14, 1e-17)
+    fmu = worker.instantiate(built(name)).begin({"solver.rtol": 1e-12, "solver.method": DOP853}, stop=problem.stop)
+    events = follow_events(fmu, mode_names(name), problem.stop)
+    fmu.free()
+    assert [tuple(modes) for _, *modes in events] == [modes for _, modes in truth]
+    assert np.abs(np.array([t for t, *_ in events]) - [t for t, _ in truth]).max() < 1e-10
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_the_belt_follows_each_law(worker, law):
+    number, problem = LAWS[law][0], LAWS[law][1]()
+    (_, end), truth = event_located.solve(problem, [0.0, 20.0], "DOP853", 3e-14, 1e-17)
+    values = {"law": number, "solver.rtol": 1e-12, "solver.method": DOP853}
+    fmu = worker.instantiate(built("belt")).begin(values, stop=20.0)
+    events = [(t, mode) for t, mode in follow_events(fmu, ["mode"], 20.0)]
+    assert event_time_error(events, [(t, mode) for t, (mode,) in truth]) < 1e-10
+    assert fmu.get("x", "v") == pytest.approx(end, abs=1e-10)
+    fmu.free()
+
+
+def test_two_sleds_have_the_events_of_a_taylor_series(worker):
+    """The system of tests/support/independent_contacts.py, solved by series of order 24: within 1e-10."""
+    sleds = System(
+        masses=(12.5, 8.0),
+        springs=(Spring((-1.0, 0.0), 742.5, drive=-1.0), Spring((1.0, -1.0), 1100.0)),
+        contacts=(
+            Contact((1.0, 0.0), 73.575, 73.575, 110.3625, 1.0),
+            Contact((0.0, 1.0), 40.0, 40.0, 66.0, 1.0),
+        ),
+        force_0=(0.0, 0.0), force_1=(0.0, 0.0), q_0=(0.0, 0.0), v_0=(0.0, 0.0), v_driver=0.034, stop=16.0,
+    )  # fmt: skip
+    truth = solve_by_taylor_series(sleds)
+    fmu = worker.instantiate(built("sleds")).begin({"solver.rtol": 1e-12, "solver.method": DOP853}, stop=16.0)
+    events = follow_events(fmu, ["mode_1", "mode_2"], 16.0)
+    assert [tuple(modes) for _, *modes in events] == [modes for _, modes in truth.events]
+    assert np.abs(np.array([t for t, *_ in events]) - [t for t, _ in truth.events]).max() < 1e-10
+    x_1, x_2, v_1, v_2 = truth.states(16.0)
+    assert fmu.get("x_1", "v_1", "x_2", "v_2") == pytest.approx([x_1, v_1, x_2, v_2], abs=1e-10)
+    fmu.free()
+
+
+@pytest.mark.parametrize("name", CERTIFIED)
+def test_python_native_and_fmi3_agree_bit_for_bit(worker, name):
+    """All outputs at 101 points of the default run."""
+    model = find_model(name).model()
+    names = [variable for variable, declared in variables(model) if isinstance(declared, Output)]
+    times = np.linspace(0.0, type(model).stop_time, 101).tolist()
+    rows = []
+    for kind in KINDS:
+        fmu = worker.instantiate(built(name, kind)).begin({}, stop=times[-1])
+        rows.append(fmu.run(times, names))
+        fmu.free()
+    assert_identical(rows[0], rows[1], names)
+    assert_identical(rows[0], rows[2], names)
+
+
+def test_commands_know_the_models_by_name(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    listed = commands.harness(tmp_path, "list", "--json").stdout
+    assert all(f'"model": "{name}"' in listed for name in CERTIFIED)
+    with pytest.raises(HarnessError, match=r"no fmus/more/belt.fmu: build it with `python build_fmus.py belt`"):
+        check_built(Path("fmus/more/belt.fmu"))
+    (tmp_path / "fmus" / "more").mkdir(parents=True)
+    (tmp_path / "fmus" / "more" / "belt.fmu").write_bytes(built("belt").read_bytes())
+    done = commands.harness(tmp_path, "run", "belt", blank=True)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "sticks for" in done.stdout
