@@ -50,7 +50,7 @@ class MeasuredRecord:
         self.subdivide(1)
 
     def subdivide(self, parts: int, every: int = 1) -> None:
-        """Divide the intervals between samples; there, inputs are cubic splines through every so-manieth sample."""
+        """Divide the intervals between samples; there, inputs are splines through each `every`-th sample."""
         self.subdivision = parts
         shares = np.arange(parts) / parts
         self.fine_t = np.append((self.t[:-1, None] + np.diff(self.t)[:, None] * shares).ravel(), self.t[-1])

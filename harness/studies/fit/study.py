@@ -93,7 +93,6 @@ def fit_as_json(fit: ParameterFit) -> dict[str, Any]:
         "bic": fit.bic,
         "searches": fit.n_searches,
         "runs": fit.n_runs,
-        "seconds": fit.seconds,
         "log": list(fit.log),
     }
 
