@@ -7,11 +7,12 @@ is printed. An error that a user can cause raises a subclass of `HarnessError`.
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from .api import compare, identify_decay, load_result, simulate, sweep
+from .api import compare, fit, identify_decay, load_result, simulate, sweep
 from .errors import HarnessError, SceneError
 
 if TYPE_CHECKING:
     from .analyses.decay.identification import DecayIdentification
+    from .analyses.fit.parameter_fit import ParameterFit
     from .running.trajectory import Trajectory
     from .studies.compare.difference import Comparison
 
@@ -21,10 +22,12 @@ __all__ = [
     "Comparison",
     "DecayIdentification",
     "HarnessError",
+    "ParameterFit",
     "SceneError",
     "Trajectory",
     "__version__",
     "compare",
+    "fit",
     "identify_decay",
     "load_result",
     "simulate",
@@ -35,6 +38,7 @@ __all__ = [
 TYPES = {
     "Comparison": "harness.studies.compare.difference",
     "DecayIdentification": "harness.analyses.decay.identification",
+    "ParameterFit": "harness.analyses.fit.parameter_fit",
     "Trajectory": "harness.running.trajectory",
 }
 

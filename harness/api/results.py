@@ -22,7 +22,7 @@ def load_result(folder: "str | Path") -> "Trajectory | xarray.Dataset | dict[str
     Returns
     -------
     Trajectory, xarray.Dataset or dict
-        The trajectory of a run, the dataset of a sweep, or the numbers of a decay or a comparison.
+        The trajectory of a run, the dataset of a sweep, or the numbers of a decay, a fit or a comparison.
 
     Raises
     ------
@@ -37,7 +37,7 @@ def load_result(folder: "str | Path") -> "Trajectory | xarray.Dataset | dict[str
         with library.open_dataset(path / "sweep.nc") as data:
             loaded: xarray.Dataset = data.load()
         return loaded
-    for name in ("decay.json", "compare.json"):
+    for name in ("decay.json", "fit.json", "compare.json"):
         if (path / name).is_file():
             numbers: dict[str, Any] = json.loads((path / name).read_text(encoding="utf-8"))
             return numbers

@@ -32,7 +32,7 @@ def test_public_names_are_complete_and_documented():
 
 
 def test_functions_document_every_parameter():
-    for name in ("simulate", "compare", "identify_decay", "sweep", "load_result"):
+    for name in ("simulate", "compare", "identify_decay", "fit", "sweep", "load_result"):
         function = getattr(harness, name)
         text = inspect.getdoc(function)
         for section in ("Parameters", "Returns", "Raises"):

@@ -3,7 +3,6 @@
 from pathlib import Path
 
 import commands
-import fmi3_fixtures
 import numpy as np
 import pytest
 from build_cache import ROOT, build_once
@@ -13,7 +12,6 @@ from independent_contacts import solve as solve_by_taylor_series
 from models import DOP853
 from native_fmus import require_compiler
 from row_comparison import assert_identical
-from worker_client import worker_fixtures
 
 from fmus.packaging.model_lookup import find_model, more_model_names
 from fmus.runtime.variable_declarations import Output, variables
@@ -25,7 +23,6 @@ from harness.scenes.fmu_files import check_built
 MORE = ROOT / "fmus" / "more"
 CERTIFIED = sorted(event_located.PROBLEMS)
 KINDS = {"python": (), "native": ("--native",), "fmi3": ("--fmi", "3")}
-_workers, worker, fresh_worker = worker_fixtures(fmi3_fixtures.Worker, "module")  # which also runs FMI 2.0 FMUs
 LAWS = {"hyperbola": (1, event_located.Belt), "stribeck": (2, event_located.StribeckBelt)}
 LAWS |= {"coulomb": (3, event_located.CoulombBelt)}
 

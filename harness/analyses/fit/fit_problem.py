@@ -1,0 +1,185 @@
+"""Residuals of records as functions of the unknowns, and their minimum by the method of Levenberg and Marquardt."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from .feasible_region import FeasibleRegion
+from .measured_record import MeasuredRecord, Simulate
+from .unknowns import GAIN, OFFSET, Unknown
+
+EXACT_STEPS, ROUGH_STEPS = (1e-6, 1e-6), (1e-5, 1e-4)  # of one-sided and central differences
+MAX_COORDINATE = 60.0
+HUBER = 3.0  # residuals in units of the noise, beyond which a robust loss is linear
+LONGEST_STEP = 0.7  # of a coordinate
+MAX_DAMPINGS = 10  # tries of one step
+
+Selection = tuple[np.ndarray, ...]  # the indices of the samples of each record
+
+
+class FitProblem:
+    """Residuals of the records, in units of their noise.
+
+    Parameters
+    ----------
+    simulate : callable
+        Runs the FMU; see `Simulator.simulate`.
+    records : sequence of MeasuredRecord
+    outputs : sequence of str
+        Observed variables, one for each column of the records.
+    unknowns : sequence of Unknown
+    fixed : mapping
+        Values of parameters that are not fitted.
+    robust : bool
+        Whether large residuals count linearly (Huber) instead of by their squares.
+    """
+
+    def __init__(
+        self,
+        simulate: Simulate,
+        records: Sequence[MeasuredRecord],
+        outputs: Sequence[str],
+        unknowns: Sequence[Unknown],
+        fixed: Mapping[str, float],
+        robust: bool = False,
+    ) -> None:
+        self.simulate, self.records, self.outputs = simulate, tuple(records), list(outputs)
+        self.unknowns, self.fixed, self.robust = tuple(unknowns), dict(fixed), robust
+        self.region = FeasibleRegion(self.unknowns)
+        self.low, self.high = np.array([unknown.search_range for unknown in self.unknowns]).T
+        self.all: Selection = tuple(record.all for record in self.records)
+        self.central = False  # whether slopes need central differences
+        self.steps = self.difference_steps()
+
+    @property
+    def n_samples(self) -> int:
+        return sum(record.y.size for record in self.records)
+
+    def values(self, z: np.ndarray, record: int) -> dict[str, float]:
+        """Return the values to set for a record."""
+        fitted = {
+            unknown.variable: unknown.to_value(float(each))
+            for unknown, each in zip(self.unknowns, z, strict=True)
+            if unknown.column is None and unknown.record in (None, record)
+        }
+        return self.fixed | fitted
+
+    def predict(self, z: np.ndarray, selection: Selection) -> list[np.ndarray] | None:
+        """Return what the sensors show at the selected samples of each record; None if the FMU refuses the values."""
+        if np.abs(z).max() > MAX_COORDINATE:
+            return None
+        predicted = []
+        for i, (record, index) in enumerate(zip(self.records, selection, strict=True)):
+            y = record.simulate(self.simulate, self.values(z, i), self.outputs, index)
+            if y is None:
+                return None
+            predicted.append(self.apply_sensors(z, i, y))
+        return predicted
+
+    def apply_sensors(self, z: np.ndarray, record: int, y: np.ndarray) -> np.ndarray:
+        """Return the outputs y (n, columns) as the sensors show them: gain times output, plus offset."""
+        for kind in (GAIN, OFFSET):
+            for unknown, each in zip(self.unknowns, z, strict=True):
+                if unknown.variable == kind and unknown.column is not None and unknown.record in (None, record):
+                    value = unknown.to_value(float(each))
+                    y[:, unknown.column] = (
+                        y[:, unknown.column] * value if kind == GAIN else y[:, unknown.column] + value
+                    )
+        return y
+
+    def residuals(self, z: np.ndarray, selection: Selection) -> np.ndarray | None:
+        """Return the residuals in units of the noise, record by record; None if the FMU refuses the values."""
+        predicted = self.predict(z, selection)
+        if predicted is None:
+            return None
+        parts = (
+            ((y - record.y[index]) / record.noise).ravel()
+            for y, record, index in zip(predicted, self.records, selection, strict=True)
+        )
+        e = np.concatenate([*parts])
+        if self.robust:
+            size = np.abs(e)
+            e = np.where(size > HUBER, np.sign(e) * np.sqrt(np.maximum(2 * HUBER * size - HUBER**2, 0.0)), e)
+        return e
+
+    def is_refused(self, z: np.ndarray) -> bool:
+        """Return whether the FMU refuses the values at the start."""
+        return self.predict(z, tuple(index[:2] for index in self.all)) is None
+
+    def difference_steps(self) -> tuple[float, float]:
+        """Return the steps of one-sided and of central differences.
+
+        They are longer where runs with nearly equal values scatter, as those of solvers with step control do. The
+        scatter is that of third differences.
+        """
+        index = tuple(each[:: max(1, len(each) // 200)] for each in self.all)
+        for share in (0.5, 0.4, 0.6, 0.3, 0.7):
+            z = self.low + (self.high - self.low) * share
+            e = [each for i in range(4) if (each := self.residuals(z + 1e-7 * i, index)) is not None]
+            if len(e) == 4:
+                scatter = np.quantile(np.abs(e[0] - 3 * e[1] + 3 * e[2] - e[3]), 0.9) / 20**0.5
+                return EXACT_STEPS if scatter < 1e-9 * np.ptp(e[0]) else ROUGH_STEPS
+        return EXACT_STEPS
+
+    def jacobian(
+        self, z: np.ndarray, e: np.ndarray, selection: Selection, free: np.ndarray, central: bool
+    ) -> np.ndarray:
+        """Return the derivatives (n, free) of the residuals e (n,); a side that is refused is left out."""
+        columns, h = np.zeros((len(e), len(free))), self.steps[central]
+        for j, i in enumerate(free):
+            d = h * np.eye(len(z))[i]
+            up = self.residuals(z + d, selection)
+            down = self.residuals(z - d, selection) if central or up is None else None
+            ends = [(each, side) for each, side in ((up, 1), (down, -1), (e, 0)) if each is not None][:2]
+            if len(ends) == 2:
+                columns[:, j] = (ends[0][0] - ends[1][0]) / (h * (ends[0][1] - ends[1][1]))
+        return columns
+
+    def minimize(
+        self,
+        z: np.ndarray,
+        selection: Selection,
+        max_steps: int,
+        min_gain: float,
+        free: np.ndarray | None = None,
+        central: bool = False,
+    ) -> tuple[float, np.ndarray]:
+        """Return the sum of squares and the coordinates after steps of Levenberg and Marquardt inside the region.
+
+        Parameters
+        ----------
+        z : numpy.ndarray
+            Coordinates (k,) to start from.
+        max_steps : int
+        min_gain : float
+            Relative reduction of the sum of squares below which the steps end.
+        free : numpy.ndarray, optional
+            Indices of the coordinates to fit; by default all.
+        """
+        free = np.arange(len(z)) if free is None else free
+        e, damping = self.residuals(z, selection), 1e-2
+        if e is None:
+            return np.inf, z
+        squares = float(e @ e)
+        for _ in range(max_steps if len(free) else 0):
+            jacobian = self.jacobian(z, e, selection, free, central or self.central)
+            matrix, slope = jacobian.T @ jacobian, jacobian.T @ e
+            scale = np.diag(np.maximum(np.diag(matrix), 1e-9 * matrix.max() + 1e-30))
+            for _ in range(MAX_DAMPINGS):
+                s, step = self.region.constrained_step(matrix + damping * scale, slope, z, free), np.zeros(len(z))
+                if not np.isfinite(s).all():
+                    return squares, z
+                step[free] = s * min(1.0, LONGEST_STEP / max(float(np.abs(s).max()), 1e-300))
+                new = self.residuals(z + step, selection)
+                if new is not None and new @ new < squares:
+                    break
+                if new is None:
+                    self.region.learn(self.is_refused, z, step)
+                damping = max(damping * 6, 1e-6)
+            else:
+                return squares, z
+            gain, z, e, damping = 1 - float(new @ new) / squares, z + step, new, damping * 0.15
+            squares = float(e @ e)
+            if gain < min_gain:
+                break
+        return squares, z

@@ -1,0 +1,97 @@
+"""A measured record as a fit uses it: samples, noise, inputs between samples, and the run at the same times."""
+
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from .noise import bin_means, estimate_noise
+
+MAX_SAMPLES = 2500  # twice as many are averaged to this number of means of neighbours
+INPUT_POINTS = 1000  # of an input that suffice for a search
+Simulate = Callable[..., np.ndarray | None]
+
+
+class MeasuredRecord:
+    """Samples y (n, columns) at the times t (n,), and the inputs that acted.
+
+    Attributes
+    ----------
+    noise, step : numpy.ndarray
+        Standard deviation of the noise and step of the quantiser (columns,); the step is 0 if there is none.
+    width : int
+        Number of samples whose mean each row of `y` is.
+    subdivision : int
+        Number of parts of each interval between samples, in each of which inputs are constant.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        t: np.ndarray,
+        y: np.ndarray,
+        inputs: Mapping[str, np.ndarray],
+        sigma: Sequence[float | None],
+        binned: bool,
+    ) -> None:
+        self.name, self.sampled_t, self.sampled_y, self.sampled_inputs = name, t, y, inputs
+        estimates = [estimate_noise(t, column) for column in y.T]
+        self.step = np.array([step for _, step in estimates])
+        self.width = len(t) // MAX_SAMPLES if binned and len(t) > 2 * MAX_SAMPLES else 1
+        self.t, self.y, self.inputs = t, y, dict(inputs)
+        if self.width > 1:
+            self.t, self.y = bin_means(t, self.width), bin_means(y, self.width)
+            self.inputs = {name: bin_means(u, self.width) for name, u in inputs.items()}
+        scatter = [estimate_noise(self.t, column)[0] for column in self.y.T]
+        self.noise = np.maximum(scatter, self.step / 12**0.5)
+        known = np.array([each or 0.0 for each in sigma])
+        self.noise = np.where(known > 0, known / np.sqrt(self.width), self.noise)
+        self.all = np.arange(len(self.t))
+        self.subdivide(1)
+
+    def subdivide(self, parts: int, every: int = 1) -> None:
+        """Divide the intervals between samples; there, inputs are splines through each `every`-th sample."""
+        self.subdivision = parts
+        shares = np.arange(parts) / parts
+        self.fine_t = np.append((self.t[:-1, None] + np.diff(self.t)[:, None] * shares).ravel(), self.t[-1])
+        if parts == every == 1:
+            self.driven = self.inputs
+            return
+        knots = np.unique(np.append(self.all[::every], self.all[-1]))
+        self.driven = {name: CubicSpline(self.t[knots], u[knots])(self.fine_t) for name, u in self.inputs.items()}
+
+    def simulate(
+        self, simulate: Simulate, values: Mapping[str, float], outputs: Sequence[str], index: np.ndarray
+    ) -> np.ndarray | None:
+        """Return the outputs (len(index), outputs) at the samples `index`, which contain the first; None if refused."""
+        if len(index) == len(self.t):
+            return simulate(values, self.fine_t, outputs, self.driven, self.subdivision)
+        if not self.inputs:
+            return simulate(values, self.t[index], outputs, {})
+        grid = np.union1d(np.arange(0, index[-1] + 1, max(1, len(self.t) // INPUT_POINTS)), index)
+        y = simulate(values, self.t[grid], outputs, {name: u[grid] for name, u in self.inputs.items()})
+        return None if y is None else y[np.searchsorted(grid, index)]
+
+    def means_hold(self, simulate: Simulate, values: Mapping[str, float], outputs: Sequence[str]) -> bool:
+        """Return whether the means of the outputs over the samples are the outputs at the mean times."""
+        if self.width == 1 or self.inputs:
+            return True
+        y = self.simulate(simulate, values, outputs, self.all)
+        whole = simulate(values, self.sampled_t, outputs, {})
+        if y is None or whole is None:
+            return False
+        return bool(np.abs((bin_means(whole, self.width) - y) / self.noise).max() < 0.3)
+
+    def stretches(self, shares: Sequence[float], points: int) -> list[np.ndarray]:
+        """Return samples of longer and longer parts of the record, each with a share of all motion."""
+        n, width = len(self.t), max(1, len(self.t) // 200)
+        edges = np.arange(0, n, width)
+        smooth = np.add.reduceat(self.y, edges) / np.diff(np.append(edges, n))[:, None]
+        motion = np.append(0.0, np.cumsum(np.sum(np.abs(np.diff(smooth, axis=0)) / np.ptp(self.y, axis=0), axis=1)))
+        progress = np.interp(np.arange(n), edges, 0.8 * motion / max(motion[-1], 1e-300) + 0.2 * edges / n)
+        parts = []
+        for share in shares:
+            end = n if share == 1 else min(max(int(np.searchsorted(progress, share)), 20), n)
+            count = max(40, int(points * max(end / n, 0.25)))
+            parts.append(np.unique(np.linspace(0, end - 1, count).astype(int)))
+        return parts

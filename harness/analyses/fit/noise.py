@@ -1,0 +1,66 @@
+"""Noise of a record and of the residuals of a fit: scatter, quantisation, correlation."""
+
+import numpy as np
+
+from ..decay.noise import interpolation_residuals, robust_std
+
+MAX_DIVISOR = 8  # of the smallest difference of two levels that is tried as the step of a quantiser
+MAX_STEP_ERROR = 0.02  # of a step, by which levels may miss multiples of it
+SMALLEST_NOISE = 1e-9  # of the range
+CORRELATED = 4.0  # standard errors of the correlation of white noise
+VARIANCE_EXCESS = 5.0  # standard errors of the variance of sums of white noise
+SUMMED_SHARES = (20, 60, 200)  # sums are over so many parts of the record
+SHORTEST_CORRELATION = 0.05  # at which the sum of correlations ends
+
+
+def estimate_noise(t: np.ndarray, x: np.ndarray) -> tuple[float, float]:
+    """Return the standard deviation of the noise of samples x (n,), and the step of a quantiser, or 0.
+
+    The noise is at least that of the quantiser, step/sqrt(12).
+    """
+    scatter = robust_std(interpolation_residuals(t, x))
+    gaps = np.diff(np.unique(x))
+    gaps = gaps[gaps > SMALLEST_NOISE * np.ptp(x)]
+    step = 0.0
+    for candidate in gaps.min() / np.arange(1, MAX_DIVISOR + 1) if len(gaps) else ():
+        if np.abs(gaps / candidate - np.round(gaps / candidate)).max() < MAX_STEP_ERROR:
+            step = float(candidate)
+            break
+    return max(scatter, step / 12**0.5, SMALLEST_NOISE * float(np.ptp(x))), step
+
+
+def residual_correlation(e: np.ndarray) -> float:
+    """Return the correlation of neighbouring residuals e (n, columns); 0 if they are white noise.
+
+    Residuals are not white if neighbours, or sums over longer stretches, vary more than those of white noise do.
+    """
+    n = len(e)
+    for column in e.T:
+        correlation = float(column[:-1] @ column[1:] / max(column @ column, 1e-300))
+        if abs(correlation) > CORRELATED / np.sqrt(n):
+            return correlation
+        for width in {max(n // parts, 2) for parts in SUMMED_SHARES}:
+            sums = np.add.reduceat(column, np.arange(0, n, width))
+            ratio = np.mean(sums**2) / (width * np.mean(column**2) + 1e-300)
+            if ratio > 1 + VARIANCE_EXCESS * np.sqrt(2 * width / n):
+                return correlation
+    return 0.0
+
+
+def correlation_length(e: np.ndarray) -> float:
+    """Return the number of residuals e (n, columns) that count as one: 1 + 2 (sum of the correlations)."""
+    longest = 1.0
+    for column in e.T:
+        spectrum = np.abs(np.fft.rfft(column, 2 * len(column))) ** 2
+        correlations = np.fft.irfft(spectrum)[: max(len(column) // 4, 2)]
+        correlations = correlations / max(correlations[0], 1e-300)
+        end = int(np.argmax(correlations < SHORTEST_CORRELATION)) or len(correlations)
+        longest = max(longest, 1 + 2 * float(correlations[1:end].sum()))
+    return longest
+
+
+def bin_means(x: np.ndarray, width: int) -> np.ndarray:
+    """Return the first of x (n, ...), and the means of every `width` of the others; the last may be over fewer."""
+    edges = np.append(0, np.arange(1, len(x), width))
+    counts = np.diff(np.append(edges, len(x))).reshape(-1, *[1] * (x.ndim - 1))
+    return np.asarray(np.add.reduceat(x, edges, axis=0) / counts)

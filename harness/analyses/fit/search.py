@@ -1,0 +1,131 @@
+"""Global search for the best values: continuation in time, and differential evolution, in turn.
+
+Continuation in time judges a Sobol set on the first stretch of the record, where the squares have few minima, and
+carries what fits into longer and longer stretches. A search of one kind repeats its own errors, so the search ends
+where searches of both kinds have found the same minimum.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.optimize import differential_evolution
+from scipy.stats import qmc
+
+from .fit_problem import FitProblem, Selection
+
+STRETCHES, SURVIVORS, SOBOL_POINTS, SEARCH_SAMPLES = (0.15, 0.3, 0.55, 1.0), (40, 24, 12, 6), 2048, 250
+EVOLUTION = {"popsize": 10, "maxiter": 150, "tol": 1e-4}
+REFUSED_COST = 1e12
+MAX_SEARCHES, REQUIRED, REQUIRED_IF_ROUGH = 8, 2, 4  # searches in all, and those that must find the same minimum
+REFINED = 4  # minima of a search that are refined
+ROUGH = 1.5  # times the noise: larger residuals ask for more searches
+DISTINCT = 0.02  # distance of coordinates from which minima are different ones
+
+Minimum = tuple[float, np.ndarray]  # sum of squares, coordinates
+
+
+@dataclass
+class SearchResult:
+    """The best minimum, all others, how many searches there were and how many of them found the best."""
+
+    best: Minimum | None = None
+    minima: list[Minimum] = field(default_factory=list)
+    n_searches: int = 0
+    n_hits: int = 0
+    log: list[str] = field(default_factory=list)
+
+    @property
+    def is_agreed(self) -> bool:
+        """Return whether enough searches found the best minimum."""
+        return self.n_hits >= REQUIRED
+
+
+def search(
+    problem: FitProblem, selection: Selection, starts: np.ndarray, report: Callable[[float], None]
+) -> SearchResult:
+    """Search until enough searches have found the same minimum of the squares of the selected samples.
+
+    Parameters
+    ----------
+    starts : numpy.ndarray
+        Coordinates (m, k) to try in addition.
+    report : callable
+        Receives the progress from 0 to 1.
+    """
+    result, hits = SearchResult(), 0
+    n = sum(len(index) * record.y.shape[1] for index, record in zip(selection, problem.records, strict=True))
+    for number in range(1, MAX_SEARCHES + 1):
+        report((number - 1) / MAX_SEARCHES)
+        is_evolution = number % 2 == 0
+        candidates = evolve(problem, number) if is_evolution else continue_in_time(problem, number, starts)
+        minima = [problem.minimize(z, selection, 20, 1e-6) for _, z in candidates[:REFINED]]
+        result.minima += minima
+        result.n_searches = number
+        new = min(minima, key=lambda each: each[0], default=(np.inf, np.zeros(0)))
+        kind = "differential evolution" if is_evolution else "continuation in time"
+        result.log.append(f"search {number}, {kind}: sum of squares {new[0]:.6g}")
+        if not np.isfinite(new[0]):
+            continue
+        if result.best and abs(new[0] - result.best[0]) < 0.5 + 1e-3 * new[0]:
+            hits += 1
+        elif not result.best or new[0] < result.best[0]:
+            hits = 1
+        result.best = new if not result.best or new[0] < result.best[0] else result.best
+        required = REQUIRED_IF_ROUGH if result.best[0] > ROUGH**2 * n else REQUIRED
+        if hits >= required:
+            result.n_hits = max(hits, REQUIRED)
+            return result
+    result.n_hits = min(hits, REQUIRED - 1)
+    return result
+
+
+def continue_in_time(problem: FitProblem, seed: int, starts: np.ndarray) -> list[Minimum]:
+    """Return the minima that survive from a Sobol set and the `starts` as the record grows."""
+    parts = stretches(problem)
+    sobol = qmc.Sobol(len(problem.unknowns), seed=seed).random(SOBOL_POINTS)
+    points = np.vstack([starts, problem.low + (problem.high - problem.low) * sobol])
+    costs = np.array([absolute_cost(problem, z, parts[0]) for z in points])
+    order = [i for i in np.argsort(costs)[: SURVIVORS[0]] if costs[i] < REFUSED_COST]
+    order += [i for i in range(len(starts)) if i not in order and costs[i] < REFUSED_COST]
+    minima = [(float(costs[i]), points[i]) for i in order]
+    for part, survivors in zip(parts, SURVIVORS, strict=True):
+        minima = distinct([problem.minimize(z, part, 6, 1e-3) for _, z in minima], survivors)
+    return minima
+
+
+def evolve(problem: FitProblem, seed: int) -> list[Minimum]:
+    """Return the minima near the end of a differential evolution of the absolute residuals."""
+    part = stretches(problem)[-1]
+    last = differential_evolution(
+        lambda z: absolute_cost(problem, z, part),
+        [*zip(problem.low, problem.high, strict=True)],
+        seed=seed,
+        init="sobol",
+        polish=False,
+        **EVOLUTION,
+    )
+    order = np.argsort(last.population_energies)[: SURVIVORS[-1]]
+    return distinct([problem.minimize(z, part, 6, 1e-3) for z in last.population[order]], SURVIVORS[-1])
+
+
+def stretches(problem: FitProblem) -> list[Selection]:
+    """Return selections of longer and longer parts of the records."""
+    points = max(SEARCH_SAMPLES // len(problem.records), 60)
+    return [*zip(*(record.stretches(STRETCHES, points) for record in problem.records), strict=True)]
+
+
+def absolute_cost(problem: FitProblem, z: np.ndarray, selection: Selection) -> float:
+    """Return the sum of absolute residuals, in which single events count less than in squares."""
+    e = problem.residuals(z, selection)
+    return REFUSED_COST if e is None else float(np.abs(e).sum())
+
+
+def distinct(minima: list[Minimum], most: int) -> list[Minimum]:
+    """Return the lowest minima that differ from each other."""
+    kept: list[Minimum] = []
+    for squares, z in sorted(minima, key=lambda each: each[0]):
+        is_new = all(np.abs(z - other).max() > DISTINCT for _, other in kept)
+        if np.isfinite(squares) and len(kept) < most and is_new:
+            kept.append((squares, z))
+    return kept

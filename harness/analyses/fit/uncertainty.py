@@ -1,0 +1,147 @@
+"""Covariance of fitted values, and by how much the noise of the record exceeds white noise.
+
+Residuals that are not white carry less information than white ones: the covariance is that of the scores summed over
+blocks. A quantiser makes errors that depend on the signal: they are computed for signals near the fitted one.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import t as student
+
+from .fit_problem import FitProblem
+from .noise import correlation_length, residual_correlation
+
+STIFF = 100.0  # ratio of the axes of the squares from which one-sided differences are too coarse
+INDETERMINATE = 0.5  # relative standard error of what cannot be determined
+BLOCK_SIZES = (20, 60, 200, 600)
+MIN_BLOCKS, MAX_BLOCKS = 12, 400
+CORRELATED_DEGREES_OF_FREEDOM = 20  # of the intervals, where residuals are correlated
+QUANTISER_DRAWS = 60
+
+
+@dataclass(frozen=True)
+class Uncertainty:
+    """Uncertainty of the coordinates z (k,) of a minimum.
+
+    Attributes
+    ----------
+    squares, variance : float
+        Sum of squares, and that per degree of freedom.
+    covariance : numpy.ndarray
+        Covariance (k, k) for white noise.
+    inflation : numpy.ndarray
+        Factors (k,) by which the variances exceed those for white noise.
+    indeterminate : numpy.ndarray
+        Directions (k, m) that the record does not determine.
+    residuals : numpy.ndarray
+        In units of the noise.
+    correlation : float
+        Of neighbouring residuals; 0 if they are white.
+    input_shift : numpy.ndarray
+        Displacements (k,) by the error of the inputs between samples.
+    """
+
+    squares: float
+    variance: float
+    covariance: np.ndarray
+    inflation: np.ndarray
+    indeterminate: np.ndarray
+    residuals: np.ndarray
+    correlation: float
+    input_shift: np.ndarray
+
+    @property
+    def quantile(self) -> float:
+        """Return the quantile of Student's distribution for 95 %."""
+        degrees = max(len(self.residuals) - len(self.inflation), 1)
+        return float(student.ppf(0.975, min(degrees, CORRELATED_DEGREES_OF_FREEDOM) if self.correlation else degrees))
+
+    @property
+    def deviations(self) -> np.ndarray:
+        """Return the standard errors (k,) of the coordinates."""
+        return np.asarray(np.sqrt(np.diag(self.covariance) * self.inflation))
+
+
+def estimate_uncertainty(
+    problem: FitProblem, z: np.ndarray, input_error: np.ndarray, min_variance: float
+) -> Uncertainty:
+    """Return the uncertainty at a minimum; set whether the problem needs central differences.
+
+    Parameters
+    ----------
+    input_error : numpy.ndarray
+        Changes (n,) of the residuals by the error of the inputs between samples.
+    min_variance : float
+        Least variance of the residuals: 1 if the noise is known, otherwise 0.
+    """
+    e = problem.residuals(z, problem.all)
+    assert e is not None
+    jacobian = problem.jacobian(z, e, problem.all, np.arange(len(z)), central=True)
+    variance = max(float(e @ e) / max(len(e) - len(z), 1), min_variance)
+    eigenvalues, axes = np.linalg.eigh(jacobian.T @ jacobian)
+    eigenvalues = np.maximum(eigenvalues, max(1e-12 * eigenvalues.max(), 1e-200))
+    inverse = axes / eigenvalues @ axes.T
+    problem.central = bool(eigenvalues.max() > STIFF**2 * eigenvalues.min())
+    white = np.diag(inverse) * variance + 1e-300
+    by_record = split_residuals(problem, e)
+    correlation = max((residual_correlation(each) for each in by_record), key=abs)
+    inflation = np.ones(len(z))
+    if correlation:
+        inflation *= max(map(correlation_length, by_record))
+        inflation = np.maximum(inflation, score_inflation(e, jacobian, inverse, axes, variance, white))
+    if any((record.step > record.noise / 2).any() for record in problem.records):
+        inflation = np.maximum(inflation, quantiser_variance(problem, z, jacobian, inverse, axes, eigenvalues) / white)
+    shift = inverse @ (jacobian.T @ input_error)
+    inflation = inflation + shift**2 / white
+    deviation = np.sqrt(variance * inflation.max() / eigenvalues)
+    indeterminate = axes[:, deviation > INDETERMINATE]
+    squares = float(e @ e)
+    return Uncertainty(squares, variance, inverse * variance, inflation, indeterminate, e, correlation, shift)
+
+
+def split_residuals(problem: FitProblem, e: np.ndarray) -> list[np.ndarray]:
+    """Return the residuals (n, columns) of each record."""
+    ends = np.cumsum([record.y.size for record in problem.records])[:-1]
+    return [part.reshape(record.y.shape) for part, record in zip(np.split(e, ends), problem.records, strict=True)]
+
+
+def score_inflation(
+    e: np.ndarray, jacobian: np.ndarray, inverse: np.ndarray, axes: np.ndarray, variance: float, white: np.ndarray
+) -> np.ndarray:
+    """Return the factors (k,) by which the scores, summed over blocks of several sizes, exceed white noise."""
+    inflation = np.ones(len(white))
+    for count in {int(np.clip(len(e) / size, MIN_BLOCKS, MAX_BLOCKS)) for size in BLOCK_SIZES}:
+        edges = np.unique(np.linspace(0, len(e), count + 1).astype(int))[:-1]
+        share = len(edges) / max(len(edges) - len(white), 1)
+        scores = np.add.reduceat(jacobian * e[:, None], edges, axis=0)
+        along = np.add.reduceat(jacobian @ axes * e[:, None], edges, axis=0)
+        norms = np.maximum(((jacobian @ axes) ** 2).sum(axis=0), 1e-300)
+        typical = np.median((along**2).sum(axis=0) / norms) * share / variance
+        single = ((scores @ inverse) ** 2).sum(axis=0) * share / white
+        inflation = np.maximum(inflation, np.maximum(typical, single))
+    return inflation
+
+
+def quantiser_variance(
+    problem: FitProblem,
+    z: np.ndarray,
+    jacobian: np.ndarray,
+    inverse: np.ndarray,
+    axes: np.ndarray,
+    eigenvalues: np.ndarray,
+) -> np.ndarray:
+    """Return the variances (k,) by a quantiser: those of the fit of quantised signals near the fitted one."""
+    random, shifts = np.random.default_rng(0), []
+    reach = np.minimum(np.sqrt(12 * len(jacobian) / eigenvalues / len(z)), 0.05)
+    for _ in range(QUANTISER_DRAWS):
+        predicted = problem.predict(z + axes @ (reach * random.normal(size=len(z))), problem.all)
+        if predicted is None:
+            continue
+        errors = []
+        for y, record in zip(predicted, problem.records, strict=True):
+            step = np.where(record.step > 0, record.step, 1e-12)
+            levels = np.round((y - record.sampled_y[0]) / step) * step + record.sampled_y[0]
+            errors.append(((levels - y) / record.noise / np.sqrt(record.width)).ravel())
+        shifts.append(inverse @ (jacobian.T @ np.concatenate(errors)))
+    return np.mean(np.square(shifts), axis=0) if shifts else np.zeros(len(z))

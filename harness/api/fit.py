@@ -1,0 +1,147 @@
+"""The parameters of an FMU from measured records, in Python: `fit`."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ..errors import SceneError
+from .options import QUIET, Progress
+
+if TYPE_CHECKING:
+    from ..analyses.fit.parameter_fit import ParameterFit
+    from ..records.table_files import Table
+
+
+def fit(
+    source: "str | Path",
+    records: Any,
+    free: "Sequence[str] | Mapping[str, tuple[float, float] | None]",
+    *,
+    observe: "Sequence[str] | Mapping[str, str]",
+    inputs: "Sequence[str] | Mapping[str, str]" = (),
+    fixed: Mapping[str, float | str] | None = None,
+    sigma: Mapping[str, float] | None = None,
+    start: "Mapping[str, float] | ParameterFit | None" = None,
+    each: Sequence[str] = (),
+    robust: bool = False,
+    time: str | None = None,
+    rate: float | None = None,
+    begin: float | None = None,
+    end: float | None = None,
+    timeout: float = 10.0,
+    progress: Progress | None = None,
+) -> "ParameterFit":
+    """Fit parameters of an FMU to measured records.
+
+    The first sample of a record is the start of the run: the start values of the FMU apply there, and can be free.
+
+    Parameters
+    ----------
+    source : str or path
+        The name of a model or the path of an FMU for co-simulation, FMI 2.0 or 3.0.
+    records : path, DataFrame, Trajectory or sequence of these
+        Measured records. Units in headings, as in ``x [mm]``, are converted to those of the FMU; a DataFrame may have
+        them in ``attrs["units"]``.
+    free : sequence or mapping
+        Parameters to fit, with the range to search, or None for a factor of 4 about the start value of the FMU.
+        ``offset(x)`` and ``gain(x)`` are unknowns of the sensor of the output ``x``.
+    observe, inputs : sequence or mapping
+        Measured outputs and driven inputs of the FMU, with the headings of their columns.
+    fixed : mapping, optional
+        Values of other parameters.
+    sigma : mapping, optional
+        Known standard deviations of the noise by output, in the units of the FMU; by default the scatter of
+        neighbouring samples.
+    start : mapping or ParameterFit, optional
+        Values to start from, in addition to those of the search.
+    each : sequence of str
+        Parameters with a value of their own for each record.
+    robust : bool
+        Whether residuals beyond three times the noise count linearly.
+    time, rate, begin, end
+        Time column, sampling rate in Hz that replaces it, and the time range in s.
+    timeout : float
+        Seconds of processor time that one run may take.
+    progress : callable, optional
+        Called with the finished share.
+
+    Returns
+    -------
+    ParameterFit
+        Values with 95 % intervals by profile likelihood, combinations of parameters that the records do not determine,
+        residuals and remarks.
+
+    Raises
+    ------
+    SceneError
+        If an argument or a record is not valid.
+    HarnessError
+        If the FMU cannot be run, or the records show no motion.
+
+    Examples
+    --------
+    >>> found = fit("stickslip", "pull.csv", ["mu_s", "mu_d", "k"], observe={"x": "laser"})  # doctest: +SKIP
+    >>> found["mu_s"].low, found["mu_s"].value, found["mu_s"].high  # doctest: +SKIP
+    """
+    from math import inf
+
+    from ..analyses.fit.parameter_fit import ParameterFit
+    from ..records.columns import ColumnOptions
+    from ..records.signal_table import parse_signals
+    from ..scenes.fmu_files import check_built, find_fmu
+    from ..studies.fit import study
+    from ..studies.fit.request import FitRequest, resolve_request
+
+    fmu = find_fmu(str(source))
+    check_built(fmu, SceneError)
+    names = [free] if isinstance(free, str) else free
+    values = start.values if isinstance(start, ParameterFit) else start or {}
+    request = FitRequest(
+        fmu=fmu,
+        free=dict(names) if isinstance(names, Mapping) else dict.fromkeys(names),
+        observe=headings_of(observe),
+        inputs=headings_of(inputs),
+        fixed=fixed or {},
+        sigma=sigma or {},
+        start=values,
+        each=tuple(each),
+        robust=robust,
+        timeout=timeout,
+        columns=ColumnOptions(
+            time=time, rate=rate, begin=-inf if begin is None else begin, end=inf if end is None else end
+        ),
+    )
+    resolved = resolve_request(request)
+    tables = [
+        study.read_file(resolved, str(each))
+        if isinstance(each, str | Path)
+        else parse_signals(signal_table_of(each), resolved.sources, request.columns, "the record")
+        for each in (records if isinstance(records, list | tuple) else [records])
+    ]
+    return study.fit_tables(resolved, tables, progress or QUIET)
+
+
+def headings_of(signals: Any) -> dict[str, str]:
+    """Return the heading of each signal; its name if there is none."""
+    if isinstance(signals, Mapping):
+        return {str(name): str(heading) for name, heading in signals.items()}
+    return {str(name): str(name) for name in ([signals] if isinstance(signals, str) else signals)}
+
+
+def signal_table_of(source: Any) -> "Table":
+    """Return the table of a trajectory or a DataFrame."""
+    import numpy as np
+
+    from ..records.table_files import Table
+    from ..results.files import column_heading
+    from ..running.trajectory import Trajectory
+
+    if isinstance(source, Trajectory):
+        columns, units = {"t": source.time, **source.columns}, {"t": "s", **source.units}
+    elif hasattr(source, "columns"):
+        frame = source if source.index.name is None else source.reset_index()
+        columns, units = {str(name): np.asarray(frame[name]) for name in frame.columns}, frame.attrs.get("units", {})
+    else:
+        raise SceneError("records must be files, DataFrames or trajectories")
+    heads = tuple(column_heading(name, units.get(name, "")) for name in columns)
+    return Table("the record", heads, tuple(np.asarray(column, dtype=float) for column in columns.values()))

@@ -1,0 +1,86 @@
+"""fit: parameters of any FMU from measured records."""
+
+from typing import Any
+
+import click
+
+from .terminal import POSITIVE, Terminal, result_options
+
+
+@click.command()
+@click.argument("model", metavar="MODEL|FMU")
+@click.argument("records", metavar="FILE...", nargs=-1, required=True)
+@click.option("--free", multiple=True, metavar="NAME[=LOW:HIGH],...", help="Parameters to fit, and ranges to search.")
+@click.option("--fixed", multiple=True, metavar="NAME=VALUE,...", help="Values of other parameters.")
+@click.option("--observe", multiple=True, metavar="OUTPUT=COLUMN", help="Measured output and its column; repeatable.")
+@click.option("--input", "inputs", multiple=True, metavar="INPUT=COLUMN", help="Input and its column; repeatable.")
+@click.option("--start", multiple=True, metavar="NAME=VALUE,...", help="Values to start from.")
+@click.option("--each", metavar="NAME,...", help="Parameters with a value of their own for each record.")
+@click.option("--sigma", multiple=True, metavar="OUTPUT=NOISE,...", help="Known noise, in the unit of the FMU.")
+@click.option("--robust", is_flag=True, help="Limit the effect of outliers.")
+@click.option("--time", help="Heading of the time column. Default: t, time, ..., or the first column.")
+@click.option("--time-unit", help="Unit of time, if the heading has none. Default: s.")
+@click.option("--columns", "names", metavar="NAMES", help="Headings, if the file has none: 't [s],x [mm]'.")
+@click.option("--rate", type=POSITIVE, metavar="HZ", help="Sampling rate in Hz, which replaces the times in the file.")
+@click.option("--from", "begin", type=click.FLOAT, default=float("-inf"), help="Ignore samples before this time in s.")
+@click.option("--until", "end", type=click.FLOAT, default=float("inf"), help="Ignore samples after this time in s.")
+@click.option(
+    "--timeout", type=POSITIVE, default=10.0, show_default=True, help="Seconds of processor time for one run."
+)
+@result_options
+def fit(
+    model: str,
+    records: tuple[str, ...],
+    free: tuple[str, ...],
+    fixed: tuple[str, ...],
+    observe: tuple[str, ...],
+    inputs: tuple[str, ...],
+    start: tuple[str, ...],
+    each: str | None,
+    sigma: tuple[str, ...],
+    robust: bool,
+    timeout: float,
+    terminal: Terminal,
+    **columns: Any,
+) -> None:
+    """Fit parameters of an FMU to measured records.
+
+    MODEL is a model of this project or the path of an FMU for co-simulation.  The first sample of a FILE is the start
+    of the run; the FMU's start values apply there and can be free.  Units in headings are converted to those of the
+    FMU.  Without LOW:HIGH, a factor of 4 about the start value is searched.  offset(OUTPUT) and gain(OUTPUT) are
+    unknowns of a sensor.
+
+    The results are values with 95 % confidence intervals.  Parameters that the record does not determine are named,
+    with the combinations that it does.
+
+    \b
+    Examples:
+      friction-fmus fit stickslip pull.csv --free mu_s,mu_d,k --fixed m=3 --observe "x=laser [mm]"
+      friction-fmus fit coulomb shaker.csv --free m,k,f,c=0:5 --observe x=pos --input F_ext=force
+      friction-fmus fit sled.fmu a.csv b.csv --free f_s,v_driver --each v_driver --observe F_spring=load
+    """
+    from ..errors import SceneError
+    from ..records.columns import ColumnOptions
+    from ..scenes.fmu_files import check_built, find_fmu
+    from ..studies.fit import options, study
+    from ..studies.fit.request import FitRequest
+    from ..studies.fit.table import fit_table, summary_lines
+
+    fmu = find_fmu(model)
+    check_built(fmu, SceneError)
+    request = FitRequest(
+        fmu=fmu,
+        free=options.parse_ranges(free),
+        observe=options.parse_columns("--observe", observe),
+        inputs=options.parse_columns("--input", inputs),
+        fixed=options.parse_values("--fixed", fixed),
+        sigma=options.parse_numbers("--sigma", sigma),
+        start=options.parse_numbers("--start", start),
+        each=tuple(filter(None, (name.strip() for name in (each or "").split(",")))),
+        robust=robust,
+        timeout=timeout,
+        columns=ColumnOptions(**columns),
+    )
+    with terminal.progress(1) as report:
+        result, folder = study.fit_files(request, records, terminal.out, lambda share: report(records[0], share))
+    terminal.print_result(study.fit_as_json(result), fit_table(result), "", *summary_lines(result), folder=folder)

@@ -1,0 +1,78 @@
+"""Conversion between units of any quantity, as in kN, mm/s, N.m/rad or lbf.in."""
+
+import re
+from collections import Counter
+
+from .units import ANGLES, LENGTHS, STANDARD_GRAVITY, TIMES, UNIT_SYNONYMS, find_unit, normalize_unit
+
+POUND = 0.45359237  # kg
+Powers = dict[str, int]  # powers of the base units kg, m, s, A and K; angles are numbers
+PREFIXES = {"": 1.0, "k": 1e3, "M": 1e6, "G": 1e9, "m": 1e-3, "u": 1e-6, "n": 1e-9, "c": 1e-2, "d": 1e-1}
+NAMED: dict[str, tuple[float, Powers]] = {
+    **{name: (size, {"m": 1}) for name, size in LENGTHS.items()},
+    **{name: (size, {"s": 1}) for name, size in TIMES.items()},
+    **{name: (size, {}) for name, size in ANGLES.items()},
+    "kg": (1.0, {"kg": 1}),
+    "lb": (POUND, {"kg": 1}),
+    "lbf": (POUND * STANDARD_GRAVITY, {"kg": 1, "m": 1, "s": -2}),
+    "kgf": (STANDARD_GRAVITY, {"kg": 1, "m": 1, "s": -2}),
+    "Hz": (1.0, {"s": -1}),
+    "%": (0.01, {}),
+}
+PREFIXED: dict[str, tuple[float, Powers]] = {
+    "g": (1e-3, {"kg": 1}),
+    "m": (1.0, {"m": 1}),
+    "s": (1.0, {"s": 1}),
+    "N": (1.0, {"kg": 1, "m": 1, "s": -2}),
+    "Pa": (1.0, {"kg": 1, "m": -1, "s": -2}),
+    "J": (1.0, {"kg": 1, "m": 2, "s": -2}),
+    "W": (1.0, {"kg": 1, "m": 2, "s": -3}),
+    "V": (1.0, {"kg": 1, "m": 2, "s": -3, "A": -1}),
+    "A": (1.0, {"A": 1}),
+    "K": (1.0, {"K": 1}),
+}
+FACTOR = re.compile(r"([^\W\d_]+|°|%)(-?\d+)?|1")
+ALIASES = {"Nm": "N.m", "Nmm": "N.mm", "kNm": "kN.m"}
+
+
+def unit_size(text: str) -> tuple[float, Powers] | None:
+    """Return a unit as a multiple of powers of base units, or None if it is not known."""
+    text = re.sub(r"\b(Nm|Nmm|kNm)\b", lambda match: ALIASES[match[0]], text.strip())
+    motion = find_unit(text)
+    if motion is not None:
+        powers = {"m": int(motion.base == "m"), "s": -motion.order}
+        return motion.size, {base: power for base, power in powers.items() if power}
+    separated = re.sub(r"(?<=\w)[·*](?=\w)|(?<=\w) (?=\w)", ".", text)
+    size, powers = 1.0, Counter[str]()
+    for i, part in enumerate(normalize_unit(separated).split("/")):
+        sign = -1 if i else 1
+        for factor in filter(None, re.split(r"[.()]", part)):
+            match = FACTOR.fullmatch(factor)
+            known = match and ((1.0, {}) if match[1] is None else named_unit(match[1]))
+            if not match or not known:
+                return None
+            power = sign * int(match[2] or 1)
+            size *= known[0] ** power
+            for base, exponent in known[1].items():
+                powers[base] += power * exponent
+    return size, {base: power for base, power in powers.items() if power}
+
+
+def named_unit(name: str) -> tuple[float, Powers] | None:
+    """Return a unit of one word, with a prefix or without."""
+    name = UNIT_SYNONYMS.get(name.lower(), name)
+    if name in NAMED:
+        return NAMED[name]
+    for prefix, factor in PREFIXES.items():
+        unit = PREFIXED.get(name.removeprefix(prefix)) if name.startswith(prefix) else None
+        if unit:
+            return factor * unit[0], unit[1]
+    return None
+
+
+def conversion_factor(unit: str, other: str) -> float | None:
+    """Return the factor from `unit` to `other`; None if they differ in dimension or one is not known."""
+    if unit == other:
+        return 1.0
+    one, two = unit_size(unit), unit_size(other)
+    return one[0] / two[0] if one and two and one[1] == two[1] else None

@@ -1,0 +1,144 @@
+"""Several signals over time from one file, converted to given units."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..errors import SceneError
+from .columns import (
+    Column,
+    ColumnOptions,
+    find_column,
+    find_time_column,
+    is_time_column,
+    list_columns,
+    no_time_message,
+    parse_numbers,
+    read_times,
+)
+from .headings import split_heading
+from .missing_values import mark_dropouts, mark_sentinels
+from .quantity_units import conversion_factor
+from .record import MIN_SAMPLES, Record, check_record
+from .table_files import Table, load_table
+from .timestamps import undo_time_rounding
+
+MAX_MISSING_SHARE = 0.2  # of the rows
+
+
+@dataclass(frozen=True)
+class SignalSource:
+    """Where a signal comes from: the heading of its column, and the unit into which it is converted (or empty)."""
+
+    heading: str
+    unit: str
+
+
+@dataclass(frozen=True)
+class SignalTable:
+    """Signals (n,) by name over the times (n,) in s, and notes on what was assumed when reading."""
+
+    name: str
+    t: np.ndarray
+    columns: Mapping[str, np.ndarray]
+    notes: tuple[str, ...] = ()
+
+
+def read_signals(source: str, wanted: Mapping[str, SignalSource], options: ColumnOptions, name: str) -> SignalTable:
+    """Read signals from a file.
+
+    Parameters
+    ----------
+    source : str
+        Path of the file; "-" for standard input.
+    wanted : mapping
+        The column and unit of each signal, by the name of the signal.
+    options : ColumnOptions
+        Options for the time: its column, unit, sampling rate and range.
+    name : str
+        Name of the record.
+
+    Raises
+    ------
+    SceneError
+        If the file lacks a column, or its numbers or units do not fit.
+    """
+    return parse_signals(load_table(source, options.names), wanted, options, name)
+
+
+def parse_signals(table: Table, wanted: Mapping[str, SignalSource], options: ColumnOptions, name: str) -> SignalTable:
+    """Return the signals in a table; see `read_signals`."""
+    notes, candidates = list(table.notes), list_columns(table)
+    selected = {signal: find_signal(each.heading, table, candidates) for signal, each in wanted.items()}
+    first = min((column for column, _ in selected.values()), key=lambda column: column.index)
+    time_column = find_time_column(table, candidates, replace(options, position=first.heading))
+    interval = 1 / options.rate if options.rate else None if time_column else table.interval
+    if interval is None and time_column is None:
+        raise SceneError(no_time_message(table))
+    if interval is not None or time_column is None:
+        t = np.arange(len(table.columns[first.index])) * (interval or 0.0)
+    else:
+        t = read_times(table, time_column, options)
+        if options.time is None and any(table.column_headings) and not is_time_column(time_column):
+            notes.append(f"{time_column.heading} is used as time; --time selects another column.")
+    columns = {}
+    for signal, (column, unit) in selected.items():
+        x = parse_numbers(table, column.index).copy()
+        notes += mark_sentinels(x, column.heading) + mark_dropouts(x, column.heading)
+        factor, note = unit_factor(column, unit, wanted[signal].unit, signal, table.name)
+        notes += note
+        columns[signal] = factor * x
+    return select_complete_rows(name, t, columns, options, notes)
+
+
+def find_signal(heading: str, table: Table, candidates: list[Column]) -> tuple[Column, str | None]:
+    """Return a column and its unit. A heading may override the unit of the file, as in "laser [mm]"."""
+    try:
+        column = find_column(heading, table, candidates)
+    except SceneError:
+        name, unit = split_heading(heading)
+        if unit is None or name == heading:
+            raise
+        return find_column(name, table, candidates), unit
+    return column, column.unit
+
+
+def unit_factor(column: Column, unit: str | None, target: str, signal: str, file: str) -> tuple[float, list[str]]:
+    """Return the factor from the unit of a column to that of the FMU, and a note if it had to be assumed."""
+    if not unit:
+        assumed = f"{column.heading} has no unit in {file}: {target} is assumed, the unit of {signal} in the FMU."
+        return 1.0, [assumed] if target else []
+    factor = conversion_factor(unit, target or "1")
+    if factor is None:
+        raise SceneError(
+            f"{column.name} is in {unit}, and {signal} of the FMU in {target or '1'}: give a column of the same "
+            f"quantity, or the right unit, as in --observe '{signal}={column.name} [{target or '1'}]'"
+        )
+    return factor, []
+
+
+def select_complete_rows(
+    name: str, t: np.ndarray, columns: dict[str, np.ndarray], options: ColumnOptions, notes: list[str]
+) -> SignalTable:
+    """Return the rows that have a time in the range of the options and all signals."""
+    complete = np.isfinite(t) & np.all([np.isfinite(x) for x in columns.values()], axis=0)
+    used = np.flatnonzero(np.isfinite(t) & np.any([np.isfinite(x) for x in columns.values()], axis=0))
+    length = int(used[-1]) + 1 if len(used) else 0  # the table may continue with a longer run
+    t, rounding = undo_time_rounding(t[:length])
+    complete = complete[:length] & (t >= options.begin) & (t <= options.end)
+    in_range = int(((t >= options.begin) & (t <= options.end)).sum())
+    missing = in_range - int(complete.sum())
+    if missing > MAX_MISSING_SHARE * max(in_range, 1):
+        raise SceneError(f"{name}: {missing} of {in_range} rows lack a time or a signal: give other columns")
+    if missing:
+        notes.append(f"{missing} of {in_range} rows have a missing cell and are skipped.")
+    if rounding:
+        notes.append(rounding)
+    t = t[complete]
+    columns = {signal: x[:length][complete] for signal, x in columns.items()}
+    if len(t) < MIN_SAMPLES:
+        raise SceneError(f"{name} has {len(t)} samples in this interval; at least {MIN_SAMPLES} are required")
+    for x in columns.values():
+        check_record(Record(name, t, x))
+    return SignalTable(name, t, columns, tuple(notes))

@@ -1,0 +1,67 @@
+"""Native FMU of the same model as an FMU in Python, built on demand."""
+
+from pathlib import Path
+from typing import Any
+
+import fmpy
+import numpy as np
+
+from ..process.subprocess_runner import run_module
+from ..process.temporary_directory import temporary_directory
+from ..scenes.fmu_files import FOLDERS
+from ..scenes.run_spec import RunSpec
+from .cached_by_mtime import cached_by_mtime
+from .description import read_description, resolve_stop
+from .unpacking import PROCESS_RESOURCES, is_python_fmu, unpack_once
+from .whole_run import open_simulator, real_variables
+
+BUILD_TIMEOUT = 300.0  # s
+COMPARED_POINTS, AGREEMENT = 51, 1e-6  # of the run that two FMUs of one model have in common
+
+
+@cached_by_mtime
+def native_equivalent(fmu: Path) -> Path:
+    """Return the native FMU of the same model, or the FMU itself if there is none.
+
+    The one in the folder native beside the FMU is taken, or one is built from the model file beside the FMU or of
+    this project. Either must be the same model.
+    """
+    if not is_python_fmu(unpack_once(fmu)):
+        return fmu
+    built = fmu.parent / "native" / fmu.name
+    if built.is_file() and is_same_model(fmu, built):
+        return built
+    candidates = (fmu.with_suffix(".py"), *(folder / f"{fmu.stem}.py" for folder in FOLDERS))
+    source = next(filter(Path.is_file, candidates), None)
+    if source is None:
+        return fmu
+    folder = PROCESS_RESOURCES.enter_context(temporary_directory("native-"))
+    platform = ("--platform", fmpy.platform) if fmpy.platform in ("linux64", "win64", "darwin64") else ()
+    done = run_module("build_fmus", "", str(source), "--native", *platform, "--out", str(folder), timeout=BUILD_TIMEOUT)
+    built = folder / fmu.name
+    return built if not done.returncode and built.is_file() and is_same_model(fmu, built) else fmu
+
+
+def is_same_model(fmu: Path, other: Path) -> bool:
+    """Return whether an FMU declares all variables of another, and its outputs are the same in a run with start values.
+
+    A native FMU declares derivatives in addition.
+    """
+    if not declared_variables(fmu) <= declared_variables(other):
+        return False
+    outputs = [
+        name for name, variable in real_variables(read_description(fmu)).items() if variable.causality == "output"
+    ]
+    t = np.linspace(0.0, resolve_stop(RunSpec(fmu), read_description(fmu)) or 1.0, COMPARED_POINTS)
+    runs = []
+    for each in (fmu, other):
+        with open_simulator(each, {}) as simulator:
+            runs.append(simulator.simulate({}, t, outputs, {}))
+    one, two = runs
+    return one is not None and two is not None and np.allclose(one, two, rtol=AGREEMENT, atol=AGREEMENT)
+
+
+def declared_variables(fmu: Path) -> set[tuple[Any, ...]]:
+    """Return name, type, causality, start value, bounds and unit of every variable."""
+    fields = ("name", "type", "causality", "variability", "start", "min", "max", "unit")
+    return {tuple(getattr(variable, field) for field in fields) for variable in read_description(fmu).modelVariables}

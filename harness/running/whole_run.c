@@ -1,0 +1,111 @@
+/* One co-simulation run in one call: sets values, initializes, steps over the given times and reads outputs.
+ *
+ * The instance is new or has been reset. The functions of the FMU are passed as pointers, so the library links nothing
+ * but the C library. Of the inputs u (n, n_in), each step gets the mean of its two ends. The outputs y are read at every `stride`-th time. The result is 0,
+ * REFUSED if the FMU does not initialize, FAILED if a later call fails, or TOO_SLOW after `limit` seconds of processor
+ * time.
+ */
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <time.h>
+
+enum { REFUSED = 1, FAILED, TOO_SLOW };
+enum { WARNING = 1, MAX_INPUTS = 64, STEPS_PER_CHECK = 16 };
+
+typedef void *Instance;
+typedef uint32_t Reference;
+
+typedef struct {
+    int (*set)(Instance, const Reference *, size_t, const double *);
+    int (*setup)(Instance, int, double, double, int, double);
+    int (*enter)(Instance);
+    int (*leave)(Instance);
+    int (*get)(Instance, const Reference *, size_t, double *);
+    int (*step)(Instance, double, double, int);
+} Fmi2;
+
+typedef struct {
+    int (*set)(Instance, const Reference *, size_t, const double *, size_t);
+    int (*enter)(Instance, bool, double, double, bool, double);
+    int (*leave)(Instance);
+    int (*get)(Instance, const Reference *, size_t, double *, size_t);
+    int (*step)(Instance, double, double, bool, bool *, bool *, bool *, double *);
+} Fmi3;
+
+typedef struct {
+    int fmi; /* 2 or 3 */
+    const void *functions;
+    Instance instance;
+    double limit; /* s */
+} Fmu;
+
+typedef struct {
+    const Reference *references;
+    size_t count;
+    double *values;
+} Variables;
+
+void ignore_message(void *environment, const char *name, int status, const char *category, const char *text, ...)
+{
+    (void)environment, (void)name, (void)status, (void)category, (void)text;
+}
+
+static bool set(const Fmu *fmu, const Variables *which, const double *values)
+{
+    if (!which->count) return true;
+    if (fmu->fmi == 2)
+        return ((const Fmi2 *)fmu->functions)->set(fmu->instance, which->references, which->count, values) <= WARNING;
+    return ((const Fmi3 *)fmu->functions)
+               ->set(fmu->instance, which->references, which->count, values, which->count) <= WARNING;
+}
+
+static bool get(const Fmu *fmu, const Variables *which, double *values)
+{
+    if (fmu->fmi == 2)
+        return ((const Fmi2 *)fmu->functions)->get(fmu->instance, which->references, which->count, values) <= WARNING;
+    return ((const Fmi3 *)fmu->functions)
+               ->get(fmu->instance, which->references, which->count, values, which->count) <= WARNING;
+}
+
+static bool initialize(const Fmu *fmu, const Variables *parameters, const Variables *inputs, double start, double stop)
+{
+    if (fmu->fmi == 2) {
+        const Fmi2 *fmi = fmu->functions;
+        return set(fmu, parameters, parameters->values) &&
+               fmi->setup(fmu->instance, 0, 0.0, start, 1, stop) <= WARNING &&
+               fmi->enter(fmu->instance) <= WARNING && set(fmu, inputs, inputs->values) &&
+               fmi->leave(fmu->instance) <= WARNING;
+    }
+    const Fmi3 *fmi = fmu->functions;
+    return set(fmu, parameters, parameters->values) &&
+           fmi->enter(fmu->instance, false, 0.0, start, true, stop) <= WARNING &&
+           set(fmu, inputs, inputs->values) && fmi->leave(fmu->instance) <= WARNING;
+}
+
+static bool step(const Fmu *fmu, double t, double h)
+{
+    if (fmu->fmi == 2) return ((const Fmi2 *)fmu->functions)->step(fmu->instance, t, h, 1) <= WARNING;
+    bool event = false, terminate = false, early = false;
+    double reached = 0.0;
+    int status =
+        ((const Fmi3 *)fmu->functions)->step(fmu->instance, t, h, true, &event, &terminate, &early, &reached);
+    return status <= WARNING && !terminate && !early;
+}
+
+int run(const Fmu *fmu, const Variables *parameters, const Variables *inputs, const Variables *outputs,
+        const double *t, size_t n, size_t stride)
+{
+    double held[MAX_INPUTS], *y = outputs->values;
+    const double *u = inputs->values;
+    clock_t begun = clock();
+    if (!initialize(fmu, parameters, inputs, t[0], t[n - 1])) return REFUSED;
+    if (!get(fmu, outputs, y)) return FAILED;
+    for (size_t i = 0; i + 1 < n; i++, u += inputs->count) {
+        for (size_t j = 0; j < inputs->count; j++) held[j] = 0.5 * (u[j] + u[j + inputs->count]);
+        if (!set(fmu, inputs, held) || !step(fmu, t[i], t[i + 1] - t[i])) return FAILED;
+        if ((i + 1) % stride == 0 && !get(fmu, outputs, y += outputs->count)) return FAILED;
+        if (i % STEPS_PER_CHECK == 0 && (double)(clock() - begun) > fmu->limit * CLOCKS_PER_SEC) return TOO_SLOW;
+    }
+    return 0;
+}

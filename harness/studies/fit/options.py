@@ -1,0 +1,69 @@
+"""Options of the command fit: ranges, assignments and columns as text."""
+
+from collections.abc import Iterable
+from math import isfinite
+from typing import Any
+
+from ...errors import SceneError, format_value
+
+
+def split_list(texts: Iterable[str]) -> list[str]:
+    """Return the items of comma-separated lists."""
+    return [item.strip() for text in texts for item in text.split(",") if item.strip()]
+
+
+def parse_ranges(texts: Iterable[str]) -> dict[str, tuple[float, float] | None]:
+    """Return the range of each name, as in "mu_s,mu_d=0.1:2"; None without a range."""
+    ranges: dict[str, tuple[float, float] | None] = {}
+    for item in split_list(texts):
+        name, separator, limits = (part.strip() for part in item.partition("="))
+        if name in ranges:
+            raise SceneError(f"--free names {name} twice: remove one")
+        low, colon, high = limits.partition(":")
+        if separator and not colon:
+            raise SceneError(f"--free {item}: give a range, as in {name}=0.1:2, or fix it by --fixed {item}")
+        ranges[name] = (parse_number("--free", item, low), parse_number("--free", item, high)) if separator else None
+    return ranges
+
+
+def parse_values(option: str, texts: Iterable[str]) -> dict[str, Any]:
+    """Return the values of assignments, as in "m=3,friction=sign": numbers, or texts."""
+    values: dict[str, Any] = {}
+    for item in split_list(texts):
+        name, separator, value = (part.strip() for part in item.partition("="))
+        if not separator or not name or not value:
+            raise SceneError(f"{option} {format_value(item)} is not an assignment; write it as in m=3")
+        try:
+            values[name] = float(value)
+        except ValueError:
+            values[name] = value
+    return values
+
+
+def parse_numbers(option: str, texts: Iterable[str]) -> dict[str, float]:
+    """Return the numbers of assignments, as in "k=800,m=3"."""
+    return {
+        name: parse_number(option, f"{name}={value}", str(value)) for name, value in parse_values(option, texts).items()
+    }
+
+
+def parse_number(option: str, item: str, text: str) -> float:
+    """Return a finite number; raise SceneError if the text is none."""
+    try:
+        number = float(text)
+    except ValueError:
+        number = float("nan")
+    if not isfinite(number):
+        raise SceneError(f"{option} {item}: {format_value(text)} is not a finite number")
+    return number
+
+
+def parse_columns(option: str, texts: Iterable[str]) -> dict[str, str]:
+    """Return the heading of each variable, as in "x=position"; the name of the variable without a heading."""
+    columns = {}
+    for text in texts:
+        name, _, heading = text.partition("=")
+        if not name.strip():
+            raise SceneError(f"{option} {format_value(text)} names no variable; write it as in x=position")
+        columns[name.strip()] = heading.strip() or name.strip()
+    return columns

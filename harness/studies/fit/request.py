@@ -1,0 +1,193 @@
+"""Checked request of a fit: what is fitted, fixed, observed and driven."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from math import inf, isfinite
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...analyses.fit.parameter_fit import RecordData
+from ...analyses.fit.unknowns import GAIN, OFFSET, RANGE_FACTOR, Unknown
+from ...errors import SceneError, check_names, format_value
+from ...records.columns import ColumnOptions
+from ...records.record import MIN_SAMPLES
+from ...records.signal_table import SignalSource, SignalTable
+from ...running.description import read_description
+from ...running.variable_values import convert_value
+from ...running.whole_run import MAX_INPUTS, RealVariable, real_variables
+
+SAMPLES_PER_UNKNOWN = 4
+GAIN_RANGE = (0.5, 2.0)
+
+Range = tuple[float, float] | None
+
+
+@dataclass(frozen=True)
+class FitRequest:
+    """What a user asks of a fit.
+
+    Attributes
+    ----------
+    fmu : pathlib.Path
+    free : mapping
+        Range to search of each unknown, None for the default. ``offset(x)`` and ``gain(x)`` are those of the sensor of
+        an observed variable.
+    fixed : mapping
+        Values of other variables by name; enumerations by label or number.
+    observe, inputs : mapping
+        Headings of the columns of observed variables and of inputs, by variable.
+    sigma : mapping
+        Known standard deviations of the noise, by observed variable, in the units of the FMU.
+    start : mapping
+        Values to start from, by unknown.
+    each : tuple of str
+        Unknowns with a value of its own for each record.
+    robust : bool
+        Whether outliers count little.
+    timeout : float
+        Seconds of processor time that one run may take.
+    columns : ColumnOptions
+        Options for the time column.
+    """
+
+    fmu: Path
+    free: Mapping[str, Range]
+    observe: Mapping[str, str]
+    inputs: Mapping[str, str] = field(default_factory=dict)
+    fixed: Mapping[str, Any] = field(default_factory=dict)
+    sigma: Mapping[str, float] = field(default_factory=dict)
+    start: Mapping[str, float] = field(default_factory=dict)
+    each: tuple[str, ...] = ()
+    robust: bool = False
+    timeout: float = 10.0
+    columns: ColumnOptions = field(default_factory=ColumnOptions)
+
+
+@dataclass(frozen=True)
+class ResolvedRequest:
+    """A request that fits the FMU: sources of all signals, fixed Reals, and settings of other types."""
+
+    request: FitRequest
+    variables: Mapping[str, RealVariable]
+    sources: Mapping[str, SignalSource]
+    fixed: Mapping[str, float]
+    settings: Mapping[str, Any]
+
+
+def resolve_request(request: FitRequest) -> ResolvedRequest:
+    """Check a request against the variables of the FMU.
+
+    Raises
+    ------
+    SceneError
+        If a name, a value or a range does not fit.
+    """
+    description = read_description(request.fmu)
+    variables = real_variables(description)
+    parameters = [name for name, variable in variables.items() if variable.causality == "parameter"]
+    inputs = [name for name, variable in variables.items() if variable.causality == "input"]
+    readable = [name for name, variable in variables.items() if variable.causality in ("output", "local")]
+    if not request.free:
+        raise SceneError(f"nothing is free: name the parameters to fit, as in --free {','.join(parameters[:2])}")
+    if not request.observe:
+        raise SceneError(f"nothing is observed: name a variable and its column, as in --observe {readable[0]}=position")
+    if len(request.inputs) > MAX_INPUTS:
+        raise SceneError(f"{len(request.inputs)} inputs are too many; at most {MAX_INPUTS} are supported")
+    sensors = [f"{kind}({name})" for name in request.observe for kind in (OFFSET, GAIN)]
+    check_names("output", request.observe, readable)
+    check_names("input", request.inputs, inputs)
+    check_names("parameter", request.free, [*parameters, *sensors])
+    check_names("observed variable", request.sigma, [*request.observe])
+    check_names("free parameter", [*request.start, *request.each], [*request.free])
+    declared = {variable.name: variable for variable in description.modelVariables}
+    settable = [name for name, variable in declared.items() if variable.causality in ("parameter", "input")]
+    check_names("parameter", request.fixed, settable)
+    for name in request.fixed:
+        if name in request.free or name in request.inputs:
+            raise SceneError(
+                f"{name} is fixed, and {'free' if name in request.free else 'driven by a column'}: remove one"
+            )
+    for name, value in request.sigma.items():
+        if not (isfinite(value) and value > 0):
+            raise SceneError(f"sigma of {name} is {value!r}: it must be a finite number above 0")
+    converted = {name: convert_value(declared[name], value) for name, value in request.fixed.items()}
+    signals = {**request.observe, **request.inputs}
+    return ResolvedRequest(
+        request,
+        variables,
+        {name: SignalSource(heading, variables[name].unit) for name, heading in signals.items()},
+        {name: value for name, value in converted.items() if name in variables},
+        {name: value for name, value in converted.items() if name not in variables},
+    )
+
+
+def make_unknowns(resolved: ResolvedRequest, records: Sequence[RecordData]) -> tuple[Unknown, ...]:
+    """Return the unknowns; one that is free in each record once for each, named as in x0[1]."""
+    request, unknowns = resolved.request, []
+    for name, limits in request.free.items():
+        unknown = make_unknown(name, limits, resolved, records)
+        if name in request.each and len(records) > 1:
+            for i in range(len(records)):
+                unknowns.append(Unknown(**vars(unknown) | {"name": f"{name}[{i + 1}]", "record": i}))
+        else:
+            unknowns.append(unknown)
+    samples = sum(record.y.size for record in records)
+    if samples < max(MIN_SAMPLES, SAMPLES_PER_UNKNOWN * len(unknowns)):
+        raise SceneError(
+            f"{len(unknowns)} unknowns need at least {SAMPLES_PER_UNKNOWN * len(unknowns)} samples, and there are "
+            f"{samples}: give a longer record, or fix some"
+        )
+    return tuple(unknowns)
+
+
+def make_unknown(name: str, limits: Range, resolved: ResolvedRequest, records: Sequence[RecordData]) -> Unknown:
+    """Return an unknown with the range to search; raise SceneError if the range is not valid."""
+    observed = [*resolved.request.observe]
+    kind, _, argument = name.partition("(")
+    start = resolved.request.start.get(name)
+    if argument and argument.removesuffix(")") in observed:
+        column = observed.index(argument.removesuffix(")"))
+        size = max(float(np.ptp(record.y[:, column])) for record in records)
+        low, high = limits or (GAIN_RANGE if kind == GAIN else (-size, size))
+        unit = "" if kind == GAIN else resolved.variables[observed[column]].unit
+        check_range(name, low, high, -inf, inf, unit)
+        return Unknown(name, kind, unit, low, high, column=column, start=start)
+    variable = resolved.variables[name]
+    minimum = -inf if variable.minimum is None else variable.minimum
+    maximum = inf if variable.maximum is None else variable.maximum
+    if limits is None:
+        middle = start if start is not None else variable.start
+        if not middle:
+            raise SceneError(f"{name} has no start value other than 0: give the range to search, as in {name}=-1:1")
+        low, high = sorted((middle / RANGE_FACTOR, middle * RANGE_FACTOR))
+        low, high = max(low, minimum), min(high, maximum)
+    else:
+        low, high = limits
+    check_range(name, low, high, minimum, maximum, variable.unit)
+    if start is not None and not low <= start <= high:
+        raise SceneError(f"the start value {start!r} of {name} is outside its range, {low!r} to {high!r}")
+    return Unknown(name, name, variable.unit, low, high, minimum, maximum, start=start)
+
+
+def check_range(name: str, low: float, high: float, minimum: float, maximum: float, unit: str) -> None:
+    """Raise SceneError if a range is empty or exceeds the limits of the FMU."""
+    text = f"{name} = {format_value(low)}:{format_value(high)}"
+    if not (isfinite(low) and isfinite(high) and low < high):
+        raise SceneError(f"{text} is not a range: give two finite numbers, the smaller one first")
+    if low < minimum or high > maximum:
+        bounds = [f"at least {minimum!r}"] * (minimum > -inf) + [f"at most {maximum!r}"] * (maximum < inf)
+        raise SceneError(f"{text} is outside the range of the FMU; allowed: {' and '.join(bounds)} {unit}".rstrip())
+
+
+def record_data(resolved: ResolvedRequest, table: SignalTable) -> RecordData:
+    """Return the observed columns and the inputs of a table."""
+    request = resolved.request
+    return RecordData(
+        table.name,
+        table.t,
+        np.stack([table.columns[name] for name in request.observe], axis=1),
+        {name: table.columns[name] for name in request.inputs},
+        tuple(request.sigma.get(name) for name in request.observe),
+    )

@@ -1,0 +1,44 @@
+"""Terminal output of a fit: a table of values, and remarks."""
+
+from math import isfinite
+
+from rich.box import SIMPLE_HEAD
+from rich.table import Table
+
+from ...analyses.decay.estimates import Estimate
+from ...analyses.fit.parameter_fit import ParameterFit
+from ...results.quantity import format_interval
+
+
+def fit_table(fit: ParameterFit) -> Table:
+    """Return the table of values with 95 % intervals."""
+    names = ", ".join(record.name for record in fit.records)
+    result = Table(
+        box=SIMPLE_HEAD, show_edge=False, padding=(0, 1, 0, 0), title=f"{fit.fmu}: {names}", title_justify="left"
+    )
+    result.add_column("")
+    result.add_column("value, 95 % interval", justify="right")
+    result.add_column("", no_wrap=True)
+    for estimate in (*fit.estimates, *fit.combinations):
+        result.add_row(estimate.name, format_estimate(estimate), estimate.unit)
+    return result
+
+
+def format_estimate(estimate: Estimate) -> str:
+    """Format value and interval; of an interval with one end, that end."""
+    if isfinite(estimate.error) or not (isfinite(estimate.low) or isfinite(estimate.high)):
+        interval = isfinite(estimate.low) and isfinite(estimate.high)
+        return format_interval(estimate.value, estimate.low, estimate.high) if interval else "not determined"
+    if isfinite(estimate.low) and isfinite(estimate.high):
+        return f"{estimate.low:.3g} to {estimate.high:.3g}"
+    return f"> {estimate.low:.3g}" if isfinite(estimate.low) else f"< {estimate.high:.3g}"
+
+
+def summary_lines(fit: ParameterFit) -> list[str]:
+    """Return the sentences below the table."""
+    lines = [
+        f"Residuals of {column.name} in {column.record}: {column.residual:.3g} {column.unit}".rstrip()
+        + f" (noise {column.noise:.3g}, range {column.range:.3g})."
+        for column in fit.columns
+    ]
+    return [*lines, *fit.remarks, *fit.notes]

@@ -1,0 +1,96 @@
+"""Several signals from one file, in the units of an FMU."""
+
+import numpy as np
+import pytest
+
+from harness.errors import SceneError
+from harness.records.columns import ColumnOptions
+from harness.records.quantity_units import conversion_factor
+from harness.records.signal_table import SignalSource, read_signals
+
+WANTED = {"x": SignalSource("laser", "m"), "F": SignalSource("load", "N")}
+
+
+@pytest.mark.parametrize(
+    ("unit", "other", "factor"),
+    [
+        ("kN", "N", 1e3),
+        ("Nm", "N.m", 1.0),
+        ("N/mm", "N/m", 1e3),
+        ("kg m/s^2", "N", 1.0),
+        ("g", "m/s2", 9.80665),
+        ("deg", "rad", np.pi / 180),
+        ("Nm/deg", "N.m/rad", 180 / np.pi),
+        ("lbf", "N", 4.4482216152605),  # NIST SP 811, appendix B.8
+        ("mA", "A", 1e-3),
+        ("mm", "N", None),
+        ("furlong", "m", None),
+    ],
+)
+def test_units_of_one_quantity_are_converted(unit, other, factor):
+    found = conversion_factor(unit, other)
+    assert found is factor is None or found == pytest.approx(factor, rel=1e-14)
+
+
+def write(path, rows, heading="# a comment\nt [ms],laser [mm],load (kN),other\n"):
+    path.write_text(heading + "".join(",".join(map(str, row)) + "\n" for row in rows))
+    return str(path)
+
+
+def rows(n=40):
+    """Rows of uneven times in ms, positions in mm and loads in kN."""
+    return [(10 * i + i % 3, 100 * np.sin(0.3 * i), 0.01 * i, 7) for i in range(n)]
+
+
+def test_columns_are_converted_and_incomplete_rows_skipped(tmp_path):
+    table = rows()
+    table[5] = (52, "NaN", 0.05, 7)
+    table[9] = (90, 1.0, "", 7)
+    found = read_signals(write(tmp_path / "a.csv", table), WANTED, ColumnOptions(), "a")
+    kept = [row for i, row in enumerate(table) if i not in (5, 9)]
+    assert found.t == pytest.approx([1e-3 * row[0] for row in kept])
+    assert found.columns["x"] == pytest.approx([1e-3 * row[1] for row in kept])
+    assert found.columns["F"] == pytest.approx([1e3 * row[2] for row in kept])
+    assert any("2 of 40 rows" in note for note in found.notes)
+
+
+def test_a_second_run_beside_the_first_is_not_read(tmp_path):
+    """Its rows go on after the end of the first."""
+    heading = "t [s],laser [mm],load (kN),t [s],laser [mm],load (kN)\n"
+    table = [(0.01 * i, i % 7, 0.1, 0.02 * i, -1, -1) for i in range(30)]
+    table += [("", "", "", 0.02 * i, -1, -1) for i in range(30, 40)]
+    found = read_signals(write(tmp_path / "a.csv", table, heading), WANTED, ColumnOptions(), "a")
+    assert len(found.t) == 30
+    assert found.columns["F"] == pytest.approx(np.full(30, 100.0))
+
+
+def test_a_range_of_times_and_a_rate_select_samples(tmp_path):
+    file = write(tmp_path / "a.csv", rows())
+    found = read_signals(file, WANTED, ColumnOptions(begin=0.1, end=0.25), "a")
+    assert found.t[0] >= 0.1
+    assert found.t[-1] <= 0.25
+    assert read_signals(file, WANTED, ColumnOptions(rate=200.0), "a").t[1] == pytest.approx(0.005)
+
+
+def test_a_unit_in_the_request_replaces_that_of_the_file(tmp_path):
+    file = write(tmp_path / "a.csv", rows(), "t [ms],laser,load,other\n")
+    wanted = {"x": SignalSource("laser [um]", "m"), "F": SignalSource("load", "N")}
+    found = read_signals(file, wanted, ColumnOptions(), "a")
+    assert found.columns["x"][1] == pytest.approx(1e-6 * rows()[1][1])
+    assert found.notes == ("load has no unit in a.csv: N is assumed, the unit of F in the FMU.",)
+
+
+@pytest.mark.parametrize(
+    ("wanted", "options", "message"),
+    [
+        ({"x": SignalSource("lasre", "m")}, {}, "laser"),
+        ({"x": SignalSource("load", "m")}, {}, "load is in kN, and x of the FMU in m"),
+        (WANTED, {"begin": 0.35}, "at least 12 are required"),
+        (WANTED, {"time": "clock"}, "clock"),
+    ],
+)
+def test_a_wrong_request_is_refused_in_one_sentence(tmp_path, wanted, options, message):
+    with pytest.raises(SceneError) as refused:
+        read_signals(write(tmp_path / "a.csv", rows()), wanted, ColumnOptions(**options), "a")
+    assert message in str(refused.value)
+    assert "\n" not in str(refused.value)

@@ -1,0 +1,225 @@
+"""fit: parameters of FMUs from drawn records, what a record does not determine, and bad requests."""
+
+import json
+from math import isfinite
+
+import build_cache
+import commands
+import numpy as np
+import pytest
+from drawn_records import GROUPS, draw_record
+from fit_campaign import SOURCES
+from native_fmus import build_native_fmus, require_compiler
+
+import harness
+from harness.errors import HarnessError, SceneError
+from harness.running.whole_run import open_simulator
+
+T = np.linspace(0.0, 16.0, 201)
+TRUTH = {"mu_s": 0.8, "mu_d": 0.5, "k": 900.0, "v_driver": 0.04}
+
+
+@pytest.fixture(autouse=True)
+def in_folder(user_folder, tmp_path, monkeypatch):
+    """Work in an empty folder with built FMUs."""
+    (tmp_path / "fmus").symlink_to(user_folder / "fmus")
+    monkeypatch.chdir(tmp_path)
+
+
+def native(model):
+    """Return a native FMU of a model for Linux."""
+    if model not in SOURCES:
+        return build_native_fmus() / f"{model}.fmu"
+    require_compiler()
+    words = (str(SOURCES[model]), "--native", "--platform", "linux64")
+    return build_cache.build_once(f"native-{model}", *words) / f"{model}.fmu"
+
+
+def pull(outputs=("x",), values=TRUTH, t=T, noise=0.01, seed=1):
+    """Return a DataFrame with a run of stickslip and white noise, a share of the range of each column."""
+    pandas = pytest.importorskip("pandas")
+    with open_simulator(native("stickslip"), {}) as simulator:
+        y = simulator.simulate(values, t, outputs, {})
+        units = {name: simulator.variables[name].unit for name in outputs}
+    y = y + noise * np.ptp(y, axis=0) * np.random.default_rng(seed).normal(size=y.shape)
+    frame = pandas.DataFrame({"t": t, **dict(zip(outputs, y.T, strict=True))})
+    frame.attrs["units"] = {"t": "s"} | units
+    return frame
+
+
+def holds(estimate, truth, factor=1.5):
+    """Return whether an interval, widened by a factor, holds the truth."""
+    return abs(estimate.value - truth) <= factor * max(estimate.high - estimate.value, estimate.value - estimate.low)
+
+
+@pytest.mark.parametrize("name", ["position, 4 free", "force", "forced", "pendulum", "Stribeck", "belt"])
+def test_the_parameters_of_a_drawn_record_are_found(name):
+    """The seed was drawn once; tests/support/fit_campaign.py fits hundreds of others."""
+    pandas, group = pytest.importorskip("pandas"), GROUPS[name]
+    with open_simulator(native(group.model), {}) as simulator:
+        record = draw_record(group, simulator, np.random.default_rng([20261123, len(name)]), max_samples=250)
+    columns = dict(zip(group.outputs, record.y.T, strict=True)) | record.inputs
+    found = harness.fit(
+        native(group.model),
+        pandas.DataFrame({"t [s]": record.t, **columns}),
+        record.free,
+        observe=group.outputs,
+        inputs=[*record.inputs],
+        fixed=record.fixed,
+    )
+    assert found.describes_record
+    for parameter, truth in record.truth.items():
+        estimate = found[parameter]
+        assert not isfinite(estimate.error) or abs(estimate.value - truth) < 5 * estimate.error
+        assert estimate.low <= estimate.value <= estimate.high
+
+
+def test_a_position_determines_the_ratio_of_stiffness_and_mass():
+    found = harness.fit(native("stickslip"), pull(), ["k", "m"], observe="x", fixed={"mu_s": 0.8} | DRIVEN)
+    assert {*found.undetermined} == {"k", "m"}
+    assert [each.name for each in found.combinations] == ["k/m"]
+    assert holds(found["k/m"], 900.0 / 12.5)
+    assert any("does not determine k, m" in remark for remark in found.remarks)
+
+
+DRIVEN = {"mu_d": 0.5, "v_driver": 0.04}
+
+
+def test_several_records_share_parameters_and_have_some_of_their_own():
+    speeds = (0.03, 0.05)
+    frames = [pull(values=TRUTH | {"v_driver": speed}, seed=i) for i, speed in enumerate(speeds)]
+    found = harness.fit(
+        native("stickslip"),
+        frames,
+        ["mu_s", "v_driver"],
+        observe="x",
+        each=["v_driver"],
+        fixed={"k": 900.0, "mu_d": 0.5},
+    )
+    assert [each.name for each in found.estimates] == ["mu_s", "v_driver[1]", "v_driver[2]"]
+    for number, speed in enumerate(speeds, 1):
+        assert holds(found[f"v_driver[{number}]"], speed)
+
+
+def test_a_sensor_with_offset_and_gain_is_identified():
+    frame = pull()
+    frame["x"] = 1.1 * frame["x"] + 0.02
+    free = ["mu_s", "offset(x)", "gain(x)"]
+    found = harness.fit(native("stickslip"), frame, free, observe="x", fixed=DRIVEN | {"k": 900.0})
+    for name, truth in {"mu_s": 0.8, "offset(x)": 0.02, "gain(x)": 1.1}.items():
+        assert holds(found[name], truth)
+
+
+def test_outliers_count_little_in_a_robust_fit():
+    frame = pull()
+    frame.loc[::25, "x"] += 0.3
+    found = harness.fit(native("stickslip"), frame, ["mu_s"], observe="x", fixed=DRIVEN | {"k": 900.0}, robust=True)
+    assert holds(found["mu_s"], 0.8)  # without `robust`, the interval is four times as wide
+    assert found["mu_s"].high - found["mu_s"].low < 0.004
+
+
+def test_a_record_of_another_motion_is_remarked():
+    frame = pull()
+    frame["x"] += 0.2 * np.sin(T)
+    found = harness.fit(native("stickslip"), frame, ["mu_s"], observe="x", fixed=DRIVEN | {"k": 900.0})
+    assert not found.describes_record
+    assert "do not rely on these values" in found.remarks[0]
+    assert not any(isfinite(each.error) for each in found.estimates)
+
+
+def test_the_command_writes_what_it_prints(tmp_path):
+    frame = pull()
+    frame = frame.assign(x=1e3 * frame["x"]).rename(columns={"t": "t [s]", "x": "laser [mm]"})
+    frame.to_csv("pull.csv", index=False)
+    words = ("fit", native("stickslip"), "pull.csv", "--free", "mu_s=0.3:1.5,k", "--fixed", "mu_d=0.5,v_driver=0.04")
+    done = commands.harness(tmp_path, *words, "--observe", "x=laser", "--json", blank=True)
+    assert (done.returncode, done.stderr) == (0, "")
+    printed = json.loads(done.stdout)
+    folder = tmp_path / "results" / "fit" / "pull"
+    stored = json.loads((folder / "fit.json").read_text())
+    assert stored == printed
+    assert {file.name for file in folder.iterdir()} == {"fit.json", "fit.csv", "figure.svg", "provenance.json"}
+    estimates = {each["name"]: each for each in stored["fit"]}
+    assert {"value", "error", "low", "high", "unit"} <= {*estimates["k"]}
+    assert estimates["k"]["low"] < 900.0 < estimates["k"]["high"]
+    assert estimates["mu_s"]["low"] < 0.8 < estimates["mu_s"]["high"]
+    assert harness.load_result(folder) == stored
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"free": ["mu_z"]}, "unknown parameter 'mu_z' (nearest: 'mu_s')"),
+        ({"free": []}, "nothing is free"),
+        ({"free": {"mu_s": (-1.0, 1.0)}}, "mu_s = -1.0:1.0 is outside the range of the FMU; allowed: at least 0.0"),
+        ({"free": {"mu_s": (1.0, 0.5)}}, "mu_s = 1.0:0.5 is not a range"),
+        ({"free": ["x0"]}, "x0 has no start value other than 0: give the range to search, as in x0=-1:1"),
+        ({"observe": {"y": "x"}}, "unknown output 'y'"),
+        ({"observe": {"x": "laser"}}, "laser"),
+        ({"observe": {"F_spring": "x"}}, "x is in m, and F_spring of the FMU in N"),
+        ({"inputs": {"x0": "x"}}, "unknown input 'x0'; allowed: F_ext"),
+        ({"fixed": {"mu_s": 0.5}}, "mu_s is fixed, and free: remove one"),
+        ({"fixed": {"m": -1.0}}, "m = -1.0 is outside its range"),
+        ({"start": {"m": 1.0}}, "unknown free parameter 'm'; allowed: mu_s"),
+        ({"free": {"mu_s": (0.1, 2.0)}, "start": {"mu_s": 99.0}}, "the start value 99.0 of mu_s is outside its range"),
+        ({"sigma": {"x": 0.0}}, "sigma of x is 0.0"),
+        ({"begin": 15.8}, "at least 12 are required"),
+        ({"begin": 14.6, "free": [*TRUTH, "m", "g"]}, "6 unknowns need at least 24 samples, and there are"),
+        ({"records": "missing.csv"}, "missing.csv"),
+        ({"records": 3}, "records must be files, DataFrames or trajectories"),
+    ],
+)
+def test_a_bad_request_is_refused_in_one_sentence(changes, message):
+    arguments = {"source": native("stickslip"), "records": pull(), "free": ["mu_s"], "observe": "x"} | changes
+    with pytest.raises(SceneError) as refused:
+        harness.fit(**arguments)
+    assert message in str(refused.value)
+    assert "\n" not in str(refused.value)
+
+
+def test_a_record_without_such_a_motion_is_refused():
+    frame = pull()
+    frame["x"] = 0.0
+    with pytest.raises(HarnessError, match="shows no motion"):
+        harness.fit(native("stickslip"), frame, ["mu_s"], observe="x")
+    frame["x"] = np.cos(7.0 * T)  # free oscillations
+    with pytest.raises(HarnessError, match="no values describe the record better than a constant does"):
+        harness.fit(native("stickslip"), frame, ["mu_s", "k"], observe="x", fixed=DRIVEN)
+    frame["x"] = 1e-4 * np.random.default_rng(1).normal(size=len(T))
+    with pytest.raises(HarnessError, match="shows no motion beyond its noise"):
+        harness.fit(native("stickslip"), frame, {"mu_s": (2.0, 8.0)}, observe="x")
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("--free", "k=3"), "--free k=3: give a range, as in k=0.1:2, or fix it by --fixed k=3"),
+        (("--free", "k=3:x"), "--free k=3:x: 'x' is not a finite number"),
+        (("--free", "k,k"), "--free names k twice: remove one"),
+        (("--free", "k", "--fixed", "m"), "--fixed 'm' is not an assignment; write it as in m=3"),
+    ],
+)
+def test_bad_options_are_refused_with_status_2(tmp_path, words, message):
+    (tmp_path / "a.csv").write_text("t,x\n" + "".join(f"{i},{i}\n" for i in range(20)))
+    done = commands.harness(tmp_path, "fit", "stickslip", "a.csv", *words, "--observe", "x")
+    assert done.returncode == 2
+    assert message in done.stderr
+
+
+def test_the_campaign_summarizes_its_log(tmp_path, capsys):
+    from fit_campaign import print_summary
+
+    row = {
+        "group": "force",
+        "noise": "white, n = 300",
+        "truth": {"k": 2.0},
+        "seconds": 1.0,
+        "remarks": [],
+        "errors": {"k": 0.1},
+        "deviation": {"k": 6.0},
+        "covered": {"k": False},
+        "describes_record": True,
+    }
+    print_summary([row, row | {"deviation": {"k": 1.0}, "covered": {"k": True}}])
+    line = next(line for line in capsys.readouterr().out.splitlines() if line.startswith("force"))
+    assert line.split()[1:6] == ["2", "0", "0", "1/2", "1"]

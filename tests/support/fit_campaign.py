@@ -1,0 +1,163 @@
+"""Fit drawn records and print what was found: python tests/support/fit_campaign.py --seed 7 --records 400 --log FILE
+
+"Found": all values within five standard errors of the truth, where the record determines them. "Silent": not found, and
+without a remark. Coverage: share of the finite 95 % intervals that hold the truth.
+"""
+
+import argparse
+import json
+import os
+import sys
+from math import isfinite
+from pathlib import Path
+from time import process_time
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+ROOT = Path(__file__).parents[2]
+sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "support")]
+
+import numpy as np  # noqa: E402
+from drawn_records import GROUPS, draw_record  # noqa: E402
+
+from harness.errors import HarnessError  # noqa: E402
+from harness.process.subprocess_runner import run_module  # noqa: E402
+from harness.process.temporary_directory import temporary_directory  # noqa: E402
+from harness.records.columns import ColumnOptions  # noqa: E402
+from harness.records.signal_table import parse_signals  # noqa: E402
+from harness.records.table_files import Table  # noqa: E402
+from harness.running.whole_run import open_simulator  # noqa: E402
+from harness.studies.fit.request import FitRequest, resolve_request  # noqa: E402
+from harness.studies.fit.study import fit_tables  # noqa: E402
+
+EXAMPLES = ROOT / "tests" / "example_models"
+SOURCES = {
+    "stribeck_sled": EXAMPLES / "fit" / "stribeck_sled.py",
+    "belt": EXAMPLES / "larger" / "belt.py",
+    "sleds": EXAMPLES / "larger" / "sleds.py",
+}
+
+
+def build_fmus(folder):
+    """Build the native FMUs of all groups for this platform and return the folder."""
+    models = sorted({group.model for group in GROUPS.values()})
+    sources = [str(SOURCES.get(model, model)) for model in models]
+    done = run_module("build_fmus", "", *sources, "--native", "--platform", "linux64", "--out", str(folder))
+    if done.returncode:
+        raise RuntimeError(done.stderr)
+    return folder
+
+
+def fit_drawn_record(group, seed, fmus):
+    """Draw a record and fit it; return the record and the fit, or the reason why it was refused."""
+    random = np.random.default_rng(seed)
+    with open_simulator(fmus / f"{group.record_of or group.model}.fmu", {}) as simulator:
+        record = draw_record(group, simulator, random)
+    columns = dict(zip(group.outputs, record.y.T, strict=True)) | record.inputs
+    table = Table("record", ("t [s]", *columns), (record.t, *columns.values()))
+    observe, inputs = {name: name for name in group.outputs}, {name: name for name in record.inputs}
+    fmu = fmus / f"{group.model}.fmu"
+    request = FitRequest(fmu, record.free, observe, inputs, record.fixed, columns=ColumnOptions())
+    resolved = resolve_request(request)
+    try:
+        signals = parse_signals(table, resolved.sources, request.columns, "record")
+        return record, fit_tables(resolved, [signals], lambda share: None)
+    except HarnessError as error:
+        return record, str(error)
+
+
+def summarize(record, fit, seconds):
+    """Return what matters of a fit as plain data."""
+    row = {"noise": record.noise, "truth": record.truth, "seconds": seconds}
+    if isinstance(fit, str):
+        return row | {"refused": fit}
+    estimates = {estimate.name: estimate for estimate in fit.estimates if estimate.name in record.truth}
+    return row | {
+        "runs": fit.n_runs,
+        "searches": fit.n_searches,
+        "remarks": list(fit.remarks),
+        "values": {name: each.value for name, each in estimates.items()},
+        "errors": {name: each.error for name, each in estimates.items()},
+        "deviation": {
+            name: abs(each.value - record.truth[name]) / each.error if each.error else np.inf
+            for name, each in estimates.items()
+        },
+        "covered": {
+            name: each.low <= record.truth[name] <= each.high
+            for name, each in estimates.items()
+            if isfinite(each.low) and isfinite(each.high)
+        },
+        "half_width": {name: (each.high - each.low) / 2 / abs(record.truth[name]) for name, each in estimates.items()},
+        "combinations": [each.name for each in fit.combinations],
+        "describes_record": fit.describes_record,
+    }
+
+
+def is_found(row):
+    """Return whether all determined values are within five standard errors."""
+    return all(not each > 5 for each in row["deviation"].values()) and row["describes_record"]
+
+
+def print_summary(rows):
+    """Print a line for each group and noise."""
+    groups = [*dict.fromkeys(row["group"] for row in rows)]
+    lines = [(group, [row for row in rows if row["group"] == group]) for group in groups]
+    right = [row for row in rows if row["group"] != "wrong law"]
+    lines += [
+        (kind, [row for row in right if row["noise"].startswith(kind)]) for kind in ("white", "coloured", "quantised")
+    ]
+    lines.append(("all with the right law", right))
+    print(f"{'':24}records refused partly found      silent remarked coverage       CPU median worst s")
+    for name, part in lines:
+        if not part:
+            continue
+        fitted = [row for row in part if "refused" not in row]
+        partly = [row for row in fitted if not all(map(isfinite, row["errors"].values()))]
+        found = [row for row in fitted if is_found(row)]
+        silent = [row for row in fitted if not is_found(row) and not row["remarks"]]
+        remarked = [row for row in fitted if row["remarks"]]
+        covered = [each for row in fitted for each in row["covered"].values()]
+        seconds = [row["seconds"] for row in part]
+        share = f"{100 * np.mean(covered):5.1f} % of {len(covered):4}" if covered else " " * 15
+        print(
+            f"{name:24}{len(part):7} {len(part) - len(fitted):7} {len(partly):6} {len(found):4}/{len(fitted):<4} "
+            f"{len(silent):6} {len(remarked):8} {share} {np.median(seconds):8.2f} {max(seconds):6.2f}"
+        )
+
+
+def main():
+    """Run a campaign, or summarize the logs of earlier ones."""
+    options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    options.add_argument("--seed", type=int, default=1)
+    options.add_argument("--records", type=int, default=11, help="number of records, over all groups")
+    options.add_argument("--group", action="append", choices=[*GROUPS], help="only this group; repeatable")
+    options.add_argument("--log", type=Path, help="file for the results; a campaign continues from there")
+    options.add_argument("--fmus", type=Path, help="folder of native FMUs that exist already")
+    options.add_argument("--summary", action="store_true", help="only print the summary of the log")
+    given = options.parse_args()
+    rows = json.loads(given.log.read_text()) if given.log and given.log.exists() else []
+    if given.summary:
+        print_summary(rows)
+        return
+    groups = given.group or [*GROUPS]
+    with temporary_directory("campaign-") as folder:
+        fmus = given.fmus or build_fmus(folder)
+        done = {(row["group"], row["seed"]) for row in rows}
+        for n in range(given.records):
+            name, number = groups[n % len(groups)], n // len(groups)
+            seed = [given.seed, [*GROUPS].index(name), number]
+            if (name, str(seed)) in done:
+                continue
+            begun = process_time()
+            record, fit = fit_drawn_record(GROUPS[name], seed, fmus)
+            row = summarize(record, fit, process_time() - begun)
+            rows.append({"group": name, "seed": str(seed)} | row)
+            bad = "" if "refused" in row or is_found(row) else "NOT FOUND"
+            missed = [each for each, held in row.get("covered", {}).items() if not held]
+            print(name, number, row["noise"], f"{row['seconds']:.1f} s", bad, missed or "", flush=True)
+            if given.log:
+                given.log.write_text(json.dumps(rows))
+    print_summary(rows)
+
+
+if __name__ == "__main__":
+    main()
