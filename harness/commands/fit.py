@@ -57,7 +57,7 @@ def fit(
     Examples:
       friction-fmus fit stickslip pull.csv --free mu_s,mu_d,k --fixed m=3 --observe "x=laser [mm]"
       friction-fmus fit coulomb shaker.csv --free m,k,f,c=0:5 --observe x=pos --input F_ext=force
-      friction-fmus fit sled.fmu a.csv b.csv --free f_s,v_driver --each v_driver --observe F_spring=load
+      friction-fmus fit sled.fmu a.csv b.csv --free f_s,v --each v --observe F=load
     """
     from ..errors import SceneError
     from ..records.columns import ColumnOptions

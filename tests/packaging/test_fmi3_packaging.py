@@ -15,7 +15,7 @@ import worker_client
 from fmpy import read_model_description, simulate_fmu
 from fmpy.validation import validate_fmu
 from lxml import etree
-from models import ROOT, model_class
+from models import ROOT, declared, model_class
 from PIL import Image
 
 from fmus.packaging.fmi_variables import model_exchange_instance
@@ -119,7 +119,7 @@ def test_every_real_has_a_unit_and_every_enumeration_its_items(fmu, name):
     units = {unit.get("name") for unit in root.findall("UnitDefinitions/Unit")}
     assert {element.get("unit") for element in root.iterfind("ModelVariables/Float64")} == units
     types = {kind.get("name"): kind for kind in root.find("TypeDefinitions")}
-    for variable, meaning in variables(find_model(name).model()):
+    for variable, meaning in declared(name).items():
         if meaning.items:
             element = root.find(f"ModelVariables/Enumeration[@name='{variable}']")
             items = types[element.get("declaredType")].findall("Item")
@@ -131,9 +131,9 @@ def test_derivatives_name_their_states_and_follow_the_order_of_the_states(fmu, n
     description = read_model_description(fmu(name))
     rates = [unknown.variable for unknown in description.derivatives]
     outputs = [variable.name for variable in description.modelVariables if variable.causality == "output"]
-    worker_client = ["x_driver"] if name in DRIVEN else []
-    assert [rate.derivative.name for rate in rates] == [*outputs[:2], *worker_client]
-    assert [rate.name for rate in rates] == [*outputs[1:3], *(f"der({state})" for state in worker_client)]
+    drivers = ["x_driver"] if name in DRIVEN else []
+    assert [rate.derivative.name for rate in rates] == [*outputs[:2], *drivers]
+    assert [rate.name for rate in rates] == [*outputs[1:3], *(f"der({state})" for state in drivers)]
     assert [variable for variable in description.modelVariables if variable.derivative] == sorted(
         rates, key=lambda rate: rate.valueReference
     )

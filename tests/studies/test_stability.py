@@ -266,7 +266,7 @@ def test_a_part_of_the_table_ends_as_expected(user_folder, tmp_path, monkeypatch
     monkeypatch.chdir(user_folder)
     rows, (*_, region) = run_stability(tmp_path, no_progress, grouped_cases(is_sampled()))
     assert [f"{row.case.label}: {row.text}" for row in rows if not row.passed] == []
-    assert {row.case.method for row in rows} == {"exact", "ode23", "ode45", "dop853", "rodas"}
+    assert {row.case.method for row in rows} == {"exact", "ode23", "ode45", "dop853", "rodas", "radau9"}
     assert {row.case.model for row in rows} == set(MODELS)
     with (tmp_path / "stability" / "stability.csv").open(encoding="utf-8", newline="") as file:
         assert len(list(csv.DictReader(file))) == len(rows) > 100

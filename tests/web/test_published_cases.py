@@ -42,4 +42,4 @@ def test_every_published_case_measures_the_same_as_the_terminal(page):
                 value = expected.to_unit(*unit) if unit and unit != [expected.unit] else expected.value
                 assert web_page.number(size) == pytest.approx(value, rel=1e-3), (name, figure)
     page.choose("preset", "")  # custom: values unchanged, but no published case any more
-    assert page.run("[app.state().preset, app.state().model]") == ["", scene.model]
+    assert page.run("[app.state().preset, app.state().model]") == ["", scene.run.model]
