@@ -55,8 +55,9 @@ def fit(
 
     \b
     Examples:
-      friction-fmus fit stickslip pull.csv --free mu_s,mu_d,k --fixed m=3 --observe "x=laser [mm]"
-      friction-fmus fit coulomb shaker.csv --free m,k,f,c=0:5 --observe x=pos --input F_ext=force
+      friction-fmus fit stickslip pull.csv --free mu_s,mu_d,k --observe x=laser
+      friction-fmus fit coulomb shaker.csv --free m,k,f,c=0:5 --fixed x0=0
+          --observe x=pos --input F_ext=force
       friction-fmus fit sled.fmu a.csv b.csv --free f_s,v --each v --observe F=load
     """
     from ..errors import SceneError
