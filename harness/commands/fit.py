@@ -58,7 +58,7 @@ def fit(
       friction-fmus fit stickslip pull.csv --free mu_s,mu_d,k --observe x=laser
       friction-fmus fit coulomb shaker.csv --free m,k,f,c=0:5 --fixed x0=0
           --observe x=pos --input F_ext=force
-      friction-fmus fit sled.fmu a.csv b.csv --free f_s,v --each v --observe F=load
+      friction-fmus fit sled.fmu a.csv b.csv --free f,v --each v --observe F=load
     """
     from ..errors import SceneError
     from ..records.columns import ColumnOptions
