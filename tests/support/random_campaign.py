@@ -29,6 +29,7 @@ from dataclasses import dataclass, field
 from math import inf, isnan
 from pathlib import Path
 
+import build_cache
 import numpy as np
 from independent_contacts import solve
 from random_models import STOP, perturb, random_structure, random_values, to_system, write_model
@@ -406,6 +407,8 @@ def main():
     parser.add_argument("--rtol", type=float, default=1e-6)
     arguments = parser.parse_args()
     folder = arguments.folder
+    folder.mkdir(parents=True, exist_ok=True)
+    build_cache.shared_folder = folder.resolve()  # for the temporary files of the worker
     worker = Worker()
     if arguments.show:
         structure = random_structure(arguments.show[0])
