@@ -1,17 +1,19 @@
 """Rests that begin and end within one integration step are found, and slips that nearly reach zero go on."""
 
+import itertools
 from functools import cache
 
 import pytest
 import short_sticks
 from build_cache import build_user_model
-from models import DOP853, EXACT, ODE23, ODE45, RODAS
+from models import DOP853, EXACT, ODE23, ODE45, RADAU9, RODAS
 from native_fmus import build_native_fmus
 
 pytestmark = pytest.mark.slow
 
 RESOLUTION = 100.0  # the slip is accurate to this multiple of the tolerance, relative to the largest slip of the phase
 NATIVE = ("--native", "--platform", "linux64")
+METHODS = [f"--method={label}" for label in ("ode23", "ode45", "dop853", "rodas", "radau9")]
 MODES = {"belt": ["mode"], "sled": ["mode"], "stack": ["mode1", "mode2"]}
 
 
@@ -21,7 +23,7 @@ def native_fmu(model, folder):
         return build_native_fmus() / "stickslip.fmu"
     file = folder / f"short_{model}.py"
     file.write_text({"belt": short_sticks.BELT, "stack": short_sticks.STACK}[model])
-    return build_user_model(file, *NATIVE) / "native" / f"short_{model}.fmu"
+    return build_user_model(file, *NATIVE, *METHODS) / "native" / f"short_{model}.fmu"
 
 
 @cache
@@ -52,8 +54,10 @@ def wrong_sets(worker, path, model, method, rtol):
 
 
 @pytest.mark.parametrize("rtol", [1e-6, 1e-11])
-@pytest.mark.parametrize("method", [ODE23, ODE45, DOP853, RODAS])
-@pytest.mark.parametrize("model", MODES)
+@pytest.mark.parametrize(
+    ("model", "method"),
+    [*itertools.product(MODES, [ODE23, ODE45, DOP853, RODAS]), ("belt", RADAU9), ("stack", RADAU9)],
+)
 def test_every_rest_deeper_than_the_error_is_found(worker, tmp_path, model, method, rtol):
     assert wrong_sets(worker, native_fmu(model, tmp_path), model, method, rtol) == []
 
@@ -62,7 +66,7 @@ def test_the_closed_form_finds_every_rest(worker, tmp_path):
     assert wrong_sets(worker, native_fmu("sled", tmp_path), "sled", EXACT, 1e-11) == []
 
 
-@pytest.mark.parametrize("method", [ODE23, ODE45, DOP853, RODAS])
+@pytest.mark.parametrize("method", [ODE23, ODE45, DOP853, RODAS, RADAU9])
 def test_a_slip_that_touches_zero_on_a_belt_goes_on(worker, tmp_path, method):
     """Static and sliding friction are equal: the block rides along once, and its slip then touches zero in each
     period."""
