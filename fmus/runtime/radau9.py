@@ -32,7 +32,7 @@ from .vectors import (
 NUMBER, TEXT = 6, "Radau IIA 9(5), L-stable; for stiff friction curves and tight tolerances"
 STAGES = 5  # evaluations of the right-hand side in an iteration; `propose` replaces it by those of a step
 EXTRA = 0  # additional evaluations for the interpolant
-OFFERED_WITH = ("rodas", "radau9")  # default methods of the models that offer it; others include it where asked to
+OFFERED_WITH = ("rodas", "radau9")  # default methods of the models that offer it; others need --method radau9
 POWER, SAFETY, SHRINK, GROW = 1.0 / 6.0, 0.9, 0.12, 4.0
 
 MAX_ITERATIONS = 7

@@ -12,7 +12,7 @@ from harness.references.den_hartog import steady_motion_with_stops, steady_motio
 from harness.studies.precision.literature_problems import SLIDING, STOPPING
 
 LOAD, HOLD_TIME, REST = 0.5, 1e5, 10.0  # N, a third of the static friction, and s
-SETTLED = 0.2  # s after which bristles have come to rest to rounding
+REST_TIME = 0.2  # s after which bristles have come to rest to rounding
 FREE = {"k": 0.0, "v_driver": 0.0, "F_ext": LOAD}  # no spring
 STICKSLIP = FREE | {"m": 1.0, "g": 10.0, "mu_s": 0.15, "mu_d": 0.1}
 HYBRID = {"stickslip": STICKSLIP, "belt": {"k": 0.0, "v_belt": 0.0, "F_ext": LOAD, "x0": 0.0}}
@@ -61,15 +61,15 @@ def test_lugre_friction_keeps_a_displacement_of_a_load_below_the_limit(worker, m
     is that of the second formulation."""
 
     class Held(event_located.Bristles):
-        load, stop = LOAD, SETTLED
+        load, stop = LOAD, REST_TIME
 
         def pull(self, t, x):
             return self.load
 
     held = Held()
-    (*_, end), _ = event_located.solve(held, [0.0, SETTLED], "DOP853", 3e-14, 1e-17)
+    (*_, end), _ = event_located.solve(held, [0.0, REST_TIME], "DOP853", 3e-14, 1e-17)
     held.load, held.start = 0.0, tuple(end)
-    (*_, free), _ = event_located.solve(held, [0.0, SETTLED], "DOP853", 3e-14, 1e-17)
+    (*_, free), _ = event_located.solve(held, [0.0, REST_TIME], "DOP853", 3e-14, 1e-17)
     loaded, released = bristle_run(worker, more, "lugre")
     assert (loaded, released) == pytest.approx((end[0], free[0]), rel=1e-6)
     assert released > 0.1 * LOAD / 1e5
