@@ -94,7 +94,7 @@ def sweep(
     n_new = result.runs - result.n_resumed
     output = [f"{result.runs} runs, {result.n_resumed} of them resumed, {result.failed} failed"]
     if result.damaged:
-        output.append(f"{result.damaged} damaged lines of the journal were ignored; their runs were repeated")
+        output.append("the checkpoint of an interrupted sweep was damaged; its runs were repeated")
     if n_new:
         output.append(f"{n_new} runs in {result.seconds:.3g} s: {n_new / result.seconds:.4g} runs/s")
     terminal.print_result(

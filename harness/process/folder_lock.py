@@ -1,4 +1,4 @@
-"""Locks of folders. A lock ends with the process that holds it, so a folder without one was left by a killed process.
+"""Locks of folders and files. A lock ends with the process that holds it: a folder without one was left by a kill.
 
 Locks exist on POSIX (fcntl), but not on all of its file systems.
 """
@@ -21,19 +21,19 @@ def create_locked_folder(create: Callable[[], Path], resources: ExitStack) -> Pa
     while True:
         folder = create()
         with suppress(FileNotFoundError):
-            resources.enter_context(lock_folder(folder, wait=True))
+            resources.enter_context(lock_path(folder, wait=True))
         if folder.exists():
             return folder
         resources.close()
 
 
 @contextmanager
-def lock_folder(folder: Path, wait: bool = False) -> Iterator[None]:
-    """Lock a folder, where locks exist; raise OSError if another process has locked it and `wait` is false."""
+def lock_path(path: Path, wait: bool = False) -> Iterator[None]:
+    """Lock a folder or a file, where locks exist; raise OSError if another process has it and `wait` is false."""
     if sys.platform == "win32":
         yield
         return
-    lock = os.open(folder, os.O_RDONLY)
+    lock = os.open(path, os.O_RDONLY)
     try:
         with suppress(OSError) if wait else nullcontext():  # file systems without locks
             fcntl.flock(lock, fcntl.LOCK_EX if wait else fcntl.LOCK_EX | fcntl.LOCK_NB)

@@ -13,7 +13,7 @@ from shutil import rmtree
 from tempfile import gettempdir, mkdtemp
 
 from ..errors import HarnessError
-from .folder_lock import create_locked_folder, lock_folder
+from .folder_lock import create_locked_folder, lock_path
 from .interrupt import defer_signals
 
 PREFIX = "friction-fmus-"  # of the directories of this project
@@ -73,5 +73,5 @@ def remove_abandoned_directories(root: Path) -> None:
                     and entry.is_dir(follow_symlinks=False)
                     and entry.stat(follow_symlinks=False).st_uid == os.getuid()
                 ):
-                    with lock_folder(Path(entry)):  # raises OSError if its process lives
+                    with lock_path(Path(entry)):  # raises OSError if its process lives
                         rmtree(entry, ignore_errors=True)

@@ -21,7 +21,7 @@ from secrets import token_hex
 from shutil import rmtree
 
 from ..errors import HarnessError
-from ..process.folder_lock import create_locked_folder, lock_folder
+from ..process.folder_lock import create_locked_folder, lock_path
 from ..process.interrupt import defer_signals
 from .provenance import FILE, load_provenance, note_replaced_result
 
@@ -119,7 +119,7 @@ def clean_up(folder: Path, own_files: Collection[str]) -> None:
             and leftover.is_dir()
             and {file.name for file in leftover.iterdir()} <= set(own_files)
         ):
-            with suppress(OSError), lock_folder(leftover):  # another process is writing it
+            with suppress(OSError), lock_path(leftover):  # another process is writing it
                 if leftover.suffix == OLD and not folder.exists():
                     leftover.rename(folder)
                 rmtree(leftover, ignore_errors=True)

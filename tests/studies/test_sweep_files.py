@@ -12,13 +12,12 @@ from models import MODELS
 from sweep_results import open_sweep, xarray
 
 from harness.errors import HarnessError
-from harness.results.netcdf import NetCDFVariable, NetCDFWriter
 from harness.running.description import read_description
 from harness.scenes.run_spec import RunSpec
 from harness.studies.sweep import figure
 from harness.studies.sweep import result_files as writing
 from harness.studies.sweep.boundaries import Boundary, read_boundaries
-from harness.studies.sweep.journal import JournalBlock
+from harness.studies.sweep.checkpoint import RunBlock
 from harness.studies.sweep.runner import SweepSpec
 from harness.studies.sweep.sampling import SweepPoints, parse_axis
 from harness.studies.sweep.study import Sweep
@@ -27,6 +26,7 @@ from harness.studies.sweep.study import Sweep
 def test_memory_use_does_not_grow_with_the_number_of_runs(monkeypatch, tmp_path):
     """The parts of a sweep that handle every run, with ten times as many of them."""
     monkeypatch.setattr(figure, "draw", lambda *arguments: None)
+    monkeypatch.setattr(writing, "CHUNK_SIZE", "8 KiB")
     peaks = []
     for many in (20, 200):
         axes = parse_axis(f"a=0:1:{many}", False), parse_axis("b=0:1:100", False)
@@ -36,39 +36,21 @@ def test_memory_use_does_not_grow_with_the_number_of_runs(monkeypatch, tmp_path)
         folder = tmp_path / str(many)
         folder.mkdir()
         tracemalloc.start()
-        journal = sweep.journal(folder)
-        with journal.open():
+        checkpoint = sweep.checkpoint(folder)
+        with checkpoint.open():
             for first in range(0, len(sweep.points), 200):
-                journal.add(
-                    JournalBlock(first, sweep.points.coordinates(first, first + 200)[:, :1], {3: f"failed at {first}"})
+                checkpoint.add(
+                    RunBlock(first, sweep.points.coordinates(first, first + 200)[:, :1], {3: f"failed at {first}"})
                 )
-        (failure,) = writing.write_files(sweep, journal, about, folder)
+        (failure,) = writing.write_files(sweep, checkpoint, about, folder)
         peaks.append(tracemalloc.get_traced_memory()[1])
         tracemalloc.stop()
         assert failure.runs == len(sweep.points) // 200
         data = open_sweep(folder)
         assert (data["c"] == data["a"]).all()
         assert (data["error"] != "").sum() == failure.runs
+        assert data["error"].to_numpy().ravel()[203] == "failed at 200"
     assert peaks[1] < 1.5 * peaks[0]
-
-
-def test_a_netcdf_file_written_in_blocks_is_read_correctly(tmp_path):
-    values = np.arange(12.0).reshape(3, 4) / 7
-    texts = np.array(["", "a", "four", "\u00e9\u00e9", "b"])
-    with (tmp_path / "a.nc").open("wb") as stream:
-        attributes = {"units": "m/s2", "size": 0.1}
-        text = NetCDFVariable("text", ("n", "letters"), {"_Encoding": "utf-8"}, 4)
-        sizes = {"y": 3, "x": 4, "n": 5, "letters": 4}
-        dataset = NetCDFWriter(stream, sizes, [NetCDFVariable("a", ("y", "x"), attributes), text], {"b": "c"})
-        for first in (8, 0, 4):
-            dataset.write_values("a", first, values.ravel()[first : first + 4])
-        dataset.write_values("text", 0, np.char.encode(texts))
-    with xarray.open_dataset(tmp_path / "a.nc") as data:
-        assert data["a"].dims == ("y", "x")
-        assert (data["a"].to_numpy() == values).all()
-        assert data["a"].attrs == attributes
-        assert data.attrs == {"b": "c"}
-        assert (data["text"].to_numpy() == texts).all()
 
 
 @pytest.mark.parametrize(

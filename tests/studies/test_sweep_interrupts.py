@@ -20,7 +20,7 @@ distributed = pytest.importorskip("distributed", reason="the extra 'sweep' is no
 from harness.errors import HarnessError  # noqa: E402
 from harness.scenes.run_spec import RunSpec  # noqa: E402
 from harness.studies.sweep import study  # noqa: E402
-from harness.studies.sweep.journal import Journal  # noqa: E402
+from harness.studies.sweep.checkpoint import Checkpoint  # noqa: E402
 from harness.studies.sweep.runner import SweepSpec  # noqa: E402
 from harness.studies.sweep.sampling import SweepPoints, parse_axis  # noqa: E402
 from harness.studies.sweep.study import WORKER_DIED, Sweep  # noqa: E402
@@ -61,23 +61,23 @@ def files(place):
     return {file.name: file.read_bytes() for file in sweep_folder(place / "results", "stickslip-mu_d").glob("sweep.*")}
 
 
-def journal(place):
-    """Return the journal of a sweep that has begun; None before."""
-    return next((place / "results/sweep").glob(".*.journal"), None)
+def checkpoint_file(place):
+    """Return the checkpoint of a sweep that has begun; None before."""
+    return next((place / "results/sweep").glob(".*.checkpoint"), None)
 
 
-def blocks(place):
-    """Return the number of finished blocks of runs."""
-    path = journal(place)
-    return path.read_bytes().count(b"\n") if path else 0
+def finished_runs(place):
+    """Return the number of finished runs."""
+    path = checkpoint_file(place)
+    return Checkpoint(path, 100, 1).n_done if path and path.stat().st_size else 0
 
 
 def start_sweep(place):
-    """Start the long sweep in a child process and wait for two finished blocks of runs.
+    """Start the long sweep in a child process and wait for two more finished runs.
 
     Its environment marks its processes, and the file `bound` lists the addresses at which they listen.
     """
-    reset_sigint, before = partial(signal.signal, signal.SIGINT, signal.SIG_DFL), blocks(place)
+    reset_sigint, before = partial(signal.signal, signal.SIGINT, signal.SIG_DFL), finished_runs(place)
     (place / "sitecustomize.py").write_text(NOTE)
     process = subprocess.Popen(
         [sys.executable, "-m", "harness", *LONG],
@@ -89,7 +89,7 @@ def start_sweep(place):
         preexec_fn=reset_sigint,  # a test run in the background ignores it
     )
     while process.poll() is None:
-        if blocks(place) > before + 1:
+        if finished_runs(place) > before + 1:
             return process
         time.sleep(0.02)
     raise AssertionError(process.communicate()[1])
@@ -116,9 +116,9 @@ def test_a_killed_sweep_resumes_and_leaves_no_worker(harness, undisturbed, tmp_p
     while sweep_processes(tmp_path) and time.monotonic() < late:
         time.sleep(0.05)
     assert sweep_processes(tmp_path) == []
-    first = Journal(journal(tmp_path), 100, 1).n_done
-    with journal(tmp_path).open("a") as file:
-        file.write("[299, [0.1")
+    first = finished_runs(tmp_path)
+    with checkpoint_file(tmp_path).with_suffix(".messages").open("a") as file:
+        file.write('"trunca')
 
     process = start_sweep(tmp_path)
     os.killpg(process.pid, signal.SIGINT)
@@ -126,14 +126,14 @@ def test_a_killed_sweep_resumes_and_leaves_no_worker(harness, undisturbed, tmp_p
     assert process.returncode == 130
     assert stderr.startswith("Error: interrupted: ")
     assert stderr.count("\n") == 1
-    done_runs = Journal(journal(tmp_path), 100, 1).n_done
+    done_runs = finished_runs(tmp_path)
     assert 0 < first < done_runs < 100
 
     done = harness(*LONG)
     assert (done.returncode, done.stderr) == (0, "")
     assert f"100 runs, {done_runs} of them resumed" in done.stdout
     assert files(tmp_path) == undisturbed
-    assert journal(tmp_path) is None
+    assert checkpoint_file(tmp_path) is None
     bound = tmp_path / "bound"  # workers use pipes; a socket whose address is a file is no port
     assert "tuple" not in (bound.read_text() if bound.exists() else "")
 
@@ -151,9 +151,9 @@ def test_a_cluster_with_a_killed_worker_finishes(harness, undisturbed, tmp_path)
             before = []
 
             def end():
-                while blocks(tmp_path) < 2 and worker.poll() is None:
+                while finished_runs(tmp_path) < 2 and worker.poll() is None:
                     time.sleep(0.02)
-                before.append(Journal(journal(tmp_path), 100, 1).n_done)
+                before.append(finished_runs(tmp_path))
                 worker.kill()
 
             thread = threading.Thread(target=end)

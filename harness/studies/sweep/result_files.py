@@ -1,6 +1,7 @@
 """Runs a sweep and writes its files: sweep.nc for xarray, sweep.csv with the same content, and the figure.
 
-The files are written block by block.  Contents of sweep.nc:
+Values are read from the checkpoint and written in parts, so that memory does not grow with the number of runs.
+Contents of sweep.nc:
 
     <parameter>     values of a varied parameter: a dimension on a grid, over `run` in a sample; units, long_name, scale
     <measure>       one number per run, NaN if the run failed or has no such value; units, long_name
@@ -18,26 +19,30 @@ from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ...errors import HarnessError, SceneError, check_names
 from ...results.files import column_heading
 from ...results.folder import replace_folder
-from ...results.netcdf import NetCDFVariable, NetCDFWriter
 from ...results.provenance import describe_sources, write_provenance
 from ...running.description import read_description
 from ...running.variable_values import REAL_TYPES, variable_unit
 from ...scenes.fmu_files import check_built
 from .boundaries import Boundary, read_boundaries
-from .journal import Journal, JournalBlock
+from .checkpoint import Checkpoint, RunBlock
 from .measures import MeasureColumn
 from .runner import SweepSpec, open_runner
 from .sampling import SweepPoints
 from .study import Sweep, run_pending
 
+if TYPE_CHECKING:
+    import dask.array
+    import xarray
+
 FOLDER = "sweep"
+CHUNK_SIZE = "8 MiB"  # of the values read and written at a time
 FILES = ("sweep.nc", "sweep.csv", "figure.svg")
 NOT_NUMBERS = ("String", "Binary", "Clock")
 NUMBER = re.compile(r"-?\b\d+\.?\d*(e[-+]?\d+)?")
@@ -63,9 +68,9 @@ class SweepResult:
     folder
         Folder of the results.
     n_resumed
-        Number of runs taken from the journal of an interrupted sweep.
+        Number of runs taken from the checkpoint of an interrupted sweep.
     damaged
-        Number of damaged lines in that journal.
+        Whether that checkpoint was damaged and not used.
     failures
         Failed runs by kind, most frequent first.
     seconds
@@ -75,7 +80,7 @@ class SweepResult:
     runs: int
     folder: Path
     n_resumed: int
-    damaged: int
+    damaged: bool
     failures: tuple[FailureGroup, ...]
     seconds: float
 
@@ -123,8 +128,8 @@ def run_sweep(
     check_built(file)
     about = describe(runs, points)
     sweep = Sweep(runs, points, file.read_bytes(), len(about.columns))
-    journal = sweep.journal(out / FOLDER)
-    n_resumed = journal.n_done
+    checkpoint = sweep.checkpoint(out / FOLDER)
+    n_resumed = checkpoint.n_done
     folder = out / FOLDER / (name or "-".join((runs.run.model, *runs.varied, sweep.key[:8])))
     source = describe_sources(str(file))
     options = runs.run.options | {
@@ -134,11 +139,11 @@ def run_sweep(
         "measures": runs.measures,
     }
     with replace_folder(folder, FILES, source) as new_folder:  # before the runs, so that conflicts are reported at once
-        seconds = run_pending(sweep, journal, scheduler, workers, report)
-        failures = write_files(sweep, journal, about, new_folder)
+        seconds = run_pending(sweep, checkpoint, scheduler, workers, report)
+        failures = write_files(sweep, checkpoint, about, new_folder)
         write_provenance(new_folder, [file], about.constants, options, source=source)
-    journal.delete()
-    return SweepResult(len(points), folder, n_resumed, journal.damaged, failures, seconds)
+    checkpoint.delete()
+    return SweepResult(len(points), folder, n_resumed, checkpoint.damaged, failures, seconds)
 
 
 def describe(runs: SweepSpec, points: SweepPoints) -> SweepDescription:
@@ -176,53 +181,91 @@ def is_settable(variable: Any) -> bool:
     return variable.causality in ("parameter", "input") and variable.type not in NOT_NUMBERS and not variable.dimensions
 
 
-def write_files(sweep: Sweep, journal: Journal, about: SweepDescription, folder: Path) -> tuple[FailureGroup, ...]:
+def write_files(
+    sweep: Sweep, checkpoint: Checkpoint, about: SweepDescription, folder: Path
+) -> tuple[FailureGroup, ...]:
     """Write the netCDF file, the table and the figure; return the failures."""
+    import dask
+
     from .figure import draw
 
-    failures, longest = group_failures(sweep, journal)
-    grid, names, length = sweep.points.random is None, sweep.runs.varied, len(sweep.points)
-    dimensions = names if grid else ("run",)
-    sizes = {item.name: len(item.values) for item in sweep.points.axes} if grid else {"run": length}
-    text_dimension = f"string{longest}"
-    variables = [
-        NetCDFVariable(name, (name,) if grid else ("run",), attributes_of)
-        for name, attributes_of in axis_attributes(sweep, about).items()
-    ]
-    coordinates: dict[str, str] = {} if grid else {"coordinates": " ".join(names)}
-    for column in about.columns:
-        attributes_of = {"units": column.unit or "1", "long_name": column.text}
-        variables.append(NetCDFVariable(column.name, dimensions, attributes_of | coordinates))
-    attributes_of = {"long_name": "error message of a failed run, otherwise empty", "_Encoding": "utf-8"}
-    variables.append(NetCDFVariable("error", (*dimensions, text_dimension), attributes_of | coordinates, longest))
-    attributes: dict[str, str | float] = {
+    failures, longest = group_failures(sweep, checkpoint)
+    with dask.config.set({"scheduler": "synchronous", "array.chunk-size": CHUNK_SIZE}):
+        dataset = build_dataset(sweep, checkpoint, about, longest)
+        dataset.to_netcdf(folder / "sweep.nc", engine="netcdf4", format="NETCDF3_64BIT")
+    with (folder / "sweep.csv").open("w", encoding="utf-8", newline="") as text:
+        table = csv.writer(text, lineterminator="\n")
+        units = {name: str(variable.attrs.get("units", "1")) for name, variable in dataset.variables.items()}
+        names = [*sweep.runs.varied, *(column.name for column in about.columns), "error"]
+        table.writerow([column_heading(name, "" if units[name] == "1" else units[name]) for name in names])
+        for block in checkpoint.blocks():
+            table.writerows(csv_rows(sweep.points.coordinates(block.first, block.last), block))
+    draw(folder / "sweep.nc", folder / "figure.svg", about.boundaries, sum(item.runs for item in failures))
+    return failures
+
+
+class ArrayOnDisk:
+    """A mapped array for Dask, which copies arrays that can be copied."""
+
+    def __init__(self, values: np.ndarray) -> None:
+        self.values, self.shape, self.dtype, self.ndim = values, values.shape, values.dtype, values.ndim
+
+    def __getitem__(self, index: Any) -> np.ndarray:
+        return np.array(self.values[index])
+
+
+def build_dataset(sweep: Sweep, checkpoint: Checkpoint, about: SweepDescription, longest: int) -> "xarray.Dataset":
+    """Return the results as an xarray.Dataset, whose values stay on the disk.
+
+    `longest` is the length in bytes of the longest error message.
+    """
+    import dask.array
+    import xarray
+
+    points, names = sweep.points, sweep.runs.varied
+    is_grid = points.random is None
+    dimensions = names if is_grid else ("run",)
+    shape = tuple(len(axis.values) for axis in points.axes) if is_grid else (len(points),)
+
+    def lazy(values: np.ndarray) -> "dask.array.Array":
+        on_disk = ArrayOnDisk(values.reshape(shape))
+        return dask.array.from_array(on_disk, chunks="auto", name=False)  # type: ignore[no-untyped-call]
+
+    def encode_messages(status: np.ndarray) -> np.ndarray:
+        sentences = [sentence.encode() for sentence in checkpoint.messages(status.ravel())]
+        return np.array(sentences, f"S{longest}").reshape(status.shape)
+
+    values, status = checkpoint.array["values"], lazy(checkpoint.array["status"])
+    attributes_of = axis_attributes(sweep, about)
+    coordinates = {
+        name: (name, np.array(axis.values), attributes_of[name])
+        if is_grid
+        else ("run", points.sample[:, i], attributes_of[name])
+        for i, (name, axis) in enumerate(zip(names, points.axes, strict=True))
+    }
+    variables = {
+        column.name: (dimensions, lazy(values[:, i]), {"units": column.unit or "1", "long_name": column.text})
+        for i, column in enumerate(about.columns)
+    }
+    variables["error"] = (
+        dimensions,
+        dask.array.map_blocks(  # type: ignore[no-untyped-call]
+            encode_messages, status, dtype=f"S{longest}"
+        ),
+        {"long_name": "error message of a failed run, otherwise empty", "_Encoding": "utf-8"},
+    )
+    attributes = {
         "title": f"{sweep.runs.run.model} over {', '.join(names)}",
         "model": sweep.runs.run.model,
         "fmu_sha256": sweep.digest,
         "stop_time": about.stop,
         "parameters": json.dumps({name: value for name, (value, _) in about.constants.items()}, sort_keys=True),
-        "sample": "grid" if grid else f"Latin hypercube, seed {sweep.points.seed}",
+        "sample": "grid" if is_grid else f"Latin hypercube, seed {points.seed}",
     }
-    with (
-        (folder / "sweep.nc").open("wb") as file,
-        (folder / "sweep.csv").open("w", encoding="utf-8", newline="") as text,
-    ):
-        data = NetCDFWriter(file, sizes | {text_dimension: longest}, variables, attributes)
-        table = csv.writer(text, lineterminator="\n")
-        heads = [(item.name, str(item.attributes.get("units", "1"))) for item in variables]
-        table.writerow([column_heading(name, "" if size == "1" else size) for name, size in heads])
-        for item in sweep.points.axes if grid else ():
-            data.write_values(item.name, 0, np.array(item.values))
-        for block in journal.blocks():
-            points = sweep.points.coordinates(block.first, block.last)
-            for name, column in zip(names, () if grid else points.T, strict=not grid):
-                data.write_values(name, block.first, column)
-            for column, values in zip(about.columns, block.values.T, strict=True):
-                data.write_values(column.name, block.first, values)
-            data.write_values("error", block.first, np.array([sentence.encode() for sentence in messages(block)]))
-            table.writerows(csv_rows(points, block))
-    draw(folder / "sweep.nc", folder / "figure.svg", about.boundaries, sum(item.runs for item in failures))
-    return failures
+    dataset = xarray.Dataset(variables, coordinates, attributes)
+    for name in (*names, *(column.name for column in about.columns)):
+        dataset[name].encoding["_FillValue"] = None  # a failed run has NaN, which needs no declaration
+    return dataset
 
 
 def axis_attributes(sweep: Sweep, about: SweepDescription) -> dict[str, dict[str, str]]:
@@ -234,24 +277,19 @@ def axis_attributes(sweep: Sweep, about: SweepDescription) -> dict[str, dict[str
     return attributes
 
 
-def messages(block: JournalBlock) -> list[str]:
-    """Return the error message of each run of a block, empty for successful runs."""
-    return [block.messages.get(i, "") for i in range(len(block.values))]
-
-
-def csv_rows(points: np.ndarray, block: JournalBlock) -> Any:
+def csv_rows(points: np.ndarray, block: RunBlock) -> Any:
     """Return the CSV rows of a block; missing values are empty."""
     values = np.column_stack([points, block.values]).astype(object)
     values[values != values] = None
-    return ([*row, sentence] for row, sentence in zip(values, messages(block), strict=True))
+    return ([*row, block.messages.get(i, "")] for i, row in enumerate(values))
 
 
-def group_failures(sweep: Sweep, journal: Journal) -> tuple[tuple[FailureGroup, ...], int]:
+def group_failures(sweep: Sweep, checkpoint: Checkpoint) -> tuple[tuple[FailureGroup, ...], int]:
     """Return the failures, most frequent first, and the length in bytes of the longest message (at least 1)."""
     runs: Counter[str] = Counter()
     examples: dict[str, FailureGroup] = {}
     longest = 1
-    for block in journal.blocks():
+    for block in checkpoint.blocks():
         for offset, sentence in block.messages.items():
             pattern = NUMBER.sub("#", sentence)
             runs[pattern] += 1

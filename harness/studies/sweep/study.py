@@ -1,8 +1,8 @@
-"""Runs a sweep: one FMU, many points, many workers, and a journal that survives a kill.
+"""Runs a sweep: one FMU, many points, many workers, and a checkpoint that survives a kill.
 
-Every finished block of runs is written to the journal, so that the same command resumes an interrupted sweep.  Results
-do not depend on the worker or the order of execution, and only the blocks in progress are held in memory.  A run that
-kills its worker is located by bisection and reported.
+Every finished block of runs is written to the checkpoint, so that the same command resumes an interrupted sweep.
+Results do not depend on the worker or the order of execution, and only the blocks in progress are held in memory.  A
+run that kills its worker is located by bisection and reported.
 """
 
 import json
@@ -22,8 +22,8 @@ from ...errors import HarnessError
 from ...process.interrupt import RECEIVED_SIGNALS, CommandInterruptedError, check_interrupt
 from ...process.temporary_directory import temporary_directory
 from ...process.worker_pool import WorkerPool
+from .checkpoint import Checkpoint, RunBlock
 from .cluster import DaskCluster, connect_cluster
-from .journal import Journal, JournalBlock
 from .runner import SweepSpec
 from .sampling import SweepPoints
 from .worker import BlockResult, run_block, unload
@@ -58,29 +58,29 @@ class Sweep:
         identity = [run, self.runs.varied, self.runs.measures, asdict(self.points), self.digest]
         return sha256(json.dumps(identity, sort_keys=True).encode()).hexdigest()[:16]
 
-    def journal(self, folder: Path) -> Journal:
-        return Journal(folder / f".{self.key}.journal", len(self.points), self.columns)
+    def checkpoint(self, folder: Path) -> Checkpoint:
+        return Checkpoint(folder / f".{self.key}.checkpoint", len(self.points), self.columns)
 
 
 def run_pending(
-    sweep: Sweep, journal: Journal, scheduler: str | None, workers: int | None, report: Callable[[float], None]
+    sweep: Sweep, checkpoint: Checkpoint, scheduler: str | None, workers: int | None, report: Callable[[float], None]
 ) -> float:
-    """Do the remaining runs and write them to the journal; return the elapsed time in s."""
+    """Do the remaining runs and write them to the checkpoint; return the elapsed time in s."""
     start = perf_counter()
-    pending = journal.missing_spans
+    pending = checkpoint.missing_spans
     if not pending:
         return 0.0
     try:
-        with open_workers(scheduler, workers, sum(last - first for first, last in pending)) as pool, journal.open():
+        with open_workers(scheduler, workers, sum(last - first for first, last in pending)) as pool, checkpoint.open():
             for block in Dispatcher(sweep, pool, pending).completed_blocks():
-                journal.add(block)
-                report(journal.n_done / len(sweep.points))
+                checkpoint.add(block)
+                report(checkpoint.n_done / len(sweep.points))
     except BaseException as error:  # an interrupt may cause any exception
         if not (RECEIVED_SIGNALS or isinstance(error, KeyboardInterrupt)):
             raise
-        if not journal.n_done:
-            journal.delete()
-        state = f"{journal.n_done} of {len(sweep.points)} runs are finished"
+        if not checkpoint.n_done:
+            checkpoint.delete()
+        state = f"{checkpoint.n_done} of {len(sweep.points)} runs are finished"
         raise CommandInterruptedError(f"interrupted: {state}; repeat the command to resume") from None
     return perf_counter() - start
 
@@ -139,7 +139,7 @@ class Dispatcher:
         self.is_isolated = False  # whether a suspect runs, with no other block
         self.deaths = 0
 
-    def completed_blocks(self) -> Iterator[JournalBlock]:
+    def completed_blocks(self) -> Iterator[RunBlock]:
         """Yield blocks as workers finish them."""
         while self.pending or self.suspects or self.running:
             check_interrupt()
@@ -175,7 +175,7 @@ class Dispatcher:
             span
         )
 
-    def handle_result(self, future: "Future[BlockResult | None]", span: Span) -> Iterator[JournalBlock]:
+    def handle_result(self, future: "Future[BlockResult | None]", span: Span) -> Iterator[RunBlock]:
         """Handle a finished block, or the death of its worker."""
         first, last = span
         try:
@@ -183,7 +183,7 @@ class Dispatcher:
         except self.workers.death_errors:
             if self.is_isolated and last - first == 1:
                 self.requeue([])
-                yield JournalBlock(first, np.full((1, self.sweep.columns), np.nan), {0: WORKER_DIED})
+                yield RunBlock(first, np.full((1, self.sweep.columns), np.nan), {0: WORKER_DIED})
             else:
                 middle = (first + last) // 2
                 self.requeue([(first, middle), (middle, last)] if self.is_isolated else [span])
@@ -198,7 +198,7 @@ class Dispatcher:
             self.is_isolated = False
             elapsed = max(result.seconds, 1e-9)
             self.size = max(1, min(MAX_BLOCK_SIZE, 10 * self.size, round((last - first) / elapsed * BLOCK_TIME)))
-            yield JournalBlock(first, result.values, result.messages)
+            yield RunBlock(first, result.values, result.messages)
 
     def requeue(self, spans: list[Span]) -> None:
         """Put the blocks of a dead worker back into the queue."""
