@@ -10,6 +10,7 @@ the textbook's logarithmic decrement or linear envelope; for a pendulum it comes
 from dataclasses import replace
 
 import numpy as np
+from scipy import optimize
 
 from ...records.record import Record
 from .decrement import damping_ratio, friction_from_envelope
@@ -21,10 +22,9 @@ from .law import AMPLITUDE, OMEGA, REST, TERMS, UNKNOWNS, ZETA, B, R
 from .least_squares import column_norms, least_squares
 from .model_selection import FittedLaw
 from .return_map import iterate_return_map
-from .signal_model import SignalModel
+from .signal_model import LAW
 
-CONVERGED = 1e-9  # relative change of a loss
-MAX_STEPS = 20
+PRECISION = 1e-12  # relative, of a loss
 
 
 def estimate_from_extrema(
@@ -57,7 +57,8 @@ def estimate_from_extrema(
             jacobian[:, np.flatnonzero(unknowns == unknown)[0]] = slope
         return p[REST] + sign * sizes[:, 0] - positions, jacobian
 
-    p, cost, _, jacobian = least_squares(residuals, start, unknowns)
+    p, cost = least_squares(residuals, start, unknowns)
+    _, jacobian = residuals(p)
     degrees_of_freedom = len(positions) - len(unknowns)
     scale = column_norms(jacobian)
     covariance = np.linalg.pinv((jacobian / scale).T @ (jacobian / scale)) * cost / degrees_of_freedom
@@ -106,8 +107,7 @@ def estimate_from_two_peaks(
 def solve_single_loss(unknown: int, first: float, last: float, count: int, is_pendulum: bool) -> float:
     """Return the single loss that leads from one amplitude to another in `count` half cycles; NaN if none does.
 
-    For a spring with damping or friction it has a closed form; otherwise Newton's method starts from that of a small
-    loss.
+    For a spring with damping or friction it has a closed form; otherwise the search starts from that of a small loss.
 
     Parameters
     ----------
@@ -122,16 +122,12 @@ def solve_single_loss(unknown: int, first: float, last: float, count: int, is_pe
     if unknown != B and not is_pendulum:
         return small_loss
     p = np.zeros(len(UNKNOWNS))
-    p[[AMPLITUDE, OMEGA, unknown]] = first, 1.0, small_loss
-    model, unknowns = SignalModel(1.0, 0, is_pendulum, 0.0, 0.0), np.array([unknown])
+    p[[AMPLITUDE, OMEGA]] = first, 1.0
 
-    for _ in range(MAX_STEPS):
-        laws, _, changes = model.perturbed_laws(p, unknowns)
-        ends = iterate_return_map(laws, is_pendulum, 0.0, count).amplitudes[-1]
-        step = changes[0] * (last - ends[0]) / (ends[1] - ends[0])
-        if not np.isfinite(step):
-            break
-        p[unknown] = np.clip(p[unknown] + step, p[unknown] / 4, 4 * p[unknown])
-        if abs(step) < CONVERGED * p[unknown]:
-            return float(p[unknown])
-    return np.nan
+    def excess(loss: float) -> float:
+        """Return how much larger the last amplitude is with this loss."""
+        p[unknown] = max(loss, 0.0)
+        return float(iterate_return_map(p[None, LAW], is_pendulum, 0.0, count).amplitudes[-1, 0]) - last
+
+    root = optimize.root_scalar(excess, x0=small_loss, x1=1.01 * small_loss, method="secant", rtol=PRECISION)
+    return float(root.root) if root.converged and root.root > 0 else np.nan

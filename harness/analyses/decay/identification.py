@@ -20,6 +20,7 @@ import numpy as np
 
 from ...errors import HarnessError, check_names
 from ...records.record import Record
+from . import thresholds
 from .estimates import Estimate, KnownParameters, make_estimates
 from .extrema import Extrema, find_extrema
 from .extrema_fit import estimate_from_extrema, estimate_from_two_peaks
@@ -30,7 +31,7 @@ from .law import DRIFT, REST, TERMS, Terms
 from .least_squares import FitError
 from .model_selection import FittedLaw, fit_all_laws, select_reported_law
 from .noise import remove_spikes
-from .remarks import ROUGH, check_fit, compare_halves, make_remarks
+from .remarks import check_fit, compare_halves, make_remarks
 
 
 @dataclass(frozen=True)
@@ -198,7 +199,7 @@ def identify_record(
             f"The forces f, c and q need a position in m or rad, and that of {record.name} is in {record.base}: "
             "they are left out; --unit sets the unit."
         )
-    if uncertainty.is_correlated and uncertainty.rms > ROUGH * problem.noise:
+    if uncertainty.is_correlated and uncertainty.rms > thresholds.ROUGH * problem.noise:
         estimates, disagreements = compare_halves(problem, full, estimates)
         remarks += disagreements
     omega = estimates[0]
