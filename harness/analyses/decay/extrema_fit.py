@@ -13,8 +13,9 @@ import numpy as np
 from scipy import optimize
 
 from ...records.record import Record
+from ..estimation.estimate import Estimate
 from .decrement import damping_ratio, friction_from_envelope
-from .estimates import Estimate, KnownParameters, force_estimates, to_record_units
+from .estimates import KnownParameters, force_estimates, to_record_units
 from .extrema import Extrema
 from .fit_problem import FitProblem
 from .intervals import confidence_interval, to_correlation

@@ -20,8 +20,9 @@ import numpy as np
 
 from ...errors import HarnessError, check_names
 from ...records.record import Record
+from ..estimation.estimate import Estimate
 from . import thresholds
-from .estimates import Estimate, KnownParameters, make_estimates
+from .estimates import KnownParameters, make_estimates
 from .extrema import Extrema, find_extrema
 from .extrema_fit import estimate_from_extrema, estimate_from_two_peaks
 from .fit_problem import FitProblem

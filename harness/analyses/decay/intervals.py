@@ -11,15 +11,13 @@ from the values that the fit would have if losses could be negative: one linear 
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import special
 
+from ..estimation.estimate import NORMAL_QUANTILE, student_quantile
 from . import thresholds
 from .fit_problem import FitProblem
 from .law import OMEGA, ZETA, Terms
 from .least_squares import column_norms
 from .nonnegative_intervals import nonnegative_interval
-
-NORMAL_QUANTILE = float(special.ndtri(0.975))
 
 
 @dataclass(frozen=True)
@@ -130,7 +128,7 @@ def confidence_interval(
     standard_errors : (n,)
     correlation : (n, n)
     """
-    wide = standard_errors * special.stdtrit(degrees_of_freedom, 0.975) / NORMAL_QUANTILE
+    wide = standard_errors * student_quantile(degrees_of_freedom) / NORMAL_QUANTILE
     losses = (unknowns >= ZETA) & (wide > 0)
     z = center / np.where(losses, wide, 1.0)
     near_bound = losses & (z < thresholds.NEGLIGIBLE_BOUND)

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...records.record import MIN_SAMPLES, Record
+from ..estimation.noise import interpolation_residuals, robust_std
 from . import thresholds
 
 
@@ -25,27 +26,6 @@ def estimate_noise(t: np.ndarray, x: np.ndarray) -> tuple[float, float]:
     step = float(differences.min()) if len(differences) else 0.0
     is_coarse = step > thresholds.COARSE_STEP * noise or noise < thresholds.FINE_NOISE * step
     return max(noise, step / np.sqrt(12)), step if is_coarse else 0.0
-
-
-def interpolation_residuals(t: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """Return the distances (n - 4,) of the inner samples of x (n,) from the cubic through their four neighbours.
-
-    They are scaled so that white noise keeps its standard deviation.
-    """
-    n = len(t) - 4
-    near = np.array([t[i : i + n] for i in (0, 1, 3, 4)])
-    weights = np.ones((4, n))
-    for i in range(4):
-        for j in range(4):
-            if i != j:
-                weights[i] *= (t[2:-2] - near[j]) / (near[i] - near[j])
-    residuals = x[2:-2] - sum(weight * x[i : i + n] for weight, i in zip(weights, (0, 1, 3, 4), strict=True))
-    return np.asarray(np.abs(residuals) / np.sqrt(1 + (weights**2).sum(axis=0)))
-
-
-def robust_std(e: np.ndarray) -> float:
-    """Return the standard deviation of residuals e (n,), estimated from their median magnitude."""
-    return 1.4826 * float(np.median(np.abs(e)))
 
 
 def remove_spikes(record: Record) -> Record:

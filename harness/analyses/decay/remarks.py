@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 
 from ...records.record import Record
+from ..estimation.estimate import Estimate
 from . import thresholds
-from .estimates import Estimate, unit_scales
+from .estimates import unit_scales
 from .fit_problem import FitProblem
 from .intervals import FitUncertainty, estimate_uncertainty
 from .law import AMPLITUDE, DRIFT, OMEGA, REST, UNKNOWNS, ZETA
