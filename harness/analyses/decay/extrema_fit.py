@@ -25,7 +25,9 @@ from .model_selection import FittedLaw
 from .return_map import iterate_return_map
 from .signal_model import LAW
 
-PRECISION = 1e-12  # relative, of a loss
+PRECISION = 1e-12  # relative to a small loss, of the single loss
+BRACKET = (2.0, 4.0, 8.0)  # times a small loss, where the single loss is sought
+STOPPED = 1e-6  # of the first amplitude: a root that misses the last amplitude by more is none
 
 
 def estimate_from_extrema(
@@ -127,8 +129,12 @@ def solve_single_loss(unknown: int, first: float, last: float, count: int, is_pe
 
     def excess(loss: float) -> float:
         """Return how much larger the last amplitude is with this loss."""
-        p[unknown] = max(loss, 0.0)
+        p[unknown] = loss
         return float(iterate_return_map(p[None, LAW], is_pendulum, 0.0, count).amplitudes[-1, 0]) - last
 
-    root = optimize.root_scalar(excess, x0=small_loss, x1=1.01 * small_loss, method="secant", rtol=PRECISION)
-    return float(root.root) if root.converged and root.root > 0 else np.nan
+    for factor in BRACKET:
+        if excess(factor * small_loss) < 0:
+            loss = float(optimize.brentq(excess, 0.0, factor * small_loss, xtol=PRECISION * small_loss))
+            # the amplitude falls suddenly at a loss with which the motion stops before
+            return loss if abs(excess(loss)) < STOPPED * first else np.nan
+    return np.nan

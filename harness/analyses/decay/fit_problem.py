@@ -67,6 +67,10 @@ class FitProblem:
     def subset(self, keep: np.ndarray | slice) -> Self:
         """Return the problem with some of its samples; FitError if these are too few."""
         problem = replace(self, t=self.t[keep], x=self.x[keep])
+        if not len(problem.t):
+            raise FitError(
+                "is not a free decay of one oscillator: no sample follows the law that fits its turning points"
+            )
         if len(problem.t) < MIN_SAMPLES:
             raise FitError(
                 f"has only {len(problem.t)} samples in a row that follow the free decay of one oscillator, and "

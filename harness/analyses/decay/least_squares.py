@@ -8,7 +8,7 @@ from scipy import optimize
 
 from ...errors import HarnessError
 from . import thresholds
-from .law import AMPLITUDE, OMEGA, ZETA, R
+from .law import AMPLITUDE, OMEGA, T0, ZETA, R
 
 Residual = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 
@@ -51,28 +51,29 @@ def least_squares(
         """Return the problem at these values of the unknowns, compressed, and its number of residuals."""
         q = p.copy()
         q[unknowns] = np.frombuffer(values)
-        with np.errstate(all="ignore"):
-            r, jacobian = residual(q)
-        is_motion = is_admissible(q) or np.array_equal(q, p)
+        r, jacobian = residual(q)
+        is_motion = jacobian.any() and (is_admissible(q, p) or np.array_equal(q, p))
         residuals, slopes = compress(r if is_motion else np.full_like(r, np.nan), jacobian)
         return residuals, slopes, len(r)
 
     lowest = np.where(unknowns >= ZETA, 0.0, -np.inf)
-    r, _, n = evaluate(start.tobytes())
+    with np.errstate(all="ignore"):
+        r, _, n = evaluate(start.tobytes())
     if not np.isfinite(r).all():
         raise FitError("does not have the turning points of a free decay of one oscillator")
     degrees_of_freedom = max(n - len(unknowns), 1)
-    fit = optimize.least_squares(
-        lambda values: evaluate(values.tobytes())[0],
-        start,
-        lambda values: evaluate(values.tobytes())[1],
-        bounds=(lowest, np.inf),
-        x_scale="jac",
-        ftol=thresholds.CONVERGED_GAIN / degrees_of_freedom,
-        xtol=thresholds.CONVERGED_CHANGE,
-        gtol=None,
-        max_nfev=max_steps + 1,
-    )
+    with np.errstate(all="ignore"):
+        fit = optimize.least_squares(
+            lambda values: evaluate(values.tobytes())[0],
+            start,
+            lambda values: evaluate(values.tobytes())[1],
+            bounds=(lowest, np.inf),
+            x_scale="jac",
+            ftol=thresholds.CONVERGED_GAIN / degrees_of_freedom,
+            xtol=thresholds.CONVERGED_CHANGE,
+            gtol=None,
+            max_nfev=max_steps + 1,
+        )
     p = p.copy()
     p[unknowns] = fit.x
     # the method approaches a bound but does not reach it, and a law without a loss is recognised by its zero
@@ -114,6 +115,12 @@ def column_norms(jacobian: np.ndarray) -> np.ndarray:
     return np.where(norms == 0, 1.0, norms)
 
 
-def is_admissible(p: np.ndarray) -> bool:
-    """Return whether the motion with the values p oscillates."""
-    return bool(p[AMPLITUDE] > 0 and p[OMEGA] > 0 and p[ZETA] < thresholds.MAX_DAMPING_RATIO and p[R] < p[AMPLITUDE])
+def is_admissible(p: np.ndarray, start: np.ndarray) -> bool:
+    """Return whether the motion with the values p oscillates, at about the time and the frequency of the start."""
+    change = p[OMEGA] / start[OMEGA]
+    return bool(
+        1 / thresholds.MAX_FREQUENCY_CHANGE < change < thresholds.MAX_FREQUENCY_CHANGE
+        and abs(p[T0] - start[T0]) * start[OMEGA] < thresholds.MAX_PHASE_CHANGE
+        and p[ZETA] < thresholds.MAX_DAMPING_RATIO
+        and max(p[R], 0.0) < p[AMPLITUDE]
+    )
