@@ -128,13 +128,14 @@ def solve_single_loss(unknown: int, first: float, last: float, count: int, is_pe
     p[[AMPLITUDE, OMEGA]] = first, 1.0
 
     def excess(loss: float) -> float:
-        """Return how much larger the last amplitude is with this loss."""
+        """Return how much larger the last amplitude is with this loss; it is zero if the motion stops before."""
         p[unknown] = loss
-        return float(iterate_return_map(p[None, LAW], is_pendulum, 0.0, count).amplitudes[-1, 0]) - last
+        amplitudes = iterate_return_map(p[None, LAW], is_pendulum, 0.0, count).amplitudes[:, 0]
+        return float(amplitudes[-1]) - last if len(amplitudes) > count else -last
 
     for factor in BRACKET:
         if excess(factor * small_loss) < 0:
             loss = float(optimize.brentq(excess, 0.0, factor * small_loss, xtol=PRECISION * small_loss))
-            # the amplitude falls suddenly at a loss with which the motion stops before
+            # the amplitude falls suddenly to zero at a loss with which the motion stops before
             return loss if abs(excess(loss)) < STOPPED * first else np.nan
     return np.nan
