@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 from scipy.stats import norm
-from scipy.stats import t as student_t
 
-from harness.analyses.decay.intervals import student_t_quantile
+from harness.analyses.decay.intervals import confidence_interval
+from harness.analyses.decay.law import OMEGA
 from harness.analyses.decay.nonnegative_intervals import N_DRAWS, nonnegative_interval, quasirandom_normal
 
 
@@ -51,9 +51,13 @@ def test_an_interval_is_continuous_in_the_correlation(rho):
     assert np.ptp(intervals, axis=0).max() < 1e-9
 
 
-def test_student_t_quantiles_agree_with_scipy():
-    freedom = range(1, 200)
-    assert [student_t_quantile(n) for n in freedom] == pytest.approx(student_t.ppf(0.975, list(freedom)), rel=3e-4)
+@pytest.mark.parametrize(
+    ("freedom", "quantile"), [(1, 12.7062), (2, 4.3027), (9, 2.2622), (100, 1.9840), (10**6, 1.96)]
+)
+def test_intervals_of_few_samples_are_those_of_student(freedom, quantile):
+    """Quantiles at 97.5 % of a printed table."""
+    low, high = confidence_interval(0, np.array([OMEGA]), np.array([5.0]), np.array([0.1]), np.eye(1), freedom)
+    assert (low, high) == pytest.approx((5.0 - 0.1 * quantile, 5.0 + 0.1 * quantile), abs=1e-5)
 
 
 def test_the_draws_are_those_of_the_additive_recurrence_of_roberts():

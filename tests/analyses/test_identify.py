@@ -28,6 +28,15 @@ def test_clean_signals_are_identified_to_nine_digits(law, sine, order):
     assert fit.remarks == ()
 
 
+@pytest.mark.parametrize("sine", [False, True])
+@pytest.mark.parametrize(("term", "truth"), [("zeta", 0.01), ("r", 0.004), ("b", 0.4)])
+def test_two_peaks_give_the_loss_that_acts_alone(term, truth, sine):
+    """Twice this friction stops the motion before the last peak."""
+    record = decay_record(**{term: truth}, sine=sine, turn=0.0, t=np.linspace(0, 3, 600))
+    fit = fit_decay(record, KnownParameters(pendulum=sine))
+    assert values(fit.two_peak_estimates)[term] == pytest.approx(truth, rel=2e-3)
+
+
 @pytest.mark.parametrize("turn", [-0.01, 0.0, 0.001, 0.12, 0.24])
 def test_the_fit_does_not_depend_on_start_or_sampling(turn):
     times = np.sort(np.random.default_rng(1).uniform(0.0, 3.0, 500))

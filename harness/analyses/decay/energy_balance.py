@@ -17,8 +17,9 @@ balance).  The division by the mean slope, which weights all half cycles alike, 
 from functools import cache
 
 import numpy as np
+from scipy import optimize
 
-from .law import TERMS, Terms, sublaws
+from .law import TERMS, Terms
 
 QUADRATURE_POINTS = 40
 
@@ -38,27 +39,14 @@ def estimate_losses(a: np.ndarray, terms: Terms, is_pendulum: bool) -> np.ndarra
         squared, cubed = np.pi / 2 * mean**2, 4 / 3 * mean**3
         lost, slope = mean * (a[:-1] - a[1:]), mean
     columns = np.stack([2 * squared, 2 * mean, cubed], axis=1) / slope[:, None]
-    return nonnegative_least_squares(columns, lost / slope, terms)
+    indices = [TERMS.index(term) for term in terms]
+    scale = np.linalg.norm(columns[:, indices], axis=0)
+    losses = np.zeros(len(TERMS))
+    losses[indices] = optimize.nnls(columns[:, indices] / scale, lost / slope)[0] / scale
+    return losses
 
 
 @cache
 def gauss_nodes() -> tuple[np.ndarray, np.ndarray]:
     """Return nodes and weights (QUADRATURE_POINTS,) of Gauss-Legendre quadrature."""
     return np.polynomial.legendre.leggauss(QUADRATURE_POINTS)
-
-
-def nonnegative_least_squares(columns: np.ndarray, right: np.ndarray, terms: Terms) -> np.ndarray:
-    """Solve the least-squares problem with nonnegative values.
-
-    The result is the best of the unconstrained solutions of all subsets of columns that has no negative value.
-    """
-    best, least = np.zeros(len(TERMS)), float(right @ right)
-    for law in sublaws(terms):
-        indices = [TERMS.index(term) for term in law]
-        scale = np.linalg.norm(columns[:, indices], axis=0)
-        solution = np.linalg.lstsq(columns[:, indices] / scale, right, rcond=1e-12)[0] / scale
-        residual = right - columns[:, indices] @ solution
-        if (solution >= 0).all() and residual @ residual < least:
-            best, least = np.zeros(len(TERMS)), float(residual @ residual)
-            best[indices] = solution
-    return best

@@ -6,11 +6,10 @@ is uncertain: the intervals of the selected law alone are too narrow wherever th
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from ...records.record import Record
+from ..estimation.estimate import Estimate
 from .fit_problem import FitProblem
-from .intervals import NORMAL_QUANTILE, FitUncertainty, confidence_interval
+from .intervals import FitUncertainty, confidence_interval
 from .law import DRIFT, OMEGA, REST, UNKNOWNS, ZETA, B, R
 from .model_selection import FittedLaw
 
@@ -23,27 +22,6 @@ class KnownParameters:
     k: float | None = None
     m: float | None = None
     pendulum: bool = False
-
-
-@dataclass(frozen=True)
-class Estimate:
-    """A value with its standard error and its 95 % interval; NaN where the data leave no degrees of freedom."""
-
-    name: str
-    value: float
-    error: float
-    low: float
-    high: float
-    unit: str
-    text: str
-
-    def multiply(self, factor: float, name: str, unit: str, text: str, relative_error: float = 0.0) -> "Estimate":
-        """Return this estimate multiplied by a `factor` that has a relative standard error of its own."""
-        value, margin = factor * self.value, NORMAL_QUANTILE * relative_error * factor * self.value
-        low = value - np.hypot(value - factor * self.low, margin)
-        high = value + np.hypot(factor * self.high - value, margin)
-        error = float(np.hypot(factor * self.error, margin / NORMAL_QUANTILE))
-        return Estimate(name, value, error, float(max(low, 0.0)), float(high), unit, text)
 
 
 def quantity_labels(record: Record) -> dict[int, tuple[str, str, str]]:

@@ -12,18 +12,8 @@ import numpy as np
 
 from ...errors import HarnessError
 from ...records.record import Record
+from . import thresholds
 from .noise import estimate_noise, find_reversals, savitzky_golay
-
-MIN_REVERSAL = 8.0  # times the noise, in the record itself
-MIN_SMOOTH_REVERSAL = 18.0  # times the noise in the smoothed record, divided by the root of the window's samples
-MIN_RELATIVE_REVERSAL = 1e-6  # of the range
-CLEAN = 1e-4  # of the range: a record with less noise needs no smoothing
-WINDOW = 0.35  # half periods in a smoothing window
-MAX_SAMPLES = 200  # per half period; a denser record is averaged
-GAP = 0.8  # of a half period without a sample
-MIN_TURNING_POINTS = 3
-ENOUGH_TURNING_POINTS = 6  # a segment before a gap is used if it has as many
-LARGE_ANGLE = 2.0  # rad: a pendulum beyond it starts at a turning point that was recorded
 
 
 @dataclass(frozen=True)
@@ -60,19 +50,21 @@ def find_extrema(record: Record, pendulum: bool) -> Extrema:
     half_period = estimate_half_period(record, noise, span)
     slices = gapless_slices(record, half_period)
     candidates = [extrema_in_slice(record, part, half_period, noise, step, span, pendulum) for part in slices]
-    sufficient = [extrema for extrema in candidates if extrema is not None and len(extrema.t) >= ENOUGH_TURNING_POINTS]
+    sufficient = [
+        extrema for extrema in candidates if extrema is not None and len(extrema.t) >= thresholds.ENOUGH_TURNING_POINTS
+    ]
     longest = max(filter(None, candidates), key=lambda extrema: len(extrema.t), default=None)
     best = sufficient[0] if sufficient else longest
-    if best is None or len(best.t) < MIN_TURNING_POINTS - 1:
+    if best is None or len(best.t) < thresholds.MIN_TURNING_POINTS - 1:
         count = 0 if best is None else len(best.t) + 1
-        if span < 1.5 * MIN_REVERSAL * noise:
+        if span < thresholds.MIN_NOISY_RANGE * noise:
             raise HarnessError(
                 f"{record.name} is all noise: its range is {span:.3g} {record.unit}, its noise {noise:.3g}; "
                 "filter it, or take at least 10 samples per cycle"
             )
         raise HarnessError(
             f"{record.name} has {count} turning points above the noise ({noise:.3g} {record.unit}), and "
-            f"{MIN_TURNING_POINTS} or more are needed: make a longer record"
+            f"{thresholds.MIN_TURNING_POINTS} or more are needed: make a longer record"
         )
     check_decay(record, best)
     return best
@@ -80,7 +72,7 @@ def find_extrema(record: Record, pendulum: bool) -> Extrema:
 
 def estimate_half_period(record: Record, noise: float, span: float) -> float:
     """Return the half period in s, from the reversals of the record or, if noise hides them, from its spectrum."""
-    at = find_reversals(record.x, max(MIN_REVERSAL * noise, MIN_RELATIVE_REVERSAL * span))
+    at = find_reversals(record.x, max(thresholds.MIN_REVERSAL * noise, thresholds.MIN_RELATIVE_REVERSAL * span))
     if len(at) >= 4:
         return float(np.median(np.diff(record.t[at[1:]])))
     step = (record.t[-1] - record.t[0]) / (len(record.t) - 1)
@@ -93,7 +85,12 @@ def estimate_half_period(record: Record, noise: float, span: float) -> float:
 def gapless_slices(record: Record, half_period: float) -> list[slice]:
     """Return the segments of the record between its gaps."""
     intervals = np.diff(record.t)
-    gaps = np.flatnonzero(intervals > max(GAP * half_period, 3 * float(np.median(intervals)))) + 1
+    gaps = (
+        np.flatnonzero(
+            intervals > max(thresholds.GAP * half_period, thresholds.MIN_GAP_SAMPLES * float(np.median(intervals)))
+        )
+        + 1
+    )
     ends = [0, *gaps.tolist(), len(record.t)]
     slices = [slice(low, high) for low, high in pairwise(ends) if high - low >= 8]
     return slices or [slice(0, len(record.t))]
@@ -105,25 +102,27 @@ def extrema_in_slice(
     """Return the turning points in one segment of the record; None if it has too few."""
     t, x = record.t[part], record.x[part]
     dt = (t[-1] - t[0]) / (len(t) - 1)
-    block = max(1, int(half_period / dt / MAX_SAMPLES))
+    block = max(1, int(half_period / dt / thresholds.MAX_SAMPLES_PER_HALF_PERIOD))
     even = np.interp(t[0] + dt * np.arange(len(t)), t, x)
     u = even[: len(even) // block * block].reshape(-1, block).mean(axis=1)
     grid = t[0] + dt * (block * np.arange(len(u)) + (block - 1) / 2)
     dt, block_noise = dt * block, noise / np.sqrt(block)
-    width = max(int(WINDOW * half_period / dt) // 2 * 2 + 1, 5)
+    width = max(int(thresholds.SMOOTHING_WINDOW * half_period / dt) // 2 * 2 + 1, 5)
     if width >= len(u) // 2:
         return None
-    y = savitzky_golay(u, width, 4 if width > 5 else 3) if width > 5 or noise > CLEAN * span else u
-    threshold = max(MIN_SMOOTH_REVERSAL * block_noise / np.sqrt(width), MIN_RELATIVE_REVERSAL * span)
+    y = savitzky_golay(u, width, 4 if width > 5 else 3) if width > 5 or noise > thresholds.CLEAN * span else u
+    threshold = max(
+        thresholds.MIN_SMOOTH_REVERSAL * block_noise / np.sqrt(width), thresholds.MIN_RELATIVE_REVERSAL * span
+    )
     if record.order:
         y, threshold = integrate_to_position(y, dt, half_period, record.order, threshold, pendulum)
         span = float(np.ptp(y))
     i = find_reversals(y, threshold)
-    if len(i) < MIN_TURNING_POINTS:
+    if len(i) < thresholds.MIN_TURNING_POINTS:
         return None
     i = select_regular_reversals(i, half_period / dt)
     i = i[(i < len(y) - 1 - width // 2) | (np.arange(len(i)) < 4)]
-    if len(i) < MIN_TURNING_POINTS:
+    if len(i) < thresholds.MIN_TURNING_POINTS:
         return None
     t_start, i = locate_start(y, grid, i, width)
     distance = max(1, min(width // 4, int(min(i[0], len(y) - 1 - i[-1]))))
@@ -131,8 +130,8 @@ def extrema_in_slice(
     curvature = before - 2 * top + after
     shift = np.clip(0.5 * (before - after) / np.where(curvature == 0, 1, curvature), -1, 1)
     times, positions = grid[i] + shift * distance * dt, top - 0.25 * (before - after) * shift
-    error = max(1.5 * threshold / MIN_SMOOTH_REVERSAL, 2e-4 * float(np.ptp(positions)) / 2)
-    if pendulum and len(positions) > 6 and abs(positions[0] - positions[1]) > 2 * LARGE_ANGLE:
+    error = max(1.5 * threshold / thresholds.MIN_SMOOTH_REVERSAL, 2e-4 * float(np.ptp(positions)) / 2)
+    if pendulum and len(positions) > 6 and abs(positions[0] - positions[1]) > 2 * thresholds.MIN_EXTRAPOLATED:
         # near pi an extrapolated start would be unreliable: start at the first turning point recorded
         t_start, times, positions = times[0], times[1:], positions[1:]
     return Extrema(times, positions, t_start, half_period, noise, step, float(t[0]), error)
@@ -145,11 +144,13 @@ def select_regular_reversals(i: np.ndarray, half_period: float) -> np.ndarray:
     irregular, the motion is lost in noise or disturbed.
     """
     gaps = np.diff(i)
-    long = gaps > 0.5 * half_period
+    long = gaps > thresholds.MIN_HALF_PERIOD * half_period
     regular = np.flatnonzero(long[:-1] & long[1:])
     first = int(regular[0]) if len(regular) else 0
     i, gaps = i[first:], gaps[first + 1 :]
-    irregular = np.flatnonzero((gaps[1:] > 1.5 * gaps[:-1]) | (gaps[1:] < 0.65 * gaps[:-1]))
+    irregular = np.flatnonzero(
+        (gaps[1:] > thresholds.MAX_SPACING * gaps[:-1]) | (gaps[1:] < thresholds.MIN_SPACING * gaps[:-1])
+    )
     return i[: irregular[0] + 3] if len(irregular) else i
 
 
@@ -160,9 +161,15 @@ def locate_start(y: np.ndarray, grid: np.ndarray, i: np.ndarray, width: int) -> 
     """
     gap = grid[i[2]] - grid[i[1]]
     share = (grid[i[1]] - grid[i[0]]) / gap
-    if share > 1.2 or i[0] <= width // 4:  # held before, released, or recorded from after a turning point on
-        return float(grid[i[0]] if 0.9 < share <= 1.2 else grid[i[1]] - gap), i[1:]
-    if abs(y[0] - y[i[0]]) > 0.25 * abs(y[i[1]] - y[i[0]]):  # recorded from within the free motion on
+    if (
+        share > thresholds.LATE_RELEASE or i[0] <= width // 4
+    ):  # held before, released, or recorded from after a turning point on
+        return float(
+            grid[i[0]] if thresholds.EARLY_RELEASE < share <= thresholds.LATE_RELEASE else grid[i[1]] - gap
+        ), i[1:]
+    if abs(y[0] - y[i[0]]) > thresholds.PARTIAL_SWING * abs(
+        y[i[1]] - y[i[0]]
+    ):  # recorded from within the free motion on
         return float(2 * grid[i[0]] - grid[i[1]]), i
     return float(grid[i[0]]), i[1:]  # recorded from near a turning point on, or released after a short time
 
@@ -183,7 +190,7 @@ def integrate_to_position(
 def check_decay(record: Record, extrema: Extrema) -> None:
     """Raise HarnessError if the oscillation grows."""
     sizes = np.abs(np.diff(extrema.x))  # peak to peak
-    if sizes[-1] > sizes[0] + 8 * extrema.error and sizes[-1] > 1.001 * sizes[0]:
+    if sizes[-1] > sizes[0] + thresholds.GROWTH_ERRORS * extrema.error and sizes[-1] > thresholds.GROWTH * sizes[0]:
         raise HarnessError(
             f"{record.name} grows, from {sizes[0]:.4g} to {sizes[-1]:.4g} {record.base} peak to peak: it is driven or "
             "gains energy, and has no decay to measure"

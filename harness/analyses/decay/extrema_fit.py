@@ -10,10 +10,12 @@ the textbook's logarithmic decrement or linear envelope; for a pendulum it comes
 from dataclasses import replace
 
 import numpy as np
+from scipy import optimize
 
 from ...records.record import Record
+from ..estimation.estimate import Estimate
 from .decrement import damping_ratio, friction_from_envelope
-from .estimates import Estimate, KnownParameters, force_estimates, to_record_units
+from .estimates import KnownParameters, force_estimates, to_record_units
 from .extrema import Extrema
 from .fit_problem import FitProblem
 from .intervals import confidence_interval, to_correlation
@@ -21,10 +23,11 @@ from .law import AMPLITUDE, OMEGA, REST, TERMS, UNKNOWNS, ZETA, B, R
 from .least_squares import column_norms, least_squares
 from .model_selection import FittedLaw
 from .return_map import iterate_return_map
-from .signal_model import SignalModel
+from .signal_model import LAW
 
-CONVERGED = 1e-9  # relative change of a loss
-MAX_STEPS = 20
+PRECISION = 1e-12  # relative to a small loss, of the single loss
+BRACKET = (2.0, 4.0, 8.0)  # times a small loss, where the single loss is sought
+STOPPED = 1e-6  # of the first amplitude: a root that misses the last amplitude by more is none
 
 
 def estimate_from_extrema(
@@ -57,7 +60,8 @@ def estimate_from_extrema(
             jacobian[:, np.flatnonzero(unknowns == unknown)[0]] = slope
         return p[REST] + sign * sizes[:, 0] - positions, jacobian
 
-    p, cost, _, jacobian = least_squares(residuals, start, unknowns)
+    p, cost = least_squares(residuals, start, unknowns)
+    _, jacobian = residuals(p)
     degrees_of_freedom = len(positions) - len(unknowns)
     scale = column_norms(jacobian)
     covariance = np.linalg.pinv((jacobian / scale).T @ (jacobian / scale)) * cost / degrees_of_freedom
@@ -106,8 +110,7 @@ def estimate_from_two_peaks(
 def solve_single_loss(unknown: int, first: float, last: float, count: int, is_pendulum: bool) -> float:
     """Return the single loss that leads from one amplitude to another in `count` half cycles; NaN if none does.
 
-    For a spring with damping or friction it has a closed form; otherwise Newton's method starts from that of a small
-    loss.
+    For a spring with damping or friction it has a closed form; otherwise the search starts from that of a small loss.
 
     Parameters
     ----------
@@ -122,16 +125,17 @@ def solve_single_loss(unknown: int, first: float, last: float, count: int, is_pe
     if unknown != B and not is_pendulum:
         return small_loss
     p = np.zeros(len(UNKNOWNS))
-    p[[AMPLITUDE, OMEGA, unknown]] = first, 1.0, small_loss
-    model, unknowns = SignalModel(1.0, 0, is_pendulum, 0.0, 0.0), np.array([unknown])
+    p[[AMPLITUDE, OMEGA]] = first, 1.0
 
-    for _ in range(MAX_STEPS):
-        laws, _, changes = model.perturbed_laws(p, unknowns)
-        ends = iterate_return_map(laws, is_pendulum, 0.0, count).amplitudes[-1]
-        step = changes[0] * (last - ends[0]) / (ends[1] - ends[0])
-        if not np.isfinite(step):
-            break
-        p[unknown] = np.clip(p[unknown] + step, p[unknown] / 4, 4 * p[unknown])
-        if abs(step) < CONVERGED * p[unknown]:
-            return float(p[unknown])
+    def excess(loss: float) -> float:
+        """Return how much larger the last amplitude is with this loss; it is zero if the motion stops before."""
+        p[unknown] = loss
+        amplitudes = iterate_return_map(p[None, LAW], is_pendulum, 0.0, count).amplitudes[:, 0]
+        return float(amplitudes[-1]) - last if len(amplitudes) > count else -last
+
+    for factor in BRACKET:
+        if excess(factor * small_loss) < 0:
+            loss = float(optimize.brentq(excess, 0.0, factor * small_loss, xtol=PRECISION * small_loss))
+            # the amplitude falls suddenly to zero at a loss with which the motion stops before
+            return loss if abs(excess(loss)) < STOPPED * first else np.nan
     return np.nan

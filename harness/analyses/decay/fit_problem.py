@@ -10,20 +10,13 @@ from typing import Self
 import numpy as np
 
 from ...records.record import MIN_SAMPLES, Record
+from . import thresholds
 from .energy_balance import estimate_losses
 from .extrema import Extrema
 from .law import AMPLITUDE, DRIFT, OMEGA, REST, T0, TERMS, UNKNOWNS, ZETA, Terms, unknown_indices
 from .least_squares import FitError, least_squares
 from .return_map import MAX_HALF_CYCLES, iterate_return_map
 from .signal_model import LAW, SignalModel
-
-MIN_NOISE = 1e-13  # relative to the amplitude: no record is more precise
-MODEL_ACCURACY = 1e-9  # truncation error of the model's series, relative to the motion
-UNREACHED = 30.0  # residual, in standard errors, of a turning point that the motion never reaches
-WINDOWS = (0.08, 0.2, 0.45, 1.0)  # fractions of a record; the fit of one window predicts the phase in the next
-WINDOW_STEPS = 15  # steps of the fit of a window
-MAX_COARSE_SAMPLES = 10_000  # a fit starts with a subset of about this size
-ROUGH = 1.3  # times the noise: larger residuals call for a fit by growing windows
 
 FitResult = tuple[np.ndarray, float]  # the values of UNKNOWNS, and the sum of squares
 
@@ -60,7 +53,7 @@ class FitProblem:
     @property
     def residual_floor(self) -> float:
         """Residuals below which no fit is better than another."""
-        return MODEL_ACCURACY * float(np.std(self.x))
+        return thresholds.MODEL_ACCURACY * float(np.std(self.x))
 
     @property
     def signal_rms(self) -> float:
@@ -74,6 +67,10 @@ class FitProblem:
     def subset(self, keep: np.ndarray | slice) -> Self:
         """Return the problem with some of its samples; FitError if these are too few."""
         problem = replace(self, t=self.t[keep], x=self.x[keep])
+        if not len(problem.t):
+            raise FitError(
+                "is not a free decay of one oscillator: no sample follows the law that fits its turning points"
+            )
         if len(problem.t) < MIN_SAMPLES:
             raise FitError(
                 f"has only {len(problem.t)} samples in a row that follow the free decay of one oscillator, and "
@@ -94,24 +91,23 @@ class FitProblem:
 
     def fit(self, p: np.ndarray, terms: Terms, max_steps: int = 30) -> FitResult:
         """Fit the law with these terms, from the starting values p."""
-        unknowns, every = self.unknowns(terms), len(self.t) // MAX_COARSE_SAMPLES
+        unknowns, every = self.unknowns(terms), len(self.t) // thresholds.MAX_COARSE_SAMPLES
         if every > 1:
             coarse = self.subset(slice(None, None, every))
-            p, _, _, _ = least_squares(lambda q: coarse.residuals(q, terms), p, unknowns, max_steps)
-        p, cost, _, _ = least_squares(lambda q: self.residuals(q, terms), p, unknowns, max_steps)
-        return p, cost
+            p, _ = least_squares(lambda q: coarse.residuals(q, terms), p, unknowns, max_steps)
+        return least_squares(lambda q: self.residuals(q, terms), p, unknowns, max_steps)
 
     def fit_growing_windows(self, p: np.ndarray, terms: Terms) -> np.ndarray:
         """Return the values of UNKNOWNS after fits to growing windows, none shorter than five half cycles."""
-        least = int(np.searchsorted(self.t, self.t[0] + 5 * self.half_period))
-        for share in WINDOWS:
+        least = int(np.searchsorted(self.t, self.t[0] + thresholds.MIN_WINDOW * self.half_period))
+        for share in thresholds.FIT_WINDOWS:
             size = max(int(share * len(self.t)), min(len(self.t), least))
-            p, _ = self.subset(slice(size)).fit(p, terms, WINDOW_STEPS)
+            p, _ = self.subset(slice(size)).fit(p, terms, thresholds.FIT_WINDOW_STEPS)
         return p
 
     def exceeds_noise(self, cost: float) -> bool:
         """Return whether a sum of squares is larger than noise explains."""
-        return cost > len(self.t) * (ROUGH * self.noise) ** 2
+        return cost > len(self.t) * (thresholds.UNEXPLAINED * self.noise) ** 2
 
     def half_cycles(self, p: np.ndarray, max_count: int = MAX_HALF_CYCLES) -> tuple[np.ndarray, np.ndarray]:
         """Return amplitudes and start times (N + 1,), in s, of the half cycles up to the end of the samples."""
@@ -138,7 +134,7 @@ def prepare_problem(record: Record, extrema: Extrema, pendulum: bool, drift: boo
     scale = 1.0 if pendulum else float(a.max())
     offset = float(rest[-1]) if record.order == 0 else float(np.median(record.x))
     a, positions, error = a / scale, (extrema.x - rest) / scale, extrema.error / scale
-    noise = max(extrema.noise / scale, MIN_NOISE * float(np.ptp(record.x)) / scale)
+    noise = max(extrema.noise / scale, thresholds.MIN_NOISE * float(np.ptp(record.x)) / scale)
     omega = np.pi / extrema.half_period * (1 + float(np.median(a)) ** 2 / 16 if pendulum else 1.0)
     error = max(error, 1e-9)
     t_mid = float(record.t[-1] - time_origin) / 2
@@ -197,8 +193,8 @@ def fit_numbered_extrema(
     def residuals(p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         at, x, jacobian = model.predict_extrema(p, unknowns, len(times))
         reached = np.isfinite(at)
-        in_time = np.where(reached, (np.where(reached, at, 0.0) - times) * weights, UNREACHED)
-        in_position = np.where(reached, (np.where(reached, x, 0.0) - positions) / error, UNREACHED)
+        in_time = np.where(reached, (np.where(reached, at, 0.0) - times) * weights, thresholds.UNREACHED)
+        in_position = np.where(reached, (np.where(reached, x, 0.0) - positions) / error, thresholds.UNREACHED)
         slopes = (
             np.where(reached[None, :, None], jacobian, 0.0)
             * np.stack([weights, np.full_like(weights, 1 / error)])[..., None]

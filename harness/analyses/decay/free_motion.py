@@ -1,79 +1,84 @@
 """Selection of the free motion: without a hold or a push at its beginning, and a rest or a disturbance at its end.
 
-The fit starts with the turning points that are certain, and extends as long as the record follows the law.
+The fit starts with the turning points that are certain, and extends as long as the record follows the law.  Each step
+takes a `FreeMotion` and returns it with other samples and their fit, or unchanged.
 """
 
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import Self
 
 import numpy as np
 
 from ...records.record import MIN_SAMPLES, Record
+from ..estimation.noise import robust_std
+from . import thresholds
 from .extrema import Extrema
-from .fit_problem import MIN_NOISE, FitProblem, FitResult, prepare_problem
+from .fit_problem import FitProblem, FitResult, prepare_problem
 from .law import OMEGA, T0, TERMS, UNKNOWNS, Terms
-from .noise import OUTLIER, estimate_noise, robust_std
-
-MIN_QUANTISER_STEPS = 2.0  # between the turning points of a half cycle
-DISTURBED_START = 2.0  # times the noise: residual of a first half cycle that is no free motion
-MAX_OUTLIERS = 0.001  # fraction of the samples, in addition to two samples
-UNDISTURBED_PARTS = (0.6, 0.35)  # fractions of the turning points that are tried as undisturbed
-DEPARTED = 4.0  # times the noise: residual of a half cycle that departs from the law
-PARTLY_DEPARTED = 0.05  # fraction of departed samples in the half cycle before it
-MIN_TURNING_POINTS = 6  # before a disturbance
-MAX_EXTENSIONS = 6  # of the samples used before a disturbance
-
-
-FittedPart = tuple[FitProblem, np.ndarray, float]  # some of the samples, the values of UNKNOWNS, and the sum of squares
+from .noise import estimate_noise
 
 
 @dataclass(frozen=True)
 class FreeMotion:
-    """The free motion of a record: the `problem` with its samples, the values `p` of the full law, the sum of squares,
-    and `notes` on what was left out."""
+    """The free motion of a record, as far as it is selected.
 
+    Attributes
+    ----------
+    record, extrema : the record and its turning points
+    terms : of the law that is fitted
+    available : the samples from which the next step may select
+    problem : the samples that are selected
+    p : the values of UNKNOWNS that fit them
+    sum_of_squares : of their residuals
+    outliers : number of samples left out as outliers
+    notes : sentences on other samples left out
+    """
+
+    record: Record
+    extrema: Extrema
+    terms: Terms
+    available: FitProblem
     problem: FitProblem
     p: np.ndarray
-    sum_of_squares: float
-    notes: tuple[str, ...]
+    sum_of_squares: float = np.inf
+    outliers: int = 0
+    notes: tuple[str, ...] = ()
+
+    def fit(self, problem: FitProblem, p: np.ndarray | None = None) -> Self:
+        """Return the motion with the samples of another problem and their fit, from the starting values p."""
+        p, squares = fit_with_fallback(problem, self.p if p is None else p, self.terms)
+        return replace(self, problem=problem, p=p, sum_of_squares=squares)
+
+    def residuals(self) -> np.ndarray:
+        """Return the residuals (n,) of the selected samples."""
+        return self.problem.residuals(self.p, self.terms)[0]
+
+    def add_note(self, note: str) -> Self:
+        return replace(self, notes=(*self.notes, note))
+
+    def format_time(self, t: float) -> str:
+        """Return a time of the problem as a time of the record."""
+        return self.record.format_time(t + self.problem.time_origin)
 
 
 def select_free_motion(record: Record, extrema: Extrema, terms: Terms, pendulum: bool, drift: bool) -> FreeMotion:
     """Return the free motion of a record with the given turning points, fitted by the law with these terms."""
     problem, p = initial_problem(record, extrema, terms, pendulum, drift)
-    notes = []
-    if extrema.segment_start > record.t[0]:
-        notes.append(
-            f"The record before the gap that ends at t = {record.format_time(extrema.segment_start)} s has too few "
-            "cycles and is left out."
-        )
-    start = max(extrema.segment_start - problem.time_origin, p[T0])
-    released = problem.subset(problem.t >= start)
-    certain = released.subset(released.t <= extrema.t[-1] - problem.time_origin + 0.6 * extrema.half_period)
-    p, squares = fit_with_fallback(certain, p, terms)
-
-    used, p, squares = truncate_at_stop(released, p, squares, terms, certain)
-    used, p, squares, outliers = remove_outliers(used, p, squares, terms)
-    undisturbed = skip_disturbed_start(used, p, squares, terms)
-    if undisturbed is not None:
-        used, p, squares = undisturbed
-        used, p, squares = truncate_at_stop(used, p, squares, terms, used)
-        notes.append(
-            f"The motion is free from t = {record.format_time(used.t[0] + used.time_origin)} s on; earlier samples are "
-            "left out."
-        )
-
-    if used.exceeds_noise(squares) and squares > len(used.t) * (2 * used.noise) ** 2:
-        truncated = truncate_at_disturbance(record, extrema, used, squares, terms)
-        if truncated is not None:
-            used, p, squares, outliers = remove_outliers(*truncated, terms)
-            at = record.format_time(used.t[-1] + used.time_origin)
-            notes.append(f"The record follows the law until t = {at} s and then departs from it; the rest is left out.")
-    if len(outliers):
-        notes.append(f"{len(outliers)} of {len(problem.t)} samples are outliers and are left out.")
-    noise, _ = estimate_noise(used.t, used.x)  # without samples at rest
-    used = replace(used, noise=max(noise, MIN_NOISE))
-    return FreeMotion(used, p, squares, tuple(notes))
+    motion = FreeMotion(record, extrema, terms, problem, problem, p)
+    for step in (
+        skip_before_start,
+        fit_certain_samples,
+        truncate_at_stop,
+        remove_outliers,
+        skip_disturbed_start,
+        truncate_at_disturbance,
+        estimate_final_noise,
+    ):
+        motion = step(motion)
+    if motion.outliers:
+        motion = motion.add_note(f"{motion.outliers} of {len(record.t)} samples are outliers and are left out.")
+    return motion
 
 
 def initial_problem(
@@ -93,17 +98,31 @@ def fit_with_fallback(problem: FitProblem, p: np.ndarray, terms: Terms) -> FitRe
     return min(fit, problem.fit(problem.fit_growing_windows(p, terms), terms), key=lambda fit: fit[1])
 
 
-def truncate_at_stop(
-    problem: FitProblem, p: np.ndarray, squares: float, terms: Terms, fitted_to: FitProblem
-) -> FittedPart:
-    """Return the problem up to the stop of the motion, with its fit.
+def skip_before_start(motion: FreeMotion) -> FreeMotion:
+    """Leave out the samples before the motion starts, or before a gap at its beginning."""
+    problem, segment_start = motion.problem, motion.extrema.segment_start
+    start = max(segment_start - problem.time_origin, motion.p[T0])
+    released = problem.subset(problem.t >= start)
+    if segment_start > motion.record.t[0]:
+        motion = motion.add_note(
+            f"The record before the gap that ends at t = {motion.record.format_time(segment_start)} s has too few "
+            "cycles and is left out."
+        )
+    return replace(motion, available=released, problem=released)
 
-    Parameters
-    ----------
-    p, squares : fit to the samples of `fitted_to`
-    """
-    used = problem.subset(problem.t <= last_usable_time(problem, p))
-    return (used, p, squares) if len(used.t) == len(fitted_to.t) else (used, *fit_with_fallback(used, p, terms))
+
+def fit_certain_samples(motion: FreeMotion) -> FreeMotion:
+    """Fit the samples up to the last turning point."""
+    problem, extrema = motion.available, motion.extrema
+    last = extrema.t[-1] - problem.time_origin + thresholds.CERTAIN_TIME * extrema.half_period
+    return motion.fit(problem.subset(problem.t <= last))
+
+
+def truncate_at_stop(motion: FreeMotion) -> FreeMotion:
+    """Select the available samples up to the stop of the motion."""
+    available = motion.available
+    used = available.subset(available.t <= last_usable_time(available, motion.p))
+    return replace(motion, problem=used) if len(used.t) == len(motion.problem.t) else motion.fit(used)
 
 
 def last_usable_time(problem: FitProblem, p: np.ndarray) -> float:
@@ -113,78 +132,90 @@ def last_usable_time(problem: FitProblem, p: np.ndarray) -> float:
     """
     amplitudes, starts = problem.half_cycles(p)
     spans = (amplitudes[:-1] + amplitudes[1:]) * p[OMEGA] ** problem.model.order
-    lost = np.flatnonzero(spans < MIN_QUANTISER_STEPS * problem.quantiser_step / problem.scale)
+    lost = np.flatnonzero(spans < thresholds.MIN_QUANTISER_STEPS * problem.quantiser_step / problem.scale)
     stop = len(starts) - (1 if starts[-1] > problem.t[-1] else 2)
     last = min(int(lost[0]), stop) if len(lost) else stop
     return float(starts[max(last, min(3, len(starts) - 1))])
 
 
-def remove_outliers(
-    problem: FitProblem, p: np.ndarray, squares: float, terms: Terms
-) -> tuple[FitProblem, np.ndarray, float, np.ndarray]:
-    """Return the problem without its outliers, with its fit and their times; unchanged if there are many of them."""
-    limit, q = 2 + int(MAX_OUTLIERS * len(problem.t)), p
+def remove_outliers(motion: FreeMotion) -> FreeMotion:
+    """Leave out the outliers, unless there are many of them."""
+    problem, trial = motion.problem, motion
+    limit = 2 + int(thresholds.MAX_OUTLIERS * len(problem.t))
     for _ in range(2):  # an outlier bends the fit away from the other samples
-        e, _ = problem.residuals(q, terms)
-        far = np.abs(e) > OUTLIER * max(robust_std(e), problem.noise, problem.residual_floor)
+        e, _ = problem.residuals(trial.p, motion.terms)
+        far = np.abs(e) > thresholds.OUTLIER * max(robust_std(e), problem.noise, problem.residual_floor)
         if not far.any():
             break
         farthest = far & (np.abs(e) >= np.sort(np.abs(e))[-limit])
-        rest = problem.subset(~farthest)
-        q, less = fit_with_fallback(rest, q, terms)
+        trial = trial.fit(problem.subset(~farthest))
         if far.sum() <= limit:
-            return rest, q, less, problem.t[far]
-    return problem, p, squares, problem.t[:0]
+            return replace(trial, outliers=int(far.sum()))
+    return replace(motion, outliers=0)
 
 
-def skip_disturbed_start(problem: FitProblem, p: np.ndarray, squares: float, terms: Terms) -> FittedPart | None:
-    """Return the problem from its first turning point on if the half cycle before it is no free motion."""
-    e, _ = problem.residuals(p, terms)
-    _, starts = problem.half_cycles(p, max_count=1)
+def skip_disturbed_start(motion: FreeMotion) -> FreeMotion:
+    """Start at the first turning point if the half cycle before it is no free motion."""
+    problem, e = motion.problem, motion.residuals()
+    _, starts = problem.half_cycles(motion.p, max_count=1)
     first = problem.t < starts[-1]
     if len(starts) < 2 or not 3 <= first.sum() < len(e) - 12:
-        return None
+        return motion
     rest = float(np.sqrt(np.mean(e[~first] ** 2)))
-    if not np.sqrt(np.mean(e[first] ** 2)) > DISTURBED_START * max(problem.noise, rest, problem.residual_floor):
-        return None
-    later, q = problem.skip_half_cycles(p, 1)
+    usual = max(problem.noise, rest, problem.residual_floor)
+    if not np.sqrt(np.mean(e[first] ** 2)) > thresholds.DISTURBED_START * usual:
+        return motion
+    later, p = problem.skip_half_cycles(motion.p, 1)
     later = later.subset(~first)
-    q, less = fit_with_fallback(later, q, terms)
-    return (later, q, less) if less / len(later.t) < 0.5 * squares / len(e) else None
+    undisturbed = motion.fit(later, p)
+    if undisturbed.sum_of_squares / len(later.t) >= thresholds.BETTER_START * motion.sum_of_squares / len(e):
+        return motion
+    undisturbed = truncate_at_stop(replace(undisturbed, available=later))
+    return undisturbed.add_note(
+        f"The motion is free from t = {motion.format_time(later.t[0])} s on; earlier samples are left out."
+    )
 
 
-def truncate_at_disturbance(
-    record: Record, extrema: Extrema, used: FitProblem, squares: float, terms: Terms
-) -> FittedPart | None:
-    """Return the problem up to where the record departs from the law that it follows until then; None if it does not.
-
-    Parameters
-    ----------
-    used, squares : the problem so far, and the sum of squares of its fit
-    """
-    start, rms = used.t[0] + used.time_origin, float(np.sqrt(squares / len(used.t))) * used.scale
-    for share in UNDISTURBED_PARTS:
+def truncate_at_disturbance(motion: FreeMotion) -> FreeMotion:
+    """Select the samples before the record departs from the law that it follows until then, if it does."""
+    used, extrema, terms = motion.problem, motion.extrema, motion.terms
+    rms = float(np.sqrt(motion.sum_of_squares / len(used.t)))
+    if rms <= thresholds.DISTURBED * used.noise:
+        return motion
+    start, rms = used.t[0] + used.time_origin, rms * used.scale
+    for share in thresholds.UNDISTURBED_PARTS:
         count = int(share * len(extrema.t))
-        if count < MIN_TURNING_POINTS:
-            return None
+        if count < thresholds.MIN_UNDISTURBED:
+            return motion
         first = replace(extrema, t=extrema.t[:count], x=extrema.x[:count])
-        problem, p = initial_problem(record, first, terms, used.model.is_pendulum, used.drift)
+        problem, p = initial_problem(motion.record, first, terms, used.model.is_pendulum, used.drift)
         problem = problem.subset(problem.t >= start - problem.time_origin)
-        early, last = problem, float(first.t[-1] - problem.time_origin)
+        last = float(first.t[-1] - problem.time_origin)
         if np.searchsorted(problem.t, last, "right") < MIN_SAMPLES:
-            return None
-        for _ in range(MAX_EXTENSIONS):  # each fit is valid a little farther than its samples
-            early = problem.subset(problem.t <= last)
-            noise, _ = estimate_noise(early.t, early.x)  # may be less than after the disturbance
-            p, cost = fit_with_fallback(replace(early, noise=max(noise, early.noise)), p, terms)
-            level = max(noise, early.noise, robust_std(early.residuals(p, terms)[0]))
-            departure = departure_time(problem, p, terms, last - extrema.half_period / 2, DEPARTED * level)
-            if departure < last + extrema.half_period / 2 or departure >= problem.t[-1]:
-                break
-            last = departure
-        if level * problem.scale < rms / DEPARTED and departure < problem.t[-1]:
-            return early, p, cost
-    return None
+            return motion
+        early, level, departure = extend_to_departure(replace(motion, available=problem, p=p), last)
+        if level * problem.scale < rms / thresholds.DEPARTED and departure < problem.t[-1]:
+            early = remove_outliers(early)
+            at = early.format_time(early.problem.t[-1])
+            return early.add_note(
+                f"The record follows the law until t = {at} s and then departs from it; the rest is left out."
+            )
+    return motion
+
+
+def extend_to_departure(motion: FreeMotion, last: float) -> tuple[FreeMotion, float, float]:
+    """Return the motion up to `last` in s and as long as it follows the law, its noise, and when it departs."""
+    problem, half_period = motion.available, motion.extrema.half_period
+    for _ in range(thresholds.MAX_EXTENSIONS):  # each fit is valid a little farther than its samples
+        early = problem.subset(problem.t <= last)
+        noise, _ = estimate_noise(early.t, early.x)  # may be less than after the disturbance
+        motion = replace(motion.fit(replace(early, noise=max(noise, early.noise))), problem=early)
+        level = max(noise, early.noise, robust_std(motion.residuals()))
+        departure = departure_time(problem, motion.p, motion.terms, last - half_period / 2, thresholds.DEPARTED * level)
+        if departure < last + half_period / 2 or departure >= problem.t[-1]:
+            break
+        last = departure
+    return motion, level, departure
 
 
 def departure_time(problem: FitProblem, p: np.ndarray, terms: Terms, after: float, limit: float) -> float:
@@ -198,5 +229,12 @@ def departure_time(problem: FitProblem, p: np.ndarray, terms: Terms, after: floa
     for i, (low, high) in enumerate(pairwise(edges)):
         if starts[i] >= after and high > low and robust_std(e[low:high]) > limit:
             before = np.abs(e[edges[max(i - 1, 0)] : low]) > limit
-            return float(starts[i - 1] if before.any() and before.mean() > PARTLY_DEPARTED else starts[i])
+            is_partly_departed = before.any() and before.mean() > thresholds.PARTLY_DEPARTED
+            return float(starts[i - 1] if is_partly_departed else starts[i])
     return float(problem.t[-1])
+
+
+def estimate_final_noise(motion: FreeMotion) -> FreeMotion:
+    """Estimate the noise of the selected samples, without those at rest."""
+    noise, _ = estimate_noise(motion.problem.t, motion.problem.x)
+    return replace(motion, problem=replace(motion.problem, noise=max(noise, thresholds.MIN_NOISE)))

@@ -20,7 +20,9 @@ import numpy as np
 
 from ...errors import HarnessError, check_names
 from ...records.record import Record
-from .estimates import Estimate, KnownParameters, make_estimates
+from ..estimation.estimate import Estimate
+from . import thresholds
+from .estimates import KnownParameters, make_estimates
 from .extrema import Extrema, find_extrema
 from .extrema_fit import estimate_from_extrema, estimate_from_two_peaks
 from .fit_problem import FitProblem
@@ -30,7 +32,7 @@ from .law import DRIFT, REST, TERMS, Terms
 from .least_squares import FitError
 from .model_selection import FittedLaw, fit_all_laws, select_reported_law
 from .noise import remove_spikes
-from .remarks import ROUGH, check_fit, compare_halves, make_remarks
+from .remarks import check_fit, compare_halves, make_remarks
 
 
 @dataclass(frozen=True)
@@ -198,7 +200,7 @@ def identify_record(
             f"The forces f, c and q need a position in m or rad, and that of {record.name} is in {record.base}: "
             "they are left out; --unit sets the unit."
         )
-    if uncertainty.is_correlated and uncertainty.rms > ROUGH * problem.noise:
+    if uncertainty.is_correlated and uncertainty.rms > thresholds.ROUGH * problem.noise:
         estimates, disagreements = compare_halves(problem, full, estimates)
         remarks += disagreements
     omega = estimates[0]

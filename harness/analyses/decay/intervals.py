@@ -9,20 +9,15 @@ from the values that the fit would have if losses could be negative: one linear 
 """
 
 from dataclasses import dataclass
-from statistics import NormalDist
 
 import numpy as np
 
+from ..estimation.estimate import NORMAL_QUANTILE, student_quantile
+from . import thresholds
 from .fit_problem import FitProblem
 from .law import OMEGA, ZETA, Terms
 from .least_squares import column_norms
-from .nonnegative_intervals import NEGLIGIBLE_BOUND, nonnegative_interval
-
-NORMAL_QUANTILE = NormalDist().inv_cdf(0.975)
-STUDENT_QUANTILES = (12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262)  # at 97.5 %, 1 to 9 degrees
-BLOCKS_PER_HALF_CYCLE = (1.0, 0.3, 0.1, 0.03)
-MIN_BLOCKS, MAX_BLOCKS = 24, 400
-SIGNIFICANT_CORRELATION = 4.5  # standard deviations of the correlation of white residuals
+from .nonnegative_intervals import nonnegative_interval
 
 
 @dataclass(frozen=True)
@@ -66,7 +61,10 @@ def estimate_uncertainty(problem: FitProblem, p: np.ndarray, terms: Terms) -> Fi
     variance = white
     if is_correlated:
         half_cycles = (problem.t[-1] - problem.t[0]) / half_period
-        counts = {int(np.clip(share * half_cycles, MIN_BLOCKS, MAX_BLOCKS)) for share in BLOCKS_PER_HALF_CYCLE}
+        counts = {
+            int(np.clip(share * half_cycles, thresholds.MIN_BLOCKS, thresholds.MAX_BLOCKS))
+            for share in thresholds.BLOCKS_PER_HALF_CYCLE
+        }
         variance = np.max([white, *(block_variances(jacobian, e, inverse, count) for count in sorted(counts))], axis=0)
     unconstrained = p[unknowns] - inverse @ (jacobian.T @ e) / scale
     rms = float(np.sqrt(np.mean(e**2)))
@@ -101,7 +99,8 @@ def residual_correlation(e: np.ndarray, width: int) -> tuple[float, bool]:
     rho = float(e[:-1] @ e[1:]) / squares
     sums = np.add.reduceat(e, np.arange(0, n, width))
     ratio = float(np.mean(sums**2)) / (width * squares / n)
-    return rho, abs(rho) > SIGNIFICANT_CORRELATION / np.sqrt(n) or ratio > 1 + 5 * np.sqrt(2 * width / n)
+    is_neighbour_correlated = abs(rho) > thresholds.SIGNIFICANT_CORRELATION / np.sqrt(n)
+    return rho, is_neighbour_correlated or ratio > 1 + thresholds.SIGNIFICANT_SUMS * np.sqrt(2 * width / n)
 
 
 def block_variances(jacobian: np.ndarray, e: np.ndarray, inverse: np.ndarray, count: int) -> np.ndarray:
@@ -110,16 +109,6 @@ def block_variances(jacobian: np.ndarray, e: np.ndarray, inverse: np.ndarray, co
     scores = np.add.reduceat(jacobian * e[:, None], edges, axis=0)
     degrees_of_freedom = max(len(edges) - jacobian.shape[1], 1)
     return np.diag(inverse @ (scores.T @ scores) @ inverse) * len(edges) / degrees_of_freedom
-
-
-def student_t_quantile(degrees_of_freedom: int) -> float:
-    """Return Student's t at 97.5 %; from ten degrees of freedom on by Abramowitz and Stegun, 26.7.5."""
-    if degrees_of_freedom <= len(STUDENT_QUANTILES):
-        return STUDENT_QUANTILES[degrees_of_freedom - 1] if degrees_of_freedom > 0 else float("nan")
-    z, v = NORMAL_QUANTILE, float(degrees_of_freedom)
-    first, second = (z**3 + z) / 4, (5 * z**5 + 16 * z**3 + 3 * z) / 96
-    third = (3 * z**7 + 19 * z**5 + 17 * z**3 - 15 * z) / 384
-    return z + first / v + second / v**2 + third / v**3
 
 
 def confidence_interval(
@@ -139,10 +128,10 @@ def confidence_interval(
     standard_errors : (n,)
     correlation : (n, n)
     """
-    wide = standard_errors * student_t_quantile(degrees_of_freedom) / NORMAL_QUANTILE
+    wide = standard_errors * student_quantile(degrees_of_freedom) / NORMAL_QUANTILE
     losses = (unknowns >= ZETA) & (wide > 0)
     z = center / np.where(losses, wide, 1.0)
-    near_bound = losses & (z < NEGLIGIBLE_BOUND)
+    near_bound = losses & (z < thresholds.NEGLIGIBLE_BOUND)
     if not losses[i] or not near_bound.any():
         return float(center[i] - NORMAL_QUANTILE * wide[i]), float(center[i] + NORMAL_QUANTILE * wide[i])
     joint = [i, *(j for j in np.flatnonzero(near_bound).tolist() if j != i)]

@@ -1,24 +1,16 @@
-"""Nonlinear least squares with nonnegative losses: the Levenberg-Marquardt method with active bounds.
-
-A full step is tried first; the damping grows only while the sum of squares does.  A loss that would become negative is
-held at zero in that step.
-
-References
-----------
-K. Madsen, H. B. Nielsen, O. Tingleff, Methods for Non-Linear Least Squares Problems (2004), section 3.2
-"""
+"""Nonlinear least squares over some of the unknowns, with nonnegative losses, by scipy."""
 
 from collections.abc import Callable
+from functools import lru_cache
 
 import numpy as np
+from scipy import optimize
 
 from ...errors import HarnessError
-from .law import AMPLITUDE, OMEGA, ZETA, R
+from . import thresholds
+from .law import AMPLITUDE, OMEGA, T0, ZETA, R
 
 Residual = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
-MAX_DAMPING_RATIO = 0.9  # beyond, nothing oscillates
-CONVERGED_GAIN = 1e-2  # reduction of the sum of squares at which a fit has converged, in variances of a sample
-MAX_DAMPING = 1e4  # of the steps, at which a fit stops
 
 
 class FitError(HarnessError):
@@ -34,7 +26,7 @@ class FitError(HarnessError):
 
 def least_squares(
     residual: Residual, p: np.ndarray, unknowns: np.ndarray, max_steps: int = 30
-) -> tuple[np.ndarray, float, np.ndarray, np.ndarray]:
+) -> tuple[np.ndarray, float]:
     """Minimise the sum of squared residuals over some of the UNKNOWNS.
 
     Parameters
@@ -45,43 +37,76 @@ def least_squares(
 
     Returns
     -------
-    p, sum of squares, residuals (n,), Jacobian (n, k)
+    p, sum of squares
 
     Raises
     ------
     FitError
         if the starting values give no motion
     """
+    start = p[unknowns]
+
+    @lru_cache(maxsize=2)
+    def evaluate(values: bytes) -> tuple[np.ndarray, np.ndarray, int]:
+        """Return the problem at these values of the unknowns, compressed, and its number of residuals."""
+        q = p.copy()
+        q[unknowns] = np.frombuffer(values)
+        r, jacobian = residual(q)
+        is_motion = jacobian.any() and (is_admissible(q, p) or np.array_equal(q, p))
+        residuals, slopes = compress(r if is_motion else np.full_like(r, np.nan), jacobian)
+        return residuals, slopes, len(r)
+
     lowest = np.where(unknowns >= ZETA, 0.0, -np.inf)
     with np.errstate(all="ignore"):
-        r, jacobian = residual(p)
-        cost, damping = float(r @ r), 0.0
-    if not (np.isfinite(cost) and np.isfinite(jacobian).all()):
+        r, _, n = evaluate(start.tobytes())
+    if not np.isfinite(r).all():
         raise FitError("does not have the turning points of a free decay of one oscillator")
-    for _ in range(max_steps):
-        scale = column_norms(jacobian)
-        matrix, slope = (jacobian / scale).T @ (jacobian / scale), (jacobian / scale).T @ r
-        step = bounded_step(matrix, slope, (lowest - p[unknowns]) * scale, damping)
-        gain = -float(2 * slope @ step + step @ matrix @ step)
-        new = p.copy()
-        new[unknowns] = np.maximum(p[unknowns] + step / scale, lowest)
-        better = is_admissible(new)
-        if better:
-            with np.errstate(all="ignore"):
-                new_r, new_jacobian = residual(new)
-                new_cost = float(new_r @ new_r)
-            better = bool(np.isfinite(new_jacobian).all()) and new_cost <= cost * (1 + 1e-12)  # False for NaN
-        converged = gain < CONVERGED_GAIN * cost / max(len(r) - len(unknowns), 1)
-        if better:
-            p, r, jacobian, cost = new, new_r, new_jacobian, new_cost
-            damping = damping / 10 if damping > 1e-8 else 0.0
-        else:
-            damping = max(10 * damping, 1e-6)
-            if damping > MAX_DAMPING:
-                break
-        if converged and (better or damping > 1):
-            break
-    return p, cost, r, jacobian
+    degrees_of_freedom = max(n - len(unknowns), 1)
+    with np.errstate(all="ignore"):
+        fit = optimize.least_squares(
+            lambda values: evaluate(values.tobytes())[0],
+            start,
+            lambda values: evaluate(values.tobytes())[1],
+            bounds=(lowest, np.inf),
+            x_scale="jac",
+            ftol=thresholds.CONVERGED_GAIN / degrees_of_freedom,
+            xtol=thresholds.CONVERGED_CHANGE,
+            gtol=None,
+            max_nfev=max_steps + 1,
+        )
+    p = p.copy()
+    p[unknowns] = fit.x
+    # the method approaches a bound but does not reach it, and a law without a loss is recognised by its zero
+    scale = column_norms(fit.jac)
+    inverse = np.linalg.pinv((fit.jac / scale).T @ (fit.jac / scale))
+    errors = np.sqrt(np.diag(inverse) * 2 * fit.cost / degrees_of_freedom) / scale
+    absent = (lowest == 0) & (fit.x <= thresholds.ABSENT_LOSS * errors) & (fit.grad >= 0)
+    if not absent.any():
+        return p, 2 * float(fit.cost)
+    p[unknowns[absent]] = 0.0
+
+    def residual_of_others(q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        r, jacobian = residual(q)
+        return r, jacobian[:, ~absent]
+
+    return least_squares(residual_of_others, p, unknowns[~absent], max_steps)
+
+
+def compress(r: np.ndarray, jacobian: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return residuals (k + 1,) and a Jacobian (k + 1, k) with the same sums of squares and products.
+
+    They save scipy the singular values of long matrices.  If a value is not finite no residual is, and scipy refuses
+    the step.
+    """
+    both = np.column_stack([jacobian, r])
+    scale = column_norms(both)
+    both /= scale
+    products = both.T @ both
+    if not np.isfinite(products).all():
+        return np.full(len(scale), np.nan), np.full((len(scale), len(scale) - 1), np.nan)
+    eigenvalues, axes = np.linalg.eigh(products)
+    root = np.sqrt(np.maximum(eigenvalues, 0.0))[:, None] * axes.T * scale
+    return root[:, -1], root[:, :-1]
 
 
 def column_norms(jacobian: np.ndarray) -> np.ndarray:
@@ -90,22 +115,12 @@ def column_norms(jacobian: np.ndarray) -> np.ndarray:
     return np.where(norms == 0, 1.0, norms)
 
 
-def bounded_step(matrix: np.ndarray, slope: np.ndarray, lowest: np.ndarray, damping: float) -> np.ndarray:
-    """Return the damped step (k,) of the normal equations, with no component below `lowest` (k,)."""
-    held = np.zeros(len(slope), bool)
-    step = np.zeros(len(slope))
-    while True:
-        free = ~held
-        step[held] = lowest[held]
-        right = -slope[free] - matrix[np.ix_(free, held)] @ step[held]
-        left = matrix[np.ix_(free, free)] + damping * np.eye(int(free.sum()))
-        step[free] = np.linalg.lstsq(left, right, rcond=1e-15)[0]
-        violated = free & (step < lowest)
-        if not violated.any():
-            return step
-        held |= violated
-
-
-def is_admissible(p: np.ndarray) -> bool:
-    """Return whether the motion with the values p oscillates."""
-    return bool(p[AMPLITUDE] > 0 and p[OMEGA] > 0 and p[ZETA] < MAX_DAMPING_RATIO and p[R] < p[AMPLITUDE])
+def is_admissible(p: np.ndarray, start: np.ndarray) -> bool:
+    """Return whether the motion with the values p oscillates, at about the time and the frequency of the start."""
+    change = p[OMEGA] / start[OMEGA]
+    return bool(
+        1 / thresholds.MAX_FREQUENCY_CHANGE < change < thresholds.MAX_FREQUENCY_CHANGE
+        and abs(p[T0] - start[T0]) * start[OMEGA] < thresholds.MAX_PHASE_CHANGE
+        and p[ZETA] < thresholds.MAX_DAMPING_RATIO
+        and max(p[R], 0.0) < p[AMPLITUDE]
+    )

@@ -11,12 +11,10 @@ from itertools import permutations
 
 import numpy as np
 
+from . import thresholds
 from .energy_balance import estimate_losses
 from .fit_problem import FitProblem, FitResult
 from .law import TERMS, ZETA, Terms, describe_law, sublaws
-
-MAX_REFITS = 2  # passes over all pairs of laws
-EQUAL_DEVIANCE = 1.0  # difference of n ln(squares) below which two laws fit equally well
 
 
 @dataclass(frozen=True)
@@ -38,7 +36,7 @@ def select_reported_law(laws: tuple[FittedLaw, ...], full: FittedLaw, problem: F
 
     Between nested fits, no value moves by more standard errors than the root of the change of n ln(squares).
     """
-    return full if deviance_difference(problem, laws[0], full) > EQUAL_DEVIANCE else laws[0]
+    return full if deviance_difference(problem, laws[0], full) > thresholds.EQUAL_DEVIANCE else laws[0]
 
 
 def deviance_difference(problem: FitProblem, law: FittedLaw, other: FittedLaw) -> float:
@@ -71,7 +69,7 @@ def fit_all_laws(
         start[ZETA:] = estimate_losses(amplitudes, law, problem.model.is_pendulum)
         best = min(without, start, key=lambda p: float(np.sum(problem.residuals(p, law)[0] ** 2)))
         fits[law] = problem.fit(best, law)
-    for _ in range(MAX_REFITS):
+    for _ in range(thresholds.MAX_REFITS):
         for part, whole in permutations(laws, 2):
             if set(part) < set(whole) and fits[whole][1] > fits[part][1] * (1 + 1e-9) + 1e-30:
                 fits[whole] = min(problem.fit(fits[part][0], whole), fits[part], key=lambda fit: fit[1])

@@ -5,11 +5,8 @@ from dataclasses import replace
 import numpy as np
 
 from ...records.record import MIN_SAMPLES, Record
-
-OUTLIER = 8.0  # times the noise
-MIN_SPIKE = 0.02  # of the range: a smaller spike hides no turning point
-MAX_ROUNDS = 40  # each round removes the outermost samples of a run of outliers
-MAX_REMOVED = 0.05  # fraction of the samples
+from ..estimation.noise import interpolation_residuals, robust_std
+from . import thresholds
 
 
 def estimate_noise(t: np.ndarray, x: np.ndarray) -> tuple[float, float]:
@@ -27,44 +24,25 @@ def estimate_noise(t: np.ndarray, x: np.ndarray) -> tuple[float, float]:
     differences = np.diff(np.unique(x))
     differences = differences[differences > 1e-9 * np.ptp(x)]  # smaller ones are rounding errors
     step = float(differences.min()) if len(differences) else 0.0
-    is_coarse = step > 1.5 * noise or noise < step / 3
+    is_coarse = step > thresholds.COARSE_STEP * noise or noise < thresholds.FINE_NOISE * step
     return max(noise, step / np.sqrt(12)), step if is_coarse else 0.0
-
-
-def interpolation_residuals(t: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """Return the distances (n - 4,) of the inner samples of x (n,) from the cubic through their four neighbours.
-
-    They are scaled so that white noise keeps its standard deviation.
-    """
-    n = len(t) - 4
-    near = np.array([t[i : i + n] for i in (0, 1, 3, 4)])
-    weights = np.ones((4, n))
-    for i in range(4):
-        for j in range(4):
-            if i != j:
-                weights[i] *= (t[2:-2] - near[j]) / (near[i] - near[j])
-    residuals = x[2:-2] - sum(weight * x[i : i + n] for weight, i in zip(weights, (0, 1, 3, 4), strict=True))
-    return np.asarray(np.abs(residuals) / np.sqrt(1 + (weights**2).sum(axis=0)))
-
-
-def robust_std(e: np.ndarray) -> float:
-    """Return the standard deviation of residuals e (n,), estimated from their median magnitude."""
-    return 1.4826 * float(np.median(np.abs(e)))
 
 
 def remove_spikes(record: Record) -> Record:
     """Return the record without samples far from their neighbours; unchanged if there are many of them."""
     t, x = record.t, record.x
-    for _ in range(MAX_ROUNDS):
+    for _ in range(thresholds.MAX_SPIKE_ROUNDS):
         e = interpolation_residuals(t, x)
-        excess = np.pad(np.where(e > max(OUTLIER * robust_std(e), MIN_SPIKE * np.ptp(x)), e, 0.0), 2)
+        excess = np.pad(
+            np.where(e > max(thresholds.OUTLIER * robust_std(e), thresholds.MIN_SPIKE * np.ptp(x)), e, 0.0), 2
+        )
         is_largest = excess[2:-2] >= np.max([excess[i : len(x) - 4 + i] for i in range(5)], axis=0)
         spikes = 2 + np.flatnonzero(is_largest & (excess[2:-2] > 0))
         t, x = np.delete(t, spikes), np.delete(x, spikes)
-        if not len(spikes) or len(x) < (1 - MAX_REMOVED) * len(record.x):
+        if not len(spikes) or len(x) < (1 - thresholds.MAX_SPIKES) * len(record.x):
             break
     removed = len(record.x) - len(x)
-    if not 0 < removed <= MAX_REMOVED * len(record.x):
+    if not 0 < removed <= thresholds.MAX_SPIKES * len(record.x):
         return record
     note = f"{removed} of {len(record.x)} samples are outliers and are left out."
     return replace(record, t=t, x=x, notes=(*record.notes, note))

@@ -11,17 +11,16 @@ G. J. Feldman, R. D. Cousins, Physical Review D 57 (1998), section IV B: the int
 C.-S. Chuang, T. L. Lai, Statistica Sinica 10 (2000): the treatment of the other means, hybrid resampling
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from functools import cache, reduce
 from itertools import combinations
-from statistics import NormalDist
 
 import numpy as np
+from scipy import optimize, special
+
+from . import thresholds
 
 N_DRAWS = 1000
-NEGLIGIBLE_BOUND = 4.0  # standard errors above zero: the bound at zero no longer matters
-SEARCH_WIDTH = 8.0  # standard errors above the most likely value: nothing beyond is accepted
-ROOT_TOLERANCE, MAX_ROOT_STEPS = 2e-3, 40  # of the interval's ends, in standard errors
 
 
 def nonnegative_interval(z: np.ndarray, correlation: np.ndarray) -> tuple[float, float]:
@@ -50,11 +49,11 @@ def nonnegative_interval(z: np.ndarray, correlation: np.ndarray) -> tuple[float,
         limit = np.partition(increase, int(0.95 * N_DRAWS))[int(0.95 * N_DRAWS)]
         return float(np.sqrt(max(square - least, 0.0)) - np.sqrt(max(limit, 0.0)))
 
-    best = float(most_likely[0])
-    high = find_root(excess_distance, best, best + SEARCH_WIDTH)
+    best, precision = float(most_likely[0]), thresholds.INTERVAL_PRECISION
+    high = optimize.brentq(excess_distance, best, best + thresholds.MAX_BOUND, xtol=precision)
     if best == 0 or excess_distance(0.0) <= 0:
         return 0.0, high
-    return find_root(lambda m: -excess_distance(m), 0.0, best), high
+    return optimize.brentq(excess_distance, 0.0, best, xtol=precision), high
 
 
 class NonnegativeCone:
@@ -107,24 +106,6 @@ def quasirandom_normal(k: int) -> np.ndarray:
     ----------
     M. Roberts, The unreasonable effectiveness of quasirandom sequences (2018)
     """
-    ratio = 2.0
-    for _ in range(50):
-        ratio = (1 + ratio) ** (1 / (k + 1))
+    ratio = optimize.brentq(lambda g: g ** (k + 1) - g - 1, 1.0, 2.0, xtol=1e-15)
     uniform = (0.5 + np.outer(ratio ** -np.arange(1.0, k + 1), np.arange(1, N_DRAWS + 1))) % 1
-    return np.array([NormalDist().inv_cdf(u) for u in uniform.ravel().tolist()]).reshape(uniform.shape)
-
-
-def find_root(rising: Callable[[float], float], low: float, high: float) -> float:
-    """Return the zero between `low` and `high` of a rising function, by false position (the Illinois method)."""
-    below, above, last = rising(low), rising(high), 0.0
-    for _ in range(MAX_ROOT_STEPS):
-        middle = (low * above - high * below) / (above - below)
-        value = rising(middle)
-        if abs(value) < ROOT_TOLERANCE:
-            break
-        if value < 0:
-            low, below, above = middle, value, above / 2 if last < 0 else above
-        else:
-            high, above, below = middle, value, below / 2 if last > 0 else below
-        last = value
-    return middle
+    return np.asarray(special.ndtri(uniform))

@@ -5,24 +5,14 @@ from dataclasses import replace
 import numpy as np
 
 from ...records.record import Record
-from .estimates import Estimate, unit_scales
+from ..estimation.estimate import Estimate
+from . import thresholds
+from .estimates import unit_scales
 from .fit_problem import FitProblem
 from .intervals import FitUncertainty, estimate_uncertainty
 from .law import AMPLITUDE, DRIFT, OMEGA, REST, UNKNOWNS, ZETA
 from .least_squares import FitError
 from .model_selection import FittedLaw, deviance_difference
-
-ROUGH = 1.5  # times the noise: larger residuals are not the noise of single samples
-NOT_A_DECAY = 0.1  # fraction of the motion: with larger residuals the record is refused
-DISTURBED = 0.008  # fraction of the motion: with larger residuals the remark is a warning
-CLEAR_BIC = 6.0  # difference of BIC: odds of 20 to 1
-DISAGREEMENT = 3.0  # standard errors by which the halves of a record differ
-SIGNIFICANT_DEVIANCE = 4.0  # of n ln(squares): an unnecessary term exceeds it in one record of twenty
-SIGNIFICANT_DRIFT = 5.0  # standard errors
-SIGNIFICANT_GAIN = 5.0  # standard errors by which the damping ratio is negative
-MIN_TURNING_POINTS = 6  # for a test of their positions between quantiser steps
-RAYLEIGH_LIMIT = 12.0  # of n R^2, R the mean of n positions on a circle: exceeded in one record of a hundred thousand
-MIN_SAMPLES = 100  # in a half of the record that is fitted separately
 
 
 def check_fit(
@@ -31,7 +21,7 @@ def check_fit(
     """Raise FitError if the best fit leaves too much of the motion, or gains energy."""
     e, _ = problem.residuals(full.p, full.terms)
     share = uncertainty.rms / problem.signal_rms
-    if share > NOT_A_DECAY and uncertainty.rms > 2 * problem.noise:
+    if share > thresholds.NOT_A_DECAY and uncertainty.rms > thresholds.NOT_NOISE * problem.noise:
         advice = "cut the record there with --from or --until"
         if record.base == "rad" and not pendulum:
             advice = "add --pendulum if it is a pendulum, or " + advice
@@ -40,7 +30,7 @@ def check_fit(
             f"of the motion and largest near t = {record.format_time(time_of_largest_residuals(problem, full.p, e))} s",
             advice,
         )
-    if damping_significance(problem, full) < -SIGNIFICANT_GAIN:
+    if damping_significance(problem, full) < -thresholds.SIGNIFICANT_GAIN:
         raise FitError("gains energy, so it is driven: the damping ratio that fits it best is negative")
 
 
@@ -69,15 +59,15 @@ def make_remarks(
 ) -> tuple[str, ...]:
     """Return remarks on residuals, drift, rounding and undecided laws."""
     noise, rms, unit = problem.noise * problem.scale, uncertainty.rms * problem.scale, record.unit
-    is_rough, is_exact = uncertainty.rms > ROUGH * problem.noise, uncertainty.rms < 1e-9 * full.p[AMPLITUDE]
-    if is_exact:
+    if uncertainty.rms < thresholds.EXACT * full.p[AMPLITUDE]:
         return ()
+    is_rough = uncertainty.rms > thresholds.ROUGH * problem.noise
     remarks, residuals = [], f"The residuals of the fit are {rms:.3g} {unit} (rms)"
     noise_level = f"the noise of the samples is {noise:.3g} {unit}"
     correlated = "the noise is not independent from sample to sample"
     disturbed = f"something else acts on the oscillator too, or {correlated}"
     share = uncertainty.rms / problem.signal_rms
-    if is_rough and share > DISTURBED:
+    if is_rough and share > thresholds.WARNED:
         e, _ = problem.residuals(full.p, full.terms)
         remarks.append(
             f"{residuals}, {100 * share:.1f} % of the motion, and largest near "
@@ -109,10 +99,10 @@ def rounding_remark(problem: FitProblem, full: FittedLaw, unit: str) -> tuple[st
     positions = full.p[REST] + problem.model.initial_sign * amplitudes * (-1.0) ** np.arange(len(amplitudes))
     recorded = (starts >= 0) & (starts <= problem.t[-1])
     amplitudes, positions, step = amplitudes[recorded], positions[recorded], problem.quantiser_step
-    if not step or problem.model.order or len(amplitudes) < MIN_TURNING_POINTS:
+    if not step or problem.model.order or len(amplitudes) < thresholds.MIN_ROUNDED:
         return ()
     resultant = abs(np.mean(np.exp(2j * np.pi * positions * problem.scale / step)))
-    if len(amplitudes) * resultant**2 < RAYLEIGH_LIMIT:
+    if len(amplitudes) * resultant**2 < thresholds.RAYLEIGH_LIMIT:
         return ()
     # fraction of the time within a step of a turning point
     near = 2 / np.pi * np.arccos(1 - min(step / (problem.scale * amplitudes.mean()), 1.0))
@@ -130,8 +120,8 @@ def drift_remark(record: Record, problem: FitProblem, full: FittedLaw) -> str:
     names = [UNKNOWNS[unknown] for unknown in uncertainty.unknowns]
     at = names.index("drift")
     p, squares = with_drift.fit(full.p, full.terms)
-    is_significant = abs(uncertainty.unconstrained[at]) > SIGNIFICANT_DRIFT * uncertainty.standard_errors[at]
-    if not (is_significant or squares < full.sum_of_squares / 2):
+    is_significant = abs(uncertainty.unconstrained[at]) > thresholds.SIGNIFICANT_DRIFT * uncertainty.standard_errors[at]
+    if not (is_significant or squares < thresholds.BETTER_WITH_DRIFT * full.sum_of_squares):
         return ""
     total = float(p[DRIFT] * (problem.t[-1] - problem.t[0]) * problem.scale)
     return f"The rest position drifts by {total:.3g} {record.unit} over the record: --drift fits the drift as well."
@@ -145,14 +135,14 @@ def ambiguity_remark(problem: FitProblem, laws: tuple[FittedLaw, ...]) -> tuple[
         (law, difference)
         for law, difference in zip(laws[1:], differences[1:], strict=True)
         if (
-            difference < -SIGNIFICANT_DEVIANCE
+            difference < -thresholds.SIGNIFICANT_DEVIANCE
             if set(best.terms) < set(law.terms)
-            else difference > 0 and law.bic - best.bic < CLEAR_BIC
+            else difference > 0 and law.bic - best.bic < thresholds.CLEAR_BIC
         )
     ]
     if not rivals:
         return ()
-    factor = float(np.sqrt((CLEAR_BIC + np.log(n)) / max(abs(rivals[0][1]), 1.0)))
+    factor = float(np.sqrt((thresholds.CLEAR_BIC + np.log(n)) / max(abs(rivals[0][1]), 1.0)))
     names = " and ".join(f"{law.description} ({law.bic - best.bic:+.1f})" for law, _ in rivals)
     return (
         f"{names[0].upper()}{names[1:]} cannot be distinguished from {best.description} at this noise: that takes "
@@ -177,7 +167,7 @@ def compare_halves(
     early = problem.t <= starts[cut]
     fits = []
     for count, keep in ((0, early), (cut, ~early)):
-        if keep.sum() < MIN_SAMPLES:
+        if keep.sum() < thresholds.MIN_HALF_SAMPLES:
             return estimates, ()
         half, p = problem.skip_half_cycles(full.p, count)
         half = half.subset(keep)
@@ -192,7 +182,7 @@ def compare_halves(
         at = int(np.flatnonzero(fits[0][1].unknowns == unknown)[0])
         first, second = (float(p[unknown]) * scale for p, _ in fits)
         error = float(np.hypot(*(uncertainty.standard_errors[at] * scale for _, uncertainty in fits)))
-        if abs(first - second) > DISAGREEMENT * error:
+        if abs(first - second) > thresholds.DISAGREEMENT * error:
             low, high = min(estimate.low, first, second), max(estimate.high, first, second)
             error = max(estimate.error, abs(first - second) / 2)
             widened[i] = replace(estimate, error=error, low=low, high=high)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..decay.estimates import Estimate
+from ..estimation.estimate import Estimate
 from .uncertainty import INDETERMINATE, Uncertainty
 from .unknowns import Unknown
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..decay.noise import interpolation_residuals, robust_std
+from ..estimation.noise import interpolation_residuals, robust_std
 
 MAX_DIVISOR = 8  # of the smallest difference of two levels that is tried as the step of a quantiser
 MAX_STEP_ERROR = 0.02  # of a step, by which levels may miss multiples of it

@@ -7,7 +7,7 @@ from math import inf, isfinite, nan
 import numpy as np
 
 from ...errors import HarnessError
-from ..decay.estimates import Estimate
+from ..estimation.estimate import Estimate
 from .combinations import determined_combinations
 from .fit_problem import FitProblem, Selection
 from .measured_record import MeasuredRecord, Simulate

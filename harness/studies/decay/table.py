@@ -3,8 +3,8 @@
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
-from ...analyses.decay.estimates import Estimate
 from ...analyses.decay.identification import DecayIdentification
+from ...analyses.estimation.estimate import Estimate
 from ...results.quantity import format_interval
 
 

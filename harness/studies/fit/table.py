@@ -5,7 +5,7 @@ from math import isfinite
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
-from ...analyses.decay.estimates import Estimate
+from ...analyses.estimation.estimate import Estimate
 from ...analyses.fit.parameter_fit import ParameterFit
 from ...results.quantity import format_interval
 

@@ -1,0 +1,91 @@
+"""Thresholds of the identification of decays: the numbers that decide, each with its unit and its reason.
+
+They are in the order of the steps of identification.py.  Numbers of the numerics (orders of series, nodes of
+interpolation) are with the code that they belong to, because they decide about accuracy only.
+"""
+
+# --- Noise of the samples (noise.py) ---
+OUTLIER = 8.0  # times the noise: white noise exceeds it in one of 1e15 samples
+MIN_SPIKE = 0.02  # of the range: a smaller spike hides no turning point
+MAX_SPIKE_ROUNDS = 40  # each round removes the outermost samples of a run of outliers
+MAX_SPIKES = 0.05  # fraction of the samples: a record with more is no record with outliers
+COARSE_STEP = 1.5  # times the noise: a larger step of the values is that of a quantiser
+FINE_NOISE = 1 / 3  # of a step of the values: noise below it cannot be seen through the quantiser
+MIN_NOISE = 1e-13  # relative to the amplitude: no record is more precise than rounding
+
+# --- Turning points (extrema.py) ---
+MIN_REVERSAL = 8.0  # times the noise, in the record itself: no pair of noisy samples differs by as much
+MIN_SMOOTH_REVERSAL = 18.0  # times the noise in the smoothed record, whose noise is correlated within the window
+MIN_RELATIVE_REVERSAL = 1e-6  # of the range: a record without noise has rounding errors
+MIN_NOISY_RANGE = 12.0  # times the noise: a record with a smaller range is all noise
+CLEAN = 1e-4  # of the range: a record with less noise needs no smoothing
+SMOOTHING_WINDOW = 0.35  # half periods: a polynomial of degree 4 over it follows a sine to 3e-5 of its amplitude
+MAX_SAMPLES_PER_HALF_PERIOD = 200  # more add no precision to a turning point: a denser record is averaged
+GAP = 0.8  # of a half period without a sample may hide a turning point
+MIN_GAP_SAMPLES = 3.0  # median intervals: a sparse record has no gaps between all of its samples
+MIN_TURNING_POINTS = 3  # two amplitudes and the rest position
+ENOUGH_TURNING_POINTS = 6  # a segment before a gap is used if it has as many
+MIN_HALF_PERIOD = 0.5  # of the median: faster reversals are ringing of the smoothed copy at a release
+MIN_SPACING, MAX_SPACING = 0.65, 1.5  # times the interval before: outside, the motion is lost in noise or disturbed
+LATE_RELEASE = 1.2  # half periods before the first turning point: the body was held before
+EARLY_RELEASE = 0.9  # half periods before the first turning point: released shortly before
+PARTIAL_SWING = 0.25  # of a half cycle: a record that begins farther from a turning point begins within the motion
+MIN_EXTRAPOLATED = 2.0  # rad: the start of a pendulum beyond it, near its upper rest, is not extrapolated
+GROWTH_ERRORS, GROWTH = 8.0, 1.001  # standard errors and ratio of the last amplitude to the first: it is driven
+
+# --- Fit of the signal (fit_problem.py, least_squares.py) ---
+MODEL_ACCURACY = 1e-9  # relative to the motion: truncation error of the series, below which no fit is better
+UNREACHED = 30.0  # standard errors: residual of a turning point that the motion never reaches
+FIT_WINDOWS = (0.08, 0.2, 0.45, 1.0)  # fractions of a record: the fit of one window predicts the phase in the next
+FIT_WINDOW_STEPS = 15  # of the fit of a window, which only starts that of the next one
+MIN_WINDOW = 5.0  # half periods: shorter windows do not tell losses apart
+MAX_COARSE_SAMPLES = 10_000  # a fit starts with a subset of about this size, whose noise does not matter yet
+UNEXPLAINED = 1.3  # times the noise: larger residuals call for a fit by growing windows
+CONVERGED_GAIN = 1e-2  # variances of a sample: a fit whose next step gains less has converged to a tenth of an error
+CONVERGED_CHANGE = 1e-14  # relative, of the values: records without noise converge to rounding
+ABSENT_LOSS = 1e-2  # standard errors: a loss that the fit pushes to zero and that is smaller is zero
+MAX_FREQUENCY_CHANGE = 10.0  # factor from the start of a fit: a step beyond it has lost the cycles of the record
+MAX_PHASE_CHANGE = 6.3  # rad, a cycle, from the start of a fit: a step beyond it has lost the cycles as well
+MAX_DAMPING_RATIO = 0.9  # beyond, nothing oscillates
+
+# --- Free motion (free_motion.py) ---
+CERTAIN_TIME = 0.6  # half periods after the last turning point: the motion certainly goes on as long
+MIN_QUANTISER_STEPS = 2.0  # between the turning points of a half cycle: with fewer, a record repeats one value
+DISTURBED_START = 2.0  # times the noise and the other residuals: a first half cycle with larger ones is no free motion
+BETTER_START = 0.5  # of the mean square of the residuals: a start is left out only if that halves it at least
+MAX_OUTLIERS = 0.001  # fraction of the samples, in addition to two: a record with more does not follow the law
+DISTURBED = 2.0  # times the noise: residuals of a record that departs from the law somewhere
+UNDISTURBED_PARTS = (0.6, 0.35)  # fractions of the turning points that are tried as undisturbed
+MIN_UNDISTURBED = 6  # turning points before a disturbance, to know the law that it departs from
+MAX_EXTENSIONS = 6  # of the samples before a disturbance: each fit is valid a little farther than its samples
+DEPARTED = 4.0  # times the noise: residual of a half cycle that departs from the law
+PARTLY_DEPARTED = 0.05  # fraction of departed samples in the half cycle before it, from which on it departs as well
+
+# --- Selection of the law (model_selection.py) ---
+MAX_REFITS = 2  # passes over all pairs of laws: each improves the fits of the one before
+EQUAL_DEVIANCE = 1.0  # of n ln(squares): no value of two such laws differs by more than a standard error
+
+# --- Intervals (intervals.py, nonnegative_intervals.py) ---
+BLOCKS_PER_HALF_CYCLE = (1.0, 0.3, 0.1, 0.03)  # lengths on which residuals may be correlated
+MIN_BLOCKS, MAX_BLOCKS = 24, 400  # fewer leave the variance uncertain; more are shorter than any correlation
+SIGNIFICANT_CORRELATION = 4.5  # standard deviations of the correlation of white residuals: one record of 1e5
+SIGNIFICANT_SUMS = 5.0  # standard deviations of the variance of sums of white residuals
+NEGLIGIBLE_BOUND = 4.0  # standard errors above zero: the bound at zero no longer matters
+MAX_BOUND = 8.0  # standard errors above the most likely value: no end of an interval is beyond
+INTERVAL_PRECISION = 1e-4  # standard errors: of the ends of an interval, well below what the draws leave uncertain
+
+# --- Remarks and refusals (remarks.py) ---
+ROUGH = 1.5  # times the noise: larger residuals are not the noise of single samples
+NOT_A_DECAY = 0.1  # fraction of the motion: with larger residuals the record is refused
+NOT_NOISE = 2.0  # times the noise: smaller residuals are no reason to refuse a record
+WARNED = 0.008  # fraction of the motion: with larger residuals the remark is a warning
+EXACT = 1e-9  # of the amplitude: smaller residuals are those of the model, and need no remark
+CLEAR_BIC = 6.0  # difference of BIC: odds of 20 to 1
+SIGNIFICANT_DEVIANCE = 4.0  # of n ln(squares): an unnecessary term exceeds it in one record of twenty
+SIGNIFICANT_DRIFT = 5.0  # standard errors
+BETTER_WITH_DRIFT = 0.5  # of the sum of squares: a drift that halves it is worth a remark
+SIGNIFICANT_GAIN = 5.0  # standard errors by which the damping ratio is negative
+DISAGREEMENT = 3.0  # standard errors by which the halves of a record differ
+MIN_HALF_SAMPLES = 100  # in a half of the record that is fitted separately
+MIN_ROUNDED = 6  # turning points for a test of their positions between quantiser steps
+RAYLEIGH_LIMIT = 12.0  # of n R^2, R the mean of n positions on a circle: exceeded in one record of a hundred thousand

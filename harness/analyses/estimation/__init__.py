@@ -1,0 +1,1 @@
+"""What `decay` and `fit` have in common: the noise of a record, and estimates with 95 % intervals."""
