@@ -15,6 +15,7 @@ from harness.references.certified_reference import FOLDER, load_reference
 from harness.studies.rivals import child, study
 from harness.studies.rivals.catalogue import ENGINES, MAX_LINES, OTHERS, OWN, RIVALS, count_lines
 from harness.studies.rivals.child import RunReply, RunRequest, run_rival
+from harness.studies.rivals.comparison import Comparison, Result
 from harness.studies.rivals.measures import match_events, measure
 from harness.studies.rivals.reference_motions import compute_reference_motion
 from harness.studies.rivals.scenes import SCENES, Motion
@@ -112,7 +113,7 @@ def test_a_missing_package_is_a_gap_with_its_reason(references):
     assert len(results) == 2 * len(SCENES)
     reason = "no-such-package is not installed: python -m pip install 'friction-fmus[rivals]'"
     assert {result.gap for result in results} == {reason}
-    comparison = study.Comparison((missing,), tuple(results))
+    comparison = Comparison((missing,), tuple(results))
     scenes = ", ".join(SCENES)
     assert [*gap_lines(comparison)] == [f"No result of MuJoCo (default: {scenes}; best: {scenes}): {reason}."]
     assert rivals_table(comparison).row_count == len(SCENES)
@@ -216,7 +217,7 @@ def test_an_unknown_rival_is_one_sentence(user_folder, tmp_path):
 
 def test_other_exact_rivals_are_named_before_ours():
     measures = measure(SCENES["held"], compute_reference_motion(SCENES["held"]), RunReply("", [[0.0] * 3] * 51, True))
-    results = [study.Result(title, "1", "best", {}, "held", 1, measures) for title in (OWN.title, "scipy", "MuJoCo")]
+    results = [Result(title, "1", "best", {}, "held", 1, measures) for title in (OWN.title, "scipy", "MuJoCo")]
     results.append(replace(results[2], setting="default", measures=replace(measures, error=0.1)))
-    comparison = study.Comparison((OWN,), tuple(results))
+    comparison = Comparison((OWN,), tuple(results))
     assert exact_rivals(comparison) == ["scipy (best)", "MuJoCo (best)", f"{OWN.title} (best)"]

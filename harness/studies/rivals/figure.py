@@ -4,11 +4,12 @@ from pathlib import Path
 from typing import Any
 
 from matplotlib.lines import Line2D
+from matplotlib.ticker import NullFormatter
 
 from ...results.style import BLUE, GREEN, GREY, ORANGE, WIDTH, open_figure
 from .catalogue import OWN, Rival
+from .comparison import Comparison
 from .scenes import SCENES, Scene
-from .study import Comparison
 
 FLOOR = 1e-16  # smaller errors are drawn at this value
 COLOURS = ("#000000", BLUE, ORANGE, GREEN, "#56B4E9", "#0a5c8a", "#CC79A7", "#E69F00", "#8c564b", GREY)
@@ -23,15 +24,16 @@ def draw(comparison: Comparison, path: Path) -> None:
     }
     with open_figure(path, 2 * WIDTH, 6.6) as figure:
         figure.suptitle("Error over processor time: lower left is better; open: default setting, full: best setting")
-        panels = figure.subplots(2, 3, squeeze=False)
+        panels = figure.subplots(2, 3, squeeze=False, sharex=True)
         for axes, scene in zip(panels.flat, SCENES.values(), strict=True):
             for rival in comparison.rivals:
                 plot_rival(axes, comparison, rival, scene, styles[rival.title])
             axes.set(xscale="log", yscale="log", ylim=(0.3 * FLOOR, 3.0))
+            axes.xaxis.set_minor_formatter(NullFormatter())
             axes.set_title(f"{scene.title}, {scene.stop:g} s")
             axes.set_ylabel(f"largest error [{scene.unit}]")
         for axes in panels[-1]:
-            axes.set_xlabel(f"processor time, 1 = {OWN.title}, default")
+            axes.set_xlabel(f"processor time over that of {OWN.title}")
         handles = [Line2D([], [], linestyle="", label=title, **style) for title, style in styles.items()]
         figure.legend(handles=handles, loc="outside lower center", ncols=5, frameon=False)
 

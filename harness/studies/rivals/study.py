@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Callable, Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from math import nan
 from pathlib import Path
 
@@ -12,60 +12,17 @@ from ...results.files import write_csv_rows
 from ...results.folder import replace_folder
 from ...results.provenance import write_provenance
 from ...scenes.fmu_files import find_fmu
-from .catalogue import OWN, Rival, find_rivals
+from .catalogue import Rival, find_rivals
 from .child import RunReply, RunRequest
-from .measures import Measures, measure
+from .comparison import Comparison, Result, format_setting
+from .figure import draw
+from .measures import measure
 from .reference_motions import ReferenceMotion, compute_reference_motion
-from .scenes import SCENES, Scene, Setting
+from .scenes import SCENES
 
 FOLDER, FILE, FIGURE = "rivals", "rivals.csv", "figure.svg"
 OWN_MODELS = ("coulomb", "stickslip", "belt", "clutch", "pendulum")
 MEASURES = ("error", "creep", "missed", "spurious", "event error [s]", "steps", "processor time [s]")
-
-
-@dataclass(frozen=True)
-class Result:
-    """One rival with one setting in one scene.
-
-    Attributes
-    ----------
-    rival, version, setting : title, version of its package, and name of the setting
-    options : values of its options
-    scene : name of the scene
-    lines : lines of code that a user writes for all scenes
-    measures : None for a gap
-    gap : why there is no result
-    """
-
-    rival: str
-    version: str
-    setting: str
-    options: Setting
-    scene: str
-    lines: int
-    measures: Measures | None
-    gap: str = ""
-
-
-@dataclass(frozen=True)
-class Comparison:
-    """All results, and the rivals in their order."""
-
-    rivals: tuple[Rival, ...]
-    results: tuple[Result, ...]
-
-    def of_scene(self, scene: Scene) -> list[Result]:
-        """Return the results of a scene, the most exact first."""
-        results = [result for result in self.results if result.scene == scene.name and result.measures]
-        return sorted(results, key=lambda result: result.measures.error if result.measures else nan)
-
-    def time_ratio(self, result: Result) -> float:
-        """Return the processor time relative to that of the FMU at its defaults in the same scene."""
-        for own in self.results:
-            is_baseline = (own.rival, own.setting, own.scene) == (OWN.title, "default", result.scene)
-            if is_baseline and own.measures and result.measures:
-                return result.measures.seconds / own.measures.seconds
-        return nan
 
 
 def run_rivals(names: tuple[str, ...], timeout: float, out: Path, report: Callable[[str, float], None]) -> Comparison:
@@ -90,8 +47,6 @@ def run_rivals(names: tuple[str, ...], timeout: float, out: Path, report: Callab
             results += run_rival(rival, references, timeout)
         comparison = Comparison(tuple(rivals), tuple(results))
         save(comparison, folder / FILE)
-        from .figure import draw  # loads matplotlib
-
         draw(comparison, folder / FIGURE)
         write_provenance(folder, map(find_fmu, OWN_MODELS), scene=versions(comparison), source=source)
     return comparison
@@ -130,12 +85,6 @@ def run_in_child(requests: list[RunRequest], timeout: float) -> list[RunReply]:
 def versions(comparison: Comparison) -> dict[str, str]:
     """Return the version of each package."""
     return {rival.package: rival.installed_version or "not installed" for rival in comparison.rivals}
-
-
-def format_setting(name: str, options: Setting) -> str:
-    """Return a setting in words."""
-    values = ", ".join(f"{option} = {value}" for option, value in options.items())
-    return f"{name}: {values}" if values else name
 
 
 def save(comparison: Comparison, path: Path) -> None:

@@ -6,8 +6,8 @@ from rich.table import Table
 from rich.text import Text
 
 from .catalogue import OWN
+from .comparison import Comparison, Result, format_setting
 from .scenes import SCENES
-from .study import Comparison, Result, format_setting
 
 EXACT = 1e-9  # in the unit of the error
 

@@ -51,9 +51,9 @@ def simulate(scene: Scene, setting: Setting) -> Motion:
     height = plant.GetPositions(plant_context)[1]
     plant.SetPositionsAndVelocities(plant_context, [scene.start[0], height, scene.start[1], 0.0])
     context.SetTime(0.0)
-    simulator.Initialize()
     log = logger.FindMutableLog(context)
     log.Clear()
+    simulator.Initialize()  # logs the start
     simulator.AdvanceTo(scene.stop)
     x, _, v, _ = log.data()
     return Motion(log.sample_times(), np.column_stack([x, v, np.zeros(len(x))]), len(x) - 1)
