@@ -34,6 +34,12 @@ from harness.studies.importers.checks import CHECKS
 from harness.studies.precision import law_deviations, table
 from harness.studies.precision.literature_problems import LiteratureRun
 from harness.studies.precision.study import FMU, ME, Point, Study
+from harness.studies.rivals.catalogue import RIVALS
+from harness.studies.rivals.comparison import Comparison as RivalComparison
+from harness.studies.rivals.comparison import Result as RivalResult
+from harness.studies.rivals.measures import Measures
+from harness.studies.rivals.scenes import SCENES
+from harness.studies.rivals.table import rivals_table
 
 WIDTH = 80
 PLAIN = {"COLUMNS": str(WIDTH), "PATH": ""}
@@ -76,6 +82,7 @@ POINTS = [
     for case in CASES
     for tool in (FMU, ME)
 ]
+RIVAL_MEASURES = Measures(1.2e-16, 2e-13, 12, 34, 5e-12, 500000, 0.001)
 TABLES = {  # of slow commands, filled with long words
     "precision": (
         [table.work_precision_table(Study(m, tuple(c for c in CASES if c.model == m), tuple(POINTS))) for m in MODELS],
@@ -119,6 +126,22 @@ TABLES = {  # of slow commands, filled with long words
             )
         ],
         "pendulum",
+    ),
+    "rivals": (
+        [
+            rivals_table(
+                RivalComparison(
+                    tuple(RIVALS.values()),
+                    tuple(
+                        RivalResult(rival.title, "1.2.3", setting, {}, scene, rival.lines, RIVAL_MEASURES)
+                        for rival in RIVALS.values()
+                        for setting in rival.settings
+                        for scene in SCENES
+                    ),
+                )
+            )
+        ],
+        "lost/extra",
     ),
 }
 

@@ -1,0 +1,38 @@
+"""rivals: the same scenes in other engines."""
+
+import click
+
+from .terminal import POSITIVE, Terminal, result_options
+
+
+@click.command()
+@click.argument("names", metavar="[RIVAL]...", nargs=-1)
+@click.option(
+    "--timeout",
+    type=POSITIVE,
+    default=300.0,
+    show_default=True,
+    help="Seconds that all scenes of one setting may take.",
+)
+@result_options
+def rivals(names: tuple[str, ...], timeout: float, terminal: Terminal) -> None:
+    """Run the same scenes with dry friction in other engines, and measure error, creep, events, run time and code.
+
+    RIVAL is one of scipy, pathsim, drake-events, drake-discrete, drake-continuous, mujoco, exudyn, dart and pybullet.
+    Default: all.  Each runs at its defaults and at its best setting, in processes of its own.  Rivals that are not
+    installed are listed with their reasons (pip install 'friction-fmus[rivals]').
+
+    \b
+    Examples:
+      python -m harness rivals
+      python -m harness rivals scipy mujoco
+    """
+    from ..studies.rivals import study as work
+    from ..studies.rivals.catalogue import RIVALS
+    from ..studies.rivals.table import rivals_table, sentences
+
+    with terminal.progress(len(RIVALS) + 1) as report:
+        comparison = work.run_rivals(names, timeout, terminal.out, report)
+    terminal.print_result(
+        comparison, rivals_table(comparison), "", *sentences(comparison), folder=terminal.out / work.FOLDER
+    )

@@ -1,0 +1,175 @@
+"""The rivals with their packages and settings."""
+
+import ast
+import re
+from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+from ...errors import check_names
+from ...results.provenance import HARNESS
+from .scenes import Setting
+
+ENGINES = Path(__file__).with_name("engines")
+MODELS = Path(__file__).parents[3] / "fmus"
+MAX_LINES = 60  # of a rival's file
+
+
+@dataclass(frozen=True)
+class Rival:
+    """An engine with its settings.
+
+    Attributes
+    ----------
+    name : for the command line
+    title : for people
+    module : file in engines/ without its ending
+    package : package of pip
+    default, best : settings
+    purpose : what the engine is made for, and what dry friction it has
+    """
+
+    name: str
+    title: str
+    module: str
+    package: str
+    default: Setting
+    best: Setting
+    purpose: str
+
+    @property
+    def settings(self) -> dict[str, Setting]:
+        """The settings by name."""
+        return {"default": self.default, "best": self.best}
+
+    @property
+    def installed_version(self) -> str | None:
+        """Return the version of the package, None if it is not installed."""
+        try:
+            return version(self.package)
+        except PackageNotFoundError:
+            return None
+
+    @property
+    def lines(self) -> int:
+        """Return how many lines of code a user writes for all scenes."""
+        files = [ENGINES / f"{self.module}.py"]
+        if self is OWN:
+            files += [MODELS / name for name in ("coulomb.py", "stickslip.py", "pendulum.py", "more/belt.py")]
+            files.append(MODELS / "more/clutch.py")
+        return sum(count_lines(file.read_text(encoding="utf-8")) for file in files)
+
+
+def count_lines(source: str) -> int:
+    """Return the number of lines of code: without blank lines, comments and docstrings."""
+    documented = (ast.Module, ast.ClassDef, ast.FunctionDef)
+    left_out: set[int] = set()
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, documented) and ast.get_docstring(node) is not None:
+            left_out.update(range(node.body[0].lineno, (node.body[0].end_lineno or 0) + 1))
+    lines = enumerate(source.splitlines(), start=1)
+    return sum(1 for number, line in lines if number not in left_out and re.match(r"\s*[^#\s]", line))
+
+
+OWN = Rival(
+    "fmu",
+    "this FMU",
+    "own_fmu",
+    HARNESS,
+    {},
+    {"solver.rtol": 1e-12},
+    "co-simulation in any FMI tool; stick and slip are modes",
+)
+STEP = 1e-4  # s, of the engines with constant steps at their best
+BY_HAND = "stick and slip are written by hand, here for one contact"
+CONTACTS = "robots with contacts; they creep below stiction_tolerance, and joints have no dry friction"
+OTHERS = (
+    Rival(
+        "scipy",
+        "scipy",
+        "scipy",
+        "scipy",
+        {},
+        {"method": "DOP853", "rtol": 1e-12, "atol": 1e-14},
+        f"general ODEs; {BY_HAND}",
+    ),
+    Rival(
+        "pathsim",
+        "PathSim",
+        "pathsim",
+        "pathsim",
+        {},
+        {"Solver": "RKDP87", "tolerance_lte_rel": 1e-10, "tolerance_lte_abs": 1e-12, "event_tolerance": 1e-10},
+        f"block diagrams with events; {BY_HAND}",
+    ),
+    Rival(
+        "drake-events",
+        "Drake events",
+        "drake_events",
+        "drake",
+        {},
+        {"accuracy": 1e-10},
+        f"general systems with witness functions; {BY_HAND}",
+    ),
+    Rival(
+        "drake-discrete",
+        "Drake discrete",
+        "drake_plant",
+        "drake",
+        {},
+        {"time_step": STEP, "stiction_tolerance": 1e-6},
+        f"the plant with steps: {CONTACTS}",
+    ),
+    Rival(
+        "drake-continuous",
+        "Drake continuous",
+        "drake_plant",
+        "drake",
+        {"time_step": 0.0},
+        {"time_step": 0.0, "integration_scheme": "radau3", "accuracy": 1e-6, "stiction_tolerance": 1e-6},
+        f"the plant without steps: {CONTACTS}",
+    ),
+    Rival(
+        "mujoco",
+        "MuJoCo",
+        "mujoco",
+        "mujoco",
+        {},
+        {"timestep": STEP, "noslip_iterations": 10, "solreffriction": "2e-4 1", "rewrite": 1},
+        "fast robots and learning; its soft constraints creep at the default settings",
+    ),
+    Rival(
+        "exudyn",
+        "Exudyn",
+        "exudyn",
+        "exudyn",
+        {"step": 1e-3, "presliding": 1e-5, "decay": 1e-3},
+        {"step": STEP, "presliding": 1e-6, "decay": 1e-5, "rewrite": 1},
+        "flexible multibody systems; friction at rest is an elastic bristle",
+    ),
+    Rival(
+        "dart",
+        "DART",
+        "dart",
+        "dartpy",
+        {},
+        {"time_step": STEP, "rewrite": 1},
+        "robots and animation; joints have Coulomb friction with one coefficient",
+    ),
+    Rival(
+        "pybullet",
+        "PyBullet",
+        "pybullet",
+        "pybullet",
+        {},
+        {"fixedTimeStep": STEP, "rewrite": 1},
+        "robots and learning; a motor with a limited force serves as the friction of a joint",
+    ),
+)
+RIVALS = {rival.name: rival for rival in (OWN, *OTHERS)}
+
+
+def find_rivals(names: tuple[str, ...]) -> list[Rival]:
+    """Return the rivals of these names, all without names; the FMU, with which the others are compared, is first."""
+    check_names("rival", names, RIVALS)
+    return [rival for rival in RIVALS.values() if rival is OWN or not names or rival.name in names]

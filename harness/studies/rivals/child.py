@@ -1,0 +1,83 @@
+"""Runs rivals in a process of their own: reads requests as lines of JSON, and writes a line for each reply."""
+
+import json
+import os
+import sys
+from dataclasses import asdict, dataclass, field
+from importlib import import_module
+from time import process_time
+
+import numpy as np
+
+from ...errors import HarnessError, first_line
+from .scenes import SCENES, Changes, NotOfferedError, Setting
+
+REPEATS = 3  # of short runs
+SHORT = 1.0  # s
+
+
+@dataclass(frozen=True)
+class RunRequest:
+    """The module of an engine, the name of a scene, and the setting."""
+
+    module: str
+    scene: str
+    setting: Setting
+
+
+@dataclass(frozen=True)
+class RunReply:
+    """What came of a run.
+
+    Attributes
+    ----------
+    gap : why there is no result; empty if there is one
+    states : (n, 3) at the times of the scene, as in Motion
+    has_modes : whether the changes are those of modes, or those of a slip that passes the level of the scene
+    changes : times in s, and what begins there
+    steps : number of internal steps
+    seconds : processor time of the fastest run, with building the model
+    """
+
+    gap: str = ""
+    states: list[list[float]] = field(default_factory=list)
+    has_modes: bool = False
+    changes: Changes = field(default_factory=list)
+    steps: int = 0
+    seconds: float = 0.0
+
+
+def run_rival(request: RunRequest) -> RunReply:
+    """Run a rival; what it raises becomes a gap."""
+    scene = SCENES[request.scene]
+    try:
+        simulate = import_module(f"{__package__}.engines.{request.module}").simulate
+        times: list[float] = []
+        while len(times) < (REPEATS if not times or times[0] < SHORT else 1):
+            begun = process_time()
+            motion = simulate(scene, dict(request.setting))
+            times.append(process_time() - begun)
+    except ImportError as error:
+        return RunReply(f"it cannot be imported: {first_line(error)}")
+    except (NotOfferedError, HarnessError) as error:
+        return RunReply(first_line(error))
+    except Exception as error:  # of an engine, which may raise anything
+        return RunReply(f"{type(error).__name__}: {first_line(error)}")
+    states = motion.sample(scene.times)
+    if not np.isfinite(states).all():
+        return RunReply("the result is not finite")
+    has_modes = motion.modes is not None
+    changes = motion.slip_changes(scene.level) if motion.modes is None else motion.modes
+    return RunReply("", states.tolist(), has_modes, changes, int(motion.steps), min(times))
+
+
+def serve() -> None:
+    """Answer the requests on standard input; what an engine prints goes to standard error."""
+    answers = os.fdopen(os.dup(1), "w")
+    os.dup2(2, 1)
+    for line in sys.stdin:
+        print(json.dumps(asdict(run_rival(RunRequest(**json.loads(line))))), file=answers, flush=True)
+
+
+if __name__ == "__main__":
+    serve()

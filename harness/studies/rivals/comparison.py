@@ -1,0 +1,59 @@
+"""The results of all rivals."""
+
+from dataclasses import dataclass
+from math import nan
+
+from .catalogue import OWN, Rival
+from .measures import Measures
+from .scenes import Scene, Setting
+
+
+@dataclass(frozen=True)
+class Result:
+    """One rival with one setting in one scene.
+
+    Attributes
+    ----------
+    rival, version, setting : title, version of its package, and name of the setting
+    options : values of its options
+    scene : name of the scene
+    lines : lines of code that a user writes for all scenes
+    measures : None for a gap
+    gap : why there is no result
+    """
+
+    rival: str
+    version: str
+    setting: str
+    options: Setting
+    scene: str
+    lines: int
+    measures: Measures | None
+    gap: str = ""
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """All results, and the rivals in their order."""
+
+    rivals: tuple[Rival, ...]
+    results: tuple[Result, ...]
+
+    def of_scene(self, scene: Scene) -> list[Result]:
+        """Return the results of a scene, the most exact first."""
+        results = [result for result in self.results if result.scene == scene.name and result.measures]
+        return sorted(results, key=lambda result: result.measures.error if result.measures else nan)
+
+    def time_ratio(self, result: Result) -> float:
+        """Return the processor time relative to that of the FMU at its defaults in the same scene."""
+        for own in self.results:
+            is_baseline = (own.rival, own.setting, own.scene) == (OWN.title, "default", result.scene)
+            if is_baseline and own.measures and result.measures:
+                return result.measures.seconds / own.measures.seconds
+        return nan
+
+
+def format_setting(name: str, options: Setting) -> str:
+    """Return a setting in words."""
+    values = ", ".join(f"{option} = {value}" for option, value in options.items())
+    return f"{name}: {values}" if values else name

@@ -1,0 +1,66 @@
+"""What is measured in a run: error, creep, and events."""
+
+from dataclasses import dataclass
+from math import inf, nan
+
+import numpy as np
+
+from .child import RunReply
+from .reference_motions import ReferenceMotion
+from .scenes import Changes, Scene
+
+
+@dataclass(frozen=True)
+class Measures:
+    """Measures of a run.
+
+    Attributes
+    ----------
+    error : largest error at the compared points, in the unit of the scene
+    creep : median slip where the body should stick, in m/s or rad/s
+    missed, spurious : number of events without a partner in the run, and in the reference
+    event_error : largest error of the times of the others, in s; NaN if there is none
+    steps : number of internal steps
+    seconds : processor time in s
+    """
+
+    error: float
+    creep: float
+    missed: int
+    spurious: int
+    event_error: float
+    steps: int
+    seconds: float
+
+
+def measure(scene: Scene, reference: ReferenceMotion, reply: RunReply) -> Measures:
+    """Compare a run with the reference of its scene."""
+    states = np.array(reply.states)
+    error = np.abs(states - reference.states)[:, scene.compared_columns].max()
+    slip = np.abs(states[:, 1] - states[:, 2])[reference.is_stuck]
+    expected = reference.modes if reply.has_modes else reference.slip_changes
+    missed, spurious, event_error = match_events([(t, kind) for t, kind in reply.changes], expected, scene.stop)
+    return Measures(float(error), float(np.median(slip)), missed, spurious, event_error, reply.steps, reply.seconds)
+
+
+def match_events(changes: Changes, expected: Changes, stop: float) -> tuple[int, int, float]:
+    """Match events of the same kind by nearest times, at most half the shortest distance of expected ones apart.
+
+    Returns
+    -------
+    number of missed events, of spurious ones, and the largest difference of the times of the others in s
+    """
+    missed, spurious, differences = 0, 0, [] if expected and changes else [nan]
+    for kind in {kind for _, kind in (*changes, *expected)}:
+        left = [t for t, other in changes if other == kind]
+        right = [t for t, other in expected if other == kind]
+        window = 0.5 * min(np.diff(right).min(initial=inf), stop)
+        for t in right:
+            nearest = min(left, key=lambda other: abs(other - t), default=inf)
+            if abs(nearest - t) <= window:
+                left.remove(nearest)
+                differences.append(abs(nearest - t))
+            else:
+                missed += 1
+        spurious += len(left)
+    return missed, spurious, max(differences, default=nan)

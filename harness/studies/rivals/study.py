@@ -1,0 +1,104 @@
+"""Runs all rivals in all scenes, each run in a process of its own, and writes rivals.csv and figure.svg."""
+
+import json
+from collections.abc import Callable, Iterator
+from dataclasses import asdict
+from math import nan
+from pathlib import Path
+
+from ...process.subprocess_runner import SubprocessTimeoutError, run_module
+from ...references.reference_trajectory import require_reference_packages
+from ...results.files import write_csv_rows
+from ...results.folder import replace_folder
+from ...results.provenance import write_provenance
+from ...scenes.fmu_files import find_fmu
+from .catalogue import Rival, find_rivals
+from .child import RunReply, RunRequest
+from .comparison import Comparison, Result, format_setting
+from .figure import draw
+from .measures import measure
+from .reference_motions import ReferenceMotion, compute_reference_motion
+from .scenes import SCENES
+
+FOLDER, FILE, FIGURE = "rivals", "rivals.csv", "figure.svg"
+OWN_MODELS = ("coulomb", "stickslip", "belt", "clutch", "pendulum")
+MEASURES = ("error", "creep", "missed", "spurious", "event error [s]", "steps", "processor time [s]")
+
+
+def run_rivals(names: tuple[str, ...], timeout: float, out: Path, report: Callable[[str, float], None]) -> Comparison:
+    """Run the rivals of these names, by default all, and write the results to out/rivals.
+
+    Parameters
+    ----------
+    names : names of rivals; the FMU of this project always runs, because times are relative to its own
+    timeout : seconds that the scenes of one setting may take
+    out : folder of results
+    report : receives the name of each rival that runs
+    """
+    require_reference_packages()
+    rivals = find_rivals(names)
+    source = ", ".join(names)
+    with replace_folder(out / FOLDER, (FILE, FIGURE), source) as folder:
+        report("references", 0.0)
+        references = {name: compute_reference_motion(scene) for name, scene in SCENES.items()}
+        results: list[Result] = []
+        for rival in rivals:
+            report(rival.title, 0.0)
+            results += run_rival(rival, references, timeout)
+        comparison = Comparison(tuple(rivals), tuple(results))
+        save(comparison, folder / FILE)
+        draw(comparison, folder / FIGURE)
+        write_provenance(folder, map(find_fmu, OWN_MODELS), scene=versions(comparison), source=source)
+    return comparison
+
+
+def run_rival(rival: Rival, references: dict[str, ReferenceMotion], timeout: float) -> Iterator[Result]:
+    """Yield the results of a rival, one for each setting and scene."""
+    version = rival.installed_version
+    for name, setting in rival.settings.items():
+        if version:
+            replies = run_in_child([RunRequest(rival.module, scene, setting) for scene in SCENES], timeout)
+        else:
+            reason = f"{rival.package} is not installed: python -m pip install 'friction-fmus[rivals]'"
+            replies = [RunReply(reason)] * len(SCENES)
+        for (scene_name, scene), reply in zip(SCENES.items(), replies, strict=True):
+            measures = None if reply.gap else measure(scene, references[scene_name], reply)
+            yield Result(rival.title, version or "-", name, setting, scene_name, rival.lines, measures, reply.gap)
+
+
+def run_in_child(requests: list[RunRequest], timeout: float) -> list[RunReply]:
+    """Run requests in one process.  A crash and a hang are gaps, after which another process goes on."""
+    replies: list[RunReply] = []
+    while len(replies) < len(requests):
+        text = "".join(f"{json.dumps(asdict(request))}\n" for request in requests[len(replies) :])
+        try:
+            done, reason = run_module(f"{__package__}.child", text, timeout=timeout), ""
+        except SubprocessTimeoutError as error:
+            done, reason = error.process, str(error)
+        replies += [RunReply(**json.loads(line)) for line in done.stdout.splitlines() if line.endswith("}")]
+        if len(replies) < len(requests):
+            last = (done.stderr.strip().splitlines() or ["no message"])[-1]
+            replies.append(RunReply(reason or f"it ended with exit status {done.returncode}: {last}"))
+    return replies
+
+
+def versions(comparison: Comparison) -> dict[str, str]:
+    """Return the version of each package."""
+    return {rival.package: rival.installed_version or "not installed" for rival in comparison.rivals}
+
+
+def save(comparison: Comparison, path: Path) -> None:
+    """Write one row for each rival, setting and scene."""
+    heads = ["scene", "unit of the error", "rival", "version", "setting", *MEASURES, "relative processor time"]
+    write_csv_rows(
+        path, [*heads, "lines of code", "gap"], (csv_row(comparison, result) for result in comparison.results)
+    )
+
+
+def csv_row(comparison: Comparison, result: Result) -> list[object]:
+    """Return the row of a result; NaN becomes an empty cell."""
+    measures = list(vars(result.measures).values()) if result.measures else [nan] * len(MEASURES)
+    cells = [None if value != value else value for value in (*measures, comparison.time_ratio(result))]
+    setting = format_setting(result.setting, result.options)
+    head = [result.scene, SCENES[result.scene].unit, result.rival, result.version, setting]
+    return [*head, *cells, result.lines, result.gap]

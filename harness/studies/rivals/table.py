@@ -1,0 +1,87 @@
+"""The table of all rivals, and the sentences about it."""
+
+from collections.abc import Iterator
+
+from rich.table import Table
+from rich.text import Text
+
+from .catalogue import OWN
+from .comparison import Comparison, Result, format_setting
+from .scenes import SCENES
+
+EXACT = 1e-9  # in the unit of the error
+
+
+def rivals_table(comparison: Comparison) -> Table:
+    """Return the table, the most exact rival of each scene first."""
+    table = Table(box=None, padding=(0, 1, 0, 0))
+    table.add_column("rival, setting", no_wrap=True)
+    for name in ("error", "creep", "lost/extra", "late", "steps", "time", "lines"):
+        table.add_column(name, justify="right", no_wrap=True)
+    for scene in SCENES.values():
+        table.add_section()
+        table.add_row(Text(f"{scene.title} [{scene.unit}]", style="bold"))
+        for result in comparison.of_scene(scene):
+            table.add_row(f" {result.rival}, {result.setting}", *cells(comparison, result))
+    return table
+
+
+def cells(comparison: Comparison, result: Result) -> list[str]:
+    """Return the cells of a result."""
+    measures = result.measures
+    assert measures
+    late = "-" if measures.event_error != measures.event_error else f"{measures.event_error:.0e}"
+    ratio = comparison.time_ratio(result)
+    return [
+        f"{measures.error:.1e}",
+        f"{measures.creep:.0e}",
+        f"{measures.missed}/{measures.spurious}",
+        late,
+        f"{measures.steps}",
+        "-" if ratio != ratio else f"{ratio:.2g}",
+        f"{result.lines}",
+    ]
+
+
+def sentences(comparison: Comparison) -> Iterator[str]:
+    """Yield who is exact, the settings, the purposes and the gaps."""
+    exact = exact_rivals(comparison)
+    if exact:
+        yield f"Exact to {EXACT:g} in every scene, without missed or spurious events: {'; '.join(exact)}."
+    yield (
+        "error: the largest in the run, against references that share no code with the FMUs; creep: median slip in m/s "
+        "or rad/s where the body sticks; lost/extra: events that the run misses or invents; late: largest error of the "
+        f"times of the others, in s; time: processor time, relative to {OWN.title} at its defaults; lines: lines of "
+        f"code that a user writes for all scenes, for {OWN.title} with its models."
+    )
+    for rival in comparison.rivals:
+        settings = "; ".join(format_setting(name, options) for name, options in rival.settings.items())
+        yield f"{rival.title} {rival.installed_version or '(not installed)'}: {settings}. Made for {rival.purpose}."
+    yield from gap_lines(comparison)
+
+
+def exact_rivals(comparison: Comparison) -> list[str]:
+    """Return the rivals and settings that are exact in every scene; those of others first."""
+    groups: dict[str, list[Result]] = {}
+    for result in comparison.results:
+        groups.setdefault(f"{result.rival} ({result.setting})", []).append(result)
+    exact = [name for name, results in groups.items() if all(map(is_exact, results))]
+    return sorted(exact, key=lambda name: name.startswith(OWN.title))
+
+
+def is_exact(result: Result) -> bool:
+    """Return whether a result is exact, with all events."""
+    measures = result.measures
+    return measures is not None and measures.error <= EXACT and not measures.missed and not measures.spurious
+
+
+def gap_lines(comparison: Comparison) -> Iterator[str]:
+    """Yield one line for each rival, setting and reason of gaps."""
+    gaps: dict[tuple[str, str], dict[str, list[str]]] = {}
+    for result in comparison.results:
+        if result.gap:
+            settings = gaps.setdefault((result.rival, result.gap), {})
+            settings.setdefault(result.setting, []).append(SCENES[result.scene].name)
+    for (rival, gap), settings in gaps.items():
+        where = "; ".join(f"{setting}: {', '.join(scenes)}" for setting, scenes in settings.items())
+        yield f"No result of {rival} ({where}): {gap}."
