@@ -1,6 +1,7 @@
 """A measured record as a fit uses it: samples, noise, inputs between samples, and the run at the same times."""
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -10,6 +11,18 @@ from .noise import bin_means, estimate_noise
 MAX_SAMPLES = 2500  # twice as many are averaged to this number of means of neighbours
 INPUT_POINTS = 1000  # of an input that suffice for a search
 Simulate = Callable[..., np.ndarray | None]
+
+
+@dataclass(frozen=True)
+class RecordData:
+    """A record in the units of the FMU: times (n,) in s, observed columns (n, columns), inputs (n,) by name, and the
+    standard deviation of the noise of each column, if it is known."""
+
+    name: str
+    t: np.ndarray
+    y: np.ndarray
+    inputs: Mapping[str, np.ndarray]
+    sigma: tuple[float | None, ...]
 
 
 class MeasuredRecord:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ...analyses.fit.parameter_fit import RecordData
+from ...analyses.fit.measured_record import RecordData
 from ...analyses.fit.unknowns import GAIN, OFFSET, RANGE_FACTOR, Unknown
 from ...errors import SceneError, check_names, format_value
 from ...records.columns import ColumnOptions

@@ -9,7 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from ...analyses.fit.parameter_fit import ParameterFit, describe_fit, fit_records
+from ...analyses.fit.fit_course import fit_records
+from ...analyses.fit.fit_description import describe_fit
+from ...analyses.fit.parameter_fit import ParameterFit
 from ...errors import SceneError, format_value
 from ...records.signal_table import SignalTable, read_signals
 from ...results import provenance
