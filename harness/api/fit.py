@@ -23,6 +23,7 @@ def fit(
     sigma: Mapping[str, float] | None = None,
     start: "Mapping[str, float] | ParameterFit | None" = None,
     each: Sequence[str] = (),
+    against: "str | Path | Sequence[str | Path]" = (),
     robust: bool = False,
     time: str | None = None,
     rate: float | None = None,
@@ -56,6 +57,9 @@ def fit(
         Values to start from, in addition to those of the search.
     each : sequence of str
         Parameters with a value of their own for each record.
+    against : str, path or sequence of these
+        Other FMUs, which are fitted to the same records and compared by the Bayesian information criterion. Each law
+        frees and fixes those of the given names that it has; ``notes`` names what it lacks.
     robust : bool
         Whether residuals beyond three times the noise count linearly.
     time, rate, begin, end
@@ -69,7 +73,7 @@ def fit(
     -------
     ParameterFit
         Values with 95 % intervals by profile likelihood, combinations of parameters that the records do not determine,
-        residuals and remarks.
+        residuals and remarks; with `against`, the other fits and the comparison.
 
     Raises
     ------
@@ -87,17 +91,20 @@ def fit(
 
     from ..analyses.fit.parameter_fit import ParameterFit
     from ..records.columns import ColumnOptions
-    from ..records.signal_table import parse_signals
     from ..scenes.fmu_files import check_built, find_fmu
     from ..studies.fit import study
-    from ..studies.fit.request import FitRequest, resolve_request
+    from ..studies.fit.laws import resolve_laws
+    from ..studies.fit.request import FitRequest
 
-    fmu = find_fmu(str(source))
-    check_built(fmu, SceneError)
+    others = [against] if isinstance(against, str | Path) else [*against]
+    fmus = [find_fmu(str(law)) for law in (source, *others)]
+    for fmu in fmus:
+        check_built(fmu, SceneError)
     names = [free] if isinstance(free, str) else free
     values = start.values if isinstance(start, ParameterFit) else start or {}
     request = FitRequest(
-        fmu=fmu,
+        fmu=fmus[0],
+        against=tuple(fmus[1:]),
         free=dict(names) if isinstance(names, Mapping) else dict.fromkeys(names),
         observe=headings_of(observe),
         inputs=headings_of(inputs),
@@ -111,14 +118,14 @@ def fit(
             time=time, rate=rate, begin=-inf if begin is None else begin, end=inf if end is None else end
         ),
     )
-    resolved = resolve_request(request)
+    laws = resolve_laws(request)
     tables = [
-        study.read_file(resolved, str(each))
+        study.load_record(str(each), request)
         if isinstance(each, str | Path)
-        else parse_signals(signal_table_of(each), resolved.sources, request.columns, "the record")
+        else study.RecordTable("the record", signal_table_of(each))
         for each in (records if isinstance(records, list | tuple) else [records])
     ]
-    return study.fit_tables(resolved, tables, progress or QUIET)
+    return study.fit_laws(laws, tables, progress or QUIET)
 
 
 def headings_of(signals: Any) -> dict[str, str]:

@@ -12,6 +12,7 @@ from fit_campaign import SOURCES
 from native_fmus import build_native_fmus, require_compiler
 
 import harness
+from harness.analyses.fit.parameter_fit import information_criterion
 from harness.errors import HarnessError, SceneError
 from harness.running.whole_run import open_simulator
 
@@ -223,3 +224,70 @@ def test_the_campaign_summarizes_its_log(tmp_path, capsys):
     print_summary([row, row | {"deviation": {"k": 1.0}, "covered": {"k": True}}])
     line = next(line for line in capsys.readouterr().out.splitlines() if line.startswith("force"))
     assert line.split()[1:6] == ["2", "0", "0", "1/2", "1"]
+
+
+LAWS = {"free": ["k", "mu_s", "mu_d", "f_s", "f_d"], "fixed": {"v_driver": 0.04, "v_s": 0.2}}
+
+
+@pytest.mark.parametrize(("record_of", "v_s"), [("stickslip", None), ("stribeck_sled", 0.2)])
+def test_the_law_that_made_the_record_has_the_lowest_bic(record_of, v_s):
+    fmus = [native("stickslip"), native("stribeck_sled")]
+    frame = pull(noise=0.003)
+    if v_s:
+        values = {"f_s": 100.0, "f_d": 40.0, "k": 900.0, "v_driver": 0.04, "v_s": v_s}
+        with open_simulator(fmus[1], {}) as simulator:
+            x = simulator.simulate(values, T, ["x"], {})[:, 0]
+        frame["x"] = x + 0.003 * np.ptp(x) * np.random.default_rng(2).normal(size=len(T))
+    found = harness.fit(fmus[0], frame, observe="x", against=fmus[1], **LAWS)
+    assert found.comparison.laws[0].fmu == record_of
+    assert found.comparison.is_clear
+    assert (found.comparison.verdict in found.remarks) == (record_of != "stickslip")
+    assert [each.name for each in found.estimates] == ["k", "mu_s", "mu_d"]
+    assert [each.name for each in found.against[0].estimates] == ["k", "f_s", "f_d"]
+    assert "stickslip has no f_s, f_d, v_s: its fit leaves them out." in found.notes
+    assert "stribeck_sled has no mu_s, mu_d: its fit leaves them out." in found.against[0].notes
+
+
+def test_the_bic_of_white_residuals_is_that_of_a_linear_model():
+    """For n residuals of variance s2 and k unknowns, BIC = n ln(s2) + k ln(n)."""
+    assert information_criterion(200.0, 100, 3, 100.0) == pytest.approx(100 * np.log(2.0) + 3 * np.log(100))
+    assert information_criterion(200.0, 100, 3, 25.0) == pytest.approx(25 * np.log(2.0) + 3 * np.log(25))
+
+
+def test_the_command_writes_the_compared_laws(tmp_path):
+    frame = pull(t=T[:81]).rename(columns={"t": "t [s]", "x": "x [m]"})
+    frame.to_csv("pull.csv", index=False)
+    words = ("fit", native("stickslip"), "pull.csv", "--free", "mu_s,f_s", "--fixed", "k=900,v_driver=0.04")
+    words += ("--observe", "x=x", "--against", native("stribeck_sled"))
+    done = commands.harness(tmp_path, *words, "--json", blank=True)
+    assert (done.returncode, done.stderr) == (0, "")
+    printed = json.loads(done.stdout)
+    assert [law["fmu"] for law in printed["against"]] == ["stribeck_sled"]
+    assert {law["fmu"] for law in printed["comparison"]["laws"]} == {"stickslip", "stribeck_sled"}
+    heads = (tmp_path / "results" / "fit" / "pull" / "fit.csv").read_text().splitlines()[0].split(",")
+    assert heads[2:] == [
+        *("x [m]", "x fit [m]", "x residual [m]", "x fit stribeck_sled [m]", "x residual stribeck_sled [m]")
+    ]
+    table = commands.harness(tmp_path, *words, blank=True).stdout
+    assert "above the best" in table
+    assert printed["comparison"]["verdict"] in " ".join(table.split())
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"against": "stickslip"}, "stickslip is to be compared with itself: give another FMU"),
+        ({"against": "pendulum", "free": ["m"]}, "unknown output of pendulum 'x'"),
+        ({"against": "coulomb"}, "coulomb has none of the free parameters mu_s: free some of its own as well"),
+        ({"against": "coulomb", "free": ["mu_s", "mu_z"]}, "unknown parameter 'mu_z' (nearest: 'mu_s')"),
+        ({"against": "coulomb", "free": {"mu_s": None, "f": (-1.0, 1.0)}}, "coulomb: f = -1.0:1.0 is outside"),
+        ({"against": ["coulomb", "coulomb"]}, "coulomb is to be compared with itself"),
+        ({"against": "missing.fmu"}, "missing.fmu"),
+    ],
+)
+def test_a_bad_comparison_is_refused_in_one_sentence(changes, message):
+    arguments = {"source": "stickslip", "records": pull(), "free": ["mu_s"], "observe": "x"} | changes
+    with pytest.raises(SceneError) as refused:
+        harness.fit(**arguments)
+    assert message in str(refused.value)
+    assert "\n" not in str(refused.value)

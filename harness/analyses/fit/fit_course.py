@@ -44,8 +44,14 @@ def fit_records(
     fixed: Mapping[str, float],
     robust: bool,
     report: Callable[[float], None],
+    averages: bool = True,
 ) -> tuple[FitProblem, FitCourse]:
-    """Fit the unknowns; long records are fitted as means of neighbouring samples where that changes nothing.
+    """Fit the unknowns.
+
+    Parameters
+    ----------
+    averages : bool
+        Whether long records are fitted as means of neighbouring samples, where that changes nothing.
 
     Raises
     ------
@@ -56,7 +62,7 @@ def fit_records(
         if not np.ptp(each.y, axis=0).all():
             raise HarnessError(f"{each.name} shows no motion in a column: nothing can be determined from it")
     warm: np.ndarray | None = None
-    for binned in (True, False):
+    for binned in (True, False) if averages else (False,):
         records = [MeasuredRecord(each.name, each.t, each.y, each.inputs, each.sigma, binned) for each in data]
         problem = FitProblem(simulate, records, outputs, unknowns, fixed, robust)
         course = find_course(problem, warm, any(any(each.sigma) for each in data), report)

@@ -9,6 +9,7 @@ from ..decay.estimates import Estimate
 from .combinations import determined_combinations
 from .fit_course import FitCourse
 from .fit_problem import FitProblem
+from .noise import correlation_length
 from .parameter_fit import ColumnResiduals, ParameterFit
 from .search import ROUGH
 from .uncertainty import INDETERMINATE, Uncertainty, split_residuals
@@ -29,7 +30,6 @@ def describe_fit(
     values = np.array([estimate.value for estimate in estimates])
     combinations = () if is_unfit else determined_combinations(problem.unknowns, values, uncertainty, undetermined)
     deviations = np.sqrt(np.diag(uncertainty.covariance))
-    n, squares = len(uncertainty.residuals), uncertainty.squares
     remarks = (
         unfit_remark(columns) if is_unfit else fit_remarks(problem, course, columns, estimates, several, undetermined)
     )
@@ -44,7 +44,8 @@ def describe_fit(
         remarks=(*remarks, *course.doubts),
         notes=tuple(notes),
         describes_record=not is_unfit,
-        bic=float(n * np.log(max(squares, 1e-300) / n) + len(z) * np.log(n)),
+        squares=uncertainty.squares,
+        n_independent=count_independent(problem, uncertainty),
         n_searches=course.n_searches,
         n_runs=n_runs,
         seconds=seconds,
@@ -52,6 +53,14 @@ def describe_fit(
         records=problem.records,
         predictions=tuple(predictions),
     )
+
+
+def count_independent(problem: FitProblem, uncertainty: Uncertainty) -> float:
+    """Return the number of residuals that count as independent."""
+    n = len(uncertainty.residuals)
+    if not uncertainty.correlation:
+        return float(n)
+    return n / max(map(correlation_length, split_residuals(problem, uncertainty.residuals)))
 
 
 def column_residuals(problem: FitProblem, uncertainty: Uncertainty) -> tuple[ColumnResiduals, ...]:

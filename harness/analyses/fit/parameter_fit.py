@@ -1,12 +1,15 @@
 """Result of a fit: values with intervals, residuals and remarks."""
 
 from dataclasses import dataclass
-from math import isfinite
+from math import isfinite, log
 
 import numpy as np
 
 from ..decay.estimates import Estimate
 from .measured_record import MeasuredRecord
+
+CLEAR_DIFFERENCE = 6.0  # of two BIC, which is strong evidence
+SMALLEST_MEAN_SQUARE = 1e-12  # in units of the noise
 
 
 @dataclass(frozen=True)
@@ -19,6 +22,63 @@ class ColumnResiduals:
     residual: float
     noise: float
     range: float
+
+
+@dataclass(frozen=True)
+class ComparedLaw:
+    """A law in a comparison.
+
+    Attributes
+    ----------
+    fmu : str
+    unknowns : int
+        Number of unknowns that were fitted.
+    residual : float
+        Root mean square of the residuals, in units of the noise.
+    bic : float
+    difference : float
+        BIC above that of the best law.
+    """
+
+    fmu: str
+    unknowns: int
+    residual: float
+    bic: float
+    difference: float
+
+
+@dataclass(frozen=True)
+class LawComparison:
+    """Laws, best first, the number of residuals that count as independent, and the verdict in a sentence."""
+
+    laws: tuple[ComparedLaw, ...]
+    n_independent: float
+    verdict: str
+
+    @property
+    def is_clear(self) -> bool:
+        """Return whether one law is clearly better than all others."""
+        return self.laws[1].difference >= CLEAR_DIFFERENCE
+
+
+def information_criterion(squares: float, n: int, n_unknowns: int, n_independent: float) -> float:
+    """Return the BIC of a fit with an unknown variance.
+
+    Parameters
+    ----------
+    squares : float
+        Sum of squares of all residuals, in units of the noise.
+    n : int
+        Number of residuals.
+    n_unknowns : int
+    n_independent : float
+        Number of residuals that count as independent.
+
+    References
+    ----------
+    G. Schwarz, Estimating the Dimension of a Model, Annals of Statistics 6 (1978) 461
+    """
+    return n_independent * log(max(squares / n, SMALLEST_MEAN_SQUARE)) + n_unknowns * log(n_independent)
 
 
 @dataclass(frozen=True)
@@ -42,8 +102,10 @@ class ParameterFit:
         Assumptions made when reading the records.
     describes_record : bool
         Whether the residuals are small enough to rely on the values.
-    bic : float
-        Bayesian information criterion, for comparisons of fits to the same records.
+    squares : float
+        Sum of squares of the residuals, in units of the noise.
+    n_independent : float
+        Number of residuals that count as independent; fewer than there are, if they are correlated.
     n_searches, n_runs : int
     seconds : float
         Processor time.
@@ -52,6 +114,10 @@ class ParameterFit:
     records : tuple of MeasuredRecord
     predictions : tuple of numpy.ndarray
         Fitted signals (n, columns) of each record at its times.
+    against : tuple of ParameterFit
+        Fits of other FMUs to the same records.
+    comparison : LawComparison or None
+        Comparison with the other FMUs.
     """
 
     fmu: str
@@ -62,13 +128,26 @@ class ParameterFit:
     remarks: tuple[str, ...]
     notes: tuple[str, ...]
     describes_record: bool
-    bic: float
+    squares: float
+    n_independent: float
     n_searches: int
     n_runs: int
     seconds: float
     log: tuple[str, ...]
     records: tuple[MeasuredRecord, ...]
     predictions: tuple[np.ndarray, ...]
+    against: "tuple[ParameterFit, ...]" = ()
+    comparison: LawComparison | None = None
+
+    @property
+    def n_samples(self) -> int:
+        """Return the number of samples of all observed columns."""
+        return sum(record.y.size for record in self.records)
+
+    @property
+    def bic(self) -> float:
+        """Return the Bayesian information criterion, with all residuals as independent ones."""
+        return information_criterion(self.squares, self.n_samples, len(self.estimates), self.n_samples)
 
     @property
     def values(self) -> dict[str, float]:

@@ -1,6 +1,6 @@
 """Checked request of a fit: what is fitted, fixed, observed and driven."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import inf, isfinite
 from pathlib import Path
@@ -20,6 +20,7 @@ from ...running.whole_run import MAX_INPUTS, RealVariable, real_variables
 
 SAMPLES_PER_UNKNOWN = 4
 GAIN_RANGE = (0.5, 2.0)
+READABLE = ("output", "local")  # causalities of variables that can be observed
 
 Range = tuple[float, float] | None
 
@@ -50,6 +51,10 @@ class FitRequest:
         Seconds of processor time that one run may take.
     columns : ColumnOptions
         Options for the time column.
+    against : tuple of pathlib.Path
+        Other FMUs to fit to the same records.
+    name : str
+        Name of the FMU in results; by default that of its file.
     """
 
     fmu: Path
@@ -63,6 +68,8 @@ class FitRequest:
     robust: bool = False
     timeout: float = 10.0
     columns: ColumnOptions = field(default_factory=ColumnOptions)
+    against: tuple[Path, ...] = ()
+    name: str = ""
 
 
 @dataclass(frozen=True)
@@ -75,6 +82,11 @@ class ResolvedRequest:
     fixed: Mapping[str, float]
     settings: Mapping[str, Any]
 
+    @property
+    def name(self) -> str:
+        """Return the name of the FMU in results."""
+        return self.request.name or self.request.fmu.stem
+
 
 def resolve_request(request: FitRequest) -> ResolvedRequest:
     """Check a request against the variables of the FMU.
@@ -86,24 +98,22 @@ def resolve_request(request: FitRequest) -> ResolvedRequest:
     """
     description = read_description(request.fmu)
     variables = real_variables(description)
-    parameters = [name for name, variable in variables.items() if variable.causality == "parameter"]
-    inputs = [name for name, variable in variables.items() if variable.causality == "input"]
-    readable = [name for name, variable in variables.items() if variable.causality in ("output", "local")]
+    parameters = parameter_names(description, request.observe)
+    inputs = variable_names(description, ("input",))
+    readable = variable_names(description, READABLE)
     if not request.free:
         raise SceneError(f"nothing is free: name the parameters to fit, as in --free {','.join(parameters[:2])}")
     if not request.observe:
         raise SceneError(f"nothing is observed: name a variable and its column, as in --observe {readable[0]}=position")
     if len(request.inputs) > MAX_INPUTS:
         raise SceneError(f"{len(request.inputs)} inputs are too many; at most {MAX_INPUTS} are supported")
-    sensors = [f"{kind}({name})" for name in request.observe for kind in (OFFSET, GAIN)]
     check_names("output", request.observe, readable)
     check_names("input", request.inputs, inputs)
-    check_names("parameter", request.free, [*parameters, *sensors])
+    check_names("parameter", request.free, parameters)
     check_names("observed variable", request.sigma, [*request.observe])
     check_names("free parameter", [*request.start, *request.each], [*request.free])
     declared = {variable.name: variable for variable in description.modelVariables}
-    settable = [name for name, variable in declared.items() if variable.causality in ("parameter", "input")]
-    check_names("parameter", request.fixed, settable)
+    check_names("parameter", request.fixed, settable_names(description))
     for name in request.fixed:
         if name in request.free or name in request.inputs:
             raise SceneError(
@@ -121,6 +131,22 @@ def resolve_request(request: FitRequest) -> ResolvedRequest:
         {name: value for name, value in converted.items() if name in variables},
         {name: value for name, value in converted.items() if name not in variables},
     )
+
+
+def variable_names(description: Any, causalities: Sequence[str]) -> list[str]:
+    """Return the names of the scalar Reals of an FMU with one of the causalities."""
+    return [name for name, variable in real_variables(description).items() if variable.causality in causalities]
+
+
+def parameter_names(description: Any, observe: Iterable[str]) -> list[str]:
+    """Return the names that can be free: Real parameters of the FMU, and offset and gain of each sensor."""
+    parameters = variable_names(description, ("parameter",))
+    return [*parameters, *(f"{kind}({name})" for name in observe for kind in (OFFSET, GAIN))]
+
+
+def settable_names(description: Any) -> list[str]:
+    """Return the names of the parameters and inputs of an FMU."""
+    return [each.name for each in description.modelVariables if each.causality in ("parameter", "input")]
 
 
 def make_unknowns(resolved: ResolvedRequest, records: Sequence[RecordData]) -> tuple[Unknown, ...]:

@@ -34,6 +34,30 @@ def format_estimate(estimate: Estimate) -> str:
     return f"> {estimate.low:.3g}" if isfinite(estimate.low) else f"< {estimate.high:.3g}"
 
 
+def comparison_table(fit: ParameterFit) -> Table:
+    """Return the table of the compared laws, best first."""
+    assert fit.comparison
+    result = Table(box=SIMPLE_HEAD, show_edge=False, padding=(0, 1, 0, 0))
+    result.add_column("law")
+    for heading in ("unknowns", "residual/noise", "BIC", "above the best"):
+        result.add_column(heading, justify="right")
+    for law in fit.comparison.laws:
+        numbers = (f"{law.residual:.3f}", f"{law.bic:.1f}", f"{law.difference:.1f}")
+        result.add_row(law.fmu, str(law.unknowns), *numbers)
+    return result
+
+
+def result_parts(fit: ParameterFit) -> list[Table | str]:
+    """Return the tables and sentences of a fit, and of those it is compared with."""
+    parts: list[Table | str] = [fit_table(fit), "", *summary_lines(fit)]
+    for law in fit.against:
+        parts += ["", fit_table(law), "", *summary_lines(law)]
+    if fit.comparison:
+        parts += ["", comparison_table(fit), ""]
+        parts += [] if fit.comparison.verdict in fit.remarks else [fit.comparison.verdict]
+    return parts
+
+
 def summary_lines(fit: ParameterFit) -> list[str]:
     """Return the sentences below the table."""
     lines = [
