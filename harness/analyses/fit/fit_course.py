@@ -25,11 +25,12 @@ ROUNDS = 6  # restarts from better minima
 
 @dataclass
 class FitCourse:
-    """Intermediate results of a fit."""
+    """Intermediate results of a fit; ends and profiles by index of the unknown and side."""
 
     z: np.ndarray
     uncertainty: Uncertainty
     ends: dict[tuple[int, int], float | None]
+    profiles: dict[tuple[int, int], tuple[tuple[float, float], ...]]
     rivals: list[np.ndarray]
     doubts: list[str]
     log: list[str]
@@ -89,6 +90,7 @@ def find_course(
         )
     z, input_error = result.best[1], subdivide_inputs(problem, result.best[1])
     ends: dict[tuple[int, int], float | None] = {}
+    profiles: dict[tuple[int, int], tuple[tuple[float, float], ...]] = {}
     rivals: list[Minimum] = []
     sides = [(i, side) for i in range(len(z)) for side in (-1, 1)]
     for _ in range(ROUNDS):
@@ -104,7 +106,7 @@ def find_course(
         for n, (i, side) in enumerate(sides):
             report(0.7 + 0.3 * n / len(sides))
             bound = profile_bound(problem, z, uncertainty, i, side)
-            ends[i, side], better = bound.end, bound.better
+            ends[i, side], profiles[i, side], better = bound.end, bound.profile, bound.better
             if better is not None:
                 z = better
                 break
@@ -113,10 +115,10 @@ def find_course(
     else:
         doubts.append("The sum of squares has many shallow minima here: the values may lie anywhere in the intervals.")
         wide = uncertainty.quantile * uncertainty.deviations
-        ends = {(i, side): float(z[i] + side * wide[i]) for i, side in sides}
+        ends, profiles = {(i, side): float(z[i] + side * wide[i]) for i, side in sides}, {}
     others = [there for _, there in rivals if np.abs(there - z).max() > DISTINCT]
     extend_ends(problem, z, uncertainty, ends, others)
-    return FitCourse(z, uncertainty, ends, others, doubts, result.log, result.n_searches)
+    return FitCourse(z, uncertainty, ends, profiles, others, doubts, result.log, result.n_searches)
 
 
 def starting_points(problem: FitProblem, warm: np.ndarray | None) -> np.ndarray:
