@@ -145,7 +145,7 @@ def test_the_values_predict_a_record_that_was_not_fitted():
     assert "do not predict x in the validation record 2" in remark
     arguments |= {"free": {"mu_s": None, "x0": (-0.1, 0.1)}}
     with pytest.raises(SceneError, match="x0 has a value of its own for each record, and none for the validation"):
-        harness.fit(native("stickslip"), pull(), validate=same, each=["x0"], **arguments)
+        harness.fit(native("stickslip"), [same, same], validate=same, each=["x0"], **arguments)
 
 
 def test_a_profile_crosses_its_limit_where_the_interval_ends():
@@ -214,6 +214,7 @@ def test_the_command_writes_what_it_prints(tmp_path):
         ({"free": {"mu_s": (0.1, 2.0)}, "start": {"mu_s": 99.0}}, "the start value 99.0 of mu_s is outside its range"),
         ({"sigma": {"x": 0.0}}, "sigma of x is 0.0"),
         ({"free": {"delay(x)": (0.0, 20.0)}}, "delay(x) = 0.0:20.0 reaches beyond the record, which lasts 16 s"),
+        ({"free": ["delay(x)"], "start": {"delay(x)": 5.0}}, "the start value 5.0 of delay(x) is outside its range"),
         ({"free": ["delay(y)"]}, "unknown parameter 'delay(y)' (nearest: 'delay(x)')"),
         ({"validate": "missing.csv"}, "missing.csv"),
         ({"begin": 15.8}, "at least 12 are required"),

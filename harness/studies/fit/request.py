@@ -186,6 +186,7 @@ def make_unknown(name: str, limits: Range, resolved: ResolvedRequest, records: S
                 f"{name} = {format_value(low)}:{format_value(high)} reaches beyond the record, which lasts "
                 f"{duration:.4g} s: give a shorter range"
             )
+        check_start(name, start, low, high)
         return Unknown(name, kind, unit, low, high, column=column, start=start)
     variable = resolved.variables[name]
     minimum = -inf if variable.minimum is None else variable.minimum
@@ -199,9 +200,14 @@ def make_unknown(name: str, limits: Range, resolved: ResolvedRequest, records: S
     else:
         low, high = limits
     check_range(name, low, high, minimum, maximum, variable.unit)
+    check_start(name, start, low, high)
+    return Unknown(name, name, variable.unit, low, high, minimum, maximum, start=start)
+
+
+def check_start(name: str, start: float | None, low: float, high: float) -> None:
+    """Raise SceneError if a start value is outside the range to search."""
     if start is not None and not low <= start <= high:
         raise SceneError(f"the start value {start!r} of {name} is outside its range, {low!r} to {high!r}")
-    return Unknown(name, name, variable.unit, low, high, minimum, maximum, start=start)
 
 
 def check_range(name: str, low: float, high: float, minimum: float, maximum: float, unit: str) -> None:

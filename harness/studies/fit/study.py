@@ -166,7 +166,7 @@ def fit_tables(
         If the fit fails.
     """
     request, begun = resolved.request, process_time()
-    if validation and request.each:
+    if validation and request.each and len(tables) > 1:
         raise SceneError(
             f"{', '.join(request.each)} has a value of its own for each record, and none for the validation record: "
             "leave out --each or --validate"
