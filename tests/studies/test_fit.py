@@ -347,3 +347,18 @@ def test_a_bad_comparison_is_refused_in_one_sentence(changes, message):
         harness.fit(**arguments)
     assert message in str(refused.value)
     assert "\n" not in str(refused.value)
+
+
+def test_a_peer_that_is_missing_or_fails_is_a_gap(monkeypatch):
+    pytest.importorskip("pandas")
+    import fit_peers
+
+    def failing_fit(*arguments):
+        raise AttributeError("no such thing")
+
+    peers = {"absent": ("no-such-package", None, (), False), "broken": ("numpy", failing_fit, (), True)}
+    monkeypatch.setattr(fit_peers, "PEERS", peers)
+    count, seconds, gaps = fit_peers.compare(1, build_native_fmus(), [*peers])
+    assert count == {"harness.fit": 1, "absent": 0, "broken": 0}
+    assert gaps == {"absent": "no-such-package is not installed", "broken": "fails: AttributeError: no such thing"}
+    assert [len(each) for each in seconds.values()] == [1, 0, 0]
