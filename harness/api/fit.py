@@ -23,6 +23,8 @@ def fit(
     sigma: Mapping[str, float] | None = None,
     start: "Mapping[str, float] | ParameterFit | None" = None,
     each: Sequence[str] = (),
+    against: "str | Path | Sequence[str | Path]" = (),
+    validate: Any = (),
     robust: bool = False,
     time: str | None = None,
     rate: float | None = None,
@@ -44,7 +46,8 @@ def fit(
         them in ``attrs["units"]``.
     free : sequence or mapping
         Parameters to fit, with the range to search, or None for a factor of 4 about the start value of the FMU.
-        ``offset(x)`` and ``gain(x)`` are unknowns of the sensor of the output ``x``.
+        ``offset(x)``, ``gain(x)`` and ``delay(x)`` are unknowns of the sensor of the output ``x``, which shows gain
+        times output plus offset, and that after a delay.
     observe, inputs : sequence or mapping
         Measured outputs and driven inputs of the FMU, with the headings of their columns.
     fixed : mapping, optional
@@ -56,6 +59,11 @@ def fit(
         Values to start from, in addition to those of the search.
     each : sequence of str
         Parameters with a value of their own for each record.
+    against : str, path or sequence of these
+        Other FMUs, which are fitted to the same records and compared by the Bayesian information criterion. Each law
+        frees and fixes those of the given names that it has; ``notes`` names what it lacks.
+    validate : path, DataFrame, Trajectory or sequence of these
+        Records that are predicted with the fitted values, but not fitted.
     robust : bool
         Whether residuals beyond three times the noise count linearly.
     time, rate, begin, end
@@ -69,7 +77,7 @@ def fit(
     -------
     ParameterFit
         Values with 95 % intervals by profile likelihood, combinations of parameters that the records do not determine,
-        residuals and remarks.
+        residuals and remarks; with `against`, the other fits and the comparison.
 
     Raises
     ------
@@ -87,17 +95,20 @@ def fit(
 
     from ..analyses.fit.parameter_fit import ParameterFit
     from ..records.columns import ColumnOptions
-    from ..records.signal_table import parse_signals
     from ..scenes.fmu_files import check_built, find_fmu
     from ..studies.fit import study
-    from ..studies.fit.request import FitRequest, resolve_request
+    from ..studies.fit.laws import resolve_laws
+    from ..studies.fit.request import FitRequest
 
-    fmu = find_fmu(str(source))
-    check_built(fmu, SceneError)
+    others = [against] if isinstance(against, str | Path) else [*against]
+    fmus = [find_fmu(str(law)) for law in (source, *others)]
+    for fmu in fmus:
+        check_built(fmu, SceneError)
     names = [free] if isinstance(free, str) else free
     values = start.values if isinstance(start, ParameterFit) else start or {}
     request = FitRequest(
-        fmu=fmu,
+        fmu=fmus[0],
+        against=tuple(fmus[1:]),
         free=dict(names) if isinstance(names, Mapping) else dict.fromkeys(names),
         observe=headings_of(observe),
         inputs=headings_of(inputs),
@@ -111,14 +122,20 @@ def fit(
             time=time, rate=rate, begin=-inf if begin is None else begin, end=inf if end is None else end
         ),
     )
-    resolved = resolve_request(request)
-    tables = [
-        study.read_file(resolved, str(each))
-        if isinstance(each, str | Path)
-        else parse_signals(signal_table_of(each), resolved.sources, request.columns, "the record")
-        for each in (records if isinstance(records, list | tuple) else [records])
-    ]
-    return study.fit_tables(resolved, tables, progress or QUIET)
+    laws = resolve_laws(request)
+
+    def load(given: Any, name: str) -> list[study.RecordTable]:
+        sources = given if isinstance(given, list | tuple) else [given]
+        names = [name] if len(sources) == 1 else [f"{name} {i + 1}" for i in range(len(sources))]
+        return [
+            study.load_record(str(source), request)
+            if isinstance(source, str | Path)
+            else study.RecordTable(own_name, signal_table_of(source))
+            for source, own_name in zip(sources, names, strict=True)
+        ]
+
+    fitted, predicted = load(records, "the record"), load(validate, "the validation record")
+    return study.fit_laws(laws, fitted, predicted, progress or QUIET)
 
 
 def headings_of(signals: Any) -> dict[str, str]:

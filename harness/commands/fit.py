@@ -17,6 +17,8 @@ from .terminal import POSITIVE, Terminal, result_options
 @click.option("--start", multiple=True, metavar="NAME=VALUE,...", help="Values to start from.")
 @click.option("--each", metavar="NAME,...", help="Parameters with a value of their own for each record.")
 @click.option("--sigma", multiple=True, metavar="OUTPUT=NOISE,...", help="Known noise, in the unit of the FMU.")
+@click.option("--against", multiple=True, metavar="MODEL|FMU", help="Other law to fit and compare; repeatable.")
+@click.option("--validate", multiple=True, metavar="FILE", help="Record to predict, not to fit; repeatable.")
 @click.option("--robust", is_flag=True, help="Limit the effect of outliers.")
 @click.option("--time", help="Heading of the time column. Default: t, time, ..., or the first column.")
 @click.option("--time-unit", help="Unit of time, if the heading has none. Default: s.")
@@ -38,6 +40,8 @@ def fit(
     start: tuple[str, ...],
     each: str | None,
     sigma: tuple[str, ...],
+    against: tuple[str, ...],
+    validate: tuple[str, ...],
     robust: bool,
     timeout: float,
     terminal: Terminal,
@@ -47,8 +51,11 @@ def fit(
 
     MODEL is a model of this project or the path of an FMU for co-simulation.  The first sample of a FILE is the start
     of the run; the FMU's start values apply there and can be free.  Units in headings are converted to those of the
-    FMU.  Without LOW:HIGH, a factor of 4 about the start value is searched.  offset(OUTPUT) and gain(OUTPUT) are
-    unknowns of a sensor.
+    FMU.  Without LOW:HIGH, a factor of 4 about the start value is searched.  offset(OUTPUT), gain(OUTPUT)
+    and delay(OUTPUT) are unknowns of a sensor.
+
+    --against fits other laws to the same records and compares all by the Bayesian information criterion.  Each law
+    frees and fixes those of the given names that it has.
 
     The results are values with 95 % confidence intervals.  Parameters that the record does not determine are named,
     with the combinations that it does.
@@ -58,6 +65,8 @@ def fit(
       friction-fmus fit stickslip pull.csv --free mu_s,mu_d,k --observe x=laser
       friction-fmus fit coulomb shaker.csv --free m,k,f,c=0:5 --fixed x0=0
           --observe x=pos --input F_ext=force
+      friction-fmus fit stickslip pull.csv --against sled.fmu
+          --free k,mu_s,mu_d,f_s,f_d,v_s --observe x=laser
       friction-fmus fit sled.fmu a.csv b.csv --free f,v --each v --observe F=load
     """
     from ..errors import SceneError
@@ -65,12 +74,14 @@ def fit(
     from ..scenes.fmu_files import check_built, find_fmu
     from ..studies.fit import options, study
     from ..studies.fit.request import FitRequest
-    from ..studies.fit.table import fit_table, summary_lines
+    from ..studies.fit.table import result_parts
 
-    fmu = find_fmu(model)
-    check_built(fmu, SceneError)
+    fmu, *others = map(find_fmu, (model, *against))
+    for each_fmu in (fmu, *others):
+        check_built(each_fmu, SceneError)
     request = FitRequest(
         fmu=fmu,
+        against=tuple(others),
         free=options.parse_ranges(free),
         observe=options.parse_columns("--observe", observe),
         inputs=options.parse_columns("--input", inputs),
@@ -83,5 +94,7 @@ def fit(
         columns=ColumnOptions(**columns),
     )
     with terminal.progress(1) as report:
-        result, folder = study.fit_files(request, records, terminal.out, lambda share: report(records[0], share))
-    terminal.print_result(study.fit_as_json(result), fit_table(result), "", *summary_lines(result), folder=folder)
+        result, folder = study.fit_files(
+            request, records, validate, terminal.out, lambda share: report(records[0], share)
+        )
+    terminal.print_result(study.fit_as_json(result), *result_parts(result), folder=folder)

@@ -1,6 +1,6 @@
 """Checked request of a fit: what is fitted, fixed, observed and driven."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import inf, isfinite
 from pathlib import Path
@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from ...analyses.fit.parameter_fit import RecordData
-from ...analyses.fit.unknowns import GAIN, OFFSET, RANGE_FACTOR, Unknown
+from ...analyses.fit.measured_record import RecordData
+from ...analyses.fit.unknowns import DELAY, GAIN, OFFSET, RANGE_FACTOR, SENSOR, Unknown
 from ...errors import SceneError, check_names, format_value
 from ...records.columns import ColumnOptions
 from ...records.record import MIN_SAMPLES
@@ -20,6 +20,8 @@ from ...running.whole_run import MAX_INPUTS, RealVariable, real_variables
 
 SAMPLES_PER_UNKNOWN = 4
 GAIN_RANGE = (0.5, 2.0)
+DELAY_SHARE = 0.1  # of the shortest record, which is searched for a delay
+READABLE = ("output", "local")  # causalities of variables that can be observed
 
 Range = tuple[float, float] | None
 
@@ -32,8 +34,8 @@ class FitRequest:
     ----------
     fmu : pathlib.Path
     free : mapping
-        Range to search of each unknown, None for the default. ``offset(x)`` and ``gain(x)`` are those of the sensor of
-        an observed variable.
+        Range to search of each unknown, None for the default. ``offset(x)``, ``gain(x)`` and ``delay(x)`` are
+        those of the sensor of an observed variable.
     fixed : mapping
         Values of other variables by name; enumerations by label or number.
     observe, inputs : mapping
@@ -50,6 +52,10 @@ class FitRequest:
         Seconds of processor time that one run may take.
     columns : ColumnOptions
         Options for the time column.
+    against : tuple of pathlib.Path
+        Other FMUs to fit to the same records.
+    name : str
+        Name of the FMU in results; by default that of its file.
     """
 
     fmu: Path
@@ -63,6 +69,8 @@ class FitRequest:
     robust: bool = False
     timeout: float = 10.0
     columns: ColumnOptions = field(default_factory=ColumnOptions)
+    against: tuple[Path, ...] = ()
+    name: str = ""
 
 
 @dataclass(frozen=True)
@@ -75,6 +83,11 @@ class ResolvedRequest:
     fixed: Mapping[str, float]
     settings: Mapping[str, Any]
 
+    @property
+    def name(self) -> str:
+        """Return the name of the FMU in results."""
+        return self.request.name or self.request.fmu.stem
+
 
 def resolve_request(request: FitRequest) -> ResolvedRequest:
     """Check a request against the variables of the FMU.
@@ -86,24 +99,22 @@ def resolve_request(request: FitRequest) -> ResolvedRequest:
     """
     description = read_description(request.fmu)
     variables = real_variables(description)
-    parameters = [name for name, variable in variables.items() if variable.causality == "parameter"]
-    inputs = [name for name, variable in variables.items() if variable.causality == "input"]
-    readable = [name for name, variable in variables.items() if variable.causality in ("output", "local")]
+    parameters = parameter_names(description, request.observe)
+    inputs = variable_names(description, ("input",))
+    readable = variable_names(description, READABLE)
     if not request.free:
         raise SceneError(f"nothing is free: name the parameters to fit, as in --free {','.join(parameters[:2])}")
     if not request.observe:
         raise SceneError(f"nothing is observed: name a variable and its column, as in --observe {readable[0]}=position")
     if len(request.inputs) > MAX_INPUTS:
         raise SceneError(f"{len(request.inputs)} inputs are too many; at most {MAX_INPUTS} are supported")
-    sensors = [f"{kind}({name})" for name in request.observe for kind in (OFFSET, GAIN)]
     check_names("output", request.observe, readable)
     check_names("input", request.inputs, inputs)
-    check_names("parameter", request.free, [*parameters, *sensors])
+    check_names("parameter", request.free, parameters)
     check_names("observed variable", request.sigma, [*request.observe])
     check_names("free parameter", [*request.start, *request.each], [*request.free])
     declared = {variable.name: variable for variable in description.modelVariables}
-    settable = [name for name, variable in declared.items() if variable.causality in ("parameter", "input")]
-    check_names("parameter", request.fixed, settable)
+    check_names("parameter", request.fixed, settable_names(description))
     for name in request.fixed:
         if name in request.free or name in request.inputs:
             raise SceneError(
@@ -121,6 +132,22 @@ def resolve_request(request: FitRequest) -> ResolvedRequest:
         {name: value for name, value in converted.items() if name in variables},
         {name: value for name, value in converted.items() if name not in variables},
     )
+
+
+def variable_names(description: Any, causalities: Sequence[str]) -> list[str]:
+    """Return the names of the scalar Reals of an FMU with one of the causalities."""
+    return [name for name, variable in real_variables(description).items() if variable.causality in causalities]
+
+
+def parameter_names(description: Any, observe: Iterable[str]) -> list[str]:
+    """Return the names that can be free: Real parameters of the FMU, and offset, gain and delay of each sensor."""
+    parameters = variable_names(description, ("parameter",))
+    return [*parameters, *(f"{kind}({name})" for name in observe for kind in SENSOR)]
+
+
+def settable_names(description: Any) -> list[str]:
+    """Return the names of the parameters and inputs of an FMU."""
+    return [each.name for each in description.modelVariables if each.causality in ("parameter", "input")]
 
 
 def make_unknowns(resolved: ResolvedRequest, records: Sequence[RecordData]) -> tuple[Unknown, ...]:
@@ -150,9 +177,16 @@ def make_unknown(name: str, limits: Range, resolved: ResolvedRequest, records: S
     if argument and argument.removesuffix(")") in observed:
         column = observed.index(argument.removesuffix(")"))
         size = max(float(np.ptp(record.y[:, column])) for record in records)
-        low, high = limits or (GAIN_RANGE if kind == GAIN else (-size, size))
-        unit = "" if kind == GAIN else resolved.variables[observed[column]].unit
+        duration = min(float(record.t[-1] - record.t[0]) for record in records)
+        low, high = limits or {OFFSET: (-size, size), GAIN: GAIN_RANGE, DELAY: (0.0, DELAY_SHARE * duration)}[kind]
+        unit = {OFFSET: resolved.variables[observed[column]].unit, GAIN: "", DELAY: "s"}[kind]
         check_range(name, low, high, -inf, inf, unit)
+        if kind == DELAY and max(abs(low), abs(high)) >= duration:
+            raise SceneError(
+                f"{name} = {format_value(low)}:{format_value(high)} reaches beyond the record, which lasts "
+                f"{duration:.4g} s: give a shorter range"
+            )
+        check_start(name, start, low, high)
         return Unknown(name, kind, unit, low, high, column=column, start=start)
     variable = resolved.variables[name]
     minimum = -inf if variable.minimum is None else variable.minimum
@@ -166,9 +200,14 @@ def make_unknown(name: str, limits: Range, resolved: ResolvedRequest, records: S
     else:
         low, high = limits
     check_range(name, low, high, minimum, maximum, variable.unit)
+    check_start(name, start, low, high)
+    return Unknown(name, name, variable.unit, low, high, minimum, maximum, start=start)
+
+
+def check_start(name: str, start: float | None, low: float, high: float) -> None:
+    """Raise SceneError if a start value is outside the range to search."""
     if start is not None and not low <= start <= high:
         raise SceneError(f"the start value {start!r} of {name} is outside its range, {low!r} to {high!r}")
-    return Unknown(name, name, variable.unit, low, high, minimum, maximum, start=start)
 
 
 def check_range(name: str, low: float, high: float, minimum: float, maximum: float, unit: str) -> None:

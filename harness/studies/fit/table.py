@@ -6,7 +6,7 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from ...analyses.estimation.estimate import Estimate
-from ...analyses.fit.parameter_fit import ParameterFit
+from ...analyses.fit.parameter_fit import ColumnResiduals, ParameterFit
 from ...results.quantity import format_interval
 
 
@@ -34,11 +34,43 @@ def format_estimate(estimate: Estimate) -> str:
     return f"> {estimate.low:.3g}" if isfinite(estimate.low) else f"< {estimate.high:.3g}"
 
 
+def comparison_table(fit: ParameterFit) -> Table:
+    """Return the table of the compared laws, best first."""
+    assert fit.comparison
+    result = Table(box=SIMPLE_HEAD, show_edge=False, padding=(0, 1, 0, 0))
+    result.add_column("law")
+    for heading in ("unknowns", "residual/noise", "BIC", "above the best"):
+        result.add_column(heading, justify="right")
+    for law in fit.comparison.laws:
+        numbers = (f"{law.residual:.3f}", f"{law.bic:.1f}", f"{law.difference:.1f}")
+        result.add_row(law.fmu, str(law.unknowns), *numbers)
+    return result
+
+
+def result_parts(fit: ParameterFit) -> list[Table | str]:
+    """Return the tables and sentences of a fit, and of those it is compared with."""
+    parts: list[Table | str] = [fit_table(fit), "", *summary_lines(fit)]
+    for law in fit.against:
+        parts += ["", fit_table(law), "", *summary_lines(law)]
+    if fit.comparison:
+        parts += ["", comparison_table(fit), ""]
+        parts += [] if fit.comparison.verdict in fit.remarks else [fit.comparison.verdict]
+    return parts
+
+
 def summary_lines(fit: ParameterFit) -> list[str]:
     """Return the sentences below the table."""
-    lines = [
-        f"Residuals of {column.name} in {column.record}: {column.residual:.3g} {column.unit}".rstrip()
-        + f" (noise {column.noise:.3g}, range {column.range:.3g})."
-        for column in fit.columns
+    lines = [describe_residuals(column, column.record) for column in fit.columns]
+    lines += [
+        describe_residuals(column, f"{column.record} (validation)")
+        for column in (fit.validation.columns if fit.validation else ())
     ]
     return [*lines, *fit.remarks, *fit.notes]
+
+
+def describe_residuals(column: ColumnResiduals, record: str) -> str:
+    """Return a sentence on the residuals of a column."""
+    return (
+        f"Residuals of {column.name} in {record}: {column.residual:.3g} {column.unit}".rstrip()
+        + f" (noise {column.noise:.3g}, range {column.range:.3g})."
+    )

@@ -1,0 +1,216 @@
+"""Course of a fit: search, refinement, rivals and intervals."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...errors import HarnessError
+from .fit_problem import FitProblem, Selection
+from .measured_record import MeasuredRecord, RecordData, Simulate
+from .profile_likelihood import profile_bound
+from .search import DISTINCT, Minimum, distinct, search
+from .uncertainty import Uncertainty, estimate_uncertainty
+from .unknowns import Unknown
+
+MIN_REDUCTION = 30.0  # of the squares of a constant, in variances of the residuals and for each unknown
+MOTION = 2.0  # rms of a record that moves, in units of its noise
+MAX_SUBDIVISION = 32  # of the intervals between samples of inputs
+INPUT_CHANGE = 0.1  # of the noise, at which a finer subdivision is not needed
+SPLINE_RATIO = 15.0  # differences of splines through half of the samples, in errors of that through all
+MAX_THIN, THIN = 3000, 2000  # samples above which a search uses fewer, and their number
+DRAWS, MAX_RIVALS, DRAW_SIZE = 24, 8, 0.3  # starts for rival minima
+ROUNDS = 6  # restarts from better minima
+
+
+@dataclass
+class FitCourse:
+    """Intermediate results of a fit; ends and profiles by index of the unknown and side."""
+
+    z: np.ndarray
+    uncertainty: Uncertainty
+    ends: dict[tuple[int, int], float | None]
+    profiles: dict[tuple[int, int], tuple[tuple[float, float], ...]]
+    rivals: list[np.ndarray]
+    doubts: list[str]
+    log: list[str]
+    n_searches: int
+
+
+def fit_records(
+    simulate: Simulate,
+    data: Sequence[RecordData],
+    outputs: Sequence[str],
+    unknowns: Sequence[Unknown],
+    fixed: Mapping[str, float],
+    robust: bool,
+    report: Callable[[float], None],
+    averages: bool = True,
+) -> tuple[FitProblem, FitCourse]:
+    """Fit the unknowns.
+
+    Parameters
+    ----------
+    averages : bool
+        Whether long records are fitted as means of neighbouring samples, where that changes nothing.
+
+    Raises
+    ------
+    HarnessError
+        If a record shows no motion or the FMU refuses all values.
+    """
+    for each in data:
+        if not np.ptp(each.y, axis=0).all():
+            raise HarnessError(f"{each.name} shows no motion in a column: nothing can be determined from it")
+    warm: np.ndarray | None = None
+    for binned in (True, False) if averages else (False,):
+        records = [MeasuredRecord(each.name, each.t, each.y, each.inputs, each.sigma, binned) for each in data]
+        problem = FitProblem(simulate, records, outputs, unknowns, fixed, robust)
+        course = find_course(problem, warm, any(any(each.sigma) for each in data), report)
+        values = [problem.values(course.z, i) for i in range(len(records))]
+        if all(record.means_hold(simulate, each, outputs) for record, each in zip(records, values, strict=True)):
+            break
+        warm = course.z
+    return problem, course
+
+
+def find_course(
+    problem: FitProblem, warm: np.ndarray | None, noise_is_known: bool, report: Callable[[float], None]
+) -> FitCourse:
+    """Search, refine and find intervals; start again wherever a better minimum appears."""
+    starts = starting_points(problem, warm)
+    thin = thin_selection(problem)
+    result = search(problem, thin, starts, lambda share: report(0.5 * share))
+    if result.best is None:
+        raise HarnessError("the FMU refuses all values that were tried: give other ranges, as in --free k=10:1000")
+    doubts = []
+    if not result.is_agreed:
+        doubts.append(
+            f"Only one of {result.n_searches} searches ended at these values: narrow the ranges, or give start values."
+        )
+    z, input_error = result.best[1], subdivide_inputs(problem, result.best[1])
+    ends: dict[tuple[int, int], float | None] = {}
+    profiles: dict[tuple[int, int], tuple[tuple[float, float], ...]] = {}
+    rivals: list[Minimum] = []
+    sides = [(i, side) for i in range(len(z)) for side in (-1, 1)]
+    for _ in range(ROUNDS):
+        squares, z = problem.minimize(z, problem.all, 30, 1e-9, central=True)
+        check_motion(problem, squares)
+        uncertainty = estimate_uncertainty(problem, z, input_error, float(noise_is_known))
+        report(0.6)
+        rivals = find_rivals(problem, z, uncertainty, result.minima, squares)
+        if rivals and rivals[0][0] < squares - 0.1 * uncertainty.variance:
+            z = rivals[0][1]
+            continue
+        ends, better = {}, None
+        for n, (i, side) in enumerate(sides):
+            report(0.7 + 0.3 * n / len(sides))
+            bound = profile_bound(problem, z, uncertainty, i, side)
+            ends[i, side], profiles[i, side], better = bound.end, bound.profile, bound.better
+            if better is not None:
+                z = better
+                break
+        if better is None:
+            break
+    else:
+        doubts.append("The sum of squares has many shallow minima here: the values may lie anywhere in the intervals.")
+        wide = uncertainty.quantile * uncertainty.deviations
+        ends, profiles = {(i, side): float(z[i] + side * wide[i]) for i, side in sides}, {}
+    others = [there for _, there in rivals if np.abs(there - z).max() > DISTINCT]
+    extend_ends(problem, z, uncertainty, ends, others)
+    return FitCourse(z, uncertainty, ends, profiles, others, doubts, result.log, result.n_searches)
+
+
+def starting_points(problem: FitProblem, warm: np.ndarray | None) -> np.ndarray:
+    """Return the coordinates (m, k) of given start values and of an earlier fit."""
+    middle = (problem.low + problem.high) / 2
+    given = [
+        middle[i] if unknown.start is None else unknown.to_coordinate(unknown.start)
+        for i, unknown in enumerate(problem.unknowns)
+    ]
+    has_start = any(unknown.start is not None for unknown in problem.unknowns)
+    starts = ([np.array(given)] if has_start else []) + ([] if warm is None else [warm])
+    return np.array(starts).reshape(len(starts), len(problem.unknowns))
+
+
+def thin_selection(problem: FitProblem) -> Selection:
+    """Return all samples of short records and evenly spaced ones of long records."""
+    return tuple(
+        index if len(index) < MAX_THIN else np.unique(np.linspace(0, len(index) - 1, THIN).astype(int))
+        for index in problem.all
+    )
+
+
+def check_motion(problem: FitProblem, squares: float) -> None:
+    """Raise HarnessError if the records show no motion, or the fit describes them hardly better than a constant."""
+    constant = sum(float(np.sum(((r.y - r.y.mean(axis=0)) / r.noise) ** 2)) for r in problem.records)
+    variance = squares / max(problem.n_samples - len(problem.unknowns), 1)
+    if problem.robust or constant - squares > MIN_REDUCTION * variance * len(problem.unknowns):
+        return
+    names = ", ".join(record.name for record in problem.records)
+    if constant < MOTION**2 * problem.n_samples:
+        raise HarnessError(f"{names} shows no motion beyond its noise: nothing can be determined from it")
+    raise HarnessError(
+        f"no values describe {names} better than a constant does: check the model, the observed columns and the ranges"
+    )
+
+
+def subdivide_inputs(problem: FitProblem, z: np.ndarray) -> np.ndarray:
+    """Divide the intervals between samples until inputs that are constant in each part are fine enough.
+
+    Returns
+    -------
+    numpy.ndarray
+        Changes (n,) of the residuals by the error of the splines through the samples of the inputs.
+    """
+    none = np.zeros(problem.n_samples)
+    if not any(record.inputs for record in problem.records):
+        return none
+    before = problem.residuals(z, problem.all)
+    parts = 1
+    while parts < MAX_SUBDIVISION:
+        parts *= 2
+        for record in problem.records:
+            record.subdivide(parts)
+        now = problem.residuals(z, problem.all)
+        is_fine = before is not None and now is not None and np.abs(now - before).max() < INPUT_CHANGE
+        before = now
+        if is_fine:
+            break
+    for record in problem.records:
+        record.subdivide(parts, every=2)
+    coarse = problem.residuals(z, problem.all)
+    for record in problem.records:
+        record.subdivide(parts)
+    return none if coarse is None or before is None else (coarse - before) / SPLINE_RATIO
+
+
+def find_rivals(
+    problem: FitProblem, z: np.ndarray, uncertainty: Uncertainty, minima: list[Minimum], squares: float
+) -> list[Minimum]:
+    """Return minima about as low as that at z (k,), found from those of the search and from draws around z."""
+    limit, random = (
+        uncertainty.variance * uncertainty.inflation.max() * uncertainty.quantile**2,
+        np.random.default_rng(0),
+    )
+    starts = [there for value, there in distinct(minima, MAX_RIVALS) if value < squares + 3 * limit]
+    eigenvalues, axes = np.linalg.eigh(uncertainty.covariance * uncertainty.inflation.mean())
+    reach = 2 * np.minimum(np.sqrt(np.maximum(eigenvalues, 0.0)), DRAW_SIZE)
+    starts += [z + axes @ (reach * random.normal(size=len(z))) for _ in range(DRAWS)]
+    found = [problem.minimize(start, problem.all, 25 if problem.central else 12, 1e-6) for start in starts]
+    return distinct([each for each in found if each[0] < squares + limit], len(found))
+
+
+def extend_ends(
+    problem: FitProblem,
+    z: np.ndarray,
+    uncertainty: Uncertainty,
+    ends: dict[tuple[int, int], float | None],
+    rivals: list[np.ndarray],
+) -> None:
+    """Follow the profile on from the rival that lies farthest out, if it lies where an interval ends or beyond."""
+    for (i, side), end in ends.items():
+        farthest = max(rivals, key=lambda there: side * float(there[i]), default=z)
+        if end is not None and side * (farthest[i] - z[i]) > 0.5 * abs(end - z[i]):
+            other = profile_bound(problem, farthest, uncertainty, i, side).end
+            ends[i, side] = None if other is None else side * max(side * other, side * end)

@@ -1,0 +1,164 @@
+"""Description of a fit for its user: estimates, combinations, residuals and remarks."""
+
+from collections.abc import Sequence
+from math import inf, isfinite, nan
+
+import numpy as np
+
+from ..estimation.estimate import Estimate
+from .combinations import determined_combinations
+from .fit_course import FitCourse
+from .fit_problem import FitProblem
+from .measured_record import MeasuredRecord
+from .noise import correlation_length
+from .parameter_fit import ColumnResiduals, ParameterFit, Profile
+from .search import ROUGH
+from .uncertainty import INDETERMINATE, Uncertainty, split_residuals
+
+UNFIT_SHARE, UNFIT_NOISE = 0.1, 2.0  # residuals as a share of the range, and in units of the noise
+SHIFTED = 0.25  # share of a variance that the error of the inputs adds before it is remarked
+
+
+def describe_fit(
+    fmu: str, problem: FitProblem, course: FitCourse, notes: Sequence[str], n_runs: int, seconds: float
+) -> ParameterFit:
+    """Return the result of a fit: estimates with intervals, combinations, residuals and remarks."""
+    z, uncertainty = course.z, course.uncertainty
+    columns = column_residuals(problem.records, split_residuals(problem, uncertainty.residuals), problem.outputs)
+    is_unfit = any(each.residual > max(UNFIT_SHARE * each.range, UNFIT_NOISE * each.noise) for each in columns)
+    estimates, several = make_estimates(problem, course, is_unfit)
+    undetermined = [i for i, estimate in enumerate(estimates) if not isfinite(estimate.error)]
+    values = np.array([estimate.value for estimate in estimates])
+    combinations = () if is_unfit else determined_combinations(problem.unknowns, values, uncertainty, undetermined)
+    deviations = np.sqrt(np.diag(uncertainty.covariance))
+    remarks = (
+        unfit_remark(columns) if is_unfit else fit_remarks(problem, course, columns, estimates, several, undetermined)
+    )
+    predictions = problem.predict(z, problem.all)
+    assert predictions is not None
+    return ParameterFit(
+        fmu=fmu,
+        estimates=estimates,
+        combinations=combinations,
+        profiles=() if is_unfit else make_profiles(problem, course),
+        correlation=uncertainty.covariance / np.outer(deviations, deviations),
+        columns=columns,
+        remarks=(*remarks, *course.doubts),
+        notes=tuple(notes),
+        describes_record=not is_unfit,
+        squares=uncertainty.squares,
+        n_independent=count_independent(problem, uncertainty),
+        n_searches=course.n_searches,
+        n_runs=n_runs,
+        seconds=seconds,
+        log=tuple(course.log),
+        records=problem.records,
+        predictions=tuple(predictions),
+    )
+
+
+def count_independent(problem: FitProblem, uncertainty: Uncertainty) -> float:
+    """Return the number of residuals that count as independent."""
+    n = len(uncertainty.residuals)
+    if not uncertainty.correlation:
+        return float(n)
+    return n / max(map(correlation_length, split_residuals(problem, uncertainty.residuals)))
+
+
+def column_residuals(
+    records: Sequence[MeasuredRecord], residuals: Sequence[np.ndarray], outputs: Sequence[str]
+) -> tuple[ColumnResiduals, ...]:
+    """Return the residuals of every observed column of every record, from those in units of the noise."""
+    found = []
+    for record, e in zip(records, residuals, strict=True):
+        rms = np.sqrt(np.mean(e**2, axis=0)) * record.noise
+        for j, name in enumerate(outputs):
+            size = float(np.ptp(record.y[:, j]))
+            found.append(ColumnResiduals(record.name, name, "", float(rms[j]), float(record.noise[j]), size))
+    return tuple(found)
+
+
+def make_estimates(problem: FitProblem, course: FitCourse, is_unfit: bool) -> tuple[tuple[Estimate, ...], list[str]]:
+    """Return the estimates, and the names of those whose intervals hold other minima."""
+    z, uncertainty, several, estimates = course.z, course.uncertainty, [], []
+    loose = uncertainty.deviations > INDETERMINATE
+    for i, unknown in enumerate(problem.unknowns):
+        value = unknown.to_value(float(z[i]))
+        if is_unfit:
+            estimates.append(Estimate(unknown.name, value, nan, nan, nan, unknown.unit, ""))
+            continue
+        sides = {side: course.ends[i, side] for side in (-1, 1)}
+        for rival in course.rivals:
+            for side, end in sides.items():
+                if end is not None and (rival[i] - end) * side > 1e-3 * abs(z[i] - end):
+                    sides[side] = float(rival[i])
+                    several.append(unknown.name)
+        low, high = unknown.value_interval(sides[-1], sides[1])
+        deviation = unknown.error_of(float(uncertainty.deviations[i]), value)
+        if low is None or high is None or loose[i]:
+            error = inf
+        else:
+            error = max(deviation, (high - low) / 2 / uncertainty.quantile)
+        ends = -inf if low is None else low, inf if high is None else high
+        estimates.append(Estimate(unknown.name, value, error, *ends, unknown.unit, ""))
+    return tuple(estimates), [*dict.fromkeys(several)]
+
+
+def make_profiles(problem: FitProblem, course: FitCourse) -> tuple[Profile, ...]:
+    """Return the profiles of the unknowns, where the squares with each value are finite."""
+    found = []
+    for i, unknown in enumerate(problem.unknowns):
+        points = sorted(
+            (unknown.to_value(coordinate), excess)
+            for coordinate, excess in (
+                (float(course.z[i]), 0.0),
+                *course.profiles.get((i, -1), ()),
+                *course.profiles.get((i, 1), ()),
+            )
+        )
+        found.append(Profile(unknown.name, *zip(*points, strict=True)))
+    return tuple(found)
+
+
+def unfit_remark(columns: Sequence[ColumnResiduals]) -> list[str]:
+    """Return the remark on a fit that does not describe the record."""
+    worst = max(columns, key=lambda each: each.residual / each.range)
+    return [
+        f"The model does not describe {worst.record}: the best values leave residuals of "
+        f"{100 * worst.residual / worst.range:.2g} % of the range of {worst.name}; do not rely on these values."
+    ]
+
+
+def fit_remarks(
+    problem: FitProblem,
+    course: FitCourse,
+    columns: Sequence[ColumnResiduals],
+    estimates: Sequence[Estimate],
+    several: Sequence[str],
+    undetermined: Sequence[int],
+) -> list[str]:
+    """Return the remarks on a fit."""
+    uncertainty, remarks = course.uncertainty, []
+    largest = max(columns, key=lambda each: each.residual / each.noise)
+    if uncertainty.correlation or largest.residual > ROUGH * largest.noise:
+        remarks.append(
+            f"The residuals are not white noise (rms {largest.residual / largest.noise:.2g} times the scatter of "
+            f"neighbouring samples, correlation {uncertainty.correlation:.2g}): the noise is coloured, or the model "
+            "lacks an effect. The intervals are widened."
+        )
+    white = np.diag(uncertainty.covariance)
+    shifted = [
+        estimate.name
+        for estimate, shift, variance in zip(estimates, uncertainty.input_shift, white, strict=True)
+        if shift**2 > SHIFTED * variance
+    ]
+    if shifted:
+        remarks.append(
+            f"The inputs between their samples are uncertain, which affects {', '.join(shifted)}: sample them faster."
+        )
+    if several:
+        remarks.append(f"Other values fit as well; the intervals of {', '.join(several)} include them.")
+    if undetermined:
+        names = ", ".join(estimates[i].name for i in undetermined)
+        remarks.append(f"The record does not determine {names}.")
+    return remarks

@@ -1,0 +1,88 @@
+"""Requests of a comparison of laws: each FMU frees and fixes the names that it has."""
+
+from dataclasses import dataclass, replace
+from itertools import chain
+from pathlib import Path
+
+from ...errors import SceneError, check_names
+from ...running.description import read_description
+from .request import (
+    READABLE,
+    FitRequest,
+    ResolvedRequest,
+    parameter_names,
+    resolve_request,
+    settable_names,
+    variable_names,
+)
+
+
+@dataclass(frozen=True)
+class ResolvedLaws:
+    """A checked request for each FMU, the one to fit first, and notes on the names that each lacks."""
+
+    requests: tuple[ResolvedRequest, ...]
+    notes: tuple[tuple[str, ...], ...]
+
+
+def resolve_laws(request: FitRequest) -> ResolvedLaws:
+    """Check a request against the FMU and those to compare it with.
+
+    Raises
+    ------
+    SceneError
+        If a name is unknown in all FMUs, if an FMU has none of the free parameters or lacks an observed output or an
+        input, or if two FMUs are the same.
+    """
+    fmus = [request.fmu, *request.against]
+    names = law_names(fmus)
+    if len(fmus) == 1:
+        return ResolvedLaws((resolve_request(request),), ((),))
+    descriptions = [read_description(fmu) for fmu in fmus]
+    free = [parameter_names(description, request.observe) for description in descriptions]
+    settable = [settable_names(description) for description in descriptions]
+    check_names("parameter", request.free, {*chain.from_iterable(free)})
+    check_names("parameter", request.fixed, {*chain.from_iterable(settable)})
+    check_names("free parameter", [*request.start, *request.each], [*request.free])
+    laws, notes = [], []
+    for fmu, name, description, own, fixable in zip(fmus, names, descriptions, free, settable, strict=True):
+        law = replace(
+            request,
+            fmu=fmu,
+            name=name,
+            against=(),
+            free={each: limits for each, limits in request.free.items() if each in own},
+            start={each: value for each, value in request.start.items() if each in own},
+            each=tuple(each for each in request.each if each in own),
+            fixed={each: value for each, value in request.fixed.items() if each in fixable},
+        )
+        for kind, causalities, given in (
+            ("output", READABLE, request.observe),
+            ("input", ("input",), request.inputs),
+        ):
+            check_names(f"{kind} of {name}", given, variable_names(description, causalities))
+        if request.free and not law.free:
+            raise SceneError(
+                f"{name} has none of the free parameters {', '.join(request.free)}: free some of its own as well, as "
+                f"in --free {','.join([*request.free, *own[:1]])}"
+            )
+        lacking = [each for each in (*request.free, *request.fixed) if each not in own and each not in fixable]
+        notes.append((f"{name} has no {', '.join(lacking)}: its fit leaves them out.",) if lacking else ())
+        try:
+            laws.append(resolve_request(law))
+        except SceneError as error:
+            raise SceneError(f"{name}: {error}") from None
+    return ResolvedLaws(tuple(laws), tuple(notes))
+
+
+def law_names(fmus: list[Path]) -> list[str]:
+    """Return names that tell the FMUs apart; raise SceneError if one occurs twice."""
+    paths = [fmu.resolve() for fmu in fmus]
+    for i, path in enumerate(paths):
+        if path in paths[:i]:
+            raise SceneError(f"{fmus[i].stem} is to be compared with itself: give another FMU")
+    stems = [fmu.stem for fmu in fmus]
+    return [
+        stem if stems.count(stem) == 1 else f"{path.parent.name}/{stem}"
+        for stem, path in zip(stems, paths, strict=True)
+    ]
