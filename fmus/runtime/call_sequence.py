@@ -64,11 +64,6 @@ def is_valid_state(run, model, exchanges):
 # ---- values
 
 
-def is_in_range(value, low, high, above, below):
-    """Return whether a value is in a range; NaN and infinities never are."""
-    return isfinite(value) and low <= value <= high and above < value < below
-
-
 def rejection_reason(run, calculated, fixed, allowed):
     """Return why a value cannot be set, or OK."""
     if calculated:

@@ -91,6 +91,14 @@ def sibling_module(model: type[VariableOwner], path: str) -> Any:
     return import_module(f"{model.__module__.split('.', 1)[0]}.{path}")
 
 
+def model_exchange_instance(model: type[VariableOwner]) -> Any:
+    """Create an instance of a lowered model for model exchange."""
+    exchange = sibling_module(model, "runtime.model_exchange")
+    thing = type(model.__name__, (exchange.ModelExchangeMixin, model), {})()
+    exchange.update_nominals(thing)
+    return thing
+
+
 def scalar_name(thing: Any, name: str) -> str:
     """Return the name of a state or mode in the lowered runtime."""
     return next(one for one in (SUFFIXED_NAME.format(name), PLAIN_NAME.format(name)) if hasattr(thing.solver, one))

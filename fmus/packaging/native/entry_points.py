@@ -7,8 +7,9 @@ from ..lowering import sibling_module
 from .c_types import BOOL, FLOAT, INT, CType, StructPointer
 
 ENTRY_POINTS = {  # module of the runtime -> its functions; callees come before their callers
+    "variable_declarations": ("is_in_range",),
     "call_sequence": (
-        *("is_in_range", "rejection_reason", "note_change", "set_experiment", "check_experiment", "is_refusal"),
+        *("rejection_reason", "note_change", "set_experiment", "check_experiment", "is_refusal"),
         *("exit_initialization", "do_step", "update_outputs", "update_statistics", "is_valid_state"),
     ),
     "model_exchange": (

@@ -3,6 +3,7 @@
 import inspect
 from collections.abc import Mapping
 from string import Formatter
+from typing import Any
 
 from ...runtime import codes
 from ...runtime.codes import FIRST_RULE, INTERRUPTED
@@ -11,13 +12,16 @@ from ...runtime.messages import CALL_MESSAGES, PHASE_NAMES, RUN_MESSAGES, VALUE_
 from ...runtime.variable_access import SETTABLE_CAUSALITIES
 from ...runtime.variable_declarations import VariableDeclaration, VariableOwner, variables
 from ..fmi_variables import (
+    CONDITION,
+    DERIVATIVE_NAME,
+    TIME,
+    TO_BREAK_AWAY,
+    TO_REST,
     all_variables,
-    attribute_path,
     derivative_indices,
     event_indicator_indices,
-    model_exchange_instance,
 )
-from ..lowering import sibling_module
+from ..lowering import model_exchange_instance, scalar_name, sibling_module
 from ..reserved_names import c_comment, c_string_literal
 from .c_types import BOOL, FLOAT, INT, StructPointer, c_literal
 from .call_graph import CallGraph
@@ -176,6 +180,20 @@ def render_model_header(model: type[VariableOwner], fmi: str) -> str:
         phases=", ".join(c_string_literal(PHASE_NAMES[phase]) for phase in range(len(PHASE_NAMES))),
         count_of_phases=len(PHASE_NAMES),
     )
+
+
+def attribute_path(thing: Any, name: str) -> str:
+    """Return the attribute path of a variable in a model-exchange instance."""
+    if name == TIME:
+        return "solver.t"
+    for indicator in (TO_REST, TO_BREAK_AWAY):
+        if name.startswith(indicator):
+            mode = name.removeprefix(indicator)[1:]  # none for a single contact
+            path = indicator.replace("events", "model_exchange", 1)
+            return f"{path}_{scalar_name(thing, mode)}" if mode else path
+    if name.startswith(CONDITION[:-2]):
+        return f"model_exchange.conditions[{int(name.removeprefix(CONDITION[:-2])) - 1}]"
+    return "model_exchange.driver_rate" if name.startswith(DERIVATIVE_NAME[:4]) else name
 
 
 def _items_array(name: str, meaning: VariableDeclaration) -> str:
