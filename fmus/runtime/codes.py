@@ -20,4 +20,7 @@ NO_PARTIAL_DERIVATIVE, NO_OUTPUT_DERIVATIVE, NO_INPUT_DERIVATIVE = 23, 24, 25
 CHATTERING = 26  # of a condition
 NEEDS_REPETITION = 27  # of an internal step
 MAX_INPUT_ORDER = 8  # highest derivative of an input: the order of dop853, which gains nothing from more
-FIRST_RULE = 100  # plus the number of the model's rule that the values violate
+# Rules that the values violate; a model has their messages by status
+FIRST_RULE = 101
+HYBRID_LAW_ONLY, NO_CONSISTENT_MODES = 101, 102  # method exact with another law; no stick and slip balances the forces
+MODEL_RULE = 110  # first rule of the model itself, then its others and its limits

@@ -6,7 +6,7 @@ conditions that must hold during the whole run.
 
 from math import inf
 
-from .codes import CHATTERING, FIRST_RULE, OK
+from .codes import CHATTERING, OK
 from .rounding import EPSILON
 from .vectors import ContactVector, StateVector
 
@@ -79,7 +79,7 @@ def update_at_event(model, t, y: StateVector, modes: ContactVector, h_max):
 def violation_status(model):
     """Return OK, or the status of the rule for a condition that must hold but does not."""
     location = model.event_location
-    return FIRST_RULE + model.first_condition_rule + location.violated if location.violated >= 0 else OK
+    return model.first_limit_rule + location.violated - model.n_switches if location.violated >= 0 else OK
 
 
 def select_sides(model, after_event):

@@ -18,7 +18,7 @@ class Oscillator(VariableOwner):
     The generated model class owns `solver`, an Integrator, and defines
 
         initial_state(t)               states at the start time t
-        prepare()                      constants that depend on parameters; returns 0, or the number of a violated rule
+        prepare()                      constants that depend on parameters; returns OK, or the status of a violated rule
         rates(t, states, modes)        rates that are not states themselves; a mode is the direction of sliding, or 0
                                        where the friction law evaluates the velocity itself
         jacobian(t, states, modes)     for each of these rates its derivatives by t and by the states (for rodas)
@@ -45,10 +45,9 @@ class Oscillator(VariableOwner):
     has_input_derivatives = False  # inputs are polynomials around t_base; has_higher_order() if any order exceeds 1
     is_linear = False  # piecewise linear (linear_closed_form.py)
     has_conditions = False  # choose() with conditions that change during a step (event_location.py)
-    # event functions: number, first of a condition; conditions that switch (others must hold); rule of the first
-    n_event_functions = first_condition = n_switches = first_condition_rule = 0
-    rules: tuple[str, ...] = ()  # message for each rule that several values must satisfy; fields are their names
-    own_solver_rule = 0  # number of the rule that concerns this solver only, not an importer's
+    # event functions: number, first of a condition; conditions that switch; status of the first of the others, limits
+    n_event_functions = first_condition = n_switches = first_limit_rule = 0
+    rules: dict[int, str] = {}  # status of each rule that values must satisfy -> message; fields are their names
     stop_time = 4.0
     step_size = 0.004
     tolerance = 1e-6

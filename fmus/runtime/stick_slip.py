@@ -8,7 +8,19 @@ principle, CACSD 1999).  contact_lcp.py treats several contacts.
 
 from math import fabs, inf
 
-from .codes import BACKWARD, EXACT, FIRST_RULE, FORWARD, HYBRID, MAX_INPUT_ORDER, SIGN, STUCK, THRESHOLD
+from .codes import (
+    BACKWARD,
+    EXACT,
+    FORWARD,
+    HYBRID,
+    HYBRID_LAW_ONLY,
+    MAX_INPUT_ORDER,
+    NO_CONSISTENT_MODES,
+    OK,
+    SIGN,
+    STUCK,
+    THRESHOLD,
+)
 from .oscillator import Oscillator
 from .rounding import ROUNDOFF_MARGIN
 from .vectors import (
@@ -25,7 +37,6 @@ HYBRID_LAW = ("hybrid", HYBRID, "stick and slip are modes; every change of mode 
 SIGN_LAW = ("sign", SIGN, "sliding force times sign(v); no sticking; events are not located; chatters")
 THRESHOLD_LAW = ("threshold", THRESHOLD, "as sign, but friction balances the load below a small velocity; chatters")
 
-NO_CONSISTENT_MODES = FIRST_RULE + 2  # status: no modes satisfy the force balance (the second rule below)
 WRONG_WAY_TOLERANCE = 1e-9  # accelerations below this share of that due to friction are rounding errors
 
 
@@ -57,16 +68,15 @@ class DryFriction(Oscillator):
 
     contacts: dict[str, str] = {"mode": "v"}
     has_dry_friction = rests_when_stuck = True
-    rules: tuple[str, ...] = (
-        "friction = {friction} with solver.method = 1 (exact) is refused: the closed form covers the hybrid law only; "
-        "set friction to 1 (hybrid), or solver.method to 2 (ode23)",
-        "no combination of stick and slip satisfies the force balance: a contact slides with a larger force than it "
-        "holds; set no sliding force above the holding force",
-    )
-    own_solver_rule = 1
+    rules: dict[int, str] = {
+        HYBRID_LAW_ONLY: "friction = {friction} with solver.method = 1 (exact) is refused: the closed form covers the "
+        "hybrid law only; set friction to 1 (hybrid), or solver.method to 2 (ode23)",
+        NO_CONSISTENT_MODES: "no combination of stick and slip satisfies the force balance: a contact slides with a "
+        "larger force than it holds; set no sliding force above the holding force",
+    }
 
     def prepare(self):
-        return 1 if self.friction != HYBRID and self.solver.method == EXACT else 0
+        return HYBRID_LAW_ONLY if self.friction != HYBRID and self.solver.method == EXACT else OK
 
     def resolve_mode(self, t, y: StateVector, tie_tolerance, i: ContactIndex):
         """Return the mode from time t on.

@@ -164,6 +164,11 @@ def method_source(name: str, arguments: Sequence[str], lines: list[str]) -> str:
     return "\n".join([f"{INDENT}def {name}({', '.join(('self', *arguments))}):", *lines])
 
 
+def rule_status(n: int) -> str:
+    """Return the status of the n-th rule of a model."""
+    return f"MODEL_RULE + {n}" if n else "MODEL_RULE"
+
+
 def can_fail(e: Operand, safe_divisors: Collection[int]) -> bool:
     """Return whether an operation in the expression may raise an error for some values of the parameters."""
     return any(

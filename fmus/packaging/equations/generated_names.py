@@ -9,7 +9,7 @@ MATH = ("copysign", "inf", "pi", *FUNCTIONS)
 IMPORTS = {  # module -> names that generated code may import
     "": tuple(label for label, _, _ in methods),
     "stick_slip": ("HYBRID_LAW", "SIGN_LAW", "THRESHOLD_LAW", "DryFriction", "sign", "threshold"),
-    "codes": ("EXACT", "HYBRID"),
+    "codes": ("EXACT", "HYBRID", "MODEL_RULE", "OK"),
     "input_polynomial": ("InputPolynomial",),
     "event_location": ("EventLocation",),
     "contact_lcp": ("CoupledFriction",),

@@ -1,8 +1,7 @@
 """Generates the methods for construction, initial states, derived constants and inputs."""
 
-from ...runtime.stick_slip import DryFriction
 from .algebra import Memo, subexpressions
-from .codegen_context import CodegenContext, method_source
+from .codegen_context import CodegenContext, method_source, rule_status
 from .expression_printer import INDENT
 from .expressions import Term
 
@@ -48,7 +47,7 @@ def initial_method(f: CodegenContext) -> str:
 
 def prepare_method(f: CodegenContext) -> str:
     """Constants and rules; a rule is checked as early as possible, before its values are used as divisors."""
-    s, dry = f.printer(), bool(f.an.contacts)
+    s = f.printer()
     computed: list[Term] = []
     s.constants = computed
     for e in f.an.ramps:
@@ -61,12 +60,12 @@ def prepare_method(f: CodegenContext) -> str:
                 s.emit_assignment(f"self.{e.name}", e)
                 computed.append(e)
 
-    for number, rule in enumerate(f.an.rules, len(DryFriction.rules) + 1 if dry else 1):
+    for n, rule in enumerate(f.an.rules):
         calculate(subexpressions(rule.broken))
         with s.block(f"if {s.text(rule.broken)}:"):
-            s.emit(f"return {number}")
+            s.emit(f"return {rule_status(n)}")
     calculate()
-    s.emit("return super().prepare()" if dry else "return 0")
+    s.emit("return super().prepare()" if f.an.contacts else "return OK")
     return method_source("prepare", (), s.lines)
 
 

@@ -6,7 +6,7 @@ from string import Formatter
 from typing import Any
 
 from ...runtime import codes
-from ...runtime.codes import FIRST_RULE, INTERRUPTED
+from ...runtime.codes import INTERRUPTED
 from ...runtime.failure_handling import CALCULATED_CAUSALITIES
 from ...runtime.messages import CALL_MESSAGES, PHASE_NAMES, RUN_MESSAGES, VALUE_MESSAGES
 from ...runtime.variable_access import SETTABLE_CAUSALITIES
@@ -140,7 +140,6 @@ def render_model_header(model: type[VariableOwner], fmi: str) -> str:
     members = [(path, ctype) for prefix, cls in roots for path, ctype in layout.iter_scalars(cls, f"{prefix}.")]
     members = [(path, ctype) for path, ctype in members if ctype in (INT, BOOL)]
     statuses = {status: message for status, message in RUN_MESSAGES.items() if status not in PYTHON_ONLY_STATUSES}
-    violated_rules = dict(enumerate(instance.rules, FIRST_RULE + 1))
     discrete = [i for i, (_, meaning) in enumerate(declared) if meaning.variability == "discrete"]
     rule_fields = {
         name: f"{'append_real' if ctype is FLOAT else 'append_integer'}(text, model->{name})"
@@ -174,7 +173,7 @@ def render_model_header(model: type[VariableOwner], fmi: str) -> str:
             )
             for name, meaning in declared
         ),
-        statuses=_switch_cases(statuses, FIELD_CODE) + _switch_cases(violated_rules, rule_fields),
+        statuses=_switch_cases(statuses, FIELD_CODE) + _switch_cases(instance.rules, rule_fields),
         values=_switch_cases(VALUE_MESSAGES, FIELD_CODE),
         calls=_switch_cases(CALL_MESSAGES, FIELD_CODE),
         phases=", ".join(c_string_literal(PHASE_NAMES[phase]) for phase in range(len(PHASE_NAMES))),
