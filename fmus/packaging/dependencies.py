@@ -34,7 +34,7 @@ def output_dependencies(model: type[VariableOwner], declared: Variables, at_star
         return {leaf for e in terms for leaf in variables_in(substitute(e, values))}
 
     def of_mode(c: Contact) -> set[Expression]:
-        contacts = [c] if c in an.independent_contacts else an.contacts
+        contacts = [c] if c in an.load else an.contacts
         held = [*an.load_expressions(c), *(an.holding_limit[d] for d in contacts)] if HYBRID in laws else []
         rates = [differentiate(e, an.coasting_derivatives) for e in held]
         others = [e for d in contacts if d is not c for e in (d.slip, d.slide)]

@@ -76,7 +76,7 @@ def analysis_lines(an: ModelAnalysis) -> Iterator[str]:
         yield f"d{state.name}/dt = {text(rate)}"
     for contact in an.contacts:
         yield f"{contact.name}: slip velocity {text(contact.slip)}, sliding force {text(contact.slide)}"
-        if contact in an.independent_contacts:
+        if contact in an.load:
             yield f"{contact.name}: load while stuck {text(an.load[contact])}"
         yield f"{contact.name}: holding limit {text(an.holding_limit[contact])}"
     for e in an.rate_outputs.values():

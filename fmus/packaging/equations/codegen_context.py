@@ -21,24 +21,29 @@ class CodegenContext:
         self.rate_expressions = [an.rate_outputs[s] for s in an.dynamic_states]  # outputs that are rates of states
         self.driver = an.drivers[0] if an.drivers else None
         taken = {e.name for e in an.declared}
+        self.names = an.names  # of terms that the model does not name
         for c in an.contacts:
             for name, e in ("load", an.load.get(c)), ("slide", c.slide), ("limit", an.holding_limit[c]):
                 name += "" if an.waits else f"_{c.name}"
-                if isinstance(e, Term) and not e.name and name not in taken:
-                    e.name = name
+                if isinstance(e, Term) and not self.name_of(e) and name not in taken:
+                    self.names[e] = name
         for (c, d), e in an.A.items():
             if (
                 isinstance(e, Term)
-                and not e.name
+                and not self.name_of(e)
                 and not depends_on(e, an.inputs)
                 and f"A_{c.name}_{d.name}" not in taken
             ):
-                e.name = f"A_{c.name}_{d.name}"
+                self.names[e] = f"A_{c.name}_{d.name}"
         self.states = [s.name for s in an.states]
         self.modes = [c.mode.name for c in an.contacts]
         self.arguments = ["t", *self.states, *self.modes]
         self.used_names = taken | {"self", *self.arguments}
         self.constants = self._constants()
+
+    def name_of(self, e: Expression) -> str:
+        """Return the name of an expression: that of the model, or of a derived term; empty if it has none."""
+        return e.name or self.names.get(e, "")
 
     def _constants(self) -> list[Term]:
         """Return named expressions of parameters that the equations need; prepare() computes them.
@@ -50,7 +55,7 @@ class CodegenContext:
         safe_divisors: set[int] = set()  # other equations divide by them
 
         def walk(e: Operand, in_case: bool) -> None:
-            is_constant = isinstance(e, Term) and e.name and not depends_on(e, (*an.time_varying, *an.inputs))
+            is_constant = isinstance(e, Term) and self.name_of(e) and not depends_on(e, (*an.time_varying, *an.inputs))
             if is_constant and not (in_case and can_fail(e, safe_divisors)):
                 result[id(e)] = e
                 return
@@ -79,7 +84,7 @@ class CodegenContext:
         for n, condition in enumerate(an.switches):
             if condition.is_frozen:
                 given |= dict.fromkeys(condition.comparisons, f"self.event_location.sides[{n}] > 0.0")
-        return ExpressionPrinter(given, self.constants, self.used_names, depth)
+        return ExpressionPrinter(given, self.constants, self.used_names, depth, self.names)
 
     def emit_driver(self, s: ExpressionPrinter, targets: Sequence[Operand]) -> None:
         """Emit the position of the driver and time-dependent inputs, if the targets need them."""

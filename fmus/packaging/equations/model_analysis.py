@@ -4,7 +4,7 @@ Variables are identified by name and declared role, never by order.  The forces 
 linear system A F = b, which makes the rates of all slips zero.
 """
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from functools import cached_property
 from keyword import iskeyword
 from math import inf, isfinite
@@ -33,7 +33,17 @@ from .algebra import (
     variables_in,
 )
 from .conditions import HOLD_TOLERANCE, Condition, find_conditions, is_nonnegative
-from .expressions import Expression, ModelError, Operand, Term, describe, is_comparison, is_number
+from .expressions import (
+    NO_EQUALITY,
+    Expression,
+    ModelError,
+    Operand,
+    Term,
+    describe,
+    is_among,
+    is_comparison,
+    is_number,
+)
 from .generated_names import RESERVED, RESERVED_WHERE_COUPLED
 from .model_declaration import Choice, Contact, Fixed, Input, Mode, Model, Output, Parameter, Rule, State, Variable
 
@@ -52,6 +62,7 @@ class ModelAnalysis:
 
     def __init__(self, model: type[Model], ramps: bool = False) -> None:
         self.model, self.name = model, model.__name__
+        self.names: dict[Expression, str] = {}  # of derived terms
         if self.name in RESERVED or is_reserved_in_c(self.name) or not self.name.isascii():
             raise ModelError(
                 f"the class name {self.name} is reserved or not ASCII: choose another name", model.location
@@ -67,7 +78,7 @@ class ModelAnalysis:
             for s in self._of_type(State)
             if isinstance(s.constant_rate, Parameter) and is_same_expression(s.start_expression, 0.0)
         ][:1]
-        self.states = [s for s in self._of_type(State) if s not in self.drivers]
+        self.states = [s for s in self._of_type(State) if not is_among(s, self.drivers)]
         self._add_driver_rates()
         self.contacts, self.modes = self._of_type(Contact), self._of_type(Mode)
         self.outputs = self._of_type(Output)
@@ -123,6 +134,10 @@ class ModelAnalysis:
                 broken.location = c.location
                 result.append(Rule(broken, sentence))
         return tuple(result)
+
+    def derivative(self, e: Operand, by: Mapping[Expression, Operand]) -> Operand:
+        """Return the derivative of e, where `by` gives the derivatives of the variables, and name its terms."""
+        return differentiate(e, by, self.names)
 
     # ---- conditions
 
@@ -202,7 +217,7 @@ class ModelAnalysis:
         self.rate: dict[State, State | Output] = {}
         for e in self.declared:
             if isinstance(e, (State, Output)) and e.integrates is not None:
-                if e.integrates not in self.states:
+                if not is_among(e.integrates, self.states):
                     integrates = getattr(e.integrates, "name", "") or describe(e.integrates)
                     raise ModelError(
                         f"rate_of of {e.name} is {integrates}, which is not a state of the model", e.location
@@ -219,7 +234,7 @@ class ModelAnalysis:
                 )
         if not self.states:
             raise ModelError(f"{self.name} has no state: declare one with State()", self.model.location)
-        self.positions = [s for s in self.states if self.rate[s] in self.states]
+        self.positions = [s for s in self.states if is_among(self.rate[s], self.states)]
         self.rate_outputs = {s: e for s, e in self.rate.items() if isinstance(e, Output)}  # rates that are not states
         self.dynamic_states = [s for s in self.states if s in self.rate_outputs]
 
@@ -256,6 +271,8 @@ class ModelAnalysis:
                         f"{word} of {s.name} varies with time: it must depend on parameters only", s.location
                     )
         for rule in self.rules:
+            if isinstance(rule.broken, Term) and rule.broken.op == "==":
+                raise ModelError(NO_EQUALITY, rule.broken.location)
             if not is_comparison(rule.broken):
                 raise ModelError(
                     f"a Rule needs a comparison of parameters first, got {describe(rule.broken)}", location
@@ -310,7 +327,7 @@ class ModelAnalysis:
                 raise ModelError(f"{e.name}: start value and bounds must be numbers, got {got}", e.location)
         if not max(e.low, e.above) <= min(e.high, e.below):
             raise ModelError(f"{e.name} has an empty range: no number is {e.allowed}", e.location)
-        if isinstance(e, Contact) and e.slip in self.positions:
+        if isinstance(e, Contact) and is_among(e.slip, self.positions):
             raise ModelError(
                 f"slip of {e.name} is {e.slip.name}, but a slip is a speed: write slip={self.rate[e.slip].name}",
                 e.location,
@@ -350,31 +367,31 @@ class ModelAnalysis:
         """Derive slip rate, holding limit and load of each contact; the load is the force that keeps the slip zero."""
         forces = (*self.contacts, *self.modes)
         self.slip_rate: dict[Contact, Operand] = {
-            c: differentiate(c.slip, self.time_derivatives) for c in self.contacts
+            c: self.derivative(c.slip, self.time_derivatives) for c in self.contacts
         }
         self.A: dict[tuple[Contact, Contact], Operand] = {}
         for c in self.contacts:
             if depends_on(c.slip, forces) or depends_on(c.slide, self.contacts):
                 raise ModelError(f"slip and slide of {c.name} must not depend on the force of a contact", c.location)
             for d in self.contacts:
-                acts = differentiate(self.slip_rate[c], {d: 1.0})
+                acts = self.derivative(self.slip_rate[c], {d: 1.0})
                 if depends_on(acts, forces):
                     raise ModelError(f"{d.name} must enter the rate of the slip of {c.name} linearly", d.location)
                 self.A[c, d] = negate(acts)
             if is_same_expression(self.A[c, c], 0.0):
                 raise ModelError(f"{c.name} does not act on its own slip, so it can never stick", c.location)
             moved = [s for s in self.dynamic_states if depends_on(self.rate_outputs[s], (c,))]
-            if any(depends_on(differentiate(c.slip, {s: 1.0}), moved) for s in moved):
+            if any(depends_on(self.derivative(c.slip, {s: 1.0}), moved) for s in moved):
                 raise ModelError(f"slip of {c.name} must be linear in the speeds on which it acts", c.location)
         self.independent_contacts = [
             c for c in self.contacts if all(is_same_expression(self.A[c, d], 0.0) for d in self.contacts if d is not c)
         ]
-        self.interacting_contacts = [c for c in self.contacts if c not in self.independent_contacts]
+        self.interacting_contacts = [c for c in self.contacts if not is_among(c, self.independent_contacts)]
         moving = (*self.time_varying, *self.inputs)
         self.variable_lever_contacts = [
             c
             for c in self.contacts
-            if any(depends_on(differentiate(c.slip, {s: 1.0}), moving) for s in self.dynamic_states)
+            if any(depends_on(self.derivative(c.slip, {s: 1.0}), moving) for s in self.dynamic_states)
         ]
         self.holding_limit: dict[Contact, Operand] = {}
         self.load: dict[Contact, Operand] = {}
@@ -383,11 +400,11 @@ class ModelAnalysis:
             self.holding_limit[c] = substitute(c.slide, at_rest) if c.hold is None else c.hold
             if depends_on(self.holding_limit[c], forces):
                 raise ModelError(f"the holding force of {c.name} depends on its direction: pass hold=", c.location)
-            if c in self.independent_contacts:
+            if is_among(c, self.independent_contacts):
                 e = self.slip_rate[c]
                 load = (
                     solve_for(e, c)
-                    if count_occurrences(e, c) == 1 and c not in self.variable_lever_contacts
+                    if count_occurrences(e, c) == 1 and not is_among(c, self.variable_lever_contacts)
                     else build_term("/", substitute(e, {c: 0.0}), self.divisor(c))
                 )
                 self.load[c] = substitute(load, {c.mode: 0.0} | (at_rest if isinstance(c.slip, State) else {}))
@@ -395,21 +412,23 @@ class ModelAnalysis:
     def divisor(self, c: Contact) -> Operand:
         """Return how a contact force acts on its own slip, as a divisor: not zero where its lever vanishes."""
         e = self.A[c, c]
-        if c not in self.variable_lever_contacts:
+        if not is_among(c, self.variable_lever_contacts):
             return e
         return build_term("choose", Term(">", Term("fabs", e), SMALLEST_DIVISOR), e, SMALLEST_DIVISOR)
 
     def load_expressions(self, c: Contact) -> list[Operand]:
         """Return the expressions that determine the load of a contact: for interacting contacts all slip rates."""
-        return [self.load[c]] if c in self.independent_contacts else [self.slip_rate[d] for d in self.contacts]
+        return [self.load[c]] if is_among(c, self.independent_contacts) else [self.slip_rate[d] for d in self.contacts]
 
     def derivative_while_stuck(self, e: Operand, by: dict[Expression, Operand]) -> Operand:
         """Return the derivative of an expression while all contacts stick."""
-        return differentiate(e, by | {c: differentiate(self.load[c], by) for c in self.independent_contacts})
+        return self.derivative(e, by | {c: self.derivative(self.load[c], by) for c in self.independent_contacts})
 
     def derivative_while_sliding(self, e: Operand, by: dict[Expression, Operand]) -> Operand:
         """Return the derivative of an expression while all contacts slide."""
-        return differentiate(e, by | {c: build_term("*", c.mode, differentiate(c.slide, by)) for c in self.contacts})
+        return self.derivative(
+            e, by | {c: build_term("*", c.mode, self.derivative(c.slide, by)) for c in self.contacts}
+        )
 
     # ---- inputs with derivatives
 
@@ -425,12 +444,12 @@ class ModelAnalysis:
         others = (TIME, *self.drivers, *self.inputs)
         if self.waits:
             (c,) = self.contacts
-            if depends_on(self.holding_limit[c], (e,)) or depends_on(differentiate(self.load[c], {e: 1.0}), others):
+            if depends_on(self.holding_limit[c], (e,)) or depends_on(self.derivative(self.load[c], {e: 1.0}), others):
                 return False
         if not self.closed_form:
             return True
         constants = (*self.closed_form, *(c.slide for c in self.contacts))
-        acts = differentiate(self.rate_outputs[self.dynamic_states[0]].expression, {e: 1.0})
+        acts = self.derivative(self.rate_outputs[self.dynamic_states[0]].expression, {e: 1.0})
         return not any(depends_on(one, (e,)) for one in constants) and not depends_on(
             acts, (*self.time_varying, *self.inputs)
         )
@@ -463,8 +482,8 @@ class ModelAnalysis:
         (x,), (v,) = self.positions, self.dynamic_states
         rate = self.rate_outputs[v].expression
         mass, force = (rate.args[1], rate.args[0]) if isinstance(rate, Term) and rate.op == "/" else (1.0, rate)
-        damping, stiffness = (negate(differentiate(force, {s: 1.0})) for s in (v, x))
-        drift, speed = differentiate(force, self.explicit_time_derivatives), 0.0
+        damping, stiffness = (negate(self.derivative(force, {s: 1.0})) for s in (v, x))
+        drift, speed = self.derivative(force, self.explicit_time_derivatives), 0.0
         if any(depends_on(e, self.time_varying) for e in (mass, damping, stiffness, drift)) or has_condition_on(
             force, self.time_varying
         ):
@@ -473,7 +492,7 @@ class ModelAnalysis:
             if len(self.drivers) != 1 or not is_same_expression(damping, 0.0):
                 return None
             (drive,) = self.drivers
-            if not is_same_expression(differentiate(force, {drive: 1.0}), stiffness) or depends_on(rate, (TIME,)):
+            if not is_same_expression(self.derivative(force, {drive: 1.0}), stiffness) or depends_on(rate, (TIME,)):
                 return None
             speed = drive.constant_rate
         return mass, damping, stiffness, speed
@@ -481,10 +500,12 @@ class ModelAnalysis:
     @cached_property
     def waits(self) -> bool:
         """Whether the model rests while its only contact sticks, with a load linear in time and a constant limit."""
-        if len(self.contacts) != 1 or len(self.positions) != 1 or self.dynamic_states != [self.contacts[0].slip]:
+        if any(len(one) != 1 for one in (self.contacts, self.positions, self.dynamic_states)):
             return False
         (c,), by_time = self.contacts, (TIME, *self.drivers)
-        changes = (differentiate(self.load[c], self.explicit_time_derivatives), self.holding_limit[c])
+        if self.dynamic_states[0] is not c.slip:
+            return False
+        changes = (self.derivative(self.load[c], self.explicit_time_derivatives), self.holding_limit[c])
         return not any(depends_on(e, by_time) for e in changes) and not any(
             has_condition_on(e, by_time) for e in (self.load[c], *self._dynamic_expressions())
         )
@@ -510,7 +531,7 @@ class ModelAnalysis:
                 return result
             c, s = alone[0]
             result.insert(0, (c, s, solve_for(c.slip, s) if is_summand(c.slip, s) else 0.0))
-            left.remove(c)
+            left = [d for d in left if d is not c]
 
     def check_solvable(self) -> None:
         """Raise ModelError if the solver cannot run the model."""
@@ -521,7 +542,7 @@ class ModelAnalysis:
                     c.location,
                 )
             for law in self.rate_outputs.values():
-                if depends_on(differentiate(law, {c: 1.0}), (*self.contacts, *self.modes)):
+                if depends_on(self.derivative(law, {c: 1.0}), (*self.contacts, *self.modes)):
                     raise ModelError(f"{c.name} must enter {law.name} linearly", law.location)
         self._check_loads()
 
@@ -541,7 +562,7 @@ class ModelAnalysis:
         A = {key: substitute(e, start) for key, e in self.A.items()}
         if any(isinstance(e, Expression) for e in A.values()):
             return  # depends on a choice: cannot be decided at build time
-        contacts = [c for c in self.contacts if c not in self.variable_lever_contacts or A[c, c] != 0.0]
+        contacts = [c for c in self.contacts if not is_among(c, self.variable_lever_contacts) or A[c, c] != 0.0]
         left = {c: A[c, c] for c in contacts}
         for n, c in enumerate(contacts):
             if not left[c] > 0.0:
@@ -587,7 +608,7 @@ class ModelAnalysis:
     def has_direct_feedthrough(self, e: Variable) -> bool:
         """Return whether an output depends directly on an input."""
         if isinstance(e, (Contact, Mode)):
-            (c,) = (c for c in self.contacts if e in (c, c.mode))
+            (c,) = (c for c in self.contacts if e is c or e is c.mode)
             return any(depends_on(one, self.inputs) for one in (*self.load_expressions(c), c.slide))
         return depends_on(e, self.inputs) or any(
             depends_on(e, (c,)) and self.has_direct_feedthrough(c) for c in self.contacts
@@ -597,7 +618,7 @@ class ModelAnalysis:
     def ordered_outputs(self) -> list[Variable]:
         """Outputs in the order of the model description: states, rates, drivers, others, modes."""
         rates = [self.rate[s] for s in self.dynamic_states]
-        others = [e for e in self.declared if isinstance(e, (Output, Contact)) and e not in rates]
+        others = [e for e in self.declared if isinstance(e, (Output, Contact)) and not is_among(e, rates)]
         return [*self.states, *rates, *self.drivers, *others, *self.modes]
 
     @property

@@ -14,6 +14,7 @@ from .conditions import Condition
 from .coupled_contact_methods import coupled_contact_methods
 from .dimensions import Dimensions, declared_dimensions, dimensions_of, expression_text
 from .expression_printer import INDENT
+from .expressions import is_among
 from .generated_names import IMPORTS, MATH
 from .model_analysis import ModelAnalysis
 from .model_declaration import Contact, Fixed, Mode, Output, State, Variable
@@ -122,7 +123,7 @@ def output_declaration(an: ModelAnalysis, e: Variable) -> str:
         else ""
     )
     if isinstance(e, State):
-        more += f", rate={string_literal(e.constant_rate.name)}" if e in an.drivers else ""
+        more += f", rate={string_literal(e.constant_rate.name)}" if is_among(e, an.drivers) else ""
         return f"State({declaration_arguments(e)}{more})"
     if isinstance(e, Contact):
         return f"Contact({declaration_arguments(e)})"

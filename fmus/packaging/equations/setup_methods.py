@@ -31,7 +31,7 @@ def init_method(f: CodegenContext) -> str:
         lines.append(f"self.{e.name}_polynomial = InputPolynomial()")
         lines.append(f"self.t_base = self.{rate.name} = 0.0")
     if f.constants:
-        lines.append(" = ".join(f"self.{e.name}" for e in f.constants) + " = 0.0")
+        lines.append(" = ".join(f"self.{f.name_of(e)}" for e in f.constants) + " = 0.0")
     return method_source("__init__", (), [2 * INDENT + line for line in lines])
 
 
@@ -57,7 +57,7 @@ def prepare_method(f: CodegenContext) -> str:
     def calculate(needed: Memo | None = None) -> None:
         for e in f.constants:
             if (needed is None or id(e) in needed) and not any(e is one for one in computed):
-                s.emit_assignment(f"self.{e.name}", e)
+                s.emit_assignment(f"self.{f.name_of(e)}", e)
                 computed.append(e)
 
     for n, rule in enumerate(f.an.rules):
