@@ -55,14 +55,6 @@ def threshold(v, eps, load, slide, hold):
 class DryFriction(Oscillator):
     """Oscillator with one body, which is at rest while its contact sticks.
 
-    The generated model also defines
-
-        stick_load(t, states)           load on the contact at rest, its rate, and the holding limit
-        load_magnitude(t, states)       sum of the absolute terms of the load, which scales its rounding error
-        load_derivative(t, states, n)   n-th derivative of the load, if inputs have derivatives
-        law_modes(t, states)            direction of slip under the laws sign and threshold, if they are offered; the
-                                        forces of these laws do not depend on the modes
-
     At rest the load is linear in time, unless an input has a higher order.
     """
 
@@ -77,6 +69,18 @@ class DryFriction(Oscillator):
 
     def prepare(self):
         return HYBRID_LAW_ONLY if self.friction != HYBRID and self.solver.method == EXACT else OK
+
+    def stick_load(self, t: float, y: StateVector, i: ContactIndex) -> tuple[float, float, float]:
+        """Return the load on the contact at rest, its rate, and the holding limit."""
+
+    def load_magnitude(self, t: float, y: StateVector, i: ContactIndex) -> float:
+        """Return the sum of the absolute terms of the load, which scales its rounding error."""
+
+    def load_derivative(self, t: float, y: StateVector, n: int, i: ContactIndex) -> float:
+        """Return the n-th derivative of the load, if inputs have derivatives."""
+
+    def law_modes(self, t: float, y: StateVector) -> ContactVector:
+        """Return the directions of slip under the laws sign and threshold, whose forces do not depend on modes."""
 
     def resolve_mode(self, t, y: StateVector, tie_tolerance, i: ContactIndex):
         """Return the mode from time t on.

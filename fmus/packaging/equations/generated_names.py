@@ -32,17 +32,10 @@ ATTRIBUTES = (
     "violation_time",
     "violation_value",
 )
-METHODS = (  # in addition to inherited ones
-    *("initial_state", "rates", "jacobian", "applied_acceleration", "linear_coefficients"),
-    *("stick_load", "load_magnitude", "compute_outputs"),
-    *("applied_acceleration_derivative", "load_derivative", "set_input_rates", "has_higher_order"),
-    *("update_conditions", "law_modes"),
-)
-COUPLED_METHODS = ("slip_velocities", "slip_magnitudes", "contact_forces", "contact_rates", "apply_impulses")
 CLASSES = ("Solver", "Model", "Fmi3Slave")
 RESERVED = {
-    *("self", "t", *MATH, *ATTRIBUTES, *METHODS, *CLASSES),
+    *("self", "t", *MATH, *ATTRIBUTES, *CLASSES),
     *(name for names in IMPORTS.values() for name in names),
     *(name for name in dir(DryFriction) if not name.startswith("__")),
 }
-RESERVED_WHERE_COUPLED = {*dir(CoupledFriction), *COUPLED_METHODS}
+RESERVED_WHERE_COUPLED = {*dir(CoupledFriction)}

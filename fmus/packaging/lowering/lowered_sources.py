@@ -6,6 +6,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from ...runtime.oscillator import Oscillator
 from ...runtime.variable_declarations import variables
 from .. import BuildError, __version__
 from ..equations.model_file import ModelFile
@@ -39,20 +40,14 @@ def runtime_sources() -> dict[str, str]:
 @cache
 def runtime_symbols() -> SourceSymbols:
     """Return the symbols of the runtime sources."""
-    return SourceSymbols(runtime_sources().values())
+    vectors = (FMUS_FOLDER / "runtime" / "vectors.py").read_text(encoding="utf-8")
+    return SourceSymbols(runtime_sources().values(), vectors)
 
 
 def model_layout(source: ModelFile, features: FeatureSelection, name_format: str) -> ModelLayout:
     """Return the layout of a model; `name_format` formats the names of states, rates and modes."""
     model: Any = source.model
-    flags = {
-        flag: getattr(model, flag)
-        for flag in (
-            *("has_dry_friction", "rests_when_stuck", "is_coupled", "has_variable_levers"),
-            *("has_driver", "has_input_derivatives", "has_conditions", "checks_event_steps"),
-            "has_nominal_velocity",
-        )
-    }
+    flags = {flag: getattr(model, flag) for flag, default in vars(Oscillator).items() if isinstance(default, bool)}
     flags["is_linear"] = EXACT in features.methods
     flags["has_other_laws"] = any(law != "hybrid" for law in features.laws)
     states, contacts = (

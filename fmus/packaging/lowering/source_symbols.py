@@ -11,29 +11,19 @@ VECTOR_KINDS = {"StateVector": STATES, "RateVector": STATES, "ContactVector": CO
 
 
 class SourceSymbols:
-    """Symbols of all files of the runtime."""
+    """Symbols of all files of the runtime, and the results of the operations in vectors.py."""
 
-    def __init__(self, texts: Iterable[str]) -> None:
+    def __init__(self, texts: Iterable[str], vector_operations: str) -> None:
         self.vector_attributes: dict[str, str] = {}
         self.assigned_attributes: set[str] = set()
         self.constants: dict[str, Any] = {}
         self.elementwise: set[str] = set()
         self.module_names: set[str] = set()  # module-level names: constants, functions, classes
         self.class_attributes: list[set[str]] = []  # attribute names of each class
-        self.result_kinds: dict[str, list[str | None]] = {
-            "initial_state": [STATES],
-            "rates": [STATES],
-            "apply_impulses": [STATES],
-            "slip_velocities": [CONTACTS],
-            "law_modes": [CONTACTS],
-            "slip_magnitudes": [CONTACTS],
-            "contact_forces": [CONTACTS] * 3,
-            "contact_rates": [CONTACTS] * 4,
-            "solve_factored": [STATES],
-            "solve_complex": [STATES] * 2,
-            "state_vector": [STATES],
-            "contact_vector": [CONTACTS],
-        }
+        self.result_kinds: dict[str, list[str | None]] = {}
+        for function in parsed_module(vector_operations).body:
+            if isinstance(function, ast.FunctionDef):
+                self.read_results(function)
         for text in texts:
             self.read_file(parsed_module(text))
             for node in parsed_nodes(text):
@@ -50,10 +40,14 @@ class SourceSymbols:
                 names = {getattr(one.targets[0], "id", "") for one in node.body if isinstance(one, ast.Assign)}
                 self.class_attributes.append(names | {one.attr for one in all_nodes(node) if is_self_assignment(one)})
             case ast.FunctionDef(name=name):
-                if kinds := annotated_results(node):
-                    self.result_kinds[name] = kinds
+                self.read_results(node)
                 if any(isinstance(one, ast.Name) and one.id == "elementwise" for one in node.decorator_list):
                     self.elementwise.add(name)
+
+    def read_results(self, node: ast.FunctionDef) -> None:
+        """Collect the kinds of the results of a function."""
+        if kinds := annotated_results(node):
+            self.result_kinds[node.name] = kinds
 
     def find_name_clash(self, spec: ModelLayout) -> str:
         """Return a name of the model that already has another meaning in the runtime, or ""."""
