@@ -23,8 +23,8 @@ from .fmi_variables import (
     event_indicator_indices,
     has_step_events,
 )
+from .text_output import xml_bytes
 from .units import UNITS, Unit, unit_of
-from .xml_output import xml_bytes
 
 STEPPING_CAPABILITIES = {
     "needsExecutionTool": "false",

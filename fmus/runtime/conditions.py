@@ -6,8 +6,7 @@ conditions that must hold during the whole run.
 
 from math import inf
 
-from .codes import CHATTERING, OK
-from .rounding import EPSILON
+from .codes import CHATTERING, EPSILON, OK
 from .vectors import ContactVector, StateVector
 
 CONDITION_MARGIN, TINY = 4.0 * EPSILON, 1e-300  # margins of conditions: relative and absolute

@@ -11,8 +11,7 @@ the most contacts held.
 
 from math import fabs, inf
 
-from .codes import BACKWARD, FORWARD, HYBRID, STUCK
-from .rounding import EPSILON, ROUNDOFF_MARGIN
+from .codes import BACKWARD, EPSILON, FORWARD, HYBRID, ROUNDOFF_MARGIN, STUCK
 from .stick_slip import DryFriction, sign
 from .vectors import ContactIndex, ContactVector, StateVector, any_of, contact_indices, contact_vector, max_of
 

@@ -15,9 +15,8 @@ solvers report a zero at the current time as another event.
 from math import fabs, inf, nan
 
 from . import call_sequence, conditions, event_location
-from .codes import DIVERGED, MODEL_EXCHANGE, NO_CONSISTENT_MODES, OK, RUNNING, STUCK
+from .codes import DIVERGED, EPSILON, MODEL_EXCHANGE, NO_CONSISTENT_MODES, OK, ROUNDOFF_MARGIN, RUNNING, STUCK
 from .integrator import DEFAULT_NOMINAL
-from .rounding import EPSILON, ROUNDOFF_MARGIN
 from .step_control import OVERFLOW_LIMIT, TIE_FACTOR
 from .vectors import (
     ContactVector,

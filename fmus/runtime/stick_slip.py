@@ -17,12 +17,12 @@ from .codes import (
     MAX_INPUT_ORDER,
     NO_CONSISTENT_MODES,
     OK,
+    ROUNDOFF_MARGIN,
     SIGN,
     STUCK,
     THRESHOLD,
 )
 from .oscillator import Oscillator
-from .rounding import ROUNDOFF_MARGIN
 from .vectors import (
     ContactIndex,
     ContactVector,

@@ -13,7 +13,6 @@ from typing import Any
 
 from ...runtime.active_method import EXACT_ITEM, METHOD_ITEMS
 from ...runtime.method_registry import methods
-from ..reserved_names import is_reserved_in_c
 from .algebra import (
     build_term,
     count_occurrences,
@@ -44,8 +43,8 @@ from .expressions import (
     is_comparison,
     is_number,
 )
-from .generated_names import RESERVED, RESERVED_WHERE_COUPLED
 from .model_declaration import Choice, Contact, Fixed, Input, Mode, Model, Output, Parameter, Rule, State, Variable
+from .reserved_names import RESERVED, RESERVED_WHERE_COUPLED, is_reserved_in_c
 
 STEEP_FUNCTIONS = ("exp", "tanh", "atan", "sinh", "cosh", "/")
 LARGEST_FLOAT = float_info.max

@@ -7,19 +7,18 @@ from textwrap import indent, wrap
 
 from ...runtime.active_method import EXACT_ITEM
 from ...runtime.oscillator import Oscillator
-from ..reserved_names import string_literal
+from ..text_output import string_literal
 from .codegen_context import CodegenContext, rule_status
-from .condition_methods import condition_methods
 from .conditions import Condition
 from .coupled_contact_methods import coupled_contact_methods
 from .dimensions import Dimensions, declared_dimensions, dimensions_of, expression_text
 from .expression_printer import INDENT
 from .expressions import is_among
-from .generated_names import IMPORTS, MATH
 from .model_analysis import ModelAnalysis
 from .model_declaration import Contact, Fixed, Mode, Output, State, Variable
-from .output_method import law_modes_method, observe_method
+from .output_methods import condition_methods, law_modes_method, observe_method
 from .rate_methods import rate_methods
+from .reserved_names import IMPORTS, MATH
 from .setup_methods import setup_methods
 from .single_contact_methods import single_contact_methods
 

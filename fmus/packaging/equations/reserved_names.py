@@ -1,7 +1,44 @@
-"""Names reserved in C, and texts in source code of Python and C."""
+"""Names that variables of a model must not use: those of generated Python, and those reserved in C."""
 
-from json import dumps
-from re import sub
+from ...runtime.contact_lcp import CoupledFriction
+from ...runtime.method_registry import methods
+from ...runtime.stick_slip import DryFriction
+from .expressions import FUNCTIONS
+
+MATH = ("copysign", "inf", "pi", *FUNCTIONS)
+IMPORTS = {  # module -> names that generated code may import
+    "": tuple(label for label, _, _ in methods),
+    "stick_slip": ("HYBRID_LAW", "SIGN_LAW", "THRESHOLD_LAW", "DryFriction", "sign", "threshold"),
+    "codes": ("EXACT", "HYBRID", "MODEL_RULE", "OK"),
+    "input_polynomial": ("InputPolynomial",),
+    "event_location": ("EventLocation",),
+    "contact_lcp": ("CoupledFriction",),
+    "variable_declarations": ("Choice", "Contact", "Fixed", "Input", "Mode", "Output", "Parameter", "State"),
+    "integrator": ("Integrator",),
+    "active_method": ("EXACT_ITEM", "METHOD_ITEMS"),
+    "oscillator": ("Oscillator",),
+}
+ATTRIBUTES = (
+    "friction",
+    "solver",
+    "events",
+    "exact",
+    "model_exchange",
+    "x_base",
+    "t_base",
+    "time",
+    "method",
+    "event_location",
+    "violation_time",
+    "violation_value",
+)
+CLASSES = ("Solver", "Model", "Fmi3Slave")
+RESERVED = {
+    *("self", "t", *MATH, *ATTRIBUTES, *CLASSES),
+    *(name for names in IMPORTS.values() for name in names),
+    *(name for name in dir(DryFriction) if not name.startswith("__")),
+}
+RESERVED_WHERE_COUPLED = {*dir(CoupledFriction)}
 
 INTEGER_TYPES = """
     CHAR SCHAR UCHAR SHRT USHRT INT UINT LONG ULONG LLONG ULLONG SIZE WCHAR
@@ -31,18 +68,3 @@ FMI_PREFIXES = ("fmi2", "fmi3", "FMI2_", "FMI3_")  # of functions, types and mac
 def is_reserved_in_c(name: str) -> bool:
     """Return whether a name is a keyword of C, a macro of its headers, or may be one of the FMI headers."""
     return name in C_NAMES or name.startswith(FMI_PREFIXES)
-
-
-def string_literal(text: str) -> str:
-    """Return a string literal of Python for printable text."""
-    return dumps(text, ensure_ascii=False)
-
-
-def c_string_literal(text: str) -> str:
-    """Return a string literal of C for printable text, without trigraphs such as ??/."""
-    return string_literal(text).replace("?", "\\?")
-
-
-def c_comment(text: str) -> str:
-    """Return a text that can be part of a comment of C, without its delimiters and trigraphs."""
-    return sub(r"\?(?=\?)", "? ", text.replace("*/", "* /").replace("/*", "/ *"))
