@@ -8,8 +8,9 @@ from ..runtime.variable_access import SETTABLE_CAUSALITIES
 from ..runtime.variable_declarations import VariableOwner
 from .equations.algebra import differentiate, substitute, variables_in
 from .equations.expressions import Expression, Operand
-from .equations.model_analysis import TIME, ModelAnalysis
+from .equations.model_analysis import ModelAnalysis
 from .equations.model_declaration import HYBRID, SIGN, THRESHOLD, Contact
+from .equations.model_roles import TIME
 from .fmi_variables import Variables
 
 

@@ -14,9 +14,10 @@ from pathlib import Path
 from .equations.algebra import differentiate
 from .equations.expression_printer import ExpressionPrinter
 from .equations.expressions import Operand, Term
-from .equations.model_analysis import TIME, ModelAnalysis
+from .equations.model_analysis import ModelAnalysis
 from .equations.model_declaration import Output, Variable
 from .equations.model_file import ModelFile
+from .equations.model_roles import TIME
 from .lowering import lowered_files, lowered_model, select_features
 from .native.sources import collect_sources
 

@@ -6,8 +6,9 @@ from .algebra import depends_on, operands, subexpressions, substitute
 from .conditions import LIMITED_DOMAIN
 from .expression_printer import INDENT, ExpressionPrinter
 from .expressions import Expression, Operand, Term
-from .model_analysis import TIME, ModelAnalysis
+from .model_analysis import ModelAnalysis
 from .model_declaration import Contact
+from .model_roles import TIME
 
 MAX_RETURN_LENGTH = 100  # characters
 OVERFLOWING = ("exp", "sinh", "cosh")  # functions that raise an error for large arguments

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 
 from .algebra import build_term, is_same_expression, rounding_scale, substitute
 from .codegen_context import CodegenContext, emit_return, emit_scales, method_source
+from .contact_analysis import SMALLEST_DIVISOR
 from .expression_printer import ExpressionPrinter
 from .expressions import Expression, Operand, Term, is_among
-from .model_analysis import SMALLEST_DIVISOR
 from .model_declaration import SIGN, THRESHOLD, Contact, State
 
 

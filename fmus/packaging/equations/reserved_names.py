@@ -1,9 +1,12 @@
 """Names that variables of a model must not use: those of generated Python, and those reserved in C."""
 
+from collections.abc import Collection
+from keyword import iskeyword
+
 from ...runtime.contact_lcp import CoupledFriction
 from ...runtime.method_registry import methods
 from ...runtime.stick_slip import DryFriction
-from .expressions import FUNCTIONS
+from .expressions import FUNCTIONS, Expression, ModelError
 
 MATH = ("copysign", "inf", "pi", *FUNCTIONS)
 IMPORTS = {  # module -> names that generated code may import
@@ -68,3 +71,11 @@ FMI_PREFIXES = ("fmi2", "fmi3", "FMI2_", "FMI3_")  # of functions, types and mac
 def is_reserved_in_c(name: str) -> bool:
     """Return whether a name is a keyword of C, a macro of its headers, or may be one of the FMI headers."""
     return name in C_NAMES or name.startswith(FMI_PREFIXES)
+
+
+def check_name(name: str, e: Expression, reserved: Collection[str] = RESERVED) -> None:
+    """Raise ModelError for a name that a variable of a model cannot have."""
+    if name in reserved or is_reserved_in_c(name) or iskeyword(name) or name.startswith("_"):
+        raise ModelError(f"the name {name} is reserved by the solver or by C: choose another name", e.location)
+    if not name.isascii():
+        raise ModelError(f"the name {name} is not ASCII, as C requires: choose another name", e.location)
