@@ -309,9 +309,9 @@ def update_modes(model, solver):
         solver.y, solver.modes = y, modes
     else:
         for i in contact_indices:
-            mode = solver.modes[i]
-            if not mode * solver.y[slip_index[i]] > 0.0:
-                if mode != STUCK and solver.y[slip_index[i]] != 0.0:
+            last_mode = solver.modes[i]
+            if not last_mode * solver.y[slip_index[i]] > 0.0:
+                if last_mode != STUCK and solver.y[slip_index[i]] != 0.0:
                     solver.y[slip_index[i]] = 0.0
                     needs_restart = True
                 if not model.is_grazing(solver.t, solver.y, solver.modes, 0.0, i):
@@ -321,7 +321,7 @@ def update_modes(model, solver):
                     load, rate, limit = model.stick_load(solver.t, solver.y, i)
                     if load * rate > 0.0 and limit - fabs(load) <= tie_tolerance * limit:
                         solver.modes[i] = 1 if rate > 0.0 else -1
-                if solver.modes[i] != mode:
+                if solver.modes[i] != last_mode:
                     changed = True
                     if solver.modes[i] != STUCK and solver.y[slip_index[i]] == 0.0:
                         step.has_consistent_modes = model.is_consistent(solver.t, solver.y, solver.modes, i)

@@ -14,7 +14,7 @@ from fmus.packaging.lowering import LoweringError, function_tree, lowered_files,
 from fmus.packaging.lowering.dead_code import prune_assignment
 from fmus.packaging.lowering.emit_source import SourceEmitter, SourceLine
 from fmus.packaging.lowering.layout import ModelLayout
-from fmus.packaging.lowering.lowered_sources import lower_all
+from fmus.packaging.lowering.lowered_sources import lower_all, runtime_symbols
 from fmus.packaging.lowering.source_symbols import SourceSymbols
 from fmus.packaging.model_lookup import find_model
 from fmus.runtime import stick_slip
@@ -129,9 +129,9 @@ def test_an_unsupported_construct_is_refused_with_file_line_and_remedy(body):
     assert re.match(r"runtime/some\.py:[234]: ", str(caught.value))
 
 
-def test_colliding_stage_names_are_refused():
-    with pytest.raises(Exception, match="take another name"):
-        ModelLayout({"x": "v", "x2": "v2", "v": "a", "v2": "b"}, {})
+def test_states_named_like_each_other_at_a_stage_get_distinct_readable_names():
+    names = runtime_symbols().resolve_names({"x": "v", "x2": "v2", "v": "a", "v2": "b"}, ["mode"])
+    assert names == {name: name for name in ("x", "v", "a", "b", "mode")} | {"x2": "x2_", "v2": "v2_"}
 
 
 def test_a_model_is_lowered_only_once():

@@ -1,13 +1,38 @@
 """Symbols of the runtime sources by name: vector attributes, results, constants, elementwise functions."""
 
 import ast
-from collections.abc import Iterable
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from itertools import count
 from typing import Any, TypeGuard
 
 from ..syntax_trees import all_nodes, parsed_module, parsed_nodes
-from .layout import CONTACTS, NAMED_VECTOR, STATES, ModelLayout
+from .layout import CONTACTS, NAMED_VECTOR, STATES, stage_name
 
+# functions of vectors, component by component: to scalars; by the kind of rates
+ELEMENTWISE = {
+    "magnitude": "{0} if {0} > 0.0 else -{0}",
+    "elementwise_max": "{0} if {0} > {1} else {1}",
+}
+SELECTIONS = ("select_kinematic", "dynamic_part", "kinematic_rates")
 VECTOR_KINDS = {"StateVector": STATES, "RateVector": STATES, "ContactVector": CONTACTS}
+
+
+@dataclass(frozen=True)
+class Scope:
+    """Names of a function, or of the attributes of a class: scalars, vectors such as y2, and other vectors."""
+
+    scalars: set[str]
+    named_vectors: list[re.Match[str]]
+    other_vectors: set[str]
+
+    @classmethod
+    def of(cls, names: set[str], vectors: set[str]) -> "Scope":
+        """Sort names by kind."""
+        named = [match for match in map(NAMED_VECTOR.fullmatch, names) if match]
+        others = vectors - {match[0] for match in named}
+        return cls(names - others - {match[0] for match in named}, named, others)
 
 
 class SourceSymbols:
@@ -19,7 +44,8 @@ class SourceSymbols:
         self.constants: dict[str, Any] = {}
         self.elementwise: set[str] = set()
         self.module_names: set[str] = set()  # module-level names: constants, functions, classes
-        self.class_attributes: list[set[str]] = []  # attribute names of each class
+        self.scopes: list[Scope] = []  # functions, and attributes of classes
+        functions: list[ast.FunctionDef] = []
         self.result_kinds: dict[str, list[str | None]] = {}
         for function in parsed_module(vector_operations).body:
             if isinstance(function, ast.FunctionDef):
@@ -28,6 +54,11 @@ class SourceSymbols:
             self.read_file(parsed_module(text))
             for node in parsed_nodes(text):
                 self.read_node(node)
+            functions += [node for node in parsed_nodes(text) if isinstance(node, ast.FunctionDef)]
+        self.scopes += map(self.function_scope, functions)
+        self.suffixes: dict[str, set[str]] = {"y": set(), "f": set(), "modes": set()}  # of vectors named y2, f2, modes0
+        for match in (match for scope in self.scopes for match in scope.named_vectors):
+            self.suffixes[match[1]].add(match[2])
 
     def read_node(self, node: ast.AST) -> None:
         """Collect the symbols of one node."""
@@ -38,7 +69,9 @@ class SourceSymbols:
                 self.assigned_attributes.add(name)
             case ast.ClassDef():
                 names = {getattr(one.targets[0], "id", "") for one in node.body if isinstance(one, ast.Assign)}
-                self.class_attributes.append(names | {one.attr for one in all_nodes(node) if is_self_assignment(one)})
+                names |= {one.attr for one in all_nodes(node) if is_self_assignment(one)}
+                annotated = {getattr(one.target, "id", "") for one in node.body if isinstance(one, ast.AnnAssign)}
+                self.scopes.append(Scope.of(names, annotated & {*self.vector_attributes}))
             case ast.FunctionDef(name=name):
                 self.read_results(node)
                 if any(isinstance(one, ast.Name) and one.id == "elementwise" for one in node.decorator_list):
@@ -49,16 +82,76 @@ class SourceSymbols:
         if kinds := annotated_results(node):
             self.result_kinds[node.name] = kinds
 
-    def find_name_clash(self, spec: ModelLayout) -> str:
-        """Return a name of the model that already has another meaning in the runtime, or ""."""
-        clashes = self.module_names & {*spec.states, *spec.states.values(), *spec.contacts}
-        for names in self.class_attributes:
-            vectors = filter(NAMED_VECTOR.fullmatch, names)
-            kinds = [(vector, self.attribute_kind(vector) or STATES) for vector in vectors]
-            clashes |= names & {
-                spec.component_name(v, kind, i) for v, kind in kinds for i in range(len(spec.component_names(kind)))
-            }
-        return min(clashes, default="")
+    def function_scope(self, function: ast.FunctionDef) -> "Scope":
+        """Return the names in a function; a name is a vector if it is annotated or a vector is assigned to it."""
+        nodes = all_nodes(function)
+        names = {one.id for one in nodes if isinstance(one, ast.Name)} | {one.arg for one in function.args.args}
+        vectors = {one.arg for one in function.args.args if annotated_kind(one)}
+        vectors |= {one for one in names if NAMED_VECTOR.fullmatch(one)}
+        elementwise = {*ELEMENTWISE, *SELECTIONS, *self.elementwise}
+
+        def is_vector(e: ast.expr) -> bool:
+            match e:
+                case ast.Name(id=name):
+                    return name in vectors
+                case ast.Attribute(attr=name):
+                    return self.attribute_kind(name) is not None
+                case ast.BinOp(left=left, right=right):
+                    return is_vector(left) or is_vector(right)
+                case ast.UnaryOp(operand=operand):
+                    return is_vector(operand)
+                case ast.Call(func=ast.Name(id=name), args=args) if name in elementwise:
+                    return any(map(is_vector, args))
+                case ast.Call(func=ast.Name(id=name) | ast.Attribute(attr=name)):
+                    return self.result_kinds.get(name, [None])[0] is not None
+            return False
+
+        for node in sorted((one for one in nodes if isinstance(one, ast.Assign)), key=lambda one: one.lineno):
+            for target in node.targets:
+                targets = target.elts if isinstance(target, ast.Tuple) else [target]
+                values = node.value.elts if isinstance(node.value, ast.Tuple) else [node.value] * len(targets)
+                pairs = zip(targets, values, strict=False)
+                vectors |= {one.id for one, value in pairs if isinstance(one, ast.Name) and is_vector(value)}
+        return Scope.of(names, vectors)
+
+    def resolve_names(self, states: Mapping[str, str], modes: Iterable[str]) -> dict[str, str]:
+        """Return the names of states, rates and modes in the runtime.
+
+        They are those of the model, with underscores where a component of a vector would get a name that has another
+        meaning in the same function or class, or is a component of another vector.
+        """
+        stems: dict[str, set[str]] = {name: set() for name in (*states, *states.values(), *modes)}
+        for stem, names in ("y", states), ("f", states.values()), ("modes", modes):
+            for name in names:
+                stems[name].add(stem)
+        result: dict[str, str] = {}
+        used: set[str] = set()
+        for name, own in stems.items():
+            candidates = (name + "_" * n for n in count())
+            result[name] = next(
+                one
+                for one in candidates
+                if (one == name or one not in stems)
+                and used.isdisjoint(self._components(one, own))
+                and self._is_free(one, own)
+            )
+            used |= self._components(result[name], own)
+        return result
+
+    def _components(self, name: str, stems: set[str]) -> set[str]:
+        """Return the names that the components of all vectors get from a name."""
+        return {stage_name(name, suffix) for stem in stems for suffix in self.suffixes[stem]}
+
+    def _is_free(self, name: str, stems: set[str]) -> bool:
+        """Return whether no component named after `name` has another meaning in the runtime."""
+        for scope in self.scopes:
+            components = {stage_name(name, match[2]) for match in scope.named_vectors if match[1] in stems}
+            components |= {f"{one}_{name}" for one in scope.other_vectors}
+            if not components.isdisjoint(scope.scalars):
+                return False
+            if "J" in scope.scalars and "f" in stems and name in scope.other_vectors:
+                return False  # components of this vector would be named like entries of the Jacobian
+        return name not in self.module_names
 
     def read_file(self, node: ast.Module) -> None:
         """Collect the module-level names and constants of a file."""
