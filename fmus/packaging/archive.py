@@ -3,7 +3,7 @@
     modelDescription.xml
     binaries/<platform>/<name>.{so,dll}     native layer of pythonfmu
     resources/slavemodule.txt               names the entry script
-    resources/<entry>.py                    imports the class (see pythonfmu_workarounds.py)
+    resources/<entry>.py                    imports the class (see runtime/pythonfmu_workarounds.py)
     resources/<package>/                    the model and the modules it needs (embedded_modules.py)
     documentation/                          page, licences, requirements on the host
     model.png                               icon

@@ -26,7 +26,7 @@ from .python_errors import check_statements, explain
 from .start_values import check_evaluation
 
 PACKAGE = __name__.split(".", 1)[0]
-RESERVED_FILE_NAMES = ("pythonfmu", "pythonfmu_workarounds", "runtime")  # embedded in the same package
+RESERVED_FILE_NAMES = ("pythonfmu", "runtime")  # embedded in the same package
 
 
 @dataclass(frozen=True)
