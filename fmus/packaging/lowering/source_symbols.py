@@ -151,7 +151,7 @@ class SourceSymbols:
                 return False
             if "J" in scope.scalars and "f" in stems and name in scope.other_vectors:
                 return False  # components of this vector would be named like entries of the Jacobian
-        return name not in self.module_names
+        return name not in self.module_names and not NAMED_VECTOR.fullmatch(name)
 
     def read_file(self, node: ast.Module) -> None:
         """Collect the module-level names and constants of a file."""
