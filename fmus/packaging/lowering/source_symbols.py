@@ -2,7 +2,7 @@
 
 import ast
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 from itertools import count
 from typing import Any, TypeGuard
@@ -28,11 +28,11 @@ class Scope:
     other_vectors: set[str]
 
     @classmethod
-    def of(cls, names: set[str], vectors: set[str]) -> "Scope":
-        """Sort names by kind."""
+    def of(cls, names: set[str], vectors: set[str], kept: Collection[str] = ()) -> "Scope":
+        """Sort names by kind; `kept` are vectors that may be lowered to a scalar of the same name."""
         named = [match for match in map(NAMED_VECTOR.fullmatch, names) if match]
         others = vectors - {match[0] for match in named}
-        return cls(names - others - {match[0] for match in named}, named, others)
+        return cls((names - others).union(kept) - {match[0] for match in named}, named, others)
 
 
 class SourceSymbols:
@@ -86,33 +86,37 @@ class SourceSymbols:
         """Return the names in a function; a name is a vector if it is annotated or a vector is assigned to it."""
         nodes = all_nodes(function)
         names = {one.id for one in nodes if isinstance(one, ast.Name)} | {one.arg for one in function.args.args}
-        vectors = {one.arg for one in function.args.args if annotated_kind(one)}
-        vectors |= {one for one in names if NAMED_VECTOR.fullmatch(one)}
+        kinds = {one.arg: annotated_kind(one) for one in function.args.args}
+        kinds |= {one: self.attribute_kind(one) for one in names if NAMED_VECTOR.fullmatch(one)}
         elementwise = {*ELEMENTWISE, *SELECTIONS, *self.elementwise}
 
-        def is_vector(e: ast.expr) -> bool:
+        def kind_of(e: ast.expr, place: int = 0) -> str | None:
             match e:
                 case ast.Name(id=name):
-                    return name in vectors
+                    return kinds.get(name)
                 case ast.Attribute(attr=name):
-                    return self.attribute_kind(name) is not None
+                    return self.attribute_kind(name)
                 case ast.BinOp(left=left, right=right):
-                    return is_vector(left) or is_vector(right)
+                    return kind_of(left) or kind_of(right)
                 case ast.UnaryOp(operand=operand):
-                    return is_vector(operand)
+                    return kind_of(operand)
                 case ast.Call(func=ast.Name(id=name), args=args) if name in elementwise:
-                    return any(map(is_vector, args))
+                    return next(filter(None, map(kind_of, args)), None)
                 case ast.Call(func=ast.Name(id=name) | ast.Attribute(attr=name)):
-                    return self.result_kinds.get(name, [None])[0] is not None
-            return False
+                    results = self.result_kinds.get(name, [])
+                    return results[place] if place < len(results) else None
+            return None
 
         for node in sorted((one for one in nodes if isinstance(one, ast.Assign)), key=lambda one: one.lineno):
             for target in node.targets:
                 targets = target.elts if isinstance(target, ast.Tuple) else [target]
                 values = node.value.elts if isinstance(node.value, ast.Tuple) else [node.value] * len(targets)
-                pairs = zip(targets, values, strict=False)
-                vectors |= {one.id for one, value in pairs if isinstance(one, ast.Name) and is_vector(value)}
-        return Scope.of(names, vectors)
+                for place, (one, value) in enumerate(zip(targets, values, strict=False)):
+                    if isinstance(one, ast.Name) and (kind := kind_of(value, place)):
+                        kinds[one.id] = kind
+        vectors = {name for name, kind in kinds.items() if kind}
+        # a vector over a single contact keeps its name
+        return Scope.of(names, vectors, {name for name in vectors if kinds[name] == CONTACTS})
 
     def resolve_names(self, states: Mapping[str, str], modes: Iterable[str]) -> dict[str, str]:
         """Return the names of states, rates and modes in the runtime.
