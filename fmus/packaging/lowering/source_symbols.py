@@ -4,6 +4,7 @@ import ast
 import re
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
+from functools import cache
 from itertools import count
 from typing import Any, TypeGuard
 
@@ -16,6 +17,7 @@ ELEMENTWISE = {
     "elementwise_max": "{0} if {0} > {1} else {1}",
 }
 SELECTIONS = ("select_kinematic", "dynamic_part", "kinematic_rates")
+named_vector = cache(NAMED_VECTOR.fullmatch)  # thousands of names, most of them several times
 VECTOR_KINDS = {"StateVector": STATES, "RateVector": STATES, "ContactVector": CONTACTS}
 
 
@@ -30,7 +32,7 @@ class Scope:
     @classmethod
     def of(cls, names: set[str], vectors: set[str], kept: Collection[str] = ()) -> "Scope":
         """Sort names by kind; `kept` are vectors that may be lowered to a scalar of the same name."""
-        named = [match for match in map(NAMED_VECTOR.fullmatch, names) if match]
+        named = [match for match in map(named_vector, names) if match]
         others = vectors - {match[0] for match in named}
         return cls((names - others).union(kept) - {match[0] for match in named}, named, others)
 
@@ -84,10 +86,14 @@ class SourceSymbols:
 
     def function_scope(self, function: ast.FunctionDef) -> "Scope":
         """Return the names in a function; a name is a vector if it is annotated or a vector is assigned to it."""
-        nodes = all_nodes(function)
-        names = {one.id for one in nodes if isinstance(one, ast.Name)} | {one.arg for one in function.args.args}
+        names, assignments = {one.arg for one in function.args.args}, []
+        for node in all_nodes(function):
+            if isinstance(node, ast.Name):
+                names.add(node.id)
+            elif isinstance(node, ast.Assign):
+                assignments.append(node)
         kinds = {one.arg: annotated_kind(one) for one in function.args.args}
-        kinds |= {one: self.attribute_kind(one) for one in names if NAMED_VECTOR.fullmatch(one)}
+        kinds |= {one: self.attribute_kind(one) for one in names if named_vector(one)}
         elementwise = {*ELEMENTWISE, *SELECTIONS, *self.elementwise}
 
         def kind_of(e: ast.expr, place: int = 0) -> str | None:
@@ -107,7 +113,7 @@ class SourceSymbols:
                     return results[place] if place < len(results) else None
             return None
 
-        for node in sorted((one for one in nodes if isinstance(one, ast.Assign)), key=lambda one: one.lineno):
+        for node in sorted(assignments, key=lambda one: one.lineno):
             for target in node.targets:
                 targets = target.elts if isinstance(target, ast.Tuple) else [target]
                 values = node.value.elts if isinstance(node.value, ast.Tuple) else [node.value] * len(targets)
@@ -176,7 +182,7 @@ class SourceSymbols:
 
     def attribute_kind(self, name: str) -> str | None:
         """Return what an attribute runs over (states or contacts); None for a scalar."""
-        stem = NAMED_VECTOR.fullmatch(name)
+        stem = named_vector(name)
         return self.vector_attributes.get(name) or ((CONTACTS if stem[1] == "modes" else STATES) if stem else None)
 
 
