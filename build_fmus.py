@@ -29,9 +29,8 @@ from hashlib import sha256
 import click
 
 from fmus.packaging import BuildError, __version__
-from fmus.packaging.archive import build
+from fmus.packaging.archive import build, measure_import_time
 from fmus.packaging.equations.model_file import ModelFile
-from fmus.packaging.import_time import measure_import_time
 from fmus.packaging.lowering import LAWS, METHODS
 from fmus.packaging.model_lookup import find_model, model_names, more_model_names
 from harness.process.temporary_directory import temporary_directory

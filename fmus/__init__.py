@@ -4,39 +4,42 @@ A model file defines one class derived from Model, which declares variables and 
 `python build_fmus.py path/to/file.py` builds its FMU.
 """
 
+from importlib import import_module
 from math import pi
+from typing import TYPE_CHECKING, Any
 
-from .packaging.equations.expressions import (
-    acos,
-    asin,
-    atan,
-    choose,
-    cos,
-    cosh,
-    exp,
-    fabs,
-    log,
-    sin,
-    sinh,
-    sqrt,
-    tan,
-    tanh,
-)
-from .packaging.equations.model_declaration import (
-    HYBRID,
-    SIGN,
-    THRESHOLD,
-    Choice,
-    Contact,
-    Fixed,
-    Input,
-    Mode,
-    Model,
-    Output,
-    Parameter,
-    Rule,
-    State,
-)
+if TYPE_CHECKING:
+    from .packaging.equations.expressions import (
+        acos,
+        asin,
+        atan,
+        choose,
+        cos,
+        cosh,
+        exp,
+        fabs,
+        log,
+        sin,
+        sinh,
+        sqrt,
+        tan,
+        tanh,
+    )
+    from .packaging.equations.model_declaration import (
+        HYBRID,
+        SIGN,
+        THRESHOLD,
+        Choice,
+        Contact,
+        Fixed,
+        Input,
+        Mode,
+        Model,
+        Output,
+        Parameter,
+        Rule,
+        State,
+    )
 
 __all__ = [
     "HYBRID",
@@ -68,3 +71,12 @@ __all__ = [
     "tan",
     "tanh",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    """Import a name at its first use, so that `import fmus.runtime` loads nothing else."""
+    for module in ("expressions", "model_declaration") if name in __all__ else ():
+        names = vars(import_module(f".packaging.equations.{module}", __name__))
+        if name in names:
+            return names[name]
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -16,7 +16,7 @@ from xml.etree.ElementTree import Element, SubElement
 
 from . import BuildError
 from .fmi_variables import Variables, integrated_states
-from .xml_output import xml_bytes
+from .text_output import xml_bytes
 
 RESULT_FOLDER = "extra/org.fmi-standard.fmi-ls-ref"
 NAMESPACE = "http://fmi-standard.org/fmi-ls-manifest"

@@ -8,8 +8,9 @@ from ..runtime.variable_access import SETTABLE_CAUSALITIES
 from ..runtime.variable_declarations import VariableOwner
 from .equations.algebra import differentiate, substitute, variables_in
 from .equations.expressions import Expression, Operand
-from .equations.model_analysis import TIME, ModelAnalysis
+from .equations.model_analysis import ModelAnalysis
 from .equations.model_declaration import HYBRID, SIGN, THRESHOLD, Contact
+from .equations.model_roles import TIME
 from .fmi_variables import Variables
 
 
@@ -34,7 +35,7 @@ def output_dependencies(model: type[VariableOwner], declared: Variables, at_star
         return {leaf for e in terms for leaf in variables_in(substitute(e, values))}
 
     def of_mode(c: Contact) -> set[Expression]:
-        contacts = [c] if c in an.independent_contacts else an.contacts
+        contacts = [c] if c in an.load else an.contacts
         held = [*an.load_expressions(c), *(an.holding_limit[d] for d in contacts)] if HYBRID in laws else []
         rates = [differentiate(e, an.coasting_derivatives) for e in held]
         others = [e for d in contacts if d is not c for e in (d.slip, d.slide)]

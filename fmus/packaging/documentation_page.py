@@ -1,4 +1,4 @@
-"""Writes documentation/index.html of an FMU from the declaration of the model."""
+"""Writes the files for users in FMUs of all kinds: documentation page, icon, known boundaries, certified result."""
 
 import re
 from html import escape
@@ -8,7 +8,7 @@ from pathlib import Path
 from ..runtime.variable_access import SETTABLE_CAUSALITIES
 from ..runtime.variable_declarations import VariableDeclaration, VariableOwner
 from . import __version__
-from .certified_result import RESULT_FOLDER, CertifiedResult
+from .certified_result import RESULT_FOLDER, CertifiedResult, find_certified_result, result_files
 from .fmi_variables import Variables, integrated_states
 from .svg_chart import draw_chart
 from .units import unit_of
@@ -157,3 +157,25 @@ def _footer(model: type[VariableOwner], result: CertifiedResult | None) -> str:
     certified = f" Certified result: <a href='../{RESULT_FOLDER}/'>{RESULT_FOLDER}</a>." if result else ""
     licences = " Licences: <a href='licenses/'>licenses</a>."
     return f"<footer>{run}{certified}{licences} friction-fmus {__version__}.</footer>"
+
+
+def extra_files(
+    model: type[VariableOwner], path: Path, declared: Variables, icon: str = "model.png", use: str = ""
+) -> dict[str, bytes]:
+    """Return the content of these files by path in the FMU.
+
+    Icon (.png), known boundaries (.toml, see harness/studies/sweep) and certified result (.csv) are optional and stand
+    next to the model file at `path`, under the same name.  `icon` is the path of the icon in the FMU; `use` is a
+    paragraph of the page on how to run the FMU.
+    """
+    name, picture, boundaries = path.stem, path.with_suffix(".png"), path.with_suffix(".toml")
+    certified = find_certified_result(path, declared)
+    icon_path = icon if picture.is_file() else ""
+    entries = {"documentation/index.html": documentation_page(model, name, declared, certified, icon_path, use)}
+    if certified is not None:
+        entries |= result_files(name, certified, declared)
+    if picture.is_file():
+        entries[icon] = picture.read_bytes()
+    if boundaries.is_file():
+        entries["documentation/boundaries.toml"] = boundaries.read_bytes()
+    return entries

@@ -18,12 +18,12 @@ from .model_lookup import FMUS
 from .syntax_trees import parsed_module, parsed_nodes
 
 ROOT, VENDORED = "__init__.py", "pythonfmu/__init__.py"  # replaced by generated or empty files
-WORKAROUNDS, SLAVE = "pythonfmu_workarounds.py", "runtime/slave.py"  # embedded with every model
+SLAVE = "runtime/slave.py"  # embedded with every model
 INIT_SOURCE = '''\
 """{name} as an FMI 2.0 co-simulation slave."""
 
 from .{name} import {model} as Model
-from .pythonfmu_workarounds import keep_reference
+from .runtime.pythonfmu_workarounds import keep_reference
 from .runtime.slave import make_slave_class
 
 {model} = make_slave_class(Model)
@@ -45,7 +45,7 @@ def embedded_files(source: ModelFile, texts: Mapping[str, str], root: Path = FMU
     Files are taken from `texts` if they are there, else from `root`.
     """
     files = {ROOT: INIT_SOURCE.format(name=source.name, model=source.class_name)}
-    pending = [f"{source.name}.py", WORKAROUNDS, SLAVE]
+    pending = [f"{source.name}.py", SLAVE]
     for path in pending:  # the list grows during the loop
         if path == VENDORED:
             files[path] = ""
@@ -64,8 +64,6 @@ def digest(files: dict[str, str], first: str = "") -> str:
 
 def _on_disk(path: str, root: Path) -> Path:
     """Return the source file for a path in the package."""
-    if path == WORKAROUNDS:
-        return Path(__file__).with_name(path)
     return installed_package("pythonfmu").parent / path if path.startswith("pythonfmu/") else root / path
 
 

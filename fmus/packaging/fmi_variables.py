@@ -7,8 +7,7 @@ from copy import copy
 from typing import Any
 
 from ..runtime.codes import HYBRID
-from ..runtime.variable_declarations import Local, VariableDeclaration, VariableOwner, variables
-from .lowering import scalar_name, sibling_module
+from ..runtime.variable_declarations import Local, VariableDeclaration, variables
 
 TIME, TO_REST, TO_BREAK_AWAY = "time", "events.to_rest", "events.to_break_away"
 CONDITION = "events.condition_{}"  # indicator of a condition of the equations, numbered from 1
@@ -26,28 +25,6 @@ class ContinuousLocal(Local):
     """A calculated local variable, continuous between events."""
 
     variability = "continuous"
-
-
-def model_exchange_instance(model: type[VariableOwner]) -> Any:
-    """Create an instance of a lowered model for model exchange."""
-    exchange = sibling_module(model, "runtime.model_exchange")
-    thing = type(model.__name__, (exchange.ModelExchangeMixin, model), {})()
-    exchange.update_nominals(thing)
-    return thing
-
-
-def attribute_path(thing: Any, name: str) -> str:
-    """Return the attribute path of a variable in a model-exchange instance."""
-    if name == TIME:
-        return "solver.t"
-    for indicator in (TO_REST, TO_BREAK_AWAY):
-        if name.startswith(indicator):
-            mode = name.removeprefix(indicator)[1:]  # none for a single contact
-            path = indicator.replace("events", "model_exchange", 1)
-            return f"{path}_{scalar_name(thing, mode)}" if mode else path
-    if name.startswith(CONDITION[:-2]):
-        return f"model_exchange.conditions[{int(name.removeprefix(CONDITION[:-2])) - 1}]"
-    return "model_exchange.driver_rate" if name.startswith(DERIVATIVE_NAME[:4]) else name
 
 
 def declared_variables(thing: Any) -> Variables:

@@ -22,10 +22,9 @@ from .fmi_variables import (
     derivative_indices,
     event_indicator_indices,
     has_step_events,
-    model_exchange_instance,
 )
+from .text_output import xml_bytes
 from .units import UNITS, Unit, unit_of
-from .xml_output import xml_bytes
 
 STEPPING_CAPABILITIES = {
     "needsExecutionTool": "false",
@@ -52,7 +51,7 @@ LOG_CATEGORIES = {
 }
 
 
-def describe(model: type[VariableOwner], name: str, code: str, date: datetime, exchanging: bool = False) -> bytes:
+def describe(model: type[VariableOwner], name: str, code: str, date: datetime, exchange: Any = None) -> bytes:
     """Return the FMI 2.0 model description of the FMU `name` as XML.
 
     Parameters
@@ -60,11 +59,12 @@ def describe(model: type[VariableOwner], name: str, code: str, date: datetime, e
     code
         Digest of the embedded sources.  The GUID is computed from it and from the description without the date, so
         equal GUIDs mean equal content.
-    exchanging
-        Whether the FMU supports model exchange.
+    exchange
+        Instance for model exchange, if the FMU supports it.
     """
     root = create_root(model, name, "2.0", "guid")
-    thing: Any = model_exchange_instance(model) if exchanging else model()
+    exchanging = exchange is not None
+    thing: Any = exchange if exchanging else model()
     declared = fmi_variables.declared_variables(thing)
     if exchanging:  # FMI 2.0 needs no time variable, and FMILibrary rejects one
         declared = [one for one in all_variables(thing) if one[0] != TIME]

@@ -19,7 +19,6 @@ from .fmi_variables import (
     derivative_indices,
     event_indicator_indices,
     has_step_events,
-    model_exchange_instance,
 )
 
 TYPE_ELEMENTS = {"Real": "Float64", "Integer": "Int64", "Enumeration": "Enumeration"}
@@ -41,11 +40,13 @@ STEPPING_CAPABILITIES = {
 }
 
 
-def describe(model: type[VariableOwner], name: str, code: str, date: datetime) -> bytes:
-    """Return the FMI 3.0 model description of the FMU `name` as XML; the token is computed like the GUID of FMI 2.0."""
+def describe(model: type[VariableOwner], name: str, code: str, date: datetime, exchange: Any) -> bytes:
+    """Return the FMI 3.0 model description of the FMU `name` as XML; the token is computed like the GUID of FMI 2.0.
+
+    `exchange` is an instance of the model for model exchange.
+    """
     root = shared.create_root(model, name, "3.0", "instantiationToken")
-    thing = model_exchange_instance(model)
-    declared = all_variables(thing)
+    declared = all_variables(exchange)
     step_report = {"needsCompletedIntegratorStep": "true" if has_step_events(declared) else "false"}
     for interface, abilities in ("ModelExchange", step_report), ("CoSimulation", STEPPING_CAPABILITIES):
         SubElement(root, interface, {"modelIdentifier": name} | COMMON_CAPABILITIES | abilities)
@@ -61,8 +62,8 @@ def describe(model: type[VariableOwner], name: str, code: str, date: datetime) -
         element = SubElement(elements, TYPE_ELEMENTS[meaning.type], attributes)
         if meaning.alias:
             SubElement(element, "Alias", name=meaning.alias, description=meaning.text)
-    shared.mark_states(list(elements), thing, rates, first=0)
-    _add_structure(root, model, thing, declared, rates)
+    shared.mark_states(list(elements), exchange, rates, first=0)
+    _add_structure(root, model, exchange, declared, rates)
     return shared.serialize(root, "instantiationToken", code, date)
 
 

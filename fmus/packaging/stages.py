@@ -14,9 +14,10 @@ from pathlib import Path
 from .equations.algebra import differentiate
 from .equations.expression_printer import ExpressionPrinter
 from .equations.expressions import Operand, Term
-from .equations.model_analysis import TIME, ModelAnalysis
+from .equations.model_analysis import ModelAnalysis
 from .equations.model_declaration import Output, Variable
 from .equations.model_file import ModelFile
+from .equations.model_roles import TIME
 from .lowering import lowered_files, lowered_model, select_features
 from .native.sources import collect_sources
 
@@ -76,7 +77,7 @@ def analysis_lines(an: ModelAnalysis) -> Iterator[str]:
         yield f"d{state.name}/dt = {text(rate)}"
     for contact in an.contacts:
         yield f"{contact.name}: slip velocity {text(contact.slip)}, sliding force {text(contact.slide)}"
-        if contact in an.independent_contacts:
+        if contact in an.load:
             yield f"{contact.name}: load while stuck {text(an.load[contact])}"
         yield f"{contact.name}: holding limit {text(an.holding_limit[contact])}"
     for e in an.rate_outputs.values():

@@ -4,7 +4,7 @@ from pathlib import Path
 from xml.etree.ElementTree import Element, SubElement
 
 from .fmi_variables import Variables
-from .xml_output import xml_bytes
+from .text_output import xml_bytes
 
 FOLDER, FILE = "terminalsAndIcons", "terminalsAndIcons.xml"
 CORNERS = {"x1": "-100", "y1": "-100", "x2": "100", "y2": "100"}

@@ -18,6 +18,7 @@ from .codes import (
     FAILED,
     FIRST_RULE,
     FIXED,
+    HYBRID_LAW_ONLY,
     INSTANTIATED,
     MODEL_EXCHANGE,
     OK,
@@ -64,11 +65,6 @@ def is_valid_state(run, model, exchanges):
 # ---- values
 
 
-def is_in_range(value, low, high, above, below):
-    """Return whether a value is in a range; NaN and infinities never are."""
-    return isfinite(value) and low <= value <= high and above < value < below
-
-
 def rejection_reason(run, calculated, fixed, allowed):
     """Return why a value cannot be set, or OK."""
     if calculated:
@@ -107,10 +103,10 @@ def check_values(run, model):
     status = check_experiment(run)
     if status != OK:
         return status
-    rule = model.prepare()
-    if rule == model.own_solver_rule and run.interface != CO_SIMULATION:
+    status = model.prepare()
+    if status == HYBRID_LAW_ONLY and run.interface != CO_SIMULATION:
         return OK  # the importer uses its own solver
-    return FIRST_RULE + rule if rule > 0 else OK
+    return status
 
 
 def is_refusal(run, status):
@@ -118,7 +114,7 @@ def is_refusal(run, status):
 
     A rule can also be violated later, while the run is computed; that is a failure.
     """
-    return status == BAD_STEP or status == BAD_VALUE or (status > FIRST_RULE and run.has_pending_changes)
+    return status == BAD_STEP or status == BAD_VALUE or (status >= FIRST_RULE and run.has_pending_changes)
 
 
 # ---- run

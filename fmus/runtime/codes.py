@@ -1,4 +1,4 @@
-"""Enumeration constants: methods, friction laws, modes, phases of an instance, status codes."""
+"""Constants: methods, friction laws, modes, phases of an instance, status codes, rounding errors."""
 
 EXACT = 1  # solver.method without steps; each other method defines its NUMBER in its own file
 HYBRID, SIGN, THRESHOLD = 1, 2, 3  # values of the parameter friction
@@ -20,4 +20,10 @@ NO_PARTIAL_DERIVATIVE, NO_OUTPUT_DERIVATIVE, NO_INPUT_DERIVATIVE = 23, 24, 25
 CHATTERING = 26  # of a condition
 NEEDS_REPETITION = 27  # of an internal step
 MAX_INPUT_ORDER = 8  # highest derivative of an input: the order of dop853, which gains nothing from more
-FIRST_RULE = 100  # plus the number of the model's rule that the values violate
+# Rules that the values violate; a model has their messages by status
+FIRST_RULE = 101
+HYBRID_LAW_ONLY, NO_CONSISTENT_MODES = 101, 102  # method exact with another law; no stick and slip balances the forces
+MODEL_RULE = 110  # first rule of the model itself, then its others and its limits
+
+EPSILON = 2.220446049250313e-16  # machine epsilon of a double
+ROUNDOFF_MARGIN = 64.0 * EPSILON  # relative tolerance for ties between stick and slip in closed forms

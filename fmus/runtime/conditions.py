@@ -6,8 +6,7 @@ conditions that must hold during the whole run.
 
 from math import inf
 
-from .codes import CHATTERING, FIRST_RULE, OK
-from .rounding import EPSILON
+from .codes import CHATTERING, EPSILON, OK
 from .vectors import ContactVector, StateVector
 
 CONDITION_MARGIN, TINY = 4.0 * EPSILON, 1e-300  # margins of conditions: relative and absolute
@@ -79,7 +78,7 @@ def update_at_event(model, t, y: StateVector, modes: ContactVector, h_max):
 def violation_status(model):
     """Return OK, or the status of the rule for a condition that must hold but does not."""
     location = model.event_location
-    return FIRST_RULE + model.first_condition_rule + location.violated if location.violated >= 0 else OK
+    return model.first_limit_rule + location.violated - model.n_switches if location.violated >= 0 else OK
 
 
 def select_sides(model, after_event):

@@ -11,8 +11,7 @@ the most contacts held.
 
 from math import fabs, inf
 
-from .codes import BACKWARD, FORWARD, HYBRID, STUCK
-from .rounding import EPSILON, ROUNDOFF_MARGIN
+from .codes import BACKWARD, EPSILON, FORWARD, HYBRID, ROUNDOFF_MARGIN, STUCK
 from .stick_slip import DryFriction, sign
 from .vectors import ContactIndex, ContactVector, StateVector, any_of, contact_indices, contact_vector, max_of
 
@@ -32,20 +31,30 @@ SLIPPING, RELOCKED, AT_REST, AT_LIMIT = 0, 1, 2, 3  # status of a contact in the
 class CoupledFriction(DryFriction):
     """Oscillator in which a contact may stick while something moves.
 
-    The generated model also defines, over its contacts,
-
-        slip_velocities(t, states)         slip velocities
-        slip_magnitudes(t, states)         sums of their absolute terms
-        contact_forces(t, states, modes)   forces, holding limits, and sums of the absolute terms of the forces
-        contact_rates(t, states, modes)    rates of forces and limits; residual forces (force required to hold a contact
-                                           minus present force) and their rates
-        apply_impulses(t, states, modes)   states after impulses that stop the slip of stuck contacts
-
     A contact whose sliding force and holding limit are zero has no friction: it never sticks, and a reversal of its
     slip is no event.  Its mode, 1 or -1, stays the direction of the last slip with friction, or of the first slip.
     """
 
     is_coupled, rests_when_stuck = True, False
+
+    def slip_velocities(self, t: float, y: StateVector) -> ContactVector:
+        """Return the slip velocities."""
+
+    def slip_magnitudes(self, t: float, y: StateVector) -> ContactVector:
+        """Return the sums of their absolute terms."""
+
+    def contact_forces(
+        self, t: float, y: StateVector, modes: ContactVector
+    ) -> tuple[ContactVector, ContactVector, ContactVector]:
+        """Return forces, holding limits, and the sums of the absolute terms of the forces."""
+
+    def contact_rates(
+        self, t: float, y: StateVector, modes: ContactVector
+    ) -> tuple[ContactVector, ContactVector, ContactVector, ContactVector]:
+        """Return the rates of forces and limits; residual forces (required minus present force) and their rates."""
+
+    def apply_impulses(self, t: float, y: StateVector, modes: ContactVector) -> StateVector:
+        """Return the states after impulses that stop the slip of stuck contacts."""
 
     # ---- end of modes
 

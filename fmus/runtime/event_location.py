@@ -11,10 +11,10 @@ computed again with a tighter tolerance (phase_repetition.py).
 
 from math import fabs, inf, pi, sin, sqrt
 
+from .codes import ROUNDOFF_MARGIN
 from .conditions import CONDITION_MARGIN, TINY
-from .extrema import largest_of, smallest_of
+from .interpolant import largest_of, smallest_of
 from .power_series import PowerSeries
-from .rounding import ROUNDOFF_MARGIN
 from .vectors import ContactVector, RateVector, StateVector, contact_indices, slip_index
 
 DEGREE = 8  # of the polynomial through an event function; interpolants have degree 7 at most

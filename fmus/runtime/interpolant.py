@@ -50,3 +50,17 @@ class Interpolant:
             else:
                 c = c + r * self.c4
         return self.c0 + s * (self.c1 + r * (self.c2 + s * c))
+
+
+def smallest_of(a, b, c, d):
+    """Return the smallest of four numbers."""
+    ab = a if a < b else b
+    cd = c if c < d else d
+    return ab if ab < cd else cd
+
+
+def largest_of(a, b, c, d):
+    """Return the largest of four numbers."""
+    ab = a if a > b else b
+    cd = c if c > d else d
+    return ab if ab > cd else cd

@@ -17,9 +17,8 @@ body in an equilibrium then stays there exactly.  q includes the moving equilibr
 
 from math import atan2, copysign, cos, exp, expm1, fabs, fmod, inf, log1p, pi, sin, sqrt
 
-from .codes import MAX_INPUT_ORDER
+from .codes import MAX_INPUT_ORDER, ROUNDOFF_MARGIN
 from .power_series import TERMS, PowerSeries
-from .rounding import ROUNDOFF_MARGIN
 from .vectors import StateVector
 
 UNDAMPED, UNDERDAMPED, OVERDAMPED, FREE, HIGHER_ORDER_INPUT, GROWING = 1, 2, 3, 4, 5, 6

@@ -79,7 +79,7 @@ PHASE_NAMES = {
 def run_message(status: int, run: RunState, model: Any, t: float, h: float) -> str:
     """Return the message for a failed run, or for the rule of the model that the values violate."""
     if status not in RUN_MESSAGES:
-        return str(model.rules[status - codes.FIRST_RULE - 1]).format_map(vars(model))
+        return str(model.rules[status]).format_map(vars(model))
     solver = model.solver
     times = {"now": solver.t, "t0": solver.step.t0, "t_end": solver.step.t_end}
     return RUN_MESSAGES[status].format(t=t, h=h, start=run.start_time, stop=run.stop_time, **times)

@@ -15,11 +15,9 @@ solvers report a zero at the current time as another event.
 from math import fabs, inf, nan
 
 from . import call_sequence, conditions, event_location
-from .codes import DIVERGED, MODEL_EXCHANGE, OK, RUNNING, STUCK
+from .codes import DIVERGED, EPSILON, MODEL_EXCHANGE, NO_CONSISTENT_MODES, OK, ROUNDOFF_MARGIN, RUNNING, STUCK
 from .integrator import DEFAULT_NOMINAL
-from .rounding import EPSILON, ROUNDOFF_MARGIN
 from .step_control import OVERFLOW_LIMIT, TIE_FACTOR
-from .stick_slip import NO_CONSISTENT_MODES
 from .vectors import (
     ContactVector,
     all_of,
@@ -311,9 +309,9 @@ def update_modes(model, solver):
         solver.y, solver.modes = y, modes
     else:
         for i in contact_indices:
-            mode = solver.modes[i]
-            if not mode * solver.y[slip_index[i]] > 0.0:
-                if mode != STUCK and solver.y[slip_index[i]] != 0.0:
+            last_mode = solver.modes[i]
+            if not last_mode * solver.y[slip_index[i]] > 0.0:
+                if last_mode != STUCK and solver.y[slip_index[i]] != 0.0:
                     solver.y[slip_index[i]] = 0.0
                     needs_restart = True
                 if not model.is_grazing(solver.t, solver.y, solver.modes, 0.0, i):
@@ -323,7 +321,7 @@ def update_modes(model, solver):
                     load, rate, limit = model.stick_load(solver.t, solver.y, i)
                     if load * rate > 0.0 and limit - fabs(load) <= tie_tolerance * limit:
                         solver.modes[i] = 1 if rate > 0.0 else -1
-                if solver.modes[i] != mode:
+                if solver.modes[i] != last_mode:
                     changed = True
                     if solver.modes[i] != STUCK and solver.y[slip_index[i]] == 0.0:
                         step.has_consistent_modes = model.is_consistent(solver.t, solver.y, solver.modes, i)

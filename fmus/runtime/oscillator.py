@@ -1,8 +1,16 @@
-"""Base class of all models: protocol between a model and the solver."""
+"""Base class of all models: what a model offers to the solver.
+
+Methods with a docstring only are declarations: the generated class of a model defines those that its flags require, and
+FMUs do not carry them. stick_slip.py and contact_lcp.py declare the methods of models with dry friction. A state vector
+runs over the states of a model, and a contact vector over its contacts; generated methods take and return their
+components.
+"""
 
 from math import inf
+from typing import Any
 
 from .variable_declarations import Count, Local, VariableOwner
+from .vectors import ContactVector, Derivatives, RateVector, StateVector
 
 
 class Events(VariableOwner):
@@ -15,22 +23,12 @@ class Events(VariableOwner):
 class Oscillator(VariableOwner):
     """Oscillator with one or more states.
 
-    The generated model class owns `solver`, an Integrator, and defines
-
-        initial_state(t)               states at the start time t
-        prepare()                      constants that depend on parameters; returns 0, or the number of a violated rule
-        rates(t, states, modes)        rates that are not states themselves; a mode is the direction of sliding, or 0
-                                       where the friction law evaluates the velocity itself
-        jacobian(t, states, modes)     for each of these rates its derivatives by t and by the states (for rodas)
-        compute_outputs(t, states, modes)   sets the outputs; returns whether all are finite
-        update_conditions(t, states, modes)   evaluates the conditions into `event_location`, if there are any
-
-    A model that is linear between its changes of mode, m v' + c v + k x = F + k u t, also defines
-
-        linear_coefficients()          m, c, k and u
-        applied_acceleration(t, modes) acceleration due to forces, at x = v = 0
-        applied_acceleration_derivative(t, n)   n-th derivative of that, if inputs have derivatives
+    Its constructor creates all attributes.
     """
+
+    solver: Any  # Integrator
+    event_location: Any  # EventLocation, of models with contacts or conditions
+    friction: int  # friction law, of models with contacts
 
     states: dict[str, str] = {"x": "v", "v": "a"}  # state -> its rate, which may be a state
     contacts: dict[str, str] = {}  # mode -> state that is the slip velocity of the contact
@@ -45,10 +43,9 @@ class Oscillator(VariableOwner):
     has_input_derivatives = False  # inputs are polynomials around t_base; has_higher_order() if any order exceeds 1
     is_linear = False  # piecewise linear (linear_closed_form.py)
     has_conditions = False  # choose() with conditions that change during a step (event_location.py)
-    # event functions: number, first of a condition; conditions that switch (others must hold); rule of the first
-    n_event_functions = first_condition = n_switches = first_condition_rule = 0
-    rules: tuple[str, ...] = ()  # message for each rule that several values must satisfy; fields are their names
-    own_solver_rule = 0  # number of the rule that concerns this solver only, not an importer's
+    # event functions: number, first of a condition; conditions that switch; status of the first of the others, limits
+    n_event_functions = first_condition = n_switches = first_limit_rule = 0
+    rules: dict[int, str] = {}  # status of each rule that values must satisfy -> message; fields are their names
     stop_time = 4.0
     step_size = 0.004
     tolerance = 1e-6
@@ -56,6 +53,42 @@ class Oscillator(VariableOwner):
     def __init__(self):
         super().__init__()
         self.events = Events()
+
+    def prepare(self) -> int:
+        """Compute the constants that depend on parameters; return OK, or the status of a violated rule."""
+
+    def initial_state(self, t: float) -> StateVector:
+        """Return the states at the start time t."""
+
+    def rates(self, t: float, y: StateVector, modes: ContactVector) -> RateVector:
+        """Return the rates of the states; a generated method returns those that are not states themselves.
+
+        A mode is the direction of sliding, or 0 where the friction law evaluates the velocity itself.
+        """
+
+    def jacobian(self, t: float, y: StateVector, modes: ContactVector) -> Derivatives:
+        """Return the derivatives of these rates by t and by the states, for implicit methods."""
+
+    def compute_outputs(self, t: float, y: StateVector, modes: ContactVector) -> bool:
+        """Set the outputs; return whether all are finite."""
+
+    def update_conditions(self, t: float, y: StateVector, modes: ContactVector) -> None:
+        """Evaluate the conditions into `event_location`, if there are any."""
+
+    def linear_coefficients(self) -> tuple[float, float, float, float]:
+        """Return m, c, k and u of a linear model: m v' + c v + k x = F + k u t between changes of mode."""
+
+    def applied_acceleration(self, t: float, modes: ContactVector) -> float:
+        """Return the acceleration of a linear model due to forces, at x = v = 0."""
+
+    def applied_acceleration_derivative(self, t: float, n: int) -> float:
+        """Return the n-th derivative of that, if inputs have derivatives."""
+
+    def set_input_rates(self, t: float) -> None:
+        """Set the rates of inputs with derivatives."""
+
+    def has_higher_order(self) -> bool:
+        """Return whether the polynomial of an input has an order above 1."""
 
     def nominal_velocity(self):
         """Return the velocity (m/s or rad/s) that the absolute tolerance must resolve; inf if there is none."""

@@ -9,13 +9,10 @@ from math import inf
 
 from . import conditions, event_location, phase_repetition, step_limits
 from .active_method import ActiveMethod
-from .codes import DIVERGED, EXACT, NEEDS_REPETITION, OK, STALLED, STUCK
+from .codes import DIVERGED, EPSILON, EXACT, NEEDS_REPETITION, NO_CONSISTENT_MODES, OK, ROUNDOFF_MARGIN, STALLED, STUCK
 from .event_location import INTERPOLANT_SHARE, NEAR_ZERO_SHARE
-from .extrema import largest_of
-from .interpolant import Interpolant
+from .interpolant import Interpolant, largest_of
 from .linear_closed_form import HIGHER_ORDER_INPUT
-from .rounding import EPSILON, ROUNDOFF_MARGIN
-from .stick_slip import NO_CONSISTENT_MODES
 from .vectors import (
     ContactVector,
     StateVector,

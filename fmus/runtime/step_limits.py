@@ -8,7 +8,7 @@ from math import fabs, sqrt
 
 from .codes import STUCK
 from .event_location import update_event_functions
-from .extrema import largest_of, smallest_of
+from .interpolant import largest_of, smallest_of
 from .vectors import RateVector, StateVector, contact_indices, contact_vector, slip_index
 
 MAX_CUBIC_ERROR = 0.02  # share of the range of an event function by which it may differ from a cubic polynomial

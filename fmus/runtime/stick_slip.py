@@ -8,9 +8,21 @@ principle, CACSD 1999).  contact_lcp.py treats several contacts.
 
 from math import fabs, inf
 
-from .codes import BACKWARD, EXACT, FIRST_RULE, FORWARD, HYBRID, MAX_INPUT_ORDER, SIGN, STUCK, THRESHOLD
+from .codes import (
+    BACKWARD,
+    EXACT,
+    FORWARD,
+    HYBRID,
+    HYBRID_LAW_ONLY,
+    MAX_INPUT_ORDER,
+    NO_CONSISTENT_MODES,
+    OK,
+    ROUNDOFF_MARGIN,
+    SIGN,
+    STUCK,
+    THRESHOLD,
+)
 from .oscillator import Oscillator
-from .rounding import ROUNDOFF_MARGIN
 from .vectors import (
     ContactIndex,
     ContactVector,
@@ -25,7 +37,6 @@ HYBRID_LAW = ("hybrid", HYBRID, "stick and slip are modes; every change of mode 
 SIGN_LAW = ("sign", SIGN, "sliding force times sign(v); no sticking; events are not located; chatters")
 THRESHOLD_LAW = ("threshold", THRESHOLD, "as sign, but friction balances the load below a small velocity; chatters")
 
-NO_CONSISTENT_MODES = FIRST_RULE + 2  # status: no modes satisfy the force balance (the second rule below)
 WRONG_WAY_TOLERANCE = 1e-9  # accelerations below this share of that due to friction are rounding errors
 
 
@@ -44,29 +55,32 @@ def threshold(v, eps, load, slide, hold):
 class DryFriction(Oscillator):
     """Oscillator with one body, which is at rest while its contact sticks.
 
-    The generated model also defines
-
-        stick_load(t, states)           load on the contact at rest, its rate, and the holding limit
-        load_magnitude(t, states)       sum of the absolute terms of the load, which scales its rounding error
-        load_derivative(t, states, n)   n-th derivative of the load, if inputs have derivatives
-        law_modes(t, states)            direction of slip under the laws sign and threshold, if they are offered; the
-                                        forces of these laws do not depend on the modes
-
     At rest the load is linear in time, unless an input has a higher order.
     """
 
     contacts: dict[str, str] = {"mode": "v"}
     has_dry_friction = rests_when_stuck = True
-    rules: tuple[str, ...] = (
-        "friction = {friction} with solver.method = 1 (exact) is refused: the closed form covers the hybrid law only; "
-        "set friction to 1 (hybrid), or solver.method to 2 (ode23)",
-        "no combination of stick and slip satisfies the force balance: a contact slides with a larger force than it "
-        "holds; set no sliding force above the holding force",
-    )
-    own_solver_rule = 1
+    rules: dict[int, str] = {
+        HYBRID_LAW_ONLY: "friction = {friction} with solver.method = 1 (exact) is refused: the closed form covers the "
+        "hybrid law only; set friction to 1 (hybrid), or solver.method to 2 (ode23)",
+        NO_CONSISTENT_MODES: "no combination of stick and slip satisfies the force balance: a contact slides with a "
+        "larger force than it holds; set no sliding force above the holding force",
+    }
 
     def prepare(self):
-        return 1 if self.friction != HYBRID and self.solver.method == EXACT else 0
+        return HYBRID_LAW_ONLY if self.friction != HYBRID and self.solver.method == EXACT else OK
+
+    def stick_load(self, t: float, y: StateVector, i: ContactIndex) -> tuple[float, float, float]:
+        """Return the load on the contact at rest, its rate, and the holding limit."""
+
+    def load_magnitude(self, t: float, y: StateVector, i: ContactIndex) -> float:
+        """Return the sum of the absolute terms of the load, which scales its rounding error."""
+
+    def load_derivative(self, t: float, y: StateVector, n: int, i: ContactIndex) -> float:
+        """Return the n-th derivative of the load, if inputs have derivatives."""
+
+    def law_modes(self, t: float, y: StateVector) -> ContactVector:
+        """Return the directions of slip under the laws sign and threshold, whose forces do not depend on modes."""
 
     def resolve_mode(self, t, y: StateVector, tie_tolerance, i: ContactIndex):
         """Return the mode from time t on.

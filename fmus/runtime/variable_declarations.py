@@ -9,7 +9,10 @@ from __future__ import annotations
 from math import inf, isfinite
 from typing import Any
 
-from .call_sequence import is_in_range
+
+def is_in_range(value: float, low: float, high: float, above: float, below: float) -> bool:
+    """Return whether a value is in a range; NaN and infinities never are."""
+    return isfinite(value) and low <= value <= high and above < value < below
 
 
 class VariableDeclaration:

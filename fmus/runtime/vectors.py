@@ -15,6 +15,7 @@ StateVector = npt.NDArray[np.float64]
 RateVector = npt.NDArray[np.float64]
 ContactVector = npt.NDArray[np.int64]
 ContactIndex = int
+Derivatives = tuple[RateVector, npt.NDArray[np.float64]]  # of rates by time, and by the states
 
 # Indices of the current model: all states; states that are the rate of another; all contacts; for each contact the
 # index of its slip velocity and of the state whose rate that is.
@@ -29,14 +30,14 @@ rate_index: list[int] = []  # index of the rate, where it is a state
 SMALL = 1e-6  # smallest ratio of a pivot to the entries below it
 
 
-def state_vector():
+def state_vector() -> StateVector:
     """Return a vector over the states, to be filled."""
     return np.zeros(len(state_indices))
 
 
-def contact_vector():
+def contact_vector() -> ContactVector:
     """Return a vector over the contacts, to be filled."""
-    return np.zeros(len(contact_indices))
+    return np.zeros(len(contact_indices))  # type: ignore[return-value]
 
 
 def magnitude(a):
@@ -130,7 +131,7 @@ def factorize(g, h, J):
     return g, h, w, inverse
 
 
-def solve_factored(system, r):
+def solve_factored(system, r) -> StateVector:
     """Solve (1 - g h J) k = g r for k."""
     g, h, w, inverse = system
     computed, k = [i for i in state_indices if is_dynamic[i]], np.zeros(len(r))
@@ -178,7 +179,7 @@ def factorize_complex(re, im, J):
     return w, inverse
 
 
-def solve_complex(system, r, q):
+def solve_complex(system, r, q) -> tuple[StateVector, StateVector]:
     """Solve for a right-hand side r + i q that is zero for states whose rate is a state; return both parts of the
     solution, for the other states only."""
     w, inverse = system

@@ -95,7 +95,7 @@ class EmbeddedModel:
             instance.solver.method = method_numbers(model)[method]
         violated = instance.prepare()
         if violated:
-            raise HarnessError(instance.rules[violated - 1].format_map(vars(instance)))
+            raise HarnessError(instance.rules[violated].format_map(vars(instance)))
         return cls(instance)
 
     def start_run(self, stop: float) -> None:

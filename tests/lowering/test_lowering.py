@@ -3,23 +3,26 @@
 import ast
 import re
 import traceback
+from inspect import isfunction, signature
 from pathlib import Path
 
 import pytest
 from internal_steps import array_steps, scalar_steps
-from models import CASES, MODELS, ROOT, label, model_class
+from models import CASES, LARGER_MODELS, MODELS, ROOT, label, model_class
 
 from fmus.packaging.lowering import LoweringError, function_tree, lowered_files, lowered_model, select_features
 from fmus.packaging.lowering.dead_code import prune_assignment
 from fmus.packaging.lowering.emit_source import SourceEmitter, SourceLine
 from fmus.packaging.lowering.layout import ModelLayout
-from fmus.packaging.lowering.lowered_sources import lower_all
+from fmus.packaging.lowering.lowered_sources import lower_all, runtime_symbols
 from fmus.packaging.lowering.source_symbols import SourceSymbols
 from fmus.packaging.model_lookup import find_model
 from fmus.runtime import stick_slip
+from fmus.runtime.vectors import ContactIndex, ContactVector, StateVector
 
 NUMERICS = ("step_control.py", "stick_slip.py", "integrator.py")
 STEPS = 150  # of a run, enough for some events
+VECTORS, DECLARATIONS = ((ROOT / "fmus" / "runtime" / name).read_text() for name in ("vectors.py", "oscillator.py"))
 EVERY_MODEL = pytest.mark.parametrize("name", MODELS)
 
 
@@ -29,6 +32,22 @@ def test_arrays_and_scalars_give_the_same_bits_at_every_step(case):
     scalars = scalar_steps(model_class(name)(), values, stop, STEPS)
     assert scalars == array_steps(find_model(name).model(), values, stop, STEPS)
     assert scalars
+
+
+@pytest.mark.parametrize("path", [*MODELS, *LARGER_MODELS], ids=str)
+def test_the_runtime_declares_each_generated_method_with_its_arguments(path):
+    model, checked = find_model(path).model, set()
+    components = {StateVector: model.states, ContactVector: model.contacts, ContactIndex: ()}
+    for name, function in vars(model).items():
+        if isfunction(function) and name != "__init__":
+            declared = next(vars(base)[name] for base in model.__mro__[1:] if name in vars(base))
+            types = declared.__annotations__
+            expected = [
+                one for word in signature(declared).parameters for one in components.get(types.get(word), [word])
+            ]
+            assert list(signature(function).parameters) == expected
+            checked.add(name)
+    assert {"prepare", "initial_state", "rates", "jacobian", "compute_outputs"} <= checked
 
 
 @EVERY_MODEL
@@ -106,13 +125,13 @@ def test_an_unsupported_construct_is_refused_with_file_line_and_remedy(body):
     text = HEAD + body + "\n"
     spec = ModelLayout({"x": "v", "v": "a"}, {"mode": "v"})
     with pytest.raises(LoweringError, match=re.escape(BODIES[body])) as caught:
-        SourceEmitter(spec, SourceSymbols([text]), "runtime/some.py", text, True)
+        SourceEmitter(spec, SourceSymbols([text, DECLARATIONS], VECTORS), "runtime/some.py", text, True)
     assert re.match(r"runtime/some\.py:[234]: ", str(caught.value))
 
 
-def test_colliding_stage_names_are_refused():
-    with pytest.raises(Exception, match="take another name"):
-        ModelLayout({"x": "v", "x2": "v2", "v": "a", "v2": "b"}, {})
+def test_states_named_like_each_other_at_a_stage_get_distinct_readable_names():
+    names = runtime_symbols().resolve_names({"x": "v", "x2": "v2", "v": "a", "v2": "b"}, ["mode"])
+    assert names == {name: name for name in ("x", "v", "a", "b", "mode")} | {"x2": "x2_", "v2": "v2_"}
 
 
 def test_a_model_is_lowered_only_once():
@@ -174,6 +193,6 @@ def f(model, x):
     return 3
 """
     spec = ModelLayout({"x": "v", "v": "a"}, {"mode": "v"}, {"has_driver": False})
-    lines = SourceEmitter(spec, SourceSymbols([text]), "runtime/some.py", text, True).lines
+    lines = SourceEmitter(spec, SourceSymbols([text, DECLARATIONS], VECTORS), "runtime/some.py", text, True).lines
     assert lines[2:4] == ["    if x < 1e-3:  # as it is written", "        return 0"]
     assert lines[4:] == ["    if x > 1.0:", "        return 2", "    return 3", ""]

@@ -7,8 +7,7 @@ from internal_steps import prepared_model, start
 from models import DOP853, LARGER_MODELS, write_growing_friction_model
 from scipy.integrate import solve_ivp
 
-from fmus.packaging.fmi_variables import model_exchange_instance
-from fmus.packaging.lowering import lowered_model, sibling_module
+from fmus.packaging.lowering import lowered_model, model_exchange_instance, sibling_module
 
 FILES = {path.stem: path for path in LARGER_MODELS}
 

@@ -4,9 +4,8 @@ import pytest
 from internal_steps import compute_step, prepared_model, start, state_values
 from models import DOP853, LARGER_MODELS, MODELS, ODE45, RODAS, declared
 
-from fmus.packaging.fmi_variables import model_exchange_instance
-from fmus.packaging.lowering import lowered_model, sibling_module
-from fmus.runtime.stick_slip import NO_CONSISTENT_MODES
+from fmus.packaging.lowering import lowered_model, model_exchange_instance, sibling_module
+from fmus.runtime.codes import NO_CONSISTENT_MODES
 
 FILES = {path.stem: path for path in LARGER_MODELS}
 ULP = 2.0**-52

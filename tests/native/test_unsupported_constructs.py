@@ -6,9 +6,8 @@ import re
 import pytest
 from models import MODELS, model_class
 
-from fmus.packaging.native.c_types import FLOAT
+from fmus.packaging.native.c_types import FLOAT, UnsupportedConstructError
 from fmus.packaging.native.call_graph import CallGraph
-from fmus.packaging.native.diagnostics import UnsupportedConstructError
 from fmus.packaging.native.sources import collect_sources
 from tests.native.test_language_subset import THIRD, Allowed, Part, half
 

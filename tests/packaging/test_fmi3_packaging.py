@@ -18,7 +18,7 @@ from lxml import etree
 from models import ROOT, declared, model_class
 from PIL import Image
 
-from fmus.packaging.fmi_variables import model_exchange_instance
+from fmus.packaging.lowering import model_exchange_instance
 from fmus.packaging.model_lookup import find_model, model_names
 from fmus.packaging.native.sources import FMI_HEADERS, OWN_HEADERS
 from fmus.runtime.variable_declarations import variables

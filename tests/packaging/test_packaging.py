@@ -346,7 +346,6 @@ def test_imports_are_followed_through_packages_for_any_line_ends(tmp_path):
     results = embedded_files(ODD, {}, tmp_path)
     assert set(results) == set(files) - {"runtime/idle.py"} | {
         "__init__.py",
-        "pythonfmu_workarounds.py",
         "pythonfmu/__init__.py",
         "pythonfmu/logmsg.py",
     }

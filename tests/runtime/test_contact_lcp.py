@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 from fmus.runtime import contact_lcp, vectors
-from fmus.runtime.codes import STUCK
+from fmus.runtime.codes import ROUNDOFF_MARGIN, STUCK
 from fmus.runtime.contact_lcp import AT_REST, CoupledFriction
-from fmus.runtime.rounding import ROUNDOFF_MARGIN
 
 
 class Chain(CoupledFriction):

@@ -1,9 +1,15 @@
 """Run the vector form of the numerics on numpy arrays."""
 
+from typing import get_args
+
 import numpy as np
 
 from fmus.packaging.lowering.layout import NAMED_VECTOR
 from fmus.runtime.vectors import (
+    ContactIndex,
+    ContactVector,
+    RateVector,
+    StateVector,
     contact_indices,
     is_dynamic,
     position_index,
@@ -14,9 +20,7 @@ from fmus.runtime.vectors import (
     velocity_indices,
 )
 
-CONTACT_RESULTS = (
-    *("slip_velocities", "slip_magnitudes", "contact_forces", "contact_rates", "apply_impulses", "law_modes"),
-)
+VECTOR_TYPES = (StateVector, RateVector, ContactVector)
 
 
 def to_array_model(model):
@@ -38,26 +42,21 @@ def to_array_model(model):
         methods = model.solver.step.active_method
         methods.exact = array_exact_method(methods.exact)
     cls = type(model)
-    alone, all_of_them = (
-        ("stick_load", "load_magnitude", "breakaway_acceleration"),
-        ("slip_velocities", "slip_magnitudes", "contact_forces", "contact_rates", "apply_impulses"),
-    )
-    about = {}
-    for name in (
-        "rates",
-        "jacobian",
-        "applied_acceleration",
-        "compute_outputs",
-        *(all_of_them if cls.is_coupled else ()),
-        *(["update_conditions"] if cls.has_conditions else ()),
-        *(["law_modes"] if cls.has_other_laws else ()),
-    ):
-        about[name] = call_with_scalars(cls, name)
-    for name in alone if modes and not cls.is_coupled else ():
-        if not getattr(cls, name).__module__.startswith("fmus.runtime"):
-            about[name] = call_for_single_contact(cls, name)
-    model.__class__ = type(cls.__name__, (cls,), about)
+    methods = {name: declaration(cls, name) for name in vars(cls)}
+    wrapped = {name: call_with_scalars(cls, name, types) for name, types in methods.items() if takes_vectors(types)}
+    model.__class__ = type(cls.__name__, (cls,), wrapped)
     return model
+
+
+def declaration(cls, name):
+    """Return the types of parameters and result with which the runtime declares a method of a generated class."""
+    function = next((vars(base)[name] for base in cls.__mro__[1:] if name in vars(base)), None)
+    return getattr(function, "__annotations__", {})
+
+
+def takes_vectors(types):
+    """Return whether a parameter of a method is a vector."""
+    return any(kind in VECTOR_TYPES for name, kind in types.items() if name != "return")
 
 
 def store_vectors_as_arrays(thing):
@@ -78,13 +77,15 @@ def store_vectors_as_arrays(thing):
             store_vectors_as_arrays(value)
 
 
-def call_with_scalars(cls, name):
-    """Wrap a method of the model so that it takes and returns vectors."""
+def call_with_scalars(cls, name, types):
+    """Wrap a method of the model so that it takes and returns vectors; a single contact needs no index."""
+    results = get_args(types.get("return")) or (types.get("return"),)
 
-    def call(self, t, *vectors):
-        result = getattr(cls, name)(self, t, *numbers(vectors))
+    def call(self, t, *arguments):
+        arguments = arguments[:-1] if ContactIndex in types.values() else arguments
+        result = getattr(cls, name)(self, t, *numbers(arguments))
         if name == "rates":
-            y, result = vectors[0], iter(result if isinstance(result, tuple) else (result,))
+            y, result = arguments[0], iter(result if isinstance(result, tuple) else (result,))
             return np.array([next(result) if is_dynamic[i] else y[rate_index[i]] for i in state_indices])
         if name == "jacobian":
             result, f_t, J = iter(result), state_vector(), np.zeros((len(state_indices), len(state_indices)))
@@ -92,21 +93,10 @@ def call_with_scalars(cls, name):
                 if is_dynamic[i]:
                     f_t[i], J[i] = next(result), [next(result) for _ in state_indices]
             return f_t, J
-        if name in CONTACT_RESULTS:
+        if results[0] in VECTOR_TYPES:
             result = np.array(result if isinstance(result, tuple) else (result,))
-            parts = len(result) // (len(state_indices) if name == "apply_impulses" else len(contact_indices))
-            return result if parts == 1 else np.split(result, parts)
+            return result if len(results) == 1 else np.split(result, len(results))
         return result
-
-    return call
-
-
-def call_for_single_contact(cls, name):
-    """Wrap a method of a model with a single contact so that it takes vectors and a contact index."""
-
-    def call(self, t, *vectors):
-        *vectors, _ = vectors
-        return getattr(cls, name)(self, t, *numbers(vectors))
 
     return call
 

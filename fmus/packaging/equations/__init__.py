@@ -4,12 +4,16 @@
     model_declaration.py        variables, rules and the base class of models
     model_file.py               loads a model file and reports errors with file and line
     algebra.py                  substitution, differentiation, solving for a variable, rounding scales
-    model_analysis.py           roles of variables, contact loads, applicable solvers
+    conditions.py               conditions of the equations that may change during a step
+    model_roles.py, declaration_checks.py, contact_analysis.py, model_analysis.py
+                                structural analysis: roles of variables, contact loads, applicable solvers
     dimensions.py               checks the units of expressions
-    generated_names.py          names reserved by generated models
+    start_values.py             names the expression that has no value at the start
+    python_errors.py            explains Python exceptions in model files
+    reserved_names.py           names reserved by generated models and in C
     expression_printer.py       prints expressions as Python statements
     codegen_context.py          shared by the generators of methods
-    setup_methods.py, rate_methods.py, single_contact_methods.py, coupled_contact_methods.py, output_method.py
+    setup_methods.py, rate_methods.py, single_contact_methods.py, coupled_contact_methods.py, output_methods.py
                                 generate the methods of a model class
     model_source.py             generates the module
 

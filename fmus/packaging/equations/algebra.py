@@ -170,8 +170,17 @@ def negate(e: Operand) -> Operand:
     return Term("neg", e)
 
 
-def differentiate(e: Operand, by: Mapping[Expression, Operand], memo: Memo | None = None) -> Operand:
-    """Return the derivative of e, where `by` gives the derivatives of the variables."""
+def differentiate(
+    e: Operand,
+    by: Mapping[Expression, Operand],
+    names: dict[Expression, str] | None = None,
+    memo: Memo | None = None,
+) -> Operand:
+    """Return the derivative of e, where `by` gives the derivatives of the variables.
+
+    New terms that are derivatives of named terms are added to `names`.
+    """
+    names = {} if names is None else names
     memo = {} if memo is None else memo
     if id(e) in memo:
         return memo[id(e)]
@@ -179,15 +188,16 @@ def differentiate(e: Operand, by: Mapping[Expression, Operand], memo: Memo | Non
         return by.get(e, 0.0)
 
     def slope(one: Operand) -> Operand:
-        return differentiate(one, by, memo)
+        return differentiate(one, by, names, memo)
 
     if isinstance(e, Output):
         new = slope(e.expression)
     else:
         assert isinstance(e, Term)
         new = _differentiate_term(e, slope)
-    if e.name and isinstance(new, Term) and not new.name and id(new) not in subexpressions(e):
-        new.name = f"d{e.name}_d{next(iter(by)).name}"
+    name = e.name or names.get(e, "")
+    if name and isinstance(new, Term) and not (new.name or new in names) and id(new) not in subexpressions(e):
+        names[new] = f"d{name}_d{next(iter(by)).name}"
     memo[id(e)] = new
     return new
 

@@ -6,8 +6,9 @@ from .algebra import depends_on, operands, subexpressions, substitute
 from .conditions import LIMITED_DOMAIN
 from .expression_printer import INDENT, ExpressionPrinter
 from .expressions import Expression, Operand, Term
-from .model_analysis import TIME, ModelAnalysis
+from .model_analysis import ModelAnalysis
 from .model_declaration import Contact
+from .model_roles import TIME
 
 MAX_RETURN_LENGTH = 100  # characters
 OVERFLOWING = ("exp", "sinh", "cosh")  # functions that raise an error for large arguments
@@ -21,24 +22,29 @@ class CodegenContext:
         self.rate_expressions = [an.rate_outputs[s] for s in an.dynamic_states]  # outputs that are rates of states
         self.driver = an.drivers[0] if an.drivers else None
         taken = {e.name for e in an.declared}
+        self.names = an.names  # of terms that the model does not name
         for c in an.contacts:
             for name, e in ("load", an.load.get(c)), ("slide", c.slide), ("limit", an.holding_limit[c]):
                 name += "" if an.waits else f"_{c.name}"
-                if isinstance(e, Term) and not e.name and name not in taken:
-                    e.name = name
+                if isinstance(e, Term) and not self.name_of(e) and name not in taken:
+                    self.names[e] = name
         for (c, d), e in an.A.items():
             if (
                 isinstance(e, Term)
-                and not e.name
+                and not self.name_of(e)
                 and not depends_on(e, an.inputs)
                 and f"A_{c.name}_{d.name}" not in taken
             ):
-                e.name = f"A_{c.name}_{d.name}"
+                self.names[e] = f"A_{c.name}_{d.name}"
         self.states = [s.name for s in an.states]
         self.modes = [c.mode.name for c in an.contacts]
         self.arguments = ["t", *self.states, *self.modes]
         self.used_names = taken | {"self", *self.arguments}
         self.constants = self._constants()
+
+    def name_of(self, e: Expression) -> str:
+        """Return the name of an expression: that of the model, or of a derived term; empty if it has none."""
+        return e.name or self.names.get(e, "")
 
     def _constants(self) -> list[Term]:
         """Return named expressions of parameters that the equations need; prepare() computes them.
@@ -50,7 +56,7 @@ class CodegenContext:
         safe_divisors: set[int] = set()  # other equations divide by them
 
         def walk(e: Operand, in_case: bool) -> None:
-            is_constant = isinstance(e, Term) and e.name and not depends_on(e, (*an.time_varying, *an.inputs))
+            is_constant = isinstance(e, Term) and self.name_of(e) and not depends_on(e, (*an.time_varying, *an.inputs))
             if is_constant and not (in_case and can_fail(e, safe_divisors)):
                 result[id(e)] = e
                 return
@@ -79,7 +85,7 @@ class CodegenContext:
         for n, condition in enumerate(an.switches):
             if condition.is_frozen:
                 given |= dict.fromkeys(condition.comparisons, f"self.event_location.sides[{n}] > 0.0")
-        return ExpressionPrinter(given, self.constants, self.used_names, depth)
+        return ExpressionPrinter(given, self.constants, self.used_names, depth, self.names)
 
     def emit_driver(self, s: ExpressionPrinter, targets: Sequence[Operand]) -> None:
         """Emit the position of the driver and time-dependent inputs, if the targets need them."""
@@ -162,6 +168,11 @@ def is_magnitude_of(e: Operand, drive: Expression) -> bool:
 def method_source(name: str, arguments: Sequence[str], lines: list[str]) -> str:
     """Return the source of a method."""
     return "\n".join([f"{INDENT}def {name}({', '.join(('self', *arguments))}):", *lines])
+
+
+def rule_status(n: int) -> str:
+    """Return the status of the n-th rule of a model."""
+    return f"MODEL_RULE + {n}" if n else "MODEL_RULE"
 
 
 def can_fail(e: Operand, safe_divisors: Collection[int]) -> bool:

@@ -7,7 +7,7 @@ equations are smooth in every step.  Limits must hold during the whole run.
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from .algebra import depends_on, is_same_expression, operands, subexpressions
+from .algebra import depends_on, is_constant, is_same_expression, operands, subexpressions
 from .expressions import COMPARISONS, Expression, Operand, Term
 from .model_declaration import Fixed, Input, Parameter
 
@@ -50,7 +50,7 @@ def comparison_margin(e: Term) -> Operand:
     """Return the difference of both sides, positive where the comparison holds."""
     a, b = e.args
     larger, smaller = (b, a) if e.op in ("<", "<=") else (a, b)
-    margin = larger if smaller == 0.0 and not isinstance(smaller, Expression) else Term("-", larger, smaller)
+    margin = larger if is_constant(smaller, 0.0) else Term("-", larger, smaller)
     # equal sides count as a positive margin where the comparison includes them
     return Term("+", margin, 1e-300) if e.op in ("<=", ">=") else margin
 

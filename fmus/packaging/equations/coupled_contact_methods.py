@@ -8,11 +8,11 @@ derivatives and impulses of the forces satisfy systems with the same matrix.
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from .algebra import build_term, differentiate, is_same_expression, rounding_scale, substitute
+from .algebra import build_term, is_same_expression, rounding_scale, substitute
 from .codegen_context import CodegenContext, emit_return, emit_scales, method_source
+from .contact_analysis import SMALLEST_DIVISOR
 from .expression_printer import ExpressionPrinter
-from .expressions import Expression, Operand, Term
-from .model_analysis import SMALLEST_DIVISOR
+from .expressions import Expression, Operand, Term, is_among
 from .model_declaration import SIGN, THRESHOLD, Contact, State
 
 
@@ -51,20 +51,19 @@ def force_unknown(f: CodegenContext) -> ContactUnknown:
     """Return the contact forces as unknowns."""
     an = f.an
     none = dict.fromkeys(an.contacts, 0.0)
-    held = {c: an.load[c] if c in an.independent_contacts else substitute(an.slip_rate[c], none) for c in an.contacts}
+    held = {c: an.load[c] if c in an.load else substitute(an.slip_rate[c], none) for c in an.contacts}
     return ContactUnknown({c: c for c in an.contacts}, {c: Term("*", c.mode, c.slide) for c in an.contacts}, held)
 
 
 def derivative_unknown(f: CodegenContext, name: str, by: dict[Expression, Operand]) -> ContactUnknown:
     """Return the derivatives of the forces along `by` as unknowns."""
     an, fixed = f.an, by | dict.fromkeys(f.an.contacts, 0.0)
-    slides = {c: build_term("*", c.mode, differentiate(c.slide, by)) for c in an.contacts}
+    slides = {c: build_term("*", c.mode, an.derivative(c.slide, by)) for c in an.contacts}
     held = {
-        c: differentiate(an.load[c], by) if c in an.independent_contacts else differentiate(an.slip_rate[c], fixed)
-        for c in an.contacts
+        c: an.derivative(an.load[c], by) if c in an.load else an.derivative(an.slip_rate[c], fixed) for c in an.contacts
     }
     zero = {
-        c: [slides[c], held[c], *([differentiate(an.holding_limit[c], by)] if THRESHOLD in c.laws else [])]
+        c: [slides[c], held[c], *([an.derivative(an.holding_limit[c], by)] if THRESHOLD in c.laws else [])]
         for c in an.contacts
     }
     none = {c for c in an.contacts if all(is_same_expression(e, 0.0) for e in zero[c])}
@@ -103,10 +102,10 @@ def emit_solution(
             with s.block(head):
                 for n in own:
                     s.emit(f"{names[n, c]} = {s.text(getattr(unknowns[n], attribute)[c])}")
-                for d in shared if c in shared else []:
+                for d in shared if is_among(c, shared) else []:
                     s.emit(f"{matrix[c, d]} = {s.text(f.an.A[c, d] if attribute == 'stuck_values' else float(c is d))}")
     sides = [{c: names[n, c] for c in shared} for n in range(len(unknowns)) if all((n, c) in names for c in shared)]
-    emit_elimination(s, shared, matrix, sides, any(c in f.an.variable_lever_contacts for c in shared))
+    emit_elimination(s, shared, matrix, sides, any(is_among(c, f.an.variable_lever_contacts) for c in shared))
     for (n, c), name in names.items():
         s.bound_names[unknowns[n].symbols[c]] = name
 
@@ -169,9 +168,7 @@ def forces_method(f: CodegenContext) -> str:
     """Forces, limits and rounding scales of the forces."""
     an, s, u = f.an, f.printer(), force_unknown(f)
     sizes = [
-        rounding_scale(an.load[c])
-        if c in an.independent_contacts
-        else build_term("/", rounding_scale(an.slip_rate[c]), an.divisor(c))
+        rounding_scale(an.load[c]) if c in an.load else build_term("/", rounding_scale(an.slip_rate[c]), an.divisor(c))
         for c in an.contacts
     ]
     limits = [an.holding_limit[c] for c in an.contacts]
@@ -188,13 +185,13 @@ def force_rates_method(f: CodegenContext) -> str:
     flow = an.time_derivatives | {c: rate.symbols[c] for c in an.contacts}
     pulls, pull_rates = [], []
     for c in an.contacts:
-        if c in an.independent_contacts:
+        if c in an.load:
             pulls.append(build_term("-", an.load[c], c))
-            pull_rates.append(build_term("-", differentiate(an.load[c], an.time_derivatives), rate.symbols[c]))
+            pull_rates.append(build_term("-", an.derivative(an.load[c], an.time_derivatives), rate.symbols[c]))
         else:
             pulls.append(build_term("/", an.slip_rate[c], an.divisor(c)))
-            pull_rates.append(build_term("/", differentiate(an.slip_rate[c], flow), an.divisor(c)))
-    rates = [*rate.symbols.values(), *(differentiate(an.holding_limit[c], an.time_derivatives) for c in an.contacts)]
+            pull_rates.append(build_term("/", an.derivative(an.slip_rate[c], flow), an.divisor(c)))
+    rates = [*rate.symbols.values(), *(an.derivative(an.holding_limit[c], an.time_derivatives) for c in an.contacts)]
     targets = [*rates, *pulls, *pull_rates]
     f.emit_driver(s, [*u.terms, *rate.terms, *targets])
     s.count_uses(*u.terms, *rate.terms, *targets)
@@ -206,16 +203,14 @@ def force_rates_method(f: CodegenContext) -> str:
 def impulse_method(f: CodegenContext) -> str:
     """States after impulses that stop the slips of stuck contacts, exactly where slips are sums of speeds."""
     an, s = f.an, f.printer()
-    ends = {
-        c: c.slip if c not in an.independent_contacts else build_term("/", c.slip, an.divisor(c)) for c in an.contacts
-    }
+    ends = {c: c.slip if c not in an.load else build_term("/", c.slip, an.divisor(c)) for c in an.contacts}
     impulse = ContactUnknown(
         {c: local_symbol(f"impulse_{c.name}") for c in an.contacts}, dict.fromkeys(an.contacts, 0.0), ends
     )
     after: dict[State, Operand] = {}
     for state in an.dynamic_states:
         for c in an.contacts:
-            effect = differentiate(an.rate_outputs[state], {c: 1.0})
+            effect = an.derivative(an.rate_outputs[state], {c: 1.0})
             if not is_same_expression(effect, 0.0):
                 after[state] = build_term("+", after.get(state, state), build_term("*", effect, impulse.symbols[c]))
     f.emit_driver(s, [*impulse.terms, *after.values()])

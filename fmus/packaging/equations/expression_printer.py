@@ -27,15 +27,22 @@ COMPARISON_OPERATORS: dict[str, ast.cmpop] = {
 class ExpressionPrinter:
     """Prints the lines of one block.
 
-    `given` maps variables to their names in the block; `kept` are constants stored as attributes of the model.
+    `given` maps variables to their names in the block; `kept` are constants stored as attributes of the model; `names`
+    are those of terms that the model does not name.
     """
 
     def __init__(
-        self, given: Mapping[Expression, str], kept: Collection[Expression], taken: Collection[str], depth: int
+        self,
+        given: Mapping[Expression, str],
+        kept: Collection[Expression],
+        taken: Collection[str],
+        depth: int,
+        names: Mapping[Expression, str] | None = None,
     ) -> None:
         self.bound_names, self.constants, self.used_names = dict(given), kept, set(taken)
         self.lines: list[str] = []
         self.depth = depth
+        self.names = {} if names is None else names
         self.local_names: dict[int, str] = {}  # value number -> local variable
         self.author_names: dict[int, str] = {}
         self._use_counts: Counter[int] = Counter()
@@ -86,9 +93,14 @@ class ExpressionPrinter:
         self._kept_alive.append(e)
         if isinstance(e, Expression):
             self._number_by_id[id(e)] = number
-            if e.name and (isinstance(e, VariableDeclaration) or number not in self.author_names):
-                self.author_names[number] = e.name
+            name = self.name_of(e)
+            if name and (isinstance(e, VariableDeclaration) or number not in self.author_names):
+                self.author_names[number] = name
         return number
+
+    def name_of(self, e: Expression) -> str:
+        """Return the name of an expression, or an empty text."""
+        return e.name or self.names.get(e, "")
 
     def _is_constant(self, e: Operand) -> bool:
         return isinstance(e, Expression) and any(e is one for one in self.constants)
@@ -148,7 +160,7 @@ class ExpressionPrinter:
         if (number := self.value_number(e)) in self.local_names:
             return ast.Name(self.local_names[number])
         if isinstance(e, (Parameter, Fixed, Input, Choice)) or self._is_constant(e):
-            return ast.Attribute(ast.Name("self"), e.name)
+            return ast.Attribute(ast.Name("self"), self.name_of(e))
         if isinstance(e, Output):
             return self._to_ast(e.expression)
         if not isinstance(e, Term):

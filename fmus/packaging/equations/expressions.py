@@ -2,13 +2,12 @@
 
 import math
 import sys
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Iterable
 from numbers import Real
 from pathlib import Path
 from typing import Any, Never
 
 EQUATIONS_FOLDER = str(Path(__file__).parent)
-PACKAGING_FOLDER = str(Path(__file__).parents[2] / "packaging")
 Operand = Any  # an expression or a number
 
 # The derivative of each function, as a function of argument and value.
@@ -33,6 +32,16 @@ POWERS: dict[object, str] = {2: "{0} * {0}", 3: "{0} * {0} * {0}", 0.5: "sqrt({0
 NO_VALUE = (
     "{name} has no value at build time, so functions of math and numpy do not take it: import functions from fmus, "
     f"which has {', '.join(FUNCTIONS)}"
+)
+
+
+NO_TRUTH = (
+    "{name} has no value at build time, as if, and, or, not, max, min and a < x < b would need: write "
+    "choose(condition, this, that), for example choose(x > 0.0, x, 0.0) instead of max(x, 0.0)"
+)
+NO_EQUALITY = (
+    "== and != cannot compare expressions, which have no value yet: write choose(a < b, this, that), or "
+    "name.choose(label=this, ...) for a Choice"
 )
 
 
@@ -88,15 +97,11 @@ class Expression:
     def __abs__(self) -> "Term":
         return Term("fabs", self)
 
-    def __eq__(self, other: object) -> bool:
-        """Compare by identity within this package; raise ModelError in model files."""
-        if self is not other and not sys._getframe(1).f_code.co_filename.startswith(PACKAGING_FOLDER):
-            raise ModelError(
-                "== and != cannot compare expressions, which have no value yet: write choose(a < b, this, that), or "
-                "name.choose(label=this, ...) for a Choice"
-            )
-        return self is other
+    def __eq__(self, other: object) -> "Term":  # type: ignore[override]
+        """Return a comparison; `is` and the keys of sets and dictionaries compare by identity."""
+        return Term("==", self, other)
 
+    __ne__ = _refusal(NO_EQUALITY)
     __hash__ = object.__hash__
 
     def __pow__(self, exponent: Hashable) -> Never:
@@ -107,10 +112,7 @@ class Expression:
         )
 
     __rpow__ = _refusal("** is not supported, because its rounding differs between platforms: write exp(x * log(a))")
-    __bool__ = _refusal(
-        "{name} has no value at build time, as if, and, or, not, max, min and a < x < b would need: write "
-        "choose(condition, this, that), for example choose(x > 0.0, x, 0.0) instead of max(x, 0.0)"
-    )
+    __bool__ = _refusal(NO_TRUTH)
     __float__ = _refusal(NO_VALUE)
     __mod__ = __rmod__ = __floordiv__ = __rfloordiv__ = __divmod__ = __rdivmod__ = __matmul__ = __rmatmul__ = _refusal(
         "%, // and @ are not supported: use +, -, *, / and choose(condition, this, that)"
@@ -150,6 +152,11 @@ def is_comparison(e: Operand) -> bool:
     return isinstance(e, Term) and e.op in COMPARISONS
 
 
+def is_among(e: object, expressions: Iterable[Expression]) -> bool:
+    """Return whether an object is one of some expressions."""
+    return any(e is one for one in expressions)
+
+
 def describe(value: object) -> str:
     """Return a short text for a value in a message."""
     if isinstance(value, (str, int, float, complex, type(None))):
@@ -164,6 +171,13 @@ class Term(Expression):
         self.location = author_location()
         condition = args[:1] if op == "choose" else ()
         self.op, self.args = op, (*condition, *map(as_operand, args[len(condition) :]))
+
+    def __bool__(self) -> Never:
+        raise (
+            ModelError(NO_EQUALITY)
+            if self.op == "=="
+            else ModelError(NO_TRUTH.format(name=self.name or "an expression"))
+        )
 
 
 def _function(name: str) -> Callable[[Operand], Operand]:
@@ -182,6 +196,8 @@ sqrt, fabs = map(_function, ("sqrt", "fabs"))
 
 def choose(condition: Operand, this: Operand, that: Operand) -> Term:
     """Return `this` where the condition, a comparison of expressions, is true, else `that`."""
-    if not (isinstance(condition, Term) and condition.op in COMPARISONS):
+    if isinstance(condition, Term) and condition.op == "==":
+        raise ModelError(NO_EQUALITY)
+    if not is_comparison(condition):
         raise ModelError("the first argument of choose() must be a comparison of expressions by <, <=, > or >=")
     return Term("choose", condition, this, that)

@@ -14,6 +14,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from ...runtime.codes import MODEL_RULE, OK
 from ...runtime.variable_declarations import VariableOwner
 from .. import BuildError
 from .dimensions import check_units
@@ -25,7 +26,7 @@ from .python_errors import check_statements, explain
 from .start_values import check_evaluation
 
 PACKAGE = __name__.split(".", 1)[0]
-RESERVED_FILE_NAMES = ("pythonfmu", "pythonfmu_workarounds", "runtime")  # embedded in the same package
+RESERVED_FILE_NAMES = ("pythonfmu", "runtime")  # embedded in the same package
 
 
 @dataclass(frozen=True)
@@ -86,7 +87,7 @@ class ModelFile:
     def _check_start_values(self, thing: Any) -> None:
         """Raise BuildError if the equations cannot be evaluated at the start values."""
         try:
-            rule = thing.prepare()
+            status = thing.prepare()
             begins = thing.initial_state(0.0)
             states = begins if isinstance(begins, tuple) else (begins,)  # a model with one state returns a number
             thing.compute_outputs(0.0, *states, *(0 for _ in self.analysis.contacts))
@@ -99,11 +100,10 @@ class ModelFile:
             except ModelError as named:
                 mistake = named
             raise self._build_error(mistake) from error
-        if rule:
-            sentence = thing.rules[rule - 1].format_map(vars(thing))
-            rules = self.analysis.rules
-            number = rule - 1 - (len(thing.rules) - len(rules))  # rules of the runtime come first
-            location = rules[number].broken.location if number >= 0 else self.analysis.model.location
+        if status != OK:
+            sentence = thing.rules[status].format_map(vars(thing))
+            own_rules = dict(enumerate(self.analysis.rules, MODEL_RULE))
+            location = own_rules[status].broken.location if status in own_rules else self.analysis.model.location
             raise self._build_error(ModelError(f"the start values are invalid: {sentence}", location))
 
     def _load_class(self) -> type[Model]:

@@ -7,19 +7,18 @@ from textwrap import indent, wrap
 
 from ...runtime.active_method import EXACT_ITEM
 from ...runtime.oscillator import Oscillator
-from ...runtime.stick_slip import DryFriction
-from ..reserved_names import string_literal
-from .codegen_context import CodegenContext
-from .condition_methods import condition_methods
+from ..text_output import string_literal
+from .codegen_context import CodegenContext, rule_status
 from .conditions import Condition
 from .coupled_contact_methods import coupled_contact_methods
 from .dimensions import Dimensions, declared_dimensions, dimensions_of, expression_text
 from .expression_printer import INDENT
-from .generated_names import IMPORTS, MATH
+from .expressions import is_among
 from .model_analysis import ModelAnalysis
 from .model_declaration import Contact, Fixed, Mode, Output, State, Variable
-from .output_method import law_modes_method, observe_method
+from .output_methods import condition_methods, law_modes_method, observe_method
 from .rate_methods import rate_methods
+from .reserved_names import IMPORTS, MATH
 from .setup_methods import setup_methods
 from .single_contact_methods import single_contact_methods
 
@@ -123,7 +122,7 @@ def output_declaration(an: ModelAnalysis, e: Variable) -> str:
         else ""
     )
     if isinstance(e, State):
-        more += f", rate={string_literal(e.constant_rate.name)}" if e in an.drivers else ""
+        more += f", rate={string_literal(e.constant_rate.name)}" if is_among(e, an.drivers) else ""
         return f"State({declaration_arguments(e)}{more})"
     if isinstance(e, Contact):
         return f"Contact({declaration_arguments(e)})"
@@ -171,16 +170,15 @@ def class_attribute_lines(an: ModelAnalysis) -> list[str]:
             f"condition_units = ({', '.join(string_literal(condition_unit(an, one)) for one in an.conditions)},)"
         )
     if an.limits:
-        own_rules = len(DryFriction.rules) + len(an.rules)
-        lines.append(f"first_condition_rule = {own_rules + 1 - len(an.switches)}")
+        lines.append(f"first_limit_rule = {rule_status(len(an.rules))}")
     for word in RUN_SETTINGS:
         if (value := float(getattr(an.model, word))) != getattr(Oscillator, word):
             lines.append(f"{word} = {value!r}")
     if an.rules or an.limits:
-        inherited = [f"{INDENT}*{base_class(an)}.rules,"] if an.contacts else []
+        inherited = [f"{INDENT}**{base_class(an)}.rules,"] if an.contacts else []
         messages = [rule.sentence for rule in an.rules] + [limit.sentence for limit in an.limits]
-        sentences = [f"{INDENT}{string_lines(message)}," for message in messages]
-        lines += ["rules = (", *inherited, *sentences, ")"]
+        sentences = [f"{INDENT}{rule_status(n)}: {string_lines(message)}," for n, message in enumerate(messages)]
+        lines += ["rules = {", *inherited, *sentences, "}"]
     return lines
 
 

@@ -1,6 +1,6 @@
 """Generates the methods for integrators: rates, Jacobian, coefficients of the linear closed form."""
 
-from .algebra import build_term, depends_on, differentiate, substitute
+from .algebra import build_term, depends_on, substitute
 from .codegen_context import CodegenContext, emit_return, method_source
 from .coupled_contact_methods import derivative_unknown, emit_friction_forces, emit_solution, force_unknown
 from .expression_printer import ExpressionPrinter
@@ -50,7 +50,7 @@ def jacobian_method(f: CodegenContext) -> str:
         return method_source(
             "jacobian",
             f.arguments,
-            f.return_lines(s, [differentiate(law, by) for law in f.rate_expressions for by in directions]),
+            f.return_lines(s, [f.an.derivative(law, by) for law in f.rate_expressions for by in directions]),
         )
     targets = [an.derivative_while_sliding(law, by) for law in f.rate_expressions for by in directions]
     if THRESHOLD in c.laws:
@@ -64,7 +64,7 @@ def jacobian_method(f: CodegenContext) -> str:
             if depends_on(c.slide, an.time_varying) or depends_on(an.holding_limit[c], an.time_varying):
                 limits = [by | {c: clipped_force_derivative(f, c, by)} for by in directions]
                 s.lines += f.return_lines(
-                    f.printer(s.depth), [differentiate(law, by) for law in f.rate_expressions for by in limits]
+                    f.printer(s.depth), [f.an.derivative(law, by) for law in f.rate_expressions for by in limits]
                 )
     f.emit_sign_mode(s, c, targets)
     return method_source("jacobian", f.arguments, f.return_lines(s, targets))
@@ -76,7 +76,7 @@ def coupled_jacobian_lines(
     """Return the lines that compute the Jacobian while some contacts slide and others stick."""
     forces = [derivative_unknown(f, f"by_{next(iter(by)).name}", by) for by in directions]
     targets = [
-        differentiate(law, by | u.symbols)
+        f.an.derivative(law, by | u.symbols)
         for law in f.rate_expressions
         for by, u in zip(directions, forces, strict=True)
     ]
@@ -100,7 +100,7 @@ def coupled_jacobian_lines(
 def clipped_force_derivative(f: CodegenContext, c: Contact, by: dict[Expression, Operand]) -> Operand:
     """Return the derivative of a force that the threshold law clips."""
     force_unknown = c if f.single_contact is None else f.an.load[c]
-    return build_term("*", Term("copysign", 1.0, force_unknown), differentiate(f.an.holding_limit[c], by))
+    return build_term("*", Term("copysign", 1.0, force_unknown), f.an.derivative(f.an.holding_limit[c], by))
 
 
 def closed_form_methods(f: CodegenContext) -> list[str]:
@@ -110,21 +110,12 @@ def closed_form_methods(f: CodegenContext) -> list[str]:
     targets = [law.expression for law in f.rate_expressions]
     targets = targets if f.single_contact is None else with_sliding_force(f.single_contact, targets)
     at_zero = dict.fromkeys(f.an.states, 0.0)
-    piece = method_source("linear_coefficients", (), f.return_lines(f.printer(), f.an.closed_form))
-    return [
-        piece,
-        *[
-            f.nth_derivative_method(
-                "applied_acceleration_derivative", ["t"], [differentiate(f.rate_expressions[0].expression, f.an.ramps)]
-            )
-        ]
-        * bool(f.an.ramps),
-        method_source(
-            "applied_acceleration",
-            ["t", *f.modes],
-            f.return_lines(f.printer(), [substitute(e, at_zero) for e in targets]),
-        ),
-    ]
+    methods = [method_source("linear_coefficients", (), f.return_lines(f.printer(), f.an.closed_form))]
+    if f.an.ramps:
+        slope = f.an.derivative(f.rate_expressions[0].expression, f.an.ramps)
+        methods.append(f.nth_derivative_method("applied_acceleration_derivative", ["t"], [slope]))
+    lines = f.return_lines(f.printer(), [substitute(e, at_zero) for e in targets])
+    return [*methods, method_source("applied_acceleration", ["t", *f.modes], lines)]
 
 
 def with_sliding_force(c: Contact, targets: list[Operand]) -> list[Operand]:

@@ -1,8 +1,7 @@
 """Generates the methods for construction, initial states, derived constants and inputs."""
 
-from ...runtime.stick_slip import DryFriction
 from .algebra import Memo, subexpressions
-from .codegen_context import CodegenContext, method_source
+from .codegen_context import CodegenContext, method_source, rule_status
 from .expression_printer import INDENT
 from .expressions import Term
 
@@ -32,7 +31,7 @@ def init_method(f: CodegenContext) -> str:
         lines.append(f"self.{e.name}_polynomial = InputPolynomial()")
         lines.append(f"self.t_base = self.{rate.name} = 0.0")
     if f.constants:
-        lines.append(" = ".join(f"self.{e.name}" for e in f.constants) + " = 0.0")
+        lines.append(" = ".join(f"self.{f.name_of(e)}" for e in f.constants) + " = 0.0")
     return method_source("__init__", (), [2 * INDENT + line for line in lines])
 
 
@@ -48,7 +47,7 @@ def initial_method(f: CodegenContext) -> str:
 
 def prepare_method(f: CodegenContext) -> str:
     """Constants and rules; a rule is checked as early as possible, before its values are used as divisors."""
-    s, dry = f.printer(), bool(f.an.contacts)
+    s = f.printer()
     computed: list[Term] = []
     s.constants = computed
     for e in f.an.ramps:
@@ -58,15 +57,15 @@ def prepare_method(f: CodegenContext) -> str:
     def calculate(needed: Memo | None = None) -> None:
         for e in f.constants:
             if (needed is None or id(e) in needed) and not any(e is one for one in computed):
-                s.emit_assignment(f"self.{e.name}", e)
+                s.emit_assignment(f"self.{f.name_of(e)}", e)
                 computed.append(e)
 
-    for number, rule in enumerate(f.an.rules, len(DryFriction.rules) + 1 if dry else 1):
+    for n, rule in enumerate(f.an.rules):
         calculate(subexpressions(rule.broken))
         with s.block(f"if {s.text(rule.broken)}:"):
-            s.emit(f"return {number}")
+            s.emit(f"return {rule_status(n)}")
     calculate()
-    s.emit("return super().prepare()" if dry else "return 0")
+    s.emit("return super().prepare()" if f.an.contacts else "return OK")
     return method_source("prepare", (), s.lines)
 
 

@@ -1,6 +1,6 @@
 """Generates the methods for the contact of a single-body model, and the friction force under the selected law."""
 
-from .algebra import depends_on, differentiate, rounding_scale, substitute
+from .algebra import depends_on, rounding_scale, substitute
 from .codegen_context import CodegenContext, emit_scales, method_source
 from .expression_printer import ExpressionPrinter
 from .expressions import Term
@@ -22,7 +22,7 @@ def load_method(f: CodegenContext, c: Contact) -> str:
     an = f.an
     wanted = [
         an.load[c],
-        substitute(differentiate(an.load[c], an.coasting_derivatives), {c.slip: 0.0}),
+        substitute(f.an.derivative(an.load[c], an.coasting_derivatives), {c.slip: 0.0}),
         an.holding_limit[c],
     ]
     return method_source("stick_load", ["t", *f.states], f.return_lines(f.printer(), wanted))
@@ -32,7 +32,7 @@ def load_rate_method(f: CodegenContext, c: Contact) -> list[str]:
     """The n-th derivative of the load caused by inputs."""
     ramps = f.an.ramps
     return (
-        [f.nth_derivative_method("load_derivative", ["t", *f.states], [differentiate(f.an.load[c], ramps)])]
+        [f.nth_derivative_method("load_derivative", ["t", *f.states], [f.an.derivative(f.an.load[c], ramps)])]
         if ramps
         else []
     )
@@ -53,7 +53,7 @@ def breakaway_method(f: CodegenContext, c: Contact) -> list[str]:
     if c.hold is None or any(depends_on(e, f.an.time_varying) for e in (c.slide, c.hold)):
         return []
     less = Term("neg", Term("*", c.mode, Term("-", c.hold, c.slide)))
-    jump = differentiate(f.an.rate_outputs[c.slip].expression, {c: less})
+    jump = f.an.derivative(f.an.rate_outputs[c.slip].expression, {c: less})
     return [method_source("breakaway_acceleration", f.arguments, f.return_lines(f.printer(), [jump]))]
 
 

@@ -26,7 +26,14 @@ Tests check that arrays, scalars and C give the same bits (tests/lowering/test_l
 """
 
 from .feature_selection import LAWS, METHODS, select_features
-from .import_hook import function_tree, lowered_files, lowered_model, scalar_name, sibling_module
+from .import_hook import (
+    function_tree,
+    lowered_files,
+    lowered_model,
+    model_exchange_instance,
+    scalar_name,
+    sibling_module,
+)
 from .scalarize import LoweringError
 
 __all__ = [
@@ -36,6 +43,7 @@ __all__ = [
     "function_tree",
     "lowered_files",
     "lowered_model",
+    "model_exchange_instance",
     "scalar_name",
     "select_features",
     "sibling_module",

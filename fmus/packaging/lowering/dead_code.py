@@ -9,7 +9,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from ..syntax_trees import all_nodes, child_nodes, parsed_module, parsed_nodes
-from .emit_source import SourceLine
+from .emit_source import MAX_LINE_LENGTH, SourceLine, wrap_line
 from .source_symbols import is_self_assignment
 
 DOTTED_NAME = re.compile(r"[A-Za-z_]\w*(?:\.[A-Za-z_]\w*)+")
@@ -198,7 +198,10 @@ def prune_imports(lines: list[SourceLine]) -> list[SourceLine]:
     for node in reversed([node for node in parse_lines(lines).body if isinstance(node, ast.ImportFrom)]):
         kept = [alias.name for alias in node.names if alias.name in names]
         if len(kept) < len(node.names) and not any(alias.asname for alias in node.names):
-            text = f"from {'.' * node.level}{node.module or ''} import {', '.join(kept)}"
-            new = [SourceLine.of(text, lines[node.lineno - 1].source)] if kept else []
+            head, names_text = f"from {'.' * node.level}{node.module or ''} import ", ", ".join(kept)
+            is_long = len(head + names_text) > MAX_LINE_LENGTH
+            text = wrap_line(f"{head}({names_text})") if is_long else head + names_text
+            source = lines[node.lineno - 1].source
+            new = [SourceLine.of(line, source) for line in text.split("\n")] if kept else []
             lines[node.lineno - 1 : node.end_lineno] = new
     return lines

@@ -91,6 +91,8 @@ class SourceEmitter:
             case ast.ClassDef():
                 self.copy_lines(self.first_line(node.body[0]), node.col_offset - depth)
                 self.lower_block(node.body, depth + 4)
+            case ast.FunctionDef(body=[ast.Expr(ast.Constant(str()))]):
+                pass  # a declaration
             case ast.FunctionDef():
                 counted = [one.arg for one in node.args.args if is_contact(one)]
                 for i in range(len(self.spec.contacts)) if counted else [0]:

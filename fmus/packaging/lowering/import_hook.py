@@ -19,7 +19,7 @@ from ..equations.model_file import ModelFile
 from ..model_lookup import FMUS, find_model
 from ..syntax_trees import all_nodes
 from .feature_selection import FeatureSelection, select_features
-from .lowered_sources import PLAIN_NAME, SUFFIXED_NAME, SourceFiles, lower_all
+from .lowered_sources import SourceFiles, lower_all, runtime_names
 
 TREE_NAME = "written_out"  # attribute of lowered modules: the tree with source line numbers
 
@@ -58,6 +58,7 @@ def import_lowered(source: ModelFile, features: FeatureSelection) -> type[Variab
     )
     result = vars(import_module(f"{package}.{name}"))[model.__name__]
     result.analysis = source.analysis  # used by model description and page
+    result.runtime_names = runtime_names(model)
     return result
 
 
@@ -91,9 +92,17 @@ def sibling_module(model: type[VariableOwner], path: str) -> Any:
     return import_module(f"{model.__module__.split('.', 1)[0]}.{path}")
 
 
+def model_exchange_instance(model: type[VariableOwner]) -> Any:
+    """Create an instance of a lowered model for model exchange."""
+    exchange = sibling_module(model, "runtime.model_exchange")
+    thing = type(model.__name__, (exchange.ModelExchangeMixin, model), {})()
+    exchange.update_nominals(thing)
+    return thing
+
+
 def scalar_name(thing: Any, name: str) -> str:
     """Return the name of a state or mode in the lowered runtime."""
-    return next(one for one in (SUFFIXED_NAME.format(name), PLAIN_NAME.format(name)) if hasattr(thing.solver, one))
+    return thing.runtime_names[name]
 
 
 def function_tree(function: FunctionType) -> ast.FunctionDef:

@@ -3,10 +3,13 @@
 import re
 from dataclasses import dataclass, field
 
-from .. import BuildError
-
 STATES, CONTACTS = "states", "contacts"  # what a vector may run over
 NAMED_VECTOR = re.compile(r"(y|f|modes)(\d*|_\w+)")  # vectors whose components have the names of the model
+
+
+def stage_name(name: str, suffix: str) -> str:
+    """Return the name of a state, rate or mode at a stage of a step: x2, x_end; x1_2 where it ends in a digit."""
+    return name + ("_" if suffix.isdigit() and name[-1].isdigit() else "") + suffix
 
 
 @dataclass(frozen=True)
@@ -29,12 +32,6 @@ class ModelLayout:
     excluded: frozenset[str] = frozenset()
     methods: dict[str, str] = field(default_factory=dict)
     zeros: frozenset[tuple[int, int]] = frozenset()
-
-    def __post_init__(self) -> None:
-        names = {*self.states, *self.states.values(), *self.contacts}
-        for name in names:
-            if (other := name.rstrip("0123456789")) in names - {name}:
-                raise BuildError(f"{name} is the name of {other} at a stage of a step; take another name.")
 
     def component_names(self, kind: str) -> list[str]:
         """Return the names of the states or modes."""
@@ -76,7 +73,7 @@ class ModelLayout:
             return vector + (self.contact_suffix(place) if kind == CONTACTS else f"_{part}")
         stem, suffix = match.groups()
         part = self.states[part] if stem == "f" else part
-        return part + ("_" if suffix.isdigit() and part[-1].isdigit() else "") + suffix
+        return stage_name(part, suffix)
 
     def jacobian_entry(self, rate: int, state: int) -> str:
         """Return the name of an entry of the Jacobian."""

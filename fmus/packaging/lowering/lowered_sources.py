@@ -6,8 +6,9 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from ...runtime.oscillator import Oscillator
 from ...runtime.variable_declarations import variables
-from .. import BuildError, __version__
+from .. import __version__
 from ..equations.model_file import ModelFile
 from ..syntax_trees import all_nodes, parsed_nodes
 from .dead_code import remove_dead_code
@@ -18,10 +19,6 @@ from .source_symbols import SourceSymbols
 
 FMUS_FOLDER = Path(__file__).resolve().parents[2]
 BUILD_TIME_ONLY = ("vectors.py", "method_registry.py")  # never embedded
-PLAIN_NAME, SUFFIXED_NAME = (
-    "{}",
-    "its_{}_",
-)  # name of a state in the runtime; the second form avoids name clashes
 SourceFiles = dict[str, list[SourceLine]]
 
 
@@ -39,24 +36,24 @@ def runtime_sources() -> dict[str, str]:
 @cache
 def runtime_symbols() -> SourceSymbols:
     """Return the symbols of the runtime sources."""
-    return SourceSymbols(runtime_sources().values())
+    vectors = (FMUS_FOLDER / "runtime" / "vectors.py").read_text(encoding="utf-8")
+    return SourceSymbols(runtime_sources().values(), vectors)
 
 
-def model_layout(source: ModelFile, features: FeatureSelection, name_format: str) -> ModelLayout:
-    """Return the layout of a model; `name_format` formats the names of states, rates and modes."""
+def runtime_names(model: Any) -> dict[str, str]:
+    """Return the names of the states, rates and modes of a model class in the runtime."""
+    return runtime_symbols().resolve_names(model.states, model.contacts)
+
+
+def model_layout(source: ModelFile, features: FeatureSelection) -> ModelLayout:
+    """Return the layout of a model."""
     model: Any = source.model
-    flags = {
-        flag: getattr(model, flag)
-        for flag in (
-            *("has_dry_friction", "rests_when_stuck", "is_coupled", "has_variable_levers"),
-            *("has_driver", "has_input_derivatives", "has_conditions", "checks_event_steps"),
-            "has_nominal_velocity",
-        )
-    }
+    flags = {flag: getattr(model, flag) for flag, default in vars(Oscillator).items() if isinstance(default, bool)}
     flags["is_linear"] = EXACT in features.methods
     flags["has_other_laws"] = any(law != "hybrid" for law in features.laws)
+    names = runtime_names(model)
     states, contacts = (
-        {name_format.format(name): other and name_format.format(other) for name, other in pairs.items()}
+        {names[name]: other and names[other] for name, other in pairs.items()}
         for pairs in (model.states, model.contacts)
     )
     layout = ModelLayout(states, contacts, flags, features.choices, features.excluded, features.stepping_methods)
@@ -77,18 +74,8 @@ def zero_jacobian_entries(text: str, spec: ModelLayout) -> frozenset[tuple[int, 
 
 @cache
 def lower_all(source: ModelFile, features: FeatureSelection) -> SourceFiles:
-    """Lower all runtime files and the file of a model.
-
-    Components have the names of the model unless these clash with names of the runtime.
-    """
-    try:
-        return lower_with_layout(source, model_layout(source, features, PLAIN_NAME))
-    except BuildError:
-        return lower_with_layout(source, model_layout(source, features, SUFFIXED_NAME))
-
-
-def lower_with_layout(source: ModelFile, spec: ModelLayout) -> SourceFiles:
-    """Lower with the names of a layout."""
+    """Lower all runtime files and the file of a model."""
+    spec = model_layout(source, features)
     file = f"{source.name}.py"
     modules = {label: "linear_closed_form" if label == EXACT else label for label in spec.excluded}
     excluded = {f"runtime/{module}.py" for module in modules.values()}
@@ -96,8 +83,6 @@ def lower_with_layout(source: ModelFile, spec: ModelLayout) -> SourceFiles:
         file: source.generated_source
     }
     declared = runtime_symbols()
-    if name := declared.find_name_clash(spec):
-        raise BuildError(f"The numerics already use the name {name}; take another name.")
     files = {path: SourceEmitter(spec, declared, path, text, path != file).lines for path, text in texts.items()}
     names = {"." + part for variable, _ in variables(source.model()) for part in variable.split(".")}
     files = remove_dead_code(files, file, names)

@@ -14,14 +14,9 @@ from .elimination import (
     solution_lines,
 )
 from .layout import NAMED_VECTOR, STATES, ModelLayout
-from .source_symbols import SourceSymbols, annotated_kind
+from .source_symbols import ELEMENTWISE, SELECTIONS, SourceSymbols, annotated_kind
 
-ELEMENTWISE = {
-    "magnitude": "{0} if {0} > 0.0 else -{0}",
-    "elementwise_max": "{0} if {0} > {1} else {1}",
-}  # component by component
 REDUCTIONS = {"max_of": ">", "min_of": "<"}  # reductions to one component
-SELECTIONS = ("select_kinematic", "dynamic_part", "kinematic_rates")  # of components by the kind of their rates
 ALLOCATORS = ("state_vector", "contact_vector")
 LOOP_RANGES = ("state_indices", "velocity_indices", "contact_indices")  # iterables of loops
 METHOD_LOOP = "methods"  # iterable of (label, module, class)

@@ -1,17 +1,15 @@
 """Translates the numerics from Python to C and compiles them to FMUs that need no Python, for every platform.
 
     struct_layout.py             the model object as structs with initializers
-    c_types.py                   types of values and their C spelling
+    c_types.py                   types of values and their C spelling; errors for source that has none
     expressions.py, statements.py    translate one function for given argument types
     call_graph.py                all functions that the FMI layer reaches
-    entry_points.py              the functions that the FMI layer calls
     directional_derivative.py    differentiates a model (forward mode)
-    model_header.py              model.h: the generated code, the variables and the messages
+    model_header.py              model.h: the functions that the FMI layer calls, the variables and the messages
     python_arithmetic.h, text_buffer.h, stderr_output.h    Python's arithmetic, number formatting, messages
     variable.h, saved_state.h, instance.h, common_functions.h, fmi2.c, fmi3.c    the FMI layer
     sources.py                   the folder sources/ of an FMU, which any C compiler can build
-    compiler.py, universal_binary.py    the binaries
-    diagnostics.py               error messages for source that cannot be translated
+    compiler.py                  the binaries
     fmu.py                       the FMU file
 
 The C code does what CPython does, bit for bit: the same operations in the same order. Where Python raises an exception,

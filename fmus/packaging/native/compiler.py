@@ -7,11 +7,11 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
+from struct import pack, unpack_from
 from tempfile import TemporaryDirectory, gettempdir
 
 from .. import BuildError
 from .expressions import MAY_RAISE, NEVER_RAISING
-from .universal_binary import make_universal_binary
 
 # Round after every operation, and call libm at run time: for constant arguments the compiler would insert its own
 # results, which can differ in the last digit.
@@ -118,3 +118,21 @@ def compile_and_link(files: Mapping[str, str], main: str, target: str, out: str,
         if completed.returncode:
             raise BuildError(f"{out} does not compile for {target}:\n{completed.stderr.strip()}")
         return (Path(folder) / out).read_bytes()
+
+
+FAT_MAGIC, MACHO_MAGIC = 0xCAFEBABE, 0xFEEDFACF
+ALIGNMENT = 14  # exponent of two: the page size of arm64, a multiple of that of x86_64
+
+
+def make_universal_binary(slices: list[bytes]) -> bytes:
+    """Combine libraries into one file. The header of each library has its processor type."""
+    offset = 1 << ALIGNMENT
+    header, body = pack(">II", FAT_MAGIC, len(slices)), b""
+    for content in slices:
+        magic, processor, subtype = unpack_from("<III", content)
+        if magic != MACHO_MAGIC:
+            raise ValueError("not a 64-bit Mach-O file")
+        header += pack(">IIIII", processor, subtype, offset, len(content), ALIGNMENT)
+        body += content + bytes(-len(content) % (1 << ALIGNMENT))
+        offset = (1 << ALIGNMENT) + len(body)
+    return header.ljust(1 << ALIGNMENT, b"\0") + body

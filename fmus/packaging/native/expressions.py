@@ -27,11 +27,12 @@ from .c_types import (
     Scalar,
     ScalarTuple,
     StructPointer,
+    UnsupportedConstructError,
     c_declaration,
     c_literal,
     scalar_type_of,
+    unsupported,
 )
-from .diagnostics import UnsupportedConstructError, unsupported
 
 if TYPE_CHECKING:
     from .call_graph import CallGraph

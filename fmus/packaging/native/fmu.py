@@ -17,14 +17,14 @@ from xml.etree.ElementTree import SubElement, fromstring
 from ...runtime.variable_declarations import VariableOwner
 from .. import BuildError
 from ..archive import build_date, license_files, write, zip_entries
+from ..documentation_page import extra_files
 from ..embedded_modules import digest
-from ..extra_files import extra_files
-from ..lowering import lowered_model, select_features
+from ..lowering import lowered_model, model_exchange_instance, select_features
 from ..model_description import declared_variables, describe
 from ..model_description_fmi3 import describe as describe3
 from ..model_lookup import find_model
 from ..terminals import terminals
-from ..xml_output import xml_bytes
+from ..text_output import xml_bytes
 from .compiler import DEFAULT_PLATFORMS, PLATFORMS, compile_binaries
 from .sources import MAIN_SOURCE, collect_sources, render_build_description, render_guid_header
 
@@ -89,10 +89,10 @@ def generate_c_sources(model: type[VariableOwner], name: str, date: datetime, fm
     """Return the C sources of a model by file name, and the matching modelDescription.xml."""
     files = collect_sources(model, fmi)
     if fmi == "3":
-        root = fromstring(describe3(model, name, digest(files), date))
+        root = fromstring(describe3(model, name, digest(files), date, model_exchange_instance(model)))
         files["guid.h"] = render_guid_header(root.attrib["instantiationToken"])
         return files, xml_bytes(root)
-    root = fromstring(describe(model, name, digest(files), date, exchanging=True))
+    root = fromstring(describe(model, name, digest(files), date, model_exchange_instance(model)))
     for interface in root.findall("ModelExchange") + root.findall("CoSimulation"):
         SubElement(SubElement(interface, "SourceFiles"), "File", name=MAIN_SOURCE[fmi])
     files["guid.h"] = render_guid_header(root.attrib["guid"])

@@ -3,26 +3,29 @@
 import inspect
 from collections.abc import Mapping
 from string import Formatter
+from typing import Any
 
 from ...runtime import codes
-from ...runtime.codes import FIRST_RULE, INTERRUPTED
+from ...runtime.codes import INTERRUPTED
 from ...runtime.failure_handling import CALCULATED_CAUSALITIES
 from ...runtime.messages import CALL_MESSAGES, PHASE_NAMES, RUN_MESSAGES, VALUE_MESSAGES
 from ...runtime.variable_access import SETTABLE_CAUSALITIES
 from ...runtime.variable_declarations import VariableDeclaration, VariableOwner, variables
 from ..fmi_variables import (
+    CONDITION,
+    DERIVATIVE_NAME,
+    TIME,
+    TO_BREAK_AWAY,
+    TO_REST,
     all_variables,
-    attribute_path,
     derivative_indices,
     event_indicator_indices,
-    model_exchange_instance,
 )
-from ..lowering import sibling_module
-from ..reserved_names import c_comment, c_string_literal
-from .c_types import BOOL, FLOAT, INT, StructPointer, c_literal
+from ..lowering import model_exchange_instance, scalar_name, sibling_module
+from ..text_output import c_comment, c_string_literal
+from .c_types import BOOL, FLOAT, INT, CType, StructPointer, c_literal
 from .call_graph import CallGraph
 from .directional_derivative import Tangent, build_tangent_functions, tangent_fields
-from .entry_points import entry_point_types
 
 HEADER = """\
 /* {sentence}
@@ -136,7 +139,6 @@ def render_model_header(model: type[VariableOwner], fmi: str) -> str:
     members = [(path, ctype) for prefix, cls in roots for path, ctype in layout.iter_scalars(cls, f"{prefix}.")]
     members = [(path, ctype) for path, ctype in members if ctype in (INT, BOOL)]
     statuses = {status: message for status, message in RUN_MESSAGES.items() if status not in PYTHON_ONLY_STATUSES}
-    violated_rules = dict(enumerate(instance.rules, FIRST_RULE + 1))
     discrete = [i for i, (_, meaning) in enumerate(declared) if meaning.variability == "discrete"]
     rule_fields = {
         name: f"{'append_real' if ctype is FLOAT else 'append_integer'}(text, model->{name})"
@@ -146,7 +148,7 @@ def render_model_header(model: type[VariableOwner], fmi: str) -> str:
         sentence=c_comment((inspect.getdoc(model) or "").splitlines()[0]),
         name=model.__name__,
         file=model.__module__.rsplit(".", 1)[-1],
-        codes="".join(f"    {name} = {code},\n" for name, code in vars(codes).items() if name.isupper()),
+        codes="".join(f"    {name} = {code},\n" for name, code in vars(codes).items() if isinstance(code, int)),
         numerics=call_graph.text(),
         run=layout.initializer(run, "        "),
         image=layout.initializer(instance, "        "),
@@ -170,12 +172,26 @@ def render_model_header(model: type[VariableOwner], fmi: str) -> str:
             )
             for name, meaning in declared
         ),
-        statuses=_switch_cases(statuses, FIELD_CODE) + _switch_cases(violated_rules, rule_fields),
+        statuses=_switch_cases(statuses, FIELD_CODE) + _switch_cases(instance.rules, rule_fields),
         values=_switch_cases(VALUE_MESSAGES, FIELD_CODE),
         calls=_switch_cases(CALL_MESSAGES, FIELD_CODE),
         phases=", ".join(c_string_literal(PHASE_NAMES[phase]) for phase in range(len(PHASE_NAMES))),
         count_of_phases=len(PHASE_NAMES),
     )
+
+
+def attribute_path(thing: Any, name: str) -> str:
+    """Return the attribute path of a variable in a model-exchange instance."""
+    if name == TIME:
+        return "solver.t"
+    for indicator in (TO_REST, TO_BREAK_AWAY):
+        if name.startswith(indicator):
+            mode = name.removeprefix(indicator)[1:]  # none for a single contact
+            path = indicator.replace("events", "model_exchange", 1)
+            return f"{path}_{scalar_name(thing, mode)}" if mode else path
+    if name.startswith(CONDITION[:-2]):
+        return f"model_exchange.conditions[{int(name.removeprefix(CONDITION[:-2])) - 1}]"
+    return "model_exchange.driver_rate" if name.startswith(DERIVATIVE_NAME[:4]) else name
 
 
 def _items_array(name: str, meaning: VariableDeclaration) -> str:
@@ -234,3 +250,36 @@ def _switch_cases(messages: Mapping[int, str], field_code: Mapping[str, str]) ->
                 lines.append(f"        {field_code[field]};\n")
         lines.append("        break;\n")
     return "".join(lines)
+
+
+ENTRY_POINTS = {  # module of the runtime -> its functions; callees come before their callers
+    "variable_declarations": ("is_in_range",),
+    "call_sequence": (
+        *("rejection_reason", "note_change", "set_experiment", "check_experiment", "is_refusal"),
+        *("exit_initialization", "do_step", "update_outputs", "update_statistics", "is_valid_state"),
+    ),
+    "model_exchange": (
+        *("enable", "update_nominals", "begin", "prepare", "set_time", "set_continuous_states", "update_states"),
+        *("update_rates", "update_input_rates", "update_indicators", "update_variables", "has_step_event"),
+        *("complete_step", "handle_event"),
+    ),
+    "early_return": ("begin_step", "next_internal_step", "complete_event"),  # for FMI 3.0
+}
+# Parameters of type bool; run and model are structs, a status is an int, all others are floats.
+BOOL_PARAMETERS = ("calculated", "fixed", "allowed", "exchanges", "ahead", "defer_events")
+
+
+def entry_point_types(
+    model: type[VariableOwner], run: StructPointer, instance: StructPointer, fmi: str
+) -> dict[Any, list[CType]]:
+    """Return the entry points of a model with the types of their arguments, which follow from the parameter names."""
+    known_types: dict[str, CType] = {"run": run, "model": instance, "status": INT}
+    known_types |= dict.fromkeys(BOOL_PARAMETERS, BOOL)
+    types = {}
+    for file in [file for file in ENTRY_POINTS if file != "early_return" or fmi == "3"]:
+        functions = sibling_module(model, f"runtime.{file}")
+        for name in ENTRY_POINTS[file]:
+            code = getattr(functions, name).__code__
+            parameters = code.co_varnames[: code.co_argcount]
+            types[getattr(functions, name)] = [known_types.get(parameter, FLOAT) for parameter in parameters]
+    return types

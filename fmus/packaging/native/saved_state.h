@@ -40,7 +40,7 @@ static bool is_allowed_value(const Variable *variable, double value)
         return false;
     }
     bool fault = false;
-    return call_sequence_is_in_range(value, variable->low, variable->high, variable->above, variable->below, &fault);
+    return variable_declarations_is_in_range(value, variable->low, variable->high, variable->above, variable->below, &fault);
 }
 
 /* ---- checksum */

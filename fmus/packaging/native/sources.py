@@ -5,7 +5,7 @@ from xml.etree.ElementTree import Element, SubElement
 
 from ...runtime.variable_declarations import VariableOwner
 from ..embedded_modules import installed_package
-from ..xml_output import xml_bytes
+from ..text_output import xml_bytes
 from .model_header import render_model_header
 
 MAIN_SOURCE = {"2": "fmi2.c", "3": "fmi3.c"}  # by version of FMI; includes all other files

@@ -10,10 +10,20 @@ from collections.abc import Callable
 from types import FunctionType
 from typing import TYPE_CHECKING
 
+from ..equations.reserved_names import C_NAMES
 from ..lowering import function_tree
-from ..reserved_names import C_NAMES
-from .c_types import FLOAT, INT, CompileTimeValue, CType, Scalar, ScalarTuple, StructPointer, c_declaration, c_spelling
-from .diagnostics import source_location
+from .c_types import (
+    FLOAT,
+    INT,
+    CompileTimeValue,
+    CType,
+    Scalar,
+    ScalarTuple,
+    StructPointer,
+    c_declaration,
+    c_spelling,
+    source_location,
+)
 from .expressions import FAULT_CHECK, UNARY, CExpression, ExpressionTranslator, make_tuple
 
 if TYPE_CHECKING:

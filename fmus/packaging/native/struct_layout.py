@@ -2,9 +2,18 @@
 
 from collections.abc import Iterator
 
-from ..reserved_names import C_NAMES
-from .c_types import FLOAT, CType, FloatArray, Scalar, StructPointer, c_declaration, c_literal, scalar_type_of
-from .diagnostics import UnsupportedConstructError
+from ..equations.reserved_names import C_NAMES
+from .c_types import (
+    FLOAT,
+    CType,
+    FloatArray,
+    Scalar,
+    StructPointer,
+    UnsupportedConstructError,
+    c_declaration,
+    c_literal,
+    scalar_type_of,
+)
 
 EMPTY_MEMBER = "nothing"  # the member of a struct without fields: C has no empty structs
 

@@ -1,22 +1,25 @@
-"""Builds the HTML file from models, style and script, with a content security policy that blocks all requests."""
+"""Builds the HTML file from models, presets, style and script; its content security policy blocks all requests."""
 
 import json
 from base64 import b64encode
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from gzip import compress
 from hashlib import sha256
 from pathlib import Path
 from string import Template
+from tomllib import loads
+from typing import Any
 from xml.etree.ElementTree import fromstring
 
 from .. import __version__
 from ..archive import build_date, write
 from ..equations.model_file import ModelFile
 from ..lowering import lowered_model, select_features
+from ..native.compiler import compile_and_link
 from ..native.fmu import generate_c_sources
+from ..native.sources import MAIN_SOURCE
 from .model_json import ModelJson, build_model_json
-from .presets import read_presets
-from .wasm import compile_to_base64
 
 FILE = "index.html"
 HERE = Path(__file__).parent
@@ -114,3 +117,42 @@ def bundle_script() -> str:
 def csp_hash(text: str) -> str:
     """Return the hash of an inline script or style for the content security policy."""
     return f"'sha256-{b64encode(sha256(text.encode()).digest()).decode()}'"
+
+
+TARGET = "wasm32-wasi"
+EXPORTED = (  # called by script/fmu.js
+    *("fmi2Instantiate", "fmi2Reset", "fmi2SetupExperiment"),
+    *("fmi2EnterInitializationMode", "fmi2ExitInitializationMode", "fmi2DoStep"),
+    *("fmi2GetReal", "fmi2GetInteger", "fmi2SetReal", "fmi2SetInteger"),
+)
+# Headers of a C library without the library itself, which the compiler would have to build first: script/libc.js
+# implements the functions.
+HEADERS = [f"-isystem{{compiler}}/lib/libc/include/{kind}-musl" for kind in ("wasm-wasi", "generic")]
+LINK_OPTIONS = ("-Wl,--no-entry", "-Wl,--import-symbols", *(f"-Wl,--export={name}" for name in EXPORTED))
+OPTIONS = ("-nostdlib", *HEADERS, *LINK_OPTIONS, "-fvisibility=hidden")
+
+
+def compile_to_base64(name: str, files: Mapping[str, str]) -> str:
+    """Compile an FMU to WebAssembly; return it compressed and base64-encoded."""
+    return b64encode(
+        compress(compile_and_link(files, MAIN_SOURCE["2"], TARGET, f"{name}.wasm", OPTIONS), mtime=0)
+    ).decode()
+
+
+# Keys of a scene and the variables they set; values of enumerations are labels.
+ENUMERATION_KEYS = {"law": "friction", "method": "solver.method"}
+NUMBER_KEYS = {"rtol": "solver.rtol", "atol": "solver.atol"}
+COPIED_KEYS = ("title", "model", "stop", "grid", "decay", "published")
+
+
+def read_presets(scenes: Iterable[Path], models: Collection[str]) -> list[dict[str, Any]]:
+    """Return the scenes with published values of one of the models, sorted by file name."""
+    presets = []
+    for path in sorted(scenes):
+        scene = loads(path.read_text(encoding="utf-8"))
+        if "published" in scene and scene.get("model") in models:
+            labels = {name: scene[key] for key, name in ENUMERATION_KEYS.items() if key in scene}
+            numbers = {name: scene[key] for key, name in NUMBER_KEYS.items() if key in scene}
+            copied = {key: scene[key] for key in COPIED_KEYS if key in scene}
+            presets.append({"name": path.stem, **copied, "labels": labels, "values": scene.get("values", {}) | numbers})
+    return presets

@@ -1,6 +1,7 @@
-"""Generates the method that computes the outputs and returns whether they are finite, and the one for modes."""
+"""Generates the methods that evaluate outputs, modes and conditions at a point."""
 
-from .codegen_context import CodegenContext, method_source
+from .algebra import rounding_scale
+from .codegen_context import CodegenContext, emit_scales, method_source
 from .coupled_contact_methods import emit_friction_forces
 from .expressions import Term
 from .model_declaration import THRESHOLD
@@ -47,3 +48,20 @@ def observe_method(f: CodegenContext) -> str:
     sizes = (s.text(e) if e.low >= 0.0 else f"fabs({s.text(e)})" for e in an.overflow_indicators)
     s.emit(f"return {' + '.join(sizes)} < inf")
     return method_source("compute_outputs", f.arguments, s.lines)
+
+
+def condition_methods(f: CodegenContext) -> list[str]:
+    """Return the source of the method; nothing without conditions."""
+    margins = [condition.margin for condition in f.an.conditions]
+    if not margins:
+        return []
+    s = f.printer()
+    f.emit_driver(s, margins)
+    scales = emit_scales(f, s, [rounding_scale(e) for e in margins])
+    f.emit_driver(s, scales)
+    s.count_uses(*margins, *scales)
+    s.emit("location = self.event_location")
+    for n, (margin, scale) in enumerate(zip(margins, scales, strict=True)):
+        s.emit(f"location.margins[{n}] = {s.text(margin)}")
+        s.emit(f"location.margin_scales[{n}] = {s.text(scale)}")
+    return [method_source("update_conditions", f.arguments, s.lines)]

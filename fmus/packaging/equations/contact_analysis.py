@@ -1,0 +1,231 @@
+"""Structural analysis of contacts: loads, limits, and whether and how contacts interact.
+
+The forces that keep all contacts stuck solve the linear system A F = b, which makes the rates of all slips zero.
+"""
+
+from functools import cached_property
+
+from .algebra import (
+    build_term,
+    count_occurrences,
+    depends_on,
+    has_condition_on,
+    is_factor,
+    is_same_expression,
+    is_summand,
+    negate,
+    solve_for,
+    substitute,
+    variables_in,
+)
+from .conditions import HOLD_TOLERANCE, Condition, is_nonnegative
+from .expressions import Expression, ModelError, Operand, Term, is_among
+from .model_declaration import Contact, Rule, State
+from .model_roles import TIME, ModelRoles
+
+SMALLEST_DIVISOR = 1e-100  # in place of an inverse mass that vanishes; its square is not zero
+
+
+class ContactAnalysis(ModelRoles):
+    """The contacts of a model: what holds them and how they act on each other."""
+
+    def _find_contact_loads(self) -> None:
+        """Derive slip rate, holding limit and load of each contact; the load is the force that keeps the slip zero."""
+        forces = (*self.contacts, *self.modes)
+        self.slip_rate: dict[Contact, Operand] = {
+            c: self.derivative(c.slip, self.time_derivatives) for c in self.contacts
+        }
+        self.A: dict[tuple[Contact, Contact], Operand] = {}
+        for c in self.contacts:
+            if depends_on(c.slip, forces) or depends_on(c.slide, self.contacts):
+                raise ModelError(f"slip and slide of {c.name} must not depend on the force of a contact", c.location)
+            for d in self.contacts:
+                acts = self.derivative(self.slip_rate[c], {d: 1.0})
+                if depends_on(acts, forces):
+                    raise ModelError(f"{d.name} must enter the rate of the slip of {c.name} linearly", d.location)
+                self.A[c, d] = negate(acts)
+            if is_same_expression(self.A[c, c], 0.0):
+                raise ModelError(f"{c.name} does not act on its own slip, so it can never stick", c.location)
+            moved = [s for s in self.dynamic_states if depends_on(self.rate_outputs[s], (c,))]
+            if any(depends_on(self.derivative(c.slip, {s: 1.0}), moved) for s in moved):
+                raise ModelError(f"slip of {c.name} must be linear in the speeds on which it acts", c.location)
+        self.independent_contacts = [
+            c for c in self.contacts if all(is_same_expression(self.A[c, d], 0.0) for d in self.contacts if d is not c)
+        ]
+        self.interacting_contacts = [c for c in self.contacts if not is_among(c, self.independent_contacts)]
+        moving = (*self.time_varying, *self.inputs)
+        self.variable_lever_contacts = [
+            c
+            for c in self.contacts
+            if any(depends_on(self.derivative(c.slip, {s: 1.0}), moving) for s in self.dynamic_states)
+        ]
+        self.holding_limit: dict[Contact, Operand] = {}
+        self.load: dict[Contact, Operand] = {}
+        for c in self.contacts:
+            at_rest = {c.slip: 0.0} if isinstance(c.slip, Expression) else {}
+            self.holding_limit[c] = substitute(c.slide, at_rest) if c.hold is None else c.hold
+            if depends_on(self.holding_limit[c], forces):
+                raise ModelError(f"the holding force of {c.name} depends on its direction: pass hold=", c.location)
+            if is_among(c, self.independent_contacts):
+                e = self.slip_rate[c]
+                load = (
+                    solve_for(e, c)
+                    if count_occurrences(e, c) == 1 and not is_among(c, self.variable_lever_contacts)
+                    else build_term("/", substitute(e, {c: 0.0}), self.divisor(c))
+                )
+                self.load[c] = substitute(load, {c.mode: 0.0} | (at_rest if isinstance(c.slip, State) else {}))
+
+    def divisor(self, c: Contact) -> Operand:
+        """Return how a contact force acts on its own slip, as a divisor: not zero where its lever vanishes."""
+        e = self.A[c, c]
+        if not is_among(c, self.variable_lever_contacts):
+            return e
+        return build_term("choose", Term(">", Term("fabs", e), SMALLEST_DIVISOR), e, SMALLEST_DIVISOR)
+
+    def load_expressions(self, c: Contact) -> list[Operand]:
+        """Return the expressions that determine the load of a contact: for interacting contacts all slip rates."""
+        return [self.load[c]] if is_among(c, self.independent_contacts) else [self.slip_rate[d] for d in self.contacts]
+
+    def derivative_while_stuck(self, e: Operand, by: dict[Expression, Operand]) -> Operand:
+        """Return the derivative of an expression while all contacts stick."""
+        return self.derivative(e, by | {c: self.derivative(self.load[c], by) for c in self.independent_contacts})
+
+    def derivative_while_sliding(self, e: Operand, by: dict[Expression, Operand]) -> Operand:
+        """Return the derivative of an expression while all contacts slide."""
+        return self.derivative(
+            e, by | {c: build_term("*", c.mode, self.derivative(c.slide, by)) for c in self.contacts}
+        )
+
+    @cached_property
+    def waits(self) -> bool:
+        """Whether the model rests while its only contact sticks, with a load linear in time and a constant limit."""
+        if any(len(one) != 1 for one in (self.contacts, self.positions, self.dynamic_states)):
+            return False
+        (c,), by_time = self.contacts, (TIME, *self.drivers)
+        if self.dynamic_states[0] is not c.slip:
+            return False
+        changes = (self.derivative(self.load[c], self.explicit_time_derivatives), self.holding_limit[c])
+        return not any(depends_on(e, by_time) for e in changes) and not any(
+            has_condition_on(e, by_time) for e in (self.load[c], *self._dynamic_expressions())
+        )
+
+    @property
+    def stick_assignments(self) -> list[tuple[Contact, State, Operand]]:
+        """Assignments (contact, speed, value) that make the slips of stuck contacts exactly zero.
+
+        They exist for slips that are sums of speeds, and are ordered so that none changes the slip of an earlier one;
+        and for slips that are the product of a lever and a speed.
+        """
+        result: list[tuple[Contact, State, Operand]] = []
+        left = list(self.contacts)
+        while True:
+            alone = [
+                (c, s)
+                for c in left
+                for s in self.dynamic_states
+                if (is_summand(c.slip, s) or (is_factor(c.slip, s) and depends_on(self.rate_outputs[s], (c,))))
+                and not any(depends_on(d.slip, (s,)) for d in left if d is not c)
+            ]
+            if not alone:
+                return result
+            c, s = alone[0]
+            result.insert(0, (c, s, solve_for(c.slip, s) if is_summand(c.slip, s) else 0.0))
+            left = [d for d in left if d is not c]
+
+    def _dynamic_expressions(self) -> list[Operand]:
+        """Return the expressions that determine the motion."""
+        forces = [e for c in self.contacts for e in (c.slip, c.slide, c.hold) if e is not None]
+        return [*self.rate_outputs.values(), *forces]
+
+    def _holding_rules(self) -> tuple[Rule, ...]:
+        """Return a rule for each contact that rejects sliding forces above the holding force.
+
+        It applies where both forces depend on parameters only and no rule of the model compares them.
+        """
+        result = []
+        for c in (c for c in self.contacts if c.hold is not None):
+            sliding, holding = (set(variables_in(e)) & {*self.parameters} for e in (c.slide, c.hold))
+            has_rule = any(
+                sliding & set(variables_in(rule.broken)) and holding & set(variables_in(rule.broken))
+                for rule in self.rules
+            )
+            if not has_rule and not depends_on(c.slide - c.hold, (*self.time_varying, *self.inputs)):
+                values = ", ".join(f"{e.name} = {{{e.name}!r}}" for e in self.parameters if e in sliding | holding)
+                sentence = (
+                    f"{c.name}: the sliding force exceeds the holding force ({values}): lower slide or raise hold"
+                )
+                broken = Term(">", c.slide, build_term("*", 1.0 + HOLD_TOLERANCE, c.hold))
+                broken.location = c.location
+                result.append(Rule(broken, sentence))
+        return tuple(result)
+
+    def _find_limits(self) -> list[Condition]:
+        """Return the limits of friction forces that vary: not negative, and no sliding above the holding force."""
+        varying = (*self.time_varying, *self.inputs)
+        result = []
+        for c in self.contacts:
+            at = "at t = {violation_time!r} s"
+            if c.lifts_off is None and depends_on(c.slide, varying) and not is_nonnegative(c.slide):
+                sentence = (
+                    f"{c.name}: the sliding force becomes negative {at} ({{violation_value!r}} {c.unit}); if the "
+                    "contact lifts off there, declare lifts_off=True"
+                )
+                result.append(Condition(c.slide, (c.slide,), sentence=sentence))
+            at_rest = substitute(c.slide, {c.slip: 0.0}) if isinstance(c.slip, Expression) else c.slide
+            if c.hold is None or depends_on(c.slide, (c.mode,)) or not depends_on(c.hold - at_rest, varying):
+                continue
+            surplus = build_term("-", build_term("*", 1.0 + HOLD_TOLERANCE, c.hold), at_rest)
+            sentence = (
+                f"{c.name}: the sliding force exceeds the holding force {at} (hold - slide = {{violation_value!r}} "
+                f"{c.unit}): lower slide or raise hold"
+            )
+            margin = Term("choose", Term("==", c.mode, 0), surplus, 1.0)
+            result.append(Condition(margin, (c.slide,), sentence=sentence))
+        return result
+
+    def check_solvable(self) -> None:
+        """Raise ModelError if the solver cannot run the model."""
+        for c in self.contacts:
+            if c.laws != self.contacts[0].laws:
+                raise ModelError(
+                    f"{c.name} and {self.contacts[0].name} have different laws: give all contacts the same laws",
+                    c.location,
+                )
+            for law in self.rate_outputs.values():
+                if depends_on(self.derivative(law, {c: 1.0}), (*self.contacts, *self.modes)):
+                    raise ModelError(f"{c.name} must enter {law.name} linearly", law.location)
+        self._check_loads()
+
+    def _check_loads(self) -> None:
+        """Check at the start values that each contact opposes its own slip and that stuck contacts are independent."""
+        start: dict[Expression, Operand] = dict.fromkeys((*self.time_varying, TIME), 0.0)
+        start |= {e: float(e.start) for e in (*self.parameters, *self.choices, *self.inputs)}
+        start |= {s: substitute(s.start_expression, start) for s in self.states}
+        for c in self.contacts:
+            least = min(
+                one
+                for one in (substitute(c.slide, start), substitute(self.holding_limit[c], start), 0.0)
+                if isinstance(one, float)
+            )
+            if least < 0.0:
+                raise ModelError(f"slide or hold of {c.name} is negative at the start values", c.location)
+        A = {key: substitute(e, start) for key, e in self.A.items()}
+        if any(isinstance(e, Expression) for e in A.values()):
+            return  # depends on a choice: cannot be decided at build time
+        contacts = [c for c in self.contacts if not is_among(c, self.variable_lever_contacts) or A[c, c] != 0.0]
+        left = {c: A[c, c] for c in contacts}
+        for n, c in enumerate(contacts):
+            if not left[c] > 0.0:
+                sentence = f"{c.name} accelerates its own slip instead of opposing it: change its sign in the rates"
+                raise ModelError(sentence, c.location)
+            if not A[c, c] > 1e-12 * left[c]:
+                others = " and ".join(d.name for d in contacts[:n] if not is_same_expression(self.A[c, d], 0.0))
+                raise ModelError(
+                    f"{c.name} and {others} hold the same motion at rest, so their forces are not determined: remove "
+                    "one or put a spring between them",
+                    c.location,
+                )
+            for d in contacts[n + 1 :]:
+                share = A[d, c] / A[c, c]
+                for e in contacts[n + 1 :]:
+                    A[d, e] -= share * A[c, e]

@@ -1,0 +1,133 @@
+"""Checks the declarations of a model: names, types, ranges, start values, rules and settings."""
+
+from math import inf
+from sys import float_info
+
+from ...runtime.active_method import EXACT_ITEM, METHOD_ITEMS
+from .algebra import depends_on, subexpressions, variables_in
+from .expressions import (
+    NO_EQUALITY,
+    Expression,
+    ModelError,
+    Operand,
+    Term,
+    describe,
+    is_among,
+    is_comparison,
+    is_number,
+)
+from .model_declaration import Choice, Contact, Fixed, Input, Parameter, Variable
+from .model_roles import ModelRoles
+from .reserved_names import RESERVED
+
+LARGEST_FLOAT = float_info.max
+METHODS = [label for label, _, _ in (EXACT_ITEM, *METHOD_ITEMS)]
+
+
+def check_declarations(an: ModelRoles) -> None:
+    """Check that all variables are declared in this class, and that modes, starts and rules are valid."""
+    known, location = set(an.declared), an.model.location
+    for e in an.declared:
+        for part in an.declared_expressions(e):
+            for leaf in variables_in(part):
+                if not leaf.name:
+                    raise ModelError(
+                        f"{e.name} uses a variable without a name: assign the variable to a name first", e.location
+                    )
+                if leaf not in known:
+                    raise ModelError(f"{e.name} uses {leaf.name}, which is not declared in {an.name}", e.location)
+            _check_choices(e, part)
+        _check_variable(an, e)
+        _check_alias(an, e)
+    for mode in an.modes:
+        owners = [c for c in an.contacts if c.mode is mode]
+        if len(owners) != 1:
+            raise ModelError(
+                f"{mode.name} is the mode of {len(owners)} contacts: each Mode needs exactly one Contact",
+                mode.location,
+            )
+    for s in (*an.states, *an.drivers):
+        for word, e in (
+            ("start", s.start_expression),
+            ("rate", s.constant_rate),
+            ("nominal_velocity", s.nominal_velocity),
+        ):
+            if depends_on(e, an.time_varying):
+                raise ModelError(f"{word} of {s.name} varies with time: it must depend on parameters only", s.location)
+    for rule in an.rules:
+        if isinstance(rule.broken, Term) and rule.broken.op == "==":
+            raise ModelError(NO_EQUALITY, rule.broken.location)
+        if not is_comparison(rule.broken):
+            raise ModelError(f"a Rule needs a comparison of parameters first, got {describe(rule.broken)}", location)
+        if depends_on(rule.broken, (*an.time_varying, *an.inputs)):
+            raise ModelError("a Rule must depend on parameters only", rule.broken.location)
+        _check_printable("the sentence of a Rule", rule.broken.location, rule.sentence)
+        try:
+            rule.sentence.format_map({e.name: 1.0 for e in (*an.parameters, *an.choices)})
+        except (LookupError, ValueError) as error:
+            raise ModelError(
+                f"the sentence of a Rule refers to {error}, which is not a parameter", rule.broken.location
+            ) from None
+    if an.model.method not in ("", *METHODS):
+        raise ModelError(f"method = {an.model.method!r} is unknown; available methods: {', '.join(METHODS)}", location)
+    for word, most in ("stop_time", inf), ("step_size", inf), ("tolerance", 1.0):
+        value = getattr(an.model, word)
+        if not is_number(value) or not 0.0 < value < most:
+            raise ModelError(
+                f"{word} = {describe(value)} is invalid: it must be a number above 0 and below {most:g}", location
+            )
+    if not (an.model.__doc__ or "").strip():
+        raise ModelError(
+            f"{an.name} has no docstring: its first line becomes the description of the FMU, the rest its page",
+            location,
+        )
+    _check_printable(an.name, location, (an.model.__doc__ or "").replace("\n", " "))
+
+
+def _check_choices(e: Variable, part: Operand) -> None:
+    """Check that an expression does not calculate with the number of a Choice."""
+    for one in subexpressions(part).values():
+        parts = one.args if isinstance(one, Term) and one.op != "==" else ()
+        for choice in (*parts, part):
+            if isinstance(choice, Choice):
+                cases = ", ".join(f"{label}=..." for label, _, _ in choice.items)
+                raise ModelError(
+                    f"{e.name} calculates with the Choice {choice.name}: write {choice.name}.choose({cases})",
+                    e.location,
+                )
+
+
+def _check_variable(an: ModelRoles, e: Variable) -> None:
+    """Check types of texts and numbers, and the range of the start value."""
+    if not e.text:
+        raise ModelError(f"{e.name} has an empty description: write a text", e.location)
+    _check_printable(e.name, e.location, e.text, *(sentence for _, _, sentence in e.items))
+    for one in (e.start, e.low, e.high, e.above, e.below):
+        if not is_number(one) or (isinstance(one, int) and abs(one) > LARGEST_FLOAT):
+            got = "an expression" if isinstance(one, Expression) else describe(one)
+            raise ModelError(f"{e.name}: start value and bounds must be numbers, got {got}", e.location)
+    if not max(e.low, e.above) <= min(e.high, e.below):
+        raise ModelError(f"{e.name} has an empty range: no number is {e.allowed}", e.location)
+    if isinstance(e, Contact) and is_among(e.slip, an.positions):
+        raise ModelError(
+            f"slip of {e.name} is {e.slip.name}, but a slip is a speed: write slip={an.rate[e.slip].name}",
+            e.location,
+        )
+    if isinstance(e, (Parameter, Fixed, Input)) and not e.accepts(e.start):
+        raise ModelError(f"{e.name} has the start value {e.start!r}; it must be {e.allowed}", e.location)
+
+
+def _check_alias(an: ModelRoles, e: Variable) -> None:
+    """Check that the alias is an identifier that nothing else uses."""
+    known = [word for each in an.declared for word in (each.name, each.alias)]
+    if e.alias and (not e.alias.isidentifier() or known.count(e.alias) > 1 or e.alias in RESERVED):
+        raise ModelError(
+            f"{e.name} has the alias {e.alias!r}: it must be an identifier that nothing else uses", e.location
+        )
+
+
+def _check_printable(name: str, location: tuple[str, int], *words: str) -> None:
+    """Check that texts are printable, because they go into XML, HTML and C."""
+    for text in words:
+        if not isinstance(text, str) or not text.isprintable():
+            raise ModelError(f"{name}: {text!r} must be printable text on one line", location)
