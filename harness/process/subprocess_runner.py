@@ -5,11 +5,13 @@ import os
 import subprocess
 import sys
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from math import inf
 from pathlib import Path
 from tempfile import TemporaryFile
-from time import monotonic
-from typing import Any, TypeVar
+from threading import Thread
+from time import monotonic, sleep
+from typing import Any, TextIO, TypeVar
 
 from ..errors import HarnessError
 from .interrupt import check_interrupt, defer_signals
@@ -17,6 +19,7 @@ from .temporary_directory import temporary_directory
 
 PROJECT_ROOT = Path(__file__).parents[2]  # contains harness and build_fmus
 RequestT = TypeVar("RequestT")
+ORPHAN_INTERVAL = 0.5  # s between two checks of a child process for its parent
 POLL_INTERVAL = 0.1  # s between two checks for signals, which a blocked thread does not notice
 
 
@@ -94,15 +97,49 @@ def run_module(module: str, text: str, *arguments: str, **how: Any) -> subproces
     return run_subprocess([sys.executable, "-m", module, *arguments], text, os.environ | {"PYTHONPATH": path}, **how)
 
 
-def serve_request(request: Callable[..., RequestT], answer: Callable[[RequestT], Any]) -> None:
+def serve_request(
+    request: Callable[..., RequestT], answer: Callable[[RequestT], Any], memory: int | None = None
+) -> None:
     """In a child process, read one JSON request from standard input and write the JSON answer to standard output.
 
-    Other output, such as that of FMUs, is redirected to standard error.
+    Other output, such as that of FMUs, is redirected to standard error. The process exits if its parent is killed.
+
+    Parameters
+    ----------
+    request : callable
+        Makes a request from the keys of the JSON table.
+    answer : callable
+        Returns the answer to a request.
+    memory : int, optional
+        Limit of the memory of the process in bytes, where the system can limit it.
     """
-    output = os.fdopen(os.dup(1), "w")
+    if memory:
+        limit_memory(memory)
+    with open_replies() as replies:
+        json.dump(answer(request(**json.load(sys.stdin))), replies)
+
+
+def limit_memory(size: int) -> None:
+    """Limit the memory of this process to a size in bytes, where the system can."""
+    with suppress(ImportError, ValueError, OSError):
+        import resource
+
+        resource.setrlimit(resource.RLIMIT_AS, (size, size))
+
+
+def open_replies() -> TextIO:
+    """In a child process, return standard output and redirect other output to standard error; exit with the parent."""
+    Thread(target=exit_with_parent, args=(os.getppid(),), daemon=True).start()
+    replies = os.fdopen(os.dup(1), "w")
     os.dup2(2, 1)
-    json.dump(answer(request(**json.load(sys.stdin))), output)
-    output.close()
+    return replies
+
+
+def exit_with_parent(parent: int) -> None:
+    """Exit once the process has another parent: the one that started it was killed."""
+    while os.getppid() == parent:
+        sleep(ORPHAN_INTERVAL)
+    os._exit(1)
 
 
 def kill_process_group(process: subprocess.Popen[str]) -> tuple[str, str]:

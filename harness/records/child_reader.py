@@ -6,7 +6,6 @@ python-calamine allocate 549 GB, and scipy reads beyond the end of some damaged 
 
 import json
 import os
-from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -108,14 +107,5 @@ def read_arrays(request: ReadRequest) -> dict[str, Any]:
     return {"columns": columns, "names": [*filter(None, arrays)]}
 
 
-def limit_memory() -> None:
-    """Limit the memory of this process, where the system can."""
-    with suppress(ImportError, ValueError, OSError):
-        import resource
-
-        resource.setrlimit(resource.RLIMIT_AS, (MAX_MEMORY, MAX_MEMORY))
-
-
 if __name__ == "__main__":
-    limit_memory()
-    serve_request(ReadRequest, answer_request)
+    serve_request(ReadRequest, answer_request, MAX_MEMORY)

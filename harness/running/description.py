@@ -16,6 +16,7 @@ from .variable_values import effective_value, variable_unit
 
 DESCRIPTION_FILE = "modelDescription.xml"
 MAX_LISTED_FAULTS = 50  # violations listed in a message
+REQUIRED_VARIABLES = ("solver.t_next", "solver.steps", "solver.rejected", "solver.evaluations")  # of this project
 
 
 def read_description(path: Path, lenient: bool = False) -> Any:
@@ -59,6 +60,16 @@ def validate_description(path: Path, lenient: bool) -> Any:
     if description is None:
         raise HarnessError(f"{path.name} has FMI version {fmi_version}; supported are 2.0 and 3.0: export it again")
     return description
+
+
+def exposes_solver_steps(description: Any) -> bool:
+    """Return whether an FMU exposes the steps of its solver, as those of this project do in FMI 2.0."""
+    names = [variable.name for variable in description.modelVariables]
+    return (
+        description.fmiVersion == "2.0"
+        and description.coSimulation is not None
+        and all(name in names for name in REQUIRED_VARIABLES)
+    )
 
 
 def declared_parameters(fmu: Path) -> dict[str, tuple[object, str]]:

@@ -14,8 +14,7 @@ import numpy as np
 from ..errors import HarnessError
 from ..scenes.fmu_files import check_built
 from .cached_by_mtime import cached_by_mtime
-from .description import read_description
-from .settings import REQUIRED_VARIABLES
+from .description import REQUIRED_VARIABLES, read_description
 from .solution import Solution
 from .unpacking import SCRIPT_NAME_FILE, unpack
 

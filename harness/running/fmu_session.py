@@ -1,192 +1,349 @@
-"""Sessions with one FMU of this project: given communication steps and value changes, to the end or to an error.
+"""Session with one instance of an FMU through fmpy: FMI 2.0 or 3.0, co-simulation or model exchange.
 
-Values are not checked before they are set, since studies of stability and errors also set NaN.
+A step and a recorded point take only microseconds, so their functions and buffers are looked up once and the library is
+called directly; everything else uses fmpy's methods.
 """
 
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass, replace
-from itertools import product
-from math import inf, isnan, nan
-from time import perf_counter
+import io
+import os
+from collections import deque
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager, redirect_stderr, suppress
+from ctypes import byref, c_bool, c_double, c_int, c_uint, c_void_p
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
 from typing import Any
 
-import numpy as np
-from fmpy.fmi1 import FMICallException
+from fmpy import fmi2
+from fmpy.fmi1 import FMICallException as FMICallException  # re-exported for adapters
+from fmpy.fmi2 import FMU2Model, FMU2Slave, fmi2LastSuccessfulTime, fmi2Terminated
+from fmpy.fmi3 import FMU3Model, FMU3Slave
 
-from ..errors import HarnessError
-from ..scenes.fmu_files import find_fmu
-from ..scenes.roles import find_roles
-from ..scenes.run_spec import RunSpec
-from .fmi2 import LogCapture, initialize, load_instance, read_own_description, read_statistics, set_variable
-from .trajectory import Trajectory
-from .unpacking import unpack_once
-from .variable_values import enumeration_labels, variable_unit
+from ..errors import HarnessError, first_line
 
-CommunicationSteps = list[tuple[float, float]]  # communication steps as (start, size) in s
-ScheduledChanges = dict[float, dict[str, float]]  # values to set, by time in s
+WARNING, DISCARD = 1, 2  # of the statuses; any status above a warning is a failure
+STATUS_NAMES = ("OK", "Warning", "Discard", "Error", "Fatal", "Pending")
+MAX_MESSAGES = 50  # log messages that are kept
+MESSAGES: deque[tuple[int, str]] = deque(maxlen=MAX_MESSAGES)  # log messages as (status, text), of all instances
 
 
-@dataclass(frozen=True)
-class FmuInfo:
-    """Capabilities of an FMU: methods, start values of parameters and inputs, enumerations, default stop in s."""
-
-    methods: tuple[str, ...]
-    default_method: str  # a method
-    start_values: dict[str, float]
-    enumerations: dict[str, dict[str, int]]
-    stop: float
-
-    def resolve_labels(self, values: dict[str, Any]) -> dict[str, float]:
-        """Replace enumeration labels by numbers."""
-        return {
-            name: self.enumerations[name][value] if isinstance(value, str) else value for name, value in values.items()
-        }
+class StepError(Exception):
+    """The FMU did not complete a step."""
 
 
-@dataclass(frozen=True)
-class RefusedRun:
-    """Run that the FMU refused: its message, and whether all calculated Reals are NaN."""
+class TerminatedError(StepError):
+    """The FMU terminated the simulation, at `t` in s if known."""
 
-    message: str
-    all_nan: bool
+    def __init__(self, t: float | None, reason: str) -> None:
+        super().__init__(f"it terminated the simulation: {reason}")
+        self.t = t
+
+
+class StepRefusedError(StepError):
+    """The FMU rejected a step of this size; a shorter one may succeed."""
+
+
+CALL_FAILURES = (FMICallException, StepError)
 
 
 @dataclass(frozen=True)
-class RefusalSummary:
-    """Number of values that were tried, and a description of each failure."""
+class LogCapture:
+    """Log messages of the FMU, and its standard error if that is captured."""
 
-    n_tried: int
-    failures: tuple[str, ...]
+    stderr: io.StringIO | None = None
 
+    @property
+    def error_message(self) -> str:
+        """Return the last message above a warning, or the last line on standard error, in one line; empty if none."""
+        logged = [text for status, text in MESSAGES if status > WARNING and text.strip()]
+        printed = self.stderr.getvalue().strip().splitlines() if self.stderr else []
+        return " ".join((logged or printed or [""])[-1].split())
 
-def read_info(model: str) -> FmuInfo:
-    """Return the capabilities of a model's FMU."""
-    description = read_own_description(RunSpec(find_fmu(model)))
-    settable = [variable for variable in description.modelVariables if variable.causality in ("parameter", "input")]
-    enumerations = {variable.name: variable for variable in settable if variable.type == "Enumeration"}
-    choices = {
-        name: {label: number for number, label in enumeration_labels(variable).items()}
-        for name, variable in enumerations.items()
-    }
-    defaults = {
-        variable.name: int(variable.start) if variable.name in choices else float(variable.start)
-        for variable in settable
-    }
-    methods = {number: label for label, number in choices["solver.method"].items()}
-    default = methods[int(defaults["solver.method"])]
-    return FmuInfo(tuple(methods.values()), default, defaults, choices, float(description.defaultExperiment.stopTime))
+    def clear(self) -> None:
+        """Discard all messages."""
+        MESSAGES.clear()
+        if self.stderr:
+            self.stderr.seek(self.stderr.truncate(0))
 
 
 class FmuSession:
-    """Instance of an FMU that can be reset and run again."""
+    """Instance of an unpacked FMU.
 
-    def __init__(self, description: Any, fmu: Any, log: LogCapture) -> None:
-        self.fmu, self.log = fmu, log
+    Parameters
+    ----------
+    description : ModelDescription
+    folder : path
+        Directory of the unpacked FMU.
+    exchange : bool
+        Model exchange instead of co-simulation.
+    name : str, optional
+        Name of the instance; by default its model identifier.
+    log : LogCapture, optional
+
+    Raises
+    ------
+    HarnessError
+        If it cannot be instantiated.
+    """
+
+    def __init__(
+        self,
+        description: Any,
+        folder: Path | str,
+        exchange: bool = False,
+        name: str | None = None,
+        log: LogCapture | None = None,
+    ) -> None:
+        self.description, self.exchange, self.log = description, exchange, log or LogCapture()
+        self.is_fmi2 = description.fmiVersion == "2.0"
+        self.prefix = "fmi2" if self.is_fmi2 else "fmi3"
         self.variables = {variable.name: variable for variable in description.modelVariables}
-        motion = find_roles(self.variables)
-        if "velocity" not in motion:
-            raise HarnessError(f"{description.modelName}: no output is declared as the derivative of a position")
-        self.outputs = (motion["position"], motion["velocity"], *(["energy"] if "energy" in self.variables else []))
+        self.interface = description.modelExchange if exchange else description.coSimulation
+        self.log.clear()
+        self.fmu = self.instantiate(str(folder), name)
+        self.instance = c_void_p(self.fmu.component)
+        self.do_step = None if exchange else self.function("DoStep")
+        # of fmi3DoStep: event handling needed, terminate simulation, early return, last successful time
+        self.step_results = () if self.is_fmi2 else (c_bool(), c_bool(), c_bool(), c_double())
+        self.step_arguments = tuple(byref(result) for result in self.step_results)
 
-    def initialize(self, spec: RunSpec) -> None:
-        """Set values and initialize the instance."""
-        values = ((self.variables[name], value) for name, value in spec.values.items())
-        initialize(self.fmu, values, spec.start or 0.0, spec.stop)
+    def instantiate(self, folder: str, name: str | None) -> Any:
+        """Return fmpy's instance."""
+        kinds: dict[tuple[bool, bool], Any] = {
+            (True, False): FMU2Slave,
+            (True, True): FMU2Model,
+            (False, False): FMU3Slave,
+            (False, True): FMU3Model,
+        }
+        try:
+            fmu = kinds[self.is_fmi2, self.exchange](
+                guid=self.description.guid or "",
+                unzipDirectory=folder,
+                modelIdentifier=self.interface.modelIdentifier,
+                instanceName=name,
+            )
+            logger = {"callbacks": shared_callbacks()} if self.is_fmi2 else {"logMessage": log_fmi3_message}
+            fmu.instantiate(loggingOn=True, **logger)
+        except Exception as error:  # fmpy raises bare Exceptions
+            hint = "; it needs the tool that made it (needsExecutionTool)" if self.interface.needsExecutionTool else ""
+            raise HarnessError(f"{first_line(error).replace(f'{folder}{os.sep}', '')}{hint}") from None
+        return fmu
 
-    def set_values(self, values: dict[str, float]) -> None:
-        """Set variables by name."""
-        for name, value in values.items():
-            set_variable(self.fmu, self.variables[name], value)
+    def function(self, name: str) -> Any:
+        """Return a function of the library, by its name without the prefix."""
+        return getattr(self.fmu.dll, f"{self.prefix}{name}")
 
-    def find_reals(self, *causalities: str) -> list[str]:
-        """Return the names of the Reals with the given causalities."""
-        return [
-            variable.name
-            for variable in self.variables.values()
-            if variable.type == "Real" and variable.causality in causalities
-        ]
+    def initialize(
+        self, values: Iterable[tuple[Any, Any]], start: float, stop: float | None, tolerance: float | None = None
+    ) -> None:
+        """Set (variable, value) and initialize the instance; times in s."""
+        experiment = {"tolerance": tolerance, "startTime": start, "stopTime": stop}
+        values = list(values)
+        structural = [(variable, value) for variable, value in values if variable.causality == "structuralParameter"]
+        if structural:
+            self.fmu.enterConfigurationMode()
+            for variable, value in structural:
+                self.set(variable, value)
+            self.fmu.exitConfigurationMode()
+        if self.is_fmi2:
+            self.fmu.setupExperiment(**experiment)
+        for variable, value in values:
+            if variable.causality != "structuralParameter":
+                self.set(variable, value)
+        self.fmu.enterInitializationMode(**({} if self.is_fmi2 else experiment))
+        self.fmu.exitInitializationMode()
 
-    def get_reals(self, names: Iterable[str]) -> list[float]:
-        """Return the values of Reals by name."""
-        return self.fmu.getReal([self.variables[name].valueReference for name in names])
+    def type_name(self, variable: Any) -> str:
+        """Return the type in the names of the functions that set and get a variable."""
+        return type_name(variable, self.description)
 
-    def read_refusal(self) -> RefusedRun:
-        """Return the error message of the FMU and the state of its outputs."""
-        return RefusedRun(self.log.error_message, all(map(isnan, self.get_reals(self.find_reals("output", "local")))))
+    def set(self, variable: Any, value: Any) -> None:
+        """Set a variable of any type; an array from a list in row-major order."""
+        set_variable(self.fmu, self.description, variable, value)
+
+    def get(self, name: str) -> Any:
+        """Return the value of a scalar variable that is no string."""
+        variable = self.variables[name]
+        return getattr(self.fmu, f"get{self.type_name(variable)}")([variable.valueReference])[0]
+
+    def step(self, t: float, h: float) -> None:
+        """Take a communication step of h from t, in s.
+
+        Raises
+        ------
+        TerminatedError
+            If the FMU terminates the simulation.
+        StepRefusedError
+            If the FMU rejects the step.
+        FMICallException
+            If the step fails.
+        HarnessError
+            If the FMU returns early, which it is not allowed.
+        """
+        status = self.do_step(self.instance, t, h, 1, *self.step_arguments)  # type: ignore[misc]
+        if status > WARNING:
+            raise self.step_failure(status, t, h)
+        if self.step_results:
+            _, terminate, early, last_time = (result.value for result in self.step_results)
+            if terminate:
+                raise TerminatedError(last_time if early else t + h, "fmi3DoStep returned terminateSimulation")
+            if early:
+                raise HarnessError("fmi3DoStep returned early without permission")
+
+    def step_failure(self, status: int, t: float, h: float) -> Exception:
+        """Return the exception for a step with a status above a warning."""
+        name = f"{self.prefix}DoStep"
+        if status != DISCARD:
+            return FMICallException(name, status)
+        terminated, last_time = False, None
+        if self.is_fmi2:
+            with suppress(FMICallException):  # these queries are optional
+                terminated = self.fmu.getBooleanStatus(fmi2Terminated)
+                last_time = self.fmu.getRealStatus(fmi2LastSuccessfulTime)
+        if terminated:
+            return TerminatedError(last_time, f"{name} returned Discard with fmi2Terminated")
+        return StepRefusedError(f"{name} returned Discard for a step of {h:.4g} s at t = {t:.9g} s")
 
     def reset(self) -> None:
         """Reset the instance and discard its messages."""
         self.log.clear()
         self.fmu.reset()
 
-
-@contextmanager
-def open_session(spec: RunSpec) -> Iterator[FmuSession]:
-    """Instantiate an FMU and capture its messages."""
-    description = read_own_description(spec)
-    with load_instance(spec, description, unpack_once(spec.fmu)) as (fmu, log):
-        yield FmuSession(description, fmu, log)
+    def close(self) -> None:
+        """Free the instance."""
+        self.fmu.freeInstance()
 
 
-def run_steps(spec: RunSpec, steps: CommunicationSteps, changes: ScheduledChanges) -> Trajectory | RefusedRun:
-    """Run communication steps and record position, velocity and energy, if the FMU has one, after each.
+class PreparedRuns:
+    """Runs of one session of FMI 2.0 from start to stop in one communication step, each with other values.
+
+    A run by closed form takes 40 microseconds, as long as a few calls through fmpy: all calls and buffers are prepared.
 
     Parameters
     ----------
-    spec : RunSpec
-        FMU, values, start and stop. Without a stop, the FMU does not receive any.
-    steps : list of (float, float)
-        Communication steps as (start, size) in s.
-    changes : dict
-        Values to set at a time in s, by time.
+    session : FmuSession
+    values : dict
+        Values that all runs share, by name.
+    varied : sequence of str
+        Variables whose values differ.
+    read : sequence of str
+        Variables to read at the end of a run, Reals first.
+    start, stop : float
+        Times in s.
     """
-    with open_session(spec) as session:
-        started = perf_counter()
-        try:
-            session.initialize(spec)
-            rows = [session.get_reals(session.outputs)]
-            for t, h in steps:
-                session.set_values(changes.get(t, {}))
-                session.fmu.doStep(t, h)
-                rows.append(session.get_reals(session.outputs))
-        except FMICallException:
-            return session.read_refusal()
-        seconds = perf_counter() - started
-        recorded = [session.variables[name] for name in session.outputs]
-        return Trajectory(
-            replace(spec, outputs=session.outputs),
-            np.array([spec.start or 0.0, *(t + h for t, h in steps)]),
-            dict(zip(session.outputs, np.array(rows).T, strict=True)),
-            {variable.name: variable_unit(variable) for variable in recorded},
-            {variable.name: variable.description or variable.name for variable in recorded},
-            {},
-            statistics=read_statistics(session.fmu, session.variables, seconds),
-        )
+
+    def __init__(
+        self,
+        session: FmuSession,
+        values: dict[str, float],
+        varied: Sequence[str],
+        read: Sequence[str],
+        start: float,
+        stop: float,
+    ) -> None:
+        self.session, slots = session, {}
+        self.start_calls = [self.prepare("Reset"), self.prepare("SetupExperiment", 0, 0.0, start, 1, stop)]
+        for type_name, names in self.group([*values, *varied]).items():
+            references, buffer = self.make_buffer(type_name, names)
+            for i, name in enumerate(names):
+                buffer[i] = values.get(name, 0)
+                slots[name] = buffer, i, float if type_name == "Real" else int
+            self.start_calls.append(self.prepare(f"Set{type_name}", references, len(names), buffer))
+        self.slots = [slots[name] for name in varied]
+        self.start_calls += [self.prepare("EnterInitializationMode"), self.prepare("ExitInitializationMode")]
+        self.step_call = self.prepare("DoStep", start, stop - start, 1)
+        self.read_calls, self.results = [], []
+        for type_name, names in self.group(read).items():
+            references, buffer = self.make_buffer(type_name, names)
+            self.results.append(buffer)
+            self.read_calls.append(self.prepare(f"Get{type_name}", references, len(names), buffer))
+
+    def group(self, names: Iterable[str]) -> dict[str, list[str]]:
+        """Return the distinct names of variables by type."""
+        groups: dict[str, list[str]] = {}
+        for name in dict.fromkeys(names):
+            groups.setdefault(self.session.type_name(self.session.variables[name]), []).append(name)
+        return groups
+
+    def make_buffer(self, type_name: str, names: list[str]) -> tuple[Any, Any]:
+        """Return value references, and a buffer for the values."""
+        references = (c_uint * len(names))(*(self.session.variables[name].valueReference for name in names))
+        return references, ((c_double if type_name == "Real" else c_int) * len(names))()
+
+    def prepare(self, name: str, *arguments: Any) -> tuple[str, Any, tuple[Any, ...]]:
+        """Return name, function and arguments of a call."""
+        return f"{self.session.prefix}{name}", self.session.function(name), (self.session.instance, *arguments)
+
+    def start(self, point: Sequence[float]) -> None:
+        """Initialize a run with the varied values."""
+        for (buffer, i, number), value in zip(self.slots, point, strict=True):
+            buffer[i] = number(value)
+        call_all(self.start_calls)
+
+    def step_to_stop(self) -> None:
+        """Run to the stop in one communication step."""
+        call_all([self.step_call])
+
+    def read(self) -> list[float]:
+        """Return the variables to read."""
+        call_all(self.read_calls)
+        return [value for buffer in self.results for value in buffer]
 
 
-def inject_nonfinite(spec: RunSpec) -> RefusalSummary:
-    """Set NaN and both infinities in every settable Real, before and during a run, one at a time.
+def call_all(calls: Iterable[tuple[str, Any, tuple[Any, ...]]]) -> None:
+    """Call functions of the library; raise FMICallException if one of them fails."""
+    for name, function, arguments in calls:
+        status = function(*arguments)
+        if status > WARNING:
+            raise FMICallException(name, status)
 
-    The FMU must refuse each with a message that starts with the variable's name, and must run again after a reset.
+
+def type_name(variable: Any, description: Any) -> str:
+    """Return the type in the names of the functions that set and get a variable."""
+    if variable.type == "Enumeration":
+        return "Integer" if description.fmiVersion == "2.0" else "Int64"
+    return str(variable.type)
+
+
+def set_variable(fmu: Any, description: Any, variable: Any, value: Any) -> None:
+    """Set a variable of any type in an instance of fmpy; an array from a list in row-major order."""
+    setter = getattr(fmu, f"set{type_name(variable, description)}")
+    setter([variable.valueReference], value if isinstance(value, list) else [value])
+
+
+@cache
+def shared_callbacks() -> fmi2.fmi2CallbackFunctions:
+    """Return the callbacks of FMI 2.0. They are created once: fmpy's logger proxy always calls the last logger."""
+
+    def log_message(environment: Any, name: bytes, status: int, category: bytes, text: bytes) -> None:
+        MESSAGES.append((status, text.decode("utf-8", "replace")))
+
+    functions = fmi2.fmi2CallbackFunctions()
+    functions.logger = fmi2.fmi2CallbackLoggerTYPE(log_message)
+    functions.allocateMemory = fmi2.fmi2CallbackAllocateMemoryTYPE(fmi2.calloc)
+    functions.freeMemory = fmi2.fmi2CallbackFreeMemoryTYPE(fmi2.free)
+    fmi2.addLoggerProxy(byref(functions))
+    return functions
+
+
+def log_fmi3_message(environment: Any, status: int, category: bytes, text: bytes) -> None:
+    """Store a log message of FMI 3.0."""
+    MESSAGES.append((status, (text or b"").decode("utf-8", "replace")))
+
+
+@contextmanager
+def capture_stderr() -> Iterator[io.StringIO]:
+    """Capture standard error of FMUs in Python and discard that of others.
+
+    The log contains the same messages.
     """
-    failures, n_tried = [], 0
-    with open_session(spec) as session:
-        for name, value, in_run in product(session.find_reals("parameter", "input"), (nan, inf, -inf), (False, True)):
-            n_tried += 1
-            session.reset()
-            try:
-                session.initialize(spec if in_run else replace(spec, values={**spec.values, name: value}))
-                session.fmu.doStep(0.0, 0.01)
-                if in_run:
-                    session.set_values({name: value})
-                    session.fmu.doStep(0.01, 0.01)
-                failures.append(f"{name} = {value} was accepted{' during the run' * in_run}")
-            except FMICallException:
-                refusal = session.read_refusal()
-                if not (refusal.message.startswith(f"{name} = ") and refusal.all_nan):
-                    failures.append(f"{name} = {value}: {refusal.message or 'no sentence'}")
-        session.reset()
-        session.initialize(spec)
-        session.fmu.doStep(0.0, 0.01)
-    return RefusalSummary(n_tried, tuple(failures))
+    captured = io.StringIO()
+    with ExitStack() as restore, redirect_stderr(captured):
+        with suppress(OSError):  # there is no standard error
+            saved = os.dup(2)
+            restore.callback(os.close, saved)
+            restore.callback(os.dup2, saved, 2)
+            with open(os.devnull, "w") as null:
+                os.dup2(null.fileno(), 2)
+        yield captured

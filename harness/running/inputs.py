@@ -1,12 +1,13 @@
 """Input signals of a run: a table over time, linear between its rows."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from math import inf
 from typing import Any
 
 import numpy as np
 
-from ..errors import SceneError, check_names
+from ..errors import HarnessError, SceneError, check_names
+from .fmu_session import FmuSession
 from .variable_values import REAL_TYPES
 
 Inputs = Mapping[str, Sequence[float]]  # "time" in s, and the values of each input at these times
@@ -45,6 +46,11 @@ def check_inputs(inputs: Inputs, variables: Mapping[str, Any]) -> None:
         raise SceneError("inputs: the time falls; sort the rows by time")
 
 
+def input_signals(inputs: Inputs, session: FmuSession) -> "InputSignals | None":
+    """Return what sets the inputs of an instance, None without input signals."""
+    return InputSignals(inputs, session) if any(name != TIME for name in inputs) else None
+
+
 class InputSignals:
     """Sets the inputs of an FMU instance from a table.
 
@@ -55,20 +61,24 @@ class InputSignals:
     ----------
     inputs : mapping
         The table, as `check_inputs` describes it.
-    set_values : callable
-        Takes the value references and the values of the inputs.
-    variables : mapping
-        The variables of the model description by name.
+    session : FmuSession
+        The instance.
+
+    Raises
+    ------
+    HarnessError
+        If the inputs are of several types.
     """
 
-    def __init__(
-        self, inputs: Inputs, set_values: Callable[[list[int], list[float]], Any], variables: Mapping[str, Any]
-    ) -> None:
-        self.set_values = set_values
+    def __init__(self, inputs: Inputs, session: FmuSession) -> None:
+        variables = [session.variables[name] for name in inputs if name != TIME]
+        kinds = {variable.type for variable in variables}
+        if len(kinds) > 1:
+            raise HarnessError(f"inputs of several types ({', '.join(sorted(kinds))}) cannot be driven at once")
+        self.set_values = getattr(session.fmu, f"set{kinds.pop()}")
+        self.references = [variable.valueReference for variable in variables]
         self.time = np.asarray(inputs[TIME], dtype=float)
-        columns = {name: column for name, column in inputs.items() if name != TIME}
-        self.references = [variables[name].valueReference for name in columns]
-        self.columns = [np.asarray(column, dtype=float) for column in columns.values()]
+        self.columns = [np.asarray(column, dtype=float) for name, column in inputs.items() if name != TIME]
         self.jumps = self.time[1:][np.diff(self.time) == 0]
 
     def apply(self, time: float, continuous: bool = True, discrete: bool = True, after_event: bool = False) -> None:

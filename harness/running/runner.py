@@ -9,11 +9,9 @@ import numpy as np
 
 from ..errors import HarnessError
 from ..scenes.run_spec import RunSpec
-from .description import read_description
-from .external import simulation as external
-from .external.sample_rows import ROW_FORMATS, element_names
-from .fmi2 import ProgressCallback, simulate
-from .settings import REQUIRED_VARIABLES
+from .description import exposes_solver_steps, read_description
+from .own_fmu import ProgressCallback, simulate
+from .recorder import C_TYPES, array_shape, element_names
 from .trajectory import Trajectory
 
 DEFAULT_COMMUNICATION_STEPS = 512  # of a run without a communication step of its own
@@ -38,8 +36,12 @@ def run(spec: RunSpec, report: ProgressCallback) -> Trajectory:
     spec = replace(spec, outputs=spec.outputs or default_outputs(description, spec.values))
     if not spec.outputs:
         raise HarnessError(f"{spec.fmu.name} has no outputs or locals to record")
-    is_own = exposes_solver_steps(description) and not spec.exchange
-    trajectory = simulate(spec, report) if is_own else external.simulate(spec, description, report)
+    if exposes_solver_steps(description) and not spec.exchange:
+        trajectory = simulate(spec, report)
+    else:
+        from .external import simulation as external
+
+        trajectory = external.simulate(spec, description, report)
     return trajectory if spec.interval is None else keep_interval(trajectory, spec.interval)
 
 
@@ -50,16 +52,6 @@ def keep_interval(run: Trajectory, interval: float) -> Trajectory:
     keep = np.abs(start + np.rint((run.time - start) / interval) * interval - run.time) <= near
     keep[-1] = True
     return replace(run, time=run.time[keep], columns={name: column[keep] for name, column in run.columns.items()})
-
-
-def exposes_solver_steps(description: Any) -> bool:
-    """Return whether an FMU exposes the steps of its solver, as those of this project do in FMI 2.0."""
-    names = [variable.name for variable in description.modelVariables]
-    return (
-        description.fmiVersion == "2.0"
-        and description.coSimulation is not None
-        and all(name in names for name in REQUIRED_VARIABLES)
-    )
 
 
 def default_outputs(description: Any, values: Mapping[str, Any] | None = None) -> tuple[str, ...]:
@@ -78,9 +70,9 @@ def default_outputs(description: Any, values: Mapping[str, Any] | None = None) -
     """
     for causality in ("output", "local"):
         shapes = {
-            variable.name: external.array_shape(variable, values or {})
+            variable.name: array_shape(variable, values or {})
             for variable in description.modelVariables
-            if variable.causality == causality and variable.variability != "constant" and variable.type in ROW_FORMATS
+            if variable.causality == causality and variable.variability != "constant" and variable.type in C_TYPES
         }
         if (count := sum(map(prod, shapes.values()))) > MAX_DEFAULT_OUTPUTS:
             raise HarnessError(

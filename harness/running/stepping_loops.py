@@ -10,7 +10,7 @@ from pathlib import Path
 import fmpy
 
 from ..scenes.run_spec import RunSpec
-from .fmi2 import open_instance, read_own_description, simulate
+from .own_fmu import open_session, read_own_description, simulate
 from .timing import time_fastest_call
 
 COMMUNICATION_STEPS = 1600
@@ -19,14 +19,14 @@ REPEATS = 10
 
 def time_fmpy_loop(file: Path, steps: int) -> float:
     """Return the run time in s of fmpy's loop, the fastest of several runs of one instance."""
-    with open_instance(RunSpec(file)) as (description, fmu, _):
-        stop = float(description.defaultExperiment.stopTime)
+    with open_session(RunSpec(file)) as session:
+        fmu, stop = session.fmu, float(session.description.defaultExperiment.stopTime)
 
         def run() -> None:
             fmu.reset()
             fmpy.simulate_fmu(
                 fmu.unzipDirectory,
-                model_description=description,
+                model_description=session.description,
                 fmu_instance=fmu,
                 stop_time=stop,
                 output_interval=stop / steps,

@@ -1,5 +1,6 @@
 """Trajectory of a run: time, columns, steps, events, statistics and the specification."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from math import nan
@@ -307,6 +308,17 @@ class Trajectory:
                 command=PYTHON_API,
                 run=self.spec,
             )
+
+    def sample_at(self, times: np.ndarray, names: Sequence[str]) -> np.ndarray:
+        """Return the named outputs, (n, names), at the recorded times nearest to `times` (n,) in s."""
+        nearest = np.abs(self.time[:, None] - times).argmin(axis=0)
+        return np.column_stack([self.columns[name][nearest] for name in names])
+
+    def find_changes(self, name: str) -> list[tuple[float, int]]:
+        """Return every change of an integer output as (time in s, new value)."""
+        values = self.columns[name]
+        after = np.flatnonzero(np.diff(values)) + 1
+        return list(zip(self.time[after].tolist(), values[after].tolist(), strict=True))
 
     def column_of_role(self, role: str) -> np.ndarray:
         """Return the recorded position, velocity or acceleration (n,)."""

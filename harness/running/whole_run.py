@@ -24,10 +24,8 @@ from ..process.subprocess_runner import run_subprocess
 from ..process.temporary_directory import temporary_directory
 from ..process.worker_pool import Worker, WorkerDiedError, process_context
 from .c_host import COMPILER
-from .description import read_description
-from .external.instance import set_variable
-from .fmi2 import capture_stderr
-from .settings import REQUIRED_VARIABLES
+from .description import REQUIRED_VARIABLES, read_description
+from .fmu_session import capture_stderr, set_variable
 from .unpacking import PROCESS_RESOURCES, unpack_once
 from .variable_values import REAL_TYPES, effective_value, find_bound, variable_unit
 

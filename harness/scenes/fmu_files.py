@@ -25,6 +25,11 @@ def find_fmu(name: str) -> Path:
     return next((file for folder in folders for file in folder.glob(f"{name}.fmu")), unbuilt / f"{name}.fmu")
 
 
+def fmi3_path(fmu: Path) -> Path:
+    """Return the path of the native FMI 3.0 FMU of the same model, built or not."""
+    return fmu.parent / "native" / "fmi3" / fmu.name
+
+
 def list_models() -> set[str]:
     """Return the names of all models, built or not."""
     return _names_in(FOLDERS) | list_more_models()

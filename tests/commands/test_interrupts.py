@@ -191,17 +191,36 @@ def test_messages_larger_than_a_pipe_buffer_arrive_at_a_slow_reader():
     assert (done.returncode, done.stdout.strip()) == (0, "200000")
 
 
+def ends(pid):
+    """Return whether a process ends within some seconds."""
+    state = Path("/proc", pid.strip(), "stat")
+    for _ in range(200):
+        if not state.exists() or state.read_text().split()[2] == "Z":  # nobody waits for its status
+            return True
+        time.sleep(0.05)
+    return False
+
+
 def test_a_program_that_times_out_ends_with_all_its_children(tmp_path):
     script = "sleep 100 & echo $! > pid; wait"
     with pytest.raises(SubprocessTimeoutError, match=r"no answer after 0\.5 s") as late:
         run_subprocess(["sh", "-c", f"cd '{tmp_path}'; echo so far; {script}"], timeout=0.5)
     assert late.value.process.stdout == "so far\n"
-    state = Path("/proc", (tmp_path / "pid").read_text().strip(), "stat")
-    for _ in range(100):
-        if not state.exists() or state.read_text().split()[2] == "Z":  # nobody waits for its status
-            return
+    assert ends((tmp_path / "pid").read_text())
+
+
+def test_a_child_process_exits_after_its_parent_was_killed(tmp_path):
+    hang = f"lambda request: (Path({str(tmp_path / 'pid')!r}).write_text(str(os.getpid())), time.sleep(100))"
+    start = "import os, sys, time; from pathlib import Path; from harness.process.subprocess_runner import "
+    child = f"{start}serve_request; serve_request(dict, {hang})"
+    code = f"{start}run_subprocess; run_subprocess([sys.executable, '-c', {child!r}], '{{}}')"
+    parent = subprocess.Popen([sys.executable, "-c", code], cwd=ROOT, env=os.environ | {"PYTHONPATH": str(ROOT)})
+    while not ((tmp_path / "pid").is_file() and (tmp_path / "pid").read_text()):
+        assert parent.poll() is None
         time.sleep(0.05)
-    raise AssertionError("what it started lives on")
+    parent.kill()
+    parent.wait()
+    assert ends((tmp_path / "pid").read_text())
 
 
 def test_a_program_awaited_by_a_thread_ends_with_the_command(tmp_path, monkeypatch):

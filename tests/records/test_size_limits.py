@@ -132,10 +132,10 @@ def test_a_file_that_takes_too_long_is_refused(monkeypatch):
 
 def test_the_memory_of_the_reader_is_limited():
     pytest.importorskip("resource", reason="a module of POSIX")
-    code = f"from {child_reader.__name__} import limit_memory; limit_memory(); import resource; "
-    code += "print(*resource.getrlimit(resource.RLIMIT_AS))"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT)
-    assert done.stdout.split() == [str(child_reader.MAX_MEMORY)] * 2
+    code = f"import resource; from {child_reader.__name__} import MAX_MEMORY, serve_request; "
+    code += "serve_request(dict, lambda request: resource.getrlimit(resource.RLIMIT_AS), MAX_MEMORY)"
+    done = subprocess.run([sys.executable, "-c", code], input="{}", capture_output=True, text=True, cwd=ROOT)
+    assert json.loads(done.stdout) == [child_reader.MAX_MEMORY] * 2
 
 
 @pytest.mark.parametrize("name", ["record.npy", "record.npz"])

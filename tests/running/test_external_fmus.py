@@ -4,6 +4,7 @@ import csv
 import json
 import os
 from math import cos, exp, sin, sqrt
+from pathlib import Path
 from types import SimpleNamespace
 from zipfile import ZipFile
 
@@ -15,13 +16,12 @@ from fmpy.model_description import Dimension, ModelVariable
 
 from harness.errors import HarnessError, SceneError
 from harness.running.description import read_description
-from harness.running.external.refinement_run import RefinementRun
-from harness.running.external.request import ExternalRunRequest
-from harness.running.external.sample_rows import RowRecorder, SampleRows
-from harness.running.external.simulation import array_shape, read_longest_rows
-from harness.running.external.step_refinement import refine
+from harness.running.external.simulation import read_longest_rows
+from harness.running.external.step_refinement import RefinementRun, refine
+from harness.running.recorder import Recorder, array_shape
 from harness.running.variable_values import convert_value
 from harness.scenes.assignments import NumberWithText
+from harness.scenes.run_spec import RunSpec
 
 
 @pytest.fixture(scope="module")
@@ -220,18 +220,23 @@ def test_a_hang_crash_exception_or_nan_is_one_sentence_and_keeps_its_samples(run
 
 
 def test_the_longest_of_the_aborted_refinement_runs_is_kept(tmp_path):
-    x = ModelVariable("x", type="Float64", valueReference=0)
+    def answer(instance, references, count, values, size):
+        values[0] = 1.5
+        return 0
+
+    chosen = [(ModelVariable("x", type="Float64", valueReference=0), ())]
+    session = SimpleNamespace(
+        is_fmi2=False, prefix="fmi3", instance=None, type_name=lambda variable: variable.type, function=lambda _: answer
+    )
     for number, times in enumerate(([0.0, 0.5, 1.0], [0.0, 0.25, 0.5, 0.75], [])):
-        recorder = RowRecorder(
-            SimpleNamespace(getFloat64=lambda *_: [1.5]), "3.0", [(x, ())], tmp_path / f"rows-{number}", None
-        )
-        for t in times:
-            recorder.record(t)
-        recorder.file.close()
+        with (tmp_path / f"rows-{number}").open("wb") as file:
+            recorder = Recorder(session, chosen, file.write)
+            for t in times:
+                recorder.record(t)
     with (tmp_path / "rows-0").open("ab") as file:
         file.write(b"cut off")
-    assert read_longest_rows(tmp_path, None, [(x, ())]).time.tolist() == [0.0, 0.5, 1.0]
-    assert read_longest_rows(tmp_path, 1, [(x, ())]).columns["x"].tolist() == [1.5] * 4
+    assert read_longest_rows(tmp_path, None, chosen, False)[0].tolist() == [0.0, 0.5, 1.0]
+    assert read_longest_rows(tmp_path, 1, chosen, False)[1]["x"].tolist() == [1.5] * 4
 
 
 def test_the_output_of_an_fmu_is_reported_and_harmless(run):
@@ -427,12 +432,12 @@ def test_results_that_never_agree_are_kept_with_their_difference(exchange, value
 
     def run(h, tolerance):
         time = np.linspace(0.0, 1.0, 65)
-        passes.append(RefinementRun(len(passes), SampleRows(time, {"x": np.full(65, values[len(passes) % 2])})))
+        passes.append(RefinementRun(len(passes), time, {"x": np.full(65, values[len(passes) % 2])}))
         return passes[-1]
 
-    request = ExternalRunRequest("", "", exchange, 0.0, 1.0, tolerance=1e-6, timeout=1.0)
+    spec = RunSpec(Path("any.fmu"), start=0.0, stop=1.0, exchange=exchange)
     answer = refine(
-        request, SimpleNamespace(coSimulation=SimpleNamespace(fixedInternalStepSize=None), defaultExperiment=None), run
+        spec, SimpleNamespace(coSimulation=SimpleNamespace(fixedInternalStepSize=None), defaultExperiment=None), run
     )
     assert answer.run_number == len(passes) - 1
     assert "of its largest value, more than the tolerance of 1e-06; raise --tolerance" in answer.failure

@@ -1,27 +1,40 @@
 """Impossible results of an FMU are refused in one sentence, and never used."""
 
 import re
+from ctypes import byref, c_bool, c_double
+from pathlib import Path
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 from fmpy.model_description import ModelVariable
 
 from harness.errors import HarnessError
-from harness.running.external.cosimulation import cosimulate
-from harness.running.external.model_exchange import update_discrete_states
-from harness.running.external.refinement_run import RefinementRun, TerminatedError, TimeGrid
-from harness.running.external.request import ExternalRunRequest
-from harness.running.external.sample_rows import RowRecorder, SampleRows, StringTable, read_rows
-from harness.running.external.step_refinement import refine
+from harness.running.external.step_refinement import RefinementRun, refine
+from harness.running.fmu_session import FmuSession, TerminatedError
+from harness.running.model_exchange import update_discrete_states
+from harness.running.recorder import Recorder, StringTable, read_rows
+from harness.running.stepping import CoSimulation, TimeGrid, step_to_stop
+from harness.scenes.run_spec import RunSpec
 
 NAN, HUGE = float("nan"), 1e300
 
 
 def run_with_step(answer):
     """Return the sample times of an FMU whose fmi3DoStep returns `answer`, and the exception."""
-    times = []
+
+    def do_step(instance, t, h, is_final, *results):
+        for result, value in zip(results, answer(t, h), strict=True):
+            result._obj.value = value
+        return 0
+
+    session = FmuSession.__new__(FmuSession)  # without a library
+    session.instance, session.do_step = None, do_step
+    session.step_results = (c_bool(), c_bool(), c_bool(), c_double())
+    session.step_arguments = tuple(map(byref, session.step_results))
+    times, grid = [], TimeGrid(0.0, 1.0, 0.25)
     with pytest.raises((TerminatedError, HarnessError)) as caught:
-        cosimulate(SimpleNamespace(doStep=answer), "3.0", TimeGrid(0.0, 1.0, 0.25), times.append, lambda share: None)
+        step_to_stop(CoSimulation(session, grid, only_grid=True), grid, times.append, lambda share: None)
     return times, str(caught.value)
 
 
@@ -59,10 +72,10 @@ def test_an_impossible_step_size_is_treated_as_undeclared(declared):
 
     def run(h, tolerance):
         steps.append(h)
-        return RefinementRun(len(steps), SampleRows([0.0], {}), "no")
+        return RefinementRun(len(steps), np.zeros(1), {}, "no")
 
     description = SimpleNamespace(coSimulation=SimpleNamespace(fixedInternalStepSize=declared), defaultExperiment=None)
-    refine(ExternalRunRequest("", "", False, 0.0, 1.0, tolerance=1e-6, timeout=1.0), description, run)
+    refine(RunSpec(Path("any.fmu"), start=0.0, stop=1.0), description, run)
     assert min(steps) > 0.0
 
 
@@ -70,12 +83,15 @@ def test_an_impossible_step_size_is_treated_as_undeclared(declared):
 def test_a_null_or_malformed_string_is_recorded(tmp_path, bytes_, text):
     def answer(component, references, count, values, size):
         values[0] = bytes_
+        return 0
 
     variable = ModelVariable("said", valueReference=7, type="String")
-    fmu = SimpleNamespace(fmi3GetString=answer, component=None, getString=None)
-    texts = StringTable(tmp_path / "texts")
-    recorder = RowRecorder(fmu, "3.0", [(variable, ())], tmp_path / "rows", texts)
-    recorder.record(0.0)
-    recorder.file.close(), texts.file.close()
-    assert read_rows(tmp_path / "rows", [(variable, ())]).columns["said"].tolist() == [0]
+    session = SimpleNamespace(
+        is_fmi2=False, prefix="fmi3", instance=None, type_name=lambda variable: "String", function=lambda name: answer
+    )
+    texts, rows = StringTable(tmp_path / "texts"), bytearray()
+    Recorder(session, [(variable, ())], rows.extend, texts).record(0.0)
+    texts.file.close()
+    _, columns = read_rows(rows, [(variable, ())], is_fmi2=False)
+    assert columns["said"].tolist() == [0]
     assert (tmp_path / "texts").read_text() == text + "\n"

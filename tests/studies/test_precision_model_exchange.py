@@ -3,6 +3,7 @@ co-simulation."""
 
 import csv
 import json
+from dataclasses import replace
 from functools import cache
 from html import unescape
 from math import isnan
@@ -17,12 +18,13 @@ from harness.errors import HarnessError
 from harness.references import peer_solvers
 from harness.references.certified_reference import load_reference
 from harness.references.models import CASES
-from harness.running import fmi3
 from harness.running.embedded_model import load_model_class
+from harness.running.own_fmu import simulate
+from harness.scenes.run_spec import RunSpec
 from harness.studies.precision import advice, study
 from harness.studies.precision.study import (
     CS,
-    FMI3_INTERFACES,
+    FMI3_TOOLS,
     FMPY,
     FMU,
     ME,
@@ -112,32 +114,33 @@ def test_a_step_limit_of_cvode_gives_a_gap_with_the_reason_of_fmpy(points, capfd
 
 
 def test_each_run_of_an_instance_starts_from_scratch(both):
-    with fmi3.open_fmi3_instance(both / "fmus/native/fmi3/stickslip.fmu", fmi3.MODEL_EXCHANGE) as fmu:
-        first, again = (fmu.simulate({"mu_s": 0.8}, ("x", "v", "mode"), 16.0, 0.5, 1e-6) for _ in range(2))
-        other = fmu.simulate({}, ("x", "v", "mode"), 16.0, 0.5, 1e-6)
-    assert np.array_equal(first.rows, again.rows)
-    assert first.evaluations == again.evaluations > 100
-    assert other.rows["x"][-1] != first.rows["x"][-1]
+    sled = RunSpec(both / "fmus/native/fmi3/stickslip.fmu", ("x", "v", "mode"), {"mu_s": 0.8}, stop=16.0, grid=0.5)
+    sled = replace(sled, follow=False, exchange=True)
+    first, again = (simulate(replace(sled, repeat=repeat)) for repeat in (1, 3))
+    other = simulate(replace(sled, values={}))
+    assert np.array_equal(first.time, again.time)
+    assert all(np.array_equal(first[name], again[name]) for name in sled.outputs)
+    assert first.statistics.evaluations == again.statistics.evaluations > 100
+    assert other["x"][-1] != first["x"][-1]
 
 
-@pytest.mark.parametrize("way", [fmi3.MODEL_EXCHANGE, fmi3.CO_SIMULATION])
-def test_a_failure_is_one_sentence(both, tmp_path, way, capfd):
-    def refused(file, values=None, timeout=None):
-        with pytest.raises(HarnessError) as error, fmi3.open_fmi3_instance(file, way) as fmu:
-            fmu.simulate(values or {}, ("x",), 16.0, 0.01, 1e-6, timeout)
+@pytest.mark.parametrize("exchange", [True, False])
+def test_a_failure_is_one_sentence(both, tmp_path, exchange, capfd):
+    def refused(file, values=None, timeout=60.0):
+        run = RunSpec(file, ("x",), values or {}, stop=16.0, grid=0.01, follow=False, exchange=exchange)
+        with pytest.raises(HarnessError) as error:
+            simulate(run, study.limit_run_time(timeout, 16.0))
         return str(error.value)
 
     sled, missing, broken = both / "fmus/native/fmi3/stickslip.fmu", tmp_path / "missing.fmu", tmp_path / "broken.fmu"
     broken.write_bytes(b"no archive")
-    assert "m = -1.0 kg is refused" in refused(sled, {"m": -1.0})
-    unknown = "stickslip.fmu: The start values for the following variables could not be set: mess"
-    assert refused(sled, {"mess": 1.0}) == unknown
-    assert refused(sled, timeout=1e-3).endswith(" s after 0.001 s of run time")
-    assert refused(missing) == f"not built: {missing} (python build_fmus.py --fmi 3)"
-    assert refused(broken) == "broken.fmu cannot be unpacked: File is not a zip file"
-    out, err = capfd.readouterr()  # where the FMU itself prints its message
-    assert (out, err.count("\n")) == ("", 1)
-    assert err.startswith("Stickslip (stickslip): m = -1.0 kg is refused")
+    assert refused(sled, {"m": -1.0}).startswith("m = -1.0 is outside its range")
+    assert refused(sled, {"mu_d": 2.0}).startswith("mu_d is 2.0, above mu_s = 0.9: ")
+    assert "'mess'" in refused(sled, {"mess": 1.0})
+    assert refused(sled, timeout=1e-6).endswith(" s after 1e-06 s of run time")
+    assert refused(missing).startswith(f"there is no {missing}: build ")
+    assert refused(broken).startswith("broken.fmu cannot be read: File is not a zip file")
+    assert capfd.readouterr() == ("", "")
 
 
 def harness(folder, *arguments):
@@ -208,10 +211,10 @@ def test_the_command_writes_every_point_and_advice_and_keeps_results_of_other_mo
     assert (folder / "pendulum.txt").read_text() == "older"
     texts = files["smd.csv"], (folder / "smd.csv").read_text()
     rows, later = (list(csv.DictReader(text.splitlines())) for text in texts)
-    tools = {FMU, FMPY, *FMI3_INTERFACES, "scipy", "cvode"} - peer_solvers.missing_packages().keys()
+    tools = {FMU, FMPY, *FMI3_TOOLS, "scipy", "cvode"} - peer_solvers.missing_packages().keys()
     assert {row["tool"] for row in rows} == tools
     unbuilt = "not built: fmus/native/fmi3/smd.fmu (python build_fmus.py --fmi 3)"
-    assert [row["failure"] for row in later if row["tool"] in FMI3_INTERFACES] == [unbuilt, unbuilt]
+    assert [row["failure"] for row in later if row["tool"] in FMI3_TOOLS] == [unbuilt, unbuilt]
     assert [item for item in json.loads(incomplete)["missing"] if unbuilt in item] == [unbuilt]
     inside, outside = ([row for row in rows if row["tool"] == tool] for tool in (FMU, FMPY))
     assert len(inside) == 1 + 4 * len(QUICK.tolerances)

@@ -22,7 +22,7 @@ from harness.errors import HarnessError
 from harness.references.models.pacejka import MagicFormula
 from harness.references.reference_trajectory import CommunicationGrid, ReferenceTrajectory, compute_reference
 from harness.results.provenance import load_provenance
-from harness.running.fmu_session import RefusalSummary, RefusedRun
+from harness.running.step_sequence import RefusalSummary, RefusedRun
 from harness.running.trajectory import Statistics, Trajectory
 from harness.scenes.run_spec import RunSpec
 from harness.studies.stability.cases import StabilityCase, expand_scene, load_scenes, value_spans

@@ -6,7 +6,7 @@ import native_fmus
 import pytest
 import web_page
 
-from harness.running.fmi2 import simulate
+from harness.running.own_fmu import simulate
 from harness.scenes.scene import load_scene, shipped_scenes
 from harness.studies.run.study import ANALYSES
 

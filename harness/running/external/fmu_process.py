@@ -1,9 +1,6 @@
-"""Child process that runs an external FMU: reads a request from standard input, writes rows and a result to files."""
+"""Child process that runs an external FMU: it writes rows and progress to files and replies with a result."""
 
-import faulthandler
-import json
 import os
-import sys
 from contextlib import suppress
 from dataclasses import asdict
 from pathlib import Path
@@ -14,42 +11,36 @@ import fmpy
 from fmpy.fmi1 import FMICallException
 
 from ...errors import HarnessError, first_line
-from ..inputs import InputSignals
-from .cosimulation import cosimulate
-from .instance import MESSAGES, STATUS_NAMES, initialize, instantiate, last_error_message, trim_messages
-from .model_exchange import integrate
-from .refinement_run import RefinementRun, StepRefusedError, TerminatedError, TimeGrid
-from .request import (
+from ...process.subprocess_runner import serve_request
+from ...scenes.run_spec import RunSpec
+from ..fmu_session import STATUS_NAMES, FmuSession, LogCapture, StepError, StepRefusedError, TerminatedError
+from ..inputs import input_signals
+from ..model_exchange import ModelExchange
+from ..recorder import Recorder, StringTable, read_rows, select_variables
+from ..stepping import CoSimulation, Stepper, TimeGrid, step_to_stop
+from .step_refinement import (
     OUTPUT_FILE,
     PROGRESS_FILE,
-    RESULT_FILE,
     ROWS_PREFIX,
     STRINGS_FILE,
-    TIMEOUT_FILE,
-    ExternalRunRequest,
-    RefinementResult,
+    RefinementRun,
+    coarsest_grid,
+    refine,
 )
-from .sample_rows import RowRecorder, StringTable, read_rows
-from .step_refinement import refine
 
 REPORT_INTERVAL = 0.2  # s between progress reports
 MAX_OUTPUT_BYTES = 1_000_000  # of FMU output that are kept
 REMAINING_SHARE = 0.8  # of the progress bar after each run
 
 
-class Watchdog:
-    """Reports progress and ends the process if one FMI call takes longer than the timeout."""
+class ProgressFile:
+    """Reports progress to the parent, which kills this process if one FMI call takes longer than its timeout."""
 
-    def __init__(self, directory: Path, timeout: float) -> None:
-        self.timeout_file, self.progress_file = (
-            (directory / TIMEOUT_FILE).open("w"),
-            (directory / PROGRESS_FILE).open("w"),
-        )
-        self.timeout, self.next, self.progress, self.n_runs = timeout, 0.0, 0.0, 0
-        self.parent = os.getppid()
+    def __init__(self, directory: Path) -> None:
+        self.file, self.next, self.progress, self.n_runs = (directory / PROGRESS_FILE).open("w"), 0.0, 0.0, 0
 
-    def report_progress(self, progress: float | None = None) -> None:
-        """Report the progress of the present run, from 0 to 1, and reset the watchdog.
+    def report(self, progress: float | None = None) -> None:
+        """Report the progress of the present run, from 0 to 1, or that the process works.
 
         The number of runs is unknown: each run takes a fixed share of what remains of the progress bar.
         """
@@ -57,38 +48,44 @@ class Watchdog:
         if now < self.next:
             return
         self.next = now + REPORT_INTERVAL
-        if os.getppid() != self.parent:  # the parent was killed
-            os._exit(1)
-        faulthandler.dump_traceback_later(self.timeout, exit=True, file=self.timeout_file)
         self.progress = self.progress if progress is None else progress
-        self.progress_file.seek(0)
-        self.progress_file.write(f"{1 - REMAINING_SHARE ** (self.n_runs + self.progress):.6f}")
-        self.progress_file.flush()
-        trim_messages()
+        self.file.seek(0)
+        self.file.write(f"{1 - REMAINING_SHARE ** (self.n_runs + self.progress):.6f}")
+        self.file.flush()
         if os.fstat(1).st_size > MAX_OUTPUT_BYTES:
             os.ftruncate(1, 0)
 
 
 class ExternalFmu:
-    """Runs an external FMU, each time with a new instance."""
+    """Runs an external FMU, each time with a new instance.
 
-    def __init__(self, request: ExternalRunRequest, directory: Path, watchdog: Watchdog) -> None:
-        self.request, self.directory, self.watchdog = request, directory, watchdog
-        self.description = fmpy.read_model_description(request.folder, validate=False)
+    Parameters
+    ----------
+    spec : RunSpec
+        The run, with its start, stop and converted values.
+    folder : str
+        Directory of the unpacked FMU.
+    directory : pathlib.Path
+        Directory for results.
+    """
+
+    def __init__(self, spec: RunSpec, folder: str, directory: Path) -> None:
+        self.spec, self.folder, self.directory = spec, folder, directory
+        self.description = fmpy.read_model_description(folder, validate=False)
         variables = {variable.name: variable for variable in self.description.modelVariables}
-        self.variables = [(variables[name], tuple(shape)) for name, shape in request.outputs.items()]
-        self.strings = StringTable(directory / STRINGS_FILE)
+        self.settings = [(variables[name], value) for name, value in spec.values.items()]
+        self.chosen = select_variables(spec, variables, spec.values)
+        self.strings, self.progress = StringTable(directory / STRINGS_FILE), ProgressFile(directory)
 
     def run(self, h: float, tolerance: float) -> RefinementRun:
         """Run the FMU with a communication step in s and a tolerance."""
-        number = self.watchdog.n_runs
+        number, log = self.progress.n_runs, LogCapture()
         path = self.directory / f"{ROWS_PREFIX}{number}"
-        del MESSAGES[:]
-        self.watchdog.next = 0.0
-        self.watchdog.report_progress(0.0)
+        self.progress.next = 0.0
+        self.progress.report(0.0)
         cause: Exception | None = None
         try:
-            self.step(path, h, tolerance)
+            self.record(path, log, h, tolerance)
         except FMICallException as error:
             status = dict(enumerate(STATUS_NAMES)).get(error.status, error.status)
             cause = HarnessError(f"{error.function} returned {status}")
@@ -96,70 +93,53 @@ class ExternalFmu:
             cause = error
         message = first_line(cause) if cause else ""
         path.touch()
-        rows = read_rows(path, self.variables)
+        time, columns = read_rows(path.read_bytes(), self.chosen, self.description.fmiVersion == "2.0")
         for older in self.directory.glob(f"{ROWS_PREFIX}*") if not message else ():
             if older != path:
                 older.unlink()  # superseded by a complete run
         if message:
-            where = f" at t = {rows.time[-1]:.9g} s" if len(rows.time) and " at t = " not in message else ""
-            message = ": ".join(filter(None, (message + where, last_error_message())))
-        self.watchdog.n_runs += 1
-        return RefinementRun(
-            number, rows, message, isinstance(cause, TerminatedError), isinstance(cause, StepRefusedError)
-        )
+            where = f" at t = {time[-1]:.9g} s" if len(time) and " at t = " not in message else ""
+            message = ": ".join(filter(None, (message + where, log.error_message)))
+        self.progress.n_runs += 1
+        terminated, step_refused = isinstance(cause, TerminatedError), isinstance(cause, StepRefusedError)
+        return RefinementRun(number, time, columns, message, terminated, step_refused)
 
-    def step(self, path: Path, h: float, tolerance: float) -> None:
+    def record(self, path: Path, log: LogCapture, h: float, tolerance: float) -> None:
         """Run a new instance and record its rows; exceptions propagate."""
-        request, description = self.request, self.description
-        fmu = instantiate(description, request.folder, request.exchange)
-        initialize(fmu, description, request.values, request.start, request.stop, tolerance)
-        record = RowRecorder(fmu, description.fmiVersion, self.variables, path, self.strings).record
-        times, report_progress = TimeGrid(request.start, request.stop, h), self.watchdog.report_progress
-        signals = self.input_signals(fmu)
-        try:
-            if request.exchange:
-                integrate(fmu, description, times, tolerance, record, report_progress, signals)
-            else:
-                cosimulate(fmu, description.fmiVersion, times, record, report_progress, signals)
-        except (TerminatedError, StepRefusedError):
-            # after any other failure the next call may crash; the exit frees the instance
-            fmu.freeInstance()
-            raise
+        span = coarsest_grid(self.spec)
+        grid = TimeGrid(span.start, span.stop, h)
+        session = FmuSession(self.description, self.folder, self.spec.exchange, log=log)
+        session.initialize(self.settings, grid.start, grid.stop, tolerance)
+        signals = input_signals(self.spec.inputs, session)
+        stepper: Stepper = (
+            ModelExchange(session, grid, tolerance, self.progress.report, signals)
+            if self.spec.exchange
+            else CoSimulation(session, grid, signals, only_grid=True)
+        )
+        with path.open("wb", buffering=0) as file:
+            recorder = Recorder(session, self.chosen, file.write, self.strings, only_finite=True)
+            try:
+                step_to_stop(stepper, grid, recorder.record, self.progress.report)
+            except StepError:  # after any other failure the next call may crash; the exit frees the instance
+                session.close()
+                raise
         with suppress(FMICallException):  # all results are recorded
-            fmu.terminate()
-        fmu.freeInstance()
-
-    def input_signals(self, fmu: Any) -> InputSignals | None:
-        """Return what sets the inputs of an instance, None if the run has no input signals."""
-        inputs = self.request.inputs
-        variables = {variable.name: variable for variable in self.description.modelVariables}
-        if not inputs:
-            return None
-        kinds = {variables[name].type for name in inputs if name in variables}
-        if len(kinds) > 1:
-            raise HarnessError(f"inputs of several types ({', '.join(sorted(kinds))}) cannot be driven at once")
-        return InputSignals(inputs, getattr(fmu, f"set{kinds.pop()}"), variables)
+            session.fmu.terminate()
+        session.close()
 
 
-def main() -> None:
-    """Handle one request."""
-    request = ExternalRunRequest(**json.load(sys.stdin))
-    directory = Path(request.directory)
-    output = os.open(directory / OUTPUT_FILE, os.O_WRONLY | os.O_CREAT | os.O_APPEND)
-    for stream in (1, 2):  # redirect output of the FMU
+def run_request(run: dict[str, Any], folder: str, directory: str) -> dict[str, Any]:
+    """Run an unpacked FMU; write rows and what the FMU prints into a directory, and return a RefinementResult."""
+    output = os.open(Path(directory) / OUTPUT_FILE, os.O_WRONLY | os.O_CREAT | os.O_APPEND)
+    for stream in (1, 2):
         os.dup2(output, stream)
-    watchdog = Watchdog(directory, request.timeout)
-    watchdog.report_progress(0.0)
     try:
-        external_fmu = ExternalFmu(request, directory, watchdog)
-        result = refine(request, external_fmu.description, external_fmu.run)
+        fmu = ExternalFmu(RunSpec.from_json(run), folder, Path(directory))
+        return asdict(refine(fmu.spec, fmu.description, fmu.run))
     except Exception as error:
-        result = RefinementResult(None, "", first_line(error))
-    temporary_file = directory / f"{RESULT_FILE}.new"
-    temporary_file.write_text(json.dumps(asdict(result)), encoding="utf-8")
-    temporary_file.rename(directory / RESULT_FILE)
-    os._exit(0)  # an FMU that has failed may crash when its library is unloaded
+        return {"run_number": None, "note": "", "failure": first_line(error)}
 
 
 if __name__ == "__main__":
-    main()
+    serve_request(dict, lambda request: run_request(**request))
+    os._exit(0)  # an FMU that has failed may crash when its library is unloaded

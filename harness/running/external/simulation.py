@@ -2,10 +2,10 @@
 
 import json
 import signal
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import asdict, replace
-from math import inf, prod
+from dataclasses import replace
+from math import inf
 from pathlib import Path
 from time import monotonic
 from typing import Any
@@ -17,30 +17,27 @@ from ...errors import MAX_VALUE_LENGTH, HarnessError, SceneError, check_names
 from ...process.interrupt import check_interrupt
 from ...process.subprocess_runner import run_module
 from ...process.temporary_directory import temporary_directory
+from ...results.files import to_json
 from ...scenes.run_spec import RunSpec
 from ..description import resolve_time_span
 from ..inputs import check_inputs
+from ..recorder import Columns, ShapedVariable, array_shape, element_names, read_rows, select_variables
 from ..trajectory import Trajectory
 from ..unpacking import unpack
 from ..variable_values import convert_value, effective_value, variable_unit
-from .request import (
+from .step_refinement import (
+    MAX_STEPS,
     OUTPUT_FILE,
     PROGRESS_FILE,
-    RESULT_FILE,
     ROWS_PREFIX,
     STRINGS_FILE,
-    TIMEOUT_FILE,
-    ExternalRunRequest,
     RefinementResult,
 )
-from .sample_rows import ROW_FORMATS, SampleRows, ShapedVariable, element_names, read_rows
-from .step_refinement import MAX_STEPS
 
 Values = dict[str, Any]  # by the name of the variable
 
-GRACE_PERIOD = 2.0  # s beyond the timeout, within which the child process ends itself
+GRACE_PERIOD = 0.5  # s beyond the timeout: a report is up to 0.2 s older than the call that follows it
 MAX_START_TIME = 60.0  # s until the child process reports progress for the first time
-MAX_COLUMNS = 100_000  # recorded values at each point
 SETTABLE = ("parameter", "structuralParameter", "input")
 
 
@@ -71,32 +68,21 @@ def simulate(spec: RunSpec, description: Any, report: Callable[[float], None]) -
     start, stop = check_time_span(spec, description)
     with unpack(spec.fmu) as folder, temporary_directory("rows-") as directory:
         check_library(spec.fmu, description, exchange, folder)
-        request = ExternalRunRequest(
-            folder=str(folder),
-            directory=str(directory),
-            exchange=exchange,
-            start=start,
-            stop=stop,
-            tolerance=spec.tolerance,
-            timeout=spec.timeout,
-            grid=None if spec.follow else spec.grid,
-            coarsest_step=min(spec.grid, stop - start) if spec.grid else None,
-            values=values,
-            outputs={variable.name: list(shape) for variable, shape in chosen},
-            inputs={name: np.asarray(column, dtype=float).tolist() for name, column in spec.inputs.items()},
-        )
-        outcome = run_fmu_process(request, directory, report)
-        rows = read_longest_rows(directory, outcome.run_number, chosen)
+        inputs = {name: tuple(map(float, column)) for name, column in spec.inputs.items()}
+        resolved = replace(spec, exchange=exchange, start=start, stop=stop, values=values, inputs=inputs)
+        outcome = run_fmu_process(resolved, folder, directory, report)
+        time, columns = read_longest_rows(directory, outcome.run_number, chosen, description.fmiVersion == "2.0")
         texts = [json.loads(line) for line in read_lines(directory / STRINGS_FILE)]
         printed = read_lines(directory / OUTPUT_FILE)
     failed = f"{spec.fmu.name}: {outcome.failure}" if outcome.failure else ""
-    if failed and len(rows.time) and " at t = " not in failed:
-        failed += f", after t = {rows.time[-1]:.9g} s"
-    if len(rows.time) < 2:
+    if failed and len(time) and " at t = " not in failed:
+        failed += f", after t = {time[-1]:.9g} s"
+    if len(time) < 2:
         raise HarnessError(failed or f"{spec.fmu.name} returns no values")
     note_on_output = f"it printed: {printed[-1][:MAX_VALUE_LENGTH]}" if printed else ""
     note = "; ".join(filter(None, (outcome.note, note_on_output)))
-    return replace(build_trajectory(spec, variables, values, chosen, rows, texts), note=note, failure=failed)
+    trajectory = build_trajectory(spec, variables, values, chosen, time, columns, texts)
+    return replace(trajectory, note=note, failure=failed)
 
 
 def offered_interfaces(description: Any) -> list[str]:
@@ -129,33 +115,6 @@ def convert_values(spec: RunSpec, variables: Values) -> Values:
     return values
 
 
-def array_shape(variable: Any, values: Mapping[str, Any]) -> tuple[int, ...]:
-    """Return the shape of an array, () for a scalar. A dimension may be a structural parameter that is set."""
-    sizes = []
-    for dimension in variable.dimensions:
-        parameter = dimension.variable
-        sizes.append(
-            convert_value(parameter, values.get(parameter.name, float(parameter.start)))
-            if parameter
-            else int(dimension.start)
-        )
-    return tuple(sizes)
-
-
-def select_variables(spec: RunSpec, variables: Values, values: Values) -> list[ShapedVariable]:
-    """Return the variables to record with their shapes; an element selects its whole array."""
-    shapes = {
-        name: array_shape(variable, values) for name, variable in variables.items() if variable.type in ROW_FORMATS
-    }
-    named = {name if name in shapes else name.rpartition("[")[0] for name in spec.outputs} & {*shapes}
-    if (count := sum(prod(shapes[name]) for name in named)) > MAX_COLUMNS:
-        raise SceneError(f"{spec.fmu.name}: the outputs have {count} elements; record at most {MAX_COLUMNS}")
-    owner = {element: name for name in named for element in (name, *element_names(name, shapes[name]))}
-    check_names("output", [name for name in spec.outputs if name not in owner], shapes)
-    chosen = dict.fromkeys(owner[name] for name in spec.outputs)
-    return [(variables[name], shapes[name]) for name in chosen]
-
-
 def check_library(fmu: Path, description: Any, exchange: bool, folder: Path) -> None:
     """Check that the FMU has a binary for this platform."""
     identifier = (description.modelExchange if exchange else description.coSimulation).modelIdentifier
@@ -172,11 +131,8 @@ class NoProgressError(Exception):
     """The child process reports no progress, and does not end."""
 
 
-class ParentWatchdog:
-    """Raises NoProgressError if a progress file stays unchanged for a time in s.
-
-    The child process ends itself when a call exceeds its timeout, unless the process is stopped by a signal.
-    """
+class Watchdog:
+    """Notices that the file in which the child process reports progress has not changed for a time in s."""
 
     def __init__(self, progress_file: Path, timeout: float) -> None:
         self.progress_file, self.timeout = progress_file, timeout
@@ -192,10 +148,9 @@ class ParentWatchdog:
             raise NoProgressError
 
 
-def run_fmu_process(request: ExternalRunRequest, directory: Path, report: Callable[[float], None]) -> RefinementResult:
+def run_fmu_process(spec: RunSpec, folder: Path, directory: Path, report: Callable[[float], None]) -> RefinementResult:
     """Run the child process and return its result, or the reason why there is none."""
-    stopped = f"a call did not return within {request.timeout:g} s (--timeout sets the limit)"
-    watchdog = ParentWatchdog(directory / PROGRESS_FILE, request.timeout + GRACE_PERIOD)
+    watchdog = Watchdog(directory / PROGRESS_FILE, spec.timeout + GRACE_PERIOD)
 
     def meanwhile() -> None:
         check_interrupt()
@@ -203,26 +158,27 @@ def run_fmu_process(request: ExternalRunRequest, directory: Path, report: Callab
         with suppress(OSError, ValueError):  # the file is being written
             report(float((directory / PROGRESS_FILE).read_text()))
 
+    request = to_json({"run": spec, "folder": folder, "directory": directory})
     try:
-        process = run_module(f"{__package__}.fmu_process", json.dumps(asdict(request)), meanwhile=meanwhile)
+        process = run_module(f"{__package__}.fmu_process", request, meanwhile=meanwhile)
     except NoProgressError:
-        return RefinementResult(None, "", stopped)
-    if (directory / RESULT_FILE).is_file():
-        return RefinementResult(**json.loads((directory / RESULT_FILE).read_text(encoding="utf-8")))
-    if read_lines(directory / TIMEOUT_FILE):
-        message = stopped
-    elif process.returncode < 0:
-        message = f"its binary crashed ({signal.strsignal(-process.returncode)})"
+        message = f"a call did not return within {spec.timeout:g} s (--timeout sets the limit)"
     else:
+        if process.stdout:
+            return RefinementResult(**json.loads(process.stdout))
         message = f"its binary exited with status {process.returncode}"
+        if process.returncode < 0:
+            message = f"its binary crashed ({signal.strsignal(-process.returncode)})"
     return RefinementResult(None, "", message)
 
 
-def read_longest_rows(directory: Path, run_number: int | None, chosen: list[ShapedVariable]) -> SampleRows:
-    """Return the rows of the selected run; for None those of the longest run, which may be empty."""
+def read_longest_rows(
+    directory: Path, run_number: int | None, chosen: list[ShapedVariable], is_fmi2: bool
+) -> tuple[np.ndarray, Columns]:
+    """Return time and columns of the selected run; for None those of the longest run, which may be empty."""
     files = [directory / f"{ROWS_PREFIX}{run_number}"] if run_number is not None else directory.glob(f"{ROWS_PREFIX}*")
-    runs = [rows for file in files if len((rows := read_rows(file, chosen)).time)]
-    return max(runs, key=lambda rows: float(rows.time[-1]), default=SampleRows(np.zeros(0), {}))
+    runs = [read_rows(file.read_bytes(), chosen, is_fmi2) for file in files]
+    return max((run for run in runs if len(run[0])), key=lambda run: float(run[0][-1]), default=(np.zeros(0), {}))
 
 
 def read_lines(path: Path) -> list[str]:
@@ -231,14 +187,20 @@ def read_lines(path: Path) -> list[str]:
 
 
 def build_trajectory(
-    spec: RunSpec, variables: Values, values: Values, chosen: list[ShapedVariable], rows: SampleRows, texts: list[str]
+    spec: RunSpec,
+    variables: Values,
+    values: Values,
+    chosen: list[ShapedVariable],
+    time: np.ndarray,
+    recorded: Columns,
+    texts: list[str],
 ) -> Trajectory:
-    """Build the trajectory of a run from its rows."""
+    """Build the trajectory of a run from what was recorded."""
     columns, units, descriptions = {}, {}, {}
     for variable, shape in chosen:
         for name in element_names(variable.name, shape):
             if name in spec.outputs or variable.name in spec.outputs:
-                column = rows.columns[name]
+                column = recorded[name]
                 columns[name] = np.array(texts)[column] if variable.type == "String" else column
                 units[name], descriptions[name] = variable_unit(variable), variable.description or name
     parameters: Values = {}
@@ -251,7 +213,7 @@ def build_trajectory(
             )
     stored = {name: effective_value(variables[name], value) for name, value in values.items()}
     as_done = replace(spec, outputs=tuple(columns), values=stored)
-    return Trajectory(as_done, rows.time, columns, units, descriptions, parameters)
+    return Trajectory(as_done, time, columns, units, descriptions, parameters)
 
 
 def alias_key(variable: Any) -> tuple[str, int]:

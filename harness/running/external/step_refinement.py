@@ -6,15 +6,20 @@ start changes the result.
 """
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from math import ceil, inf
 from typing import Any
 
 import numpy as np
 
-from .refinement_run import RefinementRun
-from .request import ExternalRunRequest, RefinementResult
-from .sample_rows import SampleRows
+from ...scenes.run_spec import RunSpec
+from ..recorder import Columns
+from ..stepping import TimeGrid
 
+# names of files in the directory of results
+PROGRESS_FILE, OUTPUT_FILE, STRINGS_FILE = "progress", "output", "strings"
+ROWS_PREFIX = "rows-"  # followed by the number of a run
+COARSEST_STEPS = 64  # communication steps of the coarsest run by default
 MAX_STEPS = 2**18  # communication steps
 STEPS_TO_SEE_INTERNAL_STEP = 2**12  # communication steps that make internal steps visible
 MIN_OUTPUT_STEPS = 512  # minimum number of output points
@@ -22,33 +27,70 @@ MAX_TOLERANCE_REDUCTIONS = 6  # of model exchange
 TOLERANCE_FACTOR = 0.1  # tolerance passed to the FMU, relative to that of the run
 MIN_TOLERANCE = 1e-13  # of any solver
 
+
+@dataclass(frozen=True)
+class RefinementRun:
+    """A run: its number, time (n,) in s and columns (n,) by name.
+
+    If it is incomplete, `message` contains the reason: the FMU terminated the simulation, refused a step, or failed.
+    """
+
+    number: int
+    time: np.ndarray
+    columns: Columns
+    message: str = ""
+    terminated: bool = False
+    step_refused: bool = False
+
+
+@dataclass(frozen=True)
+class RefinementResult:
+    """Selected run, None if there is none; a note on its accuracy; the reason for failure, empty if it is complete."""
+
+    run_number: int | None
+    note: str
+    failure: str = ""
+
+
 RunFunction = Callable[[float, float], RefinementRun]  # (communication step in s, tolerance)
 
 
-def refine(request: ExternalRunRequest, description: Any, run: RunFunction) -> RefinementResult:
+def coarsest_grid(spec: RunSpec) -> TimeGrid:
+    """Return the points of the coarsest run.
+
+    The steps of all other runs are whole fractions of its steps, so that every run has its points.
+    """
+    assert spec.start is not None
+    assert spec.stop is not None  # of a resolved run
+    duration = spec.stop - spec.start
+    return TimeGrid(spec.start, spec.stop, min(spec.grid, duration) if spec.grid else duration / COARSEST_STEPS)
+
+
+def refine(spec: RunSpec, description: Any, run: RunFunction) -> RefinementResult:
     """Run the FMU with refined steps and select a run.
 
     Parameters
     ----------
-    request : ExternalRunRequest
+    spec : RunSpec
+        The run, with its start and stop.
     description : ModelDescription
     run : callable
         Runs the FMU with a communication step in s and a tolerance; returns a RefinementRun.
     """
-    duration = request.stop - request.start
-    if request.exchange:
-        return refine_tolerance(request, request.grid or whole_fraction(request, MIN_OUTPUT_STEPS), run)
+    duration, requested_step = coarsest_grid(spec).duration, None if spec.follow else spec.grid
+    if spec.exchange:
+        return refine_tolerance(spec, requested_step or whole_fraction(spec, MIN_OUTPUT_STEPS), run)
     fixed_step = declared_step(description)
     if fixed_step:
-        result = run(communication_step(fixed_step, duration), solver_tolerance(request))
+        result = run(communication_step(fixed_step, duration), solver_tolerance(spec))
         return accept_run(result, f"declared fixed internal step of {fixed_step:g} s, error unknown")
-    if request.grid:
-        result = run(request.grid, solver_tolerance(request))
-        return accept_run(result, f"requested communication step of {request.grid:g} s, error unknown")
-    answer = refine_steps(request, run)
+    if requested_step:
+        result = run(requested_step, solver_tolerance(spec))
+        return accept_run(result, f"requested communication step of {requested_step:g} s, error unknown")
+    answer = refine_steps(spec, run)
     default_step = description.defaultExperiment.stepSize if description.defaultExperiment else None
     if answer.run_number is None and default_step:  # no run advanced by a step
-        result = run(float(default_step), solver_tolerance(request))
+        result = run(float(default_step), solver_tolerance(spec))
         if not result.message:
             note = f"declared communication step of {float(default_step):g} s, error unknown"
             return accept_run(result, f"{note}: {answer.failure}")
@@ -69,9 +111,10 @@ def communication_step(fixed_step: float, duration: float) -> float:
     return fixed_step * ceil(duration / fixed_step / MAX_STEPS)
 
 
-def whole_fraction(request: ExternalRunRequest, steps: int) -> float:
+def whole_fraction(spec: RunSpec, steps: int) -> float:
     """Return the longest whole fraction in s of the coarsest communication step that makes at least `steps` steps."""
-    return request.longest_step / ceil(steps * request.longest_step / (request.stop - request.start))
+    grid = coarsest_grid(spec)
+    return grid.h / ceil(steps * grid.h / grid.duration)
 
 
 def accept_run(result: RefinementRun, note: str) -> RefinementResult:
@@ -79,24 +122,25 @@ def accept_run(result: RefinementRun, note: str) -> RefinementResult:
     return RefinementResult(result.number, note, result.message)
 
 
-def solver_tolerance(request: ExternalRunRequest) -> float:
+def solver_tolerance(spec: RunSpec) -> float:
     """Return the tolerance to pass to an FMU with its own solver."""
-    return TOLERANCE_FACTOR * request.tolerance
+    return TOLERANCE_FACTOR * spec.tolerance
 
 
-def refine_steps(request: ExternalRunRequest, run: RunFunction) -> RefinementResult:
+def refine_steps(spec: RunSpec, run: RunFunction) -> RefinementResult:
     """Halve the communication step until two results agree at the times of the coarsest."""
-    duration, h, difference = request.stop - request.start, request.longest_step, inf
+    coarsest, difference = coarsest_grid(spec), inf
+    duration, h = coarsest.duration, coarsest.h
     previous: RefinementRun | None = None
-    while h >= min(duration / MAX_STEPS, request.longest_step / 2):
-        current = run(h, solver_tolerance(request))
+    while h >= min(duration / MAX_STEPS, coarsest.h / 2):
+        current = run(h, solver_tolerance(spec))
         if current.message and not (current.terminated or current.step_refused):
             return keep_longest_run(previous, current)
         if previous and not (current.step_refused or previous.step_refused):
-            difference = max_difference(previous.rows, current.rows, request)
+            difference = max_difference(previous, current, spec)
             if difference == 0.0:
-                return refine_solver_tolerance(request, h, current, run)
-            if difference <= request.tolerance and h <= duration / MIN_OUTPUT_STEPS:
+                return refine_solver_tolerance(spec, h, current, run)
+            if difference <= spec.tolerance and h <= duration / MIN_OUTPUT_STEPS:
                 return accept_run(
                     current, f"communication step {h:.4g} s; halving it changes no output by more than {difference:.2g}"
                 )
@@ -104,53 +148,49 @@ def refine_steps(request: ExternalRunRequest, run: RunFunction) -> RefinementRes
     if current.step_refused:
         return keep_longest_run(None, current)
     change = f"the last halving, to {round(duration / (2 * h))} communication steps,"
-    return no_agreement(change, current, difference, request)
+    return no_agreement(change, current, difference, spec)
 
 
-def no_agreement(
-    change: str, current: RefinementRun, difference: float, request: ExternalRunRequest
-) -> RefinementResult:
+def no_agreement(change: str, current: RefinementRun, difference: float, spec: RunSpec) -> RefinementResult:
     """Select the last run and report that it differs from the previous one."""
     message = f"{change} still changes an output by {difference:.2g} of its largest value"
     return RefinementResult(
-        current.number, "", f"{message}, more than the tolerance of {request.tolerance:g}; raise --tolerance"
+        current.number, "", f"{message}, more than the tolerance of {spec.tolerance:g}; raise --tolerance"
     )
 
 
 def keep_longest_run(previous: RefinementRun | None, current: RefinementRun) -> RefinementResult:
     """Report why the last run is incomplete and select the longer of the two."""
-    candidates = [each for each in (current, previous) if each and len(each.rows.time) > 1]
-    longest = max(candidates, key=lambda each: float(each.rows.time[-1]), default=None)
+    candidates = [each for each in (current, previous) if each and len(each.time) > 1]
+    longest = max(candidates, key=lambda each: float(each.time[-1]), default=None)
     return RefinementResult(longest.number if longest else None, "", current.message)
 
 
-def refine_solver_tolerance(
-    request: ExternalRunRequest, h: float, current: RefinementRun, run: RunFunction
-) -> RefinementResult:
+def refine_solver_tolerance(spec: RunSpec, h: float, current: RefinementRun, run: RunFunction) -> RefinementResult:
     """Reduce the tolerance passed to the FMU after halving the communication step changed nothing."""
-    if not any(np.ptp(column) for column in current.rows.columns.values()):
+    if not any(np.ptp(column) for column in current.columns.values()):
         return accept_run(current, f"communication step {h:.4g} s; no output changes")
-    tolerance = solver_tolerance(request)
-    short_step = min(whole_fraction(request, STEPS_TO_SEE_INTERNAL_STEP), request.longest_step / 4)
+    tolerance = solver_tolerance(spec)
+    short_step = min(whole_fraction(spec, STEPS_TO_SEE_INTERNAL_STEP), coarsest_grid(spec).h / 4)
     for _ in range(3):
         tolerance = max(tolerance / 100, MIN_TOLERANCE)
         refined = run(short_step, tolerance)
         if refined.message and not refined.terminated:
             return keep_longest_run(current, refined)
-        difference = max_difference(current.rows, refined.rows, request)
+        difference = max_difference(current, refined, spec)
         if difference == 0.0:
-            fixed_step = find_fixed_step(refined.rows)
+            fixed_step = find_fixed_step(refined)
             kind = f"fixed internal step of {fixed_step:.3g} s" if fixed_step else "internal steps"
             reason = "neither shorter communication steps nor a smaller tolerance change the result"
             return accept_run(refined, f"{kind}, error unknown: {reason}")
-        if difference <= request.tolerance:
+        if difference <= spec.tolerance:
             note = f"internal steps, controlled by a tolerance of {tolerance:.2g}"
             return accept_run(refined, f"{note}; a hundred times that changes no output by more than {difference:.2g}")
         current = refined
-    return no_agreement(f"a reduction of its tolerance by 100, to {tolerance:.2g},", current, difference, request)
+    return no_agreement(f"a reduction of its tolerance by 100, to {tolerance:.2g},", current, difference, spec)
 
 
-def find_fixed_step(samples: SampleRows) -> float | None:
+def find_fixed_step(samples: RefinementRun) -> float | None:
     """Return the fixed internal step of an FMU in s, or None.
 
     It is visible where outputs stay constant between equidistant times.
@@ -166,31 +206,32 @@ def find_fixed_step(samples: SampleRows) -> float | None:
     return float((samples.time[indices[-1]] - samples.time[indices[0]]) / (len(indices) - 1))
 
 
-def refine_tolerance(request: ExternalRunRequest, h: float, run: RunFunction) -> RefinementResult:
+def refine_tolerance(spec: RunSpec, h: float, run: RunFunction) -> RefinementResult:
     """Divide the solver tolerance by ten until two results agree at the output points."""
-    rtol, difference = request.tolerance, inf
+    rtol, difference = spec.tolerance, inf
     previous: RefinementRun | None = None
     for _ in range(MAX_TOLERANCE_REDUCTIONS):
         current = run(h, rtol)
         if current.message and not current.terminated:
             return keep_longest_run(previous, current)
         if previous:
-            difference = max_difference(previous.rows, current.rows, request)
-            if difference <= request.tolerance:
+            difference = max_difference(previous, current, spec)
+            if difference <= spec.tolerance:
                 note = (
                     f"fmpy's CVode at rtol {rtol:.2g}; ten times that changes no output by more than {difference:.2g}"
                 )
                 return accept_run(current, note)
         previous, rtol = current, max(rtol / 10, MIN_TOLERANCE)
-    return no_agreement("a reduction of the tolerance of fmpy's CVode by 10", current, difference, request)
+    return no_agreement("a reduction of the tolerance of fmpy's CVode by 10", current, difference, spec)
 
 
 @np.errstate(over="ignore")  # a warning of numpy would appear as output of the FMU
-def max_difference(first: SampleRows, second: SampleRows, request: ExternalRunRequest) -> float:
+def max_difference(first: RefinementRun, second: RefinementRun, spec: RunSpec) -> float:
     """Return the largest difference of two runs at the coarsest times, relative to each variable's largest value."""
-    end = min(each.time[-1] if len(each.time) else request.start for each in (first, second))
-    h, tolerance = request.longest_step, 1e-9 * (request.stop - request.start)
-    times = np.append(np.arange(request.start, request.stop - tolerance, h), request.stop)
+    grid = coarsest_grid(spec)
+    end = min(each.time[-1] if len(each.time) else grid.start for each in (first, second))
+    tolerance = 1e-9 * grid.duration
+    times = np.append(np.arange(grid.start, grid.stop - tolerance, grid.h), grid.stop)
     times = times[times <= end + tolerance]
     if len(times) < 2:
         return inf

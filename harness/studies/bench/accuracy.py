@@ -15,7 +15,8 @@ from ...references.ode_problem import OdeProblem
 from ...references.piecewise_linear import mp
 from ...references.reference_trajectory import CommunicationGrid, compute_reference
 from ...running.embedded_model import EmbeddedModel, load_model_class
-from ...running.fmu_session import FmuInfo, RefusedRun, read_info, run_steps
+from ...running.fmu_info import FmuInfo, read_info
+from ...running.step_sequence import RefusedRun, run_steps
 from ...scenes.fmu_files import find_fmu
 from ...scenes.run_spec import RunSpec
 from .benchmark import SETTINGS, Baseline, Benchmark

@@ -18,8 +18,9 @@ from ...process.temporary_directory import temporary_directory
 from ...references.certified_reference import relative_errors
 from ...references.models import MODELS
 from ...running.c_host import Library, MissingToolError, compile_source, load_library
-from ...running.fmi3 import CO_SIMULATION, MODEL_EXCHANGE, RecordedRun, fmi3_path, open_fmi3_instance
-from ...scenes.fmu_files import find_fmu
+from ...running.own_fmu import simulate
+from ...running.trajectory import Trajectory
+from ...scenes.fmu_files import find_fmu, fmi3_path
 from .benchmark import SETTINGS, Baseline, Benchmark
 from .native import (
     CASES_BY_NAME,
@@ -90,9 +91,9 @@ def error_ratio_to_cvode(scene: Scenario, tolerances: tuple[float, ...] = TOLERA
     return measure_or_skip(f"{scene}, model exchange: largest error, ratio to CVODE in C", "1", figures)
 
 
-def largest_error_of(scene: Scenario, result: RecordedRun | np.ndarray) -> float:
+def largest_error_of(scene: Scenario, result: Trajectory | np.ndarray) -> float:
     """Return the largest error of a recording, or of position and speed (n, 2), at the common times."""
-    motion = result.sample_at(scene.times, scene.reference_case.outputs) if isinstance(result, RecordedRun) else result
+    motion = result.sample_at(scene.times, scene.reference_case.outputs) if isinstance(result, Trajectory) else result
     return float(relative_errors(motion, scene.reference_motion).max())
 
 
@@ -116,16 +117,12 @@ def run_cvode(scene: Scenario, rtol: float) -> np.ndarray:
     return np.array([answer.split()[1:] for answer in answers if answer.startswith("values")], dtype=float)
 
 
-def run_fmpy(scene: Scenario, rtol: float, way: str = MODEL_EXCHANGE) -> RecordedRun:
-    """Run the FMI 3.0 FMU with fmpy, and count its events."""
-    its = scene.reference_case
-    outputs = (*its.outputs, *["events.count"] * its.problem.has_dry_friction)
-    span = scene.stop, scene.interval, rtol, None, scene.start
-    with open_fmi3_instance(fmi3_fmu(its.model), way) as fmu:
-        return fmu.simulate(scene.numbers, outputs, *span, signals=scene.signals, drive_inputs=scene.has_ramps)
+def run_fmpy(scene: Scenario, rtol: float, exchange: bool = True) -> Trajectory:
+    """Run the FMI 3.0 FMU with fmpy's CVode or with its own solver, and count its events."""
+    return simulate(scene.run(fmi3_fmu(scene.reference_case.model), rtol, exchange))
 
 
-def run_fmusim(scene: Scenario, rtol: float) -> RecordedRun:
+def run_fmusim(scene: Scenario, rtol: float) -> Trajectory:
     """Run the FMI 3.0 FMU with fmusim."""
     program, its = shutil.which("fmusim"), scene.reference_case
     if program is None:
@@ -140,16 +137,18 @@ def run_fmusim(scene: Scenario, rtol: float) -> RecordedRun:
         command += ["--start-time", repr(scene.start), "--stop-time", repr(scene.stop)]
         command += ["--output-interval", repr(scene.interval), "--output-file", str(file)]
         command += [word for name, value in scene.numbers.items() for word in ("--start-value", name, repr(value))]
-        if scene.signals is not None:
-            heads = ",".join(scene.signals.dtype.names or ())
-            np.savetxt(input_file, scene.signals, "%.17g", ",", header=heads, comments="")
+        if inputs := scene.inputs:
+            rows = np.column_stack([*inputs.values()])
+            np.savetxt(input_file, rows, "%.17g", ",", header=",".join(inputs), comments="")
             command += ["--input-file", str(input_file)]
         process = run_subprocess([*command, str(fmi3_fmu(its.model))])
         if process.returncode:
             raise HarnessError(
                 " ".join((process.stderr or process.stdout).split()) or "fmusim failed without a message"
             )
-        return RecordedRun(np.genfromtxt(file, delimiter=",", names=True), 0)
+        rows = np.genfromtxt(file, delimiter=",", names=True)
+        spec = scene.run(fmi3_fmu(its.model), rtol, exchange=True)
+        return Trajectory(spec, rows["time"], {name: rows[name] for name in its.outputs}, {}, {}, {})
 
 
 def difference_from_cosimulation(scene: Scenario) -> Benchmark:
@@ -157,9 +156,9 @@ def difference_from_cosimulation(scene: Scenario) -> Benchmark:
     the numbers of events differ."""
 
     def figures() -> Measured:
-        exchange_run, cosimulation_run = (run_fmpy(scene, 1e-10, way) for way in (MODEL_EXCHANGE, CO_SIMULATION))
+        exchange_run, cosimulation_run = (run_fmpy(scene, 1e-10, exchange) for exchange in (True, False))
         counts = [
-            int(recording.rows["events.count"][-1]) if scene.reference_case.problem.has_dry_friction else 0
+            int(recording.columns["events.count"][-1]) if scene.reference_case.problem.has_dry_friction else 0
             for recording in (exchange_run, cosimulation_run)
         ]
         baseline = Baseline("{} events in model exchange, {} in co-simulation".format(*counts))

@@ -3,13 +3,15 @@
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ...references.certified_reference import POINTS, ReferenceCase
 from ...references.reference_trajectory import CommunicationGrid, compute_reference
-from ...running.fmu_session import read_info
+from ...running.fmu_info import read_info
+from ...scenes.run_spec import RunSpec
 from .native import CASES_BY_NAME
 
 InputSegment = tuple[float, float, float, float]  # start and end in s, value at the start, and rate
@@ -62,11 +64,29 @@ class Scenario:
         return [(t, end, value, (last - value) / (end - t)) for (t, value), (end, last) in between if end > t]
 
     @property
-    def signals(self) -> np.ndarray | None:
-        """Return the points as a structured array for importers."""
+    def inputs(self) -> dict[str, tuple[float, ...]]:
+        """Return the table of input signals, empty without a driven input."""
         for name, points in self.led.items():
-            return np.array(points, dtype=[("time", float), (name, float)])
-        return None
+            times, values = zip(*points, strict=True)
+            return {"time": times, name: values}
+        return {}
+
+    def run(self, fmu: Path, rtol: float, exchange: bool) -> RunSpec:
+        """Return the run of an FMU at the common times, which also records the number of events."""
+        case = self.reference_case
+        values = self.numbers if exchange else {**self.numbers, "solver.rtol": rtol}
+        return RunSpec(
+            fmu,
+            (*case.outputs, *["events.count"] * case.problem.has_dry_friction),
+            values,
+            self.inputs,
+            self.start,
+            self.stop,
+            self.interval,
+            follow=False,
+            tolerance=rtol,
+            exchange=exchange,
+        )
 
     @property
     def has_ramps(self) -> bool:

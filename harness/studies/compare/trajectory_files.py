@@ -16,7 +16,7 @@ from ...records.columns import read_numeric
 from ...records.headings import split_heading
 from ...records.table_files import read_content
 from ...records.units import TIMES
-from ...running.external.sample_rows import element_names
+from ...running.recorder import element_names
 from ...running.trajectory import ModeChanges, Trajectory
 from ...scenes.run_spec import RunSpec
 

@@ -19,7 +19,7 @@ from ...results.files import write_csv as write_csv
 from ...results.folder import replace_folder
 from ...results.provenance import describe_sources, write_provenance
 from ...running.description import read_description
-from ...running.fmi2 import ProgressCallback
+from ...running.own_fmu import ProgressCallback
 from ...scenes.coupled.scene import CoupledScene, load_coupled_scene
 from ...scenes.fmu_files import find_fmu
 from .convergence import Convergence

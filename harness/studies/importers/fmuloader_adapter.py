@@ -11,7 +11,7 @@ from typing import Any
 from fmuloader.fmi2 import Fmi2Error, Fmi2Slave, Fmi2Status, Fmi2Type
 
 from ...running.description import read_description
-from ...running.fmi2 import FMICallException
+from ...running.fmu_session import FMICallException
 from ...running.unpacking import unpack_once
 from .fmpy_adapter import run_instances
 from .request import ImporterReply, ImporterRequest, serve

@@ -4,10 +4,11 @@ An adapter prints log messages of the FMU to standard error if the tool passes t
 """
 
 import json
-import os
 import sys
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
+
+from ...process.subprocess_runner import open_replies
 
 END = "\0"  # separates the messages of requests on standard error
 
@@ -42,8 +43,7 @@ class ImporterReply:
 
 def serve(run_request: Callable[[ImporterRequest], ImporterReply]) -> None:
     """Execute the requests on standard input; redirect output of the tool to standard error."""
-    answers = os.fdopen(os.dup(1), "w")
-    os.dup2(2, 1)
+    replies = open_replies()
     for line in sys.stdin:
-        print(json.dumps(asdict(run_request(ImporterRequest(**json.loads(line))))), file=answers, flush=True)
+        print(json.dumps(asdict(run_request(ImporterRequest(**json.loads(line))))), file=replies, flush=True)
         print(END, end="", file=sys.stderr, flush=True)

@@ -6,7 +6,7 @@ from math import isnan
 
 from ...references.certified_reference import ReferenceCase
 from .law_deviations import LawDeviation
-from .study import FMI3_INTERFACES, FMPY, FMU, Point, Study
+from .study import FMI3_TOOLS, FMPY, FMU, Point, Study
 
 TARGET = 1e-6
 TARGETS = (1e-3, TARGET, 1e-9)
@@ -24,7 +24,7 @@ def fastest_point(curve: Iterable[Point], target: float, beside_dry: bool = Fals
 
 def rank_solvers(study: Study, case: ReferenceCase, target: float) -> list[Point]:
     """Return the fastest point of every solver that meets the target, fastest first; runs through fmpy are excluded."""
-    curves = [study.curve(case, *solver) for solver in study.solvers(case) if solver[0] not in (FMPY, *FMI3_INTERFACES)]
+    curves = [study.curve(case, *solver) for solver in study.solvers(case) if solver[0] not in (FMPY, *FMI3_TOOLS)]
     points = [point for curve in curves if (point := fastest_point(curve, target))]
     return sorted(points, key=lambda point: point.seconds)
 

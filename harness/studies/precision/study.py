@@ -7,7 +7,7 @@ the largest value of the motion.  The integration error refers to the exact solu
 """
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from math import isnan, nan
 from pathlib import Path
@@ -22,19 +22,18 @@ from ...references.certification import certify_default_run
 from ...references.certified_reference import ReferenceCase, compute_errors, load_reference
 from ...references.models import CASES
 from ...references.ode_problem import UnspecifiedProblem
-from ...running import fmi3
 from ...running.embedded_model import EmbeddedModel, load_model_class, method_numbers
-from ...running.fmi2 import simulate
+from ...running.own_fmu import simulate
 from ...running.solution import Solution
 from ...running.timing import time_call
-from ...scenes.fmu_files import find_fmu
+from ...scenes.fmu_files import find_fmu, fmi3_path
 from ...scenes.run_spec import RunSpec
 
 MAX_REPEATS = 20  # maximum number of timed runs per point
 
 FMU, FMPY = "FMU", "fmpy"  # code of the FMU in this process; FMU through fmpy
 CS, ME = "FMI 3.0 CS", "FMI 3.0 ME"  # FMI 3.0 FMU through fmpy: co-simulation, model exchange
-FMI3_INTERFACES = {CS: fmi3.CO_SIMULATION, ME: fmi3.MODEL_EXCHANGE}
+FMI3_TOOLS = (CS, ME)
 
 
 @dataclass(frozen=True)
@@ -209,24 +208,42 @@ class CaseRunner:
         return Solution(columns, None, run.statistics.evaluations), run.statistics.seconds
 
     def run_fmi3(self, tool: str, rtol: float, settings: SweepSettings) -> tuple[Solution, float]:
-        """Run the FMI 3.0 FMU with fmpy's simulate_fmu on an open instance.
+        """Run the FMI 3.0 FMU with its own solver and tolerance, or by model exchange.
 
-        In model exchange, changes of mode are recorded.  In co-simulation the tolerance is not passed on.
+        In model exchange, changes of mode are recorded.
         """
-        outputs, stop, step = self.case.outputs, float(self.times[-1]), float(self.times[1])
-        mode_names = tuple(self.model_class.contacts) if tool == ME and self.case.reference.modes else ()
-        with fmi3.open_fmi3_instance(fmi3.fmi3_path(self.file), FMI3_INTERFACES[tool]) as fmu:
-            run = partial(fmu.simulate, self.case.values, outputs + mode_names, stop, step, rtol or None)
-            recording = run(settings.timeout)
-            seconds = best_time(run, settings.budget)
-        events = recording.find_changes(*mode_names) if mode_names else None
-        return Solution(recording.sample_at(self.times, outputs), events, recording.evaluations), seconds
+        names, stop, exchange = self.case.outputs, float(self.times[-1]), tool == ME
+        modes = tuple(self.model_class.contacts) if exchange and self.case.reference.modes else ()
+        file, grid, values = fmi3_path(self.file), float(self.times[1]), self.case.values
+        spec = RunSpec(file, names + modes, values, stop=stop, grid=grid, follow=False, exchange=exchange)
+        spec = replace(spec, tolerance=rtol) if exchange else spec
+        if not file.is_file():
+            raise HarnessError(f"not built: {file} (python build_fmus.py --fmi 3)")
+        recording = simulate(spec, limit_run_time(settings.timeout, stop))
+        assert recording.statistics  # FMUs of this project report it
+        repeat = repeats(recording.statistics.seconds, settings.budget)
+        timed = simulate(replace(spec, repeat=repeat)).statistics
+        assert timed
+        events = recording.find_changes(*modes) if modes else None
+        solution = Solution(recording.sample_at(self.times, names), events, recording.statistics.evaluations)
+        return solution, min(timed.seconds, recording.statistics.seconds)
 
     def run_peer(self, peer: str, method: str, rtol: float, settings: SweepSettings) -> tuple[Solution, float]:
         """Run a peer solver."""
         problem = self.case.problem
         ask = partial(peer_solvers.solve, peer, method, problem, self.times, rtol, problem.atol_factor * rtol)
         return ask(peer_solvers.limit_run_time(settings.timeout)), best_time(ask, settings.budget)
+
+
+def limit_run_time(timeout: float, stop: float) -> Callable[[float], None]:
+    """Return a progress callback that raises HarnessError after `timeout` s of a run to `stop`, in s."""
+    start = perf_counter()
+
+    def check(share: float) -> None:
+        if perf_counter() - start > timeout:
+            raise HarnessError(f"at t = {share * stop:.3g} s after {timeout:g} s of run time")
+
+    return check
 
 
 def solver_jobs(case: ReferenceCase, model_class: Any, file: Path) -> Iterator[SolverJob]:
@@ -240,7 +257,7 @@ def solver_jobs(case: ReferenceCase, model_class: Any, file: Path) -> Iterator[S
             yield SolverJob(FMPY, method, nan, partial(ask.run_through_fmpy, method, run_times), True, is_swept)
     if not case.is_chattering:
         usual = {number: name for name, number in method_numbers(model_class).items()}[model_class().solver.method]
-        for tool, method, is_swept in ((CS, usual, False), (ME, "fmpy's CVode", fmi3.fmi3_path(file).is_file())):
+        for tool, method, is_swept in ((CS, usual, False), (ME, "fmpy's CVode", fmi3_path(file).is_file())):
             yield SolverJob(tool, method, nan, partial(ask.run_fmi3, tool), is_swept=is_swept)
         absent = (
             peer_solvers.PACKAGES if isinstance(case.problem, UnspecifiedProblem) else peer_solvers.missing_packages()

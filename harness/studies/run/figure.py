@@ -26,9 +26,8 @@ from ...results.style import (
     mask_undrawable,
     open_figure,
 )
-from ...running import runner
-from ...running.description import read_description
-from ...running.fmi2 import simulate
+from ...running.description import exposes_solver_steps, read_description
+from ...running.own_fmu import simulate
 from ...running.plot import draw_sticking
 from ...running.trajectory import Trajectory
 from ...scenes.scene import MAX_DEFAULT_PLOTS, is_panel
@@ -129,7 +128,7 @@ def refine(run: Trajectory) -> Trajectory:
     """
     start, stop = run.time[[0, -1]].tolist()
     fine = np.diff(run.time).max() <= 2 * (stop - start) / CURVE_POINTS
-    if fine or run.failure or not runner.exposes_solver_steps(read_description(run.spec.fmu)):
+    if fine or run.failure or not exposes_solver_steps(read_description(run.spec.fmu)):
         return run
     finer = simulate(
         replace(run.spec, start=start, stop=stop, grid=(stop - start) / CURVE_POINTS, follow=False, repeat=1)

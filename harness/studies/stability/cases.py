@@ -8,7 +8,7 @@ from typing import Any
 
 from ...references.reference_trajectory import CommunicationGrid
 from ...references.segments import ParameterSpan
-from ...running.fmu_session import FmuInfo
+from ...running.fmu_info import FmuInfo
 from ...scenes.fmu_files import find_fmu
 from ...scenes.run_spec import RunSpec
 

@@ -28,14 +28,8 @@ from ...results.folder import replace_folder
 from ...results.provenance import prefix_parameters, write_provenance
 from ...running.description import declared_parameters
 from ...running.embedded_model import load_model_class
-from ...running.fmu_session import (
-    FmuInfo,
-    RefusalSummary,
-    RefusedRun,
-    inject_nonfinite,
-    read_info,
-    run_steps,
-)
+from ...running.fmu_info import FmuInfo, read_info
+from ...running.step_sequence import RefusalSummary, RefusedRun, inject_nonfinite, run_steps
 from ...running.trajectory import Trajectory
 from ...scenes.fmu_files import check_built, find_fmu
 from .cases import StabilityCase, generic_scenes, load_scenes, scene_cases

@@ -12,9 +12,9 @@ from typing import Any
 
 from ...errors import HarnessError, check_names
 from ...running import runner
-from ...running.description import read_description
-from ...running.fmi2 import FMICallException, LogCapture, open_instance, plan_run, read_parameters
-from ...running.repeated_runs import RepeatedRuns
+from ...running.description import exposes_solver_steps, read_description
+from ...running.fmu_session import CALL_FAILURES, FmuSession, PreparedRuns
+from ...running.own_fmu import build_trajectory, open_session, plan_run, read_parameters, record_run
 from ...running.variable_values import variable_unit
 from ...scenes.roles import find_roles
 from ...scenes.run_spec import RunSpec
@@ -45,8 +45,8 @@ class OwnFmuRunner:
     `columns` are the measured columns; `stop` is the stop time in s.
     """
 
-    def __init__(self, runs: SweepSpec, fmu_description: Any, fmu: Any, log: LogCapture) -> None:
-        self.log, self.variables = log, {variable.name: variable for variable in fmu_description.modelVariables}
+    def __init__(self, runs: SweepSpec, session: FmuSession) -> None:
+        self.session, self.variables, fmu_description = session, session.variables, session.description
         measures = select_measures(runs, self.variables, ours=True)
         motion = find_roles(self.variables)
         outputs = tuple(motion[role] for role in ("position", "velocity") if role in motion)
@@ -55,14 +55,17 @@ class OwnFmuRunner:
                 name for name in runner.default_outputs(fmu_description) if self.variables[name].type == "Real"
             )
         plan = plan_run(replace(runs.run, outputs=outputs), fmu_description)
-        self.stop = plan.stop
+        self.stop = plan.grid.stop
         ends = [name for name in measures if name in FINAL_MEASURES]
         self.along = [
             name for name in measures if name in TRAJECTORY_MEASURES or (name in OUTPUT_MEASURES and name != "final")
         ]
         if self.along:
-            plan = plan_run(replace(plan.spec, grid=(plan.stop - plan.start) / N_STEPS, follow=True), fmu_description)
-        self.runs = RepeatedRuns(plan, fmu, runs.varied, outputs, [FINAL_MEASURES[name][1] for name in ends])
+            step = (plan.grid.stop - plan.grid.start) / N_STEPS
+            plan = plan_run(replace(plan.spec, grid=step, follow=True), fmu_description)
+        self.plan, shared = plan, {variable.name: value for variable, value in plan.settings}
+        to_read = [*outputs, *(FINAL_MEASURES[name][1] for name in ends)]
+        self.runs = PreparedRuns(session, shared, runs.varied, to_read, plan.grid.start, plan.grid.stop)
         self.columns = measure_columns(measures, self.variables, outputs)
         read = [
             each.name for each in measure_columns(["final", *ends, "run_time", *self.along], self.variables, outputs)
@@ -71,11 +74,11 @@ class OwnFmuRunner:
 
     def run(self, point: Sequence[float]) -> list[float] | str:
         """Return the measures at a point of the varied values, or the error message."""
-        self.log.clear()
+        self.session.log.clear()
         try:
             return self.measure_run(point)
-        except FMICallException as error:
-            return self.log.error_message or str(error)
+        except CALL_FAILURES as error:
+            return self.session.log.error_message or str(error)
         except HarnessError as error:
             return str(error)
 
@@ -84,7 +87,8 @@ class OwnFmuRunner:
         self.runs.start(point)
         start_time, along = perf_counter(), []
         if self.along:
-            trajectory = self.runs.record_to_stop()
+            recorded = record_run(self.plan, self.session, lambda share: None)
+            trajectory = build_trajectory(self.plan, self.session, recorded, 0.0)
             for name in self.along:
                 along += (
                     measure_outputs(name, trajectory.columns)
@@ -100,8 +104,7 @@ class OwnFmuRunner:
     def constants(self) -> dict[str, tuple[object, str]]:
         """Return value and unit of every parameter in the last run."""
         return {
-            name: (value, variable_unit(self.variables[name]))
-            for name, value in read_parameters(self.runs.plan, self.runs.fmu).items()
+            name: (value, variable_unit(self.variables[name])) for name, value in read_parameters(self.session).items()
         }
 
 
@@ -152,8 +155,8 @@ def select_measures(runs: SweepSpec, variables: dict[str, Any], ours: bool) -> t
 def open_runner(runs: SweepSpec) -> Iterator[Runner]:
     """Open the runner of the FMU."""
     fmu_description = read_description(runs.run.fmu, runs.run.lenient)
-    if runner.exposes_solver_steps(fmu_description) and not runs.run.exchange:
-        with open_instance(runs.run) as (_, fmu, heard):
-            yield OwnFmuRunner(runs, fmu_description, fmu, heard)
+    if exposes_solver_steps(fmu_description) and not runs.run.exchange:
+        with open_session(runs.run) as session:
+            yield OwnFmuRunner(runs, session)
     else:
         yield ExternalFmuRunner(runs, fmu_description)

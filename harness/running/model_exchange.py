@@ -1,0 +1,150 @@
+"""Model exchange with fmpy's CVode: BDF with finite-difference Jacobians.
+
+The absolute tolerance is the relative one times the nominal values of the FMU. Where static friction does not exceed
+sliding friction, CVode misses reversals that only touch v = 0.
+"""
+
+from collections.abc import Callable
+from math import inf
+from typing import Any
+
+from fmpy.simulation import Input
+from fmpy.sundials import CVodeSolver
+
+from ..errors import HarnessError
+from .fmu_session import FmuSession, TerminatedError
+from .inputs import InputSignals
+from .stepping import TimeGrid
+
+MAX_CVODE_STEPS = 100_000  # between two points
+MAX_EVENTS = 1000  # at one time
+
+
+class CheckedCVode(CVodeSolver):
+    """CVode that counts right-hand sides, reports that it works, and stops at a failed FMI call."""
+
+    error: Exception | None = None
+    n_rhs = 0
+
+    def __init__(self, report_work: Callable[[], Any], **options: Any) -> None:
+        self.report_work, self.max_steps = report_work, options["maxNumSteps"]
+        super().__init__(**options)
+
+    def f(self, t: float, *arguments: Any) -> int:
+        self.n_rhs += 1
+        self.input.apply(t)  # fmpy sets inputs at the ends of its steps only
+        return self.call_checked(super().f, t, *arguments)
+
+    def g(self, *arguments: Any) -> int:
+        return self.call_checked(super().g, *arguments)
+
+    def call_checked(self, call: Callable[..., int], *arguments: Any) -> int:
+        """Call the FMU and keep its exception, which ctypes would print and swallow."""
+        try:
+            self.report_work()
+            return call(*arguments)
+        except Exception as error:
+            self.error = error
+            return -1
+
+    def step(self, t: float, target: float) -> tuple[bool, Any, float]:
+        """Integrate from t to the target or to the next event; times in s."""
+        try:
+            return super().step(t, target)
+        except (RuntimeError, TypeError) as error:  # the path of CVode's source precedes its message
+            limit = f"fmpy's CVode ({self.max_steps} steps from point to point at most)"
+            raise self.error or HarnessError(f"{limit}: {str(error).rpartition(': ')[2]}") from None
+
+
+class ModelExchange:
+    """Steps a session for model exchange to the next communication point or event.
+
+    Parameters
+    ----------
+    session : FmuSession
+    grid : TimeGrid
+    rtol : float
+        Relative tolerance.
+    report_work : callable
+        Called at every evaluation.
+    signals : InputSignals, optional
+    max_steps : int
+        Largest number of solver steps from point to point.
+    """
+
+    def __init__(
+        self,
+        session: FmuSession,
+        grid: TimeGrid,
+        rtol: float,
+        report_work: Callable[[], Any],
+        signals: InputSignals | None = None,
+        max_steps: int = MAX_CVODE_STEPS,
+    ) -> None:
+        self.session, self.fmu, self.grid, self.signals = session, session.fmu, grid, signals
+        self.rtol, self.report_work, self.max_steps = rtol, report_work, max_steps
+        self.is_event, self.n_stalled = False, 0
+
+    def start(self, t: float) -> None:
+        if self.signals:
+            self.signals.apply(t, after_event=True)
+        fmu, description = self.fmu, self.session.description
+        self.update = fmu.newDiscreteStates if self.session.is_fmi2 else fmu.updateDiscreteStates
+        self.next_event = update_discrete_states(self.update, t)
+        fmu.enterContinuousTimeMode()
+        self.solver = CheckedCVode(
+            self.report_work,
+            nx=description.numberOfContinuousStates,
+            nz=description.numberOfEventIndicators,
+            get_x=fmu.getContinuousStates,
+            set_x=fmu.setContinuousStates,
+            get_dx=fmu.getDerivatives if self.session.is_fmi2 else fmu.getContinuousStateDerivatives,
+            get_z=fmu.getEventIndicators,
+            get_nominals=fmu.getNominalsOfContinuousStates,
+            set_time=fmu.setTime,
+            input=self.signals or Input(fmu, description, None),
+            startTime=t,
+            maxStep=(self.grid.stop - self.grid.start) / 50,
+            relativeTolerance=self.rtol,
+            maxNumSteps=self.max_steps,
+        )
+
+    def advance(self, t: float, target: float) -> float:
+        jump = self.signals.next_jump(t) if self.signals else inf
+        target = min(target, self.next_event, jump)
+        has_root, _, reached = self.solver.step(t, target)
+        reached = target if abs(reached - target) <= self.grid.tolerance else reached
+        self.fmu.setTime(reached)
+        if self.signals:
+            self.signals.apply(reached)
+        needs_event = terminated = False
+        if self.session.interface.needsCompletedIntegratorStep:
+            needs_event, terminated = self.fmu.completedIntegratorStep()
+        if terminated:
+            raise TerminatedError(reached, "it returned terminateSimulation from a completed step")
+        self.is_event = has_root or needs_event or reached >= min(self.next_event, jump)
+        self.n_stalled = 0 if reached > t else self.n_stalled + 1
+        if self.n_stalled > MAX_EVENTS:
+            raise HarnessError(f"{MAX_EVENTS} events in a row at t = {reached:.9g} s")
+        return reached
+
+    def handle_event(self, t: float) -> None:
+        self.fmu.enterEventMode()
+        if self.signals:
+            self.signals.apply(t, after_event=True)
+        self.next_event = update_discrete_states(self.update, t)
+        self.fmu.enterContinuousTimeMode()
+        self.solver.reset(t)
+
+
+def update_discrete_states(update: Callable[[], tuple[bool, bool, bool, bool, bool, float]], t: float) -> float:
+    """Iterate the discrete states at an event; return the time of the next event in s, inf if there is none."""
+    for _ in range(MAX_EVENTS):
+        needs_update, terminated, _, _, is_defined, next_event = update()
+        if terminated:
+            raise TerminatedError(t, "it returned terminateSimulation from an event")
+        if is_defined and not next_event >= t:
+            raise HarnessError(f"it sets its next event to {next_event:.9g} s, at t = {t:.9g} s")
+        if not needs_update and not (is_defined and next_event == t):
+            return next_event if is_defined else inf
+    raise HarnessError(f"its discrete states do not settle at t = {t:.9g} s")

@@ -1,0 +1,199 @@
+"""Rows of recorded values: a session's variables are read into one buffer, which is written at once.
+
+A row in a file therefore survives a crash of the FMU.
+"""
+
+import json
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from ctypes import (
+    c_bool,
+    c_char_p,
+    c_double,
+    c_float,
+    c_int,
+    c_int8,
+    c_int16,
+    c_int32,
+    c_int64,
+    c_uint,
+    c_uint8,
+    c_uint16,
+    c_uint32,
+    c_uint64,
+    sizeof,
+)
+from math import isfinite, prod
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from fmpy.fmi1 import FMICallException
+
+from ..errors import HarnessError, SceneError, check_names
+from ..scenes.run_spec import RunSpec
+from .fmu_session import WARNING, FmuSession
+from .variable_values import REAL_TYPES, convert_value
+
+C_TYPES: dict[str, Any] = {
+    "Real": c_double,
+    "Float64": c_double,
+    "Float32": c_float,
+    "Integer": c_int,
+    "Int8": c_int8,
+    "UInt8": c_uint8,
+    "Int16": c_int16,
+    "UInt16": c_uint16,
+    "Int32": c_int32,
+    "UInt32": c_uint32,
+    "Int64": c_int64,
+    "UInt64": c_uint64,
+    "Boolean": c_bool,
+    "Enumeration": c_int64,
+    "String": c_int64,  # line number of the string table
+}
+FMI2_TYPES = {"Boolean": c_int, "Enumeration": c_int}  # other than those of FMI 3.0
+COLUMN_TYPES = {**dict.fromkeys(C_TYPES, np.int64), **dict.fromkeys(REAL_TYPES, np.float64), "UInt64": np.uint64}
+
+MAX_COLUMNS = 100_000  # recorded values at each point
+
+ShapedVariable = tuple[Any, tuple[int, ...]]  # variable and shape
+Columns = dict[str, np.ndarray]  # recorded values (n,) by name
+
+
+def element_names(name: str, shape: tuple[int, ...]) -> list[str]:
+    """Return the names of an array's elements in row-major order from 1, as in turn[1,2]; its name for a scalar."""
+    if not shape:
+        return [name]
+    return [f"{name}[{','.join(str(i + 1) for i in index)}]" for index in np.ndindex(shape)]
+
+
+def array_shape(variable: Any, values: Mapping[str, Any]) -> tuple[int, ...]:
+    """Return the shape of an array, () for a scalar. A dimension may be a structural parameter that is set."""
+    sizes = []
+    for dimension in variable.dimensions:
+        parameter = dimension.variable
+        sizes.append(
+            convert_value(parameter, values.get(parameter.name, float(parameter.start)))
+            if parameter
+            else int(dimension.start)
+        )
+    return tuple(sizes)
+
+
+def select_variables(spec: RunSpec, variables: Mapping[str, Any], values: Mapping[str, Any]) -> list[ShapedVariable]:
+    """Return the variables to record with their shapes; an element selects its whole array."""
+    shapes = {name: array_shape(variable, values) for name, variable in variables.items() if variable.type in C_TYPES}
+    named = {name if name in shapes else name.rpartition("[")[0] for name in spec.outputs} & {*shapes}
+    if (count := sum(prod(shapes[name]) for name in named)) > MAX_COLUMNS:
+        raise SceneError(f"{spec.fmu.name}: the outputs have {count} elements; record at most {MAX_COLUMNS}")
+    owner = {element: name for name in named for element in (name, *element_names(name, shapes[name]))}
+    check_names("output", [name for name in spec.outputs if name not in owner], shapes)
+    chosen = dict.fromkeys(owner[name] for name in spec.outputs)
+    return [(variables[name], shapes[name]) for name in chosen]
+
+
+def group_by_type(chosen: Sequence[ShapedVariable]) -> Iterator[tuple[str, list[Any], list[str]]]:
+    """Yield each type with its variables and the names of their elements, in the order of a row."""
+    for type_name in dict.fromkeys(variable.type for variable, _ in chosen):
+        group = [(variable, shape) for variable, shape in chosen if variable.type == type_name]
+        names = [name for variable, shape in group for name in element_names(variable.name, shape)]
+        yield type_name, [variable for variable, _ in group], names
+
+
+def row_type(chosen: Sequence[ShapedVariable], is_fmi2: bool) -> np.dtype:
+    """Return the type of a row: the time in s and the values of each type."""
+    types = C_TYPES | (FMI2_TYPES if is_fmi2 else {})
+    groups = [(type_name, types[type_name], (len(names),)) for type_name, _, names in group_by_type(chosen)]
+    return np.dtype([("time", c_double), *groups], align=True)
+
+
+class Recorder:
+    """Reads variables of a session and writes them as a row.
+
+    Parameters
+    ----------
+    session : FmuSession
+    chosen : sequence of (variable, shape)
+    write : callable
+        Receives the bytes of each row.
+    strings : StringTable, optional
+        Required if there are Strings.
+    only_finite : bool
+        Whether to raise HarnessError, instead of writing the row, if a value is not finite.
+    """
+
+    def __init__(
+        self,
+        session: FmuSession,
+        chosen: Sequence[ShapedVariable],
+        write: Callable[[bytearray], object],
+        strings: "StringTable | None" = None,
+        only_finite: bool = False,
+    ) -> None:
+        layout = row_type(chosen, session.is_fmi2)
+        self.row, self.write, self.strings, self.only_finite = bytearray(layout.itemsize), write, strings, only_finite
+        self.time = c_double.from_buffer(self.row)
+        self.calls: list[tuple[str, Any, tuple[Any, ...]]] = []
+        self.cells: dict[str, tuple[Any, int]] = {}  # of Reals: buffer and index
+        self.texts: list[tuple[Any, Any]] = []  # of Strings: pointers and indices
+        for type_name, variables, names in group_by_type(chosen):
+            kind, offset = layout.fields[type_name][0].base, layout.fields[type_name][1]  # type: ignore[index]
+            buffer = (np.ctypeslib.as_ctypes_type(kind) * len(names)).from_buffer(self.row, offset)
+            if type_name in REAL_TYPES:
+                self.cells |= {name: (buffer, i) for i, name in enumerate(names)}
+            values = buffer
+            if type_name == "String":
+                values = (c_char_p * len(names))()
+                self.texts = [(values, buffer)]
+            name = f"Get{session.type_name(variables[0])}"
+            references = (c_uint * len(variables))(*(variable.valueReference for variable in variables))
+            count = () if session.is_fmi2 else (len(names),)
+            arguments = (session.instance, references, len(variables), values, *count)
+            self.calls.append((f"{session.prefix}{name}", session.function(name), arguments))
+
+    def cell(self, name: str) -> c_double:
+        """Return what holds the last recorded value of a Float64."""
+        buffer, i = self.cells[name]
+        return c_double.from_buffer(buffer, i * sizeof(c_double))
+
+    def record(self, t: float) -> None:
+        """Write a row of the present values at a time in s."""
+        self.time.value = t
+        for name, function, arguments in self.calls:
+            status = function(*arguments)
+            if status > WARNING:
+                raise FMICallException(name, status)
+        for texts, indices in self.texts:
+            assert self.strings
+            indices[:] = [self.strings.index_of(text) for text in texts]
+        if self.only_finite:
+            for name, (buffer, i) in self.cells.items():
+                if not isfinite(buffer[i]):
+                    raise HarnessError(f"{name} is {buffer[i]} at t = {t:.9g} s")
+        self.write(self.row)
+
+
+class StringTable:
+    """Distinct strings, one per line of a file; rows contain line numbers."""
+
+    def __init__(self, path: Path) -> None:
+        self.file, self.indices = path.open("w", encoding="utf-8", buffering=1), dict[str, int]()
+
+    def index_of(self, text: bytes | str | None) -> int:
+        """Return the line number of a string; append the string if it is new."""
+        text = text.decode("utf-8", "replace") if isinstance(text, bytes) else text or ""
+        if text not in self.indices:
+            self.indices[text] = len(self.indices)
+            self.file.write(json.dumps(text) + "\n")
+        return self.indices[text]
+
+
+def read_rows(data: bytes | memoryview, chosen: Sequence[ShapedVariable], is_fmi2: bool) -> tuple[np.ndarray, Columns]:
+    """Return time (n,) in s and columns of the rows of a run; ignore an incomplete last row."""
+    layout = row_type(chosen, is_fmi2)
+    rows = np.frombuffer(data, layout, count=len(data) // layout.itemsize)
+    columns: Columns = {}
+    for type_name, _, names in group_by_type(chosen):
+        values = rows[type_name].astype(COLUMN_TYPES[type_name])
+        columns |= zip(names, values.T, strict=True)
+    return np.array(rows["time"]), columns

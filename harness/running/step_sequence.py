@@ -1,0 +1,157 @@
+"""Runs of an FMU of this project by given communication steps and value changes, to the end or to an error.
+
+Values are not checked before they are set, since studies of stability and errors also set NaN.
+"""
+
+import io
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from itertools import product
+from math import inf, isnan, nan
+from time import perf_counter
+from typing import Any
+
+from ..errors import HarnessError
+from ..scenes.roles import find_roles
+from ..scenes.run_spec import RunSpec
+from .fmu_session import CALL_FAILURES, FmuSession
+from .own_fmu import open_session, read_statistics
+from .recorder import Recorder, ShapedVariable, read_rows
+from .trajectory import Trajectory
+from .unpacking import unpack_once
+from .variable_values import REAL_TYPES, variable_unit
+
+CommunicationSteps = list[tuple[float, float]]  # communication steps as (start, size) in s
+ScheduledChanges = dict[float, dict[str, float]]  # values to set, by time in s
+
+
+@dataclass(frozen=True)
+class RefusedRun:
+    """Run that the FMU refused: its message, and whether all calculated Reals are NaN."""
+
+    message: str
+    all_nan: bool
+
+
+@dataclass(frozen=True)
+class RefusalSummary:
+    """Number of values that were tried, and a description of each failure."""
+
+    n_tried: int
+    failures: tuple[str, ...]
+
+
+@contextmanager
+def open_reusable_session(spec: RunSpec) -> Iterator[FmuSession]:
+    """Instantiate an FMU whose files stay unpacked as long as the process lasts."""
+    with open_session(spec, unpack_once(spec.fmu)) as session:
+        yield session
+
+
+def initialize(session: FmuSession, spec: RunSpec) -> None:
+    """Set the values of a run and initialize the instance."""
+    session.initialize(settings(session, spec.values), spec.start or 0.0, spec.stop)
+
+
+def settings(session: FmuSession, values: dict[str, float]) -> list[tuple[Any, float]]:
+    """Return variables and values, from values by name."""
+    variables = [session.variables[name] for name in values]
+    return [
+        (variable, value if variable.type in REAL_TYPES else int(value))
+        for variable, value in zip(variables, values.values(), strict=True)
+    ]
+
+
+def set_values(session: FmuSession, values: dict[str, float]) -> None:
+    """Set variables by name."""
+    for variable, value in settings(session, values):
+        session.set(variable, value)
+
+
+def find_reals(session: FmuSession, *causalities: str) -> list[str]:
+    """Return the names of the Reals with the given causalities."""
+    return [
+        name
+        for name, variable in session.variables.items()
+        if variable.type in REAL_TYPES and variable.causality in causalities
+    ]
+
+
+def find_outputs(session: FmuSession) -> tuple[str, ...]:
+    """Return position, velocity and, if the FMU has it, energy."""
+    motion = find_roles(session.variables)
+    if "velocity" not in motion:
+        raise HarnessError(f"{session.description.modelName}: no output is declared as the derivative of a position")
+    return (motion["position"], motion["velocity"], *(["energy"] if "energy" in session.variables else []))
+
+
+def read_refusal(session: FmuSession) -> RefusedRun:
+    """Return the error message of the FMU and the state of its outputs."""
+    values = [session.get(name) for name in find_reals(session, "output", "local")]
+    return RefusedRun(session.log.error_message, all(map(isnan, values)))
+
+
+def run_steps(spec: RunSpec, steps: CommunicationSteps, changes: ScheduledChanges) -> Trajectory | RefusedRun:
+    """Run communication steps and record position, velocity and energy, if the FMU has one, after each.
+
+    Parameters
+    ----------
+    spec : RunSpec
+        FMU, values, start and stop. Without a stop, the FMU does not receive any.
+    steps : list of (float, float)
+        Communication steps as (start, size) in s.
+    changes : dict
+        Values to set at a time in s, by time.
+    """
+    with open_reusable_session(spec) as session:
+        outputs, rows = find_outputs(session), io.BytesIO()
+        recorded = [session.variables[name] for name in outputs]
+        chosen: list[ShapedVariable] = [(variable, ()) for variable in recorded]
+        recorder = Recorder(session, chosen, rows.write)
+        started = perf_counter()
+        try:
+            initialize(session, spec)
+            recorder.record(spec.start or 0.0)
+            for t, h in steps:
+                set_values(session, changes.get(t, {}))
+                session.step(t, h)
+                recorder.record(t + h)
+        except CALL_FAILURES:
+            return read_refusal(session)
+        seconds = perf_counter() - started
+        return Trajectory(
+            replace(spec, outputs=outputs),
+            *read_rows(rows.getbuffer(), chosen, session.is_fmi2),
+            {variable.name: variable_unit(variable) for variable in recorded},
+            {variable.name: variable.description or variable.name for variable in recorded},
+            {},
+            statistics=read_statistics(session, seconds),
+        )
+
+
+def inject_nonfinite(spec: RunSpec) -> RefusalSummary:
+    """Set NaN and both infinities in every settable Real, before and during a run, one at a time.
+
+    The FMU must refuse each with a message that starts with the variable's name, and must run again after a reset.
+    """
+    failures, n_tried = [], 0
+    with open_reusable_session(spec) as session:
+        for name, value, in_run in product(find_reals(session, "parameter", "input"), (nan, inf, -inf), (False, True)):
+            n_tried += 1
+            session.reset()
+            try:
+                initialize(session, spec if in_run else replace(spec, values={**spec.values, name: value}))
+                session.step(0.0, 0.01)
+                if in_run:
+                    set_values(session, {name: value})
+                    session.step(0.01, 0.01)
+                failures.append(f"{name} = {value} was accepted{' during the run' * in_run}")
+            except CALL_FAILURES:
+                refusal = read_refusal(session)
+                if not (refusal.message.startswith(f"{name} = ") and refusal.all_nan):
+                    failures.append(f"{name} = {value}: {refusal.message or 'no sentence'}")
+        session.reset()
+        initialize(session, spec)
+        session.step(0.0, 0.01)
+    return RefusalSummary(n_tried, tuple(failures))
