@@ -23,7 +23,7 @@ from .native import Measured, build_cvode_fmu, built_fmu, measure_or_skip, time_
 
 RADAU9 = 6  # of solver.method
 SPEED_RATIOS = {float(error): ratio for error, ratio in SETTINGS["stiff"].items()}
-TOLERANCES: tuple[float, ...] = tuple((10.0 ** -np.arange(2.0, 13.1, 0.5)).tolist())
+TOLERANCES: tuple[float, ...] = tuple((10.0 ** -np.arange(2.0, 14.1, 0.5)).tolist())
 ATOL_SHARES = (1.0, 0.01)  # absolute tolerances of CVODE, as multiples of rtol and the smallest scale of the states
 LEAST_REPEATS, MOST_REPEATS, RUN_TIME = 5, 100, 0.1  # of one setting; s in all, as far as these allow
 Runs = list[tuple[float, float]]  # run time in s, and largest error relative to the largest of each state
