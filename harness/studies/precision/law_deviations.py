@@ -3,6 +3,9 @@
 It quantifies published observations: with the magic formula the sled creeps instead of sticking, and its acceleration
 is not symmetric; bristles creep, too.  The law sign has no model error: in the limit of small steps it is dry friction
 (A. F. Filippov, Differential Equations with Discontinuous Righthand Sides, 1988).
+
+Bristles and a block that sticks are compared in one scene, as by D. A. Haessig and B. Friedland, On the modeling and
+simulation of friction, J. Dyn. Syst. Meas. Control 113 (1991) 354-362.
 """
 
 from dataclasses import dataclass, replace
