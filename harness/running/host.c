@@ -12,8 +12,8 @@
  * end of the output of a request.
  *
  * time simulates from t = 0 to STOP in STEPS equal communication steps, REPEAT times. A word R=VALUE sets the Real with
- * value reference R before each run, iR=VALUE the Integer; a word R reads that Real at every point. It prints the run time
- * of the fastest run in s, including initialization and reading, and the values at every point of the last run.
+ * value reference R before each run, iR=VALUE an Integer; a word R reads that Real at every point. It prints the run
+ * time of the fastest run in s, including initialization and reading, and the values at every point of the last run.
  *
  * calls measures the model exchange calls of a solver, TURNS calls at a time. It prints the shortest time per call in
  * s: to set the time, to set the states, to get the derivatives, to get the event indicators.
