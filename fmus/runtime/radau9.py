@@ -37,7 +37,7 @@ POWER, SAFETY, SHRINK, GROW = 1.0 / 6.0, 0.9, 0.12, 4.0
 
 MAX_ITERATIONS = 7
 NEWTON_TOLERANCE = 0.1  # error of the iteration, in multiples of the tolerance
-CAUTIOUS_STEPS, CAUTIOUS_GROWTH = 2, 1.0  # after a divergence of the iteration
+CAUTIOUS_STEPS, CAUTIOUS_GROWTH = 2, 1.5  # after a divergence of the iteration
 HOPELESS, LARGE = 10.0, 1e100  # excess over it, predicted for the last iteration; change that ends the iteration
 
 # fmt: off
