@@ -48,7 +48,9 @@ FMUS = (
 @click.option("--native", "compiled", is_flag=True, help="Compile to machine code; the FMU contains no Python.")
 @click.option("--more", is_flag=True, help="Build the models of fmus/more.")
 @click.option(
-    "--web", is_flag=True, help="Write a page that runs the models in a browser, web/index.html, instead of FMUs."
+    "--web",
+    is_flag=True,
+    help="Write a page that runs the models in a browser, web/index.html, instead of FMUs; with --more web/more.html.",
 )
 @click.option(
     "--method",
@@ -133,7 +135,7 @@ def main(
         is_project_model = any(model in model_names() + more_model_names() for model in sources)
         web_folder = out or (FMUS if is_project_model else next(iter(sources.values())).path.parent) / "web"
         with show_progress("writing the page"):
-            path = build_page(list(sources.values()), web_folder, methods, laws)
+            path = build_page(list(sources.values()), web_folder, methods, laws, more)
         print_summary(path)
         return
     if stages is not None:
@@ -202,12 +204,14 @@ def release_archive(folder: Path) -> Path:
         raise click.ClickException(str(error)) from error
 
 
-def build_page(models: list[ModelFile], folder: Path, methods: tuple[str, ...], laws: tuple[str, ...]) -> Path:
-    """Build the web page that runs the models."""
-    from fmus.packaging.web import build
+def build_page(
+    models: list[ModelFile], folder: Path, methods: tuple[str, ...], laws: tuple[str, ...], more: bool
+) -> Path:
+    """Build the web page that runs the models; that of fmus/more leaves the page of the shipped models as it is."""
+    from fmus.packaging.web import FILE, MORE_FILE, build
 
     try:
-        return build(models, folder, methods, laws, SCENES.glob("*.toml"))
+        return build(models, folder, methods, laws, SCENES.glob("*.toml"), MORE_FILE if more else FILE)
     except BuildError as error:
         raise click.ClickException(str(error)) from error
 

@@ -48,7 +48,7 @@ class Pacejka(Model):
 
     stop_time = 16.0
     step_size = 0.016
-    method = "rodas"
+    method = "radau9"
     tolerance = 2e-7  # a position error shifts the next break-away and costs the speed another digit
     rules = (
         Rule(

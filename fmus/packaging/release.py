@@ -7,8 +7,9 @@ from tempfile import TemporaryDirectory
 
 from . import __version__
 from .archive import build, build_date, license_files, write, zip_entries
-from .model_lookup import find_model, model_names
+from .model_lookup import find_model, model_names, more_model_names
 from .native import build as build_native
+from .web import FILE, MORE_FILE
 from .web import build as build_page
 
 CHECKSUMS = "SHA256SUMS"
@@ -20,7 +21,9 @@ FMUs of mechanical oscillators with dry friction.
 fmus/              FMI 2.0 co-simulation; needs Python 3.9 to 3.13 in the simulation tool
 fmus/native/       FMI 2.0 co-simulation and model exchange; needs nothing
 fmus/native/fmi3/  FMI 3.0 co-simulation and model exchange; needs nothing
-web/index.html     all models in a browser; works offline
+fmus/more/         the same three kinds of further models
+web/index.html     the five models in a browser; works offline
+web/more.html      the further models in a browser
 references/        certified results of the default experiments (CSV)
 licenses/          licences
 {CHECKSUMS}         checksums; check them with: sha256sum --check {CHECKSUMS}
@@ -28,7 +31,7 @@ licenses/          licences
 
 
 def build_release(folder: Path, scenes: Iterable[Path], report: Callable[[str], None] = lambda file: None) -> Path:
-    """Build every FMU of every kind and the live page, and write them into one zip file.
+    """Build every FMU of every kind and the live pages, and write them into one zip file.
 
     The archive has the same bytes for the same sources.
 
@@ -37,7 +40,7 @@ def build_release(folder: Path, scenes: Iterable[Path], report: Callable[[str], 
     folder : Path
         Where to write ``friction-fmus-VERSION.zip``.
     scenes : iterable of Path
-        The scene files that the live page offers as presets.
+        The scene files that the live pages offer as presets.
     report : callable, optional
         Takes the name of each file when its build begins.
 
@@ -51,24 +54,26 @@ def build_release(folder: Path, scenes: Iterable[Path], report: Callable[[str], 
     BuildError
         If an FMU cannot be built or the archive cannot be written.
     """
+    presets = list(scenes)
     entries = {f"licenses/{Path(path).name}": content for path, content in license_files().items()}
     entries["README.txt"] = README.encode()
     with TemporaryDirectory() as temporary:
-        for name in model_names():
-            source = find_model(name)
-            kinds = {
-                "fmus": lambda out, path=source.path: build(path, out),
-                "fmus/native": lambda out, path=source.path: build_native(path, out),
-                "fmus/native/fmi3": lambda out, path=source.path: build_native(path, out, fmi="3"),
-            }
-            for kind, make in kinds.items():
-                report(f"{kind}/{name}.fmu")
-                entries[f"{kind}/{name}.fmu"] = make(Path(temporary)).read_bytes()
-            for file in sorted(source.path.parent.glob(f"{name}*.csv")):
-                entries[f"references/{file.name}"] = file.read_bytes()
-        report("web/index.html")
-        page = build_page([find_model(name) for name in model_names()], Path(temporary), (), (), scenes)
-        entries["web/index.html"] = page.read_bytes()
+        for group, names, page in (("fmus", model_names(), FILE), ("fmus/more", more_model_names(), MORE_FILE)):
+            for name in names:
+                source = find_model(name)
+                kinds = {
+                    group: lambda out, path=source.path: build(path, out),
+                    f"{group}/native": lambda out, path=source.path: build_native(path, out),
+                    f"{group}/native/fmi3": lambda out, path=source.path: build_native(path, out, fmi="3"),
+                }
+                for kind, make in kinds.items():
+                    report(f"{kind}/{name}.fmu")
+                    entries[f"{kind}/{name}.fmu"] = make(Path(temporary)).read_bytes()
+                for file in sorted(source.path.parent.glob(f"{name}*.csv")):
+                    entries[f"references/{file.name}"] = file.read_bytes()
+            report(f"web/{page}")
+            sources = [find_model(name) for name in names]
+            entries[f"web/{page}"] = build_page(sources, Path(temporary), (), (), presets, page).read_bytes()
     sums = "".join(f"{sha256(entries[path]).hexdigest()}  {path}\n" for path in sorted(entries))
     entries[CHECKSUMS] = sums.encode()
     root = f"friction-fmus-{__version__}"

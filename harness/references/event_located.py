@@ -178,7 +178,8 @@ class CoulombBelt(Belt):
 class Bristles(HybridProblem):
     """Mass pulled through a spring, with LuGre friction; the kink is where the speed changes its sign."""
 
-    start, stop = (0.0, 0.0, 0.0), 20.0
+    start: tuple[float, ...] = (0.0, 0.0, 0.0)
+    stop = 20.0
     sigma_0, sigma_1, sigma_2, F_c, F_s, v_s = 1e5, sqrt(1e5), 0.4, 1.0, 1.5, 1e-3
 
     def pull(self, t: float, x: float) -> float:
@@ -200,6 +201,26 @@ class Bristles(HybridProblem):
         x, v, z = y
         rate = v * (1.0 - self.plastic_share(v, z, modes))
         return [v, self.pull(t, x) - self.sigma_0 * z - self.sigma_1 * rate - self.sigma_2 * v, rate]
+
+
+class DryBlock(Bristles):
+    """The same mass with Coulomb and viscous friction, which sticks: what bristles approximate."""
+
+    start, first = (0.0, 0.0), (0,)
+
+    def conditions(self, t: float, y: StateVector) -> list[float]:
+        return []
+
+    def rates(self, t: float, y: StateVector, modes: list[int]) -> list[float]:
+        x, v = y
+        return [v, self.pull(t, x) - modes[0] * self.F_c - self.sigma_2 * v if modes[0] else 0.0]
+
+    def contacts(self, t: float, y: StateVector, modes: list[int]) -> list[tuple[float, float, float]]:
+        return [(y[1], self.pull(t, y[0]), self.F_s)]
+
+    def stop_slip(self, y: np.ndarray, modes: list[int]) -> None:
+        if modes[0] == 0:
+            y[1] = 0.0
 
 
 class ElastoplasticBristles(Bristles):

@@ -25,7 +25,7 @@ ADVICE = (
     "every change of mode is located as an event.",
     "If the model is linear between events, use the method exact: it is the fastest and accurate to rounding.",
     "The laws sign and threshold show the cost of common approximations: they chatter.",
-    "For a smooth friction curve use the magic formula with the method rodas, because it is stiff.",
+    "For a smooth friction curve use the magic formula with the method radau9, because it is stiff.",
 )
 ENVIRONMENT = Environment(
     loader=PackageLoader(__package__, "."), autoescape=True, undefined=StrictUndefined, trim_blocks=True

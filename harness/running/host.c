@@ -12,8 +12,8 @@
  * end of the output of a request.
  *
  * time simulates from t = 0 to STOP in STEPS equal communication steps, REPEAT times. A word R=VALUE sets the Real with
- * value reference R before each run; a word R reads that Real at every point. It prints the run time of the fastest run
- * in s, including initialization and reading, and the values at every point of the last run.
+ * value reference R before each run, iR=VALUE an Integer; a word R reads that Real at every point. It prints the run
+ * time of the fastest run in s, including initialization and reading, and the values at every point of the last run.
  *
  * calls measures the model exchange calls of a solver, TURNS calls at a time. It prints the shortest time per call in
  * s: to set the time, to set the states, to get the derivatives, to get the event indicators.
@@ -33,9 +33,9 @@ enum { INSTANCES = 4, WORDS = 64, LINE = 4096, REPETITIONS = 500 };
 
 #define FUNCTIONS(f)                                                                                               \
     f(Instantiate) f(FreeInstance) f(SetupExperiment) f(EnterInitializationMode) f(ExitInitializationMode) f(Reset) \
-    f(SetReal) f(GetReal) f(DoStep) f(GetFMUstate) f(SetFMUstate) f(FreeFMUstate) f(NewDiscreteStates)              \
-    f(EnterContinuousTimeMode) f(GetContinuousStates) f(SetTime) f(SetContinuousStates) f(GetDerivatives)           \
-    f(GetEventIndicators)
+    f(SetReal) f(SetInteger) f(GetReal) f(DoStep) f(GetFMUstate) f(SetFMUstate) f(FreeFMUstate)                     \
+    f(NewDiscreteStates) f(EnterContinuousTimeMode) f(GetContinuousStates) f(SetTime) f(SetContinuousStates)        \
+    f(GetDerivatives) f(GetEventIndicators)
 
 static struct {
 #define DECLARE(name) fmi2##name##TYPE *name;
@@ -47,6 +47,12 @@ typedef struct {
     fmi2Real values[WORDS];
     size_t count;
 } Reals;
+
+typedef struct {
+    fmi2ValueReference references[WORDS];
+    fmi2Integer values[WORDS];
+    size_t count;
+} Integers;
 
 static void die(const char *what, const char *why)
 {
@@ -79,6 +85,14 @@ static void add(Reals *reals, const char *word)
     reals->references[reals->count++] = (fmi2ValueReference)strtoul(word, NULL, 10);
 }
 
+/* Append a word R=VALUE. */
+static void add_integer(Integers *integers, const char *word)
+{
+    char *value;
+    integers->references[integers->count] = (fmi2ValueReference)strtoul(word, &value, 10);
+    integers->values[integers->count++] = atoi(value + 1);
+}
+
 static void print_values(const fmi2Real *values, size_t count)
 {
     printf("values");
@@ -94,10 +108,12 @@ static double now(void)
 }
 
 /* Return the time of one run in s; write the values at each point to `out`, row by row. */
-static double run(fmi2Component c, const Reals *set, const Reals *read, double stop, int steps, double *out)
+static double run(fmi2Component c, const Reals *set, const Integers *choices, const Reals *read, double stop, int steps,
+                  double *out)
 {
     double begun = now(), t = 0.0;
     if (set->count) DO(SetReal(c, set->references, set->count, set->values));
+    if (choices->count) DO(SetInteger(c, choices->references, choices->count, choices->values));
     DO(SetupExperiment(c, fmi2False, 0.0, 0.0, fmi2True, stop));
     DO(EnterInitializationMode(c));
     DO(ExitInitializationMode(c));
@@ -114,13 +130,19 @@ static double run(fmi2Component c, const Reals *set, const Reals *read, double s
 static void time_runs(fmi2Component c, char **words, int count)
 {
     Reals set = {.count = 0}, read = {.count = 0};
+    Integers choices = {.count = 0};
     int repeat = atoi(words[0]), steps = atoi(words[2]);
     double stop = strtod(words[1], NULL), fastest = 0.0;
-    for (int n = 3; n < count; n++) add(strchr(words[n], '=') ? &set : &read, words[n]);
+    for (int n = 3; n < count; n++) {
+        if (words[n][0] == 'i')
+            add_integer(&choices, words[n] + 1);
+        else
+            add(strchr(words[n], '=') ? &set : &read, words[n]);
+    }
     double *out = malloc(((size_t)steps + 1) * read.count * sizeof *out);
     if (!out) die("time", "no memory");
     for (int i = 0; i <= repeat; i++) { /* the first one warms up */
-        double seconds = run(c, &set, &read, stop, steps, out);
+        double seconds = run(c, &set, &choices, &read, stop, steps, out);
         if (i == 1 || (i && seconds < fastest)) fastest = seconds;
         DO(Reset(c));
     }

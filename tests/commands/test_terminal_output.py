@@ -93,7 +93,7 @@ TABLES = {  # of slow commands, filled with long words
             table.deviation_table(
                 [
                     law_deviations.LawDeviation(
-                        "stickslip", "stickslip-threshold", "threshold", *(1.2e-5,) * 4, 3.3451, 0.877
+                        "stickslip", "stickslip-threshold", "threshold", *(1.2e-5,) * 4, 3.3451, 0.877, 1.2e-13
                     )
                 ]
             )

@@ -83,7 +83,7 @@ def test_outputs_have_their_names(name):
 @pytest.mark.parametrize("name", TUNABLE)
 def test_the_solver_has_its_settings_and_counters(name):
     settings = {v: d.start for v, d in declared(name).items() if v.startswith("solver.") and isinstance(d, Parameter)}
-    default = {"pacejka": "rodas", "pendulum": "dop853"}.get(name, "exact")
+    default = {"pacejka": "radau9", "pendulum": "dop853"}.get(name, "exact")
     assert settings == {"solver.method": METHODS[default], "solver.rtol": 0.0, "solver.atol": 0.0, "solver.h_max": 0.0}
     for label, value, _ in declared(name)["solver.method"].items:
         assert METHODS[label] == value

@@ -19,9 +19,10 @@ SCENES = sorted((ROOT / "harness" / "scenes").glob("*.toml"))
 
 @pytest.fixture(scope="module")
 def archives(tmp_path_factory):
-    """Two builds of a release that holds the smallest model only, which saves a minute."""
+    """Two builds of a release that holds two small models only, which saves minutes."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(release, "model_names", lambda: ["smd"])
+        patch.setattr(release, "more_model_names", lambda: ["forced"])
         paths = [release.build_release(tmp_path_factory.mktemp("release"), SCENES) for _ in range(2)]
     return [path.read_bytes() for path in paths]
 
@@ -36,6 +37,8 @@ def test_the_release_holds_every_kind_and_correct_checksums(archives, tmp_path):
         files = {name.removeprefix(root): archive.read(name) for name in archive.namelist()}
     kinds = {"fmus": "2.0", "fmus/native": "2.0", "fmus/native/fmi3": "3.0"}
     assert {f"{kind}/smd.fmu" for kind in kinds} | {"web/index.html", "references/smd.csv", "README.txt"} <= {*files}
+    more = {f"{kind.replace('fmus', 'fmus/more', 1)}/forced.fmu" for kind in kinds}
+    assert more | {"web/more.html", "references/forced.csv", "references/forced-events.csv"} <= {*files}
     assert {"licenses/license.txt", "licenses/pythonfmu.txt"} <= {*files}
     for kind, version in kinds.items():
         (tmp_path / "smd.fmu").write_bytes(files[f"{kind}/smd.fmu"])

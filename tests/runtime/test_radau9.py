@@ -5,10 +5,11 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from models import DOP853, RADAU9, RODAS, model_class, runtime
+from models import DOP853, RADAU9, RODAS, ROOT, model_class, runtime
 from scipy.integrate import solve_ivp
 
 STAGES = range(1, 6)
+LUGRE = ROOT / "fmus" / "more" / "lugre.py"
 
 
 def table(letter):
@@ -219,51 +220,13 @@ def test_it_takes_fewer_steps_than_rodas_for_a_smaller_error(truth, rtol):
 # ---- friction with a kink
 
 
-@pytest.fixture(scope="module")
-def lugre(tmp_path_factory):
-    """Return the path of a block with LuGre friction, whose rates have a kink at standstill."""
-    path = tmp_path_factory.mktemp("bristles") / "bristles.py"
-    path.write_text(LUGRE)
-    return path
-
-
-LUGRE = '''
-"""Block with LuGre friction."""
-
-from fmus import Model, Output, Parameter, State, exp, fabs
-
-
-class Bristles(Model):
-    """Block with LuGre friction, drawn by a spring."""
-
-    m = Parameter(1.0, "kg", "mass", above=0.0)
-    k = Parameter(2.0, "N/m", "stiffness of the spring")
-    f_s = Parameter(1.5, "N", "friction force at rest")
-    f_d = Parameter(1.0, "N", "friction force at high speed", above=0.0)
-    s_0 = Parameter(1e5, "N/m", "stiffness of the bristles")
-    s_1 = Parameter(316.22776601683796, "N.s/m", "damping of the bristles")
-    s_2 = Parameter(0.4, "N.s/m", "viscous friction")
-    v_s = Parameter(1e-3, "m/s", "Stribeck speed", above=0.0)
-    v_driver = Parameter(0.1, "m/s", "speed of the driver")
-    x = State("m", "position")
-    v = State("m/s", "speed", rate_of=x, nominal_velocity=v_s)
-    z = State("m", "deflection of the bristles")
-    x_driver = State("m", "position of the driver, zero at the start", rate=v_driver)
-    ratio = v / v_s
-    curve = f_d + (f_s - f_d) * exp(-ratio * ratio)
-    u = Output("m/s", "speed of the bristles", v - s_0 * fabs(v) * z / curve, rate_of=z)
-    a = Output("m/s2", "acceleration", (k * (x_driver - x) - s_0 * z - s_1 * u - s_2 * v) / m, rate_of=v)
-    stop_time, step_size, method = 40.0, 0.025, "radau9"
-'''
-
-
-def test_a_kink_of_the_rates_costs_less_than_ten_tolerances(lugre):
+def test_a_kink_of_the_rates_costs_less_than_ten_tolerances():
     """LuGre, three stops and restarts; the reference is an explicit method of order 8.
 
     The absolute tolerance resolves the bristles, which deflect by 1e-5 m.
     """
-    reference, _ = run(lugre, {"solver.method": DOP853, "solver.rtol": 1e-11}, 22.0)
+    reference, _ = run(LUGRE, {"solver.method": DOP853, "solver.rtol": 1e-11}, 22.0)
     for rtol in 10.0 ** -np.arange(2, 10, 1.0):
         values = {"solver.method": RADAU9, "solver.rtol": rtol, "solver.atol": 1e-5 * rtol}
-        rows, _ = run(lugre, values, 22.0)
+        rows, _ = run(LUGRE, values, 22.0)
         assert relative_error(rows[:, :2], reference[:, :2]) < 10.0 * rtol, rtol

@@ -9,13 +9,14 @@ from math import atan, inf, nan, sin
 
 import fmi3_fixtures
 import pytest
+from build_cache import build_once
 from native_fmus import build_native_fmus as native_built
 
 from harness.errors import HarnessError
 from harness.results.provenance import load_provenance
 from harness.running import c_host, stepping_loops
 from harness.running.timing import time_fastest_call
-from harness.studies.bench import model_exchange, native
+from harness.studies.bench import model_exchange, native, stiff
 from harness.studies.bench import speed as bench_speed
 from harness.studies.bench.accuracy import (
     default_run_error,
@@ -61,7 +62,7 @@ def both_backends(fmus, tmp_path, monkeypatch):
 
 def forget():
     """Clear the cache of measurements."""
-    for measured in (native.time_fmu, native.time_cvode, native.time_through_fmpy):
+    for measured in (native.time_fmu, native.time_cvode, native.time_through_fmpy, stiff.run_fmu, stiff.run_cvode):
         measured.cache_clear()
 
 
@@ -163,14 +164,45 @@ def test_the_cvode_fmu_improves_with_its_tolerance_and_the_native_one_is_better(
     assert len(measure.baselines) == 4
 
 
+def test_the_run_time_at_an_error_is_not_that_of_a_lucky_run():
+    """Errors 1e-3, 1e-6 by luck, 1e-4, 1e-6 take 1, 2, 4, 8 s."""
+    runs = [(1.0, 1e-3), (2.0, 1e-6), (4.0, 1e-4), (8.0, 1e-6)]
+    assert stiff.time_at_error(runs, 1e-4) == pytest.approx(2.0)
+    assert stiff.time_at_error(runs, 1e-5) == pytest.approx(32.0**0.5)
+    assert stiff.time_at_error(runs, 1e-6) == pytest.approx(8.0)
+    assert stiff.time_at_error(runs, 1e-7) == inf
+
+
+@pytest.mark.skipif(c_host.COMPILER is None, reason="there is no C compiler on this machine: install gcc")
+def test_radau9_is_faster_than_cvode_at_equal_error(both_backends, monkeypatch):
+    monkeypatch.setattr(stiff, "RUN_TIME", 0.0)
+    monkeypatch.setattr(stiff, "TOLERANCES", (1e-3, 1e-5, 1e-7, 1e-9, 1e-11))
+    (both_backends / "more").mkdir()
+    (both_backends / "more" / "lugre.fmu").touch()
+    (both_backends / "more" / "native").symlink_to(
+        build_once("native-lugre", "lugre", "--native", "--platform", "linux64")
+    )
+    for name in (name for name, case in stiff.CASES.items() if case.reference_source):
+        measures = [stiff.compare_at_equal_error(name, error) for error in (1e-4, 1e-6)]
+        if "not installed: SUNDIALS" in measures[0].baselines[0].name:
+            pytest.skip(measures[0].baselines[0].name)
+        for measure in measures:
+            assert 0.0 < measure.value < measure.baselines[0].value
+            assert measure.target < measure.baselines[0].value
+
+
 def test_missing_tools_are_reported_in_their_row_and_fail_nothing(both_backends, monkeypatch):
     monkeypatch.setattr(c_host, "COMPILER", None)
     shutil.rmtree(both_backends / "native")
+    (both_backends / "more").mkdir()
+    (both_backends / "more" / "lugre.fmu").touch()
     c_host.build_host.cache_clear()
     native.build_cvode_fmu.cache_clear()
     measures = [native.run_through_fmpy("smd"), native.run_in_c("smd"), native.compare_with_cvode("smd")]
-    assert [measure.is_met for measure in measures] == [False, False, False]
-    assert [measure.baselines[0].name.split(":")[0] for measure in measures] == ["not built"] * 3
+    measures += [stiff.compare_at_equal_error(name, 1e-6) for name in ("pacejka, x_m = 0.01 m/s", "lugre")]
+    assert [measure.is_met for measure in measures] == [False] * 5
+    assert [measure.baselines[0].name.split(":")[0] for measure in measures] == ["not built"] * 5
+    assert measures[-1].baselines[0].name.endswith("(python build_fmus.py lugre --native)")
     with pytest.raises(c_host.MissingToolError, match="not installed: a C compiler"):
         native.time_cvode("smd", 1e-6)
     monkeypatch.setattr(c_host, "COMPILER", "false")  # one that finds no header

@@ -14,14 +14,15 @@ from matplotlib.figure import Figure
 from models import EXAMPLE_MODELS
 
 from harness.errors import HarnessError
-from harness.references import peer_solvers
-from harness.references.certified_reference import compute_errors, load_reference
+from harness.references import event_located, peer_solvers
+from harness.references.certified_reference import compute_errors, load_reference, relative_errors
 from harness.references.models import CASES
 from harness.results.provenance import write_provenance
 from harness.running.embedded_model import EmbeddedModel, load_model_class, method_numbers
 from harness.running.solution import Solution
 from harness.studies.precision import advice, law_deviations
 from harness.studies.precision.figure import OTHER, draw
+from harness.studies.precision.literature_problems import load_more_model
 from harness.studies.precision.study import (
     FMI3_INTERFACES,
     FMPY,
@@ -225,6 +226,21 @@ def test_the_laws_creep_and_lose_their_symmetry_as_published(fmus):
     assert (soft.period, steep.period) == pytest.approx((3.7169, 3.3533), abs=1e-3)
     assert soft.asymmetry < steep.asymmetry
     assert soft.rms > steep.rms
+
+
+def test_bristles_creep_and_each_law_has_a_smaller_integration_than_model_error(fmus):
+    """The bristles of LuGre and of the elasto-plastic law, against a block that sticks, by two methods."""
+    dry = law_deviations.solve_dry_block()
+    problem = event_located.DryBlock()
+    other, events = event_located.solve(problem, dry.times.tolist(), "Radau", *event_located.TOLERANCES["Radau"])
+    assert relative_errors(other, dry.motion).max() < 1e-9
+    assert [mode for _, (mode,) in events] == [mode for _, mode in dry.events] == [1, 0, 1, 0]
+    for name, law in law_deviations.BRISTLES.items():
+        deviation = law_deviations.compare_bristles(name, law, load_more_model(name))
+        assert 1e-6 < deviation.creep < 1e-5
+        assert 1e-3 < deviation.rms < 0.1
+        assert 0.0 < deviation.integration < 1e-4
+        assert deviation.period == pytest.approx(dry.events[2][0] - dry.events[0][0], rel=0.02)
 
 
 def test_stuck_points_lie_between_a_stop_and_the_next_breakaway():

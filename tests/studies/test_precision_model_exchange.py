@@ -101,7 +101,7 @@ def test_every_change_of_mode_is_located_in_model_exchange(points, case):
 def test_co_simulation_is_one_point_with_the_own_method(points, case):
     (point,) = points(case.name, CS)
     assert isnan(point.rtol)
-    assert point.method == {"pacejka": "rodas", "pendulum": "dop853"}.get(case.model, "exact")
+    assert point.method == {"pacejka": "radau9", "pendulum": "dop853"}.get(case.model, "exact")
     assert point.largest < {"pacejka": 1e-6, "pendulum": 1e-9}.get(case.model, 1e-13)
     assert point.evaluations > 0
 

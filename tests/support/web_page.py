@@ -18,7 +18,7 @@ SHIFTS = (
 )
 
 
-def build_page(name, *words):
+def build_page(name, *words, file="index.html"):
     """Build the page in a folder of its own and return its file."""
     pytest.importorskip("ziglang", reason="the page is compiled by the package ziglang: pip install -e '.[native]'")
 
@@ -26,7 +26,7 @@ def build_page(name, *words):
         done = commands.build("--web", *words, "--out", folder)
         assert done.returncode == 0, done.stderr
 
-    return build_cache.cached_folder(name, make) / "index.html"
+    return build_cache.cached_folder(name, make) / file
 
 
 class Page:

@@ -4,7 +4,7 @@ import web_page
 from build_cache import ROOT
 from models import EXAMPLE_MODELS, LARGER_MODELS
 
-from fmus.packaging.model_lookup import find_model
+from fmus.packaging.model_lookup import find_model, more_model_names
 from fmus.packaging.web.model_json import list_bodies
 
 
@@ -19,6 +19,18 @@ def test_moving_bodies_of_any_model_are_read_from_its_declaration():
     assert {bodies_by_model[name][0]["friction"] for name in ("bumper", "lugre")} == {"F_drag", "F_friction"}  # smooth
     assert bodies_by_model["sleds"][0]["linked"] == ["x2"]
     assert bodies_by_model["viscous_pendulum"][0]["dampers"] == ["d"]
+
+
+def test_the_models_of_fmus_more_run_on_a_second_page(quiet):
+    """It leaves index.html, the page of the shipped models, as it is."""
+    page = web_page.Page(quiet, web_page.build_page("web-more", "--more", file="more.html"))
+    assert [file.name for file in page.file.parent.iterdir()] == ["more.html"]
+    page.open()
+    assert page.run("[...app.session.models.keys()]") == more_model_names()
+    for name in more_model_names():
+        page.open(f".model={name}")
+        assert page.run("app.session.runs.main.failure") == ""
+        assert page.run("app.session.runs.main.time.at(-1)") >= find_model(name).model.stop_time
 
 
 def test_user_models_run_on_a_page_of_their_own(quiet):

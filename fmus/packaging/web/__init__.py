@@ -9,6 +9,6 @@
 The modules in script/ are concatenated in the order of MODULES in html_page.py; each imports only from earlier ones.
 """
 
-from .html_page import build
+from .html_page import FILE, MORE_FILE, build
 
-__all__ = ["build"]
+__all__ = ["FILE", "MORE_FILE", "build"]

@@ -21,7 +21,7 @@ from ..native.fmu import generate_c_sources
 from ..native.sources import MAIN_SOURCE
 from .model_json import ModelJson, build_model_json
 
-FILE = "index.html"
+FILE, MORE_FILE = "index.html", "more.html"  # pages of the shipped models and of those in fmus/more
 HERE = Path(__file__).parent
 MODULES = (
     *(
@@ -55,6 +55,7 @@ def build(
     methods: Sequence[str] = (),
     laws: Sequence[str] = (),
     scenes: Iterable[Path] = (),
+    file: str = FILE,
 ) -> Path:
     """Build the live page of models and write it to `folder`.
 
@@ -68,6 +69,8 @@ def build(
         Labels of the methods and friction laws to include; none: all.
     scenes
         Scene files. Those with published values of one of the models become presets.
+    file
+        Name of the page.
     """
     with ThreadPoolExecutor() as pool:
         models = list(pool.map(lambda source: model_with_code(source, methods, laws), sources))
@@ -77,7 +80,7 @@ def build(
         "presets": read_presets(scenes, [source.name for source in sources]),
     }
     is_complete = not methods and not laws and {source.name for source in sources}.issuperset(STORY_MODELS)
-    return write(folder / FILE, render_page(data, with_stories=is_complete).encode())
+    return write(folder / file, render_page(data, with_stories=is_complete).encode())
 
 
 def model_with_code(source: ModelFile, methods: Sequence[str], laws: Sequence[str]) -> ModelJson:

@@ -42,7 +42,7 @@ def accuracy_benchmarks() -> list[Callable[[], Benchmark]]:
             partial(default_run_error, "pendulum", cards["pendulum"], "pin_load", load, 1e-9)
             for load in ("weight", "reaction")
         ),
-        *(partial(default_run_error, "pacejka", cards["pacejka"], "x_m", 10.0**-n, 1e-6) for n in range(2, 7)),
+        *(partial(default_run_error, "pacejka", cards["pacejka"], "x_m", 10.0**-n, 1e-7) for n in range(2, 7)),
         *(partial(between_grids, model, cards[model]) for model in MODELS),
         *(partial(stuck_drift, model, cards[model], values) for model, values in SETTINGS["stuck"].items()),
     ]

@@ -1,15 +1,18 @@
-/* The five oscillators solved by SUNDIALS CVODE: an FMI 2.0 co-simulation FMU with the functions that the C host calls.
+/* The five oscillators, and LuGre friction, solved by SUNDIALS CVODE: an FMI 2.0 co-simulation FMU with the functions
+ * that the C host calls.
  *
  *     y = (x, v),    y' = (v, acceleration),    mode = -1 sliding backward, 0 stuck, 1 sliding forward
+ *     y = (x, v, z) with LuGre friction, where z is the deflection of the bristles
  *
  * Dry friction is modelled by modes: sliding lasts until the root v = 0, sticking until the load exceeds the limit of
  * static friction; CVODE is restarted at each event.  Internal steps do not depend on communication points, where the
- * solution is interpolated.  The stiff model uses BDF with Newton iteration and the exact Jacobian, all others Adams
+ * solution is interpolated.  The stiff models use BDF with Newton iteration and the exact Jacobian, all others Adams
  * with fixed-point iteration.
  *
- *     cc -DMODEL=STICKSLIP ...    (SMD, COULOMB, STICKSLIP, PACEJKA, PENDULUM)
+ *     cc -DMODEL=STICKSLIP ...    (SMD, COULOMB, STICKSLIP, PACEJKA, PENDULUM, LUGRE)
  *     cc -DMODEL=STICKSLIP -DPLAIN=1 ...    as importers solve in model exchange: BDF with a finite-difference
  *                                           Jacobian, and the position of the driver as a state
+ *     cc -DMODEL=PACEJKA -DADAMS=1 ...    Adams with Newton iteration for a stiff model
  *
  * SI units; the default experiments.
  */
@@ -29,26 +32,35 @@
 #define STICKSLIP 3
 #define PACEJKA 4
 #define PENDULUM 5
+#define LUGRE 6
 
 #ifndef PLAIN
 #define PLAIN 0
 #endif
+#ifndef ADAMS
+#define ADAMS 0
+#endif
 
-enum { X, V, RTOL, ATOL, X_M, FORCE, RATE, VARIABLES }; /* value references */
+enum { X, V, Z, RTOL, ATOL, X_M, FORCE, RATE, VARIABLES }; /* value references */
 
 #define IS_DRY (MODEL == COULOMB || MODEL == STICKSLIP || MODEL == PENDULUM)
-#define IS_SLED (MODEL == STICKSLIP || MODEL == PACEJKA)
-#define IS_STIFF (MODEL == PACEJKA)
-#define IS_DRIVEN (PLAIN && IS_SLED)
+#define IS_PULLED (MODEL == STICKSLIP || MODEL == PACEJKA || MODEL == LUGRE)
+#define HAS_BRISTLES (MODEL == LUGRE)
+#define IS_STIFF (MODEL == PACEJKA || HAS_BRISTLES)
+#define IS_DRIVEN (PLAIN && IS_PULLED)
 #define IS_IMPLICIT (IS_STIFF || PLAIN)
 #define PI 3.14159265358979323846
 #define POUND 0.45359237
 #define INCH 0.0254
 
 /* m: mass or moment of inertia; hold, slide: static and sliding friction */
-enum { STATES = 2 + IS_DRIVEN };
+enum { STATES = 2 + HAS_BRISTLES + IS_DRIVEN };
 
-#if IS_SLED
+#if HAS_BRISTLES
+static const double m = 1.0, k = 2.0, v_driver = 0.1, hold = 1.5, slide = 1.0, v_s = 1e-3;
+static const double sigma_0 = 1e5, sigma_1 = 316.22776601683796, sigma_2 = 0.4;
+static const double start[STATES] = {0.0, 0.0, 0.0};
+#elif IS_PULLED
 static const double m = 12.5, k = 742.5, v_driver = 0.034, hold = 0.9 * 12.5 * 9.81, slide = 0.6 * 12.5 * 9.81;
 static const double start[STATES] = {0.0, 0.0};
 #elif MODEL == PENDULUM
@@ -81,7 +93,7 @@ static double load(const Instance *instance, double t, N_Vector y)
     double x = NV_Ith_S(y, 0), force = instance->values[FORCE] + instance->values[RATE] * (t - instance->ramp_start);
 #if MODEL == PENDULUM
     return force - WEIGHT * ARM * sin(x);
-#elif IS_SLED
+#elif IS_PULLED
     return force + k * ((IS_DRIVEN ? NV_Ith_S(y, STATES - 1) : v_driver * t) - x);
 #else
     return force - k * x;
@@ -97,11 +109,16 @@ static int rates(sunrealtype t, N_Vector y, N_Vector slope, void *user)
         double z = instance->B * v;
         resistance = hold * sin(instance->C * atan(z - instance->E * (z - atan(z))));
     }
+#if HAS_BRISTLES
+    double z = NV_Ith_S(y, 2), ratio = v / v_s, steady_force = slide + (hold - slide) * exp(-ratio * ratio);
+    NV_Ith_S(slope, 2) = v - sigma_0 * fabs(v) * z / steady_force;
+    resistance = sigma_0 * z + sigma_1 * NV_Ith_S(slope, 2) + sigma_2 * v;
+#endif
     bool stuck = IS_DRY && instance->mode == 0;
     NV_Ith_S(slope, 0) = stuck ? 0.0 : v;
     NV_Ith_S(slope, 1) = stuck ? 0.0 : (load(instance, t, y) - resistance) / m;
 #if IS_DRIVEN
-    NV_Ith_S(slope, 2) = v_driver;
+    NV_Ith_S(slope, STATES - 1) = v_driver;
 #endif
     return 0;
 }
@@ -111,12 +128,27 @@ static int derivatives(sunrealtype t, N_Vector y, N_Vector slope, SUNMatrix jaco
                        N_Vector c)
 {
     (void)t, (void)slope, (void)a, (void)b, (void)c;
+#if HAS_BRISTLES
+    (void)user;
+    double v = NV_Ith_S(y, 1), z = NV_Ith_S(y, 2), size = fabs(v), ratio = v / v_s;
+    double peak = (hold - slide) * exp(-ratio * ratio);
+    double g = slide + peak, g_v = -2.0 * ratio / v_s * peak, sign = (v > 0.0) - (v < 0.0);
+    double rate_v = 1.0 - sigma_0 * z * (sign / g - size * g_v / (g * g)), rate_z = -sigma_0 * size / g;
+    SM_ELEMENT_D(jacobian, 0, 0) = SM_ELEMENT_D(jacobian, 0, 2) = SM_ELEMENT_D(jacobian, 2, 0) = 0.0;
+    SM_ELEMENT_D(jacobian, 0, 1) = 1.0;
+    SM_ELEMENT_D(jacobian, 1, 0) = -k / m;
+    SM_ELEMENT_D(jacobian, 1, 1) = -(sigma_1 * rate_v + sigma_2) / m;
+    SM_ELEMENT_D(jacobian, 1, 2) = -(sigma_0 + sigma_1 * rate_z) / m;
+    SM_ELEMENT_D(jacobian, 2, 1) = rate_v;
+    SM_ELEMENT_D(jacobian, 2, 2) = rate_z;
+#else
     const Instance *instance = user;
     double B = instance->B, C = instance->C, E = instance->E, z = B * NV_Ith_S(y, 1), u = z - E * (z - atan(z));
     SM_ELEMENT_D(jacobian, 0, 0) = 0.0;
     SM_ELEMENT_D(jacobian, 0, 1) = 1.0;
     SM_ELEMENT_D(jacobian, 1, 0) = -k / m;
     SM_ELEMENT_D(jacobian, 1, 1) = -hold / m * cos(C * atan(u)) * C / (1 + u * u) * B * (1 - E + E / (1 + z * z));
+#endif
     return 0;
 }
 #endif
@@ -156,7 +188,7 @@ fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference references[], s
 {
     const Instance *instance = c;
     for (size_t i = 0; i < count; i++) {
-        values[i] = references[i] <= V ? NV_Ith_S(instance->y, references[i]) : instance->values[references[i]];
+        values[i] = references[i] <= Z ? NV_Ith_S(instance->y, references[i]) : instance->values[references[i]];
     }
     return fmi2OK;
 }
@@ -187,7 +219,7 @@ static bool create_solver(Instance *instance)
 {
     if (SUNContext_Create(0, &instance->context)) return false;
     instance->y = N_VNew_Serial(STATES, instance->context);
-    instance->cvode = CVodeCreate(IS_IMPLICIT ? CV_BDF : CV_ADAMS, instance->context);
+    instance->cvode = CVodeCreate(IS_IMPLICIT && !ADAMS ? CV_BDF : CV_ADAMS, instance->context);
     if (!instance->y || !instance->cvode) return false;
     bool good = !CVodeInit(instance->cvode, rates, 0.0, instance->y) && !CVodeSetUserData(instance->cvode, instance) &&
                 !CVodeSetMaxNumSteps(instance->cvode, 1000000);

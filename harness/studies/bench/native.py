@@ -16,7 +16,7 @@ from ...references.certified_reference import relative_errors
 from ...references.models import CASES, MODELS
 from ...running.c_host import Library, MissingToolError, compile_source, find_compiler, load_library
 from ...running.stepping_loops import COMMUNICATION_STEPS, time_direct_loop, time_per_step
-from ...scenes.fmu_files import find_fmu
+from ...scenes.fmu_files import find_fmu, list_more_models
 from .benchmark import SETTINGS, Baseline, Benchmark
 
 Measured = tuple[float, float, tuple[Baseline, ...]]  # value, target, baselines
@@ -26,6 +26,7 @@ CASES_BY_NAME = {case.name: case for case in CASES}
 RUN_TIME_TARGETS: dict[str, float] = SETTINGS["in_c"]
 TOLERANCES = (1e-4, 1e-6, 1e-8)  # relative tolerances of CVODE
 REPEAT, REPEAT_PYTHON = 100, 5
+CVODE_VARIABLES = ("x", "v", "z", "rtol", "atol", "x_m", "force", "rate")  # by value reference, as in cvode.c
 
 
 def native_benchmarks() -> list[Callable[[], Benchmark]]:
@@ -124,9 +125,9 @@ def measure_or_skip(what: str, unit: str, figures: Callable[[], Measured]) -> Be
 
 def built_fmu(model: str, backend: str) -> Path:
     """Return the built FMU of a backend: python or native."""
-    path, option = find_fmu(model), ""
+    path, option = find_fmu(model), f" {model}" if model in list_more_models() else ""
     if backend == "native":
-        path, option = path.parent / "native" / path.name, " --native"
+        path, option = path.parent / "native" / path.name, f"{option} --native"
     if not path.is_file():
         raise MissingToolError(f"not built: {path} (python build_fmus.py{option})")
     return path
@@ -144,7 +145,7 @@ def time_runs(
     library: Library, values: dict[str, float], read: tuple[str, ...], stop: float, steps: int, repeat: int
 ) -> Timing:
     """Time repeated runs of one instance from 0 to `stop` in equal steps."""
-    words = [f"{library.references[name]}={value!r}" for name, value in values.items()]
+    words = [f"{'i' * isinstance(value, int)}{library.references[name]}={value!r}" for name, value in values.items()]
     words += [str(library.references[name]) for name in read]
     calls = f"0 new bench quiet\n0 time {repeat} {stop!r} {steps} {' '.join(words)}\n0 free\n"
     (_, seconds), *rows = (line.split() for line in run_host(library, calls).splitlines())
@@ -163,15 +164,22 @@ def run_host(library: Library, calls: str) -> str:
 
 
 @cache
-def build_cvode_fmu(model: str, plain: bool = False) -> Library:
-    """Compile the CVODE FMU of a model; if `plain`, with the solver settings of importers in model exchange."""
+def build_cvode_fmu(model: str, plain: bool = False, adams: bool = False) -> Library:
+    """Compile the CVODE FMU of a model.
+
+    Parameters
+    ----------
+    plain : whether to use the solver settings of importers in model exchange
+    adams : whether to use the method of Adams for a stiff model
+    """
     command = [find_compiler(), "-E", "-x", "c", "-", "-o", os.devnull]
     if run_subprocess(command, "#include <cvode/cvode.h>\n").returncode:
         raise MissingToolError("not installed: SUNDIALS for C (on Debian libsundials-dev)")
-    options = (f"-DMODEL={model.upper()}", f"-DPLAIN={plain:d}", "-shared", "-fPIC")
+    options = (f"-DMODEL={model.upper()}", f"-DPLAIN={plain:d}", f"-DADAMS={adams:d}", "-shared", "-fPIC")
     libraries = ("-lsundials_cvode", "-lsundials_nvecserial", "-lm")
-    file = compile_source(Path(__file__).with_name("cvode.c"), f"{model}-{plain:d}-cvode.so", options, libraries)
-    return Library(file, {name: place for place, name in enumerate(("x", "v", "rtol", "atol", "x_m", "force", "rate"))})
+    name = f"{model}-{plain:d}{adams:d}-cvode.so"
+    file = compile_source(Path(__file__).with_name("cvode.c"), name, options, libraries)
+    return Library(file, {variable: number for number, variable in enumerate(CVODE_VARIABLES)})
 
 
 @cache

@@ -16,14 +16,21 @@ FOLDER, FILE = "bench", "bench.csv"
 
 
 def all_benchmarks() -> list[Callable[[], Benchmark]]:
-    """Return all benchmarks: run times, native FMUs, model exchange, accuracy."""
+    """Return all benchmarks: run times, native FMUs, stiff friction, model exchange, accuracy."""
     require_reference_packages()
     from .accuracy import accuracy_benchmarks
     from .model_exchange import exchange_benchmarks
     from .native import native_benchmarks
     from .speed import speed_benchmarks
+    from .stiff import stiff_benchmarks
 
-    return [*speed_benchmarks(), *native_benchmarks(), *exchange_benchmarks(), *accuracy_benchmarks()]
+    return [
+        *speed_benchmarks(),
+        *native_benchmarks(),
+        *stiff_benchmarks(),
+        *exchange_benchmarks(),
+        *accuracy_benchmarks(),
+    ]
 
 
 def run_benchmarks(

@@ -1,22 +1,35 @@
-"""Model error of approximate friction laws, without integration error, against true stick and slip.
+"""Model error of approximate friction laws against true stick and slip, beside the integration error within each law.
 
 It quantifies published observations: with the magic formula the sled creeps instead of sticking, and its acceleration
-is not symmetric.  The law sign has no model error: in the limit of small steps it is dry friction
+is not symmetric; bristles creep, too.  The law sign has no model error: in the limit of small steps it is dry friction
 (A. F. Filippov, Differential Equations with Discontinuous Righthand Sides, 1988).
+
+Bristles and a block that sticks are compared in one scene, as by D. A. Haessig and B. Friedland, On the modeling and
+simulation of friction, J. Dyn. Syst. Meas. Control 113 (1991) 354-362.
 """
 
-from dataclasses import dataclass
-from functools import partial
+from dataclasses import dataclass, replace
+from functools import cache, partial
+from math import nan
 
 import numpy as np
 
 from ...analyses.slip import upward_crossings
-from ...references.certified_reference import CertifiedReference, ReferenceCase, compute_errors, load_reference
+from ...references import event_located
+from ...references.certified_reference import (
+    POINTS,
+    CertifiedReference,
+    ReferenceCase,
+    compute_errors,
+    load_reference,
+)
 from ...running.embedded_model import EmbeddedModel
 from ...running.solution import Solution
 
 FINE = 16001  # points used to find peaks and slips
 TOLERANCE = 1e-8
+CHATTERING_METHOD = "ode45"  # the closed form covers the hybrid law only
+BRISTLES = {"lugre": "LuGre", "elastoplastic": "elasto-plastic"}  # models of fmus/more and their laws
 
 
 @dataclass(frozen=True)
@@ -26,13 +39,16 @@ class LawDeviation:
     Attributes
     ----------
     final, rms, largest
-        Errors of the solution as in reference.Errors.
+        Errors of the solution of the law, without integration error, as in reference.Errors.
     creep
         Median speed in m/s while dry friction sticks.
     period
         Slip period in s.
     asymmetry
         Largest forward over largest backward acceleration; 1 for dry friction.
+    integration
+        Largest integration error of the FMU with its default tolerance and method (ode45 for laws that chatter),
+        relative to the solution of the law.
     """
 
     model: str
@@ -44,6 +60,7 @@ class LawDeviation:
     creep: float | None
     period: float | None
     asymmetry: float | None
+    integration: float
 
 
 def compare_with_dry_friction(case: ReferenceCase, model: type) -> LawDeviation:
@@ -51,8 +68,17 @@ def compare_with_dry_friction(case: ReferenceCase, model: type) -> LawDeviation:
     assert case.dry_friction_reference is not None
     law_reference, dry_reference = load_reference(case.reference_source), load_reference(case.dry_friction_reference)
     deviation = compute_errors(Solution(law_reference.motion, None, 0), dry_reference)
+    method = CHATTERING_METHOD if case.is_chattering else None
+    own_run = EmbeddedModel.create(model, case.values, method, 0.0).solve(law_reference.times.tolist())
     make_result = partial(
-        LawDeviation, case.model, case.name, case.law, deviation.final, deviation.rms, deviation.largest
+        LawDeviation,
+        case.model,
+        case.name,
+        case.law,
+        deviation.final,
+        deviation.rms,
+        deviation.largest,
+        integration=compute_errors(own_run, law_reference).largest,
     )
     sticking = stuck_points(dry_reference)
     if not sticking.any():
@@ -67,6 +93,39 @@ def compare_with_dry_friction(case: ReferenceCase, model: type) -> LawDeviation:
     a = [rates(t, y)[1] for t, y in zip(times.tolist(), motion, strict=True)]
     slips = upward_crossings(times, np.array(motion)[:, 1] - run.model.v_driver)
     return make_result(creep, float(np.mean(np.diff(slips))), max(a) / -min(a))
+
+
+def compare_bristles(name: str, law: str, model: type) -> LawDeviation:
+    """Compare a model of fmus/more with bristles, in its default run, with a block that sticks."""
+    reference, dry = load_reference(f"more/{name}"), solve_dry_block()
+    bristles = replace(reference, motion=reference.motion[:, :2])
+    deviation = compute_errors(Solution(bristles.motion, None, 0), dry)
+    own_run = EmbeddedModel.create(model, {}, None, 0.0).solve(reference.times.tolist())
+    times = np.linspace(0.0, float(reference.times[-1]), FINE)
+    fine_run = EmbeddedModel.create(model, {}, None, TOLERANCE)
+    motion = np.array(fine_run.compute_states(times.tolist()))
+    slips = upward_crossings(times, motion[:, 1] - fine_run.model.v_driver)
+    return LawDeviation(
+        name,
+        name,
+        law,
+        deviation.final,
+        deviation.rms,
+        deviation.largest,
+        creep=float(np.median(np.abs(bristles.motion[stuck_points(dry), 1]))),
+        period=float(np.mean(np.diff(slips))),
+        asymmetry=None,
+        integration=compute_errors(own_run, reference).largest,
+    )
+
+
+@cache
+def solve_dry_block() -> CertifiedReference:
+    """Return the motion of the block that sticks, in the default run of the models with bristles."""
+    problem, times = event_located.DryBlock(), np.linspace(0.0, event_located.DryBlock.stop, POINTS)
+    method = "DOP853"
+    states, events = event_located.solve(problem, times.tolist(), method, *event_located.TOLERANCES[method])
+    return CertifiedReference(times, states, [(0.0, 0), *((t, mode) for t, (mode,) in events)], method, nan)
 
 
 def stuck_points(truth: CertifiedReference) -> np.ndarray:

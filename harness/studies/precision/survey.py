@@ -22,7 +22,7 @@ from .study import QUICK, Point, Study, SweepSettings, study_model
 FOLDER = "precision"
 QUICK_RUN = "a quick run"  # does not replace a full run
 UNITS = {  # of columns; SI means m and m/s, or rad and rad/s
-    **dict.fromkeys(("rtol", "final", "rms", "largest", "beside_dry", "asymmetry"), "1"),
+    **dict.fromkeys(("rtol", "final", "rms", "largest", "beside_dry", "asymmetry", "integration"), "1"),
     **dict.fromkeys(("seconds", "events", "period"), "s"),
     **dict.fromkeys(("atol", "error"), "SI"),
     "creep": "m/s",
@@ -70,6 +70,11 @@ def run_studies(models: Iterable[str], extent: SweepSettings, report: Callable[[
         for case in CASES
         if case.dry_friction_reference and case.model in models
     ]
+    if "stickslip" in models:
+        deviations += [
+            law_deviations.compare_bristles(name, law, literature_problems.load_more_model(name))
+            for name, law in law_deviations.BRISTLES.items()
+        ]
     report("anchors", 0.0)
     literature = (
         tuple(literature_problems.solve_all()) if deviations or any(case.model in models for case in CASES) else ()
@@ -115,6 +120,8 @@ def write_results(results: PrecisionSurvey, files: Sequence[Path], folder: Path,
                 folder / f"{study.model}-exchange.csv", [EXCHANGE_HEADING, *(f"{case} [1]" for case in cases)], rows
             )
         model_deviations = [law for law in results.deviations if law.model == study.model]
+        if study.model == "stickslip":
+            model_deviations += [law for law in results.deviations if law.model in law_deviations.BRISTLES]
         draw(study, model_deviations, folder / f"{study.model}.svg")
         if model_deviations:
             write_table(

@@ -47,11 +47,11 @@ def exchange_table(studies: Iterable[Study]) -> Table:
 
 def deviation_table(deviations: Iterable[LawDeviation]) -> Table:
     """Return the table of law deviations."""
-    table = empty_table("model error of each law against true stick and slip", "law")
-    for name in ("final", "rms", "largest", "creep [m/s]", "period [s]", "a+/a-"):
+    table = empty_table("laws: model error against true stick and slip; within: integration error", "law")
+    for name in ("rms", "largest", "within", "creep [m/s]", "period [s]", "a+/a-"):
         table.add_column(name, justify="right")
     for law in deviations:
-        errors = ((law.final, ".2g"), (law.rms, ".2g"), (law.largest, ".2g"))
+        errors = ((law.rms, ".2g"), (law.largest, ".2g"), (law.integration, ".0e"))
         figures = (*errors, (law.creep, ".2g"), (law.period, ".4f"), (law.asymmetry, ".3f"))
         table.add_row(law.case, *("" if value is None else f"{value:{how}}" for value, how in figures))
     return table
