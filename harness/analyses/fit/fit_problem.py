@@ -45,9 +45,11 @@ class FitProblem:
     ) -> None:
         self.simulate, self.records, self.outputs = simulate, tuple(records), list(outputs)
         self.unknowns, self.fixed, self.robust = tuple(unknowns), dict(fixed), robust
+        self.has_sensors = any(unknown.column is not None for unknown in self.unknowns)
         self.region = FeasibleRegion(self.unknowns)
         self.low, self.high = np.array([unknown.search_range for unknown in self.unknowns]).T
         self.all: Selection = tuple(record.all for record in self.records)
+        self.first_samples: Selection = tuple(index[:2] for index in self.all)
         self.central = False  # whether slopes need central differences
         self.steps = self.difference_steps()
 
@@ -58,15 +60,15 @@ class FitProblem:
     def values(self, z: np.ndarray, record: int) -> dict[str, float]:
         """Return the values to set for a record."""
         fitted = {
-            unknown.variable: unknown.to_value(float(each))
-            for unknown, each in zip(self.unknowns, z, strict=True)
+            unknown.variable: unknown.to_value(each)
+            for unknown, each in zip(self.unknowns, z.tolist(), strict=True)
             if unknown.column is None and unknown.record in (None, record)
         }
         return self.fixed | fitted
 
     def predict(self, z: np.ndarray, selection: Selection) -> list[np.ndarray] | None:
         """Return what the sensors show at the selected samples of each record; None if the FMU refuses the values."""
-        if np.abs(z).max() > MAX_COORDINATE:
+        if max(map(abs, z.tolist())) > MAX_COORDINATE:
             return None
         predicted = []
         for i, (record, index) in enumerate(zip(self.records, selection, strict=True)):
@@ -78,7 +80,7 @@ class FitProblem:
 
     def apply_sensors(self, z: np.ndarray, record: int, y: np.ndarray) -> np.ndarray:
         """Return the outputs y (n, columns) as the sensors show them: gain times output, plus offset."""
-        for kind in (GAIN, OFFSET):
+        for kind in (GAIN, OFFSET) if self.has_sensors else ():
             for unknown, each in zip(self.unknowns, z, strict=True):
                 if unknown.variable == kind and unknown.column is not None and unknown.record in (None, record):
                     value = unknown.to_value(float(each))
@@ -92,11 +94,11 @@ class FitProblem:
         predicted = self.predict(z, selection)
         if predicted is None:
             return None
-        parts = (
-            ((y - record.y[index]) / record.noise).ravel()
+        parts = [
+            ((y - (record.y if index is record.all else record.part(index).y)) / record.noise).ravel()
             for y, record, index in zip(predicted, self.records, selection, strict=True)
-        )
-        e = np.concatenate([*parts])
+        ]
+        e = np.concatenate(parts)
         if self.robust:
             size = np.abs(e)
             e = np.where(size > HUBER, np.sign(e) * np.sqrt(np.maximum(2 * HUBER * size - HUBER**2, 0.0)), e)
@@ -104,7 +106,7 @@ class FitProblem:
 
     def is_refused(self, z: np.ndarray) -> bool:
         """Return whether the FMU refuses the values at the start."""
-        return self.predict(z, tuple(index[:2] for index in self.all)) is None
+        return self.predict(z, self.first_samples) is None
 
     def difference_steps(self) -> tuple[float, float]:
         """Return the steps of one-sided and of central differences.
