@@ -23,7 +23,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from run_blocks import run_page
 
-DOCS = Path(__file__).parent
+DOCS = Path(__file__).resolve().parent
 IMAGES = DOCS / "images"
 FMUS = DOCS.parent / "fmus"
 
@@ -35,6 +35,7 @@ OF_PAGES = {
     "shaken": ("tutorials/own_model.md", "results/shaken/figure.svg"),
     "chain": ("tutorials/own_model.md", "results/speeds/figure.svg"),
     "decay": ("tutorials/identify_decay.md", "results/decay/record/figure.svg"),
+    "fit": ("tutorials/fit_parameters.md", "results/fit/pulled_block/figure.svg"),
     "sweep": ("tutorials/sweep.md", "results/sweep/map/figure.svg"),
     "compare": ("how-to/external_fmus.md", "results/compare/coulomb-coulomb-sign/figure.svg"),
     "my_scene": ("reference/scene_files.md", "results/my_scene/figure.svg"),
@@ -59,6 +60,7 @@ def harness(folder: Path, command: str) -> None:
 def of_page(page: str, folder: Path) -> None:
     """Run the code blocks of a page in a folder."""
     (folder / "fmus").symlink_to(FMUS.resolve())
+    (folder / "docs").symlink_to(DOCS)
     here = os.getcwd()
     os.chdir(folder)
     try:

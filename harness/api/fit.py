@@ -24,6 +24,7 @@ def fit(
     start: "Mapping[str, float] | ParameterFit | None" = None,
     each: Sequence[str] = (),
     against: "str | Path | Sequence[str | Path]" = (),
+    validate: Any = (),
     robust: bool = False,
     time: str | None = None,
     rate: float | None = None,
@@ -45,7 +46,8 @@ def fit(
         them in ``attrs["units"]``.
     free : sequence or mapping
         Parameters to fit, with the range to search, or None for a factor of 4 about the start value of the FMU.
-        ``offset(x)`` and ``gain(x)`` are unknowns of the sensor of the output ``x``.
+        ``offset(x)``, ``gain(x)`` and ``delay(x)`` are unknowns of the sensor of the output ``x``, which shows gain
+        times output plus offset, and that after a delay.
     observe, inputs : sequence or mapping
         Measured outputs and driven inputs of the FMU, with the headings of their columns.
     fixed : mapping, optional
@@ -60,6 +62,8 @@ def fit(
     against : str, path or sequence of these
         Other FMUs, which are fitted to the same records and compared by the Bayesian information criterion. Each law
         frees and fixes those of the given names that it has; ``notes`` names what it lacks.
+    validate : path, DataFrame, Trajectory or sequence of these
+        Records that are predicted with the fitted values, but not fitted.
     robust : bool
         Whether residuals beyond three times the noise count linearly.
     time, rate, begin, end
@@ -119,13 +123,19 @@ def fit(
         ),
     )
     laws = resolve_laws(request)
-    tables = [
-        study.load_record(str(each), request)
-        if isinstance(each, str | Path)
-        else study.RecordTable("the record", signal_table_of(each))
-        for each in (records if isinstance(records, list | tuple) else [records])
-    ]
-    return study.fit_laws(laws, tables, progress or QUIET)
+
+    def load(given: Any, name: str) -> list[study.RecordTable]:
+        sources = given if isinstance(given, list | tuple) else [given]
+        names = [name] if len(sources) == 1 else [f"{name} {i + 1}" for i in range(len(sources))]
+        return [
+            study.load_record(str(source), request)
+            if isinstance(source, str | Path)
+            else study.RecordTable(own_name, signal_table_of(source))
+            for source, own_name in zip(sources, names, strict=True)
+        ]
+
+    fitted, predicted = load(records, "the record"), load(validate, "the validation record")
+    return study.fit_laws(laws, fitted, predicted, progress or QUIET)
 
 
 def headings_of(signals: Any) -> dict[str, str]:

@@ -18,6 +18,7 @@ from .terminal import POSITIVE, Terminal, result_options
 @click.option("--each", metavar="NAME,...", help="Parameters with a value of their own for each record.")
 @click.option("--sigma", multiple=True, metavar="OUTPUT=NOISE,...", help="Known noise, in the unit of the FMU.")
 @click.option("--against", multiple=True, metavar="MODEL|FMU", help="Other law to fit and compare; repeatable.")
+@click.option("--validate", multiple=True, metavar="FILE", help="Record to predict, not to fit; repeatable.")
 @click.option("--robust", is_flag=True, help="Limit the effect of outliers.")
 @click.option("--time", help="Heading of the time column. Default: t, time, ..., or the first column.")
 @click.option("--time-unit", help="Unit of time, if the heading has none. Default: s.")
@@ -40,6 +41,7 @@ def fit(
     each: str | None,
     sigma: tuple[str, ...],
     against: tuple[str, ...],
+    validate: tuple[str, ...],
     robust: bool,
     timeout: float,
     terminal: Terminal,
@@ -49,8 +51,8 @@ def fit(
 
     MODEL is a model of this project or the path of an FMU for co-simulation.  The first sample of a FILE is the start
     of the run; the FMU's start values apply there and can be free.  Units in headings are converted to those of the
-    FMU.  Without LOW:HIGH, a factor of 4 about the start value is searched.  offset(OUTPUT) and gain(OUTPUT) are
-    unknowns of a sensor.
+    FMU.  Without LOW:HIGH, a factor of 4 about the start value is searched.  offset(OUTPUT), gain(OUTPUT)
+    and delay(OUTPUT) are unknowns of a sensor.
 
     --against fits other laws to the same records and compares all by the Bayesian information criterion.  Each law
     frees and fixes those of the given names that it has.
@@ -92,5 +94,7 @@ def fit(
         columns=ColumnOptions(**columns),
     )
     with terminal.progress(1) as report:
-        result, folder = study.fit_files(request, records, terminal.out, lambda share: report(records[0], share))
+        result, folder = study.fit_files(
+            request, records, validate, terminal.out, lambda share: report(records[0], share)
+        )
     terminal.print_result(study.fit_as_json(result), *result_parts(result), folder=folder)

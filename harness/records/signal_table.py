@@ -16,6 +16,7 @@ from .columns import (
     no_time_message,
     parse_numbers,
     read_times,
+    runs_side_by_side,
 )
 from .headings import split_heading
 from .missing_values import mark_dropouts, mark_sentinels
@@ -82,6 +83,8 @@ def parse_signals(table: Table, wanted: Mapping[str, SignalSource], options: Col
         t = read_times(table, time_column, options)
         if options.time is None and any(table.column_headings) and not is_time_column(time_column):
             notes.append(f"{time_column.heading} is used as time; --time selects another column.")
+        if options.time is None:
+            notes += runs_side_by_side(candidates, time_column, first)
     columns = {}
     for signal, (column, unit) in selected.items():
         x = parse_numbers(table, column.index).copy()

@@ -38,6 +38,7 @@ scripts = load("run_blocks")
 @pytest.mark.parametrize("page", [page for page in PAGES if runnable(page)])
 def test_code_blocks_run(page, fmus, tmp_path):
     (tmp_path / "fmus").symlink_to(fmus)
+    (tmp_path / "docs").symlink_to(DOCS)
     command = [sys.executable, str(DOCS / "run_blocks.py"), str(tmp_path), str(DOCS / page)]
     done = subprocess.run(command, capture_output=True, text=True, env=ENVIRONMENT, timeout=300)
     assert done.returncode == 0, done.stderr

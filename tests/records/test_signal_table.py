@@ -2,11 +2,13 @@
 
 import numpy as np
 import pytest
+from record_formats import FORMATS, LIBRARIES
 
 from harness.errors import SceneError
-from harness.records.columns import ColumnOptions
+from harness.records.columns import ColumnOptions, find_signal_column, find_time_column, list_columns, read_record
 from harness.records.quantity_units import conversion_factor
-from harness.records.signal_table import SignalSource, read_signals
+from harness.records.signal_table import SignalSource, parse_signals, read_signals
+from harness.records.table_files import load_table
 
 WANTED = {"x": SignalSource("laser", "m"), "F": SignalSource("load", "N")}
 
@@ -62,6 +64,47 @@ def test_a_second_run_beside_the_first_is_not_read(tmp_path):
     found = read_signals(write(tmp_path / "a.csv", table, heading), WANTED, ColumnOptions(), "a")
     assert len(found.t) == 30
     assert found.columns["F"] == pytest.approx(np.full(30, 100.0))
+
+
+TEXTS = [form for form in FORMATS if not form.refusal and not any(part in form.file for part in LIBRARIES)]
+
+
+@pytest.mark.parametrize("form", TEXTS, ids=lambda form: form.file)
+def test_a_signal_is_read_as_the_record_of_a_decay(tmp_path, form):
+    content, path = form.content(), tmp_path / form.file
+    path.write_bytes(content.encode() if isinstance(content, str) else content)
+    options = {name: value for name, value in form.options.items() if name not in ("unit", "per_count")}
+    check_signal(path, ColumnOptions(**form.options), ColumnOptions(**options), form.base)
+
+
+@pytest.mark.parametrize("tail", [",", ",t [s],laser [mm]"])
+def test_comments_gaps_and_a_second_run_are_read_as_for_a_decay(tmp_path, tail):
+    """Uneven times in ms, positions in mm, one NaN, one empty cell; the second run has its own times."""
+    random = np.random.default_rng(5)
+    t = np.cumsum(random.uniform(7.0, 13.0, 300)).round(3)
+    cells = [f"{a},{100 * np.cos(0.01 * a) + 300:.3f},{0.02 * i},{-i}" for i, a in enumerate(t)]
+    cells[20], cells[50] = f"{t[20]},NaN,0.4,-20", f"{t[50]},,1.0,-50"
+    cells += [f",,{0.02 * i},{-i}" for i in range(300, 340)]
+    path = tmp_path / "a.csv"
+    path.write_text("# phone 3, second floor\n# laser 2\nt [ms],laser [mm]" + tail + "\n" + "\n".join(cells))
+    record = check_signal(path, ColumnOptions(), ColumnOptions(), "m")
+    assert len(record.t) == 298
+    assert any("2 runs side by side" in note for note in record.notes) == ("laser" in tail)
+
+
+def check_signal(path, decay_options, options, unit):
+    """Assert that both readers give the same samples and notes; return the record."""
+    record, table = read_record(str(path), decay_options, "a"), load_table(str(path), options.names)
+    candidates = list_columns(table)
+    column, _ = find_signal_column(table, candidates, options, find_time_column(table, candidates, options))
+    unit_of_column = "mm" if decay_options != options else ""  # a unit that the file lacks is given with the column
+    heading = f"{column.heading} [{unit_of_column}]" if unit_of_column else column.heading
+    found = parse_signals(table, {"x": SignalSource(heading, unit)}, options, "a")
+    assert found.t.tolist() == record.t.tolist()
+    assert found.columns["x"] == pytest.approx(record.x, rel=1e-14)
+    for text in ("side by side", "missing cell"):
+        assert [note for note in found.notes if text in note] == [note for note in record.notes if text in note]
+    return record
 
 
 def test_a_range_of_times_and_a_rate_select_samples(tmp_path):

@@ -111,6 +111,55 @@ def test_a_sensor_with_offset_and_gain_is_identified():
         assert holds(found[name], truth)
 
 
+@pytest.mark.parametrize("delay", [0.084, -0.1])
+def test_the_delay_of_a_sensor_is_identified(delay):
+    """The delayed signal is interpolated from a run with 20 times as many samples."""
+    fine = np.linspace(0.0, 8.0, 4001)
+    with open_simulator(native("coulomb"), {}) as simulator:
+        force = shaker(fine)
+        x = simulator.simulate({"x0": 0.0, "f": 2.0}, fine, ["x"], {"F_ext": force})[:, 0]
+    t = fine[:-200:20]
+    y = np.interp(t - delay, fine, x) + 0.003 * np.ptp(x) * np.random.default_rng(3).normal(size=len(t))
+    frame = pytest.importorskip("pandas").DataFrame({"t [s]": t, "x [m]": y, "F": shaker(t)})
+    free = {"f": None, "delay(x)": (-0.3, 0.3)}
+    found = harness.fit(native("coulomb"), frame, free, observe="x", inputs={"F_ext": "F"}, fixed={"x0": 0.0})
+    assert holds(found["delay(x)"], delay)
+    assert holds(found["f"], 2.0)
+    assert found["delay(x)"].high - found["delay(x)"].low < 0.005
+
+
+def shaker(t):
+    """Return a force of two frequencies."""
+    return 8.0 * np.sin(7.0 * t) + 3.0 * np.sin(3.1 * t)
+
+
+def test_the_values_predict_a_record_that_was_not_fitted():
+    arguments = {"free": ["mu_s"], "observe": "x", "fixed": DRIVEN | {"k": 900.0}}
+    same, other = pull(seed=2, t=T[:150]), pull(values=TRUTH | {"mu_d": 0.7}, seed=3)
+    found = harness.fit(native("stickslip"), pull(), validate=[same, other], **arguments)
+    good, bad = found.validation.columns
+    assert good.residual < 1.3 * good.noise
+    assert bad.residual > 5.0 * bad.noise
+    assert [len(record.t) for record in found.validation.records] == [150, len(T)]
+    (remark,) = (remark for remark in found.remarks if "do not predict" in remark)
+    assert "do not predict x in the validation record 2" in remark
+    arguments |= {"free": {"mu_s": None, "x0": (-0.1, 0.1)}}
+    with pytest.raises(SceneError, match="x0 has a value of its own for each record, and none for the validation"):
+        harness.fit(native("stickslip"), [same, same], validate=same, each=["x0"], **arguments)
+
+
+def test_a_profile_crosses_its_limit_where_the_interval_ends():
+    """Between the points, the root of the squares is nearly linear."""
+    found = harness.fit(
+        native("stickslip"), pull(), ["mu_s", "mu_d"], observe="x", fixed={"k": 900.0, "v_driver": 0.04}
+    )
+    for profile, estimate in zip(found.profiles, found.estimates, strict=True):
+        value, excess = np.array(profile.value), np.array(profile.excess)
+        assert excess[value == estimate.value] == 0.0
+        root = np.sqrt(excess) * np.sign(value - estimate.value)
+        assert np.interp([estimate.low, estimate.high], value, root) == pytest.approx([-1.0, 1.0], abs=0.05)
+
+
 def test_outliers_count_little_in_a_robust_fit():
     frame = pull()
     frame.loc[::25, "x"] += 0.3
@@ -164,6 +213,10 @@ def test_the_command_writes_what_it_prints(tmp_path):
         ({"start": {"m": 1.0}}, "unknown free parameter 'm'; allowed: mu_s"),
         ({"free": {"mu_s": (0.1, 2.0)}, "start": {"mu_s": 99.0}}, "the start value 99.0 of mu_s is outside its range"),
         ({"sigma": {"x": 0.0}}, "sigma of x is 0.0"),
+        ({"free": {"delay(x)": (0.0, 20.0)}}, "delay(x) = 0.0:20.0 reaches beyond the record, which lasts 16 s"),
+        ({"free": ["delay(x)"], "start": {"delay(x)": 5.0}}, "the start value 5.0 of delay(x) is outside its range"),
+        ({"free": ["delay(y)"]}, "unknown parameter 'delay(y)' (nearest: 'delay(x)')"),
+        ({"validate": "missing.csv"}, "missing.csv"),
         ({"begin": 15.8}, "at least 12 are required"),
         ({"begin": 14.6, "free": [*TRUTH, "m", "g"]}, "6 unknowns need at least 24 samples, and there are"),
         ({"records": "missing.csv"}, "missing.csv"),
@@ -257,17 +310,20 @@ def test_the_bic_of_white_residuals_is_that_of_a_linear_model():
 def test_the_command_writes_the_compared_laws(tmp_path):
     frame = pull(t=T[:81]).rename(columns={"t": "t [s]", "x": "x [m]"})
     frame.to_csv("pull.csv", index=False)
+    frame.iloc[:60].to_csv("later.csv", index=False)
     words = ("fit", native("stickslip"), "pull.csv", "--free", "mu_s,f_s", "--fixed", "k=900,v_driver=0.04")
-    words += ("--observe", "x=x", "--against", native("stribeck_sled"))
+    words += ("--observe", "x=x", "--against", native("stribeck_sled"), "--validate", "later.csv")
     done = commands.harness(tmp_path, *words, "--json", blank=True)
     assert (done.returncode, done.stderr) == (0, "")
     printed = json.loads(done.stdout)
     assert [law["fmu"] for law in printed["against"]] == ["stribeck_sled"]
     assert {law["fmu"] for law in printed["comparison"]["laws"]} == {"stickslip", "stribeck_sled"}
-    heads = (tmp_path / "results" / "fit" / "pull" / "fit.csv").read_text().splitlines()[0].split(",")
-    assert heads[2:] == [
-        *("x [m]", "x fit [m]", "x residual [m]", "x fit stribeck_sled [m]", "x residual stribeck_sled [m]")
-    ]
+    assert [column["record"] for column in printed["validation"]] == ["later"]
+    for name, count in (("fit.csv", 81), ("validation.csv", 60)):
+        lines = (tmp_path / "results" / "fit" / "pull" / name).read_text().splitlines()
+        assert lines[0].split(",")[2:5] == ["x [m]", "x fit [m]", "x residual [m]"]
+        assert lines[0].split(",")[5:] == ["x fit stribeck_sled [m]", "x residual stribeck_sled [m]"]
+        assert len(lines) == 1 + count
     table = commands.harness(tmp_path, *words, blank=True).stdout
     assert "above the best" in table
     assert printed["comparison"]["verdict"] in " ".join(table.split())

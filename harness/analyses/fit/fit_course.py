@@ -27,11 +27,12 @@ SHALLOW = 0.1  # variances of the residuals by which a minimum must be lower to 
 
 @dataclass
 class FitCourse:
-    """Intermediate results of a fit."""
+    """Intermediate results of a fit; ends and profiles by index of the unknown and side."""
 
     z: np.ndarray
     uncertainty: Uncertainty
     ends: dict[tuple[int, int], float | None]
+    profiles: dict[tuple[int, int], tuple[tuple[float, float], ...]]
     rivals: list[np.ndarray]
     doubts: list[str]
     log: list[str]
@@ -91,6 +92,7 @@ def find_course(
         )
     z, input_error = result.best[1], subdivide_inputs(problem, result.best[1])
     ends: dict[tuple[int, int], float | None] = {}
+    profiles: dict[tuple[int, int], tuple[tuple[float, float], ...]] = {}
     rivals: list[Minimum] = []
     sides = [(i, side) for i in range(len(z)) for side in (-1, 1)]
     sought = np.inf  # squares at which rivals were sought
@@ -108,7 +110,8 @@ def find_course(
         for n, (i, side) in enumerate(sides):
             report(0.7 + 0.3 * n / len(sides))
             bound = profile_bound(problem, z, uncertainty, i, side, ends_at_better=remaining > 0)
-            ends[i, side], better = bound.end, bound.better if better is None else better
+            ends[i, side], profiles[i, side] = bound.end, bound.profile
+            better = bound.better if better is None else better
             if remaining and better is not None:
                 z = better
                 break
@@ -118,7 +121,7 @@ def find_course(
         doubts.append("The sum of squares has many shallow minima here: the values may lie anywhere in the intervals.")
     others = [there for _, there in rivals if np.abs(there - z).max() > DISTINCT]
     extend_ends(problem, z, uncertainty, ends, others)
-    return FitCourse(z, uncertainty, ends, others, doubts, result.log, result.n_searches)
+    return FitCourse(z, uncertainty, ends, profiles, others, doubts, result.log, result.n_searches)
 
 
 def starting_points(problem: FitProblem, warm: np.ndarray | None) -> np.ndarray:

@@ -9,8 +9,9 @@ from ..decay.estimates import Estimate
 from .combinations import determined_combinations
 from .fit_course import FitCourse
 from .fit_problem import FitProblem
+from .measured_record import MeasuredRecord
 from .noise import correlation_length
-from .parameter_fit import ColumnResiduals, ParameterFit
+from .parameter_fit import ColumnResiduals, ParameterFit, Profile
 from .search import ROUGH
 from .uncertainty import INDETERMINATE, Uncertainty, split_residuals
 
@@ -23,7 +24,7 @@ def describe_fit(
 ) -> ParameterFit:
     """Return the result of a fit: estimates with intervals, combinations, residuals and remarks."""
     z, uncertainty = course.z, course.uncertainty
-    columns = column_residuals(problem, uncertainty)
+    columns = column_residuals(problem.records, split_residuals(problem, uncertainty.residuals), problem.outputs)
     is_unfit = any(each.residual > max(UNFIT_SHARE * each.range, UNFIT_NOISE * each.noise) for each in columns)
     estimates, several = make_estimates(problem, course, is_unfit)
     undetermined = [i for i, estimate in enumerate(estimates) if not isfinite(estimate.error)]
@@ -39,6 +40,7 @@ def describe_fit(
         fmu=fmu,
         estimates=estimates,
         combinations=combinations,
+        profiles=() if is_unfit else make_profiles(problem, course),
         correlation=uncertainty.covariance / np.outer(deviations, deviations),
         columns=columns,
         remarks=(*remarks, *course.doubts),
@@ -63,12 +65,14 @@ def count_independent(problem: FitProblem, uncertainty: Uncertainty) -> float:
     return n / max(map(correlation_length, split_residuals(problem, uncertainty.residuals)))
 
 
-def column_residuals(problem: FitProblem, uncertainty: Uncertainty) -> tuple[ColumnResiduals, ...]:
-    """Return the residuals of every observed column of every record."""
+def column_residuals(
+    records: Sequence[MeasuredRecord], residuals: Sequence[np.ndarray], outputs: Sequence[str]
+) -> tuple[ColumnResiduals, ...]:
+    """Return the residuals of every observed column of every record, from those in units of the noise."""
     found = []
-    for record, e in zip(problem.records, split_residuals(problem, uncertainty.residuals), strict=True):
+    for record, e in zip(records, residuals, strict=True):
         rms = np.sqrt(np.mean(e**2, axis=0)) * record.noise
-        for j, name in enumerate(problem.outputs):
+        for j, name in enumerate(outputs):
             size = float(np.ptp(record.y[:, j]))
             found.append(ColumnResiduals(record.name, name, "", float(rms[j]), float(record.noise[j]), size))
     return tuple(found)
@@ -98,6 +102,22 @@ def make_estimates(problem: FitProblem, course: FitCourse, is_unfit: bool) -> tu
         ends = -inf if low is None else low, inf if high is None else high
         estimates.append(Estimate(unknown.name, value, error, *ends, unknown.unit, ""))
     return tuple(estimates), [*dict.fromkeys(several)]
+
+
+def make_profiles(problem: FitProblem, course: FitCourse) -> tuple[Profile, ...]:
+    """Return the profiles of the unknowns, where the squares with each value are finite."""
+    found = []
+    for i, unknown in enumerate(problem.unknowns):
+        points = sorted(
+            (unknown.to_value(coordinate), excess)
+            for coordinate, excess in (
+                (float(course.z[i]), 0.0),
+                *course.profiles.get((i, -1), ()),
+                *course.profiles.get((i, 1), ()),
+            )
+        )
+        found.append(Profile(unknown.name, *zip(*points, strict=True)))
+    return tuple(found)
 
 
 def unfit_remark(columns: Sequence[ColumnResiduals]) -> list[str]:

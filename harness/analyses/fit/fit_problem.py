@@ -6,7 +6,7 @@ import numpy as np
 
 from .feasible_region import FeasibleRegion
 from .measured_record import MeasuredRecord, Simulate
-from .unknowns import GAIN, OFFSET, Unknown
+from .unknowns import DELAY, GAIN, OFFSET, Unknown
 
 EXACT_STEPS, ROUGH_STEPS = (1e-6, 1e-6), (1e-5, 1e-4)  # of one-sided and central differences
 MAX_COORDINATE = 60.0
@@ -45,7 +45,7 @@ class FitProblem:
     ) -> None:
         self.simulate, self.records, self.outputs = simulate, tuple(records), list(outputs)
         self.unknowns, self.fixed, self.robust = tuple(unknowns), dict(fixed), robust
-        self.has_sensors = any(unknown.column is not None for unknown in self.unknowns)
+        self.sensors = [(i, unknown) for i, unknown in enumerate(self.unknowns) if unknown.column is not None]
         self.region = FeasibleRegion(self.unknowns)
         self.low, self.high = np.array([unknown.search_range for unknown in self.unknowns]).T
         self.all: Selection = tuple(record.all for record in self.records)
@@ -72,22 +72,31 @@ class FitProblem:
             return None
         predicted = []
         for i, (record, index) in enumerate(zip(self.records, selection, strict=True)):
-            y = record.simulate(self.simulate, self.values(z, i), self.outputs, index)
+            y = self.predict_record(z, record, i, index)
             if y is None:
                 return None
-            predicted.append(self.apply_sensors(z, i, y))
+            predicted.append(y)
         return predicted
 
-    def apply_sensors(self, z: np.ndarray, record: int, y: np.ndarray) -> np.ndarray:
-        """Return the outputs y (n, columns) as the sensors show them: gain times output, plus offset."""
-        for kind in (GAIN, OFFSET) if self.has_sensors else ():
-            for unknown, each in zip(self.unknowns, z, strict=True):
-                if unknown.variable == kind and unknown.column is not None and unknown.record in (None, record):
-                    value = unknown.to_value(float(each))
-                    y[:, unknown.column] = (
-                        y[:, unknown.column] * value if kind == GAIN else y[:, unknown.column] + value
-                    )
+    def predict_record(self, z: np.ndarray, record: MeasuredRecord, i: int, index: np.ndarray) -> np.ndarray | None:
+        """Return what the sensors show at samples of a record, with the values of record `i`; None if refused."""
+        delays = self.sensor_values(z, i, DELAY)
+        y = record.simulate(self.simulate, self.values(z, i), self.outputs, index, delays)
+        if y is None:
+            return None
+        for column, gain in self.sensor_values(z, i, GAIN).items():
+            y[:, column] *= gain
+        for column, offset in self.sensor_values(z, i, OFFSET).items():
+            y[:, column] += offset
         return y
+
+    def sensor_values(self, z: np.ndarray, record: int, kind: str) -> dict[int, float]:
+        """Return the offset, gain or delay of the sensor of each column of a record that has such an unknown."""
+        return {
+            unknown.column: unknown.to_value(float(z[i]))
+            for i, unknown in self.sensors
+            if unknown.column is not None and unknown.variable == kind and unknown.record in (None, record)
+        }
 
     def residuals(self, z: np.ndarray, selection: Selection) -> np.ndarray | None:
         """Return the residuals in units of the noise, record by record; None if the FMU refuses the values."""

@@ -11,6 +11,7 @@ from .noise import bin_means, estimate_noise
 MAX_SAMPLES = 2500  # twice as many are averaged to this number of means of neighbours
 INPUT_POINTS = 500  # of an input that suffice for a search
 MAX_PARTS = 32  # that are kept
+SHORTEST_STEP = 1e-6  # between communication points, in intervals between samples
 Simulate = Callable[..., np.ndarray | None]
 
 
@@ -93,9 +94,22 @@ class MeasuredRecord:
         self.driven = {name: CubicSpline(self.t[knots], u[knots])(self.fine_t) for name, u in self.inputs.items()}
 
     def simulate(
-        self, simulate: Simulate, values: Mapping[str, float], outputs: Sequence[str], index: np.ndarray
+        self,
+        simulate: Simulate,
+        values: Mapping[str, float],
+        outputs: Sequence[str],
+        index: np.ndarray,
+        delays: Mapping[int, float] | None = None,
     ) -> np.ndarray | None:
-        """Return the outputs (len(index), outputs) at the samples `index`, which contain the first; None if refused."""
+        """Return the outputs (len(index), outputs) at the samples `index`, which contain the first; None if refused.
+
+        Parameters
+        ----------
+        delays : mapping, optional
+            Delay in s of the sensor of an output, by its position. An output has its start value before the run.
+        """
+        if delays:
+            return self.simulate_delayed(simulate, values, outputs, index, delays)
         if len(index) == len(self.t):
             return simulate(values, self.fine_t, outputs, self.driven, self.subdivision)
         part = self.part(index)
@@ -114,6 +128,38 @@ class MeasuredRecord:
             rows = np.searchsorted(grid, index) if self.inputs else None
             self.parts[id(index)] = RecordPart(index, self.y[index], self.t[grid], inputs, rows)
         return self.parts[id(index)]
+
+    def simulate_delayed(
+        self,
+        simulate: Simulate,
+        values: Mapping[str, float],
+        outputs: Sequence[str],
+        index: np.ndarray,
+        delays: Mapping[int, float],
+    ) -> np.ndarray | None:
+        """Return the outputs at the samples, each earlier by its delay.
+
+        The run has communication points there: interpolated outputs would have kinks between samples. Inputs keep
+        their last value after the record, which a negative delay needs.
+        """
+        t, begin = self.t[index], self.t[0]
+        shortest = SHORTEST_STEP * (self.t[-1] - begin) / len(self.t)  # an FMU may refuse tiny steps
+        earlier = [t - delays.get(j, 0.0) for j in range(len(outputs))]
+        shown = [np.where(each > begin + shortest, each, begin) for each in earlier]
+        knots, inputs = self.t[[0, index[-1]]], {}
+        if self.inputs and len(index) == len(self.t):
+            knots, inputs = self.fine_t, self.driven
+        elif self.inputs:
+            grid = np.arange(0, index[-1] + 1, max(1, len(self.t) // INPUT_POINTS))
+            knots, inputs = self.t[grid], {name: u[grid] for name, u in self.inputs.items()}
+        points = np.unique(np.concatenate(shown))
+        right = np.minimum(np.searchsorted(points, knots), len(points) - 1)
+        gap = np.minimum(np.abs(points[right] - knots), np.abs(points[np.maximum(right - 1, 0)] - knots))
+        times = np.unique(np.concatenate([self.t[:1], points, knots[gap > shortest]]))
+        y = simulate(values, times, outputs, {name: np.interp(times, knots, u) for name, u in inputs.items()})
+        if y is None:
+            return None
+        return np.stack([y[np.searchsorted(times, each), j] for j, each in enumerate(shown)], axis=1)
 
     def means_hold(self, simulate: Simulate, values: Mapping[str, float], outputs: Sequence[str]) -> bool:
         """Return whether the means of the outputs over the samples are the outputs at the mean times."""

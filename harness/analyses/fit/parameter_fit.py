@@ -25,6 +25,27 @@ class ColumnResiduals:
 
 
 @dataclass(frozen=True)
+class Profile:
+    """Profile likelihood of an unknown: values (m,), and the least squares with each value.
+
+    `excess` (m,) is the sum of squares above the minimum, in units of the limit at which the 95 % interval ends.
+    """
+
+    name: str
+    value: tuple[float, ...]
+    excess: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Validation:
+    """Records that were not fitted: residuals of each column, samples, and the predicted signals (n, columns)."""
+
+    columns: tuple[ColumnResiduals, ...]
+    records: tuple[MeasuredRecord, ...]
+    predictions: tuple[np.ndarray, ...]
+
+
+@dataclass(frozen=True)
 class ComparedLaw:
     """A law in a comparison.
 
@@ -93,6 +114,8 @@ class ParameterFit:
         Value, standard error and 95 % interval of each unknown; an infinite end where the record sets no bound.
     combinations : tuple of Estimate
         Combinations that the record determines, of parameters that it does not.
+    profiles : tuple of Profile
+        Of the estimates, in their order; empty if the fit does not describe the record.
     correlation : numpy.ndarray
         Correlation (k, k) of the estimates.
     columns : tuple of ColumnResiduals
@@ -114,6 +137,8 @@ class ParameterFit:
     records : tuple of MeasuredRecord
     predictions : tuple of numpy.ndarray
         Fitted signals (n, columns) of each record at its times.
+    validation : Validation or None
+        What the values predict for records that were not fitted.
     against : tuple of ParameterFit
         Fits of other FMUs to the same records.
     comparison : LawComparison or None
@@ -123,6 +148,7 @@ class ParameterFit:
     fmu: str
     estimates: tuple[Estimate, ...]
     combinations: tuple[Estimate, ...]
+    profiles: tuple[Profile, ...]
     correlation: np.ndarray
     columns: tuple[ColumnResiduals, ...]
     remarks: tuple[str, ...]
@@ -136,6 +162,7 @@ class ParameterFit:
     log: tuple[str, ...]
     records: tuple[MeasuredRecord, ...]
     predictions: tuple[np.ndarray, ...]
+    validation: Validation | None = None
     against: "tuple[ParameterFit, ...]" = ()
     comparison: LawComparison | None = None
 

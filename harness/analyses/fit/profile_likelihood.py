@@ -19,10 +19,14 @@ NEAR_LIMIT = 0.05  # distance of a coordinate from the limits of the fit at whic
 
 @dataclass(frozen=True)
 class Bound:
-    """End of an interval: the coordinate, None if there is none; a better minimum, if the profile met one."""
+    """End of an interval: the coordinate, None if there is none; a better minimum, if the profile met one.
+
+    `profile` holds coordinates of the profile, with the squares above the minimum in units of the limit.
+    """
 
     end: float | None
     better: np.ndarray | None = None
+    profile: tuple[tuple[float, float], ...] = ()
 
 
 def profile_bound(
@@ -64,6 +68,7 @@ def profile_bound(
     low, last = (0.0, excess(float(start @ start))), (1.0, z + tangent)
     high: tuple[float, float] | None = None
     better: np.ndarray | None = None
+    profile = []
     for _ in range(MAX_EVALUATIONS):
         squares, there = fit_others(x, last)
         if squares < uncertainty.squares - 0.02 * target:
@@ -73,6 +78,7 @@ def profile_bound(
         distance = excess(squares)
         if np.isfinite(distance):
             last = (x, there)
+            profile.append((float(z[i] + side * x), (1 + distance) ** 2))
         if abs(distance) < CLOSE or (high and high[0] - low[0] < 1e-3 * high[0]):
             break
         low, high = ((x, distance), high) if distance < 0 else (low, (x, distance))
@@ -82,7 +88,8 @@ def profile_bound(
             x = low[0] + (high[0] - low[0]) * float(np.clip(-low[1] / (high[1] - low[1]), 0.1, 0.95))
         else:  # the region ends here
             x = (low[0] + high[0]) / 2
-    return Bound(None if is_at_limit(problem, last[1]) else float(z[i] + side * x), better)
+    end = None if is_at_limit(problem, last[1]) else float(z[i] + side * x)
+    return Bound(end, better, profile=tuple(profile))
 
 
 def is_at_limit(problem: FitProblem, z: np.ndarray) -> bool:

@@ -1,4 +1,4 @@
-"""Unknowns of a fit: parameters and start values of the FMU, and offset and gain of a sensor."""
+"""Unknowns of a fit: parameters and start values of the FMU, and offset, gain and delay of a sensor."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -6,7 +6,8 @@ from math import exp, inf, log
 
 import numpy as np
 
-OFFSET, GAIN = "offset", "gain"  # of a sensor
+OFFSET, GAIN, DELAY = "offset", "gain", "delay"  # of a sensor
+SENSOR = (OFFSET, GAIN, DELAY)
 RANGE_FACTOR = 4.0  # of the range that is searched by default, about the start value of the FMU
 BEYOND_FACTOR = 2.0  # times the range, or so many quarters of one that holds zero, are the limits of a fit
 
@@ -20,7 +21,7 @@ class Unknown:
     name : str
         Name in results.
     variable : str
-        Variable of the FMU that it sets, or OFFSET or GAIN.
+        Variable of the FMU that it sets, or one of SENSOR.
     unit : str
     low, high : float
         Range to search.

@@ -1,47 +1,95 @@
-"""Figure of a fit: record and fits, and the residuals of each law, for each observed column."""
+"""Figure of a fit: records and fits, the residuals of each law, and the profiles of the parameters."""
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import isfinite
 from pathlib import Path
 
 import numpy as np
+from scipy.interpolate import PchipInterpolator
 
-from ...analyses.fit.parameter_fit import ColumnResiduals, ParameterFit
+from ...analyses.decay.estimates import Estimate
+from ...analyses.fit.measured_record import MeasuredRecord
+from ...analyses.fit.parameter_fit import ColumnResiduals, ParameterFit, Profile
 from ...results.quantity import display_unit
 from ...results.style import BLUE, GREEN, GREY, HEIGHT, LEGEND_ABOVE, ORANGE, WIDTH, Axes, axis_label, open_figure
 
-MAX_COLUMNS = 6  # that are drawn
+MAX_COLUMNS, MAX_PROFILES = 6, 12  # that are drawn
 COLOURS = (ORANGE, GREEN, "#CC79A7", "#56B4E9")  # of the laws
-RECORD, RESIDUALS = 2.0, 1.0  # relative heights of the panels
+RECORD, RESIDUALS, PROFILES = 2.0, 1.0, 1.3  # relative heights of the panels
+PROFILES_IN_ROW = 4
+HIGHEST_EXCESS = 2.0  # of a profile, in units of the limit of the 95 % interval
+
+
+@dataclass(frozen=True)
+class FittedColumn:
+    """A column of a record, what each law says of it, and the title of its panel."""
+
+    column: ColumnResiduals
+    record: MeasuredRecord
+    position: int
+    signals: tuple[np.ndarray, ...]
+    title: str
 
 
 def draw(fit: ParameterFit, path: Path) -> None:
     """Save the figure."""
-    columns, laws = fit.columns[:MAX_COLUMNS], (fit, *fit.against)
+    laws = (fit, *fit.against)
+    columns = fitted_columns(laws)[:MAX_COLUMNS]
+    profiles = [(n, profile) for n, law in enumerate(laws) for profile in law.profiles][:MAX_PROFILES]
+    in_row = min(len(profiles), PROFILES_IN_ROW)
+    rows = -(-len(profiles) // PROFILES_IN_ROW)
     heights = [RECORD, *[RESIDUALS] * len(laws)] * len(columns)
-    height = 0.53 * HEIGHT * sum(heights)
-    with open_figure(path, 1.8 * WIDTH, height) as figure:
-        axes = figure.subplots(len(heights), 1, height_ratios=heights, squeeze=False)[:, 0]
+    signal_height, profile_height = sum(heights), PROFILES * rows
+    with open_figure(path, 1.8 * WIDTH, 0.53 * HEIGHT * (signal_height + profile_height)) as figure:
+        grid = figure.add_gridspec(2, 1, height_ratios=(signal_height, max(profile_height, 1e-6)))
+        upper = figure.add_subfigure(grid[0]) if rows else figure
+        axes = upper.subplots(len(heights), 1, height_ratios=heights, squeeze=False)[:, 0]
         for n, column in enumerate(columns):
-            panels = axes[n * (len(laws) + 1) :][: len(laws) + 1]
-            plot_column(panels, laws, n, column)
+            plot_column(axes[n * (len(laws) + 1) :][: len(laws) + 1], laws, column)
         axes[-1].set_xlabel("t [s]")
+        if rows:
+            panels = figure.add_subfigure(grid[1]).subplots(rows, in_row, sharey=True, squeeze=False)
+            for panel, (n, profile) in zip(panels.flat, profiles, strict=False):
+                plot_profile(panel, profile, laws[n][profile.name], COLOURS[n % len(COLOURS)])
+                panel.set_title(f"profile: {laws[n].fmu}" if len(laws) > 1 else "profile")
+            for panel in panels.flat[len(profiles) :]:
+                panel.set_axis_off()
+            for panel in panels[:, 0]:
+                panel.set_ylabel("rise of squares\n(1: 95 %)")
 
 
-def plot_column(panels: np.ndarray, laws: tuple[ParameterFit, ...], n: int, column: ColumnResiduals) -> None:
+def fitted_columns(laws: Sequence[ParameterFit]) -> list[FittedColumn]:
+    """Return the columns of the fitted records, then those of the validation records."""
+    parts = [(laws[0].columns, laws[0].records, [law.predictions for law in laws], "")]
+    if validation := laws[0].validation:
+        signals = [law.validation.predictions for law in laws if law.validation]
+        parts.append((validation.columns, validation.records, signals, ", for validation: not fitted"))
+    found = []
+    for columns, records, predictions, text in parts:
+        for n, column in enumerate(columns):
+            i, j = divmod(n, predictions[0][0].shape[1])
+            signals_of_laws = tuple(each[i][:, j] for each in predictions)
+            found.append(FittedColumn(column, records[i], j, signals_of_laws, f"{column.record}{text}"))
+    return found
+
+
+def plot_column(panels: np.ndarray, laws: Sequence[ParameterFit], fitted: FittedColumn) -> None:
     """Plot a column of a record with the fits, and below it the residuals of each law."""
-    i, j = divmod(n, laws[0].predictions[0].shape[1])
-    record = laws[0].records[i]
-    unit, size = display_unit(column.unit)
+    record, j = fitted.record, fitted.position
+    unit, size = display_unit(fitted.column.unit)
     measured = record.y[:, j] / size
     panels[0].plot(record.t, measured, ".", markersize=2.5, color=BLUE, label="record")
-    for law, axes, colour in zip(laws, panels[1:], COLOURS * len(laws), strict=False):
-        fitted = law.predictions[i][:, j] / size
-        panels[0].plot(record.t, fitted, color=colour, linewidth=0.9, label=f"fit: {law.fmu}")
-        name = f" of {law.fmu}" if len(laws) > 1 else ""
-        plot_residuals(axes, record.t, measured - fitted, float(record.noise[j]) / size, name, unit)
+    for n, (law, signal, axes) in enumerate(zip(laws, fitted.signals, panels[1:], strict=True)):
+        label, name = f"fit: {law.fmu}", f" of {law.fmu}" if len(laws) > 1 else ""
+        panels[0].plot(record.t, signal / size, color=COLOURS[n % len(COLOURS)], linewidth=0.9, label=label)
+        plot_residuals(axes, record.t, measured - signal / size, float(record.noise[j]) / size, name, unit)
         axes.sharex(panels[0])
-        axes.sharey(panels[1])
-    panels[0].set_title(record.name)
-    panels[0].set_ylabel(axis_label(column.name, unit))
+    limits = [axes.get_ylim() for axes in panels[1:]]
+    for axes in panels[1:]:
+        axes.set_ylim(min(low for low, _ in limits), max(high for _, high in limits))
+    panels[0].set_title(fitted.title)
+    panels[0].set_ylabel(axis_label(fitted.column.name, unit))
     panels[0].legend(ncols=len(laws) + 1, **LEGEND_ABOVE)
 
 
@@ -53,3 +101,23 @@ def plot_residuals(axes: Axes, t: np.ndarray, e: np.ndarray, noise: float, name:
     rms = float(np.sqrt(np.mean(e**2)))
     axes.set_title(f"residuals{name} (rms {rms:.3g} {unit}; the band is the noise)")
     axes.set_ylabel(axis_label("record - fit", unit))
+
+
+def plot_profile(axes: Axes, profile: Profile, estimate: Estimate, colour: str) -> None:
+    """Plot a profile; the 95 % interval ends where it reaches 1.
+
+    Between its points, the root of the squares is interpolated, which is nearly linear.
+    """
+    unit, size = display_unit(estimate.unit)
+    value, excess = np.array(profile.value) / size, np.array(profile.excess)
+    root = np.sqrt(excess) * np.sign(value - estimate.value / size)
+    if len(value) > 1:
+        fine = np.linspace(value[0], value[-1], 200)
+        axes.plot(fine, PchipInterpolator(value, root)(fine) ** 2, color=colour, linewidth=0.9)
+    axes.plot(value, excess, ".", markersize=4, color=colour)
+    axes.axhline(1.0, color="black", linewidth=0.6)
+    if isfinite(estimate.low) and isfinite(estimate.high):
+        axes.axvspan(estimate.low / size, estimate.high / size, color=GREY, alpha=0.2, linewidth=0)
+    axes.set_ylim(0.0, HIGHEST_EXCESS)
+    axes.locator_params(axis="x", nbins=3)
+    axes.set_xlabel(axis_label(profile.name, unit))

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ...analyses.fit.measured_record import RecordData
-from ...analyses.fit.unknowns import GAIN, OFFSET, RANGE_FACTOR, Unknown
+from ...analyses.fit.unknowns import DELAY, GAIN, OFFSET, RANGE_FACTOR, SENSOR, Unknown
 from ...errors import SceneError, check_names, format_value
 from ...records.columns import ColumnOptions
 from ...records.record import MIN_SAMPLES
@@ -20,6 +20,7 @@ from ...running.whole_run import MAX_INPUTS, RealVariable, real_variables
 
 SAMPLES_PER_UNKNOWN = 4
 GAIN_RANGE = (0.5, 2.0)
+DELAY_SHARE = 0.1  # of the shortest record, which is searched for a delay
 READABLE = ("output", "local")  # causalities of variables that can be observed
 
 Range = tuple[float, float] | None
@@ -33,8 +34,8 @@ class FitRequest:
     ----------
     fmu : pathlib.Path
     free : mapping
-        Range to search of each unknown, None for the default. ``offset(x)`` and ``gain(x)`` are those of the sensor of
-        an observed variable.
+        Range to search of each unknown, None for the default. ``offset(x)``, ``gain(x)`` and ``delay(x)`` are
+        those of the sensor of an observed variable.
     fixed : mapping
         Values of other variables by name; enumerations by label or number.
     observe, inputs : mapping
@@ -139,9 +140,9 @@ def variable_names(description: Any, causalities: Sequence[str]) -> list[str]:
 
 
 def parameter_names(description: Any, observe: Iterable[str]) -> list[str]:
-    """Return the names that can be free: Real parameters of the FMU, and offset and gain of each sensor."""
+    """Return the names that can be free: Real parameters of the FMU, and offset, gain and delay of each sensor."""
     parameters = variable_names(description, ("parameter",))
-    return [*parameters, *(f"{kind}({name})" for name in observe for kind in (OFFSET, GAIN))]
+    return [*parameters, *(f"{kind}({name})" for name in observe for kind in SENSOR)]
 
 
 def settable_names(description: Any) -> list[str]:
@@ -176,9 +177,16 @@ def make_unknown(name: str, limits: Range, resolved: ResolvedRequest, records: S
     if argument and argument.removesuffix(")") in observed:
         column = observed.index(argument.removesuffix(")"))
         size = max(float(np.ptp(record.y[:, column])) for record in records)
-        low, high = limits or (GAIN_RANGE if kind == GAIN else (-size, size))
-        unit = "" if kind == GAIN else resolved.variables[observed[column]].unit
+        duration = min(float(record.t[-1] - record.t[0]) for record in records)
+        low, high = limits or {OFFSET: (-size, size), GAIN: GAIN_RANGE, DELAY: (0.0, DELAY_SHARE * duration)}[kind]
+        unit = {OFFSET: resolved.variables[observed[column]].unit, GAIN: "", DELAY: "s"}[kind]
         check_range(name, low, high, -inf, inf, unit)
+        if kind == DELAY and max(abs(low), abs(high)) >= duration:
+            raise SceneError(
+                f"{name} = {format_value(low)}:{format_value(high)} reaches beyond the record, which lasts "
+                f"{duration:.4g} s: give a shorter range"
+            )
+        check_start(name, start, low, high)
         return Unknown(name, kind, unit, low, high, column=column, start=start)
     variable = resolved.variables[name]
     minimum = -inf if variable.minimum is None else variable.minimum
@@ -192,9 +200,14 @@ def make_unknown(name: str, limits: Range, resolved: ResolvedRequest, records: S
     else:
         low, high = limits
     check_range(name, low, high, minimum, maximum, variable.unit)
+    check_start(name, start, low, high)
+    return Unknown(name, name, variable.unit, low, high, minimum, maximum, start=start)
+
+
+def check_start(name: str, start: float | None, low: float, high: float) -> None:
+    """Raise SceneError if a start value is outside the range to search."""
     if start is not None and not low <= start <= high:
         raise SceneError(f"the start value {start!r} of {name} is outside its range, {low!r} to {high!r}")
-    return Unknown(name, name, variable.unit, low, high, minimum, maximum, start=start)
 
 
 def check_range(name: str, low: float, high: float, minimum: float, maximum: float, unit: str) -> None:

@@ -1,6 +1,6 @@
 """Fits the parameters of an FMU to record files, and writes the result folder."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from os.path import exists
 from pathlib import Path
@@ -12,9 +12,10 @@ import numpy as np
 from ...analyses.fit.fit_course import fit_records
 from ...analyses.fit.fit_description import describe_fit
 from ...analyses.fit.law_comparison import compare_laws
-from ...analyses.fit.parameter_fit import ParameterFit
+from ...analyses.fit.measured_record import MeasuredRecord
+from ...analyses.fit.parameter_fit import ColumnResiduals, ParameterFit, Validation
+from ...analyses.fit.validation import validate, validation_remarks
 from ...errors import HarnessError, SceneError, format_value
-from ...records.quantity_units import conversion_factor
 from ...records.signal_table import SignalTable, parse_signals
 from ...records.table_files import Table, load_table
 from ...results import provenance
@@ -26,21 +27,31 @@ from .laws import ResolvedLaws, resolve_laws
 from .request import FitRequest, ResolvedRequest, make_unknowns, record_data
 
 FOLDER = "fit"
-FILES = ("fit.json", "fit.csv", "figure.svg")
+FILES = ("fit.json", "fit.csv", "validation.csv", "figure.svg")
 
 
 def fit_files(
-    request: FitRequest, files: Sequence[str], out: Path, report: Callable[[float], None]
+    request: FitRequest,
+    files: Sequence[str],
+    validation: Sequence[str],
+    out: Path,
+    report: Callable[[float], None],
 ) -> tuple[ParameterFit, Path]:
-    """Fit the parameters of an FMU to record files, and write the result to out/fit/<record>."""
+    """Fit the parameters of an FMU to record files, and write the result to out/fit/<record>.
+
+    Parameters
+    ----------
+    validation : sequence of str
+        Record files that are predicted, but not fitted.
+    """
     laws = resolve_laws(request)
-    records = [load_record(file, request) for file in files]
+    records, others = ([load_record(file, request) for file in each] for each in (files, validation))
     folder = out / FOLDER / records[0].name
     source = provenance.describe_sources(*files)
     with replace_folder(folder, FILES, source) as new_folder:
-        fit = fit_laws(laws, records, report)
+        fit = fit_laws(laws, records, others, report)
         write_results(fit, new_folder)
-        paths = [request.fmu, *request.against, *(Path(file) for file in files if file != "-")]
+        paths = [request.fmu, *request.against, *(Path(file) for file in (*files, *validation) if file != "-")]
         scene = {name: value for name, value in asdict(request).items() if name not in ("fmu", "columns", "against")}
         parameters = {name: (value, "") for name, value in request.fixed.items()}
         provenance.write_provenance(new_folder, files=paths, parameters=parameters, scene=scene, source=source)
@@ -63,8 +74,13 @@ def load_record(source: str, request: FitRequest) -> RecordTable:
     return RecordTable(name, load_table(source, request.columns.names))
 
 
-def fit_laws(laws: ResolvedLaws, records: Sequence[RecordTable], report: Callable[[float], None]) -> ParameterFit:
-    """Fit an FMU, and those to compare it with, to the same records.
+def fit_laws(
+    laws: ResolvedLaws,
+    records: Sequence[RecordTable],
+    validation: Sequence[RecordTable],
+    report: Callable[[float], None],
+) -> ParameterFit:
+    """Fit an FMU, and those to compare it with, to the same records, and predict those for validation.
 
     All fits use the same samples: where one of them cannot use means of neighbouring samples, none of them does.
     """
@@ -72,9 +88,12 @@ def fit_laws(laws: ResolvedLaws, records: Sequence[RecordTable], report: Callabl
 
     def fit_law(i: int, averages: bool) -> ParameterFit:
         law = laws.requests[i]
-        tables = [parse_signals(each.table, law.sources, law.request.columns, each.name) for each in records]
+        tables, others = (
+            [parse_signals(each.table, law.sources, law.request.columns, each.name) for each in group]
+            for group in (records, validation)
+        )
         try:
-            fit = fit_tables(law, tables, lambda share: report((i + share) / count), averages)
+            fit = fit_tables(law, tables, lambda share: report((i + share) / count), averages, others)
         except HarnessError as error:
             raise type(error)(f"{law.name}: {error}" if count > 1 else str(error)) from None
         return replace(fit, notes=(*fit.notes, *laws.notes[i]))
@@ -94,18 +113,32 @@ def fit_laws(laws: ResolvedLaws, records: Sequence[RecordTable], report: Callabl
 
 def convert_outputs(fit: ParameterFit, target: ParameterFit) -> ParameterFit:
     """Return a fit with its outputs in the units of another fit to the same records."""
-    factors = [
-        (conversion_factor(own.unit, other.unit) if own.unit and other.unit else None) or 1.0
-        for own, other in zip(fit.columns, target.columns, strict=True)
-    ][: fit.predictions[0].shape[1]]
+    columns = convert_columns(fit.columns, target.columns)
+    outputs = fit.predictions[0].shape[1]
+    factors = [other.noise / own.noise for own, other in zip(fit.columns, target.columns, strict=True)][:outputs]
+    validation = fit.validation
+    if validation and target.validation:
+        validation = Validation(
+            convert_columns(validation.columns, target.validation.columns),
+            target.validation.records,
+            tuple(prediction * factors for prediction in validation.predictions),
+        )
     return replace(
         fit,
-        columns=tuple(
-            replace(other, residual=own.residual * other.noise / own.noise)
-            for own, other in zip(fit.columns, target.columns, strict=True)
-        ),
+        columns=columns,
         records=target.records,
         predictions=tuple(prediction * factors for prediction in fit.predictions),
+        validation=validation,
+    )
+
+
+def convert_columns(
+    columns: Sequence[ColumnResiduals], targets: Sequence[ColumnResiduals]
+) -> tuple[ColumnResiduals, ...]:
+    """Return the residuals of columns in the units of others of the same samples, whose noise is the same."""
+    return tuple(
+        replace(target, residual=own.residual * (target.noise / own.noise))
+        for own, target in zip(columns, targets, strict=True)
     )
 
 
@@ -114,6 +147,7 @@ def fit_tables(
     tables: Sequence[SignalTable],
     report: Callable[[float], None],
     averages: bool = True,
+    validation: Sequence[SignalTable] = (),
 ) -> ParameterFit:
     """Fit the parameters of an FMU to the signals in tables.
 
@@ -121,8 +155,22 @@ def fit_tables(
     ----------
     averages : bool
         Whether long records may be fitted as means of neighbouring samples.
+    validation : sequence of SignalTable
+        Records that are predicted, but not fitted.
+
+    Raises
+    ------
+    SceneError
+        If the request does not fit the records.
+    HarnessError
+        If the fit fails.
     """
     request, begun = resolved.request, process_time()
+    if validation and request.each and len(tables) > 1:
+        raise SceneError(
+            f"{', '.join(request.each)} has a value of its own for each record, and none for the validation record: "
+            "leave out --each or --validate"
+        )
     data = [record_data(resolved, table) for table in tables]
     unknowns = make_unknowns(resolved, data)
     outputs = [*request.observe]
@@ -130,10 +178,21 @@ def fit_tables(
         problem, course = fit_records(
             simulator.simulate, data, outputs, unknowns, resolved.fixed, request.robust, report, averages
         )
-        notes = [note for table in tables for note in table.notes]
+        prediction = (
+            validate(problem, course, [record_data(resolved, table) for table in validation]) if validation else None
+        )
+        notes = [note for table in (*tables, *validation) for note in table.notes]
         fit = describe_fit(resolved.name, problem, course, notes, simulator.n_runs, process_time() - begun)
     units = {name: resolved.variables[name].unit for name in request.observe}
-    return replace(fit, columns=tuple(replace(each, unit=units[each.name]) for each in fit.columns))
+    fit = replace(fit, columns=with_units(fit.columns, units))
+    if prediction:
+        fit = replace(fit, validation=replace(prediction, columns=with_units(prediction.columns, units)))
+    return replace(fit, remarks=(*fit.remarks, *validation_remarks(fit)))
+
+
+def with_units(columns: Sequence[ColumnResiduals], units: Mapping[str, str]) -> tuple[ColumnResiduals, ...]:
+    """Return columns with the units of their variables."""
+    return tuple(replace(each, unit=units[each.name]) for each in columns)
 
 
 def fit_as_json(fit: ParameterFit) -> dict[str, Any]:
@@ -159,8 +218,10 @@ def fit_as_json(fit: ParameterFit) -> dict[str, Any]:
         "fit": [asdict(estimate) for estimate in fit.estimates],
         "undetermined": list(fit.undetermined),
         "combinations": [asdict(estimate) for estimate in fit.combinations],
+        "profiles": [asdict(profile) for profile in fit.profiles],
         "correlation": fit.correlation.tolist(),
         "columns": [asdict(column) for column in fit.columns],
+        "validation": [asdict(column) for column in fit.validation.columns] if fit.validation else [],
         "bic": fit.bic,
         "searches": fit.n_searches,
         "runs": fit.n_runs,
@@ -174,17 +235,31 @@ def write_results(fit: ParameterFit, folder: Path) -> None:
     from .figure import draw
 
     (folder / "fit.json").write_text(to_json(fit_as_json(fit)) + "\n", encoding="utf-8")
+    laws = (fit, *fit.against)
+    write_fitted_signals(folder / "fit.csv", laws, fit.records, [law.predictions for law in laws])
+    if fit.validation:
+        predictions = [law.validation.predictions for law in laws if law.validation]
+        write_fitted_signals(folder / "validation.csv", laws, fit.validation.records, predictions)
+    draw(fit, folder / "figure.svg")
+
+
+def write_fitted_signals(
+    path: Path,
+    laws: Sequence[ParameterFit],
+    records: Sequence[MeasuredRecord],
+    predictions: Sequence[Sequence[np.ndarray]],
+) -> None:
+    """Write records, and what each law predicts for them."""
     heads = ["record", "t [s]"]
-    numbers = np.concatenate([np.full(len(record.t), float(i + 1)) for i, record in enumerate(fit.records)])
-    columns = [numbers, np.concatenate([record.t for record in fit.records])]
-    for j, column in enumerate(fit.columns[: fit.predictions[0].shape[1]]):
-        measured = np.concatenate([record.y[:, j] for record in fit.records])
+    numbers = np.concatenate([np.full(len(record.t), float(i + 1)) for i, record in enumerate(records)])
+    columns = [numbers, np.concatenate([record.t for record in records])]
+    for j, column in enumerate(laws[0].columns[: predictions[0][0].shape[1]]):
+        measured = np.concatenate([record.y[:, j] for record in records])
         heads.append(column_heading(column.name, column.unit))
         columns.append(measured)
-        for law in (fit, *fit.against):
-            fitted = np.concatenate([prediction[:, j] for prediction in law.predictions])
-            name = "" if law is fit else f" {law.fmu}"
+        for law, signals in zip(laws, predictions, strict=True):
+            fitted = np.concatenate([signal[:, j] for signal in signals])
+            name = "" if law is laws[0] else f" {law.fmu}"
             heads += [column_heading(f"{column.name}{suffix}{name}", column.unit) for suffix in (" fit", " residual")]
             columns += [fitted, measured - fitted]
-    write_csv(folder / "fit.csv", heads, columns)
-    draw(fit, folder / "figure.svg")
+    write_csv(path, heads, columns)

@@ -6,7 +6,7 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from ...analyses.decay.estimates import Estimate
-from ...analyses.fit.parameter_fit import ParameterFit
+from ...analyses.fit.parameter_fit import ColumnResiduals, ParameterFit
 from ...results.quantity import format_interval
 
 
@@ -60,9 +60,17 @@ def result_parts(fit: ParameterFit) -> list[Table | str]:
 
 def summary_lines(fit: ParameterFit) -> list[str]:
     """Return the sentences below the table."""
-    lines = [
-        f"Residuals of {column.name} in {column.record}: {column.residual:.3g} {column.unit}".rstrip()
-        + f" (noise {column.noise:.3g}, range {column.range:.3g})."
-        for column in fit.columns
+    lines = [describe_residuals(column, column.record) for column in fit.columns]
+    lines += [
+        describe_residuals(column, f"{column.record} (validation)")
+        for column in (fit.validation.columns if fit.validation else ())
     ]
     return [*lines, *fit.remarks, *fit.notes]
+
+
+def describe_residuals(column: ColumnResiduals, record: str) -> str:
+    """Return a sentence on the residuals of a column."""
+    return (
+        f"Residuals of {column.name} in {record}: {column.residual:.3g} {column.unit}".rstrip()
+        + f" (noise {column.noise:.3g}, range {column.range:.3g})."
+    )
