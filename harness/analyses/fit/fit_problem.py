@@ -13,6 +13,7 @@ MAX_COORDINATE = 60.0
 HUBER = 3.0  # residuals in units of the noise, beyond which a robust loss is linear
 LONGEST_STEP = 0.7  # of a coordinate
 MAX_DAMPINGS = 10  # tries of one step
+MIN_DAMPING = 1e-10  # with less, the equations of parameters that are not determined are singular to rounding
 
 Selection = tuple[np.ndarray, ...]  # the indices of the samples of each record
 
@@ -189,7 +190,8 @@ class FitProblem:
                 damping = max(damping * 6, 1e-6)
             else:
                 return squares, z
-            gain, z, e, damping = 1 - float(new @ new) / squares, z + step, new, damping * 0.15
+            gain, z, e = 1 - float(new @ new) / squares, z + step, new
+            damping = max(damping * 0.15, MIN_DAMPING)
             squares = float(e @ e)
             if gain < min_gain:
                 break
