@@ -1,9 +1,9 @@
 /* One co-simulation run in one call: sets values, initializes, steps over the given times and reads outputs.
  *
  * The instance is new or has been reset. The functions of the FMU are passed as pointers, so the library links nothing
- * but the C library. Of the inputs u (n, n_in), each step gets the mean of its two ends. The outputs y are read at every
- * `stride`-th time. The result is 0, REFUSED if the FMU does not initialize, FAILED if a later call fails or an output is
- * not finite, or TOO_SLOW after `limit` seconds of processor time.
+ * but the C library. Of the inputs u (n, n_in), each step gets the mean of its two ends. The outputs y are read at
+ * every `stride`-th time. The result is 0, REFUSED if the FMU does not initialize, FAILED if a later call fails or an
+ * output is not finite, or TOO_SLOW after `limit` seconds of processor time.
  */
 #include <math.h>
 #include <stdbool.h>
