@@ -1,17 +1,18 @@
 /* One co-simulation run in one call: sets values, initializes, steps over the given times and reads outputs.
  *
  * The instance is new or has been reset. The functions of the FMU are passed as pointers, so the library links nothing
- * but the C library. Of the inputs u (n, n_in), each step gets the mean of its two ends. The outputs y are read at every `stride`-th time. The result is 0,
- * REFUSED if the FMU does not initialize, FAILED if a later call fails, or TOO_SLOW after `limit` seconds of processor
- * time.
+ * but the C library. Of the inputs u (n, n_in), each step gets the mean of its two ends. The outputs y are read at
+ * every `stride`-th time. The result is 0, REFUSED if the FMU does not initialize, FAILED if a later call fails or an
+ * output is not finite, or TOO_SLOW after `limit` seconds of processor time.
  */
+#include <math.h>
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 #include <time.h>
 
 enum { REFUSED = 1, FAILED, TOO_SLOW };
-enum { WARNING = 1, MAX_INPUTS = 64, STEPS_PER_CHECK = 16 };
+enum { WARNING = 1, MAX_INPUTS = 64, STEPS_PER_CHECK = 128 };
 
 typedef void *Instance;
 typedef uint32_t Reference;
@@ -62,10 +63,13 @@ static bool set(const Fmu *fmu, const Variables *which, const double *values)
 
 static bool get(const Fmu *fmu, const Variables *which, double *values)
 {
-    if (fmu->fmi == 2)
-        return ((const Fmi2 *)fmu->functions)->get(fmu->instance, which->references, which->count, values) <= WARNING;
-    return ((const Fmi3 *)fmu->functions)
-               ->get(fmu->instance, which->references, which->count, values, which->count) <= WARNING;
+    const Reference *references = which->references;
+    size_t n = which->count;
+    int status = fmu->fmi == 2 ? ((const Fmi2 *)fmu->functions)->get(fmu->instance, references, n, values)
+                               : ((const Fmi3 *)fmu->functions)->get(fmu->instance, references, n, values, n);
+    for (size_t i = 0; i < n; i++)
+        if (!isfinite(values[i])) return false;
+    return status <= WARNING;
 }
 
 static bool initialize(const Fmu *fmu, const Variables *parameters, const Variables *inputs, double start, double stop)

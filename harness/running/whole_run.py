@@ -5,7 +5,7 @@ made from Python, which takes about thirty times as long. The FMU is instantiate
 """
 
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from ctypes import CDLL, Structure, addressof, byref, c_double, c_int, c_size_t, c_uint32, c_void_p, cast
 from dataclasses import dataclass
@@ -39,6 +39,7 @@ OPTIONS = ("-std=c99", "-O2", "-shared", "-fPIC", "-nostdlib", "-lc")
 MAX_INPUTS = 64  # of whole_run.c
 TIME_LIMIT = 10.0  # s of processor time of one run
 STEPS_PER_CHECK = 16
+MAX_PREPARED = 64
 START_TIME = 20.0  # s that the child process of an external FMU may take to start
 
 
@@ -69,7 +70,10 @@ class RealVariable:
 
 @dataclass(frozen=True)
 class RunRequest:
-    """A run: values to set, communication points (n,) in s, outputs to read at every `stride`-th point, inputs (n,)."""
+    """A run: values to set, communication points (n,) in s, outputs to read at every `stride`-th point, inputs (n,).
+
+    The arrays of a request do not change: the structs of whole_run.c keep copies of them for runs with other values.
+    """
 
     values: Mapping[str, float]
     t: np.ndarray
@@ -97,7 +101,7 @@ class RepeatedRun:
         named = {variable.name: variable for variable in description.modelVariables}
         self.settings = [(named[name], value) for name, value in settings.items()]
         self.is_new = True
-        self.references: dict[tuple[str, ...], Any] = {}  # of variables that are set or read together
+        self.prepared: dict[tuple[Any, ...], PreparedRun] = {}
         self.fmu = self.instantiate(fmu)
         names = FUNCTIONS[self.version]
         pointers = (cast(getattr(self.fmu.dll, f"fmi{self.version[0]}{name}"), c_void_p) for name in names)
@@ -131,43 +135,32 @@ class RepeatedRun:
 
     def run(self, request: RunRequest) -> np.ndarray | None:
         """Return the outputs (1 + (n - 1)//stride, outputs), or None if the FMU refuses the values or is too slow."""
-        y = np.empty(((len(request.t) - 1) // request.stride + 1, len(request.outputs)))
         try:
             if not self.is_new:
                 self.fmu.reset()
             self.is_new = False
             for variable, value in self.settings:
                 set_variable(self.fmu, self.description, variable, value)
-            if self.loop:
-                self.run_compiled(self.loop, request, y)
-            else:
-                self.run_in_python(request, y)
+            return self.run_compiled(self.loop, request) if self.loop else self.run_in_python(request)
         except (FMICallException, RunTimeError):
             return None
-        return y if np.isfinite(y).all() else None
 
-    def run_compiled(self, loop: CDLL, request: RunRequest, y: np.ndarray) -> None:
+    def run_compiled(self, loop: CDLL, request: RunRequest) -> np.ndarray:
         """Run the compiled loop; raise RunTimeError if it does not end well."""
-        x = np.array([*request.values.values(), 0.0])
-        u = np.ascontiguousarray(np.stack([*request.inputs.values()], axis=1)) if request.inputs else x
-        t = np.ascontiguousarray(request.t, dtype=float)
-        bound = [
-            self.bind(tuple(names), a) for names, a in ((request.values, x), (request.inputs, u), (request.outputs, y))
-        ]
-        n, stride = c_size_t(len(t)), c_size_t(request.stride)
-        if loop.run(byref(self.handle), *map(byref, bound), c_void_p(t.ctypes.data), n, stride):
+        key = (tuple(request.values), id(request.t), tuple(map(id, request.inputs.values())), *request.outputs)
+        prepared = self.prepared.get(key)
+        if prepared is None or prepared.request.stride != request.stride:
+            if len(self.prepared) >= MAX_PREPARED:
+                self.prepared.clear()
+            prepared = self.prepared[key] = PreparedRun(request, self.handle, self.variables)
+        prepared.x[:-1] = [*request.values.values()]
+        if loop.run(*prepared.arguments):
             raise RunTimeError
+        return prepared.y.copy()
 
-    def bind(self, names: tuple[str, ...], values: np.ndarray) -> VariablesStruct:
-        """Return the C struct of variables and their values."""
-        if names not in self.references:
-            self.references[names] = (c_uint32 * max(len(names), 1))(
-                *(self.variables[each].reference for each in names)
-            )
-        return VariablesStruct(addressof(self.references[names]), len(names), values.ctypes.data)
-
-    def run_in_python(self, request: RunRequest, y: np.ndarray) -> None:
+    def run_in_python(self, request: RunRequest) -> np.ndarray:
         """Make the calls of whole_run.c from Python."""
+        y = np.empty(((len(request.t) - 1) // request.stride + 1, len(request.outputs)))
         fmu, t, begun = self.fmu, request.t.tolist(), process_time()
         is_fmi2 = self.version == "2.0"
         set_reals, get_reals = (fmu.setReal, fmu.getReal) if is_fmi2 else (fmu.setFloat64, fmu.getFloat64)
@@ -193,10 +186,46 @@ class RepeatedRun:
                 y[(i + 1) // request.stride] = get_reals(outputs)
             if i % STEPS_PER_CHECK == 0 and process_time() - begun > self.limit:
                 raise RunTimeError
+        if not np.isfinite(y).all():
+            raise RunTimeError
+        return y
+
+
+class PreparedRun:
+    """A request as whole_run.c receives it: for runs that differ in values only, all but the values stays.
+
+    Attributes
+    ----------
+    x, y : numpy.ndarray
+        Values to set, and one more; outputs (1 + (n - 1)//stride, outputs).
+    arguments : tuple
+        Arguments of the function `run` of whole_run.c.
+    """
+
+    def __init__(self, request: RunRequest, handle: FmuStruct, variables: Mapping[str, RealVariable]) -> None:
+        self.request = request  # whose arrays must live on: their addresses identify this object
+        self.x, self.t = np.zeros(len(request.values) + 1), np.ascontiguousarray(request.t, dtype=float)
+        self.u = np.stack([*request.inputs.values()], axis=1).astype(float) if request.inputs else self.x
+        self.y = np.empty(((len(self.t) - 1) // request.stride + 1, len(request.outputs)))
+        self.structs = [
+            make_struct(names, variables, array)
+            for names, array in ((request.values, self.x), (request.inputs, self.u), (request.outputs, self.y))
+        ]
+        pointers = [byref(handle), *(byref(struct) for struct, _ in self.structs), c_void_p(self.t.ctypes.data)]
+        self.arguments = (*pointers, c_size_t(len(self.t)), c_size_t(request.stride))
+
+
+def make_struct(
+    names: Iterable[str], variables: Mapping[str, RealVariable], array: np.ndarray
+) -> tuple[VariablesStruct, Any]:
+    """Return the struct of variables and their values, and the references, which must live as long."""
+    references = [variables[name].reference for name in names]
+    array_of_references = (c_uint32 * max(len(references), 1))(*references)
+    return VariablesStruct(addressof(array_of_references), len(references), array.ctypes.data), array_of_references
 
 
 class RunTimeError(Exception):
-    """A run does not reach its end in time, or the FMU terminates it."""
+    """A run does not reach its end in time, the FMU terminates it, or outputs are not finite."""
 
 
 class IsolatedRun:

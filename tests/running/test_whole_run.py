@@ -8,7 +8,7 @@ from native_fmus import build_native_fmus, require_compiler
 
 from harness.api import simulate
 from harness.running.native_equivalent import native_equivalent
-from harness.running.whole_run import open_simulator
+from harness.running.whole_run import MAX_PREPARED, open_simulator
 
 T = np.linspace(0.0, 8.0, 401)
 
@@ -51,6 +51,18 @@ def test_inputs_are_means_over_steps_and_strides_skip_points(sled):
     assert np.array_equal(every[::2], second)
     assert np.array_equal(every, stepped)
     assert np.abs(constant - parameter).max() < 1e-12
+
+
+def test_runs_of_many_requests_do_not_mix(sled):
+    """Of more requests than stay prepared, whose arrays live no longer than the run."""
+    forces = [5.0 * i for i in range(MAX_PREPARED + 6)] * 2
+    with open_simulator(sled, {}) as simulator:
+        driven = [simulator.simulate({"k": 60.0}, T[:41].copy(), ["x"], {"F_ext": np.full(41, f)}) for f in forces]
+        constant = [simulator.simulate({"k": 60.0, "F_ext": f}, T[:41], ["x"], {}) for f in forces]
+        other = simulator.simulate({"k": 900.0, "F_ext": forces[-1]}, T[:41], ["x"], {})
+    assert np.abs(np.array(driven) - constant).max() < 1e-12
+    assert np.ptp([each[-1] for each in driven]) > 0
+    assert not np.array_equal(other, constant[-1])
 
 
 def test_settings_hold_in_every_run(sled):

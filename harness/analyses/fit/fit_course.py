@@ -20,7 +20,9 @@ INPUT_CHANGE = 0.1  # of the noise, at which a finer subdivision is not needed
 SPLINE_RATIO = 15.0  # differences of splines through half of the samples, in errors of that through all
 MAX_THIN, THIN = 3000, 2000  # samples above which a search uses fewer, and their number
 DRAWS, MAX_RIVALS, DRAW_SIZE = 24, 8, 0.3  # starts for rival minima
-ROUNDS = 6  # restarts from better minima
+RIVAL_SAMPLES = 500  # of each record, in which rival minima are sought first
+ROUNDS = 6  # starts, all but the first from better minima
+SHALLOW = 0.1  # variances of the residuals by which a minimum must be lower to count as better
 
 
 @dataclass
@@ -93,29 +95,30 @@ def find_course(
     profiles: dict[tuple[int, int], tuple[tuple[float, float], ...]] = {}
     rivals: list[Minimum] = []
     sides = [(i, side) for i in range(len(z)) for side in (-1, 1)]
-    for _ in range(ROUNDS):
+    sought = np.inf  # squares at which rivals were sought
+    for remaining in reversed(range(ROUNDS)):
         squares, z = problem.minimize(z, problem.all, 30, 1e-9, central=True)
         check_motion(problem, squares)
         uncertainty = estimate_uncertainty(problem, z, input_error, float(noise_is_known))
         report(0.6)
-        rivals = find_rivals(problem, z, uncertainty, result.minima, squares)
-        if rivals and rivals[0][0] < squares - 0.1 * uncertainty.variance:
-            z = rivals[0][1]
-            continue
-        ends, better = {}, None
+        if squares < sought - uncertainty.variance:
+            rivals, sought = find_rivals(problem, z, uncertainty, result.minima, squares), squares
+            if remaining and rivals and rivals[0][0] < squares - SHALLOW * uncertainty.variance:
+                z = rivals[0][1]
+                continue
+        better = None
         for n, (i, side) in enumerate(sides):
             report(0.7 + 0.3 * n / len(sides))
-            bound = profile_bound(problem, z, uncertainty, i, side)
-            ends[i, side], profiles[i, side], better = bound.end, bound.profile, bound.better
-            if better is not None:
+            bound = profile_bound(problem, z, uncertainty, i, side, ends_at_better=remaining > 0)
+            ends[i, side], profiles[i, side] = bound.end, bound.profile
+            better = bound.better if better is None else better
+            if remaining and better is not None:
                 z = better
                 break
         if better is None:
             break
     else:
         doubts.append("The sum of squares has many shallow minima here: the values may lie anywhere in the intervals.")
-        wide = uncertainty.quantile * uncertainty.deviations
-        ends, profiles = {(i, side): float(z[i] + side * wide[i]) for i, side in sides}, {}
     others = [there for _, there in rivals if np.abs(there - z).max() > DISTINCT]
     extend_ends(problem, z, uncertainty, ends, others)
     return FitCourse(z, uncertainty, ends, profiles, others, doubts, result.log, result.n_searches)
@@ -197,7 +200,12 @@ def find_rivals(
     eigenvalues, axes = np.linalg.eigh(uncertainty.covariance * uncertainty.inflation.mean())
     reach = 2 * np.minimum(np.sqrt(np.maximum(eigenvalues, 0.0)), DRAW_SIZE)
     starts += [z + axes @ (reach * random.normal(size=len(z))) for _ in range(DRAWS)]
-    found = [problem.minimize(start, problem.all, 25 if problem.central else 12, 1e-6) for start in starts]
+    steps = 25 if problem.central else 12
+    if problem.n_samples > 2 * RIVAL_SAMPLES * len(problem.records):
+        few = tuple(np.unique(np.linspace(0, index[-1], RIVAL_SAMPLES).astype(int)) for index in problem.all)
+        coarse = distinct([problem.minimize(start, few, steps, 1e-4) for start in starts], len(starts))
+        starts = [there for value, there in coarse if value < coarse[0][0] + 3 * limit]
+    found = [problem.minimize(start, problem.all, steps, 1e-6) for start in starts]
     return distinct([each for each in found if each[0] < squares + limit], len(found))
 
 
@@ -212,5 +220,5 @@ def extend_ends(
     for (i, side), end in ends.items():
         farthest = max(rivals, key=lambda there: side * float(there[i]), default=z)
         if end is not None and side * (farthest[i] - z[i]) > 0.5 * abs(end - z[i]):
-            other = profile_bound(problem, farthest, uncertainty, i, side).end
+            other = profile_bound(problem, farthest, uncertainty, i, side, ends_at_better=False).end
             ends[i, side] = None if other is None else side * max(side * other, side * end)

@@ -13,6 +13,7 @@ MAX_COORDINATE = 60.0
 HUBER = 3.0  # residuals in units of the noise, beyond which a robust loss is linear
 LONGEST_STEP = 0.7  # of a coordinate
 MAX_DAMPINGS = 10  # tries of one step
+MIN_DAMPING = 1e-10  # with less, the equations of parameters that are not determined are singular to rounding
 
 Selection = tuple[np.ndarray, ...]  # the indices of the samples of each record
 
@@ -49,6 +50,7 @@ class FitProblem:
         self.region = FeasibleRegion(self.unknowns)
         self.low, self.high = np.array([unknown.search_range for unknown in self.unknowns]).T
         self.all: Selection = tuple(record.all for record in self.records)
+        self.first_samples: Selection = tuple(index[:2] for index in self.all)
         self.central = False  # whether slopes need central differences
         self.steps = self.difference_steps()
 
@@ -59,15 +61,15 @@ class FitProblem:
     def values(self, z: np.ndarray, record: int) -> dict[str, float]:
         """Return the values to set for a record."""
         fitted = {
-            unknown.variable: unknown.to_value(float(each))
-            for unknown, each in zip(self.unknowns, z, strict=True)
+            unknown.variable: unknown.to_value(each)
+            for unknown, each in zip(self.unknowns, z.tolist(), strict=True)
             if unknown.column is None and unknown.record in (None, record)
         }
         return self.fixed | fitted
 
     def predict(self, z: np.ndarray, selection: Selection) -> list[np.ndarray] | None:
         """Return what the sensors show at the selected samples of each record; None if the FMU refuses the values."""
-        if np.abs(z).max() > MAX_COORDINATE:
+        if max(map(abs, z.tolist())) > MAX_COORDINATE:
             return None
         predicted = []
         for i, (record, index) in enumerate(zip(self.records, selection, strict=True)):
@@ -102,11 +104,11 @@ class FitProblem:
         predicted = self.predict(z, selection)
         if predicted is None:
             return None
-        parts = (
-            ((y - record.y[index]) / record.noise).ravel()
+        parts = [
+            ((y - (record.y if index is record.all else record.part(index).y)) / record.noise).ravel()
             for y, record, index in zip(predicted, self.records, selection, strict=True)
-        )
-        e = np.concatenate([*parts])
+        ]
+        e = np.concatenate(parts)
         if self.robust:
             size = np.abs(e)
             e = np.where(size > HUBER, np.sign(e) * np.sqrt(np.maximum(2 * HUBER * size - HUBER**2, 0.0)), e)
@@ -114,7 +116,7 @@ class FitProblem:
 
     def is_refused(self, z: np.ndarray) -> bool:
         """Return whether the FMU refuses the values at the start."""
-        return self.predict(z, tuple(index[:2] for index in self.all)) is None
+        return self.predict(z, self.first_samples) is None
 
     def difference_steps(self) -> tuple[float, float]:
         """Return the steps of one-sided and of central differences.
@@ -188,7 +190,8 @@ class FitProblem:
                 damping = max(damping * 6, 1e-6)
             else:
                 return squares, z
-            gain, z, e, damping = 1 - float(new @ new) / squares, z + step, new, damping * 0.15
+            gain, z, e = 1 - float(new @ new) / squares, z + step, new
+            damping = max(damping * 0.15, MIN_DAMPING)
             squares = float(e @ e)
             if gain < min_gain:
                 break

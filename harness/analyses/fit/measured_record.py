@@ -9,9 +9,27 @@ from scipy.interpolate import CubicSpline
 from .noise import bin_means, estimate_noise
 
 MAX_SAMPLES = 2500  # twice as many are averaged to this number of means of neighbours
-INPUT_POINTS = 1000  # of an input that suffice for a search
+INPUT_POINTS = 500  # of an input that suffice for a search
+MAX_PARTS = 32  # that are kept
 SHORTEST_STEP = 1e-6  # between communication points, in intervals between samples
 Simulate = Callable[..., np.ndarray | None]
+
+
+@dataclass(frozen=True)
+class RecordPart:
+    """The samples `index` of a record: their values y, and the times and inputs of a run that reads them.
+
+    Attributes
+    ----------
+    rows : numpy.ndarray or None
+        Those times of the run that are times of the samples; None if all are.
+    """
+
+    index: np.ndarray
+    y: np.ndarray
+    t: np.ndarray
+    inputs: Mapping[str, np.ndarray]
+    rows: np.ndarray | None
 
 
 @dataclass(frozen=True)
@@ -61,6 +79,7 @@ class MeasuredRecord:
         known = np.array([each or 0.0 for each in sigma])
         self.noise = np.where(known > 0, known / np.sqrt(self.width), self.noise)
         self.all = np.arange(len(self.t))
+        self.parts: dict[int, RecordPart] = {}
         self.subdivide(1)
 
     def subdivide(self, parts: int, every: int = 1) -> None:
@@ -93,11 +112,22 @@ class MeasuredRecord:
             return self.simulate_delayed(simulate, values, outputs, index, delays)
         if len(index) == len(self.t):
             return simulate(values, self.fine_t, outputs, self.driven, self.subdivision)
-        if not self.inputs:
-            return simulate(values, self.t[index], outputs, {})
-        grid = np.union1d(np.arange(0, index[-1] + 1, max(1, len(self.t) // INPUT_POINTS)), index)
-        y = simulate(values, self.t[grid], outputs, {name: u[grid] for name, u in self.inputs.items()})
-        return None if y is None else y[np.searchsorted(grid, index)]
+        part = self.part(index)
+        y = simulate(values, part.t, outputs, part.inputs)
+        return y if y is None or part.rows is None else y[part.rows]
+
+    def part(self, index: np.ndarray) -> "RecordPart":
+        """Return what a run for the samples `index` needs. It is kept, for an index serves many runs."""
+        if id(index) not in self.parts:
+            if len(self.parts) >= MAX_PARTS:
+                self.parts.clear()
+            grid = index
+            if self.inputs:
+                grid = np.union1d(np.arange(0, index[-1] + 1, max(1, len(self.t) // INPUT_POINTS)), index)
+            inputs = {name: u[grid] for name, u in self.inputs.items()}
+            rows = np.searchsorted(grid, index) if self.inputs else None
+            self.parts[id(index)] = RecordPart(index, self.y[index], self.t[grid], inputs, rows)
+        return self.parts[id(index)]
 
     def simulate_delayed(
         self,

@@ -6,6 +6,8 @@ from ..estimation.noise import interpolation_residuals, robust_std
 
 MAX_DIVISOR = 8  # of the smallest difference of two levels that is tried as the step of a quantiser
 MAX_STEP_ERROR = 0.02  # of a step, by which levels may miss multiples of it
+FEW_LEVELS = 100  # at most, none a step apart perhaps: larger divisors are tried, with levels that hit multiples
+MAX_DIVISOR_OF_FEW, MAX_STEP_ERROR_OF_FEW = 10_000, 1e-5
 SMALLEST_NOISE = 1e-9  # of the range
 CORRELATED = 4.0  # standard errors of the correlation of white noise
 VARIANCE_EXCESS = 5.0  # standard errors of the variance of sums of white noise
@@ -19,14 +21,29 @@ def estimate_noise(t: np.ndarray, x: np.ndarray) -> tuple[float, float]:
     The noise is at least that of the quantiser, step/sqrt(12).
     """
     scatter = robust_std(interpolation_residuals(t, x))
+    step = quantiser_step(x)
+    return max(scatter, step / 12**0.5, SMALLEST_NOISE * float(np.ptp(x))), step
+
+
+def quantiser_step(x: np.ndarray) -> float:
+    """Return the largest step of which the differences of the levels of samples x (n,) are multiples; 0 if none is.
+
+    A record of long rests has few levels, which may all be many steps apart.
+    """
     gaps = np.diff(np.unique(x))
     gaps = gaps[gaps > SMALLEST_NOISE * np.ptp(x)]
-    step = 0.0
-    for candidate in gaps.min() / np.arange(1, MAX_DIVISOR + 1) if len(gaps) else ():
-        if np.abs(gaps / candidate - np.round(gaps / candidate)).max() < MAX_STEP_ERROR:
-            step = float(candidate)
-            break
-    return max(scatter, step / 12**0.5, SMALLEST_NOISE * float(np.ptp(x))), step
+    if not len(gaps):
+        return 0.0
+    attempts = [(1, MAX_DIVISOR, MAX_STEP_ERROR)]
+    if len(gaps) < min(FEW_LEVELS, len(x) / 2):
+        attempts.append((MAX_DIVISOR + 1, MAX_DIVISOR_OF_FEW, MAX_STEP_ERROR_OF_FEW))
+    for first, last, max_error in attempts:
+        steps = gaps.min() / np.arange(first, last + 1)
+        counts = gaps[:, None] / steps
+        fits = np.abs(counts - np.round(counts)).max(axis=0) < max_error
+        if fits.any():
+            return float(steps[np.argmax(fits)])
+    return 0.0
 
 
 def residual_correlation(e: np.ndarray) -> float:

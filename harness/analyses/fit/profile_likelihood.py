@@ -29,10 +29,17 @@ class Bound:
     profile: tuple[tuple[float, float], ...] = ()
 
 
-def profile_bound(problem: FitProblem, z: np.ndarray, uncertainty: Uncertainty, i: int, side: int) -> Bound:
+def profile_bound(
+    problem: FitProblem, z: np.ndarray, uncertainty: Uncertainty, i: int, side: int, ends_at_better: bool = True
+) -> Bound:
     """Return how far coordinate `i` moves from z (k,) to one side until the squares exceed the limit of 95 %.
 
     The other coordinates are fitted at each position.
+
+    Parameters
+    ----------
+    ends_at_better : bool
+        Whether there is no end where a better minimum is met; otherwise the profile is followed on.
     """
     others = np.delete(np.arange(len(z)), i)
     target = uncertainty.variance * uncertainty.inflation[i] * uncertainty.quantile**2
@@ -60,11 +67,14 @@ def profile_bound(problem: FitProblem, z: np.ndarray, uncertainty: Uncertainty, 
     x = float(np.clip(np.sqrt(target / uncertainty.variance * covariance[i, i]), 1e-6, 0.5))
     low, last = (0.0, excess(float(start @ start))), (1.0, z + tangent)
     high: tuple[float, float] | None = None
+    better: np.ndarray | None = None
     profile = []
     for _ in range(MAX_EVALUATIONS):
         squares, there = fit_others(x, last)
         if squares < uncertainty.squares - 0.02 * target:
-            return Bound(None, there)
+            better = there
+            if ends_at_better:
+                return Bound(None, better)
         distance = excess(squares)
         if np.isfinite(distance):
             last = (x, there)
@@ -79,7 +89,7 @@ def profile_bound(problem: FitProblem, z: np.ndarray, uncertainty: Uncertainty, 
         else:  # the region ends here
             x = (low[0] + high[0]) / 2
     end = None if is_at_limit(problem, last[1]) else float(z[i] + side * x)
-    return Bound(end, profile=tuple(profile))
+    return Bound(end, better, profile=tuple(profile))
 
 
 def is_at_limit(problem: FitProblem, z: np.ndarray) -> bool:

@@ -2,7 +2,8 @@
 
 Continuation in time judges a Sobol set on the first stretch of the record, where the squares have few minima, and
 carries what fits into longer and longer stretches. A search of one kind repeats its own errors, so the search ends
-where searches of both kinds have found the same minimum.
+where searches of both kinds have found the same minimum. A minimum whose residuals are as small as the noise is also
+accepted where two more searches find nothing lower.
 """
 
 from collections.abc import Callable
@@ -15,9 +16,12 @@ from scipy.stats import qmc
 from .fit_problem import FitProblem, Selection
 
 STRETCHES, SURVIVORS, SOBOL_POINTS, SEARCH_SAMPLES = (0.15, 0.3, 0.55, 1.0), (40, 24, 12, 6), 2048, 250
-EVOLUTION = {"popsize": 10, "maxiter": 150, "tol": 1e-4}
+EVOLUTION = {"popsize": 10, "maxiter": 150, "tol": 1e-2}
+NEAR_KNOWN = 1.2  # times the cost of the known minimum, at which an evolution has found it again
 REFUSED_COST = 1e12
 MAX_SEARCHES, REQUIRED, REQUIRED_IF_ROUGH = 8, 2, 4  # searches in all, and those that must find the same minimum
+EXPLAINED = 6.0  # standard errors of the squares of white noise: a minimum within them explains the records
+REQUIRED_AFTER = 2  # searches that find nothing lower than such a minimum
 REFINED = 4  # minima of a search that are refined
 ROUGH = 1.5  # times the noise: larger residuals ask for more searches
 DISTINCT = 0.02  # distance of coordinates from which minima are different ones
@@ -27,18 +31,14 @@ Minimum = tuple[float, np.ndarray]  # sum of squares, coordinates
 
 @dataclass
 class SearchResult:
-    """The best minimum, all others, how many searches there were and how many of them found the best."""
+    """The best minimum, all others, how many searches there were, how many found the best, and whether they suffice."""
 
     best: Minimum | None = None
     minima: list[Minimum] = field(default_factory=list)
     n_searches: int = 0
     n_hits: int = 0
+    is_agreed: bool = False
     log: list[str] = field(default_factory=list)
-
-    @property
-    def is_agreed(self) -> bool:
-        """Return whether enough searches found the best minimum."""
-        return self.n_hits >= REQUIRED
 
 
 def search(
@@ -53,12 +53,14 @@ def search(
     report : callable
         Receives the progress from 0 to 1.
     """
-    result, hits = SearchResult(), 0
+    result, first = SearchResult(), 0
     n = sum(len(index) * record.y.shape[1] for index, record in zip(selection, problem.records, strict=True))
     for number in range(1, MAX_SEARCHES + 1):
         report((number - 1) / MAX_SEARCHES)
         is_evolution = number % 2 == 0
-        candidates = evolve(problem, number) if is_evolution else continue_in_time(problem, number, starts)
+        is_known = result.best and (result.best[0] < ROUGH**2 * n or result.n_hits >= REQUIRED)
+        known = result.best[1] if result.best and is_known else None
+        candidates = evolve(problem, number, known) if is_evolution else continue_in_time(problem, number, starts)
         minima = [problem.minimize(z, selection, 20, 1e-6) for _, z in candidates[:REFINED]]
         result.minima += minima
         result.n_searches = number
@@ -68,15 +70,16 @@ def search(
         if not np.isfinite(new[0]):
             continue
         if result.best and abs(new[0] - result.best[0]) < 0.5 + 1e-3 * new[0]:
-            hits += 1
+            result.n_hits += 1
         elif not result.best or new[0] < result.best[0]:
-            hits = 1
+            result.n_hits, first = 1, number
         result.best = new if not result.best or new[0] < result.best[0] else result.best
-        required = REQUIRED_IF_ROUGH if result.best[0] > ROUGH**2 * n else REQUIRED
-        if hits >= required:
-            result.n_hits = max(hits, REQUIRED)
+        squares = result.best[0]
+        is_explained = squares < n + EXPLAINED * np.sqrt(2 * n) and number >= first + REQUIRED_AFTER
+        if is_explained or result.n_hits >= (REQUIRED_IF_ROUGH if squares > ROUGH**2 * n else REQUIRED):
+            result.is_agreed = True
             return result
-    result.n_hits = min(hits, REQUIRED - 1)
+    result.is_agreed = result.n_hits >= REQUIRED
     return result
 
 
@@ -94,15 +97,26 @@ def continue_in_time(problem: FitProblem, seed: int, starts: np.ndarray) -> list
     return minima
 
 
-def evolve(problem: FitProblem, seed: int) -> list[Minimum]:
-    """Return the minima near the end of a differential evolution of the absolute residuals."""
+def evolve(problem: FitProblem, seed: int, known: np.ndarray | None) -> list[Minimum]:
+    """Return the minima near the end of a differential evolution of the absolute residuals.
+
+    Parameters
+    ----------
+    known : numpy.ndarray or None
+        Coordinates (k,) of a minimum that is as small as the noise or that several searches found: the evolution ends
+        when it comes near that cost.
+    """
     part = stretches(problem)[-1]
+    enough = 0.0 if known is None else NEAR_KNOWN * absolute_cost(problem, known, part)
     last = differential_evolution(
-        lambda z: absolute_cost(problem, z, part),
+        lambda columns: np.array([absolute_cost(problem, z, part) for z in columns.T]),
         [*zip(problem.low, problem.high, strict=True)],
         seed=seed,
         init="sobol",
         polish=False,
+        vectorized=True,
+        updating="deferred",
+        callback=lambda intermediate_result: bool(intermediate_result.fun < enough),
         **EVOLUTION,
     )
     order = np.argsort(last.population_energies)[: SURVIVORS[-1]]

@@ -1,6 +1,7 @@
 """Unknowns of a fit: parameters and start values of the FMU, and offset, gain and delay of a sensor."""
 
 from dataclasses import dataclass
+from functools import cached_property
 from math import exp, inf, log
 
 import numpy as np
@@ -45,12 +46,12 @@ class Unknown:
     column: int | None = None
     start: float | None = None
 
-    @property
+    @cached_property
     def sign(self) -> int:
         """Return the sign of the range, 0 if it holds zero. With a sign, the coordinate is the logarithm."""
         return 1 if self.low > 0 else -1 if self.high < 0 else 0
 
-    @property
+    @cached_property
     def scale(self) -> float:
         """Return the unit of the coordinate of a range that holds zero."""
         return (self.high - self.low) / 4
