@@ -46,6 +46,7 @@ OF_COMMANDS = {
     "pendulum": ("run pendulum", "results/pendulum/figure.svg"),
     "coupled": ("couple two-masses", "results/coupled/two-masses/figure.svg"),
     "precision": ("precision stickslip --quick", "results/precision/stickslip.svg"),
+    "rivals": ("rivals", "results/rivals/figure.svg"),  # needs the extra rivals
 }
 
 

@@ -4,7 +4,6 @@ from pathlib import Path
 from typing import Any
 
 from matplotlib.lines import Line2D
-from matplotlib.ticker import NullFormatter
 
 from ...results.style import BLUE, GREEN, GREY, ORANGE, WIDTH, open_figure
 from .catalogue import OWN, Rival
@@ -29,7 +28,7 @@ def draw(comparison: Comparison, path: Path) -> None:
             for rival in comparison.rivals:
                 plot_rival(axes, comparison, rival, scene, styles[rival.title])
             axes.set(xscale="log", yscale="log", ylim=(0.3 * FLOOR, 3.0))
-            axes.xaxis.set_minor_formatter(NullFormatter())
+            axes.minorticks_off()
             axes.set_title(f"{scene.title}, {scene.stop:g} s")
             axes.set_ylabel(f"largest error [{scene.unit}]")
         for axes in panels[-1]:
