@@ -110,8 +110,11 @@ class EmbeddedModel:
         return attrgetter(*names) if len(names) > 1 else lambda solver: (getattr(solver, names[0]),)
 
     def solver_attribute(self, name: str) -> str:
-        """Return the solver's attribute for a state or mode: its_h_ if h means something else to the solver."""
-        return f"its_{name}_" if hasattr(self.model.solver, f"its_{name}_") else name
+        """Return the solver's attribute for a state or mode: h_ if h means something else to the solver."""
+        others = {*self.model.states, *self.model.contacts} - {name}
+        return next(
+            one for one in (f"{name}__", f"{name}_", name) if hasattr(self.model.solver, one) and one not in others
+        )
 
     def compute_states(self, times: list[float], timeout: float | None = None) -> list[tuple[float, ...]]:
         """Return the states at the times, starting at 0 s.

@@ -69,10 +69,17 @@ def test_the_command_line_uses_both_sides_of_a_pause(tmp_path):
     assert data["used"]["from"] < 2.03 < data["used"]["until"]
 
 
-@pytest.mark.parametrize("n_samples", [0, 3, 11])
-def test_a_window_with_too_few_samples_is_reported(n_samples):
+@pytest.mark.parametrize(
+    ("n_samples", "sentence"),
+    [
+        (0, "no sample follows the law that fits its turning points"),
+        (3, "has only 3 samples in a row that follow .* and 12 are needed"),
+        (11, "has only 11 samples in a row that follow .* and 12 are needed"),
+    ],
+)
+def test_a_window_with_too_few_samples_is_reported(n_samples, sentence):
     """Whatever removed the other samples."""
     record = paused(2.03, 0.95)
     problem, _ = prepare_problem(record, find_extrema(record, False), False, False)
-    with pytest.raises(HarnessError, match=f"has only {n_samples} samples in a row that follow .* and 12 are needed"):
+    with pytest.raises(HarnessError, match=sentence):
         problem.subset(slice(n_samples))

@@ -59,6 +59,9 @@ def test_the_numerics_stay_within_the_c_subset(name):
     tree = ast.parse(NUMERICS[name])
     for node in ast.walk(tree):
         if isinstance(node, ast.ImportFrom) and not node.level:
+            if node.module == "typing":  # of annotations, which lowering removes
+                assert [alias.name for alias in node.names] == ["Any"]
+                continue
             assert node.module == "math", f"line {node.lineno} imports {node.module}"
             assert {alias.name for alias in node.names} <= MATH, f"line {node.lineno}: not all of this is libm"
         assert not isinstance(node, ast.Import), f"line {node.lineno}: a whole module is imported"

@@ -24,7 +24,7 @@ from harness.studies.precision import advice, law_deviations
 from harness.studies.precision.figure import OTHER, draw
 from harness.studies.precision.literature_problems import load_more_model
 from harness.studies.precision.study import (
-    FMI3_INTERFACES,
+    FMI3_TOOLS,
     FMPY,
     FMU,
     FULL,
@@ -258,7 +258,7 @@ def test_a_user_model_is_studied_by_its_path_or_that_of_its_fmu(path, ending):
     name = (build_user_model(path) / path.name).with_suffix(ending)
     points = study_model(str(name), SweepSettings((1e-6,), 5.0, 0.0), lambda share: None)
     assert points.model == path.stem
-    assert {tool for tool, _ in points.solvers(points.cases[0])} == {FMU, FMPY, *FMI3_INTERFACES}
+    assert {tool for tool, _ in points.solvers(points.cases[0])} == {FMU, FMPY, *FMI3_TOOLS}
     best = {p.tool: p.largest for p in points.points if p.method == "dop853"}
     assert best[FMU] == best[FMPY] < 1e-3
 

@@ -1,6 +1,6 @@
 """Run the vector form of the numerics on numpy arrays."""
 
-from typing import get_args
+from typing import get_args, get_origin
 
 import numpy as np
 
@@ -79,7 +79,8 @@ def store_vectors_as_arrays(thing):
 
 def call_with_scalars(cls, name, types):
     """Wrap a method of the model so that it takes and returns vectors; a single contact needs no index."""
-    results = get_args(types.get("return")) or (types.get("return"),)
+    returned = types.get("return")
+    results = get_args(returned) if get_origin(returned) is tuple else (returned,)
 
     def call(self, t, *arguments):
         arguments = arguments[:-1] if ContactIndex in types.values() else arguments
