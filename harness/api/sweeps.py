@@ -79,7 +79,7 @@ def sweep(
     from ..studies.sweep.runner import SweepSpec
     from ..studies.sweep.sampling import SweepPoints, axis_from_numbers
 
-    library = optional("xarray", "a sweep", "sweep")
+    library, *_ = (optional(package, "a sweep", "sweep") for package in ("xarray", "dask", "netCDF4"))
     if not grid:
         raise SceneError("grid is empty: name at least one parameter and its values, as in {'mu_d': [0.3, 0.6]}")
     run = with_options(RunSpec(find_fmu(str(source)), follow=False), stop=stop, interface=interface, timeout=timeout)

@@ -12,7 +12,7 @@ from .terminal import POSITIVE, Terminal, result_options
     type=POSITIVE,
     default=300.0,
     show_default=True,
-    help="Seconds that all scenes of one setting may take.",
+    help="Seconds that one process may take, which runs the scenes of a setting. After a hang, another one goes on.",
 )
 @result_options
 def rivals(names: tuple[str, ...], timeout: float, terminal: Terminal) -> None:
@@ -28,10 +28,10 @@ def rivals(names: tuple[str, ...], timeout: float, terminal: Terminal) -> None:
       python -m harness rivals scipy mujoco
     """
     from ..studies.rivals import study as work
-    from ..studies.rivals.catalogue import RIVALS
+    from ..studies.rivals.catalogue import find_rivals
     from ..studies.rivals.table import rivals_table, sentences
 
-    with terminal.progress(len(RIVALS) + 1) as report:
+    with terminal.progress(len(find_rivals(names)) + 1) as report:
         comparison = work.run_rivals(names, timeout, terminal.out, report)
     terminal.print_result(
         comparison, rivals_table(comparison), "", *sentences(comparison), folder=terminal.out / work.FOLDER

@@ -75,8 +75,9 @@ def sweep(
         refuse_options(context, "without --random", "seed")
     if scheduler is not None:
         refuse_options(context, "with --scheduler: the cluster has its own workers", "workers")
-    if find_spec("xarray") is None:  # checked before the runs: the figure needs it afterwards
-        raise HarnessError("a sweep needs xarray: python -m pip install 'friction-fmus[sweep]'")
+    for package in ("xarray", "dask", "netCDF4"):  # checked before the runs, whose results they write
+        if find_spec(package) is None:
+            raise HarnessError(f"a sweep needs {package}: python -m pip install 'friction-fmus[sweep]'")
     from ..scenes.assignments import parse_assignment
     from ..scenes.fmu_files import find_fmu
     from ..scenes.run_spec import RunSpec

@@ -6,7 +6,7 @@ from typing import Any
 import fmpy
 import numpy as np
 
-from ..process.subprocess_runner import run_module
+from ..process.subprocess_runner import SubprocessTimeoutError, run_module
 from ..process.temporary_directory import temporary_directory
 from ..scenes.fmu_files import FOLDERS
 from ..scenes.run_spec import RunSpec
@@ -37,7 +37,11 @@ def native_equivalent(fmu: Path) -> Path:
         return fmu
     folder = PROCESS_RESOURCES.enter_context(temporary_directory("native-"))
     platform = ("--platform", fmpy.platform) if fmpy.platform in ("linux64", "win64", "darwin64") else ()
-    done = run_module("build_fmus", "", str(source), "--native", *platform, "--out", str(folder), timeout=BUILD_TIMEOUT)
+    arguments = (str(source), "--native", *platform, "--out", str(folder))
+    try:
+        done = run_module("build_fmus", "", *arguments, timeout=BUILD_TIMEOUT)
+    except SubprocessTimeoutError:
+        return fmu
     built = folder / fmu.name
     return built if not done.returncode and built.is_file() and is_same_model(fmu, built) else fmu
 

@@ -32,7 +32,7 @@ COMMANDS = {  # and a file or folder that exists once it has started
     "stability": (["stability"], "temporary/friction-fmus-bounded-*"),
     "bench": (["bench"], "out/.bench-*"),
     "importers": (["importers"], "temporary/friction-fmus-child-*"),
-    "sweep": (["sweep", "pacejka", "--vary", "x_m=0.001:0.1:3000", "--workers", "1"], "out/sweep/.*.journal"),
+    "sweep": (["sweep", "pacejka", "--vary", "x_m=0.001:0.1:3000", "--workers", "1"], "out/sweep/.*.checkpoint"),
 }
 
 
@@ -73,7 +73,9 @@ def test_a_signal_ends_a_command_and_leaves_nothing_behind(user_folder, tmp_path
     assert list((tmp_path / "temporary").iterdir()) == []
     files = [path.name for path in (tmp_path / "out").rglob("*") if path.is_file() or path.name.startswith(".")]
     if command == "sweep":
-        assert [name for name in files if not name.endswith(".journal")] == []  # completed work is kept
+        assert [
+            name for name in files if not name.endswith((".checkpoint", ".messages"))
+        ] == []  # finished runs are kept
     elif command == "main":
         assert [name for name in files if name.startswith(".")] == []  # completed scenes are intact
         assert len(list((tmp_path / "out").glob("*"))) < 8

@@ -14,7 +14,7 @@ from build_cache import build_once
 from harness.references.certified_reference import FOLDER, load_reference
 from harness.studies.rivals import child, study
 from harness.studies.rivals.catalogue import ENGINES, MAX_LINES, OTHERS, OWN, RIVALS, count_lines
-from harness.studies.rivals.child import RunReply, RunRequest, run_rival
+from harness.studies.rivals.child import RunReply, RunRequest, run_request
 from harness.studies.rivals.comparison import Comparison, Result
 from harness.studies.rivals.measures import match_events, measure
 from harness.studies.rivals.reference_motions import compute_reference_motion
@@ -63,7 +63,7 @@ def test_references_agree_with_the_certified_results(references, name):
 @pytest.mark.parametrize("name", SCENES)
 def test_scipy_with_events_by_hand_agrees_with_the_references(references, name):
     rival = RIVALS["scipy"]
-    measures = measure(SCENES[name], references[name], run_rival(RunRequest(rival.module, name, rival.best)))
+    measures = measure(SCENES[name], references[name], run_request(RunRequest(rival.module, name, rival.best)))
     assert measures.error < 1e-9
     assert (measures.creep, measures.missed, measures.spurious) == (0.0, 0, 0)
     assert isnan(measures.event_error) if name == "held" else measures.event_error < 1e-9
@@ -87,7 +87,7 @@ def test_our_fmus_are_exact_in_all_scenes(references, fmus, tmp_path, monkeypatc
     (tmp_path / "fmus" / "more").symlink_to(build_once("more-rivals", "belt", "clutch"))
     monkeypatch.chdir(tmp_path)
     for name, scene in SCENES.items():
-        measures = measure(scene, references[name], run_rival(RunRequest(OWN.module, name, OWN.best)))
+        measures = measure(scene, references[name], run_request(RunRequest(OWN.module, name, OWN.best)))
         assert measures.error < 1e-9, name
         assert (measures.creep, measures.missed, measures.spurious) == (0.0, 0, 0), name
 
@@ -126,11 +126,11 @@ def test_what_an_engine_raises_is_a_gap(engine):
     def diverges(scene, setting):
         return Motion(scene.times, np.full((len(scene.times), 3), np.nan), 1)
 
-    assert run_rival(engine(fails)).gap == "RuntimeError: the solver fell over"
-    assert run_rival(engine(diverges)).gap == "the result is not finite"
-    assert run_rival(RunRequest("no_such_engine", "rest", {})).gap.startswith("it cannot be imported: ")
+    assert run_request(engine(fails)).gap == "RuntimeError: the solver fell over"
+    assert run_request(engine(diverges)).gap == "the result is not finite"
+    assert run_request(RunRequest("no_such_engine", "rest", {})).gap.startswith("it cannot be imported: ")
     pytest.importorskip("mujoco", reason="extra rivals")
-    assert run_rival(RunRequest("mujoco", "sled", {})).gap == "frictionloss is one constant force"
+    assert run_request(RunRequest("mujoco", "sled", {})).gap == "frictionloss is one constant force"
 
 
 BROKEN = """
@@ -181,7 +181,7 @@ def test_a_slip_begins_and_ends_where_it_passes_the_level_even_within_one_step()
 
 def test_a_body_that_stays_where_it_should_move_has_its_error_and_no_events(references, engine):
     scene = SCENES["rest"]
-    measures = measure(scene, references["rest"], run_rival(engine(lambda scene, setting: at_rest(scene))))
+    measures = measure(scene, references["rest"], run_request(engine(lambda scene, setting: at_rest(scene))))
     assert measures.error == pytest.approx(np.abs(references["rest"].states[:, 0] - 0.1).max())
     assert (measures.missed, measures.spurious, measures.steps) == (32, 0, 7)
 

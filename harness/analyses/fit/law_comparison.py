@@ -33,8 +33,7 @@ def verdict(laws: Sequence[ComparedLaw], describes_record: bool) -> str:
     others = " and ".join(f"{law.difference:.3g} ({law.fmu})" for law in laws[1:])
     if close:
         names = " and ".join([best, *close])
-        return (
-            f"The records do not tell {names} apart: BIC higher by {others} than {best}; {CLEAR_DIFFERENCE:g} is clear."
-        )
+        higher = f"BIC higher by {others} than {best}; {CLEAR_DIFFERENCE:g} is clear"
+        return f"The records do not distinguish {names}: {higher}."
     doubt = "" if describes_record else ", which does not describe them either"
     return f"The records favour {best}{doubt}: its BIC is lower by {others}."

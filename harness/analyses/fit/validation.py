@@ -2,6 +2,8 @@
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from ...errors import HarnessError
 from .fit_course import FitCourse
 from .fit_description import column_residuals
@@ -23,6 +25,7 @@ def validate(problem: FitProblem, course: FitCourse, data: Sequence[RecordData])
     records, predictions = [], []
     for each in data:
         record = MeasuredRecord(each.name, each.t, each.y, each.inputs, each.sigma, problem.records[0].width > 1)
+        record.noise = np.where(record.noise > 0.0, record.noise, problem.records[0].noise)  # of a body at rest
         record.subdivide(problem.records[0].subdivision)
         prediction = problem.predict_record(course.z, record, 0, record.all)
         if prediction is None:

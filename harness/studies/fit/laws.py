@@ -6,6 +6,7 @@ from pathlib import Path
 
 from ...errors import SceneError, check_names
 from ...running.description import read_description
+from ...running.variable_values import variable_unit
 from .request import (
     READABLE,
     FitRequest,
@@ -72,17 +73,29 @@ def resolve_laws(request: FitRequest) -> ResolvedLaws:
             laws.append(resolve_request(law))
         except SceneError as error:
             raise SceneError(f"{name}: {error}") from None
+    for name in request.sigma:
+        units = {
+            variable_unit(variable) or "1"
+            for description in descriptions
+            for variable in description.modelVariables
+            if variable.name == name
+        }
+        if len(units) > 1:
+            raise SceneError(f"--sigma {name} has no single unit: it is in {' and '.join(sorted(units))}; leave it out")
     return ResolvedLaws(tuple(laws), tuple(notes))
 
 
 def law_names(fmus: list[Path]) -> list[str]:
-    """Return names that tell the FMUs apart; raise SceneError if one occurs twice."""
+    """Return a distinct name for each FMU; raise SceneError if one occurs twice."""
     paths = [fmu.resolve() for fmu in fmus]
     for i, path in enumerate(paths):
         if path in paths[:i]:
             raise SceneError(f"{fmus[i].stem} is to be compared with itself: give another FMU")
     stems = [fmu.stem for fmu in fmus]
-    return [
+    names = [
         stem if stems.count(stem) == 1 else f"{path.parent.name}/{stem}"
         for stem, path in zip(stems, paths, strict=True)
+    ]
+    return [
+        name if names.count(name) == 1 else str(path.with_suffix("")) for name, path in zip(names, paths, strict=True)
     ]

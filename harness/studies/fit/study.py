@@ -95,7 +95,9 @@ def fit_laws(
         try:
             fit = fit_tables(law, tables, lambda share: report((i + share) / count), averages, others)
         except HarnessError as error:
-            raise type(error)(f"{law.name}: {error}" if count > 1 else str(error)) from None
+            if count > 1:
+                error.args = (f"{law.name}: {error}", *error.args[1:])
+            raise
         return replace(fit, notes=(*fit.notes, *laws.notes[i]))
 
     fits = [fit_law(i, averages=True) for i in range(count)]

@@ -1,7 +1,6 @@
 """Runs rivals in a process of their own: reads requests as lines of JSON, and writes a line for each reply."""
 
 import json
-import os
 import sys
 from dataclasses import asdict, dataclass, field
 from importlib import import_module
@@ -10,6 +9,7 @@ from time import process_time
 import numpy as np
 
 from ...errors import HarnessError, first_line
+from ...process.subprocess_runner import open_replies
 from .scenes import SCENES, Changes, NotOfferedError, Setting
 
 REPEATS = 3  # of short runs
@@ -47,7 +47,7 @@ class RunReply:
     seconds: float = 0.0
 
 
-def run_rival(request: RunRequest) -> RunReply:
+def run_request(request: RunRequest) -> RunReply:
     """Run a rival; what it raises becomes a gap."""
     scene = SCENES[request.scene]
     try:
@@ -73,10 +73,9 @@ def run_rival(request: RunRequest) -> RunReply:
 
 def serve() -> None:
     """Answer the requests on standard input; what an engine prints goes to standard error."""
-    answers = os.fdopen(os.dup(1), "w")
-    os.dup2(2, 1)
+    replies = open_replies()
     for line in sys.stdin:
-        print(json.dumps(asdict(run_rival(RunRequest(**json.loads(line))))), file=answers, flush=True)
+        print(json.dumps(asdict(run_request(RunRequest(**json.loads(line))))), file=replies, flush=True)
 
 
 if __name__ == "__main__":

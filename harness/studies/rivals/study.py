@@ -1,4 +1,4 @@
-"""Runs all rivals in all scenes, each run in a process of its own, and writes rivals.csv and figure.svg."""
+"""Runs all rivals in all scenes, each setting in one process, and writes rivals.csv and figure.svg."""
 
 import json
 from collections.abc import Callable, Iterator
@@ -31,7 +31,7 @@ def run_rivals(names: tuple[str, ...], timeout: float, out: Path, report: Callab
     Parameters
     ----------
     names : names of rivals; the FMU of this project always runs, because times are relative to its own
-    timeout : seconds that the scenes of one setting may take
+    timeout : seconds that one process may take, which runs the scenes of a setting
     out : folder of results
     report : receives the name of each rival that runs
     """

@@ -61,10 +61,17 @@ class Checkpoint:
     def __init__(self, path: Path, runs: int, columns: int) -> None:
         self.path, self.message_path, self.runs = path, path.with_suffix(".messages"), runs
         self.dtype = np.dtype([("status", "<i8"), ("values", "<f8", (columns,))])
+        self.damaged, self.n_done = False, 0
+        self.read()
+
+    def read(self) -> None:
+        """Read how many runs are done."""
         with self.os_errors_reported():
-            self.damaged = path.exists() and not self.is_intact()
-            use_file = path.exists() and not self.damaged
-            self.n_done = int(np.count_nonzero(self.array["status"])) if use_file else 0
+            self.unmap()
+            exists = self.path.exists()
+            is_intact = exists and self.is_intact()
+            self.damaged |= exists and not is_intact
+            self.n_done = int(np.count_nonzero(self.array["status"])) if is_intact else 0
 
     @contextmanager
     def os_errors_reported(self) -> Iterator[None]:
@@ -112,7 +119,7 @@ class Checkpoint:
     def open(self) -> Iterator[None]:
         """Open the files for writing; create them if there are none that can be used.
 
-        Raises HarnessError if another command has them open.
+        At the end they are deleted if no run is done.  Raises HarnessError if another command has them open.
         """
         with ExitStack() as files:
             with self.os_errors_reported():
@@ -122,9 +129,15 @@ class Checkpoint:
                     files.enter_context(lock_path(self.message_path))
                 except BlockingIOError:
                     raise HarnessError("another command runs this sweep; wait until it has finished") from None
+                self.read()  # again: another command may have finished meanwhile
                 if not self.n_done:
                     self.create()
-            yield
+            try:
+                yield
+            finally:
+                if not self.n_done:
+                    self.message_file.close()
+                    self.delete()
 
     def create(self) -> None:
         """Create the array, with the status MISSING for each run, and remove all messages.

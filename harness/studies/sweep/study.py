@@ -67,19 +67,18 @@ def run_pending(
 ) -> float:
     """Do the remaining runs and write them to the checkpoint; return the elapsed time in s."""
     start = perf_counter()
-    pending = checkpoint.missing_spans
-    if not pending:
+    if not checkpoint.missing_spans:
         return 0.0
     try:
-        with open_workers(scheduler, workers, sum(last - first for first, last in pending)) as pool, checkpoint.open():
-            for block in Dispatcher(sweep, pool, pending).completed_blocks():
-                checkpoint.add(block)
-                report(checkpoint.n_done / len(sweep.points))
+        with checkpoint.open():
+            pending = checkpoint.missing_spans
+            with open_workers(scheduler, workers, sum(last - first for first, last in pending)) as pool:
+                for block in Dispatcher(sweep, pool, pending).completed_blocks():
+                    checkpoint.add(block)
+                    report(checkpoint.n_done / len(sweep.points))
     except BaseException as error:  # an interrupt may cause any exception
         if not (RECEIVED_SIGNALS or isinstance(error, KeyboardInterrupt)):
             raise
-        if not checkpoint.n_done:
-            checkpoint.delete()
         state = f"{checkpoint.n_done} of {len(sweep.points)} runs are finished"
         raise CommandInterruptedError(f"interrupted: {state}; repeat the command to resume") from None
     return perf_counter() - start
