@@ -112,9 +112,8 @@ class EmbeddedModel:
     def solver_attribute(self, name: str) -> str:
         """Return the solver's attribute for a state or mode: h_ if h means something else to the solver."""
         others = {*self.model.states, *self.model.contacts} - {name}
-        return next(
-            one for one in (f"{name}__", f"{name}_", name) if hasattr(self.model.solver, one) and one not in others
-        )
+        candidates = (f"{prefix}{name}{'_' * n}" for prefix in ("own_", "") for n in (3, 2, 1, 0))
+        return next(one for one in candidates if hasattr(self.model.solver, one) and one not in others)
 
     def compute_states(self, times: list[float], timeout: float | None = None) -> list[tuple[float, ...]]:
         """Return the states at the times, starting at 0 s.

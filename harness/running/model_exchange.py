@@ -4,6 +4,7 @@ The absolute tolerance is the relative one times the nominal values of the FMU. 
 sliding friction, CVode misses reversals that only touch v = 0.
 """
 
+import os
 from collections.abc import Callable
 from math import inf
 from typing import Any
@@ -19,11 +20,14 @@ from .stepping import TimeGrid
 MAX_CVODE_STEPS = 100_000  # between two points
 MAX_EVENTS = 1000  # at one time
 
+for log_file in ("SUNLOGGER_ERROR_FILENAME", "SUNLOGGER_WARNING_FILENAME"):
+    os.environ.setdefault(log_file, os.devnull)  # fmpy raises the messages that CVode would print
+
 
 class CheckedCVode(CVodeSolver):
     """CVode that counts right-hand sides, reports that it works, and stops at a failed FMI call."""
 
-    error: Exception | None = None
+    error: BaseException | None = None
     n_rhs = 0
 
     def __init__(self, report_work: Callable[[], Any], **options: Any) -> None:
@@ -32,8 +36,12 @@ class CheckedCVode(CVodeSolver):
 
     def f(self, t: float, *arguments: Any) -> int:
         self.n_rhs += 1
-        self.input.apply(t)  # fmpy sets inputs at the ends of its steps only
-        return self.call_checked(super().f, t, *arguments)
+        return self.call_checked(self.set_inputs_and_rates, t, *arguments)
+
+    def set_inputs_and_rates(self, t: float, *arguments: Any) -> int:
+        """Set the inputs, which fmpy sets at the ends of its steps only, and compute the rates."""
+        self.input.apply(t)
+        return int(super().f(t, *arguments))
 
     def g(self, *arguments: Any) -> int:
         return self.call_checked(super().g, *arguments)
@@ -43,7 +51,7 @@ class CheckedCVode(CVodeSolver):
         try:
             self.report_work()
             return call(*arguments)
-        except Exception as error:
+        except BaseException as error:  # an interrupt, too
             self.error = error
             return -1
 

@@ -32,7 +32,8 @@ from .variable_values import convert_value, effective_value, enumeration_labels,
 ProgressCallback = Callable[[float], None]  # receives the progress of a run, from 0 to 1
 
 MAX_POINTS = 10_000_000  # of a grid
-REPORT_INTERVAL = 4096  # communication points
+REPORT_INTERVAL = 4096  # communication points at most, from one report of the progress to the next
+MIN_REPORTS = 50  # of the progress in a run on a grid: a report also checks the time limit
 MAX_CVODE_STEPS = 500  # of model exchange, from point to point: the limit of fmpy's simulate_fmu
 
 
@@ -123,6 +124,8 @@ def open_session(spec: RunSpec, unpacked: Path | None = None) -> Iterator[FmuSes
 def plan_run(spec: RunSpec, description: Any) -> RunPlan:
     """Resolve times and variables of a run; add the variables that expose internal steps and events."""
     variables = {variable.name: variable for variable in description.modelVariables}
+    if spec.exchange:
+        spec = replace(spec, follow=False)  # the solver of the FMU takes no steps
     start, stop = resolve_time_span(spec, description)
     check_inputs(spec.inputs, variables)
     if spec.grid is None and spec.equal_steps:
@@ -202,7 +205,8 @@ def record_run(plan: RunPlan, session: FmuSession, report: ProgressCallback) -> 
         return RecordedRun(*read_rows(rows.getbuffer(), chosen, session.is_fmi2), exchange.solver.n_rhs)
     next_step = recorder.cell("solver.t_next") if spec.follow else None
     stepper = CoSimulation(session, grid, signals, next_step)
-    step_to_stop(stepper, grid, recorder.record, report, REPORT_INTERVAL)
+    interval = max(1, min(REPORT_INTERVAL, grid.whole_count // MIN_REPORTS)) if grid.h < inf else REPORT_INTERVAL
+    step_to_stop(stepper, grid, recorder.record, report, interval)
     return RecordedRun(*read_rows(rows.getbuffer(), chosen, session.is_fmi2), session.get("solver.evaluations"))
 
 

@@ -274,6 +274,7 @@ def run_in_child(
 ) -> np.ndarray | bool | None:
     """Run as requested, or load the FMU if nothing is requested."""
     instance = cached_run(fmu, settings, limit)
+    instance.prepared.clear()  # the arrays of each request are new here
     return instance.run(request) if request else True
 
 

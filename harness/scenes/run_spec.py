@@ -46,7 +46,7 @@ class RunSpec:
     repeat : int
         Number of timed repetitions.
     tolerance : float
-        Tolerance of the step refinement of external FMUs.
+        Tolerance of the step refinement of external FMUs, or of the solver in model exchange.
     exchange : bool
         Whether to use model exchange; automatic if the FMU offers nothing else. External FMUs only.
     lenient : bool

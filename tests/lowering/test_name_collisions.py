@@ -33,8 +33,13 @@ class Mine(Model):
 SLED = BELT.replace(" - 0.5 * u", "")
 # For position, speed, rate and mode: local names, attributes, constants, stages of each other, names in the C code.
 NAMES = {
-    SLED: [("y", "v", "e", "modes"), ("x", "x1", "x0", "x_1")],
-    BELT: [("h", "size", "end", "i"), ("OVERFLOW_LIMIT", "d_x", "to", "tie_tolerance")],
+    SLED: [("y", "v", "e", "modes"), ("x", "x1", "x0", "x_1"), ("y_1", "y_2", "f_1", "modes_a")],
+    BELT: [
+        ("h", "size", "end", "i"),
+        ("OVERFLOW_LIMIT", "d_x", "to", "tie_tolerance"),
+        ("x", "e_x", "u_x", "mode"),  # the last of them components of vectors of the methods
+        ("x", "v", "driver_x", "x_v"),  # an entry of the Jacobian
+    ],
 }
 NATIVE = ("--native", "--platform", "linux64")
 INDICATORS = [f"events.{kind}_mode{n}" for kind in ("to_rest", "to_break_away") for n in (1, 2)]

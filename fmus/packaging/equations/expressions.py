@@ -133,6 +133,8 @@ def as_operand(e: Operand) -> Operand:
     """Return an expression unchanged and a number as float; raise ModelError for anything else."""
     if isinstance(e, Expression):
         if is_comparison(e):
+            if isinstance(e, Term) and e.op == "==":
+                raise ModelError(NO_EQUALITY)
             raise ModelError("a comparison is no number: it can only be the first argument of choose() or of a Rule")
         return e
     if not is_number(e):

@@ -18,6 +18,7 @@ ELEMENTWISE = {
 }
 SELECTIONS = ("select_kinematic", "dynamic_part", "kinematic_rates")
 named_vector = cache(NAMED_VECTOR.fullmatch)  # thousands of names, most of them several times
+PREFIX = "own_"  # of names of a model that look like those of vectors
 VECTOR_KINDS = {"StateVector": STATES, "RateVector": STATES, "ContactVector": CONTACTS}
 
 
@@ -128,16 +129,20 @@ class SourceSymbols:
         """Return the names of states, rates and modes in the runtime.
 
         They are those of the model, with underscores where a component of a vector would get a name that has another
-        meaning in the same function or class, or is a component of another vector.
+        meaning in the same function or class, or is a component of another vector.  A name like y_1, which is that of a
+        vector whatever follows it, gets a prefix.
         """
         stems: dict[str, set[str]] = {name: set() for name in (*states, *states.values(), *modes)}
         for stem, names in ("y", states), ("f", states.values()), ("modes", modes):
             for name in names:
                 stems[name].add(stem)
         result: dict[str, str] = {}
-        used: set[str] = set()
+        vectors = {vector for scope in self.scopes if scope.named_vectors for vector in scope.other_vectors}
+        used = {f"{vector}_{name}" for vector in vectors for name in stems}
+        used |= {f"{rate}_{state}" for rate in states.values() for state in states}  # entries of the Jacobian
         for name, own in stems.items():
-            candidates = (name + "_" * n for n in count())
+            first = f"{PREFIX}{name}" if NAMED_VECTOR.fullmatch(f"{name}_") else name
+            candidates = (first + "_" * n for n in count())
             result[name] = next(
                 one
                 for one in candidates
