@@ -19,9 +19,7 @@ from .stepping import TimeGrid
 
 MAX_CVODE_STEPS = 100_000  # between two points
 MAX_EVENTS = 1000  # at one time
-
-for log_file in ("SUNLOGGER_ERROR_FILENAME", "SUNLOGGER_WARNING_FILENAME"):
-    os.environ.setdefault(log_file, os.devnull)  # fmpy raises the messages that CVode would print
+LOG_FILES = ("SUNLOGGER_ERROR_FILENAME", "SUNLOGGER_WARNING_FILENAME")  # environment variables of CVode
 
 
 class CheckedCVode(CVodeSolver):
@@ -32,7 +30,13 @@ class CheckedCVode(CVodeSolver):
 
     def __init__(self, report_work: Callable[[], Any], **options: Any) -> None:
         self.report_work, self.max_steps = report_work, options["maxNumSteps"]
-        super().__init__(**options)
+        before = dict(os.environ)
+        os.environ.update(dict.fromkeys(LOG_FILES, os.devnull) | before)  # fmpy raises what CVode would print
+        try:
+            super().__init__(**options)
+        finally:
+            for name in {*LOG_FILES} - {*before}:
+                del os.environ[name]
 
     def f(self, t: float, *arguments: Any) -> int:
         self.n_rhs += 1
