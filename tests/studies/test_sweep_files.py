@@ -26,7 +26,7 @@ from harness.studies.sweep.study import Sweep
 def test_memory_use_does_not_grow_with_the_number_of_runs(monkeypatch, tmp_path):
     """The parts of a sweep that handle every run, with ten times as many of them."""
     monkeypatch.setattr(figure, "draw", lambda *arguments: None)
-    monkeypatch.setattr(writing, "CHUNK_SIZE", "8 KiB")
+    monkeypatch.setattr(writing, "CHUNK_SIZE", "40 KiB")
     peaks = []
     for many in (20, 200):
         axes = parse_axis(f"a=0:1:{many}", False), parse_axis("b=0:1:100", False)
