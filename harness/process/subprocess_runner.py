@@ -129,13 +129,13 @@ def limit_memory(size: int) -> None:
 
 def open_replies() -> TextIO:
     """In a child process, return standard output and redirect other output to standard error; exit with the parent."""
-    Thread(target=exit_with_parent, args=(os.getppid(),), daemon=True).start()
+    Thread(target=exit_when_orphaned, args=(os.getppid(),), daemon=True).start()
     replies = os.fdopen(os.dup(1), "w")
     os.dup2(2, 1)
     return replies
 
 
-def exit_with_parent(parent: int) -> None:
+def exit_when_orphaned(parent: int) -> None:
     """Exit once the process has another parent: the one that started it was killed."""
     while os.getppid() == parent:
         sleep(ORPHAN_INTERVAL)

@@ -61,7 +61,7 @@ def test_references_agree_with_the_certified_results(references, name):
 
 
 @pytest.mark.parametrize("name", SCENES)
-def test_scipy_with_events_by_hand_agrees_with_the_references(references, name):
+def test_scipy_with_programmed_events_agrees_with_the_references(references, name):
     rival = RIVALS["scipy"]
     measures = measure(SCENES[name], references[name], run_request(RunRequest(rival.module, name, rival.best)))
     assert measures.error < 1e-9

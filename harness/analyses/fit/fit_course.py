@@ -1,4 +1,4 @@
-"""Course of a fit: search, refinement, rivals and intervals."""
+"""Course of a fit: search, refinement, other minima and intervals."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -19,8 +19,8 @@ MAX_SUBDIVISION = 32  # of the intervals between samples of inputs
 INPUT_CHANGE = 0.1  # of the noise, at which a finer subdivision is not needed
 SPLINE_RATIO = 15.0  # differences of splines through half of the samples, in errors of that through all
 MAX_THIN, THIN = 3000, 2000  # samples above which a search uses fewer, and their number
-DRAWS, MAX_RIVALS, DRAW_SIZE = 24, 8, 0.3  # starts for rival minima
-RIVAL_SAMPLES = 500  # of each record, in which rival minima are sought first
+DRAWS, MAX_OTHER_MINIMA, DRAW_SIZE = 24, 8, 0.3  # starts for other minima
+COARSE_SAMPLES = 500  # of each record, in which other minima are sought first
 ROUNDS = 6  # starts, all but the first from better minima
 SHALLOW = 0.1  # variances of the residuals by which a minimum must be lower to count as better
 
@@ -33,7 +33,7 @@ class FitCourse:
     uncertainty: Uncertainty
     ends: dict[tuple[int, int], float | None]
     profiles: dict[tuple[int, int], tuple[tuple[float, float], ...]]
-    rivals: list[np.ndarray]
+    other_minima: list[np.ndarray]
     doubts: list[str]
     log: list[str]
     n_searches: int
@@ -93,18 +93,19 @@ def find_course(
     z, input_error = result.best[1], subdivide_inputs(problem, result.best[1])
     ends: dict[tuple[int, int], float | None] = {}
     profiles: dict[tuple[int, int], tuple[tuple[float, float], ...]] = {}
-    rivals: list[Minimum] = []
+    minima: list[Minimum] = []
     sides = [(i, side) for i in range(len(z)) for side in (-1, 1)]
-    sought = np.inf  # squares at which rivals were sought
+    searched_squares = np.inf  # at the last search for other minima
     for remaining in reversed(range(ROUNDS)):
         squares, z = problem.minimize(z, problem.all, 30, 1e-9, central=True)
         check_motion(problem, squares)
         uncertainty = estimate_uncertainty(problem, z, input_error, float(noise_is_known))
         report(0.6)
-        if squares < sought - uncertainty.variance:
-            rivals, sought = find_rivals(problem, z, uncertainty, result.minima, squares), squares
-            if remaining and rivals and rivals[0][0] < squares - SHALLOW * uncertainty.variance:
-                z = rivals[0][1]
+        if squares < searched_squares - uncertainty.variance:
+            minima = find_other_minima(problem, z, uncertainty, result.minima, squares)
+            searched_squares = squares
+            if remaining and minima and minima[0][0] < squares - SHALLOW * uncertainty.variance:
+                z = minima[0][1]
                 continue
         better = None
         for n, (i, side) in enumerate(sides):
@@ -119,7 +120,7 @@ def find_course(
             break
     else:
         doubts.append("The sum of squares has many shallow minima here: the values may lie anywhere in the intervals.")
-    others = [there for _, there in rivals if np.abs(there - z).max() > DISTINCT]
+    others = [there for _, there in minima if np.abs(there - z).max() > DISTINCT]
     extend_ends(problem, z, uncertainty, ends, others)
     return FitCourse(z, uncertainty, ends, profiles, others, doubts, result.log, result.n_searches)
 
@@ -127,12 +128,12 @@ def find_course(
 def starting_points(problem: FitProblem, warm: np.ndarray | None) -> np.ndarray:
     """Return the coordinates (m, k) of given start values and of an earlier fit."""
     middle = (problem.low + problem.high) / 2
-    given = [
+    start_values = [
         middle[i] if unknown.start is None else unknown.to_coordinate(unknown.start)
         for i, unknown in enumerate(problem.unknowns)
     ]
     has_start = any(unknown.start is not None for unknown in problem.unknowns)
-    starts = ([np.array(given)] if has_start else []) + ([] if warm is None else [warm])
+    starts = ([np.array(start_values)] if has_start else []) + ([] if warm is None else [warm])
     return np.array(starts).reshape(len(starts), len(problem.unknowns))
 
 
@@ -188,25 +189,23 @@ def subdivide_inputs(problem: FitProblem, z: np.ndarray) -> np.ndarray:
     return none if coarse is None or before is None else (coarse - before) / SPLINE_RATIO
 
 
-def find_rivals(
+def find_other_minima(
     problem: FitProblem, z: np.ndarray, uncertainty: Uncertainty, minima: list[Minimum], squares: float
 ) -> list[Minimum]:
     """Return minima about as low as that at z (k,), found from those of the search and from draws around z."""
-    limit, random = (
-        uncertainty.variance * uncertainty.inflation.max() * uncertainty.quantile**2,
-        np.random.default_rng(0),
-    )
-    starts = [there for value, there in distinct(minima, MAX_RIVALS) if value < squares + 3 * limit]
+    limit = uncertainty.variance * uncertainty.inflation.max() * uncertainty.quantile**2
+    random = np.random.default_rng(0)
+    starts = [there for value, there in distinct(minima, MAX_OTHER_MINIMA) if value < squares + 3 * limit]
     eigenvalues, axes = np.linalg.eigh(uncertainty.covariance * uncertainty.inflation.mean())
     reach = 2 * np.minimum(np.sqrt(np.maximum(eigenvalues, 0.0)), DRAW_SIZE)
     starts += [z + axes @ (reach * random.normal(size=len(z))) for _ in range(DRAWS)]
     steps = 25 if problem.central else 12
-    if problem.n_samples > 2 * RIVAL_SAMPLES * len(problem.records):
-        few = tuple(np.unique(np.linspace(0, index[-1], RIVAL_SAMPLES).astype(int)) for index in problem.all)
+    if problem.n_samples > 2 * COARSE_SAMPLES * len(problem.records):
+        few = tuple(np.unique(np.linspace(0, index[-1], COARSE_SAMPLES).astype(int)) for index in problem.all)
         coarse = distinct([problem.minimize(start, few, steps, 1e-4) for start in starts], len(starts))
         starts = [there for value, there in coarse if value < coarse[0][0] + 3 * limit]
-    found = [problem.minimize(start, problem.all, steps, 1e-6) for start in starts]
-    return distinct([each for each in found if each[0] < squares + limit], len(found))
+    ends = [problem.minimize(start, problem.all, steps, 1e-6) for start in starts]
+    return distinct([end for end in ends if end[0] < squares + limit], len(ends))
 
 
 def extend_ends(
@@ -214,11 +213,11 @@ def extend_ends(
     z: np.ndarray,
     uncertainty: Uncertainty,
     ends: dict[tuple[int, int], float | None],
-    rivals: list[np.ndarray],
+    other_minima: list[np.ndarray],
 ) -> None:
-    """Follow the profile on from the rival that lies farthest out, if it lies where an interval ends or beyond."""
+    """Follow the profile from the minimum that lies farthest out, if it lies where an interval ends or beyond."""
     for (i, side), end in ends.items():
-        farthest = max(rivals, key=lambda there: side * float(there[i]), default=z)
+        farthest = max(other_minima, key=lambda there: side * float(there[i]), default=z)
         if end is not None and side * (farthest[i] - z[i]) > 0.5 * abs(end - z[i]):
             other = profile_bound(problem, farthest, uncertainty, i, side, ends_at_better=False).end
             ends[i, side] = None if other is None else side * max(side * other, side * end)

@@ -69,13 +69,13 @@ def column_residuals(
     records: Sequence[MeasuredRecord], residuals: Sequence[np.ndarray], outputs: Sequence[str]
 ) -> tuple[ColumnResiduals, ...]:
     """Return the residuals of every observed column of every record, from those in units of the noise."""
-    found = []
+    columns = []
     for record, e in zip(records, residuals, strict=True):
         rms = np.sqrt(np.mean(e**2, axis=0)) * record.noise
         for j, name in enumerate(outputs):
             size = float(np.ptp(record.y[:, j]))
-            found.append(ColumnResiduals(record.name, name, "", float(rms[j]), float(record.noise[j]), size))
-    return tuple(found)
+            columns.append(ColumnResiduals(record.name, name, "", float(rms[j]), float(record.noise[j]), size))
+    return tuple(columns)
 
 
 def make_estimates(problem: FitProblem, course: FitCourse, is_unfit: bool) -> tuple[tuple[Estimate, ...], list[str]]:
@@ -88,10 +88,10 @@ def make_estimates(problem: FitProblem, course: FitCourse, is_unfit: bool) -> tu
             estimates.append(Estimate(unknown.name, value, nan, nan, nan, unknown.unit, ""))
             continue
         sides = {side: course.ends[i, side] for side in (-1, 1)}
-        for rival in course.rivals:
+        for minimum in course.other_minima:
             for side, end in sides.items():
-                if end is not None and (rival[i] - end) * side > 1e-3 * abs(z[i] - end):
-                    sides[side] = float(rival[i])
+                if end is not None and (minimum[i] - end) * side > 1e-3 * abs(z[i] - end):
+                    sides[side] = float(minimum[i])
                     several.append(unknown.name)
         low, high = unknown.value_interval(sides[-1], sides[1])
         deviation = unknown.error_of(float(uncertainty.deviations[i]), value)
@@ -106,7 +106,7 @@ def make_estimates(problem: FitProblem, course: FitCourse, is_unfit: bool) -> tu
 
 def make_profiles(problem: FitProblem, course: FitCourse) -> tuple[Profile, ...]:
     """Return the profiles of the unknowns, where the squares with each value are finite."""
-    found = []
+    profiles = []
     for i, unknown in enumerate(problem.unknowns):
         points = sorted(
             (unknown.to_value(coordinate), excess)
@@ -116,8 +116,8 @@ def make_profiles(problem: FitProblem, course: FitCourse) -> tuple[Profile, ...]
                 *course.profiles.get((i, 1), ()),
             )
         )
-        found.append(Profile(unknown.name, *zip(*points, strict=True)))
-    return tuple(found)
+        profiles.append(Profile(unknown.name, *zip(*points, strict=True)))
+    return tuple(profiles)
 
 
 def unfit_remark(columns: Sequence[ColumnResiduals]) -> list[str]:

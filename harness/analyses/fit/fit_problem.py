@@ -108,11 +108,14 @@ class FitProblem:
             ((y - (record.y if index is record.all else record.part(index).y)) / record.noise).ravel()
             for y, record, index in zip(predicted, self.records, selection, strict=True)
         ]
-        e = np.concatenate(parts)
-        if self.robust:
-            size = np.abs(e)
-            e = np.where(size > HUBER, np.sign(e) * np.sqrt(np.maximum(2 * HUBER * size - HUBER**2, 0.0)), e)
-        return e
+        return self.limit_outliers(np.concatenate(parts))
+
+    def limit_outliers(self, e: np.ndarray) -> np.ndarray:
+        """Return residuals in units of the noise whose squares are those of Huber's loss, if the fit is robust."""
+        if not self.robust:
+            return e
+        size = np.abs(e)
+        return np.where(size > HUBER, np.sign(e) * np.sqrt(np.maximum(2 * HUBER * size - HUBER**2, 0.0)), e)
 
     def is_refused(self, z: np.ndarray) -> bool:
         """Return whether the FMU refuses the values at the start."""

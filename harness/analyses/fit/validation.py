@@ -33,7 +33,8 @@ def validate(problem: FitProblem, course: FitCourse, data: Sequence[RecordData])
         records.append(record)
         predictions.append(prediction)
     residuals = [
-        (prediction - record.y) / record.noise for record, prediction in zip(records, predictions, strict=True)
+        problem.limit_outliers((prediction - record.y) / record.noise)
+        for record, prediction in zip(records, predictions, strict=True)
     ]
     return Validation(column_residuals(records, residuals, problem.outputs), tuple(records), tuple(predictions))
 

@@ -23,7 +23,7 @@ HIGHEST_EXCESS = 2.0  # of a profile, in units of the limit of the 95 % interval
 
 @dataclass(frozen=True)
 class FittedColumn:
-    """A column of a record, what each law says of it, and the title of its panel."""
+    """A column of a record, the prediction of each law for it, and the title of its panel."""
 
     column: ColumnResiduals
     record: MeasuredRecord
@@ -65,13 +65,13 @@ def fitted_columns(laws: Sequence[ParameterFit]) -> list[FittedColumn]:
     if validation := laws[0].validation:
         signals = [law.validation.predictions for law in laws if law.validation]
         parts.append((validation.columns, validation.records, signals, ", for validation: not fitted"))
-    found = []
+    fitted = []
     for columns, records, predictions, text in parts:
         for n, column in enumerate(columns):
             i, j = divmod(n, predictions[0][0].shape[1])
             signals_of_laws = tuple(each[i][:, j] for each in predictions)
-            found.append(FittedColumn(column, records[i], j, signals_of_laws, f"{column.record}{text}"))
-    return found
+            fitted.append(FittedColumn(column, records[i], j, signals_of_laws, f"{column.record}{text}"))
+    return fitted
 
 
 def plot_column(panels: np.ndarray, laws: Sequence[ParameterFit], fitted: FittedColumn) -> None:

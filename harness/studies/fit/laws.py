@@ -6,7 +6,6 @@ from pathlib import Path
 
 from ...errors import SceneError, check_names
 from ...running.description import read_description
-from ...running.variable_values import variable_unit
 from .request import (
     READABLE,
     FitRequest,
@@ -74,12 +73,7 @@ def resolve_laws(request: FitRequest) -> ResolvedLaws:
         except SceneError as error:
             raise SceneError(f"{name}: {error}") from None
     for name in request.sigma:
-        units = {
-            variable_unit(variable) or "1"
-            for description in descriptions
-            for variable in description.modelVariables
-            if variable.name == name
-        }
+        units = {law.variables[name].unit or "1" for law in laws}
         if len(units) > 1:
             raise SceneError(f"--sigma {name} has no single unit: it is in {' and '.join(sorted(units))}; leave it out")
     return ResolvedLaws(tuple(laws), tuple(notes))

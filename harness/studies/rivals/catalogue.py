@@ -81,7 +81,7 @@ OWN = Rival(
     "co-simulation in any FMI tool; stick and slip are modes",
 )
 STEP = 1e-4  # s, of the engines with constant steps at their best
-BY_HAND = "stick and slip are written by hand, here for one contact"
+USER_EVENTS = "the user programs stick and slip as events, here for one contact"
 CONTACTS = "robots with contacts; they creep below stiction_tolerance, and joints have no dry friction"
 OTHERS = (
     Rival(
@@ -91,7 +91,7 @@ OTHERS = (
         "scipy",
         {},
         {"method": "DOP853", "rtol": 1e-12, "atol": 1e-14},
-        f"general ODEs; {BY_HAND}",
+        f"general ODEs; {USER_EVENTS}",
     ),
     Rival(
         "pathsim",
@@ -100,7 +100,7 @@ OTHERS = (
         "pathsim",
         {},
         {"Solver": "RKDP87", "tolerance_lte_rel": 1e-10, "tolerance_lte_abs": 1e-12, "event_tolerance": 1e-10},
-        f"block diagrams with events; {BY_HAND}",
+        f"block diagrams with events; {USER_EVENTS}",
     ),
     Rival(
         "drake-events",
@@ -109,7 +109,7 @@ OTHERS = (
         "drake",
         {},
         {"accuracy": 1e-10},
-        f"general systems with witness functions; {BY_HAND}",
+        f"general systems with witness functions; {USER_EVENTS}",
     ),
     Rival(
         "drake-discrete",

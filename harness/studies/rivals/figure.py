@@ -42,7 +42,8 @@ def plot_rival(axes: Any, comparison: Comparison, rival: Rival, scene: Scene, st
     results = [result for result in comparison.of_scene(scene) if result.rival == rival.title]
     results.sort(key=lambda result: list(rival.settings).index(result.setting))
     points = [(comparison.time_ratio(r), max(r.measures.error, FLOOR)) for r in results if r.measures]
-    axes.plot(*zip(*points, strict=True), color=style["color"], linewidth=0.8, alpha=0.6) if points else None
+    if points:
+        axes.plot(*zip(*points, strict=True), color=style["color"], linewidth=0.8, alpha=0.6)
     for point, result in zip(points, results, strict=True):
         face = style["color"] if result.setting == "best" else "none"
         axes.plot(*point, linestyle="", markersize=9 if rival is OWN else 6, markerfacecolor=face, **style)

@@ -237,12 +237,10 @@ def build_dataset(sweep: Sweep, checkpoint: Checkpoint, about: SweepDescription,
 
     values, status = checkpoint.array["values"], lazy(checkpoint.array["status"])
     attributes_of = axis_attributes(sweep, about)
-    coordinates = {
-        name: (name, np.array(axis.values), attributes_of[name])
-        if is_grid
-        else ("run", points.sample[:, i], attributes_of[name])
-        for i, (name, axis) in enumerate(zip(names, points.axes, strict=True))
-    }
+    coordinates = {}
+    for i, axis in enumerate(points.axes):
+        dimension, coordinate = (axis.name, np.array(axis.values)) if is_grid else ("run", points.sample[:, i])
+        coordinates[axis.name] = dimension, coordinate, attributes_of[axis.name]
     variables = {
         column.name: (dimensions, lazy(values[:, i]), {"units": column.unit or "1", "long_name": column.text})
         for i, column in enumerate(about.columns)

@@ -1,4 +1,4 @@
-"""Drake: a system with witness functions, written by hand; the integrator stops where one of them falls to zero."""
+"""Drake: a system with witness functions; the integrator stops where one of them falls to zero."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""PathSim: an ODE block, and zero crossings at which the mode is changed by hand."""
+"""PathSim: an ODE block, and zero crossings whose functions change the mode."""
 
 from typing import Any
 

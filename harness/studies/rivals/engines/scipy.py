@@ -1,4 +1,4 @@
-"""scipy: solve_ivp, restarted by hand at every change of mode."""
+"""scipy: solve_ivp, restarted at every change of mode."""
 
 from typing import Any
 
