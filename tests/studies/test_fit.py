@@ -143,6 +143,16 @@ def test_the_values_predict_a_record_that_was_not_fitted():
     assert [len(record.t) for record in found.validation.records] == [150, len(T)]
     (remark,) = (remark for remark in found.remarks if "do not predict" in remark)
     assert "do not predict x in the validation record 2" in remark
+    rest = harness.fit(native("stickslip"), pull(), validate=same.assign(x=0.05), **arguments)
+    (column,) = rest.validation.columns
+    assert column.residual == pytest.approx(np.sqrt(np.mean((0.05 - rest.validation.predictions[0]) ** 2)))
+    assert column.noise == found.columns[0].noise  # a record at rest has none of its own
+    spikes = np.where(np.arange(150) % 50 == 25, 20.0 * good.noise, 0.0)
+    spiked = harness.fit(
+        native("stickslip"), pull(), validate=same.assign(x=same["x"] + spikes), robust=True, **arguments
+    )
+    assert spiked.validation.columns[0].residual > 2.5 * spiked.validation.columns[0].noise
+    assert not any("do not predict" in remark for remark in spiked.remarks)
     arguments |= {"free": {"mu_s": None, "x0": (-0.1, 0.1)}}
     with pytest.raises(SceneError, match="x0 has a value of its own for each record, and none for the validation"):
         harness.fit(native("stickslip"), [same, same], validate=same, each=["x0"], **arguments)

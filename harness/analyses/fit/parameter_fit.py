@@ -38,11 +38,12 @@ class Profile:
 
 @dataclass(frozen=True)
 class Validation:
-    """Records that were not fitted: residuals of each column, samples, and the predicted signals (n, columns)."""
+    """Records that were not fitted: residuals of each column, samples, predicted signals (n, columns), and remarks."""
 
     columns: tuple[ColumnResiduals, ...]
     records: tuple[MeasuredRecord, ...]
     predictions: tuple[np.ndarray, ...]
+    remarks: tuple[str, ...]
 
 
 @dataclass(frozen=True)

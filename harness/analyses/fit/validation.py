@@ -1,6 +1,6 @@
 """Validation of a fit: what its values predict for records that were not fitted."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -9,7 +9,8 @@ from .fit_course import FitCourse
 from .fit_description import column_residuals
 from .fit_problem import FitProblem
 from .measured_record import MeasuredRecord, RecordData
-from .parameter_fit import ParameterFit, Validation
+from .parameter_fit import ColumnResiduals, Validation
+from .uncertainty import split_residuals
 
 WORSE = 2.0  # residuals of a validation record over those of the fitted ones, from which there is a remark
 
@@ -23,31 +24,43 @@ def validate(problem: FitProblem, course: FitCourse, data: Sequence[RecordData])
         If the FMU refuses the values there.
     """
     records, predictions = [], []
+    fitted = problem.records[0]
     for each in data:
-        record = MeasuredRecord(each.name, each.t, each.y, each.inputs, each.sigma, problem.records[0].width > 1)
-        record.noise = np.where(record.noise > 0.0, record.noise, problem.records[0].noise)  # of a body at rest
-        record.subdivide(problem.records[0].subdivision)
+        record = MeasuredRecord(each.name, each.t, each.y, each.inputs, each.sigma, fitted.width > 1)
+        record.noise = np.where(np.ptp(record.y, axis=0) > 0.0, record.noise, fitted.noise)  # of a body at rest
+        record.subdivide(fitted.subdivision)
         prediction = problem.predict_record(course.z, record, 0, record.all)
         if prediction is None:
             raise HarnessError(f"the FMU refuses the fitted values in the run of the validation record {each.name}")
         records.append(record)
         predictions.append(prediction)
     residuals = [
-        problem.limit_outliers((prediction - record.y) / record.noise)
-        for record, prediction in zip(records, predictions, strict=True)
+        (prediction - record.y) / record.noise for record, prediction in zip(records, predictions, strict=True)
     ]
-    return Validation(column_residuals(records, residuals, problem.outputs), tuple(records), tuple(predictions))
+    columns = column_residuals(records, residuals, problem.outputs)
+    return Validation(
+        columns, tuple(records), tuple(predictions), tuple(validation_remarks(problem, course, columns, residuals))
+    )
 
 
-def validation_remarks(fit: ParameterFit) -> list[str]:
-    """Return a remark for each column that the values predict much worse than they fit the fitted records."""
-    remarks, outputs = [], fit.predictions[0].shape[1]
-    for i, column in enumerate(fit.validation.columns if fit.validation else ()):
-        fitted = max(each.residual / each.noise for each in fit.columns[i % outputs :: outputs])
-        ratio = column.residual / column.noise
-        if ratio > WORSE * max(fitted, 1.0):
-            remarks.append(
+def validation_remarks(
+    problem: FitProblem, course: FitCourse, columns: Sequence[ColumnResiduals], residuals: Sequence[np.ndarray]
+) -> Iterator[str]:
+    """Yield a remark for each column that the values predict much worse than they fit the fitted records.
+
+    Both are compared without the effect of outliers if the fit is robust.
+    """
+    fitted = [root_mean_squares(e) for e in split_residuals(problem, course.uncertainty.residuals)]
+    limits = WORSE * np.maximum(np.max(fitted, axis=0), 1.0)
+    ratios = np.concatenate([root_mean_squares(problem.limit_outliers(e)) for e in residuals])
+    for column, ratio, limit in zip(columns, ratios, np.tile(limits, len(residuals)), strict=True):
+        if ratio > limit:
+            yield (
                 f"The values do not predict {column.name} in {column.record}: its residuals are {ratio:.2g} times the "
-                f"noise, and {fitted:.2g} times in the fitted records."
+                f"noise, and at most {limit / WORSE:.2g} times in the fitted records."
             )
-    return remarks
+
+
+def root_mean_squares(e: np.ndarray) -> np.ndarray:
+    """Return the root mean square of each column."""
+    return np.asarray(np.sqrt(np.mean(e**2, axis=0)))

@@ -13,8 +13,8 @@ from ...analyses.fit.fit_course import fit_records
 from ...analyses.fit.fit_description import describe_fit
 from ...analyses.fit.law_comparison import compare_laws
 from ...analyses.fit.measured_record import MeasuredRecord
-from ...analyses.fit.parameter_fit import ColumnResiduals, ParameterFit, Validation
-from ...analyses.fit.validation import validate, validation_remarks
+from ...analyses.fit.parameter_fit import ColumnResiduals, ParameterFit
+from ...analyses.fit.validation import validate
 from ...errors import HarnessError, SceneError, format_value
 from ...records.signal_table import SignalTable, parse_signals
 from ...records.table_files import Table, load_table
@@ -120,10 +120,11 @@ def convert_outputs(fit: ParameterFit, target: ParameterFit) -> ParameterFit:
     factors = [other.noise / own.noise for own, other in zip(fit.columns, target.columns, strict=True)][:outputs]
     validation = fit.validation
     if validation and target.validation:
-        validation = Validation(
-            convert_columns(validation.columns, target.validation.columns),
-            target.validation.records,
-            tuple(prediction * factors for prediction in validation.predictions),
+        validation = replace(
+            validation,
+            columns=convert_columns(validation.columns, target.validation.columns),
+            records=target.validation.records,
+            predictions=tuple(prediction * factors for prediction in validation.predictions),
         )
     return replace(
         fit,
@@ -188,8 +189,9 @@ def fit_tables(
     units = {name: resolved.variables[name].unit for name in request.observe}
     fit = replace(fit, columns=with_units(fit.columns, units))
     if prediction:
-        fit = replace(fit, validation=replace(prediction, columns=with_units(prediction.columns, units)))
-    return replace(fit, remarks=(*fit.remarks, *validation_remarks(fit)))
+        prediction = replace(prediction, columns=with_units(prediction.columns, units))
+        fit = replace(fit, validation=prediction, remarks=(*fit.remarks, *prediction.remarks))
+    return fit
 
 
 def with_units(columns: Sequence[ColumnResiduals], units: Mapping[str, str]) -> tuple[ColumnResiduals, ...]:
