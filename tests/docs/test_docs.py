@@ -51,6 +51,7 @@ def test_each_python_or_sh_block_that_is_not_run_has_a_reason():
             assert not block.skipped or len(block.skipped.split()) >= 3, f"{page}, line {block.line}: give a reason"
 
 
+@pytest.mark.slow
 def test_generated_tables_are_up_to_date(fmus):
     reference = load("make_reference")
     for page in sorted((DOCS / "reference").glob("*.md")):

@@ -21,7 +21,7 @@ KINDS = {
     "native": ("--native", "--platform", "linux64"),
     "native/fmi3": ("--fmi", "3", "--platform", "linux64"),
 }
-EVERY_KIND = pytest.mark.parametrize("kind", KINDS)
+EVERY_KIND = pytest.mark.parametrize("kind", ["", "native", pytest.param("native/fmi3", marks=pytest.mark.slow)])
 STOP, K, F, GAP, T_ON, MU = 2.0, 100.0, 5.0, 0.1, 0.3, 0.5  # SI, as in the models
 MODEL = '''from fmus import (
     Contact, Fixed, Input, Mode, Model, Output, Parameter, State, choose, exp, fabs, log, sin, sqrt

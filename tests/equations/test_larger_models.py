@@ -101,6 +101,7 @@ def test_contacts_stick_and_slip_as_in_an_independent_formulation(worker, name, 
     assert np.abs(np.array(final) - end).max() < 1e-9
 
 
+@pytest.mark.slow  # builds every model twice
 @pytest.mark.parametrize("name", [path.stem for path in LARGER_MODELS])
 def test_python_and_native_agree_bit_for_bit(worker, name):
     """Outputs and counters at every internal step, by every method."""

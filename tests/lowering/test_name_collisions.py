@@ -106,6 +106,7 @@ def test_names_used_by_the_contact_solver_change_nothing(tmp_path):
     assert rates[0] == rates[1]
 
 
+@pytest.mark.slow
 def test_event_indicators_of_a_native_fmu_do_not_depend_on_names(tmp_path, worker):
     """Two blocks, one of whose positions is named like a step size of the numerics."""
     (blocks,) = (path for path in LARGER_MODELS if path.stem == "blocks")

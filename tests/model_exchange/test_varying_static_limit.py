@@ -5,6 +5,7 @@ from internal_steps import compute_step, prepared_model, start, state_values
 from models import DOP853, LARGER_MODELS, MODELS, ODE45, RODAS, declared
 
 from fmus.packaging.lowering import lowered_model, model_exchange_instance, sibling_module
+from fmus.packaging.model_lookup import find_model
 from fmus.runtime.codes import NO_CONSISTENT_MODES
 
 FILES = {path.stem: path for path in LARGER_MODELS}
@@ -55,7 +56,7 @@ def externally_integrated(source, values):
     return model, exchange, run
 
 
-STUCK = [one for one in (*MODELS, *FILES.values()) if any(d.role == "contact" for d in declared(one).values())]
+STUCK = [one for one in (*MODELS, *FILES.values()) if find_model(one).model().contacts]
 STUCK = [one for one in STUCK if one not in (FILES["belt"], FILES["clutch"])]  # which slip at the start
 
 

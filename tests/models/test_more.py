@@ -66,7 +66,9 @@ def test_every_model_has_an_icon_and_a_certified_result():
         assert load_reference(name, MORE).estimated_error < 1e-10
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize(
+    "kind", ["python", *(pytest.param(kind, marks=pytest.mark.slow) for kind in ("native", "fmi3"))]
+)
 @pytest.mark.parametrize("name", more_model_names())
 def test_fmpy_validates_each_kind(name, kind):
     assert validate_fmu(str(built(name, kind))) == []
@@ -127,6 +129,7 @@ def test_two_sleds_have_the_events_of_a_taylor_series(worker):
     fmu.free()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CERTIFIED)
 def test_python_native_and_fmi3_agree_bit_for_bit(worker, name):
     """All outputs at 101 points of the default run."""

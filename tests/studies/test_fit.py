@@ -53,7 +53,12 @@ def holds(estimate, truth, factor=1.5):
     return abs(estimate.value - truth) <= factor * max(estimate.high - estimate.value, estimate.value - estimate.low)
 
 
-@pytest.mark.parametrize("name", ["position, 4 free", "force", "forced", "pendulum", "Stribeck", "belt"])
+LONG_FITS = ("position, 4 free", "Stribeck", "belt")
+
+
+@pytest.mark.parametrize(
+    "name", ["force", "forced", "pendulum", *(pytest.param(name, marks=pytest.mark.slow) for name in LONG_FITS)]
+)
 def test_the_parameters_of_a_drawn_record_are_found(name):
     """The seed was drawn once; tests/support/fit_campaign.py fits hundreds of others."""
     pandas, group = pytest.importorskip("pandas"), GROUPS[name]

@@ -228,6 +228,7 @@ def test_the_laws_creep_and_lose_their_symmetry_as_published(fmus):
     assert soft.rms > steep.rms
 
 
+@pytest.mark.slow
 def test_bristles_creep_and_each_law_has_a_smaller_integration_than_model_error(fmus):
     """The bristles of LuGre and of the elasto-plastic law, against a block that sticks, by two methods."""
     dry = law_deviations.solve_dry_block()

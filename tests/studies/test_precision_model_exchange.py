@@ -35,6 +35,7 @@ from harness.studies.precision.study import (
 )
 
 CASE = {case.name: case for case in CASES}
+pytestmark = pytest.mark.slow
 SMOOTH = [case for case in CASES if not case.is_chattering]
 TOLERANCES = (1e-4, 1e-6, 1e-8)
 
