@@ -1,4 +1,7 @@
-"""Conversion between units of any quantity, as in kN, mm/s, N.m/rad or lbf.in."""
+"""Conversion between units of any quantity, as in kN, mm/s, N.m/rad or lbf.in.
+
+Angles are numbers, so that N.m/rad is N.m. Cycles are not: Hz is neither 1/s nor rad/s, which differ by 2 pi in use.
+"""
 
 import re
 from collections import Counter
@@ -6,7 +9,7 @@ from collections import Counter
 from .units import ANGLES, LENGTHS, STANDARD_GRAVITY, TIMES, UNIT_SYNONYMS, find_unit, normalize_unit
 
 POUND = 0.45359237  # kg
-Powers = dict[str, int]  # powers of the base units kg, m, s, A and K; angles are numbers
+Powers = dict[str, int]  # powers of the base units kg, m, s, A and K, and of cycles
 PREFIXES = {"": 1.0, "k": 1e3, "M": 1e6, "G": 1e9, "m": 1e-3, "u": 1e-6, "n": 1e-9, "c": 1e-2, "d": 1e-1}
 NAMED: dict[str, tuple[float, Powers]] = {
     **{name: (size, {"m": 1}) for name, size in LENGTHS.items()},
@@ -16,7 +19,7 @@ NAMED: dict[str, tuple[float, Powers]] = {
     "lb": (POUND, {"kg": 1}),
     "lbf": (POUND * STANDARD_GRAVITY, {"kg": 1, "m": 1, "s": -2}),
     "kgf": (STANDARD_GRAVITY, {"kg": 1, "m": 1, "s": -2}),
-    "Hz": (1.0, {"s": -1}),
+    "Hz": (1.0, {"cycle": 1, "s": -1}),
     "%": (0.01, {}),
 }
 PREFIXED: dict[str, tuple[float, Powers]] = {

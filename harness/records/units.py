@@ -41,9 +41,9 @@ def normalize_unit(text: str) -> str:
 
 
 def find_unit(text: str) -> MotionUnit | None:
-    """Return a unit of motion by name, or None."""
+    """Return a unit of motion by name, or None; in any case, but Nm is a torque and no nanometre."""
     name = normalize_unit(text)
-    if name not in UNITS:
+    if name not in UNITS and not name.startswith("N"):
         name = name.lower()
     numerator, slash, denominator = name.partition("/")
     return UNITS.get(UNIT_SYNONYMS.get(numerator, numerator) + slash + denominator)

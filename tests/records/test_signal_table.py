@@ -25,7 +25,13 @@ WANTED = {"x": SignalSource("laser", "m"), "F": SignalSource("load", "N")}
         ("Nm/deg", "N.m/rad", 180 / np.pi),
         ("lbf", "N", 4.4482216152605),  # NIST SP 811, appendix B.8
         ("mA", "A", 1e-3),
+        ("N·m", "N.m", 1.0),
+        ("N*m", "kN m", 1e-3),
         ("mm", "N", None),
+        ("Nm", "m", None),
+        ("N m", "m", None),
+        ("Hz", "rad/s", None),
+        ("rpm", "Hz", None),
         ("furlong", "m", None),
     ],
 )

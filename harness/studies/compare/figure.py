@@ -42,7 +42,7 @@ def draw(comparison: Comparison, path: Path) -> None:
                 (comparison.two, {"color": ORANGE, "linestyle": "--"}),
             ):
                 values = mask_undrawable(side.columns[variable.name]) * (
-                    units.conversion_factor(side.units[variable.name], variable.unit) or 1.0
+                    units.comparison_factor(side.units[variable.name], variable.unit) or 1.0
                 )
                 values_axes.plot(side.time, values / size, label=f"{side.name} ", **style)
             values_axes.set_ylabel(axis_label(variable.name, unit))

@@ -1,10 +1,10 @@
-"""Unit spellings and conversion factors: m/s2, m.s-2, m s^-2 and m/s/s are equal; 180 deg are pi rad."""
+"""Unit spellings and factors for comparisons: m/s2, m.s-2, m s^-2 and m/s/s are equal."""
 
 import re
 from collections import Counter
 from functools import cache
 
-from ...records.units import find_unit
+from ...records.quantity_units import conversion_factor
 
 SPELLINGS = (("²", "2"), ("³", "3"), ("⁻", "-"), ("¹", "1"), ("**", ""), ("^", ""), ("·", "."), ("*", "."), ("µ", "u"))
 FACTOR = re.compile(r"([^\W\d_]+|°|%)(-?\d+)?|1")
@@ -30,14 +30,9 @@ def parse_unit(unit: str) -> frozenset[tuple[str, int]] | str:
     return frozenset((name, power) for name, power in powers.items() if power)
 
 
-def conversion_factor(unit: str, other: str) -> float | None:
-    """Return the factor from `unit` to `other`; None if they are incompatible or unknown."""
-    if parse_unit(unit) == parse_unit(other):
-        return 1.0
-    one, two = find_unit(unit), find_unit(other)
-    if one and two and (one.order, one.base) == (two.order, two.base):
-        return one.size / two.size
-    return None
+def comparison_factor(unit: str, other: str) -> float | None:
+    """Return the factor from `unit` to `other`, 1 for two spellings of an unknown one; None if they are incompatible."""
+    return 1.0 if parse_unit(unit) == parse_unit(other) else conversion_factor(unit, other)
 
 
 @cache
