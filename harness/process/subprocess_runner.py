@@ -19,6 +19,7 @@ from .temporary_directory import temporary_directory
 
 PROJECT_ROOT = Path(__file__).parents[2]  # contains harness and build_fmus
 RequestT = TypeVar("RequestT")
+PARENT_VARIABLE = "FRICTION_FMUS_PARENT"  # environment variable with the process id of the parent
 ORPHAN_INTERVAL = 0.5  # s between two checks of a child process for its parent
 POLL_INTERVAL = 0.1  # s between two checks for signals, which a blocked thread does not notice
 
@@ -62,6 +63,7 @@ def run_subprocess(
     """
     deadline = monotonic() + timeout
     process = None
+    environment = {**environment, PARENT_VARIABLE: str(os.getpid())}
     with temporary_directory("child-") as directory, TemporaryFile("w+", encoding="utf-8") as standard_input:
         standard_input.write(text)  # not a pipe: communicate() does not resume writing after its timeout
         standard_input.seek(0)
@@ -129,10 +131,19 @@ def limit_memory(size: int) -> None:
 
 def open_replies() -> TextIO:
     """In a child process, return standard output and redirect other output to standard error; exit with the parent."""
-    Thread(target=exit_when_orphaned, args=(os.getppid(),), daemon=True).start()
+    Thread(target=exit_when_orphaned, args=(parent_process_id(),), daemon=True).start()
     replies = os.fdopen(os.dup(1), "w")
     os.dup2(2, 1)
     return replies
+
+
+def parent_process_id() -> int:
+    """Return the process id of the parent that started this process, even if the parent has been killed since.
+
+    On Windows the launcher of a virtual environment is between the two processes, and a parent's id never changes.
+    """
+    started_by = os.environ.pop(PARENT_VARIABLE, "")  # not for programs that this process starts
+    return int(started_by) if started_by and os.name == "posix" else os.getppid()
 
 
 def exit_when_orphaned(parent: int) -> None:

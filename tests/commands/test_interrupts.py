@@ -225,6 +225,23 @@ def test_a_child_process_exits_after_its_parent_was_killed(tmp_path):
     assert ends((tmp_path / "pid").read_text())
 
 
+def test_a_child_process_exits_if_its_parent_was_killed_during_its_imports(tmp_path):
+    start = "import os, sys, time; from pathlib import Path\n"
+    child = f"{start}parent = os.getppid()\nPath({str(tmp_path / 'pid')!r}).write_text(str(os.getpid()))\n"
+    child += "while os.getppid() == parent:\n    time.sleep(0.01)\n"
+    child += "from harness.process.subprocess_runner import serve_request\n"
+    child += "serve_request(dict, lambda request: time.sleep(100))"
+    code = f"{start}from harness.process.subprocess_runner import run_subprocess\n"
+    code += f"run_subprocess([sys.executable, '-c', {child!r}], '{{}}')"
+    parent = subprocess.Popen([sys.executable, "-c", code], cwd=ROOT, env=os.environ | {"PYTHONPATH": str(ROOT)})
+    while not ((tmp_path / "pid").is_file() and (tmp_path / "pid").read_text()):
+        assert parent.poll() is None
+        time.sleep(0.05)
+    parent.kill()
+    parent.wait()
+    assert ends((tmp_path / "pid").read_text())
+
+
 def test_a_program_awaited_by_a_thread_ends_with_the_command(tmp_path, monkeypatch):
     monkeypatch.setattr(interrupt, "RECEIVED_SIGNALS", [])
     ended = []

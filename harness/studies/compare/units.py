@@ -31,7 +31,7 @@ def parse_unit(unit: str) -> frozenset[tuple[str, int]] | str:
 
 
 def comparison_factor(unit: str, other: str) -> float | None:
-    """Return the factor from `unit` to `other`, 1 for two spellings of an unknown one; None if they are incompatible."""
+    """Return the factor from `unit` to `other`, 1 for two spellings of one unit; None if they are incompatible."""
     return 1.0 if parse_unit(unit) == parse_unit(other) else conversion_factor(unit, other)
 
 
