@@ -120,6 +120,12 @@ def parse_record(table: Table, columns: ColumnOptions, name: str) -> Record:
         notes += runs_side_by_side(candidates, time_column, motion_column)
     label, unit = motion_column.name or motion_column.heading, columns.unit or motion_column.unit
     x = parse_numbers(table, motion_column.index).copy()
+    others = [column.heading for column in candidates if column not in (time_column, motion_column)]
+    if others and columns.position is None and len(np.unique(x[np.isfinite(x)])) == 1:
+        raise SceneError(
+            f"{table.name}: {motion_column.heading} does not move; select another column by --position or --velocity: "
+            f"{', '.join(others)}"
+        )
     order, base, size, assumption = resolve_unit(label, unit, columns, table.name)
     if time_column is None or interval is not None:
         t, time_label = np.arange(len(x)) * (interval or 0.0), "the time"

@@ -345,6 +345,14 @@ def test_a_missing_file_error_names_the_nearest(tmp_path):
         read_record(str(tmp_path / "swng.csv"), ColumnOptions(), "swng")
 
 
+def test_a_first_column_that_does_not_move_is_named_with_the_others(tmp_path):
+    path = tmp_path / "record.csv"
+    path.write_text("t [s],cart,arm\n" + rows(T, 0 * X, X))
+    with pytest.raises(SceneError, match="cart does not move; select another column by --position or --velocity: arm"):
+        read_record(str(path), ColumnOptions(), "record")
+    assert read_record(str(path), ColumnOptions(position="arm"), "record").x == pytest.approx(X, abs=1e-9)
+
+
 def test_a_heading_is_matched_literally(tmp_path):
     path = tmp_path / "record.csv"
     path.write_text("clock [s],x [mm],Laser 2 [mm]\n" + rows(T, 0 * X, 1e3 * X))
