@@ -7,6 +7,8 @@ Multibody Dynamics with Unilateral Contacts, chapters 5 and 6).  Its pivoting st
 those whose load exceeds the limit, and locks again those that would slip against their own friction force.  With
 holding limits above the sliding forces, several combinations of modes may be consistent; the solution is the one with
 the most contacts held.
+
+The model states slips, forces and impulses; the functions below, which belong to the solver, decide on modes.
 """
 
 from math import fabs, inf
@@ -56,376 +58,394 @@ class CoupledFriction(DryFriction):
     def apply_impulses(self, t: float, y: StateVector, modes: ContactVector) -> StateVector:
         """Return the states after impulses that stop the slip of stuck contacts."""
 
-    # ---- end of modes
 
-    def update_contact_event_functions(self, location, t, y: StateVector, modes: ContactVector):
-        """Evaluate the event functions of all contacts, with margins for rounding errors."""
-        slips = self.slip_velocities(t, y)
-        slip_terms = self.slip_magnitudes(t, y)
+# ---- end of modes
+
+
+def update_contact_event_functions(model, location, t, y: StateVector, modes: ContactVector):
+    """Evaluate the event functions of all contacts, with margins for rounding errors."""
+    slips = model.slip_velocities(t, y)
+    slip_terms = model.slip_magnitudes(t, y)
+    for i in contact_indices:
+        location.scales[i] = location.scales[len(modes) + i] = slip_terms[i]
+        location.values[i] = modes[i] * slips[i] + ROUNDOFF_MARGIN * slip_terms[i]
+        location.values[len(modes) + i] = 1.0
+        if model.friction != HYBRID or location.is_frictionless[i] > 0.0:
+            location.values[i] = 1.0
+    if model.friction == HYBRID and any_of(modes == STUCK):
+        force, limit, terms = model.contact_forces(t, y, modes)
         for i in contact_indices:
-            location.scales[i] = location.scales[len(modes) + i] = slip_terms[i]
-            location.values[i] = modes[i] * slips[i] + ROUNDOFF_MARGIN * slip_terms[i]
-            location.values[len(modes) + i] = 1.0
-            if self.friction != HYBRID or location.is_frictionless[i] > 0.0:
-                location.values[i] = 1.0
-        if self.friction == HYBRID and any_of(modes == STUCK):
-            force, limit, terms = self.contact_forces(t, y, modes)
-            for i in contact_indices:
-                if modes[i] == STUCK:
-                    limit_with_margin = limit[i] + ROUNDOFF_MARGIN * (terms[i] + limit[i])
-                    location.scales[i] = location.scales[len(modes) + i] = terms[i] + limit[i]
-                    location.values[i] = limit_with_margin - force[i]
-                    location.values[len(modes) + i] = limit_with_margin + force[i]
+            if modes[i] == STUCK:
+                limit_with_margin = limit[i] + ROUNDOFF_MARGIN * (terms[i] + limit[i])
+                location.scales[i] = location.scales[len(modes) + i] = terms[i] + limit[i]
+                location.values[i] = limit_with_margin - force[i]
+                location.values[len(modes) + i] = limit_with_margin + force[i]
 
-    def find_frictionless_contacts(self, location, step):
-        """Note which contacts have no friction in a step: a reversal of their slips is no event."""
-        force, limit, _terms = self.contact_forces(step.t0, step.y0, step.modes0)
-        force_at_end, limit_at_end, _terms_at_end = self.contact_forces(step.t1, step.y1, step.modes0)
+
+def find_frictionless_contacts(model, location, step):
+    """Note which contacts have no friction in a step: a reversal of their slips is no event."""
+    force, limit, _terms = model.contact_forces(step.t0, step.y0, step.modes0)
+    force_at_end, limit_at_end, _terms_at_end = model.contact_forces(step.t1, step.y1, step.modes0)
+    for i in contact_indices:
+        sizes = fabs(force[i]) + limit[i] + fabs(force_at_end[i]) + limit_at_end[i]
+        location.is_frictionless[i] = 1.0 if step.modes0[i] != STUCK and sizes == 0.0 else 0.0
+
+
+def resolve_after_event(model, step, ends: ContactVector, tie_tolerance) -> tuple[StateVector, ContactVector, bool]:
+    """Return states and modes after an event at the end of a step, and whether the modes are consistent."""
+    t = step.t1
+    slips = model.slip_velocities(t, step.y1)
+    terms = model.slip_magnitudes(t, step.y1)
+    force, limit, _ = model.contact_forces(t, step.y1, step.modes0)
+    status, new_modes = contact_vector(), contact_vector()
+    y = step.y1
+    for i in contact_indices:
+        status[i], new_modes[i] = SLIPPING, step.modes0[i]
+        if new_modes[i] == STUCK:
+            status[i] = AT_LIMIT if ends[i] <= t else AT_REST
+        elif not (force[i] == 0.0 and limit[i] == 0.0):
+            if new_modes[i] * slips[i] < -REVERSED_SHARE * (terms[i] + SLIP_SCALE):
+                new_modes[i] = sign(slips[i])  # it reversed without friction, which has returned
+            elif ends[i] <= t or new_modes[i] * slips[i] <= SIMULTANEITY_MARGIN * terms[i]:
+                depth = inf
+                if fabs(force[i]) >= EQUAL_SHARE * limit[i]:
+                    depth = reversal_depth(model, t, y, step.modes0, limit[i], i)
+                if depth <= tie_tolerance * (terms[i] + start_slip(model, step, i) + SLIP_SCALE):
+                    y = raise_slip(model, t, y, step.modes0, 2.0 * depth + ROUNDOFF_MARGIN * terms[i], i)
+                else:
+                    status[i], new_modes[i] = AT_REST, STUCK
+    return resolve_contacts(model, t, y, step.modes0, new_modes, status, tie_tolerance)
+
+
+def reversal_depth(model, t, y: StateVector, modes: ContactVector, holding_limit, i: ContactIndex):
+    """Return how far a slip velocity, zero now, would go against its mode before it returns; inf if it does not.
+
+    With a holding limit equal to the sliding force, the contact breaks away again when the slip would return; after
+    a slip velocity that only touches zero the depth is zero, except for errors of the method.
+    """
+    _force_rate, _limit_rate, residual_force, residual_force_rate = model.contact_rates(t, y, modes)
+    ahead, rate = modes[i] * residual_force[i], modes[i] * residual_force_rate[i]
+    if fabs(ahead) > holding_limit:  # far from breaking away, or at a dead point
+        return inf
+    if ahead > 0.0:
+        return 0.0
+    if not rate > 0.0:
+        return inf
+    delta = PREDICTION_SHARE * model.solver.step.h_max
+    f = model.rates(t, y, modes)
+    y2 = y + delta * f
+    slips = model.slip_velocities(t, y)
+    slips_ahead = model.slip_velocities(t + delta, y2)
+    return 0.5 * fabs(slips_ahead[i] - slips[i]) / delta * (-ahead / rate)
+
+
+def start_slip(model, step, i: ContactIndex):
+    """Return the absolute slip velocity at the start of a step."""
+    slips = model.slip_velocities(step.t0, step.y0)
+    return fabs(slips[i])
+
+
+def raise_slip(model, t, y: StateVector, modes: ContactVector, amount, i: ContactIndex) -> StateVector:
+    """Return the states after an impulse in a contact that changes its slip in the direction of its mode."""
+    reverse_modes = contact_vector()
+    for j in contact_indices:
+        reverse_modes[j] = modes[j]
+    reverse_modes[i] = -modes[i]
+    y2 = y
+    f = model.rates(t, y, modes)
+    f2 = model.rates(t, y2, reverse_modes)
+    impulse = f2 - f
+    y3 = y + impulse
+    slips = model.slip_velocities(t, y)
+    slips_after = model.slip_velocities(t, y3)
+    effect = modes[i] * (slips_after[i] - slips[i])
+    if effect > 0.0:
+        share = amount / effect
+        return y + share * impulse
+    return y
+
+
+def resolve_at_start(
+    model, t, y: StateVector, modes: ContactVector, tie_tolerance, reach
+) -> tuple[StateVector, ContactVector, bool]:
+    """Return the same at the start of a run or after a change of values: contacts with a slip velocity slide.
+
+    Parameters
+    ----------
+    t
+        Time in s.
+    y
+        States.
+    modes
+        Previous modes.
+    tie_tolerance, reach
+        Slip velocities below these shares of their absolute terms count as zero, for contacts that were stuck and
+        for contacts that slip against their mode.
+    """
+    slips = model.slip_velocities(t, y)
+    terms = model.slip_magnitudes(t, y)
+    force, limit, _ = model.contact_forces(t, y, modes)
+    status, new_modes = contact_vector(), contact_vector()
+    for i in contact_indices:
+        zero_level = ROUNDOFF_MARGIN * terms[i]
+        if modes[i] * slips[i] <= 0.0:
+            zero_level = (tie_tolerance if modes[i] == STUCK else reach) * (terms[i] + SLIP_SCALE)
+        status[i], new_modes[i] = SLIPPING, sign(slips[i])
+        if modes[i] != STUCK and force[i] == 0.0 and limit[i] == 0.0:
+            new_modes[i] = modes[i]
+        elif fabs(slips[i]) <= zero_level:
+            status[i], new_modes[i] = AT_REST, STUCK
+    return resolve_contacts(model, t, y, modes, new_modes, status, tie_tolerance)
+
+
+def resolve_contacts(
+    model, t, y: StateVector, modes: ContactVector, new_modes: ContactVector, status: ContactVector, tie_tolerance
+) -> tuple[StateVector, ContactVector, bool]:
+    """Return the states without slip in the contacts at rest, their modes, and whether these are consistent.
+
+    Where levers change, a slip velocity also vanishes at a dead point, where the contact has no lever on anything
+    that moves.  An impulse must not stop the motion there.  So the modes are first determined with the velocities
+    as they are: the load that would hold the slip at zero exceeds every limit at a dead point, and the contact
+    slips on.
+
+    Parameters
+    ----------
+    t, y
+        Time in s; states.
+    modes
+        Modes before.
+    new_modes, status
+        Modes in which contacts at rest are stuck, and the status of each contact.
+    tie_tolerance
+        See `violations`.
+    """
+    if model.has_variable_levers:
+        slips = model.slip_velocities(t, y)
+        _force, limit, terms = model.contact_forces(t, y, new_modes)
+        moving_modes, _consistent = solve_modes(model, t, y, new_modes, status, tie_tolerance)
+        slips_ahead = predict_slips(model, t, y, moving_modes)
         for i in contact_indices:
-            sizes = fabs(force[i]) + limit[i] + fabs(force_at_end[i]) + limit_at_end[i]
-            location.is_frictionless[i] = 1.0 if step.modes0[i] != STUCK and sizes == 0.0 else 0.0
+            if status[i] == AT_REST and moving_modes[i] != STUCK:
+                status[i], new_modes[i] = SLIPPING, moving_modes[i]
+                if modes[i] * slips[i] > 0.0:
+                    new_modes[i] = modes[i]  # it has not quite reached zero
+                elif ROUNDOFF_MARGIN * terms[i] > limit[i] and slips_ahead[i] != 0.0:
+                    new_modes[i] = sign(slips_ahead[i])  # at a dead point; the load has rounding errors only
+    y = stop_slips(model, t, y, new_modes)
+    resolved_modes, consistent = solve_modes(model, t, y, new_modes, status, tie_tolerance)
+    return y, resolved_modes, consistent
 
-    def resolve_after_event(self, step, ends: ContactVector, tie_tolerance) -> tuple[StateVector, ContactVector, bool]:
-        """Return states and modes after an event at the end of a step, and whether the modes are consistent."""
-        t = step.t1
-        slips = self.slip_velocities(t, step.y1)
-        terms = self.slip_magnitudes(t, step.y1)
-        force, limit, _ = self.contact_forces(t, step.y1, step.modes0)
-        status, new_modes = contact_vector(), contact_vector()
-        y = step.y1
+
+# ---- complementarity problem
+
+
+def stop_slips(model, t, y: StateVector, modes: ContactVector) -> StateVector:
+    """Return the states without slip in the stuck contacts; impulses conserve momentum."""
+    for _ in range(MAX_IMPULSES):
+        slips = model.slip_velocities(t, y)
+        at_rest = True
         for i in contact_indices:
-            status[i], new_modes[i] = SLIPPING, step.modes0[i]
-            if new_modes[i] == STUCK:
-                status[i] = AT_LIMIT if ends[i] <= t else AT_REST
-            elif not (force[i] == 0.0 and limit[i] == 0.0):
-                if new_modes[i] * slips[i] < -REVERSED_SHARE * (terms[i] + SLIP_SCALE):
-                    new_modes[i] = sign(slips[i])  # it reversed without friction, which has returned
-                elif ends[i] <= t or new_modes[i] * slips[i] <= SIMULTANEITY_MARGIN * terms[i]:
-                    depth = inf
-                    if fabs(force[i]) >= EQUAL_SHARE * limit[i]:
-                        depth = self.reversal_depth(t, y, step.modes0, limit[i], i)
-                    if depth <= tie_tolerance * (terms[i] + self.start_slip(step, i) + SLIP_SCALE):
-                        y = self.raise_slip(t, y, step.modes0, 2.0 * depth + ROUNDOFF_MARGIN * terms[i], i)
-                    else:
-                        status[i], new_modes[i] = AT_REST, STUCK
-        return self.resolve_contacts(t, y, step.modes0, new_modes, status, tie_tolerance)
-
-    def reversal_depth(self, t, y: StateVector, modes: ContactVector, holding_limit, i: ContactIndex):
-        """Return how far a slip velocity, zero now, would go against its mode before it returns; inf if it does not.
-
-        With a holding limit equal to the sliding force, the contact breaks away again when the slip would return; after
-        a slip velocity that only touches zero the depth is zero, except for errors of the method.
-        """
-        _force_rate, _limit_rate, residual_force, residual_force_rate = self.contact_rates(t, y, modes)
-        ahead, rate = modes[i] * residual_force[i], modes[i] * residual_force_rate[i]
-        if fabs(ahead) > holding_limit:  # far from breaking away, or at a dead point
-            return inf
-        if ahead > 0.0:
-            return 0.0
-        if not rate > 0.0:
-            return inf
-        delta = PREDICTION_SHARE * self.solver.step.h_max
-        f = self.rates(t, y, modes)
-        y2 = y + delta * f
-        slips = self.slip_velocities(t, y)
-        slips_ahead = self.slip_velocities(t + delta, y2)
-        return 0.5 * fabs(slips_ahead[i] - slips[i]) / delta * (-ahead / rate)
-
-    def start_slip(self, step, i: ContactIndex):
-        """Return the absolute slip velocity at the start of a step."""
-        slips = self.slip_velocities(step.t0, step.y0)
-        return fabs(slips[i])
-
-    def raise_slip(self, t, y: StateVector, modes: ContactVector, amount, i: ContactIndex) -> StateVector:
-        """Return the states after an impulse in a contact that changes its slip in the direction of its mode."""
-        reverse_modes = contact_vector()
-        for j in contact_indices:
-            reverse_modes[j] = modes[j]
-        reverse_modes[i] = -modes[i]
-        y2 = y
-        f = self.rates(t, y, modes)
-        f2 = self.rates(t, y2, reverse_modes)
-        impulse = f2 - f
-        y3 = y + impulse
-        slips = self.slip_velocities(t, y)
-        slips_after = self.slip_velocities(t, y3)
-        effect = modes[i] * (slips_after[i] - slips[i])
-        if effect > 0.0:
-            share = amount / effect
-            return y + share * impulse
-        return y
-
-    def resolve_at_start(
-        self, t, y: StateVector, modes: ContactVector, tie_tolerance, reach
-    ) -> tuple[StateVector, ContactVector, bool]:
-        """Return the same at the start of a run or after a change of values: contacts with a slip velocity slide.
-
-        Parameters
-        ----------
-        t
-            Time in s.
-        y
-            States.
-        modes
-            Previous modes.
-        tie_tolerance, reach
-            Slip velocities below these shares of their absolute terms count as zero, for contacts that were stuck and
-            for contacts that slip against their mode.
-        """
-        slips = self.slip_velocities(t, y)
-        terms = self.slip_magnitudes(t, y)
-        force, limit, _ = self.contact_forces(t, y, modes)
-        status, new_modes = contact_vector(), contact_vector()
-        for i in contact_indices:
-            zero_level = ROUNDOFF_MARGIN * terms[i]
-            if modes[i] * slips[i] <= 0.0:
-                zero_level = (tie_tolerance if modes[i] == STUCK else reach) * (terms[i] + SLIP_SCALE)
-            status[i], new_modes[i] = SLIPPING, sign(slips[i])
-            if modes[i] != STUCK and force[i] == 0.0 and limit[i] == 0.0:
-                new_modes[i] = modes[i]
-            elif fabs(slips[i]) <= zero_level:
-                status[i], new_modes[i] = AT_REST, STUCK
-        return self.resolve_contacts(t, y, modes, new_modes, status, tie_tolerance)
-
-    def resolve_contacts(
-        self, t, y: StateVector, modes: ContactVector, new_modes: ContactVector, status: ContactVector, tie_tolerance
-    ) -> tuple[StateVector, ContactVector, bool]:
-        """Return the states without slip in the contacts at rest, their modes, and whether these are consistent.
-
-        Where levers change, a slip velocity also vanishes at a dead point, where the contact has no lever on anything
-        that moves.  An impulse must not stop the motion there.  So the modes are first determined with the velocities
-        as they are: the load that would hold the slip at zero exceeds every limit at a dead point, and the contact
-        slips on.
-
-        Parameters
-        ----------
-        t, y
-            Time in s; states.
-        modes
-            Modes before.
-        new_modes, status
-            Modes in which contacts at rest are stuck, and the status of each contact.
-        tie_tolerance
-            See `violations`.
-        """
-        if self.has_variable_levers:
-            slips = self.slip_velocities(t, y)
-            _force, limit, terms = self.contact_forces(t, y, new_modes)
-            moving_modes, _consistent = self.solve_modes(t, y, new_modes, status, tie_tolerance)
-            slips_ahead = self.predict_slips(t, y, moving_modes)
-            for i in contact_indices:
-                if status[i] == AT_REST and moving_modes[i] != STUCK:
-                    status[i], new_modes[i] = SLIPPING, moving_modes[i]
-                    if modes[i] * slips[i] > 0.0:
-                        new_modes[i] = modes[i]  # it has not quite reached zero
-                    elif ROUNDOFF_MARGIN * terms[i] > limit[i] and slips_ahead[i] != 0.0:
-                        new_modes[i] = sign(slips_ahead[i])  # at a dead point; the load has rounding errors only
-        y = self.stop_slips(t, y, new_modes)
-        resolved_modes, consistent = self.solve_modes(t, y, new_modes, status, tie_tolerance)
-        return y, resolved_modes, consistent
-
-    # ---- complementarity problem
-
-    def stop_slips(self, t, y: StateVector, modes: ContactVector) -> StateVector:
-        """Return the states without slip in the stuck contacts; impulses conserve momentum."""
-        for _ in range(MAX_IMPULSES):
-            slips = self.slip_velocities(t, y)
+            if modes[i] == STUCK and slips[i] != 0.0:
+                at_rest = False
+        if model.has_variable_levers and not at_rest:  # products with levers have rounding errors
+            terms = model.slip_magnitudes(t, y)
             at_rest = True
             for i in contact_indices:
-                if modes[i] == STUCK and slips[i] != 0.0:
+                if modes[i] == STUCK and fabs(slips[i]) > 4.0 * EPSILON * terms[i]:
                     at_rest = False
-            if self.has_variable_levers and not at_rest:  # products with levers have rounding errors
-                terms = self.slip_magnitudes(t, y)
-                at_rest = True
-                for i in contact_indices:
-                    if modes[i] == STUCK and fabs(slips[i]) > 4.0 * EPSILON * terms[i]:
-                        at_rest = False
-            if at_rest:
-                break
-            y = self.apply_impulses(t, y, modes)
-        return y
+        if at_rest:
+            break
+        y = model.apply_impulses(t, y, modes)
+    return y
 
-    def solve_modes(
-        self, t, y: StateVector, modes: ContactVector, status: ContactVector, tie_tolerance
-    ) -> tuple[ContactVector, bool]:
-        """Solve the complementarity problem for the modes of contacts at rest.
 
-        Contacts that would slip against their own friction force are locked first; else those with the highest load
-        relative to their limit are released together.  If this does not end, one contact changes at a time, the first
-        that violates its conditions.
+def solve_modes(
+    model, t, y: StateVector, modes: ContactVector, status: ContactVector, tie_tolerance
+) -> tuple[ContactVector, bool]:
+    """Solve the complementarity problem for the modes of contacts at rest.
 
-        If more than one contact was released, perhaps a contact could be held that is not.  For up to MAX_ENUMERATED
-        contacts at rest, all combinations of modes are then tried; with more, each released contact is locked again
-        where this is consistent.
+    Contacts that would slip against their own friction force are locked first; else those with the highest load
+    relative to their limit are released together.  If this does not end, one contact changes at a time, the first
+    that violates its conditions.
 
-        Returns
-        -------
-        tuple
-            The modes, and whether they are consistent with the forces.
-        """
-        pivot_modes, pivot_status = contact_vector(), contact_vector()
+    If more than one contact was released, perhaps a contact could be held that is not.  For up to MAX_ENUMERATED
+    contacts at rest, all combinations of modes are then tried; with more, each released contact is locked again
+    where this is consistent.
+
+    Returns
+    -------
+    tuple
+        The modes, and whether they are consistent with the forces.
+    """
+    pivot_modes, pivot_status = contact_vector(), contact_vector()
+    for i in contact_indices:
+        pivot_modes[i], pivot_status[i] = modes[i], status[i]
+    consistent = False
+    for iteration in range(MAX_ITERATIONS):
+        violation, next_modes = violations(model, t, y, pivot_modes, pivot_status, tie_tolerance)
+        highest = max_of(violation)
+        if not highest > 0.0:
+            consistent = True
+            break
+        release_level = TIE_SHARE * highest if iteration < MAX_JOINT_ITERATIONS else 0.0
+        changed = False
         for i in contact_indices:
-            pivot_modes[i], pivot_status[i] = modes[i], status[i]
-        consistent = False
-        for iteration in range(MAX_ITERATIONS):
-            violation, next_modes = self.violations(t, y, pivot_modes, pivot_status, tie_tolerance)
-            highest = max_of(violation)
-            if not highest > 0.0:
-                consistent = True
-                break
-            release_level = TIE_SHARE * highest if iteration < MAX_JOINT_ITERATIONS else 0.0
-            changed = False
+            if violation[i] > 0.0 and violation[i] >= release_level and not (changed and release_level == 0.0):
+                pivot_modes[i], changed = next_modes[i], True
+                if next_modes[i] == STUCK:
+                    pivot_status[i] = RELOCKED
+    n_at_rest = n_released = 0
+    for i in contact_indices:
+        if status[i] != SLIPPING:
+            n_at_rest += 1
+            if pivot_modes[i] != STUCK:
+                n_released += 1
+    if consistent and n_released < 2:
+        return pivot_modes, True
+    if n_at_rest > MAX_ENUMERATED:
+        if not consistent:
+            return modes, False
+        relocked_modes = relock(model, t, y, pivot_modes, status, tie_tolerance)
+        return relocked_modes, True
+    best_modes, found = most_held(
+        model, t, y, modes, status, tie_tolerance, n_at_rest, n_released if consistent else n_at_rest + 1
+    )
+    if found:
+        return best_modes, True
+    if consistent:
+        return pivot_modes, True
+    return modes, False
+
+
+def predict_slips(model, t, y: StateVector, modes: ContactVector) -> ContactVector:
+    """Return the slip velocities a short time ahead, also if the motion only starts."""
+    delta = PREDICTION_SHARE * model.solver.step.h_max
+    f = model.rates(t, y, modes)
+    y2 = y + delta * f
+    f2 = model.rates(t + delta, y2, modes)
+    y3 = y2 + delta * f2
+    return model.slip_velocities(t + 2.0 * delta, y3)
+
+
+def contact_rates_ahead(
+    model, t, y: StateVector, modes: ContactVector
+) -> tuple[ContactVector, ContactVector, ContactVector, ContactVector]:
+    """Return the rates a short time ahead, which decide a tie where the rates at t are zero."""
+    delta = PREDICTION_SHARE * model.solver.step.h_max
+    f = model.rates(t, y, modes)
+    y2 = y + delta * f
+    return model.contact_rates(t + delta, y2, modes)
+
+
+def relock(model, t, y: StateVector, modes: ContactVector, status: ContactVector, tie_tolerance) -> ContactVector:
+    """Return consistent modes in which released contacts are locked again, one after another, where this fits."""
+    trial_modes = contact_vector()
+    for i in contact_indices:
+        trial_modes[i] = modes[i]
+    for i in contact_indices:
+        if status[i] != SLIPPING and modes[i] != STUCK:
+            trial_modes[i] = STUCK
+            if not are_consistent(model, t, y, trial_modes, status, tie_tolerance):
+                trial_modes[i] = modes[i]
+    return trial_modes
+
+
+def most_held(
+    model, t, y: StateVector, modes: ContactVector, status: ContactVector, tie_tolerance, n_at_rest, n_released
+) -> tuple[ContactVector, bool]:
+    """Return the consistent modes that release the fewest contacts at rest, fewer than `n_released`, if any.
+
+    Of several such, those count whose held contacts have the lowest load relative to their limit.
+    """
+    n_combinations = 1
+    for _ in range(n_at_rest):
+        n_combinations *= 3
+    best_modes, trial_modes = contact_vector(), contact_vector()
+    for i in contact_indices:
+        best_modes[i] = modes[i]
+    lowest = inf
+    for n in range(n_released):
+        for i in contact_indices:
+            trial_modes[i] = modes[i] if status[i] == SLIPPING else STUCK
+        for _ in range(n_combinations):
+            n_sliding = 0
             for i in contact_indices:
-                if violation[i] > 0.0 and violation[i] >= release_level and not (changed and release_level == 0.0):
-                    pivot_modes[i], changed = next_modes[i], True
-                    if next_modes[i] == STUCK:
-                        pivot_status[i] = RELOCKED
-        n_at_rest = n_released = 0
-        for i in contact_indices:
-            if status[i] != SLIPPING:
-                n_at_rest += 1
-                if pivot_modes[i] != STUCK:
-                    n_released += 1
-        if consistent and n_released < 2:
-            return pivot_modes, True
-        if n_at_rest > MAX_ENUMERATED:
-            if not consistent:
-                return modes, False
-            relocked_modes = self.relock(t, y, pivot_modes, status, tie_tolerance)
-            return relocked_modes, True
-        best_modes, found = self.most_held(
-            t, y, modes, status, tie_tolerance, n_at_rest, n_released if consistent else n_at_rest + 1
-        )
-        if found:
-            return best_modes, True
-        if consistent:
-            return pivot_modes, True
-        return modes, False
-
-    def predict_slips(self, t, y: StateVector, modes: ContactVector) -> ContactVector:
-        """Return the slip velocities a short time ahead, also if the motion only starts."""
-        delta = PREDICTION_SHARE * self.solver.step.h_max
-        f = self.rates(t, y, modes)
-        y2 = y + delta * f
-        f2 = self.rates(t + delta, y2, modes)
-        y3 = y2 + delta * f2
-        return self.slip_velocities(t + 2.0 * delta, y3)
-
-    def contact_rates_ahead(
-        self, t, y: StateVector, modes: ContactVector
-    ) -> tuple[ContactVector, ContactVector, ContactVector, ContactVector]:
-        """Return the rates a short time ahead, which decide a tie where the rates at t are zero."""
-        delta = PREDICTION_SHARE * self.solver.step.h_max
-        f = self.rates(t, y, modes)
-        y2 = y + delta * f
-        return self.contact_rates(t + delta, y2, modes)
-
-    def relock(self, t, y: StateVector, modes: ContactVector, status: ContactVector, tie_tolerance) -> ContactVector:
-        """Return consistent modes in which released contacts are locked again, one after another, where this fits."""
-        trial_modes = contact_vector()
-        for i in contact_indices:
-            trial_modes[i] = modes[i]
-        for i in contact_indices:
-            if status[i] != SLIPPING and modes[i] != STUCK:
-                trial_modes[i] = STUCK
-                if not self.are_consistent(t, y, trial_modes, status, tie_tolerance):
-                    trial_modes[i] = modes[i]
-        return trial_modes
-
-    def most_held(
-        self, t, y: StateVector, modes: ContactVector, status: ContactVector, tie_tolerance, n_at_rest, n_released
-    ) -> tuple[ContactVector, bool]:
-        """Return the consistent modes that release the fewest contacts at rest, fewer than `n_released`, if any.
-
-        Of several such, those count whose held contacts have the lowest load relative to their limit.
-        """
-        n_combinations = 1
-        for _ in range(n_at_rest):
-            n_combinations *= 3
-        best_modes, trial_modes = contact_vector(), contact_vector()
-        for i in contact_indices:
-            best_modes[i] = modes[i]
-        lowest = inf
-        for n in range(n_released):
-            for i in contact_indices:
-                trial_modes[i] = modes[i] if status[i] == SLIPPING else STUCK
-            for _ in range(n_combinations):
-                n_sliding = 0
-                for i in contact_indices:
-                    if status[i] != SLIPPING and trial_modes[i] != STUCK:
-                        n_sliding += 1
-                if n_sliding == n:
-                    if self.are_consistent(t, y, trial_modes, status, tie_tolerance):
-                        force, limit, _terms = self.contact_forces(t, y, trial_modes)
-                        highest = 0.0
+                if status[i] != SLIPPING and trial_modes[i] != STUCK:
+                    n_sliding += 1
+            if n_sliding == n:
+                if are_consistent(model, t, y, trial_modes, status, tie_tolerance):
+                    force, limit, _terms = model.contact_forces(t, y, trial_modes)
+                    highest = 0.0
+                    for i in contact_indices:
+                        if status[i] != SLIPPING and trial_modes[i] == STUCK:
+                            relative_load = fabs(force[i]) / (limit[i] + TINY_FORCE)
+                            highest = relative_load if relative_load > highest else highest
+                    if highest < lowest:
+                        lowest = highest
                         for i in contact_indices:
-                            if status[i] != SLIPPING and trial_modes[i] == STUCK:
-                                relative_load = fabs(force[i]) / (limit[i] + TINY_FORCE)
-                                highest = relative_load if relative_load > highest else highest
-                        if highest < lowest:
-                            lowest = highest
-                            for i in contact_indices:
-                                best_modes[i] = trial_modes[i]
-                carry = True  # to the next combination
-                for i in contact_indices:
-                    if carry and status[i] != SLIPPING:
-                        trial_modes[i] = (
-                            FORWARD if trial_modes[i] == STUCK else BACKWARD if trial_modes[i] == FORWARD else STUCK
-                        )
-                        carry = trial_modes[i] == STUCK
-            if lowest < inf:
-                return best_modes, True
-        return best_modes, False
+                            best_modes[i] = trial_modes[i]
+            carry = True  # to the next combination
+            for i in contact_indices:
+                if carry and status[i] != SLIPPING:
+                    trial_modes[i] = (
+                        FORWARD if trial_modes[i] == STUCK else BACKWARD if trial_modes[i] == FORWARD else STUCK
+                    )
+                    carry = trial_modes[i] == STUCK
+        if lowest < inf:
+            return best_modes, True
+    return best_modes, False
 
-    def are_consistent(self, t, y: StateVector, modes: ContactVector, status: ContactVector, tie_tolerance):
-        """Return whether no contact at rest violates the conditions of its mode."""
-        violation, _next_modes = self.violations(t, y, modes, status, tie_tolerance)
-        return not max_of(violation) > 0.0
 
-    def violations(
-        self, t, y: StateVector, modes: ContactVector, status: ContactVector, tie_tolerance
-    ) -> tuple[ContactVector, ContactVector]:
-        """Return how far each contact at rest violates the conditions of its mode (0: not at all), and its next mode.
+def are_consistent(model, t, y: StateVector, modes: ContactVector, status: ContactVector, tie_tolerance):
+    """Return whether no contact at rest violates the conditions of its mode."""
+    violation, _next_modes = violations(model, t, y, modes, status, tie_tolerance)
+    return not max_of(violation) > 0.0
 
-        The next derivative decides ties, unless the contact was locked again.  Loads have the rounding errors of their
-        terms and, if they decrease, the relative error `tie_tolerance`.
-        """
-        force, limit, terms = self.contact_forces(t, y, modes)
-        force_rate, limit_rate, residual_force, residual_force_rate = self.contact_rates(t, y, modes)
-        later_force_rate, later_limit_rate, _, later_residual_rate = self.contact_rates_ahead(t, y, modes)
-        delta = PREDICTION_SHARE * self.solver.step.h_max
-        violation, next_modes = contact_vector(), contact_vector()
-        for i in contact_indices:
-            violation[i], next_modes[i] = 0.0, STUCK
-            slack = ROUNDOFF_MARGIN * (terms[i] + limit[i])
-            # without a lever, a load is unknown, except for no load at all
-            can_hold = limit[i] > 0.0 and not (self.has_variable_levers and ROUNDOFF_MARGIN * terms[i] > limit[i])
-            if status[i] != SLIPPING and modes[i] == STUCK:
-                next_modes[i] = sign(force[i]) if fabs(force[i]) > slack else sign(force_rate[i])
-                outward = next_modes[i] * force_rate[i] - limit_rate[i]
-                if outward == 0.0:
-                    later = next_modes[i] * later_force_rate[i] - later_limit_rate[i]
-                    outward = later if fabs(later) * delta > slack else 0.0
-                if status[i] == AT_LIMIT or (status[i] == AT_REST and outward > 0.0):
-                    slack = -slack
-                elif outward < 0.0:
-                    slack += tie_tolerance * limit[i]
-                if not can_hold:
+
+def violations(
+    model, t, y: StateVector, modes: ContactVector, status: ContactVector, tie_tolerance
+) -> tuple[ContactVector, ContactVector]:
+    """Return how far each contact at rest violates the conditions of its mode (0: not at all), and its next mode.
+
+    The next derivative decides ties, unless the contact was locked again.  Loads have the rounding errors of their
+    terms and, if they decrease, the relative error `tie_tolerance`.
+    """
+    force, limit, terms = model.contact_forces(t, y, modes)
+    force_rate, limit_rate, residual_force, residual_force_rate = model.contact_rates(t, y, modes)
+    later_force_rate, later_limit_rate, _, later_residual_rate = contact_rates_ahead(model, t, y, modes)
+    delta = PREDICTION_SHARE * model.solver.step.h_max
+    violation, next_modes = contact_vector(), contact_vector()
+    for i in contact_indices:
+        violation[i], next_modes[i] = 0.0, STUCK
+        slack = ROUNDOFF_MARGIN * (terms[i] + limit[i])
+        # without a lever, a load is unknown, except for no load at all
+        can_hold = limit[i] > 0.0 and not (model.has_variable_levers and ROUNDOFF_MARGIN * terms[i] > limit[i])
+        if status[i] != SLIPPING and modes[i] == STUCK:
+            next_modes[i] = sign(force[i]) if fabs(force[i]) > slack else sign(force_rate[i])
+            outward = next_modes[i] * force_rate[i] - limit_rate[i]
+            if outward == 0.0:
+                later = next_modes[i] * later_force_rate[i] - later_limit_rate[i]
+                outward = later if fabs(later) * delta > slack else 0.0
+            if status[i] == AT_LIMIT or (status[i] == AT_REST and outward > 0.0):
+                slack = -slack
+            elif outward < 0.0:
+                slack += tie_tolerance * limit[i]
+            if not can_hold:
+                violation[i] = inf
+                if next_modes[i] == STUCK:
+                    next_modes[i] = FORWARD
+            elif next_modes[i] != STUCK and fabs(force[i]) > limit[i] + slack:
+                violation[i] = fabs(force[i]) / limit[i]
+        elif status[i] != SLIPPING:
+            ahead = modes[i] * residual_force[i]
+            if not can_hold:
+                if ahead < -slack:
+                    violation[i], next_modes[i] = inf, -modes[i]
+            else:
+                ahead_rate = modes[i] * residual_force_rate[i]
+                if ahead_rate == 0.0:
+                    later = modes[i] * later_residual_rate[i]
+                    ahead_rate = later if fabs(later) * delta > slack else 0.0
+                if ahead < -slack or (ahead <= slack and ahead_rate <= 0.0):
                     violation[i] = inf
-                    if next_modes[i] == STUCK:
-                        next_modes[i] = FORWARD
-                elif next_modes[i] != STUCK and fabs(force[i]) > limit[i] + slack:
-                    violation[i] = fabs(force[i]) / limit[i]
-            elif status[i] != SLIPPING:
-                ahead = modes[i] * residual_force[i]
-                if not can_hold:
-                    if ahead < -slack:
-                        violation[i], next_modes[i] = inf, -modes[i]
-                else:
-                    ahead_rate = modes[i] * residual_force_rate[i]
-                    if ahead_rate == 0.0:
-                        later = modes[i] * later_residual_rate[i]
-                        ahead_rate = later if fabs(later) * delta > slack else 0.0
-                    if ahead < -slack or (ahead <= slack and ahead_rate <= 0.0):
-                        violation[i] = inf
-        return violation, next_modes
+    return violation, next_modes

@@ -11,6 +11,7 @@ computed again with a tighter tolerance (phase_repetition.py).
 
 from math import fabs, inf, pi, sin, sqrt
 
+from . import contact_lcp, stick_slip
 from .codes import ROUNDOFF_MARGIN
 from .conditions import CONDITION_MARGIN, TINY
 from .interpolant import largest_of, smallest_of
@@ -74,7 +75,10 @@ def update_event_functions(model, t, y: StateVector, modes: ContactVector):
     """Evaluate all event functions."""
     location = model.event_location
     if model.has_dry_friction:
-        model.update_contact_event_functions(location, t, y, modes)
+        if model.is_coupled:
+            contact_lcp.update_contact_event_functions(model, location, t, y, modes)
+        else:
+            stick_slip.update_contact_event_functions(model, location, t, y, modes)
     if model.has_conditions:
         model.update_conditions(t, y, modes)
         for j in range(model.n_event_functions - model.first_condition):
@@ -130,7 +134,7 @@ def evaluate_on_cubic(model, step):
     y2 = (20.0 * step.y0 + 7.0 * step.y1 + h * (4.0 * step.f0 - 2.0 * step.f1)) / 27.0
     y3 = (7.0 * step.y0 + 20.0 * step.y1 + h * (2.0 * step.f0 - 4.0 * step.f1)) / 27.0
     if model.is_coupled:
-        model.find_frictionless_contacts(location, step)
+        contact_lcp.find_frictionless_contacts(model, location, step)
     update_event_functions(model, t0, step.y0, step.modes0)
     for j in range(model.n_event_functions):
         location.start[j] = location.values[j]

@@ -14,7 +14,7 @@ solvers report a zero at the current time as another event.
 
 from math import fabs, inf, nan
 
-from . import call_sequence, conditions, event_location
+from . import call_sequence, conditions, contact_lcp, event_location, stick_slip
 from .codes import DIVERGED, EPSILON, MODEL_EXCHANGE, NO_CONSISTENT_MODES, OK, ROUNDOFF_MARGIN, RUNNING, STUCK
 from .integrator import DEFAULT_NOMINAL
 from .step_control import OVERFLOW_LIMIT, TIE_FACTOR
@@ -194,7 +194,7 @@ def update_indicators(model):
                 if solver.modes[i] != STUCK:
                     to_rest[i] = solver.modes[i] * solver.y[slip_index[i]] + TINY
                 else:
-                    load, _, limit, slack = model.stick_balance(solver.t, solver.y, i)
+                    load, _, limit, slack = stick_slip.stick_balance(model, solver.t, solver.y, i)
                     to_break_away[i] = limit + slack + INDICATOR_OFFSET * limit + TINY - fabs(load)
     for i in contact_indices:
         exchange.indicators[i] = to_rest[i]
@@ -302,8 +302,8 @@ def update_modes(model, solver):
     needs_restart = changed = False
     step = solver.step
     if model.is_coupled:
-        y, modes, step.has_consistent_modes = model.resolve_at_start(
-            solver.t, solver.y, solver.modes, tie_tolerance, OVERSHOOT_TOLERANCE
+        y, modes, step.has_consistent_modes = contact_lcp.resolve_at_start(
+            model, solver.t, solver.y, solver.modes, tie_tolerance, OVERSHOOT_TOLERANCE
         )
         needs_restart, changed = any_of(y != solver.y), any_of(modes != solver.modes)
         solver.y, solver.modes = y, modes
@@ -314,8 +314,8 @@ def update_modes(model, solver):
                 if last_mode != STUCK and solver.y[slip_index[i]] != 0.0:
                     solver.y[slip_index[i]] = 0.0
                     needs_restart = True
-                if not model.is_grazing(solver.t, solver.y, solver.modes, 0.0, i):
-                    solver.modes[i] = model.resolve_mode(solver.t, solver.y, tie_tolerance, i)
+                if not stick_slip.is_grazing(model, solver.t, solver.y, solver.modes, 0.0, i):
+                    solver.modes[i] = stick_slip.resolve_mode(model, solver.t, solver.y, tie_tolerance, i)
                 if solver.modes[i] == STUCK and solver.t >= model.model_exchange.t_next_event:
                     # the load is at the limit, except for rounding errors
                     load, rate, limit = model.stick_load(solver.t, solver.y, i)
@@ -324,7 +324,7 @@ def update_modes(model, solver):
                 if solver.modes[i] != last_mode:
                     changed = True
                     if solver.modes[i] != STUCK and solver.y[slip_index[i]] == 0.0:
-                        step.has_consistent_modes = model.is_consistent(solver.t, solver.y, solver.modes, i)
+                        step.has_consistent_modes = stick_slip.is_consistent(model, solver.t, solver.y, solver.modes, i)
     if changed:
         solver.step.start_counters.n_events += 1
         solver.step.start_counters.t_event = solver.t
@@ -337,5 +337,5 @@ def next_breakaway(model, solver):
         return inf
     ends, directions = contact_vector(), contact_vector()
     for i in contact_indices:
-        ends[i], directions[i] = model.breakaway_time(solver.t, solver.y, i)
+        ends[i], directions[i] = stick_slip.breakaway_time(model, solver.t, solver.y, i)
     return min_of(ends)

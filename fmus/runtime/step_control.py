@@ -7,7 +7,7 @@ integration method that meets the tolerance.  The step size is controlled as in 
 
 from math import inf
 
-from . import conditions, event_location, phase_repetition, step_limits
+from . import conditions, contact_lcp, event_location, phase_repetition, step_limits, stick_slip
 from .active_method import ActiveMethod
 from .codes import DIVERGED, EPSILON, EXACT, NEEDS_REPETITION, NO_CONSISTENT_MODES, OK, ROUNDOFF_MARGIN, STALLED, STUCK
 from .event_location import INTERPOLANT_SHARE, NEAR_ZERO_SHARE
@@ -237,7 +237,7 @@ class InternalStep:
             self.y1[slip_index[i]] = 0.0
         ends, directions = contact_vector(), contact_vector()
         for i in contact_indices:
-            ends[i], directions[i] = model.breakaway_time(self.t0, self.y1, i)
+            ends[i], directions[i] = stick_slip.breakaway_time(model, self.t0, self.y1, i)
         end = min_of(ends)
         if end <= self.t_end and end < inf:
             self.t1 = end
@@ -394,7 +394,7 @@ class InternalStep:
                     return NEEDS_REPETITION
                 return self.end_at(model, end)
             if model.is_coupled and self.is_hybrid:
-                self.y1 = model.stop_slips(self.t1, self.y1, modes)
+                self.y1 = contact_lcp.stop_slips(model, self.t1, self.y1, modes)
                 self.f1 = select_kinematic(kinematic_rates(self.y1), self.f1)
             phase_repetition.end_phase_in_doubt(model, self)
         return OK
@@ -440,8 +440,8 @@ class InternalStep:
                 other = location.times[len(self.modes0) + i]
                 ends[i] = location.times[i] if location.times[i] < other else other
             if model.is_coupled:
-                self.y1, self.modes1, self.has_consistent_modes = model.resolve_after_event(
-                    self, ends, self.tie_tolerance(model)
+                self.y1, self.modes1, self.has_consistent_modes = contact_lcp.resolve_after_event(
+                    model, self, ends, self.tie_tolerance(model)
                 )
             else:
                 for i in contact_indices:
@@ -471,14 +471,14 @@ class InternalStep:
             self.modes1 = modes  # they change at the ends of steps: see update_law_modes
         if self.is_hybrid:
             if model.is_coupled:
-                self.y1, self.modes1, self.has_consistent_modes = model.resolve_at_start(
-                    self.t1, self.y1, modes, tie_tolerance, tie_tolerance
+                self.y1, self.modes1, self.has_consistent_modes = contact_lcp.resolve_at_start(
+                    model, self.t1, self.y1, modes, tie_tolerance, tie_tolerance
                 )
             else:
                 for i in contact_indices:
-                    self.modes1[i] = model.resolve_mode(self.t1, self.y1, tie_tolerance, i)
+                    self.modes1[i] = stick_slip.resolve_mode(model, self.t1, self.y1, tie_tolerance, i)
                     if self.y1[slip_index[i]] == 0.0 and self.modes1[i] != modes[i] != STUCK:
-                        if model.is_grazing(self.t1, self.y1, modes, tie_tolerance, i):
+                        if stick_slip.is_grazing(model, self.t1, self.y1, modes, tie_tolerance, i):
                             self.modes1[i], self.grazes_at_end = modes[i], True
 
     def update_end_rates(self, model):
@@ -498,8 +498,8 @@ class InternalStep:
                         and self.y1[slip_index[i]] == 0.0
                         and self.modes1[i] * self.f1[slip_index[i]] < 0.0
                     ):
-                        self.has_consistent_modes = self.grazes_at_end or model.is_consistent(
-                            self.t1, self.y1, self.modes1, i
+                        self.has_consistent_modes = self.grazes_at_end or stick_slip.is_consistent(
+                            model, self.t1, self.y1, self.modes1, i
                         )
                         self.f1[slip_index[i]] = 0.0  # rounding at a break-away: no body starts against its mode
 

@@ -4,6 +4,8 @@ While it slides, the friction force follows the model and opposes the direction 
 balances the load, up to the holding limit.  Slip ends when the slip velocity reaches zero, stick when the load exceeds
 the limit (M. Otter, H. Elmqvist, S. E. Mattsson, Hybrid modeling in Modelica based on the synchronous data flow
 principle, CACSD 1999).  contact_lcp.py treats several contacts.
+
+The model states loads and accelerations; the functions below, which belong to the solver, decide on modes.
 """
 
 from math import fabs, inf
@@ -82,74 +84,6 @@ class DryFriction(Oscillator):
     def law_modes(self, t: float, y: StateVector) -> ContactVector:
         """Return the directions of slip under the laws sign and threshold, whose forces do not depend on modes."""
 
-    def resolve_mode(self, t, y: StateVector, tie_tolerance, i: ContactIndex):
-        """Return the mode from time t on.
-
-        A load at the limit is a tie, which the rate of the load decides: the contact breaks away if the load grows and
-        sticks otherwise.
-
-        Parameters
-        ----------
-        t
-            Time in s.
-        y
-            States.
-        tie_tolerance
-            Relative tolerance of the limit for a decreasing load, besides the rounding errors of its terms.
-        i
-            Index of the contact.
-        """
-        if y[slip_index[i]] > 0.0:
-            return FORWARD
-        if y[slip_index[i]] < 0.0:
-            return BACKWARD
-        load, rate, limit, slack = self.stick_balance(t, y, i)
-        if rate > 0.0 and load >= limit - slack:
-            return FORWARD
-        if rate < 0.0 and load <= slack - limit:
-            return BACKWARD
-        if rate != 0.0:
-            slack += tie_tolerance * limit
-        if fabs(load) <= limit + slack:
-            return STUCK
-        return FORWARD if load > 0.0 else BACKWARD
-
-    def stick_balance(self, t, y: StateVector, i: ContactIndex):
-        """Return the load on a contact at rest, its rate, the holding limit, and the rounding error of that."""
-        load, rate, limit = self.stick_load(t, y, i)
-        return load, rate, limit, ROUNDOFF_MARGIN * (self.load_magnitude(t, y, i) + limit)
-
-    def is_grazing(self, t, y: StateVector, modes: ContactVector, tie_tolerance, i: ContactIndex):
-        """Return whether the slip velocity only touches zero here and the slip continues.
-
-        A contact that holds more than its sliding force comes to rest.  Another one goes on slipping if it would break
-        away again so soon that a velocity with the relative error `tie_tolerance` might not reach zero.  After s
-        seconds the velocity grows as v = u (1 - cos(w s)), where the load has the rate m w^2 u.
-        A load that varies by itself can make u larger than any velocity of the motion.  So the velocity must also not
-        go further in the other direction than its error, which the largest slip velocity bounds, if it is known.
-        """
-        load, rate, limit = self.stick_load(t, y, i)
-        if rate == 0.0:
-            return load == 0.0 and limit == 0.0  # no friction: the remaining velocity is the error of the method
-        if modes[i] * rate < 0.0 or self.jumps_at_breakaway(t, y, modes, i):
-            return False
-        delay = (limit - modes[i] * load) / fabs(rate)
-        _, J = self.jacobian(t, y, modes)
-        stiffness = J[slip_index[i], position_index[i]]
-        if not ((stiffness < 0.0 or delay == 0.0) and -0.5 * stiffness * delay * delay < tie_tolerance):
-            return False
-        largest_slip = self.event_location.peaks[i]
-        reversed_velocity = -0.5 * modes[i] * self.slip_acceleration(t, y, modes, i) * delay
-        return largest_slip == 0.0 or reversed_velocity < tie_tolerance * largest_slip
-
-    def jumps_at_breakaway(self, t, y: StateVector, modes: ContactVector, i: ContactIndex):
-        """Return whether the holding force exceeds the sliding force, except for rounding errors."""
-        reverse_modes = contact_vector()
-        reverse_modes[i] = -modes[i]
-        forward, backward = self.slip_acceleration(t, y, modes, i), self.slip_acceleration(t, y, reverse_modes, i)
-        jump = modes[i] * self.breakaway_acceleration(t, y, modes, i)
-        return jump > WRONG_WAY_TOLERANCE * fabs(forward - backward)
-
     def breakaway_acceleration(self, t, y: StateVector, modes: ContactVector, i: ContactIndex):
         """Return the slip acceleration at a break-away, where the load equals the limit."""
         return self.slip_acceleration(t, y, modes, i)
@@ -159,57 +93,133 @@ class DryFriction(Oscillator):
         f = self.rates(t, y, modes)
         return f[slip_index[i]]
 
-    def is_consistent(self, t, y: StateVector, modes: ContactVector, i: ContactIndex):
-        """Return whether a body that breaks away starts in the direction of its mode.
 
-        It does not if the sliding force exceeds the holding force; rounding errors are tolerated.
-        """
-        reverse_modes = contact_vector()
-        reverse_modes[i] = -modes[i]
-        forward, backward = self.slip_acceleration(t, y, modes, i), self.slip_acceleration(t, y, reverse_modes, i)
-        if modes[i] * backward <= 0.0:
-            return True  # it does not stay at rest either, it moves the other way
-        load, _, _, slack = self.stick_balance(t, y, i)
-        if fabs(load) <= slack:
-            return True
-        # late in a run a load is a small difference of large numbers
-        rounding = WRONG_WAY_TOLERANCE * fabs(forward - backward) + slack / fabs(load) * fabs(forward + backward)
-        return modes[i] * forward >= -rounding
+def resolve_mode(model, t, y: StateVector, tie_tolerance, i: ContactIndex):
+    """Return the mode from time t on.
 
-    def breakaway_time(self, t, y: StateVector, i: ContactIndex):
-        """Return when a contact breaks away if nothing moves (inf if never), and the direction."""
-        load, rate, limit = self.stick_load(t, y, i)
-        if self.has_input_derivatives and self.has_higher_order():
-            return self.breakaway_time_by_series(t, y, load, rate, limit, i)
-        if rate == 0.0:
-            return inf, STUCK
-        direction = FORWARD if rate > 0.0 else BACKWARD
-        delay = (limit - direction * load) / fabs(rate)
-        return t + (delay if delay > 0.0 else 0.0), direction
+    A load at the limit is a tie, which the rate of the load decides: the contact breaks away if the load grows and
+    sticks otherwise.
 
-    def breakaway_time_by_series(self, t, y: StateVector, load, rate, limit, i: ContactIndex):
-        """Return the same for inputs of higher order; direction 0 if the search must continue from that time."""
-        series = self.event_location.load_series
-        duration = scale = self.solver.step.h_max
-        series.c[1] = rate * duration
-        for n in range(2, MAX_INPUT_ORDER + 1):
-            scale *= duration / n
-            series.c[n] = self.load_derivative(t, y, n, i) * scale
-        series.c[0] = load - limit if load < limit else 0.0
-        up, forward = series.first_zero(BACKWARD)
-        series.c[0] = load + limit if load > -limit else 0.0
-        down, backward = series.first_zero(FORWARD)
-        if forward and up <= down:
-            return t + up * duration, FORWARD
-        if backward and down <= up:
-            return t + down * duration, BACKWARD
-        return t + (up if up < down else down) * duration, STUCK
+    Parameters
+    ----------
+    t
+        Time in s.
+    y
+        States.
+    tie_tolerance
+        Relative tolerance of the limit for a decreasing load, besides the rounding errors of its terms.
+    i
+        Index of the contact.
+    """
+    if y[slip_index[i]] > 0.0:
+        return FORWARD
+    if y[slip_index[i]] < 0.0:
+        return BACKWARD
+    load, rate, limit, slack = stick_balance(model, t, y, i)
+    if rate > 0.0 and load >= limit - slack:
+        return FORWARD
+    if rate < 0.0 and load <= slack - limit:
+        return BACKWARD
+    if rate != 0.0:
+        slack += tie_tolerance * limit
+    if fabs(load) <= limit + slack:
+        return STUCK
+    return FORWARD if load > 0.0 else BACKWARD
 
-    def update_contact_event_functions(self, location, t, y: StateVector, modes: ContactVector):
-        """Evaluate the event functions of the contact: the slip velocity in the direction of the mode."""
-        for i in contact_indices:
-            location.values[i] = location.values[len(modes) + i] = 1.0
-            location.scales[i] = location.scales[len(modes) + i] = 0.0
-            if self.friction == HYBRID and modes[i] != STUCK:
-                location.values[i] = modes[i] * y[slip_index[i]]
-                location.scales[i] = fabs(y[slip_index[i]])
+
+def stick_balance(model, t, y: StateVector, i: ContactIndex):
+    """Return the load on a contact at rest, its rate, the holding limit, and the rounding error of that."""
+    load, rate, limit = model.stick_load(t, y, i)
+    return load, rate, limit, ROUNDOFF_MARGIN * (model.load_magnitude(t, y, i) + limit)
+
+
+def is_grazing(model, t, y: StateVector, modes: ContactVector, tie_tolerance, i: ContactIndex):
+    """Return whether the slip velocity only touches zero here and the slip continues.
+
+    A contact that holds more than its sliding force comes to rest.  Another one goes on slipping if it would break
+    away again so soon that a velocity with the relative error `tie_tolerance` might not reach zero.  After s
+    seconds the velocity grows as v = u (1 - cos(w s)), where the load has the rate m w^2 u.
+    A load that varies by itself can make u larger than any velocity of the motion.  So the velocity must also not
+    go further in the other direction than its error, which the largest slip velocity bounds, if it is known.
+    """
+    load, rate, limit = model.stick_load(t, y, i)
+    if rate == 0.0:
+        return load == 0.0 and limit == 0.0  # no friction: the remaining velocity is the error of the method
+    if modes[i] * rate < 0.0 or jumps_at_breakaway(model, t, y, modes, i):
+        return False
+    delay = (limit - modes[i] * load) / fabs(rate)
+    _, J = model.jacobian(t, y, modes)
+    stiffness = J[slip_index[i], position_index[i]]
+    if not ((stiffness < 0.0 or delay == 0.0) and -0.5 * stiffness * delay * delay < tie_tolerance):
+        return False
+    largest_slip = model.event_location.peaks[i]
+    reversed_velocity = -0.5 * modes[i] * model.slip_acceleration(t, y, modes, i) * delay
+    return largest_slip == 0.0 or reversed_velocity < tie_tolerance * largest_slip
+
+
+def jumps_at_breakaway(model, t, y: StateVector, modes: ContactVector, i: ContactIndex):
+    """Return whether the holding force exceeds the sliding force, except for rounding errors."""
+    reverse_modes = contact_vector()
+    reverse_modes[i] = -modes[i]
+    forward, backward = model.slip_acceleration(t, y, modes, i), model.slip_acceleration(t, y, reverse_modes, i)
+    jump = modes[i] * model.breakaway_acceleration(t, y, modes, i)
+    return jump > WRONG_WAY_TOLERANCE * fabs(forward - backward)
+
+
+def is_consistent(model, t, y: StateVector, modes: ContactVector, i: ContactIndex):
+    """Return whether a body that breaks away starts in the direction of its mode.
+
+    It does not if the sliding force exceeds the holding force; rounding errors are tolerated.
+    """
+    reverse_modes = contact_vector()
+    reverse_modes[i] = -modes[i]
+    forward, backward = model.slip_acceleration(t, y, modes, i), model.slip_acceleration(t, y, reverse_modes, i)
+    if modes[i] * backward <= 0.0:
+        return True  # it does not stay at rest either, it moves the other way
+    load, _, _, slack = stick_balance(model, t, y, i)
+    if fabs(load) <= slack:
+        return True
+    # late in a run a load is a small difference of large numbers
+    rounding = WRONG_WAY_TOLERANCE * fabs(forward - backward) + slack / fabs(load) * fabs(forward + backward)
+    return modes[i] * forward >= -rounding
+
+
+def breakaway_time(model, t, y: StateVector, i: ContactIndex):
+    """Return when a contact breaks away if nothing moves (inf if never), and the direction."""
+    load, rate, limit = model.stick_load(t, y, i)
+    if model.has_input_derivatives and model.has_higher_order():
+        return breakaway_time_by_series(model, t, y, load, rate, limit, i)
+    if rate == 0.0:
+        return inf, STUCK
+    direction = FORWARD if rate > 0.0 else BACKWARD
+    delay = (limit - direction * load) / fabs(rate)
+    return t + (delay if delay > 0.0 else 0.0), direction
+
+
+def breakaway_time_by_series(model, t, y: StateVector, load, rate, limit, i: ContactIndex):
+    """Return the same for inputs of higher order; direction 0 if the search must continue from that time."""
+    series = model.event_location.load_series
+    duration = scale = model.solver.step.h_max
+    series.c[1] = rate * duration
+    for n in range(2, MAX_INPUT_ORDER + 1):
+        scale *= duration / n
+        series.c[n] = model.load_derivative(t, y, n, i) * scale
+    series.c[0] = load - limit if load < limit else 0.0
+    up, forward = series.first_zero(BACKWARD)
+    series.c[0] = load + limit if load > -limit else 0.0
+    down, backward = series.first_zero(FORWARD)
+    if forward and up <= down:
+        return t + up * duration, FORWARD
+    if backward and down <= up:
+        return t + down * duration, BACKWARD
+    return t + (up if up < down else down) * duration, STUCK
+
+
+def update_contact_event_functions(model, location, t, y: StateVector, modes: ContactVector):
+    """Evaluate the event functions of the contact: the slip velocity in the direction of the mode."""
+    for i in contact_indices:
+        location.values[i] = location.values[len(modes) + i] = 1.0
+        location.scales[i] = location.scales[len(modes) + i] = 0.0
+        if model.friction == HYBRID and modes[i] != STUCK:
+            location.values[i] = modes[i] * y[slip_index[i]]
+            location.scales[i] = fabs(y[slip_index[i]])

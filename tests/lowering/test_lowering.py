@@ -157,7 +157,7 @@ def test_every_compound_statement_keeps_the_number_of_its_source_line(name):
 
 def test_the_tree_of_a_function_has_the_line_numbers_of_its_file():
     source = Path(stick_slip.__file__).read_text(encoding="utf-8").split("\n")
-    for function in (stick_slip.threshold, stick_slip.DryFriction.resolve_mode):
+    for function in (stick_slip.threshold, stick_slip.DryFriction.slip_acceleration, stick_slip.resolve_mode):
         tree = function_tree(function)
         assert source[tree.lineno - 1].strip().startswith(f"def {function.__name__}(")
         last = tree.body[-1]

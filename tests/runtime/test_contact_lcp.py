@@ -44,13 +44,14 @@ class Chain(CoupledFriction):
         pulls = [(b - self.A @ f) / np.diag(self.A) for b, f in ((self.b, force), (self.b_rate, rate))]
         return rate, np.zeros(self.n), *pulls
 
-    def contact_rates_ahead(self, t, y, modes):
-        return self.contact_rates(t, y, modes)  # the rates are constant
+    def rates(self, t, y, modes):
+        return np.zeros(self.n)  # the rates of forces are constant
 
     def answer(self):
         """Return the modes, found from all contacts stuck, and whether they are consistent."""
         vectors.contact_indices[:] = range(self.n)
-        modes, fits = self.solve_modes(0.0, None, np.zeros(self.n), np.full(self.n, AT_REST), ROUNDOFF_MARGIN)
+        y, status = np.zeros(self.n), np.full(self.n, AT_REST)
+        modes, fits = contact_lcp.solve_modes(self, 0.0, y, np.zeros(self.n), status, ROUNDOFF_MARGIN)
         return tuple(map(int, modes)), fits
 
     def fits(self, modes):
@@ -137,7 +138,7 @@ def test_with_many_contacts_at_rest_none_is_released_that_could_be_held_alone(mo
         for i in range(7):
             assert modes[i] == STUCK or not chain.fits([STUCK if j == i else mode for j, mode in enumerate(modes)])
         with monkeypatch.context() as patch:
-            patch.setattr(Chain, "relock", lambda self, t, y, modes, status, tie_tolerance: modes)
+            patch.setattr(contact_lcp, "relock", lambda model, t, y, modes, status, tie_tolerance: modes)
             n_relocked += chain.answer()[0] != modes
     assert n_relocked > 0
 
