@@ -1,5 +1,6 @@
 """Models of users on a page of their own."""
 
+import pytest
 import web_page
 from build_cache import ROOT
 from models import EXAMPLE_MODELS, LARGER_MODELS
@@ -19,6 +20,12 @@ def test_moving_bodies_of_any_model_are_read_from_its_declaration():
     assert {bodies_by_model[name][0]["friction"] for name in ("bumper", "lugre")} == {"F_drag", "F_friction"}  # smooth
     assert bodies_by_model["sleds"][0]["linked"] == ["x2"]
     assert bodies_by_model["viscous_pendulum"][0]["dampers"] == ["d"]
+
+
+@pytest.mark.parametrize(("name", "driver"), [("joint", ""), ("forced", ""), ("elastoplastic", "x_driver")])
+def test_a_phase_angle_is_no_driver(name, driver):
+    """It enters the motion by its sine; a driver pulls through a spring."""
+    assert list_bodies(find_model(name).analysis)[0].get("driver", "") == driver
 
 
 def test_the_models_of_fmus_more_run_on_a_second_page(quiet):

@@ -79,11 +79,11 @@ def body_json(analysis: ModelAnalysis, x: State) -> ModelJson:
         e for e in analysis.outputs if is_friction_force(e, v)
     ]
     linked = [y.name for y in analysis.positions if y is not x and depends_on(law, (y,))]
-    drives = [d for d in analysis.drivers if depends_on(law, (d,))]
+    drives = [d for d in analysis.drivers if pulls_on(law, d, x)]
     springs = [e for e in analysis.outputs for d in drives if is_spring_force(e, x, d)]
     slip = v.name if frictions and slips_with(frictions[0], v) else ""
     starts = [s.start_expression.name for s in (x, v) if isinstance(s, State) and isinstance(s.start_expression, Fixed)]
-    moves_with_driver = all(is_same_expression(differentiate(law, {x: 1.0, d: 1.0}), 0.0) for d in drives)
+    moves_with_driver = all(moves_along(law, d, x) for d in analysis.drivers if depends_on(law, (d,)))
     is_alone = len(analysis.contacts) == 1 and not linked
     items = {
         "kind": "pendulum" if is_angle and is_nonlinear else "rotor" if is_angle else "block",
@@ -119,6 +119,17 @@ def slips_with(friction: Contact | Output, v: State | Output) -> bool:
     if isinstance(friction, Contact):
         return is_same_expression(friction.slip, v)
     return variables_of_motion(friction) == {v.name}
+
+
+def moves_along(law: Operand, driver: State, x: State) -> bool:
+    """Check whether an acceleration stays the same if the driver and the position x move by the same distance."""
+    return is_same_expression(differentiate(law, {x: 1.0, driver: 1.0}), 0.0)
+
+
+def pulls_on(law: Operand, driver: State, x: State) -> bool:
+    """Check whether a driver pulls on x, unlike a phase angle, which enters an acceleration by its sine."""
+    pull = differentiate(law, {driver: 1.0})
+    return depends_on(law, (driver,)) and (moves_along(law, driver, x) or not depends_on(pull, (driver,)))
 
 
 def is_spring_force(e: Output, x: State, driver: State) -> bool:

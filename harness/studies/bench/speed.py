@@ -32,7 +32,7 @@ def speed_benchmarks() -> list[Callable[[], Benchmark]]:
     """Return the run-time benchmarks."""
     sled = load_model_class(find_fmu("stickslip"))
     pacejka = partial(
-        time_in_process, "pacejka", load_model_class(find_fmu("pacejka")), "rodas", 8e-3, ("Radau", "BDF")
+        time_in_process, "pacejka", load_model_class(find_fmu("pacejka")), "radau9", 8e-3, ("Radau", "BDF")
     )
     return [
         partial(time_in_process, "stickslip", sled, "exact", 0.5e-3, ("RK23", "Adams"), StickslipProblem(), {}),
