@@ -10,7 +10,6 @@ from dataclasses import dataclass
 
 from ..syntax_trees import all_nodes, child_nodes, parsed_module, parsed_nodes
 from .emit_source import MAX_LINE_LENGTH, SourceLine, wrap_line
-from .source_symbols import is_self_assignment
 
 DOTTED_NAME = re.compile(r"[A-Za-z_]\w*(?:\.[A-Za-z_]\w*)+")
 FMI_LAYER_MODULES = (
@@ -20,6 +19,11 @@ FMI_LAYER_MODULES = (
 KEPT_WHOLE = {f"runtime/{name}.py" for name in FMI_LAYER_MODULES}  # called by the FMI layer
 Files = dict[str, list[SourceLine]]
 Removable = ast.ClassDef | ast.FunctionDef | ast.Assign
+# parts of an expression that cannot fail and change nothing, unlike calls, division, powers and indexing
+WITHOUT_EFFECT = (
+    *(ast.Name, ast.Constant, ast.Attribute, ast.List, ast.UnaryOp, ast.unaryop, ast.IfExp, ast.Compare, ast.cmpop),
+    *(ast.BinOp, ast.Add, ast.Sub, ast.Mult),
+)
 
 
 def remove_dead_code(files: Files, model: str, names: Iterable[str]) -> Files:
@@ -89,12 +93,12 @@ def units_of_node(part: ast.AST, needs: list[set[str]], whole: bool) -> list[Cod
             case ast.Constant(value=str(text)) if DOTTED_NAME.fullmatch(text):
                 mine.reads |= {"." + word for word in text.split(".")}
             case ast.Assign():
-                mine.reads |= {"." + name for name in attributes_with_effects(node)}
+                mine.reads |= {"." + name for name in attributes_kept(node, whole)}
                 for targets, value in [] if whole else assignment_pairs(node):
                     if all(is_dead_store(one, value, set()) for one in targets):
-                        result += units_of_node(
-                            value, [*needs, {"." + one.attr for one in targets if is_self_assignment(one)}], True
-                        )
+                        stored = {"." + one.attr for one in targets if isinstance(one, ast.Attribute)}
+                        for piece in (*targets, value):
+                            result += units_of_node(piece, [*needs, stored], True)
                     else:
                         pending += [*targets, value]
                 if not whole:
@@ -149,7 +153,7 @@ def delete_definition(lines: list[SourceLine], node: ast.ClassDef | ast.Function
 
 
 def prune_assignment(lines: list[SourceLine], node: ast.Assign, used: set[str]) -> None:
-    """Remove unread attributes of self from an assignment without other effects."""
+    """Remove unread attributes from an assignment without other effects."""
     pairs = assignment_pairs(node)
     kept = [([one for one in targets if not is_dead_store(one, value, used)], value) for targets, value in pairs]
     if kept == pairs:
@@ -161,9 +165,10 @@ def prune_assignment(lines: list[SourceLine], node: ast.Assign, used: set[str]) 
     old, end = lines[node.lineno - 1], node.end_lineno or 0
     comment = re.search(r"  #.*$", lines[end - 1])
     text = " = ".join(sides) + (comment[0] if comment else "") if len(sides) > 1 else ""
-    if not text and lines[node.lineno - 2].endswith(":") and not "".join(lines[end : end + 1]).strip():
+    indent = " " * node.col_offset
+    if not text and lines[node.lineno - 2].endswith(":") and not "".join(lines[end : end + 1]).startswith(indent):
         text = "pass"  # the body would be empty
-    lines[node.lineno - 1 : end] = [SourceLine.of(" " * node.col_offset + text, old.source)] if text else []
+    lines[node.lineno - 1 : end] = [SourceLine.of(indent + text, old.source)] if text else []
 
 
 def assignment_pairs(node: ast.Assign) -> list[tuple[list[ast.expr], ast.expr]]:
@@ -179,17 +184,19 @@ def assignment_targets(node: ast.Assign) -> list[tuple[ast.expr, ast.expr]]:
     return [(target, value) for targets, value in assignment_pairs(node) for target in targets]
 
 
-def attributes_with_effects(node: ast.Assign) -> set[str]:
-    """Return the attributes in assignments that may have other effects."""
-    kept = [target for target, value in assignment_targets(node) if not is_dead_store(target, value, set())]
+def attributes_kept(node: ast.Assign, whole: bool) -> set[str]:
+    """Return the attributes in targets that stay without a reader: all if `whole`, else those with other effects."""
+    kept = [target for target, value in assignment_targets(node) if whole or not is_dead_store(target, value, set())]
     return {part.attr for one in kept for part in all_nodes(one) if isinstance(part, ast.Attribute)}
 
 
 def is_dead_store(target: ast.expr, value: ast.expr, used: set[str]) -> bool:
-    """Return whether this only sets an attribute of self that is never read."""
+    """Return whether this only sets an attribute that is never read."""
+    if not isinstance(target, ast.Attribute) or "." + target.attr in used:
+        return False
     makes = isinstance(value, ast.Call) and isinstance(value.func, ast.Name) and not value.args
-    mine = is_self_assignment(target) and "." + target.attr not in used
-    return mine and (makes or isinstance(value, (ast.Name, ast.Constant, ast.Attribute)))
+    parts = all_nodes(target) + ([] if makes else all_nodes(value))
+    return all(isinstance(one, WITHOUT_EFFECT) for one in parts)
 
 
 def prune_imports(lines: list[SourceLine]) -> list[SourceLine]:
