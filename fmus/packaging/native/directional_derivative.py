@@ -77,8 +77,9 @@ def build_tangent_functions(
     functions = {}
     for name, body in bodies.items():
         text = ast.unparse(ast.fix_missing_locations(ast.Module([function_around(name, body)], [])))
-        own_names = names | {TREE_NAME: ast.parse(text)}
-        exec(compile(text, module.__file__ or "?", "exec", optimize=0), own_names)
+        tree = ast.parse(text)
+        own_names = names | {TREE_NAME: tree}
+        exec(compile(tree, module.__file__ or "?", "exec", optimize=0), own_names)
         functions[name] = own_names[name]
     tangent = Tangent()
     for field in (*tangent_fields(declared).values(), *constants):

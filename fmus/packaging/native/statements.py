@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 from ..equations.reserved_names import C_NAMES
 from ..lowering import function_tree
+from ..syntax_trees import replace_fields
 from .c_types import (
     FLOAT,
     INT,
@@ -181,7 +182,7 @@ class FunctionTranslator(ExpressionTranslator):
             self.assign(part, CExpression(ctype, f"{value.text}._{i}"))
 
     def visit_AugAssign(self, node: ast.AugAssign) -> bool:
-        loaded = ast.copy_location(ast.parse(ast.unparse(node.target), mode="eval").body, node)
+        loaded = replace_fields(node.target, ctx=ast.Load())
         value = ast.copy_location(ast.BinOp(loaded, node.op, node.value), node)
         self.assign(node.target, self.run_time_number(value))
         return True
