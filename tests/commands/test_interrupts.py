@@ -211,18 +211,23 @@ def test_a_program_that_times_out_ends_with_all_its_children(tmp_path):
     assert ends((tmp_path / "pid").read_text())
 
 
+def child_of_killed_parent(code, file):
+    """Run Python code whose child writes its process id to a file, kill it then, and return the id of the child."""
+    parent = subprocess.Popen([sys.executable, "-c", code], cwd=ROOT, env=os.environ | {"PYTHONPATH": str(ROOT)})
+    while not (file.is_file() and file.read_text()):
+        assert parent.poll() is None
+        time.sleep(0.05)
+    parent.kill()
+    parent.wait()
+    return file.read_text()
+
+
 def test_a_child_process_exits_after_its_parent_was_killed(tmp_path):
     hang = f"lambda request: (Path({str(tmp_path / 'pid')!r}).write_text(str(os.getpid())), time.sleep(100))"
     start = "import os, sys, time; from pathlib import Path; from harness.process.subprocess_runner import "
     child = f"{start}serve_request; serve_request(dict, {hang})"
     code = f"{start}run_subprocess; run_subprocess([sys.executable, '-c', {child!r}], '{{}}')"
-    parent = subprocess.Popen([sys.executable, "-c", code], cwd=ROOT, env=os.environ | {"PYTHONPATH": str(ROOT)})
-    while not ((tmp_path / "pid").is_file() and (tmp_path / "pid").read_text()):
-        assert parent.poll() is None
-        time.sleep(0.05)
-    parent.kill()
-    parent.wait()
-    assert ends((tmp_path / "pid").read_text())
+    assert ends(child_of_killed_parent(code, tmp_path / "pid"))
 
 
 def test_a_child_process_exits_if_its_parent_was_killed_during_its_imports(tmp_path):
@@ -233,13 +238,7 @@ def test_a_child_process_exits_if_its_parent_was_killed_during_its_imports(tmp_p
     child += "serve_request(dict, lambda request: time.sleep(100))"
     code = f"{start}from harness.process.subprocess_runner import run_subprocess\n"
     code += f"run_subprocess([sys.executable, '-c', {child!r}], '{{}}')"
-    parent = subprocess.Popen([sys.executable, "-c", code], cwd=ROOT, env=os.environ | {"PYTHONPATH": str(ROOT)})
-    while not ((tmp_path / "pid").is_file() and (tmp_path / "pid").read_text()):
-        assert parent.poll() is None
-        time.sleep(0.05)
-    parent.kill()
-    parent.wait()
-    assert ends((tmp_path / "pid").read_text())
+    assert ends(child_of_killed_parent(code, tmp_path / "pid"))
 
 
 def test_a_program_awaited_by_a_thread_ends_with_the_command(tmp_path, monkeypatch):
