@@ -1,7 +1,7 @@
 """Workarounds for the native layer of pythonfmu 0.7.0, in its file PySlaveInstance.cpp; embedded in every Python FMU.
 
 1. handle_py_exception() releases the class, the instance and the log, which the destructor releases again.
-   add_references() takes the missing references before an exception leaves Python.
+   compensate_references() takes the missing references before an exception leaves Python.
 2. findClass() releases the globals of the entry script, a reference that it does not own: the second instance frees
    them. Each run of the script calls keep_reference().
 3. At process exit a library that is still loaded releases its state in a static destructor, and again through the
@@ -19,6 +19,7 @@ from __future__ import annotations
 import atexit
 import os
 import sys
+from collections.abc import Iterable
 from contextlib import suppress
 from ctypes import PYFUNCTYPE, PyDLL, c_ulong, c_void_p, cast, py_object, pythonapi
 from functools import partial
@@ -122,10 +123,15 @@ def reraise_later(error: BaseException, message: object) -> object:
     return ref(message, partial(raise_in, get_ident(), again))
 
 
-def add_references(*objects: object) -> None:
-    """Add the references that the native layer releases once too often."""
-    for one in objects:
-        pythonapi["Py_IncRef"](py_object(one))
+def compensate_references(fmu_class: type, instances: Iterable[Any]) -> None:
+    """Take the references that the native layer releases once too often when an exception leaves Python.
+
+    In a class method, the instance whose references it releases is unknown: pass all.
+    """
+    for instance in instances:
+        for released in (instance, instance._get_log_queue()):
+            pythonapi["Py_IncRef"](py_object(released))
+    pythonapi["Py_IncRef"](py_object(fmu_class))
 
 
 def sanitize(text: str) -> str:

@@ -10,7 +10,7 @@ from weakref import WeakSet
 from . import call_sequence
 from .codes import INVALID_STATE
 from .messages import CALL_MESSAGES
-from .pythonfmu_workarounds import add_references, sanitize, signal_safe, write_to_stderr
+from .pythonfmu_workarounds import compensate_references, sanitize, signal_safe, write_to_stderr
 from .variable_access import SETTABLE_CAUSALITIES, UNKNOWN_NAME, VariableAccess
 
 AttributeTree = dict[str, Any]  # attribute name -> None for a number, subtree for an object
@@ -116,7 +116,7 @@ class SavedStateAccess(VariableAccess):
         try:
             return to_bytes(state)
         except BaseException:
-            cls.compensate_references()
+            compensate_references(cls, cls.instances)
             raise
 
     @classmethod
@@ -129,15 +129,8 @@ class SavedStateAccess(VariableAccess):
                 raise InvalidStateError
             return state
         except BaseException:
-            cls.compensate_references()
+            compensate_references(cls, cls.instances)
             raise
-
-    @classmethod
-    def compensate_references(cls) -> None:
-        """Add references for an exception in a class method; the instance it releases is unknown, so for all."""
-        for slave in cls.instances:
-            add_references(slave, slave._get_log_queue())
-        add_references(cls)
 
     @classmethod
     def is_own_state(cls, state: dict[str, Any], content: bytes) -> bool:
@@ -178,7 +171,7 @@ class SavedStateAccess(VariableAccess):
         else:
             if not own:
                 write_to_stderr(f"{type(self).__name__} ({self.instance_name}): {INVALID_STATE_MESSAGE}")
-                add_references(self, self._get_log_queue(), type(self))
+                compensate_references(type(self), [self])
                 raise InvalidStateError
 
     def restore(self, state: dict[str, Any]) -> None:
