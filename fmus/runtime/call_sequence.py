@@ -13,7 +13,6 @@ from .codes import (
     BAD_VALUE,
     CALCULATED,
     CO_SIMULATION,
-    CONTINUOUS,
     DIVERGED,
     FAILED,
     FIRST_RULE,
@@ -25,7 +24,6 @@ from .codes import (
     OUT_OF_RANGE,
     RUNNING,
 )
-from .vectors import contact_indices
 
 
 class RunState:
@@ -39,27 +37,6 @@ class RunState:
         self.values_changed = False  # values were applied since the last event
         self.outputs_current = False  # the outputs belong to the current time
         self.has_failed = False
-
-
-def is_valid_state(run, model, exchanges):
-    """Return whether a restored state is valid for an instance, for model exchange if `exchanges`.
-
-    The solver might never end in an invalid one.
-    """
-    if not (INSTANTIATED <= run.phase <= CONTINUOUS and 0.0 < run.tolerance < 1.0):
-        return False
-    if run.interface != (MODEL_EXCHANGE if exchanges else CO_SIMULATION):
-        return False
-    if run.phase == (RUNNING if exchanges else CONTINUOUS):
-        return False
-    if run.phase < RUNNING or run.has_failed or exchanges:
-        return True
-    solver = model.solver
-    step = solver.step
-    sound = step.t0 <= solver.t <= step.t1 <= step.t_end and step.active_method.method_number == solver.method
-    for i in contact_indices:
-        sound = sound and -1 <= solver.modes[i] <= 1 and -1 <= step.modes0[i] <= 1 and -1 <= step.modes1[i] <= 1
-    return sound
 
 
 # ---- values

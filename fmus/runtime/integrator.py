@@ -210,7 +210,9 @@ class Integrator(VariableOwner):
     def update_t_next(self, model):
         """Set `t_next` to the end of the internal step after the current time; NaN if that step fails."""
         step = self.step
-        while self.t >= step.t1 and step.t1 < step.t_end:
+        for _ in range(BATCH_STEPS):  # at most the last of them has a length
+            if not (self.t >= step.t1 and step.t1 < step.t_end):
+                break
             status = step.compute_next(model)
             if (model.has_dry_friction or model.has_conditions) and status == NEEDS_REPETITION:
                 status = step.repeat_steps(model)

@@ -10,14 +10,12 @@ from weakref import WeakSet
 from . import call_sequence
 from .codes import INVALID_STATE
 from .messages import CALL_MESSAGES
-from .pythonfmu_workarounds import compensate_references, sanitize, signal_safe, write_to_stderr
-from .variable_access import SETTABLE_CAUSALITIES, UNKNOWN_NAME, VariableAccess
+from .pythonfmu_workarounds import compensate_references, signal_safe, write_to_stderr
+from .variable_access import VariableAccess
 
 AttributeTree = dict[str, Any]  # attribute name -> None for a number, subtree for an object
 
-MAX_BYTES = 1 << 20  # typical: some thousand
-MAX_NESTING = 400  # brackets in total, so that the parser cannot overflow
-INT64_LIMIT = 1 << 63  # integers must fit into C
+INT64_LIMIT = 1 << 63  # a larger integer raises in the native layer, in the code of the host
 
 INVALID_STATE_MESSAGE = CALL_MESSAGES[INVALID_STATE]
 
@@ -31,21 +29,16 @@ def to_bytes(state: object) -> bytes:
 def from_bytes(content: bytes) -> Any:
     """Parse a serialized state; None if it cannot be one."""
     seal, text = content[:8], content[8:]
-    if len(text) > MAX_BYTES or seal != b"%08x" % crc32(text) or text.count(b"[") + text.count(b"{") > MAX_NESTING:
+    if seal != b"%08x" % crc32(text):
         return None
     try:
-        return json.loads(text, parse_int=parse_integer)
+        return json.loads(text)
     except (ValueError, RecursionError):
         return None
 
 
-def parse_integer(text: str) -> int:
-    """Parse an integer of limited length; int() would take minutes for a million digits."""
-    return int(text[:20])
-
-
 def matches_pattern(value: Any, pattern: Any) -> bool:
-    """Return whether a value has the same names, types and lengths as the pattern."""
+    """Return whether a value has the same names, types and lengths as the pattern; another would raise in a call."""
     if type(value) is not type(pattern):
         return False
     if type(value) is dict:
@@ -124,7 +117,7 @@ class SavedStateAccess(VariableAccess):
     def _fmu_state_from_bytes(cls, content: bytes) -> Any:
         try:
             state = from_bytes(content)
-            if state is None or not cls.is_own_state(state, content):
+            if state is None or not cls.is_own_state(state):
                 write_to_stderr(f"{cls.__name__}: {INVALID_STATE_MESSAGE}")
                 raise InvalidStateError
             return state
@@ -133,32 +126,16 @@ class SavedStateAccess(VariableAccess):
             raise
 
     @classmethod
-    def is_own_state(cls, state: dict[str, Any], content: bytes) -> bool:
-        """Return whether an instance can have this state and would serialize it to the same bytes."""
+    def is_own_state(cls, state: Any) -> bool:
+        """Return whether an instance of this FMU wrote the state; one with forged numbers is accepted as well."""
         instance = cls.plain_class(instance_name="")
         cls.instances.discard(instance)
+        pattern = instance._get_fmu_state()
         try:
-            if not matches_pattern(dict(state, invalid_values={}), instance._get_fmu_state()):
-                return False
-            instance.restore(state)
-            return instance.is_valid() and to_bytes(instance._get_fmu_state()) == content
-        except (ArithmeticError, LookupError, TypeError, ValueError):
+            pattern["invalid_values"] = dict.fromkeys(state["invalid_values"], "")
+        except (LookupError, TypeError):
             return False
-
-    def is_valid(self) -> bool:
-        """Return whether run, settings and messages are valid."""
-        names = {UNKNOWN_NAME, *(name for name, _ in self.variables)}
-        return (
-            call_sequence.is_valid_state(self.run, self.model, False)
-            and self.run.n_invalid_values == len(self.invalid_values)
-            and names.issuperset(self.invalid_values)
-            and all(type(text) is str and text == sanitize(text) for text in self.invalid_values.values())
-            and all(
-                declared.accepts(getattr(owner, name))
-                for (_, declared), (owner, name) in zip(self.variables, self.attribute_owners)
-                if declared.causality in SETTABLE_CAUSALITIES or declared.type != "Real"
-            )
-        )
+        return matches_pattern(state, pattern) and bool(state["origin"] == __name__)
 
     @signal_safe
     def _set_fmu_state(self, state: Any) -> None:

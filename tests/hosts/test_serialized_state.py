@@ -1,4 +1,4 @@
-"""The bytes of a saved state are validated: refused, or restored to the last bit.
+"""Damaged bytes of a saved state are refused, and forged ones harm neither instance nor process.
 
 Most tests use the classes packed in the FMUs, which check a thousand forgeries per second. Dangerous ones use built
 FMUs in a clean process.
@@ -6,11 +6,11 @@ FMUs in a clean process.
 
 import json
 import random
-from math import nan
+from math import inf, nan
 from zlib import crc32
 
 import pytest
-from models import MODELS, declared, model_class, outputs, runtime
+from models import MODELS, model_class, outputs, runtime
 from row_comparison import assert_identical
 from worker_client import FmiError, Worker
 
@@ -82,6 +82,12 @@ def find_member(state, path):
     return state, path[-1]
 
 
+def member(content, path):
+    """Return the member of serialized bytes at the end of a path."""
+    thing, last = find_member(json.loads(content[8:]), path)
+    return thing[last]
+
+
 @EVERY_MODEL
 def test_own_bytes_are_accepted_and_reproduced(name):
     slave_class, one = running_instance(name)
@@ -149,46 +155,11 @@ def test_every_member_must_be_present_with_its_name_type_and_length(name, capsys
             assert not is_accepted(slave_class, forge_bytes(content, change)), (path, change)
 
 
-@EVERY_MODEL
-def test_every_setting_must_be_in_range(name, capsys):
-    slave_class, one = running_instance(name)
-    content = own_bytes(slave_class, one)
-    settable = {v: d for v, d in declared(name).items() if d.causality in ("parameter", "input")}
-    for variable, declaration in settable.items():
-        for wrong in (nan, declaration.low - 1.0, declaration.high + 1.0) if declaration.type == "Real" else (0, 99):
-
-            def change(state, variable=variable, wrong=wrong):
-                thing, last = find_member(state["model"], variable.split("."))
-                thing[last] = wrong
-
-            if not declaration.accepts(wrong):
-                assert not is_accepted(slave_class, forge_bytes(content, change)), (variable, wrong)
-
-
-SENTENCES = {
-    "of a variable that is not there": {"rules": "a"},
-    "that is no text": {"m": 1},
-    "that is a list": {"m": ["a"]},
-    "with half a letter": {"m": "\ud800"},
-    "with an end in C": {"m": "a\0b"},
-}
+SENTENCES = {"that is no text": {"m": 1}, "that is a list": {"m": ["a"]}}
 SETTINGS = {"origin": "elsewhere", "invalid_values": [["m", "a"]], "run": {}}
-RUN = {
-    "phase": 7,
-    "interface": 3,
-    "start_time": 1,
-    "tolerance": 1.0,
-    "n_invalid_values": 1,
-    "has_pending_changes": 0,
-    "outputs_current": True,
-}
+RUN = {"start_time": 1, "has_pending_changes": 0}
 SPELLINGS = {
-    "a space more": lambda text: text + b" ",
-    "no spaces": lambda text: text.replace(b" ", b""),
-    "a name twice": lambda text: text.replace(b'{"phase": ', b'{"phase": 0, "phase": ', 1),
-    "another number of the same value": lambda text: text.replace(b": 0.0,", b": 0.00,", 1),
     "another order": lambda text: json.dumps(dict(reversed(json.loads(text).items()))).encode(),
-    "letters for digits": lambda text: text.replace(b"phase", b"\\u0070hase", 1),
     "a number of a million digits": lambda text: text.replace(b'{"phase": ', b'{"phase": ' + b"9" * 1_000_000, 1),
     "nested without end": lambda text: b"[" * 200_000,
     "nested objects": lambda text: b'{"a":' * 200_000,
@@ -200,7 +171,6 @@ SPELLINGS = {
     "a number": lambda text: b"NaN",
     "nothing": lambda text: b"",
     "no UTF-8": lambda text: b"\xff\xfe",
-    "UTF-16": lambda text: text.decode().encode("utf-16"),
 }
 FORGERIES = {
     **{
@@ -216,7 +186,6 @@ FORGERIES = {
         for what, v in RUN.items()
     },
     **{what: lambda content, spell=spell: with_checksum(spell(content[8:])) for what, spell in SPELLINGS.items()},
-    "mass of -5": lambda content: forge_bytes(content, lambda state: state["model"].update(m=-5.0)),
     "a class": lambda content: forge_bytes(content, lambda state: state["model"].update(__class__={"rules": ["a"]})),
     "rules": lambda content: forge_bytes(
         content, lambda state: state["model"].update(rules=["a"], compute_outputs=1.0)
@@ -258,6 +227,35 @@ def test_forged_bytes_change_neither_instance_nor_neighbour_nor_process(fmu):
         instance.reset()
         assert_identical(instance.begin().run(times[:3], names), expected[:3], names)
         instance.free()
+
+
+def test_forged_numbers_end_in_a_status_and_a_reset_restores_the_instance(fmu):
+    """A valid checksum over random numbers, in the built FMU: it may be accepted, and the run may then fail."""
+    worker, path = fmu
+    names, draw, accepted = outputs("stickslip"), random.Random(1), 0
+    one = worker.instantiate(path).begin()
+    expected = one.run([0.0, 0.1, 0.2], names)
+    content = bytes.fromhex(one.serialize(one.save()))
+    numbers = [p for p in iterate_members(json.loads(content[8:])) if type(member(content, p)) in (int, float)]
+
+    def forge(state):
+        for path in draw.sample(numbers, 4):
+            thing, last = find_member(state, path)
+            values = (0, 1, -1, 99, 2**40) if type(thing[last]) is int else (0.0, -1.0, 1e300, nan, inf, -inf)
+            thing[last] = draw.choice(values)
+
+    for _ in range(60):
+        try:
+            one.restore(one.deserialize(forge_bytes(content, forge).hex()))
+            accepted += 1
+            one.step(0.2, 0.1)
+        except FmiError:
+            pass
+        one.get(*names, "solver.t_next")
+        one.reset()
+        assert_identical(one.begin().run([0.0, 0.1, 0.2], names), expected, names)
+    assert accepted > 20
+    one.free()
 
 
 def test_a_state_of_another_fmu_is_refused_and_the_instance_continues(fmu):

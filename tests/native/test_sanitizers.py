@@ -66,6 +66,10 @@ def test_every_fmi3_function_in_every_state_follows_the_standard_without_leaks(w
     assert int(output) > 2_500
 
 
+def test_a_forged_discrete_value_is_refused_in_fmi3(walk):
+    walk("forge_states")
+
+
 def test_random_fmi3_calls_end_in_a_status_and_leave_other_instances_alone(walk):
     walk("random_calls", 1, 20_000)
 

@@ -1,6 +1,6 @@
 /* Every function of FMI 3.0 in every state of every kind of instance. This program includes the sources of the FMU.
  *
- *     fmi3_stress states THREADS | random_calls SEED TURNS     prints the number of instances | nothing
+ *     fmi3_stress states THREADS | random_calls SEED TURNS | forge_states     prints the number of instances | nothing
  *
  * It aborts on an unexpected result; a sanitizer stops it on a memory error.
  */
@@ -300,10 +300,29 @@ static void random_calls(uint64_t seed, int turns)
     release(&bystander);
 }
 
+/* A stored value of a discrete integer that no int64_t can have is refused, though the checksum is right. */
+static void forge_states(void)
+{
+    static const double forged[] = {NAN, INFINITY, -1e300};
+    for (int i = 0; i < 3 * DISCRETE; i++) {
+        Context context;
+        SavedState sealed;
+        prepare(&context, KIND_CS_EVENTS, RUNNING);
+        State state = context.it->state;
+        if (!variables[discrete_variables[i / 3]].is_real) {
+            state.discrete_values[i / 3] = forged[i % 3];
+            write_saved_state(&sealed, &state);
+            CHECK(fmi3SetFMUState(context.it, &sealed) == fmi3Error);
+        }
+        release(&context);
+    }
+}
+
 int main(int argc, char **argv)
 {
-    const char *what = argc > 2 ? argv[1] : "";
-    if (!strcmp(what, "states")) printf("%d\n", walk_in_threads(atoi(argv[2])));
+    const char *what = argc > 1 ? argv[1] : "";
+    if (!strcmp(what, "forge_states")) forge_states();
+    else if (!strcmp(what, "states") && argc == 3) printf("%d\n", walk_in_threads(atoi(argv[2])));
     else if (!strcmp(what, "random_calls") && argc == 4) random_calls(strtoull(argv[2], NULL, 10), atoi(argv[3]));
     else die("usage", __LINE__);
     return 0;

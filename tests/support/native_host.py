@@ -52,8 +52,7 @@ def host_program(sanitizers="", source=HOST_SOURCE):
 def compile_sanitized(source, fmu, *how, sanitizers=SANITIZERS):
     """Compile the program `source` of tests/support together with the sources in an FMU, which it includes."""
     name, sources = f"{source} {fmu.stem}", unpack_cached(fmu) / "sources"
-    dry = ["-DDRY"] if "mode" in declared(fmu.stem) else []
-    words = ["-c", "-fPIC", "-fvisibility=hidden", *dry, f"-I{sources}", HOST_SOURCE.with_name(source)]
+    words = ["-c", "-fPIC", "-fvisibility=hidden", f"-I{sources}", HOST_SOURCE.with_name(source)]
     program = compile_cached(name, *words, sanitizers=sanitizers)
     return compile_cached(" ".join([name, "linked", *how]), *how, program, sanitizers=sanitizers)
 

@@ -256,7 +256,7 @@ ENTRY_POINTS = {  # module of the runtime -> its functions; callees come before 
     "variable_declarations": ("is_in_range",),
     "call_sequence": (
         *("rejection_reason", "note_change", "set_experiment", "check_experiment", "is_refusal"),
-        *("exit_initialization", "do_step", "update_outputs", "update_statistics", "is_valid_state"),
+        *("exit_initialization", "do_step", "update_outputs", "update_statistics"),
     ),
     "model_exchange": (
         *("enable", "update_nominals", "begin", "prepare", "set_time", "set_continuous_states", "update_states"),
@@ -266,7 +266,7 @@ ENTRY_POINTS = {  # module of the runtime -> its functions; callees come before 
     "early_return": ("begin_step", "next_internal_step", "complete_event"),  # for FMI 3.0
 }
 # Parameters of type bool; run and model are structs, a status is an int, all others are floats.
-BOOL_PARAMETERS = ("calculated", "fixed", "allowed", "exchanges", "ahead", "defer_events")
+BOOL_PARAMETERS = ("calculated", "fixed", "allowed", "ahead", "defer_events")
 
 
 def entry_point_types(
