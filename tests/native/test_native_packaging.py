@@ -22,7 +22,14 @@ from native_fmus import build_for_all_platforms, build_native_fmus
 from native_host import compiler, unpack_cached
 
 from fmus.packaging import BuildError, native
-from fmus.packaging.native.compiler import DEFAULT_PLATFORMS, PLATFORMS, STRICT, compile_and_link
+from fmus.packaging.native.compiler import (
+    DEFAULT_PLATFORMS,
+    LARGE_SOURCE,
+    PLATFORMS,
+    STRICT,
+    compile_and_link,
+    compile_libraries,
+)
 from fmus.packaging.native.sources import FMI_HEADERS, MAIN_SOURCE, OWN_HEADERS
 from tests.packaging.test_packaging import entries
 
@@ -270,6 +277,20 @@ def test_the_build_description_names_the_existing_files(smd):
     described = read_model_description(fmu).buildConfigurations[0]
     for item in (configuration, described):
         assert [file for files in item.sourceFileSets for file in files.sourceFiles] == ["fmi2.c"]
+
+
+@pytest.mark.parametrize("platform", PLATFORMS)
+def test_large_sources_compile_for_every_platform(platform):
+    """With options of their own: in the headers for Windows, isfinite and isnan are inline functions."""
+    checks = {"checks.c": CHECKS, "padding.h": " " * LARGE_SOURCE}
+    assert all(compile_libraries("checks", checks, "checks.c", platform).values())
+
+
+CHECKS = """\
+#include <math.h>
+int check(double x);
+int check(double x) { return isfinite(x) + isnan(x) + signbit(x); }
+"""
 
 
 # ---- mistakes on the command line

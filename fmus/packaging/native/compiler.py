@@ -17,9 +17,13 @@ from .expressions import MAY_RAISE, NEVER_RAISING
 # results, which can differ in the last digit.
 INTRINSICS = {math.fabs, math.copysign, math.sqrt}  # processor instructions with exact results
 LIBM = [function.__name__ for function in (*NEVER_RAISING, *MAY_RAISE) if function not in INTRINSICS]
-BIT_EXACT = ("-O2", "-ffp-contract=off", *(f"-fno-builtin-{name}" for name in LIBM))
+BIT_EXACT = ("-Os", "-ffp-contract=off", *(f"-fno-builtin-{name}" for name in LIBM))
+# At -Os the compiler inlines less than pays here. With this threshold, the shipped models run with 1 to 3 % fewer
+# instructions than at -O2, from libraries that are smaller by 10 to 20 %.
+INLINING = ("-mllvm", "-inline-threshold=125")
 # In the sources of large models, inlining takes half of the compile time and makes no run faster; it changes no bits.
-LARGE_SOURCE, LARGE_SOURCE_OPTIONS = 500_000, ("-fno-inline-functions",)  # characters in all files
+# Functions that are marked inline stay so: some of those in the headers for Windows exist in no library.
+LARGE_SOURCE, LARGE_SOURCE_OPTIONS = 500_000, ("-finline-hint-functions",)  # characters in all files
 FMI_HEADER_WARNINGS_OFF = ("-Wno-strict-prototypes",)  # the headers of FMI 3.0 declare functions without prototypes
 STRICT = ("-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror", *FMI_HEADER_WARNINGS_OFF)
 # Link only the libraries named explicitly: building the compiler's runtime takes longer than building the FMU.
@@ -47,21 +51,25 @@ class Platform:
     sources: tuple[str, ...] = ()
 
 
+# Exceptions do not pass the C interface of FMI, so nothing unwinds the stack through an FMU, except on Windows, which
+# requires tables for it. macOS requires frame pointers.
+NO_UNWIND_TABLES = ("-fno-unwind-tables", "-fno-asynchronous-unwind-tables")
+LINUX = ("-lc", "-lm", "-Wl,--hash-style=gnu", "-fno-plt", "-fomit-frame-pointer", *NO_UNWIND_TABLES)
 # Windows 10 and later: link the Universal C Runtime directly, with the headers from the compiler package.
 UCRT = (
     *("-isystem", "{compiler}/lib/libc/include/any-windows-any", "-D__USE_MINGW_ANSI_STDIO=0"),
     *(f"-lapi-ms-win-crt-{part}-l1-1-0" for part in ("convert", "heap", "math", "private", "stdio", "string")),
-    *("-lkernel32", "-Wl,-e,DllMainCRTStartup"),
+    *("-lkernel32", "-Wl,-e,DllMainCRTStartup", "-fomit-frame-pointer"),
 )
 PLATFORMS = {
-    "linux64": Platform(".so", {"x86_64-linux": "x86_64-linux-gnu.2.17"}, ("-lc", "-lm")),
+    "linux64": Platform(".so", {"x86_64-linux": "x86_64-linux-gnu.2.17"}, LINUX),
     "win64": Platform(".dll", {"x86_64-windows": "x86_64-windows-gnu"}, UCRT, ("windows_runtime.c",)),
     "darwin64": Platform(
         ".dylib",
         {"x86_64-darwin": "x86_64-macos.11.0", "aarch64-darwin": "aarch64-macos.11.0"},
-        ("-Wl,-install_name,@rpath/{name}.dylib", "-lc", "-lm"),
+        ("-Wl,-install_name,@rpath/{name}.dylib", "-lc", "-lm", *NO_UNWIND_TABLES),
     ),
-    "aarch64-linux": Platform(".so", {"aarch64-linux": "aarch64-linux-gnu.2.17"}, ("-lc", "-lm")),
+    "aarch64-linux": Platform(".so", {"aarch64-linux": "aarch64-linux-gnu.2.17"}, LINUX),
 }
 DEFAULT_PLATFORMS = ("linux64", "win64", "darwin64")
 
@@ -82,7 +90,7 @@ def compile_libraries(name: str, files: Mapping[str, str], main: str, platform: 
     chosen, out = PLATFORMS[platform], f"{name}{PLATFORMS[platform].suffix}"
     own = {source: Path(__file__).with_name(source).read_text(encoding="utf-8") for source in chosen.sources}
     is_large = sum(map(len, files.values())) > LARGE_SOURCE
-    options = (*SHARED_LIBRARY, *own, *chosen.options, *LARGE_SOURCE_OPTIONS * is_large)
+    options = (*SHARED_LIBRARY, *own, *chosen.options, *(LARGE_SOURCE_OPTIONS if is_large else INLINING))
     return {
         folder: compile_and_link({**files, **own}, main, target, out, options)
         for folder, target in chosen.targets.items()

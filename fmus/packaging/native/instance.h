@@ -47,22 +47,15 @@ enum {
 
 /* ---- error messages */
 
-/* Keeps rarely executed code out of the hot path. */
-#if defined(__GNUC__)
-#define COLD __attribute__((cold, noinline))
-#else
-#define COLD
-#endif
-
 static void log_to_host(const Host *host, const char *name, const char *message);
 
-static void report_error_for(const Host *host, const char *name, bool logging, const TextBuffer *text)
+static COLD void report_error_for(const Host *host, const char *name, bool logging, const TextBuffer *text)
 {
     if (logging) log_to_host(host, name, text->buffer);
     print_to_stderr(name, text->buffer);
 }
 
-static void report_error(const Instance *self, const TextBuffer *text)
+static COLD void report_error(const Instance *self, const TextBuffer *text)
 {
     report_error_for(&self->host, self->name, self->logging, text);
 }
@@ -94,7 +87,7 @@ static COLD Status refuse_phase(const Instance *self, int allowed, const char *f
     return refuse_call(self, OUT_OF_ORDER, &(Call){function, allowed_phases.buffer, phases[self->state.run.phase], 0});
 }
 
-static Status refuse_reference(const Instance *self, uint32_t reference, const char *type)
+static COLD Status refuse_reference(const Instance *self, uint32_t reference, const char *type)
 {
     return refuse_call(self, UNKNOWN_REFERENCE, &(Call){.word = type, .reference = reference});
 }

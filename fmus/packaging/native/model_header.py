@@ -78,15 +78,15 @@ static const Member members[MEMBERS] = {{
 {members}}};
 
 /* Append why the run cannot continue, in a communication step of size h from t. */
-static void append_run_message(TextBuffer *text, int64_t status,
-                               const struct RunState *run, const Model *model, double t, double h)
+static COLD void append_run_message(TextBuffer *text, int64_t status,
+                                    const struct RunState *run, const Model *model, double t, double h)
 {{
     switch (status) {{
 {statuses}    }}
 }}
 
 /* Append why a variable cannot be set to a value. */
-static void append_value_message(TextBuffer *text, int64_t reason, const Variable *variable, double value)
+static COLD void append_value_message(TextBuffer *text, int64_t reason, const Variable *variable, double value)
 {{
     switch (reason) {{
 {values}    }}
@@ -97,7 +97,7 @@ enum {{ PHASES = {count_of_phases} }};
 static const char *const phases[PHASES] = {{{phases}}};
 
 /* Append why a call is refused. */
-static void append_call_message(TextBuffer *text, int64_t reason, const Call *call)
+static COLD void append_call_message(TextBuffer *text, int64_t reason, const Call *call)
 {{
     switch (reason) {{
 {calls}    }}

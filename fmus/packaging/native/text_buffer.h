@@ -9,12 +9,19 @@
 #include <stdlib.h>
 #include <string.h>
 
+/* Keeps rarely executed code out of the hot path. */
+#if defined(__GNUC__)
+#define COLD __attribute__((cold, noinline))
+#else
+#define COLD
+#endif
+
 typedef struct {
     size_t length;
     char buffer[2048]; /* longer than any message; longer text is truncated */
 } TextBuffer;
 
-static inline void append(TextBuffer *text, const char *addition)
+static COLD void append(TextBuffer *text, const char *addition)
 {
     size_t space = sizeof text->buffer - 1 - text->length, length = strlen(addition);
     if (length > space) length = space;
@@ -23,7 +30,7 @@ static inline void append(TextBuffer *text, const char *addition)
     text->buffer[text->length] = '\0';
 }
 
-static inline void append_integer(TextBuffer *text, int64_t number)
+static COLD void append_integer(TextBuffer *text, int64_t number)
 {
     char digits[24];
     snprintf(digits, sizeof digits, "%lld", (long long)number);
@@ -32,7 +39,7 @@ static inline void append_integer(TextBuffer *text, int64_t number)
 
 /* Increment a string of decimal digits in its last place. Returns 1 if the carry runs through all digits; the digits
  * are then 1000... and the decimal exponent must grow by one. */
-static inline int increment_digits(char *digits, int length)
+static COLD int increment_digits(char *digits, int length)
 {
     for (int i = length - 1; i >= 0; i--) {
         if (digits[i] != '9') {
@@ -47,7 +54,7 @@ static inline int increment_digits(char *digits, int length)
 
 /* Check whether 0.d1d2d3... * 10^exponent reads back as the number. The text passed to strtod has no decimal point, so
  * the result does not depend on the locale. */
-static inline int round_trips(const char *digits, int exponent, double number)
+static COLD int round_trips(const char *digits, int exponent, double number)
 {
     char decimal[40];
     snprintf(decimal, sizeof decimal, "%se%d", digits, exponent - (int)strlen(digits));
@@ -55,7 +62,7 @@ static inline int round_trips(const char *digits, int exponent, double number)
 }
 
 /* Find the shortest digits of a positive number. Returns the exponent: number = 0.d1d2d3... * 10^exponent. */
-static inline int shortest_digits(double number, char digits[20])
+static COLD int shortest_digits(double number, char digits[20])
 {
     for (int length = 1;; length++) {
         char scientific[40];
@@ -73,7 +80,7 @@ static inline int shortest_digits(double number, char digits[20])
     }
 }
 
-static inline void append_real(TextBuffer *text, double number)
+static COLD void append_real(TextBuffer *text, double number)
 {
     char digits[20], formatted[40];
     int exponent, length;

@@ -41,7 +41,7 @@ typedef struct {
     uint32_t reference;
 } Call;
 
-static inline void append_value(TextBuffer *text, const Variable *variable, double value)
+static COLD void append_value(TextBuffer *text, const Variable *variable, double value)
 {
     if (variable->is_real) append_real(text, value);
     else append_integer(text, (int64_t)value);
