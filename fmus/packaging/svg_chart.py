@@ -1,5 +1,6 @@
 """Draws a curve over time as inline SVG; colours come from the style sheet of the page."""
 
+from itertools import pairwise
 from math import ceil, floor, log10
 
 WIDTH, HEIGHT = 640, 230  # of the view box
@@ -26,18 +27,29 @@ def draw_chart(times: list[float], values: list[float], label: str) -> str:
         x, _ = to_view_box(t, low)
         parts.append(f'<line class="grid" x1="{x:.1f}" x2="{x:.1f}" y1="{TOP}" y2="{HEIGHT - BOTTOM}"/>')
         parts.append(f'<text x="{x:.1f}" y="{HEIGHT - BOTTOM + 19}" text-anchor="middle">{t:g}</text>')
-    points = (to_view_box(t, value) for t, value in zip(times, values, strict=True))
-    line = " ".join(f"{x:.1f},{y:.1f}" for x, y in points)
-    parts.append(f'<polyline class="curve" points="{line}"/>')
+    points = [to_view_box(t, value) for t, value in zip(times, values, strict=True)]
+    parts.append(f'<path class="curve" d="{relative_path(points)}"/>')
     parts.append(f'<text x="{WIDTH - RIGHT}" y="{HEIGHT - 6}" text-anchor="end">time in s</text>')
     parts.append(f'<text x="{LEFT}" y="{HEIGHT - 6}">{label}</text></svg>')
     return "\n".join(parts)
 
 
+def relative_path(points: list[tuple[float, float]]) -> str:
+    """Return the path data of a polyline, with points relative to the one before, which compress to half the size.
+
+    >>> relative_path([(0.0, 1.0), (0.26, 1.0), (0.5, 0.5)])
+    'M0 1l0.3 0 0.2 -0.5'
+    """
+    rounded = [(round(10.0 * x), round(10.0 * y)) for x, y in points]  # in tenths, so that roundings do not add up
+    steps = [(x - x0, y - y0) for (x0, y0), (x, y) in pairwise(rounded)]
+    start = "M{:g} {:g}l".format(*(place / 10.0 for place in rounded[0]))
+    return start + " ".join(f"{dx / 10.0:g} {dy / 10.0:g}" for dx, dy in steps)
+
+
 def tick_values(low: float, high: float) -> list[float]:
     """Return about TICKS round numbers from low to high.
 
-    >>> ticks(-0.11, 0.11)
+    >>> tick_values(-0.11, 0.11)
     [-0.1, -0.05, 0.0, 0.05, 0.1]
     """
     rough = (high - low) / TICKS
