@@ -12,7 +12,7 @@ from .terminal import POSITIVE, Terminal, result_options
     type=POSITIVE,
     default=300.0,
     show_default=True,
-    help="Seconds that one process may take, which runs the scenes of a setting. After a hang, another one goes on.",
+    help="Seconds that a run may take.",
 )
 @result_options
 def rivals(names: tuple[str, ...], timeout: float, terminal: Terminal) -> None:

@@ -1,26 +1,21 @@
 """Programs in child processes with temporary directories of their own. Both end with the command that started them."""
 
-import json
 import os
 import subprocess
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from math import inf
 from pathlib import Path
 from tempfile import TemporaryFile
-from threading import Thread
-from time import monotonic, sleep
-from typing import Any, TextIO, TypeVar
+from time import monotonic
+from typing import Any
 
 from ..errors import HarnessError
 from .interrupt import check_interrupt, defer_signals
 from .temporary_directory import temporary_directory
 
 PROJECT_ROOT = Path(__file__).parents[2]  # contains harness and build_fmus
-RequestT = TypeVar("RequestT")
-PARENT_VARIABLE = "FRICTION_FMUS_PARENT"  # environment variable with the process id of the parent
-ORPHAN_INTERVAL = 0.5  # s between two checks of a child process for its parent
 POLL_INTERVAL = 0.1  # s between two checks for signals, which a blocked thread does not notice
 
 
@@ -37,7 +32,6 @@ def run_subprocess(
     text: str = "",
     environment: Mapping[str, str] = os.environ,
     timeout: float = inf,
-    meanwhile: Callable[[], object] = check_interrupt,
 ) -> subprocess.CompletedProcess[str]:
     """Run a command and return the completed process.
 
@@ -53,8 +47,6 @@ def run_subprocess(
         Environment variables.
     timeout : float
         Time limit in s.
-    meanwhile : callable
-        Called while waiting; must check for signals.
 
     Raises
     ------
@@ -63,7 +55,6 @@ def run_subprocess(
     """
     deadline = monotonic() + timeout
     process = None
-    environment = {**environment, PARENT_VARIABLE: str(os.getpid())}
     with temporary_directory("child-") as directory, TemporaryFile("w+", encoding="utf-8") as standard_input:
         standard_input.write(text)  # not a pipe: communicate() does not resume writing after its timeout
         standard_input.seek(0)
@@ -76,7 +67,7 @@ def run_subprocess(
                     stderr=subprocess.PIPE,
                     encoding="utf-8",
                     errors="replace",
-                    env={**environment, **dict.fromkeys(("TMPDIR", "TEMP", "TMP"), str(directory))},
+                    env=place_temporary_files(environment, directory),
                     start_new_session=True,  # Ctrl-C reaches this process only, which then kills the child
                 )
             while monotonic() <= deadline:
@@ -84,79 +75,37 @@ def run_subprocess(
                     stdout, stderr = process.communicate(timeout=POLL_INTERVAL)
                     return subprocess.CompletedProcess(command, process.returncode, stdout, stderr)
                 except subprocess.TimeoutExpired:
-                    meanwhile()
+                    check_interrupt()
         except BaseException:
             if process:
                 kill_process_group(process)
+                process.communicate()
             raise
-        stdout, stderr = kill_process_group(process)
+        kill_process_group(process)
+        stdout, stderr = process.communicate()
         raise SubprocessTimeoutError(timeout, subprocess.CompletedProcess(command, process.returncode, stdout, stderr))
 
 
-def run_module(module: str, text: str, *arguments: str, **how: Any) -> subprocess.CompletedProcess[str]:
+def run_module(module: str, *arguments: str, **how: Any) -> subprocess.CompletedProcess[str]:
     """Run a module of this project with the present interpreter, from any working directory; see `run_subprocess`."""
+    return run_subprocess([sys.executable, "-m", module, *arguments], environment=project_environment(), **how)
+
+
+def project_environment() -> dict[str, str]:
+    """Return the environment of a Python process that finds this project."""
     path = os.pathsep.join(filter(None, (str(PROJECT_ROOT), os.environ.get("PYTHONPATH", ""))))
-    return run_subprocess([sys.executable, "-m", module, *arguments], text, os.environ | {"PYTHONPATH": path}, **how)
+    return os.environ | {"PYTHONPATH": path}
 
 
-def serve_request(
-    request: Callable[..., RequestT], answer: Callable[[RequestT], Any], memory: int | None = None
-) -> None:
-    """In a child process, read one JSON request from standard input and write the JSON answer to standard output.
-
-    Other output, such as that of FMUs, is redirected to standard error. The process exits if its parent is killed.
-
-    Parameters
-    ----------
-    request : callable
-        Makes a request from the keys of the JSON table.
-    answer : callable
-        Returns the answer to a request.
-    memory : int, optional
-        Limit of the memory of the process in bytes, where the system can limit it.
-    """
-    if memory:
-        limit_memory(memory)
-    with open_replies() as replies:
-        json.dump(answer(request(**json.load(sys.stdin))), replies)
+def place_temporary_files(environment: Mapping[str, str], directory: Path) -> dict[str, str]:
+    """Return the environment of a process whose temporary files are in a directory."""
+    return {**environment, **dict.fromkeys(("TMPDIR", "TEMP", "TMP"), str(directory))}
 
 
-def limit_memory(size: int) -> None:
-    """Limit the memory of this process to a size in bytes, where the system can."""
-    with suppress(ImportError, ValueError, OSError):
-        import resource
-
-        resource.setrlimit(resource.RLIMIT_AS, (size, size))
-
-
-def open_replies() -> TextIO:
-    """In a child process, return standard output and redirect other output to standard error; exit with the parent."""
-    Thread(target=exit_when_orphaned, args=(parent_process_id(),), daemon=True).start()
-    replies = os.fdopen(os.dup(1), "w")
-    os.dup2(2, 1)
-    return replies
-
-
-def parent_process_id() -> int:
-    """Return the process id of the parent that started this process, even if the parent has been killed since.
-
-    On Windows the launcher of a virtual environment is between the two processes, and a parent's id never changes.
-    """
-    started_by = os.environ.pop(PARENT_VARIABLE, "")  # not for programs that this process starts
-    return int(started_by) if started_by and os.name == "posix" else os.getppid()
-
-
-def exit_when_orphaned(parent: int) -> None:
-    """Exit once the process has another parent: the one that started it was killed."""
-    while os.getppid() == parent:
-        sleep(ORPHAN_INTERVAL)
-    os._exit(1)
-
-
-def kill_process_group(process: subprocess.Popen[str]) -> tuple[str, str]:
-    """Kill a process and, on POSIX, its process group. Return its standard output and standard error."""
+def kill_process_group(process: subprocess.Popen[str]) -> None:
+    """Kill a process and, on POSIX, the processes that it started."""
     if os.name == "posix":
-        os.killpg(process.pid, 9)
+        with suppress(ProcessLookupError):  # all have ended
+            os.killpg(process.pid, 9)
     else:
         process.kill()
-    return process.communicate()

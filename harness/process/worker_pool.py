@@ -14,7 +14,7 @@ from multiprocessing.connection import Connection, wait
 from pathlib import Path
 from shutil import rmtree
 from signal import SIG_IGN, SIGINT, signal
-from threading import Lock, Thread
+from threading import Thread
 from typing import Any
 
 from ..errors import HarnessError
@@ -23,8 +23,6 @@ from .subprocess_runner import POLL_INTERVAL
 
 # bytes; the fork server puts a socket below the temporary directory, and its path is limited to 107 bytes (unix(7))
 MAX_SOCKET_DIRECTORY = 70
-# starting a process polls all others, and may take the exit code of one that another thread is joining
-PROCESS_LOCK = Lock()
 
 
 class WorkerDiedError(HarnessError):
@@ -50,7 +48,7 @@ class Worker:
     def __init__(self, context: Any, folder: Path) -> None:
         self.connection, child_connection = context.Pipe()
         self.process = context.Process(target=run_tasks, args=(child_connection, str(folder)), daemon=True)
-        with PROCESS_LOCK, ignore_sigint():
+        with ignore_sigint():
             self.process.start()
         child_connection.close()
 
@@ -58,11 +56,6 @@ class Worker:
         """Start function(*arguments) in the worker, in the present working directory."""
         with self.raise_if_died():
             self.connection.send((Path.cwd(), function, arguments))
-
-    def has_result(self, timeout: float) -> bool:
-        """Return whether a result arrives within `timeout` s."""
-        with self.raise_if_died():
-            return self.connection.poll(timeout)
 
     def receive_result(self) -> Any:
         """Return what the function returned, or the exception that it raised."""
@@ -80,9 +73,8 @@ class Worker:
 
     def kill(self) -> None:
         """Kill the process, whatever it is doing."""
-        with PROCESS_LOCK:
-            self.process.kill()
-            self.process.join()
+        self.process.kill()
+        self.process.join()
         self.connection.close()
 
 

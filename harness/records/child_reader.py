@@ -4,13 +4,12 @@ The libraries for these formats end their process for some files: one cell in th
 python-calamine allocate 549 GB, and scipy reads beyond the end of some damaged .mat files.
 """
 
-import json
 import os
 from dataclasses import dataclass
 from typing import Any
 
 from ..errors import HarnessError, SceneError, first_line
-from ..process.subprocess_runner import SubprocessTimeoutError, run_module, serve_request
+from ..process.child_process import ChildDiedError, ChildTimeoutError, RequestServer, ask_once
 from ..process.temporary_directory import temporary_directory
 from . import text_table
 
@@ -40,36 +39,32 @@ def read_in_child(data: bytes, name: str, file_format: str) -> dict[str, Any]:
     with temporary_directory("record-") as folder:
         path = folder / "record"
         path.write_bytes(data)
-        request = json.dumps({"path": str(path), "name": name, "format": file_format})
         try:
-            done = run_module(__name__, request, timeout=TIMEOUT)
-        except SubprocessTimeoutError:
+            answer: dict[str, Any] = ask_once(__name__, ReadRequest(str(path), name, file_format), TIMEOUT)
+        except ChildTimeoutError:
             raise SceneError(f"{name} takes longer than {TIMEOUT:g} s to read: save its columns as .csv") from None
-    if done.returncode:
-        raise SceneError(
-            f"{name} cannot be read: it is damaged, has cells far from its table, or needs more than "
-            f"{MAX_MEMORY >> 30} GB of memory; save its columns as .csv"
-        )
-    answer: dict[str, Any] = json.loads(done.stdout)
+        except ChildDiedError:
+            raise SceneError(
+                f"{name} cannot be read: it is damaged, has cells far from its table, or needs more than "
+                f"{MAX_MEMORY >> 30} GB of memory; save its columns as .csv"
+            ) from None
+        except HarnessError as error:
+            raise SceneError(str(error)) from None
     if "library" in answer:
         raise ImportError(name=answer["library"])
-    if "error" in answer:
-        raise SceneError(answer["error"])
     return answer
 
 
 def answer_request(request: ReadRequest) -> dict[str, Any]:
-    """Return the contents of a file, the `error` that it has, or the `library` that is missing."""
+    """Return the contents of a file, or the `library` that is missing."""
     try:
         return read_workbook(request) if request.format == "workbook" else read_arrays(request)
-    except HarnessError as error:
-        return {"error": str(error)}
+    except (HarnessError, MemoryError):
+        raise
     except ImportError as error:
         return {"library": error.name}
-    except MemoryError:
-        raise
     except Exception as error:  # the readers raise arbitrary exceptions for damaged files
-        return {"error": f"{request.name} cannot be read: {first_line(error)}"}
+        raise SceneError(f"{request.name} cannot be read: {first_line(error)}") from None
 
 
 def read_workbook(request: ReadRequest) -> dict[str, Any]:
@@ -108,4 +103,4 @@ def read_arrays(request: ReadRequest) -> dict[str, Any]:
 
 
 if __name__ == "__main__":
-    serve_request(ReadRequest, answer_request, MAX_MEMORY)
+    RequestServer(MAX_MEMORY).serve(lambda request: answer_request(ReadRequest(**request)))

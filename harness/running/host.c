@@ -5,11 +5,10 @@
  *     I new NAME [quiet [exchange]]                  I begin [T]             I step T H
  *     I setr REFERENCE VALUE                         I calls STATES INDICATORS TURNS
  *     I getr REFERENCE...    I pass REFERENCE J TO   I save                  I restore             I reset
- *     I free                 I time REPEAT STOP STEPS WORD...                0 end                   0 unload
+ *     I free                 I time REPEAT STOP STEPS WORD...                0 unload
  *
  * I and J are indices of instances. step prints the status, getr the values. After a refused value all steps have its
- * status, until the instance is reset. Any other failure exits. end writes a NUL to both output streams, which marks the
- * end of the output of a request.
+ * status, until the instance is reset. Any other failure exits.
  *
  * time simulates from t = 0 to STOP in STEPS equal communication steps, REPEAT times. A word R=VALUE sets the Real with
  * value reference R before each run, iR=VALUE an Integer; a word R reads that Real at every point. It prints the run
@@ -248,8 +247,6 @@ int main(int argc, char **argv)
         if (count < 2) die("line", "an instance and a command are needed");
         if (!strcmp(words[1], "unload")) {
             if (dlclose(library)) die("dlclose", dlerror());
-        } else if (!strcmp(words[1], "end")) {
-            if (putchar('\0') || fflush(stdout) || fputc('\0', stderr)) die("end", "cannot write");
         } else {
             execute(words[1], atoi(words[0]), words + 2, count - 2, argv);
         }

@@ -39,7 +39,7 @@ def native_equivalent(fmu: Path) -> Path:
     platform = ("--platform", fmpy.platform) if fmpy.platform in ("linux64", "win64", "darwin64") else ()
     arguments = (str(source), "--native", *platform, "--out", str(folder))
     try:
-        done = run_module("build_fmus", "", *arguments, timeout=BUILD_TIMEOUT)
+        done = run_module("build_fmus", *arguments, timeout=BUILD_TIMEOUT)
     except SubprocessTimeoutError:
         return fmu
     built = folder / fmu.name

@@ -9,7 +9,7 @@ from zipfile import ZipFile
 from fmpy.ssp.simulation import simulate_ssp
 from fmpy.ssp.ssd import read_ssv
 
-from ..process.subprocess_runner import serve_request
+from ..process.child_process import RequestServer
 from ..process.temporary_directory import temporary_directory
 
 
@@ -25,4 +25,4 @@ def run(archive: str, step: float, count: int, read: list[tuple[str, str, int]],
 
 
 if __name__ == "__main__":
-    serve_request(dict, lambda request: run(**request))
+    RequestServer().serve(lambda request: run(**request))

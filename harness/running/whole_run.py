@@ -20,9 +20,9 @@ from fmpy import fmi2, fmi3
 from fmpy.fmi1 import FMICallException
 
 from ..errors import HarnessError, first_line
+from ..process.child_process import ChildError, ChildProcess
 from ..process.subprocess_runner import run_subprocess
 from ..process.temporary_directory import temporary_directory
-from ..process.worker_pool import Worker, WorkerDiedError, process_context
 from .c_host import COMPILER
 from .description import REQUIRED_VARIABLES, read_description
 from .fmu_session import capture_stderr, set_variable
@@ -40,7 +40,7 @@ MAX_INPUTS = 64  # of whole_run.c
 TIME_LIMIT = 10.0  # s of processor time of one run
 STEPS_PER_CHECK = 16
 MAX_PREPARED = 64
-START_TIME = 20.0  # s that the child process of an external FMU may take to start
+BUSY_TIME = 20.0  # s that a run in a child process may take beyond its processor time, on a busy machine
 
 
 class FmuStruct(Structure):
@@ -229,53 +229,49 @@ class RunTimeError(Exception):
 
 
 class IsolatedRun:
-    """Runs of an external FMU in a child process, which is replaced when it crashes or exceeds the time limit."""
+    """Runs of an external FMU in a child process, which is replaced when it crashes or exceeds the time limit.
+
+    Arrays are exchanged by files in `folder`.
+    """
 
     def __init__(self, fmu: Path, settings: Mapping[str, Any], limit: float, folder: Path) -> None:
-        self.arguments, self.folder = (fmu, tuple(settings.items()), limit), folder
-        self.timeout = START_TIME + limit  # the limit is processor time, and the process has to start
-        self.context = process_context([__name__])
-        self.worker: Worker | None = None
-        if (result := self.ask(None)) is not True:
-            raise result or HarnessError(f"{fmu.name} cannot be loaded: it crashes or hangs")
-
-    def ask(self, request: RunRequest | None) -> Any:
-        """Return what `run_in_child` returns or raises; None if the process crashes or exceeds the time limit."""
-        self.worker = self.worker or Worker(self.context, self.folder)
+        self.process, self.folder = ChildProcess(f"{__package__}.whole_run_process"), folder
+        self.instance = {"fmu": fmu, "settings": settings, "limit": limit}
+        self.timeout = limit + BUSY_TIME
+        self.files: dict[int, tuple[np.ndarray, Path]] = {}
+        self.n_files = 0
         try:
-            self.worker.send_task(run_in_child, *self.arguments, request)
-            if self.worker.has_result(self.timeout):
-                return self.worker.receive_result()
-            self.worker.kill()
-        except WorkerDiedError:
-            pass
-        self.worker = None
-        return None
+            self.process.ask({**self.instance, "run": None}, self.timeout)
+        except ChildError:
+            raise HarnessError(f"{fmu.name} cannot be loaded: it crashes or hangs") from None
+
+    def store(self, array: np.ndarray) -> Path:
+        """Return the file of an array of a request, which is written once."""
+        if id(array) not in self.files:
+            if len(self.files) >= MAX_PREPARED:
+                for _, path in self.files.values():
+                    path.unlink()
+                self.files.clear()
+            path = self.folder / f"{self.n_files}.npy"
+            np.save(path, array)
+            self.files[id(array)] = array, path
+            self.n_files += 1
+        return self.files[id(array)][1]
 
     def run(self, request: RunRequest) -> np.ndarray | None:
         """Return the outputs, or None if the FMU refuses the values, crashes or is too slow."""
-        result = self.ask(request)
-        return result if isinstance(result, np.ndarray) else None
+        inputs = {name: self.store(column) for name, column in request.inputs.items()}
+        run = {**vars(request), "t": self.store(request.t), "inputs": inputs}
+        results = self.folder / "y.npy"
+        try:
+            has_results = self.process.ask({**self.instance, "run": run, "results": results}, self.timeout)
+        except ChildError:
+            return None
+        return np.load(results) if has_results else None
 
     def close(self) -> None:
         """End the child process."""
-        if self.worker:
-            self.worker.kill()
-
-
-@cache
-def cached_run(fmu: Path, settings: tuple[tuple[str, Any], ...], limit: float) -> RepeatedRun:
-    """Return the instance of a child process."""
-    return RepeatedRun(fmu, dict(settings), limit)
-
-
-def run_in_child(
-    fmu: Path, settings: tuple[tuple[str, Any], ...], limit: float, request: RunRequest | None
-) -> np.ndarray | bool | None:
-    """Run as requested, or load the FMU if nothing is requested."""
-    instance = cached_run(fmu, settings, limit)
-    instance.prepared.clear()  # the arrays of each request are new here
-    return instance.run(request) if request else True
+        self.process.kill()
 
 
 class Simulator:

@@ -29,7 +29,7 @@ COMMANDS = {  # and a file or folder that exists once it has started
     "main": ([], "out/.*"),
     "run": (["run", "slow.toml"], "temporary/friction-fmus-fmu-*"),
     "precision": (["precision", "pacejka"], "out/.precision-*"),
-    "stability": (["stability"], "temporary/friction-fmus-bounded-*"),
+    "stability": (["stability"], "temporary/friction-fmus-child-*"),
     "bench": (["bench"], "out/.bench-*"),
     "importers": (["importers"], "temporary/friction-fmus-child-*"),
     "sweep": (["sweep", "pacejka", "--vary", "x_m=0.001:0.1:3000", "--workers", "1"], "out/sweep/.*.checkpoint"),
@@ -213,7 +213,7 @@ def test_a_program_that_times_out_ends_with_all_its_children(tmp_path):
 
 def child_of_killed_parent(code, file):
     """Run Python code whose child writes its process id to a file, kill it then, and return the id of the child."""
-    parent = subprocess.Popen([sys.executable, "-c", code], cwd=ROOT, env=os.environ | {"PYTHONPATH": str(ROOT)})
+    parent = subprocess.Popen([sys.executable, "-c", code], cwd=ROOT)
     while not (file.is_file() and file.read_text()):
         assert parent.poll() is None
         time.sleep(0.05)
@@ -222,22 +222,27 @@ def child_of_killed_parent(code, file):
     return file.read_text()
 
 
-def test_a_child_process_exits_after_its_parent_was_killed(tmp_path):
+def test_a_child_process_exits_after_its_parent_was_killed(tmp_path, monkeypatch):
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     hang = f"lambda request: (Path({str(tmp_path / 'pid')!r}).write_text(str(os.getpid())), time.sleep(100))"
-    start = "import os, sys, time; from pathlib import Path; from harness.process.subprocess_runner import "
-    child = f"{start}serve_request; serve_request(dict, {hang})"
-    code = f"{start}run_subprocess; run_subprocess([sys.executable, '-c', {child!r}], '{{}}')"
+    (tmp_path / "hanging.py").write_text(
+        "import os, time\nfrom pathlib import Path\nfrom harness.process.child_process import RequestServer\n"
+        f"RequestServer().serve({hang})"
+    )
+    code = "from harness.process.child_process import ChildProcess; ChildProcess('hanging').ask(1)"
     assert ends(child_of_killed_parent(code, tmp_path / "pid"))
 
 
-def test_a_child_process_exits_if_its_parent_was_killed_during_its_imports(tmp_path):
-    start = "import os, sys, time; from pathlib import Path\n"
-    child = f"{start}parent = os.getppid()\nPath({str(tmp_path / 'pid')!r}).write_text(str(os.getpid()))\n"
-    child += "while os.getppid() == parent:\n    time.sleep(0.01)\n"
-    child += "from harness.process.subprocess_runner import serve_request\n"
-    child += "serve_request(dict, lambda request: time.sleep(100))"
-    code = f"{start}from harness.process.subprocess_runner import run_subprocess\n"
-    code += f"run_subprocess([sys.executable, '-c', {child!r}], '{{}}')"
+def test_a_child_process_exits_if_its_parent_was_killed_during_its_imports(tmp_path, monkeypatch):
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    (tmp_path / "importing.py").write_text(
+        "import os, time\nfrom pathlib import Path\nparent = os.getppid()\n"
+        f"Path({str(tmp_path / 'pid')!r}).write_text(str(os.getpid()))\n"
+        "while os.getppid() == parent:\n    time.sleep(0.01)\n"
+        "from harness.process.child_process import RequestServer\n"
+        "server = RequestServer()\ntime.sleep(100)"
+    )
+    code = "from harness.process.child_process import ChildProcess; ChildProcess('importing').ask(1)"
     assert ends(child_of_killed_parent(code, tmp_path / "pid"))
 
 

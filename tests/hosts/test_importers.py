@@ -3,11 +3,7 @@
 Tools that are not installed are skipped with the reason; they are in the extra `importers`.
 """
 
-import json
 import pickle
-from dataclasses import asdict
-from itertools import takewhile
-from subprocess import CompletedProcess
 
 import fmi3_fixtures
 import native_fmus
@@ -16,10 +12,10 @@ from build_cache import build_user_model, cached_folder
 from models import EXAMPLE_MODELS, LARGER_MODELS, MODELS
 
 from harness.errors import HarnessError
-from harness.process.subprocess_runner import SubprocessTimeoutError
+from harness.process.child_process import ChildProcess
 from harness.studies.importers import checks, table
 from harness.studies.importers.checks import CHECKS, IMPORTERS, NOT_RUN, CheckFailedError
-from harness.studies.importers.request import END, ImporterReply, ImporterRequest
+from harness.studies.importers.request import ImporterRequest
 
 pytestmark = pytest.mark.slow
 
@@ -75,41 +71,51 @@ def test_an_fmu_unsuitable_for_the_checks_is_skipped_with_a_reason(tmp_path, mon
     assert (first.importer, first.reason.split(",")[0]) == ("rotor_brake.fmu", "the checks require a mass m")
 
 
-def test_a_crash_or_timeout_affects_only_its_own_check(monkeypatch):
+ADAPTER = """
+import os, sys, time
+from harness.studies.importers.request import ImporterReply, serve
+
+def run(request):
+    (name,) = request.instances
+    print(f"{name} speaks", file=sys.stderr)
+    if name == "crash":
+        os.kill(os.getpid(), 11)
+    time.sleep(60 * (name == "hang"))
+    if name == "leak":
+        __import__("atexit").register(os._exit, 6)
+    return ImporterReply(name, [], [], os.getpid())
+
+serve(run)
+"""
+
+
+def test_a_crash_or_timeout_affects_only_its_own_check(tmp_path, monkeypatch):
     """The checks that follow run in another process; a process that ends badly loses its last answer."""
-    batches = []
-
-    def process(module, text, timeout):
-        batches.append([json.loads(line)["instances"][0] for line in text.splitlines()])
-        finished = [*takewhile(lambda name: name not in ("crash", "hang"), batches[-1])]
-        last = batches[-1][: len(finished) + 1][-1]  # the check in which it ended
-        ends = {"crash": -11, "hang": -9, "leak": -6}.get(last, 0)
-        replies = "\n".join(json.dumps(asdict(ImporterReply(name, [], [], 0))) for name in finished)
-        stderr = "".join(f"{name} speaks{END}" for name in finished) + "a reason\n" * bool(ends)
-        done = CompletedProcess([], ends, replies, stderr)
-        if last == "hang":
-            raise SubprocessTimeoutError(timeout, done)
-        return done
-
-    monkeypatch.setattr(checks, "run_module", process)
+    (tmp_path / "ecos_adapter.py").write_text(ADAPTER)
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    monkeypatch.setattr(checks, "ChildProcess", lambda module: ChildProcess(module.rpartition(".")[2]))
     monkeypatch.setattr(checks, "RESULTS", {})
+    monkeypatch.setattr(checks, "TIMEOUT", 2.0)
     tool, *_ = (importer for importer in IMPORTERS if importer.name == "Ecos")
     names = ["one", "crash", "two", "hang", "three", "leak"]
     requests = [ImporterRequest("a.fmu", {}, 1.0, 1, [], instances=[name]) for name in names]
     checks.prepare(tool, requests[:3])
     checks.prepare(tool, requests)
-    versions = {}
+    versions, processes = {}, []
     for name, request in zip(names, requests, strict=True):
         try:
             played = checks.run_request(tool, request)
             versions[name] = played.reply.version, played.stderr
+            processes.append(played.reply.accepted)
         except CheckFailedError as wrong:
             versions[name] = str(wrong)
+    ended = {"crash": "it ended with exit status -11: crash speaks", "leak": "it ended with exit status 6: leak speaks"}
     assert versions == {
-        **{name: (name, f"{name} speaks") for name in ("one", "two", "three")},
-        **{"crash": "exit status -11: a reason", "hang": "no answer after 300 s", "leak": "exit status -6: a reason"},
+        **{name: (name, f"{name} speaks\n") for name in ("one", "two", "three")},
+        **ended,
+        "hang": "no answer after 2 s",
     }
-    assert batches == [names[:3], ["two"], names[3:], names[4:]]
+    assert len(set(processes)) == 3
     assert [table.name_with_version(tool, request) for request in requests[:2]] == ["Ecos one", "Ecos"]
 
 

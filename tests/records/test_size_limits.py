@@ -4,16 +4,14 @@ import gzip
 import io
 import json
 import struct
-import subprocess
-import sys
 from zipfile import ZIP_DEFLATED, ZipFile
 
 import numpy as np
 import pytest
 import record_formats
-from build_cache import ROOT
 
 from harness.errors import HarnessError, SceneError
+from harness.process.child_process import ask_once
 from harness.records import array_files, child_reader, size_limits
 from harness.records.columns import ColumnOptions, read_record
 from harness.studies.compare.trajectory_files import read_trajectory
@@ -115,9 +113,9 @@ def test_a_cell_far_from_the_table_does_not_end_the_command(tmp_path):
 
 
 def test_a_file_at_which_its_library_crashes_does_not_end_the_command(tmp_path):
-    """scipy reads beyond the end of this one: the type of its data is 0x0109."""
+    """scipy reads beyond the end of this one: the type of its data is 0x0809."""
     data = bytearray(record_formats.mat(t=record_formats.T, x=record_formats.MM))
-    data[177] = 1
+    data[177] = 8
     (tmp_path / "damaged.mat").write_bytes(data)
     for read in (lambda path: read_record(str(path), ColumnOptions(), "record"), read_trajectory):
         with pytest.raises(SceneError, match=r"damaged.mat cannot be read: it is damaged"):
@@ -130,12 +128,13 @@ def test_a_file_that_takes_too_long_is_refused(monkeypatch):
         child_reader.read_in_child(wide_sheet(), "book", "workbook")
 
 
-def test_the_memory_of_the_reader_is_limited():
+def test_the_memory_of_the_reader_is_limited(tmp_path, monkeypatch):
     pytest.importorskip("resource", reason="a module of POSIX")
-    code = f"import resource; from {child_reader.__name__} import MAX_MEMORY, serve_request; "
-    code += "serve_request(dict, lambda request: resource.getrlimit(resource.RLIMIT_AS), MAX_MEMORY)"
-    done = subprocess.run([sys.executable, "-c", code], input="{}", capture_output=True, text=True, cwd=ROOT)
-    assert json.loads(done.stdout) == [child_reader.MAX_MEMORY] * 2
+    code = f"import resource\nfrom {child_reader.__name__} import MAX_MEMORY, RequestServer\n"
+    code += "RequestServer(MAX_MEMORY).serve(lambda request: resource.getrlimit(resource.RLIMIT_AS))"
+    (tmp_path / "limits.py").write_text(code)
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    assert ask_once("limits", None, 60.0) == [child_reader.MAX_MEMORY] * 2
 
 
 @pytest.mark.parametrize("name", ["record.npy", "record.npz"])

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from build_cache import build_once
 
+from harness.process.child_process import ChildProcess
 from harness.references.certified_reference import FOLDER, load_reference
 from harness.studies.rivals import child, study
 from harness.studies.rivals.catalogue import ENGINES, MAX_LINES, OTHERS, OWN, RIVALS, count_lines
@@ -154,8 +155,7 @@ child.serve()
 def test_after_a_rival_that_dies_or_hangs_the_next_scene_runs(tmp_path, monkeypatch, how, reason):
     (tmp_path / "broken.py").write_text(BROKEN)
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
-    run_module = study.run_module
-    monkeypatch.setattr(study, "run_module", lambda module, text, **how: run_module("broken", text, **how))
+    monkeypatch.setattr(study, "ChildProcess", lambda module: ChildProcess("broken"))
     replies = run_in_child([RunRequest("broken", name, {"how": how}) for name in ("rest", "sled", "held")], 8.0)
     assert [reply.gap for reply in replies] == ["", reason, ""]
 

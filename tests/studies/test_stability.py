@@ -1,11 +1,6 @@
 """Stiff and extreme scenes: reference solutions, verdicts, and a part of the table."""
 
 import csv
-import os
-import signal
-import subprocess
-import sys
-import time
 from dataclasses import replace
 from math import nan
 from pathlib import Path
@@ -16,9 +11,9 @@ import independent_solution
 import numpy as np
 import pytest
 from build_cache import build_user_model
-from models import EXAMPLE_MODELS, LARGER_MODELS, MODELS, ROOT, declared
+from models import EXAMPLE_MODELS, LARGER_MODELS, MODELS, declared
 
-from harness.errors import HarnessError
+from harness.process.child_process import ChildProcess, ChildTimeoutError
 from harness.references.models.pacejka import MagicFormula
 from harness.references.reference_trajectory import CommunicationGrid, ReferenceTrajectory, compute_reference
 from harness.results.provenance import load_provenance
@@ -26,8 +21,8 @@ from harness.running.step_sequence import RefusalSummary, RefusedRun
 from harness.running.trajectory import Statistics, Trajectory
 from harness.scenes.run_spec import RunSpec
 from harness.studies.stability.cases import StabilityCase, expand_scene, load_scenes, value_spans
-from harness.studies.stability.run_with_timeout import run_with_timeout
 from harness.studies.stability.study import (
+    CASE_PROCESS,
     FINISHED,
     REFUSED,
     WRONG,
@@ -142,34 +137,6 @@ def test_the_smooth_sled_creates_no_energy():
     np.testing.assert_allclose(0.5 * values["m"] * solution.v**2, work, atol=3e-4)
 
 
-# ---- the time limits
-
-
-def test_a_hang_is_one_sentence():
-    with pytest.raises(HarnessError, match=r"no answer after 0\.5 s"):
-        run_with_timeout(0.5, time.sleep, 60)
-
-
-def test_a_crash_is_one_sentence():
-    with pytest.raises(HarnessError, match="the process died with exit code 7"):
-        run_with_timeout(30.0, os._exit, 7)
-
-
-def test_an_exception_is_passed_on():
-    with pytest.raises(ValueError, match="invalid literal"):
-        run_with_timeout(30.0, int, "x")
-
-
-def test_a_worker_process_is_reused_and_replaced_after_a_crash(tmp_path, monkeypatch):
-    """Each call runs in the process it is sent to."""
-    first = run_with_timeout(30.0, os.getpid)
-    monkeypatch.chdir(tmp_path)
-    assert (run_with_timeout(30.0, os.getpid), run_with_timeout(30.0, os.getcwd)) == (first, str(tmp_path))
-    run_with_timeout(30.0, signal.setitimer, signal.ITIMER_REAL, 0.05)
-    run_with_timeout(30.0, time.sleep, 0.5)
-    assert run_with_timeout(30.0, os.getpid) != first
-
-
 # ---- the verdicts
 
 
@@ -281,17 +248,6 @@ def test_a_part_of_the_table_ends_as_expected(user_folder, tmp_path, monkeypatch
     assert summary(rows, []).startswith(f"{len(rows)} of {len(rows)} ended as expected.")
 
 
-def test_a_long_path_of_temporary_files_is_supported(tmp_path):
-    """The socket path of a fork server is limited to 107 bytes."""
-    folder = tmp_path / ("long" * 25)
-    folder.mkdir()
-    name = "run_with_timeout"
-    code = f"from harness.studies.stability.{name} import {name}\nprint({name}(60.0, len, 'three'))"
-    environment = {**os.environ, "PYTHONPATH": str(ROOT), "TMPDIR": str(folder)}
-    done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, timeout=120)
-    assert (done.stdout, done.stderr) == ("5\n", "")
-
-
 @pytest.mark.parametrize("name", ["rotor_brake", "sleds", "belt"])
 def test_a_user_model_passes_the_standard_scenes(tmp_path, name):
     """Its values, its tolerances and nonfinite numbers, by every method; a rule between two values may refuse them,
@@ -335,10 +291,20 @@ def test_a_model_without_position_and_speed_is_refused_by_stability_but_not_by_p
     assert (tmp_path / "results/precision/relax.csv").is_file()
 
 
+def test_a_hang_or_crash_is_the_outcome_of_its_case(monkeypatch):
+    def answer(self, request, timeout):
+        raise ChildTimeoutError("no answer after 120 s", "")
+
+    monkeypatch.setattr(ChildProcess, "ask", answer)
+    (row,) = run_group([CASE], ChildProcess(CASE_PROCESS))
+    assert (row.ended, row.text) == (WRONG, "no answer after 120 s")
+
+
 def test_a_motion_that_differs_from_two_agreeing_methods_is_wrong():
     file = str(build_user_model(EXAMPLE_MODELS[0]) / f"{EXAMPLE_MODELS[0].stem}.fmu")
     group = next(group for group in grouped_cases(models=[file]) if group[0].title == "as it comes")
     one = replace(group[0], max_error=1e-300)
-    (row,) = run_group([one])
+    with ChildProcess(CASE_PROCESS) as process:
+        (row,) = run_group([one], process)
     assert (row.passed, row.ended) == (False, WRONG)
     assert "more than 1e-300" in row.text

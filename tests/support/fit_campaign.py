@@ -40,7 +40,7 @@ def build_fmus(folder):
     """Build the native FMUs of all groups for this platform and return the folder."""
     models = sorted({group.model for group in GROUPS.values()})
     sources = [str(SOURCES.get(model, model)) for model in models]
-    done = run_module("build_fmus", "", *sources, "--native", "--platform", "linux64", "--out", str(folder))
+    done = run_module("build_fmus", *sources, "--native", "--platform", "linux64", "--out", str(folder))
     if done.returncode:
         raise RuntimeError(done.stderr)
     return folder

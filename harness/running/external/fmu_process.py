@@ -1,17 +1,16 @@
-"""Child process that runs an external FMU: it writes rows and progress to files and replies with a result."""
+"""Child process that runs an external FMU: it writes rows to files and replies with a result."""
 
 import os
+from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import asdict
 from pathlib import Path
-from time import perf_counter
 from typing import Any
 
 import fmpy
 from fmpy.fmi1 import FMICallException
 
 from ...errors import HarnessError, first_line
-from ...process.subprocess_runner import serve_request
+from ...process.child_process import RequestServer
 from ...scenes.run_spec import RunSpec
 from ..fmu_session import STATUS_NAMES, FmuSession, LogCapture, StepError, StepRefusedError, TerminatedError
 from ..inputs import input_signals
@@ -19,41 +18,23 @@ from ..model_exchange import ModelExchange
 from ..recorder import Recorder, StringTable, read_rows, select_variables
 from ..stepping import CoSimulation, Stepper, TimeGrid, step_to_stop
 from .step_refinement import (
-    OUTPUT_FILE,
-    PROGRESS_FILE,
     ROWS_PREFIX,
     STRINGS_FILE,
+    RefinementResult,
     RefinementRun,
     coarsest_grid,
     refine,
 )
 
-REPORT_INTERVAL = 0.2  # s between progress reports
-MAX_OUTPUT_BYTES = 1_000_000  # of FMU output that are kept
 REMAINING_SHARE = 0.8  # of the progress bar after each run
 
 
-class ProgressFile:
-    """Reports progress to the parent, which kills this process if one FMI call takes longer than its timeout."""
-
-    def __init__(self, directory: Path) -> None:
-        self.file, self.next, self.progress, self.n_runs = (directory / PROGRESS_FILE).open("w"), 0.0, 0.0, 0
-
-    def report(self, progress: float | None = None) -> None:
-        """Report the progress of the present run, from 0 to 1, or that the process works.
-
-        The number of runs is unknown: each run takes a fixed share of what remains of the progress bar.
-        """
-        now = perf_counter()
-        if now < self.next:
-            return
-        self.next = now + REPORT_INTERVAL
-        self.progress = self.progress if progress is None else progress
-        self.file.seek(0)
-        self.file.write(f"{1 - REMAINING_SHARE ** (self.n_runs + self.progress):.6f}")
-        self.file.flush()
-        if os.fstat(1).st_size > MAX_OUTPUT_BYTES:
-            os.ftruncate(1, 0)
+def memory_size() -> int | None:
+    """Return the memory of this machine in bytes, where the system states it: an FMU that needs more cannot run."""
+    try:
+        return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    except (AttributeError, ValueError, OSError):
+        return None
 
 
 class ExternalFmu:
@@ -67,22 +48,32 @@ class ExternalFmu:
         Directory of the unpacked FMU.
     directory : pathlib.Path
         Directory for results.
+    report : callable
+        Receives the progress from 0 to 1. The parent kills this process if one FMI call takes longer than its timeout.
     """
 
-    def __init__(self, spec: RunSpec, folder: str, directory: Path) -> None:
+    def __init__(self, spec: RunSpec, folder: str, directory: Path, report: Callable[[float], None]) -> None:
         self.spec, self.folder, self.directory = spec, folder, directory
         self.description = fmpy.read_model_description(folder, validate=False)
         variables = {variable.name: variable for variable in self.description.modelVariables}
         self.settings = [(variables[name], value) for name, value in spec.values.items()]
         self.chosen = select_variables(spec, variables, spec.values)
-        self.strings, self.progress = StringTable(directory / STRINGS_FILE), ProgressFile(directory)
+        self.strings, self.report = StringTable(directory / STRINGS_FILE), report
+        self.n_runs, self.progress = 0, 0.0
+
+    def report_progress(self, progress: float | None = None) -> None:
+        """Report the progress of the present run, from 0 to 1, or that the process works.
+
+        The number of runs is unknown: each run takes a fixed share of what remains of the progress bar.
+        """
+        self.progress = self.progress if progress is None else progress
+        self.report(1 - REMAINING_SHARE ** (self.n_runs + self.progress))
 
     def run(self, h: float, tolerance: float) -> RefinementRun:
         """Run the FMU with a communication step in s and a tolerance."""
-        number, log = self.progress.n_runs, LogCapture()
+        number, log = self.n_runs, LogCapture()
         path = self.directory / f"{ROWS_PREFIX}{number}"
-        self.progress.next = 0.0
-        self.progress.report(0.0)
+        self.report_progress(0.0)
         cause: Exception | None = None
         try:
             self.record(path, log, h, tolerance)
@@ -100,7 +91,7 @@ class ExternalFmu:
         if message:
             where = f" at t = {time[-1]:.9g} s" if len(time) and " at t = " not in message else ""
             message = ": ".join(filter(None, (message + where, log.error_message)))
-        self.progress.n_runs += 1
+        self.n_runs += 1
         terminated, step_refused = isinstance(cause, TerminatedError), isinstance(cause, StepRefusedError)
         return RefinementRun(number, time, columns, message, terminated, step_refused)
 
@@ -112,14 +103,14 @@ class ExternalFmu:
         session.initialize(self.settings, grid.start, grid.stop, tolerance)
         signals = input_signals(self.spec.inputs, session)
         stepper: Stepper = (
-            ModelExchange(session, grid, tolerance, self.progress.report, signals)
+            ModelExchange(session, grid, tolerance, self.report_progress, signals)
             if self.spec.exchange
             else CoSimulation(session, grid, signals, only_grid=True)
         )
         with path.open("wb", buffering=0) as file:
             recorder = Recorder(session, self.chosen, file.write, self.strings, only_finite=True)
             try:
-                step_to_stop(stepper, grid, recorder.record, self.progress.report)
+                step_to_stop(stepper, grid, recorder.record, self.report_progress)
             except StepError:  # after any other failure the next call may crash; the exit frees the instance
                 session.close()
                 raise
@@ -128,18 +119,15 @@ class ExternalFmu:
         session.close()
 
 
-def run_request(run: dict[str, Any], folder: str, directory: str) -> dict[str, Any]:
-    """Run an unpacked FMU; write rows and what the FMU prints into a directory, and return a RefinementResult."""
-    output = os.open(Path(directory) / OUTPUT_FILE, os.O_WRONLY | os.O_CREAT | os.O_APPEND)
-    for stream in (1, 2):
-        os.dup2(output, stream)
+def run_request(run: dict[str, Any], folder: str, directory: str, report: Callable[[float], None]) -> RefinementResult:
+    """Run an unpacked FMU and write rows into a directory."""
     try:
-        fmu = ExternalFmu(RunSpec.from_json(run), folder, Path(directory))
-        return asdict(refine(fmu.spec, fmu.description, fmu.run))
+        fmu = ExternalFmu(RunSpec.from_json(run), folder, Path(directory), report)
+        return refine(fmu.spec, fmu.description, fmu.run)
     except Exception as error:
-        return {"run_number": None, "note": "", "failure": first_line(error)}
+        return RefinementResult(None, "", first_line(error))
 
 
 if __name__ == "__main__":
-    serve_request(dict, lambda request: run_request(**request))
-    os._exit(0)  # an FMU that has failed may crash when its library is unloaded
+    server = RequestServer(memory_size())
+    server.serve(lambda request: run_request(**request, report=server.report))

@@ -3,21 +3,18 @@
 import json
 import signal
 from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import replace
 from math import inf
 from pathlib import Path
-from time import monotonic
 from typing import Any
 
 import fmpy
 import numpy as np
 
 from ...errors import MAX_VALUE_LENGTH, HarnessError, SceneError, check_names
-from ...process.interrupt import check_interrupt
-from ...process.subprocess_runner import run_module
+from ...process.child_process import ChildDiedError, ChildProcess, ChildTimeoutError
 from ...process.temporary_directory import temporary_directory
-from ...results.files import to_json
+from ...results.files import replace_nonfinite
 from ...scenes.run_spec import RunSpec
 from ..description import resolve_time_span
 from ..inputs import check_inputs
@@ -27,8 +24,6 @@ from ..unpacking import unpack
 from ..variable_values import convert_value, effective_value, variable_unit
 from .step_refinement import (
     MAX_STEPS,
-    OUTPUT_FILE,
-    PROGRESS_FILE,
     ROWS_PREFIX,
     STRINGS_FILE,
     RefinementResult,
@@ -37,7 +32,6 @@ from .step_refinement import (
 Values = dict[str, Any]  # by the name of the variable
 
 GRACE_PERIOD = 0.5  # s beyond the timeout: a report is up to 0.2 s older than the call that follows it
-MAX_START_TIME = 60.0  # s until the child process reports progress for the first time
 SETTABLE = ("parameter", "structuralParameter", "input")
 
 
@@ -70,10 +64,9 @@ def simulate(spec: RunSpec, description: Any, report: Callable[[float], None]) -
         check_library(spec.fmu, description, exchange, folder)
         inputs = {name: tuple(map(float, column)) for name, column in spec.inputs.items()}
         resolved = replace(spec, exchange=exchange, start=start, stop=stop, values=values, inputs=inputs)
-        outcome = run_fmu_process(resolved, folder, directory, report)
+        outcome, printed = run_fmu_process(resolved, folder, directory, report)
         time, columns = read_longest_rows(directory, outcome.run_number, chosen, description.fmiVersion == "2.0")
         texts = [json.loads(line) for line in read_lines(directory / STRINGS_FILE)]
-        printed = read_lines(directory / OUTPUT_FILE)
     failed = f"{spec.fmu.name}: {outcome.failure}" if outcome.failure else ""
     if failed and len(time) and " at t = " not in failed:
         failed += f", after t = {time[-1]:.9g} s"
@@ -127,49 +120,23 @@ def check_library(fmu: Path, description: Any, exchange: bool, folder: Path) -> 
     raise HarnessError(f"{fmu.name} has no binary {platform}/{identifier} for this machine: {available}{sources}")
 
 
-class NoProgressError(Exception):
-    """The child process reports no progress, and does not end."""
-
-
-class Watchdog:
-    """Notices that the file in which the child process reports progress has not changed for a time in s."""
-
-    def __init__(self, progress_file: Path, timeout: float) -> None:
-        self.progress_file, self.timeout = progress_file, timeout
-        self.modified, self.since = 0, monotonic()
-
-    def check(self) -> None:
-        """Raise NoProgressError if the time is over."""
-        with suppress(OSError):  # the child process has not started yet
-            modified = self.progress_file.stat().st_mtime_ns
-            if modified != self.modified:
-                self.modified, self.since = modified, monotonic()
-        if monotonic() - self.since > (self.timeout if self.modified else max(self.timeout, MAX_START_TIME)):
-            raise NoProgressError
-
-
-def run_fmu_process(spec: RunSpec, folder: Path, directory: Path, report: Callable[[float], None]) -> RefinementResult:
-    """Run the child process and return its result, or the reason why there is none."""
-    watchdog = Watchdog(directory / PROGRESS_FILE, spec.timeout + GRACE_PERIOD)
-
-    def meanwhile() -> None:
-        check_interrupt()
-        watchdog.check()
-        with suppress(OSError, ValueError):  # the file is being written
-            report(float((directory / PROGRESS_FILE).read_text()))
-
-    request = to_json({"run": spec, "folder": folder, "directory": directory})
-    try:
-        process = run_module(f"{__package__}.fmu_process", request, meanwhile=meanwhile)
-    except NoProgressError:
-        message = f"a call did not return within {spec.timeout:g} s (--timeout sets the limit)"
-    else:
-        if process.stdout:
-            return RefinementResult(**json.loads(process.stdout))
-        message = f"its binary exited with status {process.returncode}"
-        if process.returncode < 0:
-            message = f"its binary crashed ({signal.strsignal(-process.returncode)})"
-    return RefinementResult(None, "", message)
+def run_fmu_process(
+    spec: RunSpec, folder: Path, directory: Path, report: Callable[[float], None]
+) -> tuple[RefinementResult, list[str]]:
+    """Run the child process and return its result, or the reason why there is none, and the lines that it printed."""
+    request = {"run": replace_nonfinite(spec), "folder": folder, "directory": directory}
+    with ChildProcess(f"{__package__}.fmu_process") as child:
+        try:
+            reply = child.ask(request, spec.timeout + GRACE_PERIOD, report)
+            return RefinementResult(**reply), child.messages.splitlines()
+        except ChildTimeoutError as error:
+            message = f"a call did not return within {spec.timeout:g} s (--timeout sets the limit)"
+            return RefinementResult(None, "", message), error.messages.splitlines()
+        except ChildDiedError as error:
+            message = f"its binary exited with status {error.status}"
+            if error.status < 0:
+                message = f"its binary crashed ({signal.strsignal(-error.status)})"
+            return RefinementResult(None, "", message), error.messages.splitlines()
 
 
 def read_longest_rows(

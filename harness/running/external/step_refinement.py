@@ -17,7 +17,7 @@ from ..recorder import Columns
 from ..stepping import TimeGrid
 
 # names of files in the directory of results
-PROGRESS_FILE, OUTPUT_FILE, STRINGS_FILE = "progress", "output", "strings"
+STRINGS_FILE = "strings"
 ROWS_PREFIX = "rows-"  # followed by the number of a run
 COARSEST_STEPS = 64  # communication steps of the coarsest run by default
 MAX_STEPS = 2**18  # communication steps

@@ -4,7 +4,7 @@ import ctypes
 import sys
 from pathlib import Path
 
-from ...process.subprocess_runner import serve_request
+from ...process.child_process import RequestServer
 from .engine import EngineRequest
 
 
@@ -26,4 +26,4 @@ def run(request: EngineRequest) -> list[list[float]]:
 
 
 if __name__ == "__main__":
-    serve_request(EngineRequest, run)
+    RequestServer().serve(lambda request: run(EngineRequest(**request)))

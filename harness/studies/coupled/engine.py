@@ -1,11 +1,10 @@
 """Engines that run an SSP archive, each in a separate process with JSON input and output."""
 
-import json
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 
 from ...errors import HarnessError
-from ...process.subprocess_runner import SubprocessTimeoutError, run_module
+from ...process.child_process import ChildDiedError, ask_once
 
 ENGINE_TIMEOUT = 300.0  # s, for one run
 EXTRA = "python -m pip install 'friction-fmus[coupled]'"
@@ -39,12 +38,10 @@ def run_engine(engine: str, request: EngineRequest) -> list[list[float]]:
     """
     failed = f"{engine} could not run {Path(request.archive).name}"
     try:
-        process = run_module(ENGINES[engine], json.dumps(asdict(request)), timeout=ENGINE_TIMEOUT)
-    except SubprocessTimeoutError as timeout:
-        raise HarnessError(f"{failed}: {timeout}") from None
-    if process.returncode or not process.stdout:
-        last = (process.stderr.strip().splitlines() or [f"exit status {process.returncode}"])[-1]
-        hint = f"; {EXTRA}" if "ModuleNotFoundError" in last else ""
-        raise HarnessError(f"{failed}: {last}{hint}")
-    rows: list[list[float]] = json.loads(process.stdout)
+        rows: list[list[float]] = ask_once(ENGINES[engine], request, ENGINE_TIMEOUT)
+    except ChildDiedError as died:
+        hint = f"; {EXTRA}" if "ModuleNotFoundError" in died.last_line else ""
+        raise HarnessError(f"{failed}: {died.last_line}{hint}") from None
+    except HarnessError as error:
+        raise HarnessError(f"{failed}: {error}") from None
     return rows

@@ -1,6 +1,6 @@
 """Runs an SSP archive with libcosim (package libcosimpy); the first row is that after the first step."""
 
-from ...process.subprocess_runner import serve_request
+from ...process.child_process import RequestServer
 from .engine import EngineRequest
 
 NANO = 1e9  # libcosim counts time in ns
@@ -31,4 +31,4 @@ def run(request: EngineRequest) -> list[list[float]]:
 
 
 if __name__ == "__main__":
-    serve_request(EngineRequest, run)
+    RequestServer().serve(lambda request: run(EngineRequest(**request)))

@@ -99,7 +99,7 @@ def element_fmus(scene: CoupledScene, folder: Path) -> dict[str, Path]:
     """Return the FMU of each element; the FMU of the springs is built here."""
     fmus = {part.name: part.fmu for part in scene.parts}
     if scene.springs:
-        done = run_module("build_fmus", "", str(SPRING), "--out", str(folder))
+        done = run_module("build_fmus", str(SPRING), "--out", str(folder))
         if done.returncode:
             raise HarnessError(f"the spring could not be built: {done.stderr.strip()}")
     return fmus | {spring.name: folder / "spring.fmu" for spring in scene.springs}

@@ -1,44 +1,24 @@
-"""Executes requests for one FMU in a C program (running/host.c).
+"""Executes requests in a C program (running/host.c), which takes calls and prints values instead of JSON."""
 
-It runs in the process of the harness, so that the program is compiled only once per FMU.
-"""
-
-import json
 import re
 import subprocess
-from dataclasses import asdict
 from functools import cache
 from pathlib import Path
 
-from ...process.subprocess_runner import SubprocessTimeoutError, run_subprocess
+from ...process.child_process import ChildDiedError
+from ...process.subprocess_runner import run_subprocess
 from ...running.c_host import find_compiler, load_library
-from .request import END, ImporterReply, ImporterRequest
+from .request import ImporterReply, ImporterRequest
 
 
-def run_requests(text: str, timeout: float) -> subprocess.CompletedProcess[str]:
-    """Run requests in the C program; return the process with replies like those of an adapter."""
-    requests = [ImporterRequest(**json.loads(line)) for line in text.splitlines()]
-    library = load_library(Path(requests[0].fmu))
-    calls = [
-        call
-        for request in requests
-        for call in [*(reset_cycle_calls(request) * request.reset_cycles or runs(request)), "0 end"]
-    ]
-    commands = "".join(f"{call}\n" for call in [*calls, "0 unload"])
-    try:
-        return with_replies(requests, run_subprocess(library.command, commands, library.environment, timeout))
-    except SubprocessTimeoutError as timeout:
-        with_replies(requests, timeout.process)
-        raise
-
-
-def with_replies(
-    requests: list[ImporterRequest], process: subprocess.CompletedProcess[str]
-) -> subprocess.CompletedProcess[str]:
-    """Replace the output of the process by replies in JSON."""
-    replies = map(reply, requests, process.stdout.split(END)[:-1])
-    process.stdout = "\n".join(json.dumps(asdict(reply_object)) for reply_object in replies)
-    return process
+def run_request(request: ImporterRequest, timeout: float) -> tuple[ImporterReply, str]:
+    """Run a request in the C program; return the reply and what the program printed on standard error."""
+    library = load_library(Path(request.fmu))
+    calls = [*(reset_cycle_calls(request) * request.reset_cycles or runs(request)), "0 unload"]
+    done = run_subprocess(library.command, "".join(f"{call}\n" for call in calls), library.environment, timeout)
+    if done.returncode:
+        raise ChildDiedError(done.returncode, done.stderr)
+    return reply(request, done.stdout), done.stderr
 
 
 def reply(request: ImporterRequest, text: str) -> ImporterReply:

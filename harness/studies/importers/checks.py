@@ -14,14 +14,14 @@ from typing import Any
 from zipfile import ZipFile
 
 from ...errors import HarnessError
-from ...process.subprocess_runner import SubprocessTimeoutError, run_module
+from ...process.child_process import ChildError, ChildProcess
 from ...running.c_host import COMPILER, PYTHON_LIBRARY
 from ...running.description import read_description
 from . import c_adapter
-from .request import END, ImporterReply, ImporterRequest
+from .request import ImporterReply, ImporterRequest
 
 TOLERANCE = 1e-6
-TIMEOUT = 300  # s per process
+TIMEOUT = 300.0  # s per request
 RESET_CYCLES = 100
 POINTS = 200  # communication steps
 DIVERGENCE_MESSAGE = "the solution diverges"
@@ -127,38 +127,28 @@ def run_request(importer: Importer, request: ImporterRequest) -> AdapterResult:
 
 
 def prepare(importer: Importer, requests: list[ImporterRequest]) -> None:
-    """Run all new requests of an importer in one process; if it crashes, continue in another process."""
-    texts = [json.dumps(asdict(request)) for request in requests]
-    texts = [text for text in dict.fromkeys(texts) if (importer.adapter, text) not in RESULTS]
-    while texts:
-        answers = run_adapter(importer.adapter, texts)
-        RESULTS.update(((importer.adapter, text), answer) for text, answer in zip(texts, answers, strict=False))
-        texts = texts[len(answers) :]
+    """Run all new requests of an importer in one process; after a crash or timeout another process goes on."""
+    keys = {(importer.adapter, json.dumps(asdict(request))): request for request in requests}
+    new_requests = {key: request for key, request in keys.items() if key not in RESULTS}
+    with ChildProcess(f"{__package__}.{importer.adapter}") as process:
+        for key, request in new_requests.items():
+            RESULTS[key] = run_adapter(process, importer, request)
+        try:
+            process.finish()
+        except ChildError as error:
+            RESULTS[key] = CheckFailedError(str(error))
 
 
-def run_adapter(adapter: str, texts: list[str]) -> list[AdapterResult | CheckFailedError]:
-    """Run requests in a process; return the results, the last of which is an error if the process crashed."""
-    text, timeout_message = "\n".join(texts), ""
+def run_adapter(
+    process: ChildProcess, importer: Importer, request: ImporterRequest
+) -> AdapterResult | CheckFailedError:
+    """Run a request in the process of an adapter, or in the C program."""
     try:
-        in_c = adapter == "c_adapter"
-        process = (
-            c_adapter.run_requests(text, TIMEOUT)
-            if in_c
-            else run_module(f"{__package__}.{adapter}", text, timeout=TIMEOUT)
-        )
-    except SubprocessTimeoutError as timeout:
-        process, timeout_message = timeout.process, f"no answer after {TIMEOUT} s"
-    *messages, rest = process.stderr.split(END)
-    replies = [ImporterReply(**json.loads(line)) for line in process.stdout.splitlines()]
-    results: list[AdapterResult | CheckFailedError] = [
-        AdapterResult(*pair) for pair in zip(replies, messages, strict=False)
-    ]
-    if process.returncode or rest or len(results) < len(texts):
-        last = rest.strip().splitlines()[-1:] or ["no message"]
-        results[len(texts) - 1 :] = [
-            CheckFailedError(timeout_message or f"exit status {process.returncode}: {last[0]}")
-        ]
-    return results
+        if importer.adapter == "c_adapter":
+            return AdapterResult(*c_adapter.run_request(request, TIMEOUT))
+        return AdapterResult(ImporterReply(**process.ask(request, TIMEOUT)), process.messages)
+    except HarnessError as error:
+        return CheckFailedError(str(error))
 
 
 @dataclass(frozen=True)

@@ -1,16 +1,12 @@
-"""Protocol of the adapters: requests and replies as JSON lines on standard input and output.
+"""Requests to the adapters and their replies.
 
 An adapter prints log messages of the FMU to standard error if the tool passes them on.
 """
 
-import json
-import sys
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 
-from ...process.subprocess_runner import open_replies
-
-END = "\0"  # separates the messages of requests on standard error
+from ...process.child_process import RequestServer
 
 
 @dataclass(frozen=True)
@@ -42,8 +38,5 @@ class ImporterReply:
 
 
 def serve(run_request: Callable[[ImporterRequest], ImporterReply]) -> None:
-    """Execute the requests on standard input; redirect output of the tool to standard error."""
-    replies = open_replies()
-    for line in sys.stdin:
-        print(json.dumps(asdict(run_request(ImporterRequest(**json.loads(line))))), file=replies, flush=True)
-        print(END, end="", file=sys.stderr, flush=True)
+    """Execute the requests of the parent."""
+    RequestServer().serve(lambda request: run_request(ImporterRequest(**request)))

@@ -113,12 +113,11 @@ def find_fmus(folder: Path) -> list[Path]:
 
 
 def run_all_requests(subjects: list[FmuUnderTest], importer: Importer) -> None:
-    """Run all requests of an importer: one process for all FMUs, or one per FMU in C."""
-    requests_by_fmu = [[request(subject) for _, request in CHECKS.values()] for subject in subjects]
-    if importer.adapter != "c_adapter":  # without reset cycles; fmpy's run is the reference for C
-        requests_by_fmu = [[replace(request, reset_cycles=0) for requests in requests_by_fmu for request in requests]]
-    for requests in requests_by_fmu:
-        prepare(importer, requests)
+    """Run all requests of an importer."""
+    requests = [request(subject) for subject in subjects for _, request in CHECKS.values()]
+    if importer.adapter != "c_adapter":  # fmpy's run without reset cycles is the reference for C
+        requests = [replace(request, reset_cycles=0) for request in requests]
+    prepare(importer, requests)
 
 
 def judge_fmu(importer: Importer, subject: FmuUnderTest) -> list[str]:

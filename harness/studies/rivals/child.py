@@ -1,15 +1,13 @@
-"""Runs rivals in a process of their own: reads requests as lines of JSON, and writes a line for each reply."""
+"""Runs rivals in a process of their own."""
 
-import json
-import sys
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from importlib import import_module
 from time import process_time
 
 import numpy as np
 
 from ...errors import HarnessError, first_line
-from ...process.subprocess_runner import open_replies
+from ...process.child_process import RequestServer
 from .scenes import SCENES, Changes, NotOfferedError, Setting
 
 REPEATS = 3  # of short runs
@@ -72,10 +70,8 @@ def run_request(request: RunRequest) -> RunReply:
 
 
 def serve() -> None:
-    """Answer the requests on standard input; what an engine prints goes to standard error."""
-    replies = open_replies()
-    for line in sys.stdin:
-        print(json.dumps(asdict(run_request(RunRequest(**json.loads(line))))), file=replies, flush=True)
+    """Answer the requests of the parent."""
+    RequestServer().serve(lambda request: run_request(RunRequest(**request)))
 
 
 if __name__ == "__main__":

@@ -1,12 +1,10 @@
 """Runs all rivals in all scenes, each setting in one process, and writes rivals.csv and figure.svg."""
 
-import json
 from collections.abc import Callable, Iterator
-from dataclasses import asdict
 from math import nan
 from pathlib import Path
 
-from ...process.subprocess_runner import SubprocessTimeoutError, run_module
+from ...process.child_process import ChildError, ChildProcess
 from ...references.reference_trajectory import require_reference_packages
 from ...results.files import write_csv_rows
 from ...results.folder import replace_folder
@@ -31,7 +29,7 @@ def run_rivals(names: tuple[str, ...], timeout: float, out: Path, report: Callab
     Parameters
     ----------
     names : names of rivals; the FMU of this project always runs, because times are relative to its own
-    timeout : seconds that one process may take, which runs the scenes of a setting
+    timeout : seconds that a run may take
     out : folder of results
     report : receives the name of each rival that runs
     """
@@ -67,18 +65,14 @@ def run_rival(rival: Rival, references: dict[str, ReferenceMotion], timeout: flo
 
 
 def run_in_child(requests: list[RunRequest], timeout: float) -> list[RunReply]:
-    """Run requests in one process.  A crash and a hang are gaps, after which another process goes on."""
+    """Run requests in one process. A crash and a hang are gaps, after which another process goes on."""
     replies: list[RunReply] = []
-    while len(replies) < len(requests):
-        text = "".join(f"{json.dumps(asdict(request))}\n" for request in requests[len(replies) :])
-        try:
-            done, reason = run_module(f"{__package__}.child", text, timeout=timeout), ""
-        except SubprocessTimeoutError as error:
-            done, reason = error.process, str(error)
-        replies += [RunReply(**json.loads(line)) for line in done.stdout.splitlines() if line.endswith("}")]
-        if len(replies) < len(requests):
-            last = (done.stderr.strip().splitlines() or ["no message"])[-1]
-            replies.append(RunReply(reason or f"it ended with exit status {done.returncode}: {last}"))
+    with ChildProcess(f"{__package__}.child") as child:
+        for request in requests:
+            try:
+                replies.append(RunReply(**child.ask(request, timeout)))
+            except ChildError as error:
+                replies.append(RunReply(str(error)))
     return replies
 
 

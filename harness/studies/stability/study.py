@@ -6,38 +6,33 @@ limit in a separate process.
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import ExitStack
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
+from queue import SimpleQueue
 from typing import Any
 
 import numpy as np
 
 from ...errors import HarnessError
+from ...process.child_process import ChildProcess, ask_once
 from ...process.interruptible_wait import map_in_threads
-from ...references.certification import compute_by_two_methods
-from ...references.models import MODELS
-from ...references.reference_trajectory import (
-    ReferenceTrajectory,
-    compute_reference,
-    max_or_nan,
-    require_reference_packages,
-)
+from ...references.reference_trajectory import ReferenceTrajectory, max_or_nan, require_reference_packages
 from ...results.files import write_csv_rows
 from ...results.folder import replace_folder
 from ...results.provenance import prefix_parameters, write_provenance
 from ...running.description import declared_parameters
-from ...running.embedded_model import load_model_class
 from ...running.fmu_info import FmuInfo, read_info
-from ...running.step_sequence import RefusalSummary, RefusedRun, inject_nonfinite, run_steps
-from ...running.trajectory import Trajectory
+from ...running.step_sequence import CommunicationSteps, RefusalSummary, RefusedRun
+from ...running.trajectory import Statistics, Trajectory
 from ...scenes.fmu_files import check_built, find_fmu
 from .cases import StabilityCase, generic_scenes, load_scenes, scene_cases
 from .outcomes import FINISHED, REFUSED, WRONG, CaseOutcome, StabilityRegion
-from .run_with_timeout import run_with_timeout
 
 WORKERS = 2
 LIMIT = 120.0  # s; time limit of a run and of a reference
+CASE_PROCESS = f"{__package__}.case_process"
 FOLDER, FILES = "stability", ("stability.csv", "region.svg")
 REFUSED_STEP = "a communication step of"  # a refused step changes nothing
 
@@ -62,15 +57,22 @@ def run_stability(
 
 def run_cases(report: Callable[[str, float], None], chosen: list[list[StabilityCase]]) -> list[CaseOutcome]:
     """Run groups of cases in parallel; `report` receives the label of each finished case."""
+    idle: SimpleQueue[ChildProcess] = SimpleQueue()  # starting a process takes longer than most runs
 
     def rows(group: list[StabilityCase]) -> list[CaseOutcome]:
-        outcomes = []
-        for row in run_group(group):
-            outcomes.append(row)
-            report(row.case.label, 1.0)
+        outcomes, process = [], idle.get()
+        try:
+            for row in run_group(group, process):
+                outcomes.append(row)
+                report(row.case.label, 1.0)
+        finally:
+            idle.put(process)
         return outcomes
 
-    outcomes = [row for outcomes in map_in_threads(WORKERS, rows, chosen) for row in outcomes]
+    with ExitStack() as processes:
+        for _ in range(WORKERS):
+            idle.put(processes.enter_context(ChildProcess(CASE_PROCESS)))
+        outcomes = [row for outcomes in map_in_threads(WORKERS, rows, chosen) for row in outcomes]
     return sorted(outcomes, key=lambda row: row.case.order)
 
 
@@ -90,9 +92,9 @@ def grouped_cases(
     ]
     cards: dict[str, FmuInfo] = {}
     for model in dict.fromkeys((*models, *(scene["model"] for scene in selected_scenes))):
-        cards[model] = run_with_timeout(LIMIT, read_info, model)
+        cards[model] = read_info(model)
         if model not in [scene["model"] for scene in selected_scenes]:
-            has_comparable_events = len(run_with_timeout(LIMIT, mode_names, model)) < 2
+            has_comparable_events = len(ask_once(CASE_PROCESS, ("modes", {"model": model}), LIMIT)) < 2
             selected_scenes += generic_scenes(model, cards[model], has_comparable_events)
     groups: dict[str, list[StabilityCase]] = {}
     for order, scene in enumerate(selected_scenes):
@@ -102,34 +104,26 @@ def grouped_cases(
     return list(groups.values())
 
 
-def mode_names(model: str) -> list[str]:
-    """Return the modes of a model; HarnessError if it has no position with a speed."""
-    carried: Any = load_model_class(find_fmu(model))
-    if not {*carried.states} & {*carried.states.values()}:
-        raise HarnessError(f"{model}: no state is the rate of another one; the cases need a position and a speed")
-    return list(carried.contacts)
-
-
-def run_group(group: Iterable[StabilityCase]) -> Iterator[CaseOutcome]:
-    """Run cases with a common reference."""
+def run_group(group: Iterable[StabilityCase], process: ChildProcess) -> Iterator[CaseOutcome]:
+    """Run cases with a common reference in a process."""
     reference: ReferenceTrajectory | None = None
     reference_error = ""
     for case in group:
         try:
             if case.inject_nonfinite:
-                yield judge_injections(case, run_with_timeout(LIMIT, inject_nonfinite, case.run))
+                summary = RefusalSummary(**process.ask(("nonfinite", {"run": case.run}), LIMIT))
+                yield judge_injections(case, summary)
                 continue
             if case.expected_message is None and reference is None and not reference_error:
-                solve_reference = compute_reference if case.model in MODELS else compute_by_two_methods
                 try:
-                    reference = run_with_timeout(LIMIT, solve_reference, case.model, case.spans, case.grid)
+                    reference = solve_reference(case, process)
                 except HarnessError as error:
                     if not case.may_be_refused:
                         raise
                     reference_error = str(error)  # the run may reject such values
             times = reference.times.tolist() if reference else case.grid.times(())
             calls = case.calls or [(t, ahead - t) for t, ahead in pairwise(times)]
-            outcome = run_with_timeout(LIMIT, run_steps, case.run, calls, case.changes)
+            outcome = run_case(case, calls, process)
             if isinstance(outcome, RefusedRun):
                 yield judge_refusal(case, outcome)
             elif reference is None or case.expected_message is not None:
@@ -138,6 +132,26 @@ def run_group(group: Iterable[StabilityCase]) -> Iterator[CaseOutcome]:
                 yield judge_solution(case, outcome, reference)
         except HarnessError as error:
             yield CaseOutcome(case, WRONG, str(error))
+
+
+def solve_reference(case: StabilityCase, process: ChildProcess) -> ReferenceTrajectory:
+    """Return the reference of a case, computed in a process."""
+    request = {"model": case.model, "spans": case.spans, "grid": case.grid}
+    reply = process.ask(("reference", request), LIMIT)
+    times, x, v = (np.array(reply[name]) for name in ("times", "x", "v"))
+    return ReferenceTrajectory(times, x, v, tuple((t, mode) for t, mode in reply["events"]))
+
+
+def run_case(case: StabilityCase, calls: CommunicationSteps, process: ChildProcess) -> Trajectory | RefusedRun:
+    """Run a case in a process."""
+    request = {"run": case.run, "calls": calls, "changes": [*case.changes.items()]}
+    reply = process.ask(("steps", request), LIMIT)
+    if "all_nan" in reply:
+        return RefusedRun(**reply)
+    columns = {name: np.array(column) for name, column in reply["columns"].items()}
+    run, statistics = replace(case.run, outputs=tuple(columns)), Statistics(**reply["statistics"])
+    described = reply["units"], reply["descriptions"], reply["parameters"]
+    return Trajectory(run, np.array(reply["time"]), columns, *described, statistics=statistics)
 
 
 def judge_injections(case: StabilityCase, ending: RefusalSummary) -> CaseOutcome:
