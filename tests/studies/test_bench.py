@@ -222,11 +222,9 @@ def test_a_run_refused_by_an_fmu_in_c_reports_its_message(both_backends):
 EXPLICIT_EVENTS = [
     scene
     for scene in model_exchange.DRIVEN_SCENARIOS
-    if not scene.reference_case.problem.is_stiff or str(scene) == "pacejka-0.01, ramps"
+    if not scene.case.problem.is_stiff or str(scene) == "pacejka-0.01, ramps"
 ]
-LATE = [
-    scene for scene in model_exchange.LATE_SCENARIOS if scene.has_ramps and not scene.reference_case.problem.is_stiff
-]
+LATE = [scene for scene in model_exchange.LATE_SCENARIOS if scene.has_ramps and not scene.case.problem.is_stiff]
 
 
 @pytest.mark.skipif(c_host.COMPILER is None, reason="there is no C compiler on this machine: install gcc")

@@ -204,7 +204,8 @@ def test_a_scene_is_checked_before_any_fmu(monkeypatch, tmp_path):
 
 
 def test_an_engine_that_hangs_is_reported_by_name(monkeypatch, tmp_path):
-    (tmp_path / "sleeps.py").write_text("import time\ntime.sleep(100)\n")
+    code = "import time\nfrom harness.process.child_process import RequestServer\n"
+    (tmp_path / "sleeps.py").write_text(f"{code}RequestServer().serve(lambda request: time.sleep(100))")
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     monkeypatch.setitem(ENGINES, "Sleeper", "sleeps")
     monkeypatch.setattr(engine, "ENGINE_TIMEOUT", 0.3)

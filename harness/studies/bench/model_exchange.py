@@ -33,7 +33,7 @@ from .native import (
     run_host,
     time_cvode,
 )
-from .scenario import Scenario
+from .scenario import Scenario, make_scenario
 
 TOLERANCES = (1e-6, 1e-8, 1e-10)
 REFERENCE_FMUS = Path("Reference-FMUs")  # a clone in the working directory
@@ -41,12 +41,16 @@ BOUNCING_BALL_SIZES, BOUNCING_BALL_START = (
     (2, 1),
     {"h": 0.175, "v": 0.3},
 )  # numbers of states and event indicators; start values
-DEFAULT_SCENARIOS = [Scenario(case) for case in RUN_TIME_TARGETS]
-DRIVEN_SCENARIOS = [
-    Scenario(case, *its) for case in RUN_TIME_TARGETS for its in SETTINGS["driven"][CASES_BY_NAME[case].model].items()
-]
-LATE_SCENARIOS = [Scenario(scenario.case, scenario.name, scenario.values, 1000.0) for scenario in DRIVEN_SCENARIOS]
-TIE_SCENARIOS = [Scenario(model, *its) for model, ties in SETTINGS["ties"].items() for its in ties.items()]
+DEFAULT_SCENARIOS = [make_scenario(case) for case in RUN_TIME_TARGETS]
+DRIVEN_SCENARIOS, LATE_SCENARIOS = (
+    [
+        make_scenario(case, name, changes, start)
+        for case in RUN_TIME_TARGETS
+        for name, changes in SETTINGS["driven"][CASES_BY_NAME[case].model].items()
+    ]
+    for start in (0.0, 1000.0)
+)
+TIE_SCENARIOS = [make_scenario(model, *its) for model, ties in SETTINGS["ties"].items() for its in ties.items()]
 COMPARED_SCENARIOS = [
     scene for scene in (*DEFAULT_SCENARIOS, *DRIVEN_SCENARIOS, *TIE_SCENARIOS) if not scene.has_ramps
 ]  # fmpy holds inputs in co-simulation
@@ -83,7 +87,9 @@ def error_ratio_to_cvode(scene: Scenario, tolerances: tuple[float, ...] = TOLERA
             reference_error, *others = errors.values()
             ratio = max(ratio, *(error_value / reference_error for error_value in others))
             if scene.is_default:
-                errors["CVODE with Adams or exact Jacobian"] = largest_error(scene.case, time_cvode(scene.case, rtol))
+                errors["CVODE with Adams or exact Jacobian"] = largest_error(
+                    scene.case.name, time_cvode(scene.case.name, rtol)
+                )
             text = ", ".join(f"{name} {error_value:.1e}" for name, error_value in errors.items())
             baselines.append(Baseline(f"errors at rtol {rtol:.0e}: {text}"))
         return ratio, 3.0, (*baselines, *missing)
@@ -93,19 +99,19 @@ def error_ratio_to_cvode(scene: Scenario, tolerances: tuple[float, ...] = TOLERA
 
 def largest_error_of(scene: Scenario, result: Trajectory | np.ndarray) -> float:
     """Return the largest error of a recording, or of position and speed (n, 2), at the common times."""
-    motion = result.sample_at(scene.times, scene.reference_case.outputs) if isinstance(result, Trajectory) else result
+    motion = result.sample_at(scene.times, scene.case.outputs) if isinstance(result, Trajectory) else result
     return float(relative_errors(motion, scene.reference_motion).max())
 
 
 def run_cvode(scene: Scenario, rtol: float) -> np.ndarray:
     """Run CVODE in C; return position and speed (n, 2) at the common times."""
-    its, library = scene.reference_case, build_cvode_fmu(scene.reference_case.model, plain=True)
+    its, library = scene.case, build_cvode_fmu(scene.case.model, plain=True)
 
     def set_values(**values: float) -> list[str]:
         return [f"0 setr {library.references[name]} {value!r}" for name, value in values.items()]
 
     read = "0 getr {} {}".format(*map(library.references.__getitem__, ("x", "v")))
-    input_calls = {t: set_values(force=value, rate=rate) for t, _, value, rate in scene.lines}
+    input_calls = {t: set_values(force=value, rate=rate) for t, _, value, rate in scene.segments}
     common_times = {*scene.times.tolist()}
     calls = ["0 new hand quiet", *set_values(**its.values, rtol=rtol, atol=rtol * its.problem.atol_factor)]
     calls += [*input_calls.pop(scene.start), f"0 begin {scene.start!r}", read]
@@ -119,12 +125,12 @@ def run_cvode(scene: Scenario, rtol: float) -> np.ndarray:
 
 def run_fmpy(scene: Scenario, rtol: float, exchange: bool = True) -> Trajectory:
     """Run the FMI 3.0 FMU with fmpy's CVode or with its own solver, and count its events."""
-    return simulate(scene.run(fmi3_fmu(scene.reference_case.model), rtol, exchange))
+    return simulate(scene.run_with(fmi3_fmu(scene.case.model), rtol, exchange))
 
 
 def run_fmusim(scene: Scenario, rtol: float) -> Trajectory:
     """Run the FMI 3.0 FMU with fmusim."""
-    program, its = shutil.which("fmusim"), scene.reference_case
+    program, its = shutil.which("fmusim"), scene.case
     if program is None:
         raise MissingToolError("not installed: fmusim")
     if scene.has_ramps:
@@ -135,9 +141,9 @@ def run_fmusim(scene: Scenario, rtol: float) -> Trajectory:
         file, input_file = folder / "out.csv", folder / "in.csv"
         command = [program, "--interface-type", "me", "--solver", "cvode", "--tolerance", repr(rtol)]
         command += ["--start-time", repr(scene.start), "--stop-time", repr(scene.stop)]
-        command += ["--output-interval", repr(scene.interval), "--output-file", str(file)]
-        command += [word for name, value in scene.numbers.items() for word in ("--start-value", name, repr(value))]
-        if inputs := scene.inputs:
+        command += ["--output-interval", repr(scene.run.grid), "--output-file", str(file)]
+        command += [word for name, value in scene.run.values.items() for word in ("--start-value", name, repr(value))]
+        if inputs := scene.run.inputs:
             rows = np.column_stack([*inputs.values()])
             np.savetxt(input_file, rows, "%.17g", ",", header=",".join(inputs), comments="")
             command += ["--input-file", str(input_file)]
@@ -147,7 +153,7 @@ def run_fmusim(scene: Scenario, rtol: float) -> Trajectory:
                 " ".join((process.stderr or process.stdout).split()) or "fmusim failed without a message"
             )
         rows = np.genfromtxt(file, delimiter=",", names=True)
-        spec = scene.run(fmi3_fmu(its.model), rtol, exchange=True)
+        spec = scene.run_with(fmi3_fmu(its.model), rtol, exchange=True)
         return Trajectory(spec, rows["time"], {name: rows[name] for name in its.outputs}, {}, {}, {})
 
 
@@ -158,15 +164,12 @@ def difference_from_cosimulation(scene: Scenario) -> Benchmark:
     def figures() -> Measured:
         exchange_run, cosimulation_run = (run_fmpy(scene, 1e-10, exchange) for exchange in (True, False))
         counts = [
-            int(recording.columns["events.count"][-1]) if scene.reference_case.problem.has_dry_friction else 0
+            int(recording.columns["events.count"][-1]) if scene.case.problem.has_dry_friction else 0
             for recording in (exchange_run, cosimulation_run)
         ]
         baseline = Baseline("{} events in model exchange, {} in co-simulation".format(*counts))
         difference = relative_errors(
-            *(
-                recording.sample_at(scene.times, scene.reference_case.outputs)
-                for recording in (exchange_run, cosimulation_run)
-            )
+            *(recording.sample_at(scene.times, scene.case.outputs) for recording in (exchange_run, cosimulation_run))
         ).max()
         return float(difference) if counts[0] == counts[1] else inf, 1e-6, (baseline,)
 

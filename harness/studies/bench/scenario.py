@@ -1,6 +1,7 @@
 """Scenarios for benchmarks of model exchange: a case with other values, input signals or start time."""
 
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
@@ -14,109 +15,95 @@ from ...running.fmu_info import read_info
 from ...scenes.run_spec import RunSpec
 from .native import CASES_BY_NAME
 
+DEFAULT_RUN = "default run"
 InputSegment = tuple[float, float, float, float]  # start and end in s, value at the start, and rate
 
 
 @dataclass(frozen=True, eq=False)
 class Scenario:
-    """A case that starts at `start` s, with additional `values`.
+    """A case with a run on the grid of its reference; `name` is for people."""
 
-    The value of a driven input is a list of points (s from the start, value), linear in between; a repeated time is a
-    jump.
-    """
-
-    case: str
-    name: str = "default run"
-    values: dict[str, Any] = field(default_factory=dict)
-    start: float = 0.0
+    case: ReferenceCase
+    name: str
+    run: RunSpec
 
     def __str__(self) -> str:
-        return f"{self.case}, {self.name}" + (f" from {self.start:g} s" if self.start else "")
+        return f"{self.case.name}, {self.name}" + (f" from {self.start:g} s" if self.start else "")
 
     @property
-    def reference_case(self) -> ReferenceCase:
-        return CASES_BY_NAME[self.case]
+    def start(self) -> float:
+        """Return the start in s."""
+        return self.run.start or 0.0
+
+    @property
+    def stop(self) -> float:
+        """Return the stop in s."""
+        return self.start + self.case.problem.stop
 
     @property
     def is_default(self) -> bool:
         """Return whether this is the unchanged case, which has a certified reference."""
-        return not self.values and not self.start
+        return self.name == DEFAULT_RUN
 
     @property
-    def numbers(self) -> dict[str, float]:
-        """Return the start values."""
-        return {
-            **self.reference_case.values,
-            **{name: value for name, value in self.values.items() if name not in self.led},
-        }
-
-    @property
-    def led(self) -> dict[str, list[tuple[float, float]]]:
-        """Return the points of driven inputs, with absolute times in s."""
-        lists = {name: value for name, value in self.values.items() if isinstance(value, list)}
-        return {name: [(self.start + t, value) for t, value in points] for name, points in lists.items()}
-
-    @property
-    def lines(self) -> list[InputSegment]:
+    def segments(self) -> list[InputSegment]:
         """Return the linear segments of the driven input, or one segment of zero."""
-        (points,) = self.led.values() or [[(self.start, 0.0), (self.stop, 0.0)]]
-        between = pairwise(points)
+        times, values = self.run.inputs.values() or ((self.start, self.stop), (0.0, 0.0))
+        between = pairwise(zip(times, values, strict=True))
         return [(t, end, value, (last - value) / (end - t)) for (t, value), (end, last) in between if end > t]
-
-    @property
-    def inputs(self) -> dict[str, tuple[float, ...]]:
-        """Return the table of input signals, empty without a driven input."""
-        for name, points in self.led.items():
-            times, values = zip(*points, strict=True)
-            return {"time": times, name: values}
-        return {}
-
-    def run(self, fmu: Path, rtol: float, exchange: bool) -> RunSpec:
-        """Return the run of an FMU at the common times, which also records the number of events."""
-        case = self.reference_case
-        values = self.numbers if exchange else {**self.numbers, "solver.rtol": rtol}
-        return RunSpec(
-            fmu,
-            (*case.outputs, *["events.count"] * case.problem.has_dry_friction),
-            values,
-            self.inputs,
-            self.start,
-            self.stop,
-            self.interval,
-            follow=False,
-            tolerance=rtol,
-            exchange=exchange,
-        )
 
     @property
     def has_ramps(self) -> bool:
         """Return whether the input has ramps."""
-        return any(rate for *_, rate in self.lines)
-
-    @property
-    def stop(self) -> float:
-        return self.start + self.reference_case.problem.stop
-
-    @property
-    def interval(self) -> float:
-        """Return the interval of the common times in s."""
-        return self.reference_case.problem.stop / (POINTS - 1)
+        return any(rate for *_, rate in self.segments)
 
     @property
     def times(self) -> np.ndarray:
         """Return the common times in s."""
-        return self.start + self.reference_case.reference.times
+        return self.start + self.case.reference.times
+
+    def run_with(self, fmu: Path, rtol: float, exchange: bool) -> RunSpec:
+        """Return the run of an FMU with a tolerance."""
+        values = self.run.values if exchange else {**self.run.values, "solver.rtol": rtol}
+        return replace(self.run, fmu=fmu, values=values, tolerance=rtol, exchange=exchange)
 
     @cached_property
     def reference_motion(self) -> np.ndarray:
         """Return the reference position and speed (n, 2) at the common times."""
         if self.is_default:
-            return self.reference_case.reference.motion
-        info = read_info(self.reference_case.model)
-        values = info.resolve_labels({**info.start_values, **self.numbers})
-        lines = [(t, end, {**dict.fromkeys(self.led, value), "rate": rate}) for t, end, value, rate in self.lines]
-        spans = [(t, end, {**values, **driven}) for t, end, driven in lines]
-        reference = compute_reference(
-            self.reference_case.model, spans, CommunicationGrid(self.start, self.stop, POINTS - 1)
-        )
+            return self.case.reference.motion
+        info, driven = read_info(self.case.model), [name for name in self.run.inputs if name != "time"]
+        values = info.resolve_labels({**info.start_values, **self.run.values})
+        spans = [
+            (t, end, {**values, **dict.fromkeys(driven, value), "rate": rate}) for t, end, value, rate in self.segments
+        ]
+        reference = compute_reference(self.case.model, spans, CommunicationGrid(self.start, self.stop, POINTS - 1))
         return np.column_stack([reference.x, reference.v])
+
+
+def make_scenario(
+    case_name: str, name: str = DEFAULT_RUN, changes: Mapping[str, Any] | None = None, start: float = 0.0
+) -> Scenario:
+    """Return a case with changed values that starts at `start` s, and records the number of events as well.
+
+    The value of a driven input is a list of points (s from the start, value), linear in between; a repeated time is a
+    jump.
+    """
+    case, values, inputs = CASES_BY_NAME[case_name], {}, {}
+    for variable, value in (changes or {}).items():
+        if isinstance(value, list):
+            times, column = zip(*value, strict=True)
+            inputs = {"time": tuple(start + t for t in times), variable: column}
+        else:
+            values[variable] = value
+    run = RunSpec(
+        Path(f"{case.model}.fmu"),
+        outputs=(*case.outputs, *["events.count"] * case.problem.has_dry_friction),
+        values={**case.values, **values},
+        inputs=inputs,
+        start=start,
+        stop=start + case.problem.stop,
+        grid=case.problem.stop / (POINTS - 1),
+        follow=False,
+    )
+    return Scenario(case, name, run)
