@@ -4,6 +4,7 @@ Tools that are not installed are skipped with the reason; they are in the extra 
 """
 
 import pickle
+from pathlib import Path
 
 import fmi3_fixtures
 import native_fmus
@@ -13,6 +14,7 @@ from models import EXAMPLE_MODELS, LARGER_MODELS, MODELS
 
 from harness.errors import HarnessError
 from harness.process.child_process import ChildProcess
+from harness.scenes.run_spec import RunSpec
 from harness.studies.importers import checks, table
 from harness.studies.importers.checks import CHECKS, IMPORTERS, NOT_RUN, CheckFailedError
 from harness.studies.importers.request import ImporterRequest
@@ -98,7 +100,7 @@ def test_a_crash_or_timeout_affects_only_its_own_check(tmp_path, monkeypatch):
     monkeypatch.setattr(checks, "TIMEOUT", 2.0)
     tool, *_ = (importer for importer in IMPORTERS if importer.name == "Ecos")
     names = ["one", "crash", "two", "hang", "three", "leak"]
-    requests = [ImporterRequest("a.fmu", {}, 1.0, 1, [], instances=[name]) for name in names]
+    requests = [ImporterRequest(RunSpec(Path("a.fmu"), stop=1.0, grid=1.0), {}, instances=[name]) for name in names]
     checks.prepare(tool, requests[:3])
     checks.prepare(tool, requests)
     versions, processes = {}, []

@@ -3,7 +3,6 @@
 import re
 import subprocess
 from functools import cache
-from pathlib import Path
 
 from ...process.child_process import ChildDiedError
 from ...process.subprocess_runner import run_subprocess
@@ -13,7 +12,7 @@ from .request import ImporterReply, ImporterRequest
 
 def run_request(request: ImporterRequest, timeout: float) -> tuple[ImporterReply, str]:
     """Run a request in the C program; return the reply and what the program printed on standard error."""
-    library = load_library(Path(request.fmu))
+    library = load_library(request.run.fmu)
     calls = [*(reset_cycle_calls(request) * request.reset_cycles or runs(request)), "0 unload"]
     done = run_subprocess(library.command, "".join(f"{call}\n" for call in calls), library.environment, timeout)
     if done.returncode:
@@ -32,7 +31,7 @@ def runs(request: ImporterRequest) -> list[str]:
     """Return the calls of all runs of a request without reset cycles."""
     all_instances = range(len(request.instances))
     calls = [f"{i} new {name}" for i, name in enumerate(request.instances)]
-    calls += run(request, request.values, request.midrun_changes)
+    calls += run(request, request.run.values, request.midrun_changes)
     if request.rerun:
         calls += [f"{i} reset" for i in all_instances] + run(request, {}, {})
     return calls + [f"{i} free" for i in all_instances]
@@ -41,7 +40,7 @@ def runs(request: ImporterRequest) -> list[str]:
 def run(request: ImporterRequest, values: dict[str, float], midrun_changes: dict[str, float]) -> list[str]:
     """Return the calls of one run."""
     references, all_instances = request.references, range(len(request.instances))
-    read = "getr " + " ".join(str(references[name]) for name in request.outputs)
+    read = "getr " + " ".join(str(references[name]) for name in request.run.outputs)
     calls = [f"0 setr {references[name]} {value!r}" for name, value in values.items()]
     calls += [f"{i} begin" for i in all_instances] + [f"{i} {read}" for i in all_instances]
     for step in range(request.steps):
@@ -60,7 +59,7 @@ def reset_cycle_calls(request: ImporterRequest) -> list[str]:
     times = [request.step * i for i in range(request.steps)]
     steps = [f"0 step {t!r} {request.step!r}" for t in times]
     first_half, second_half = steps[: len(steps) // 2], steps[len(steps) // 2 :]
-    read = ["0 getr " + " ".join(str(request.references[name]) for name in request.outputs)]
+    read = ["0 getr " + " ".join(str(request.references[name]) for name in request.run.outputs)]
     calls = [*first_half, "0 save", *second_half, *read, "0 restore", *second_half, *read]
     return ["0 new a", "0 begin", *calls, "0 reset", "0 begin", *steps, *read, "0 free"]
 

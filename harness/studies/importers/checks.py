@@ -4,9 +4,8 @@ Values agree if they differ by less than TOLERANCE, relative to the largest valu
 time differently, and a slightly later change during the run causes other internal steps.
 """
 
-import json
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from importlib.metadata import PackageNotFoundError, version
 from math import isfinite, isnan, nan
 from pathlib import Path
@@ -17,6 +16,7 @@ from ...errors import HarnessError
 from ...process.child_process import ChildError, ChildProcess
 from ...running.c_host import COMPILER, PYTHON_LIBRARY
 from ...running.description import read_description
+from ...scenes.run_spec import RunSpec
 from . import c_adapter
 from .request import ImporterReply, ImporterRequest
 
@@ -90,7 +90,7 @@ class CheckFailedError(Exception):
     """A check failed."""
 
 
-RESULTS: dict[tuple[str, str], AdapterResult | CheckFailedError] = {}  # cache by adapter and request in JSON
+RESULTS: dict[tuple[str, str], AdapterResult | CheckFailedError] = {}  # cache by adapter and request
 
 
 def unavailable_reason(importer: Importer, fmu: Path | None = None) -> str:
@@ -120,7 +120,7 @@ def has_function(fmu: Path, function: str) -> bool:
 def run_request(importer: Importer, request: ImporterRequest) -> AdapterResult:
     """Run a request in an importer; CheckFailedError if its process crashes or times out."""
     prepare(importer, [request])
-    answer = RESULTS[importer.adapter, json.dumps(asdict(request))]
+    answer = RESULTS[importer.adapter, repr(request)]
     if isinstance(answer, CheckFailedError):
         raise answer
     return answer
@@ -128,7 +128,7 @@ def run_request(importer: Importer, request: ImporterRequest) -> AdapterResult:
 
 def prepare(importer: Importer, requests: list[ImporterRequest]) -> None:
     """Run all new requests of an importer in one process; after a crash or timeout another process goes on."""
-    keys = {(importer.adapter, json.dumps(asdict(request))): request for request in requests}
+    keys = {(importer.adapter, repr(request)): request for request in requests}
     new_requests = {key: request for key, request in keys.items() if key not in RESULTS}
     with ChildProcess(f"{__package__}.{importer.adapter}") as process:
         for key, request in new_requests.items():
@@ -178,13 +178,11 @@ def describe_fmu(fmu: Path) -> FmuUnderTest:
     output_name = next((name for name in outputs if input_name and reals[name].unit == reals[input_name].unit), "")
     if not output_name or "m" not in reals:
         raise UnsuitableFmuError("the checks require a mass m, an input, and an output of the same unit")
+    stop = float(fmu_description.defaultExperiment.stopTime)
     midrun_changes = {name: FACTOR * float(v.start) for name, v in reals.items() if name in ("k", "r")}
     base_request = ImporterRequest(
-        fmu=str(fmu.resolve()),
+        RunSpec(fmu.resolve(), tuple(outputs[:2]), stop=stop, grid=stop / POINTS),
         references={name: v.valueReference for name, v in reals.items()},
-        step=float(fmu_description.defaultExperiment.stopTime) / POINTS,
-        steps=POINTS,
-        outputs=outputs[:2],
     )
     return FmuUnderTest(fmu, base_request, [output_name, input_name], midrun_changes)
 
@@ -224,14 +222,14 @@ def check_failure(importer: Importer, request: ImporterRequest) -> str:
     try:
         run_instances = run_request(importer, request)
     except CheckFailedError as wrong:
-        if importer.exits_on_error and request.values and sentence in str(wrong):
+        if importer.exits_on_error and request.run.values and sentence in str(wrong):
             return "message, exits"
         raise
     instance = request.instances[0]
     lines = [line for line in run_instances.stderr.splitlines() if sentence in line]
     names = (
         f"({instance}): ",
-        f"{Path(request.fmu).name}): ",
+        f"{request.run.fmu.name}): ",
         f"({instance}.0.fmu): ",
     )  # the last one inside a container
     own_lines = [line for line in lines if any(name in line for name in names)]
@@ -242,8 +240,9 @@ def check_failure(importer: Importer, request: ImporterRequest) -> str:
     rows, accepted = run_instances.reply.rows, run_instances.reply.accepted
     if importer.checks_status and accepted == request.steps:
         raise CheckFailedError("every step was accepted")
+    unchanged = replace(request.run, values={})
     expected = run_request(
-        IMPORTERS[0], replace(request, values={}, midrun_changes={}, instances=["a"], rerun=False)
+        IMPORTERS[0], replace(request, run=unchanged, midrun_changes={}, instances=["a"], rerun=False)
     ).reply.rows
     if importer.checks_status:
         if not (all(isnan(value) for value in rows[-1]) or rows[-1] == rows[accepted]):
@@ -256,13 +255,14 @@ def check_failure(importer: Importer, request: ImporterRequest) -> str:
 
 def expected_message(request: ImporterRequest) -> str:
     """Return the expected message: the rejected value, or divergence if several values are set."""
-    (name, value), *more = [*request.values.items(), *request.midrun_changes.items()]
+    (name, value), *more = {**request.run.values, **request.midrun_changes}.items()
     return DIVERGENCE_MESSAGE if more else f"{name} = {value!r}"
 
 
-def failing_request(subject: FmuUnderTest, **changes: Any) -> ImporterRequest:
-    """Return a request that fails first and succeeds after a reset."""
-    return replace(subject.base_request, steps=10, rerun=True, **changes)
+def shorten(subject: FmuUnderTest, values: dict[str, float] | None = None, **changes: Any) -> ImporterRequest:
+    """Return a request of ten communication steps."""
+    request = subject.base_request
+    return replace(request, run=replace(request.run, values=values or {}, stop=10 * request.step), **changes)
 
 
 def check_reset_cycles(importer: Importer, request: ImporterRequest) -> str:
@@ -289,13 +289,16 @@ CHECKS: dict[str, tuple[CheckFunction, Callable[[FmuUnderTest], ImporterRequest]
     ),
     "100 resets": (
         check_reset_cycles,
-        lambda subject: replace(subject.base_request, steps=10, reset_cycles=RESET_CYCLES),
+        lambda subject: shorten(subject, reset_cycles=RESET_CYCLES),
     ),
-    "bad parameter": (check_failure, lambda subject: failing_request(subject, values=NEGATIVE)),
-    "bad input": (check_failure, lambda subject: failing_request(subject, midrun_changes={subject.connection[1]: nan})),
+    "bad parameter": (check_failure, lambda subject: shorten(subject, NEGATIVE, rerun=True)),
+    "bad input": (
+        check_failure,
+        lambda subject: shorten(subject, midrun_changes={subject.connection[1]: nan}, rerun=True),
+    ),
     "diverging run": (
         check_failure,
-        lambda subject: failing_request(subject, midrun_changes={**TINY, subject.connection[1]: 1e308}),
+        lambda subject: shorten(subject, midrun_changes={**TINY, subject.connection[1]: 1e308}, rerun=True),
     ),
-    "% in a name": (check_failure, lambda subject: failing_request(subject, instances=["100%s%n"], values=NEGATIVE)),
+    "% in a name": (check_failure, lambda subject: shorten(subject, NEGATIVE, instances=["100%s%n"], rerun=True)),
 }

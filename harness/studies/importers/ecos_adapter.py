@@ -18,11 +18,11 @@ def run_request(request: ImporterRequest) -> ImporterReply:
     first = request.instances[0]
     with EcosSimulationStructure() as structure:
         for name in request.instances:
-            structure.add_model(name, request.fmu)
+            structure.add_model(name, str(request.run.fmu))
         if request.connection:
             source, sink = request.connection
             structure.make_real_connection(f"{first}::{source}", f"{request.instances[1]}::{sink}")
-        structure.add_parameter_set("values", {f"{first}::{name}": value for name, value in request.values.items()})
+        structure.add_parameter_set("values", {f"{first}::{name}": value for name, value in request.run.values.items()})
         with EcosSimulation(structure=structure, step_size=request.step) as simulation:
             rows = run(simulation, request, "values", request.midrun_changes)
             rerun: list[list[float]] = []
@@ -40,7 +40,7 @@ def run(
 
     def row() -> list[float]:
         return [
-            simulation.get_real(f"{instance}::{name}") for instance in request.instances for name in request.outputs
+            simulation.get_real(f"{instance}::{name}") for instance in request.instances for name in request.run.outputs
         ]
 
     simulation.init(parameter_set=values)

@@ -3,7 +3,6 @@
 import ctypes
 import sys
 from contextlib import suppress
-from pathlib import Path
 from typing import Any
 
 import fmpy
@@ -18,12 +17,12 @@ from .request import ImporterReply, ImporterRequest, serve
 
 def run_request(request: ImporterRequest, prefixes: tuple[str, ...] = ("",)) -> ImporterReply:
     """Execute a request; print log messages that start with one of `logged`."""
-    fmu_description = read_description(Path(request.fmu))
+    fmu_description = read_description(request.run.fmu)
     callbacks = logging(prefixes)
     arguments = {
         "guid": fmu_description.guid,
         "modelIdentifier": fmu_description.coSimulation.modelIdentifier,
-        "unzipDirectory": str(unpack_once(Path(request.fmu))),
+        "unzipDirectory": str(unpack_once(request.run.fmu)),
     }
     instances = [fmi2.FMU2Slave(instanceName=name, **arguments) for name in request.instances]
     for instance in instances:
@@ -33,7 +32,7 @@ def run_request(request: ImporterRequest, prefixes: tuple[str, ...] = ("",)) -> 
 
 def run_instances(request: ImporterRequest, instances: list[Any], version: str) -> ImporterReply:
     """Execute a request with instances, and free them; `version` is that of the tool."""
-    rows, accepted = run(request, instances, request.values, request.midrun_changes)
+    rows, accepted = run(request, instances, request.run.values, request.midrun_changes)
     rerun: list[list[float]] = []
     if request.rerun:
         for instance in instances:
@@ -49,7 +48,7 @@ def run(
 ) -> tuple[list[list[float]], int]:
     """Return the rows of one run and the number of accepted steps; a refused value or step ends the run."""
     references = request.references
-    output_references = [references[name] for name in request.outputs]
+    output_references = [references[name] for name in request.run.outputs]
     refused: list[FMICallException] = []
 
     def write(instance: Any, new: dict[str, float]) -> None:

@@ -25,28 +25,27 @@ from .request import ImporterReply, ImporterRequest, serve
 
 
 def run_request(request: ImporterRequest) -> ImporterReply:
-    path, files = Path(request.fmu), tuple(f"{i}.fmu" for i in range(len(request.instances)))
+    path, files = request.run.fmu, tuple(f"{i}.fmu" for i in range(len(request.instances)))
     reals = [variable for variable in read_description(path).modelVariables if variable.type == "Real"]
     settable = [
         variable.name for variable in reals if variable.causality == "input" or variable.variability == "tunable"
     ]
     inputs = dict.fromkeys(
-        [*settable, *request.values, *request.midrun_changes]
+        [*settable, *request.run.values, *request.midrun_changes]
     )  # equal for most requests, so that the container is cached
     container: dict[str, Any] = {
         "name": "container.fmu",
         "fmu": files,
         "step_size": request.step,
         "input": [[name, files[0], name] for name in inputs],
-        "output": [[file, name, f"{name}_{i}"] for i, file in enumerate(files) for name in request.outputs],
+        "output": [[file, name, f"{name}_{i}"] for i, file in enumerate(files) for name in request.run.outputs],
         "link": [[files[0], request.connection[0], files[1], request.connection[1]]] if request.connection else [],
     }
     fmu = build_container(path, files, json.dumps(container))
     inner_request = replace(
         request,
-        fmu=str(fmu),
+        run=replace(request.run, fmu=fmu, outputs=tuple(name for _, _, name in container["output"])),
         references={variable.name: variable.valueReference for variable in read_description(fmu).modelVariables},
-        outputs=[name for _, _, name in container["output"]],
         instances=request.instances[:1],
         connection=[],
     )

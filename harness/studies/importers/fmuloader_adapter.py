@@ -52,8 +52,8 @@ def print_message(environment: Any, name: bytes, status: int, category: bytes, t
 
 
 def run_request(request: ImporterRequest) -> ImporterReply:
-    fmu_description = read_description(Path(request.fmu))
-    instances = [Instance(unpack_once(Path(request.fmu)), fmu_description, name) for name in request.instances]
+    fmu_description = read_description(request.run.fmu)
+    instances = [Instance(unpack_once(request.run.fmu), fmu_description, name) for name in request.instances]
     return run_instances(request, instances, version("fmuloader"))
 
 

@@ -15,7 +15,7 @@ NANO = 1e9  # libcosim counts time in ns
 
 def run_request(request: ImporterRequest) -> ImporterReply:
     log_output_level(CosimLogLevel.ERROR)
-    rows, accepted = run(request, request.values, request.midrun_changes)
+    rows, accepted = run(request, request.run.values, request.midrun_changes)
     rerun = run(request, {}, {})[0] if request.rerun else []
     return ImporterReply(version("libcosimpy"), rows, rerun, accepted)
 
@@ -26,7 +26,7 @@ def run(
     """Return the rows of one run, the last one repeated after a rejected step, and the number of accepted steps."""
     references = request.references
     execution = CosimExecution.from_step_size(round(request.step * NANO))
-    slaves = [CosimLocalSlave(request.fmu, name) for name in request.instances]
+    slaves = [CosimLocalSlave(str(request.run.fmu), name) for name in request.instances]
     indices = [execution.add_local_slave(slave) for slave in slaves]
     observer, manipulator = CosimObserver.create_last_value(), CosimManipulator.create_override()
     execution.add_observer(observer)
@@ -36,7 +36,7 @@ def run(
     if request.connection:
         source, sink = (references[name] for name in request.connection)
         execution.connect_real_variables(indices[0], source, indices[1], sink)
-    output_references = [references[name] for name in request.outputs]
+    output_references = [references[name] for name in request.run.outputs]
 
     def row() -> list[float]:
         return [value for index in indices for value in observer.last_real_values(index, output_references)]

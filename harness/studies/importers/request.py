@@ -5,25 +5,40 @@ An adapter prints log messages of the FMU to standard error if the tool passes t
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Any
 
 from ...process.child_process import RequestServer
+from ...scenes.run_spec import RunSpec
 
 
 @dataclass(frozen=True)
 class ImporterRequest:
-    """A run of instances of one FMU with equal communication steps of `step` s, starting at t = 0."""
+    """A run of instances of one FMU by equal communication steps from 0 s on; its values are set in the first one."""
 
-    fmu: str
-    references: dict[str, int]  # value references of the variables below
-    step: float
-    steps: int
-    outputs: list[str]
+    run: RunSpec
+    references: dict[str, int]  # value references of all variables
     instances: list[str] = field(default_factory=lambda: ["a"])
-    values: dict[str, float] = field(default_factory=dict)  # set in the first instance before the run
     midrun_changes: dict[str, float] = field(default_factory=dict)  # set in the first instance after half of the steps
     connection: list[str] = field(default_factory=list)  # output of the first instance, input of the second
     rerun: bool = False  # reset and run again with start values
     reset_cycles: int = 0  # C program only: number of reset cycles to run instead; three last rows of each
+
+    @classmethod
+    def from_json(cls, stored: dict[str, Any]) -> "ImporterRequest":
+        """Return the request in a table."""
+        return cls(**{**stored, "run": RunSpec.from_json(stored["run"])})
+
+    @property
+    def step(self) -> float:
+        """Return the communication step in s."""
+        assert self.run.grid is not None
+        return self.run.grid
+
+    @property
+    def steps(self) -> int:
+        """Return the number of communication steps."""
+        assert self.run.stop is not None
+        return round(self.run.stop / self.step)
 
 
 @dataclass(frozen=True)
@@ -39,4 +54,4 @@ class ImporterReply:
 
 def serve(run_request: Callable[[ImporterRequest], ImporterReply]) -> None:
     """Execute the requests of the parent."""
-    RequestServer().serve(lambda request: run_request(ImporterRequest(**request)))
+    RequestServer().serve(lambda request: run_request(ImporterRequest.from_json(request)))
