@@ -5,7 +5,7 @@ from event_located.py.  A result is written next to the file of the model, under
 the next build.  A second file has the changes of mode.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,11 +14,12 @@ import numpy as np
 from ..errors import HarnessError
 from ..results.files import column_heading, write_csv_rows
 from ..running.embedded_model import EmbeddedModel, load_model_class, method_numbers
+from ..running.solution import Solution
 from ..scenes.fmu_files import find_fmu
-from .certified_reference import ERROR_LABEL, FOLDER, POINTS, CertifiedReference, max_relative_difference
+from .certified_reference import ERROR_LABEL, FOLDER, POINTS, max_relative_difference
 from .event_located import PROBLEMS, certify_by_two_routes
 from .models import CASES
-from .reference_trajectory import CommunicationGrid, ReferenceTrajectory, require_reference_packages
+from .reference_trajectory import CommunicationGrid, require_reference_packages
 from .segments import ParameterSpan, ParameterValues
 
 METHODS = {"dop853": 1e-13, "rodas": 1e-12}  # an explicit and a stiff method, with their relative tolerances
@@ -51,7 +52,7 @@ def certify(file: Path) -> list[CertifiedFile]:
     return [write_reference(file.with_name(f"{name}.csv"), heads, reference) for name, reference in references.items()]
 
 
-def generate_all(file: Path) -> dict[str, CertifiedReference]:
+def generate_all(file: Path) -> dict[str, Solution]:
     """Return the references of all laws of a model by name; none if it has no independent implementation."""
     if file.resolve().parent == FOLDER / "more" and file.stem in PROBLEMS:
         require_reference_packages()
@@ -65,9 +66,9 @@ def generate_all(file: Path) -> dict[str, CertifiedReference]:
     return {str(name): generate_reference(case) for name, case in cases.items()}
 
 
-def write_reference(path: Path, heads: list[str], reference: CertifiedReference) -> CertifiedFile:
+def write_reference(path: Path, heads: list[str], reference: Solution) -> CertifiedFile:
     """Write a reference to a file, and its changes of mode to another."""
-    rows = np.column_stack([reference.times, reference.motion]).tolist()
+    rows = np.column_stack([reference.times, reference.states]).tolist()
     write_csv_rows(path, heads, rows, f"# {reference.method}{ERROR_LABEL}{reference.estimated_error:.1e}\n")
     if reference.modes:
         write_csv_rows(path.with_name(f"{path.stem}-events.csv"), ["t [s]", "mode"], reference.modes)
@@ -80,7 +81,7 @@ def states(model: type) -> list[tuple[str, str]]:
     return [(state.name, state.unit) for state in declared if not state.rate]
 
 
-def compute_by_two_methods(model: str, spans: list[ParameterSpan], grid: CommunicationGrid) -> ReferenceTrajectory:
+def compute_by_two_methods(model: str, spans: list[ParameterSpan], grid: CommunicationGrid) -> Solution:
     """Return the trajectory on which two methods of an FMU agree, over a single span from 0 s on."""
     file, ((_, _, values),) = find_fmu(model), spans
     model_class: Any = load_model_class(file)
@@ -89,13 +90,12 @@ def compute_by_two_methods(model: str, spans: list[ParameterSpan], grid: Communi
     rates = list(model_class.states.values())
     position = next(i for i, rate in enumerate(rates) if rate in model_class.states)
     velocity = list(model_class.states).index(rates[position])
-    motion = reference.motion
-    return ReferenceTrajectory(reference.times, motion[:, position], motion[:, velocity], tuple(reference.events))
+    return replace(reference, states=reference.states[:, [position, velocity]])
 
 
 def certify_default_run(
     model: Any, file: Path, values: ParameterValues | None = None, times: list[float] | None = None
-) -> CertifiedReference:
+) -> Solution:
     """Return a run of a model by two methods, in this process.
 
     Parameters
@@ -122,5 +122,4 @@ def certify_default_run(
             f"{file.name}: {methods} differ by {difference:.1e}, more than {AGREEMENT_TOLERANCE:g}, so the result is "
             "not certified: shorten the default run, or smooth a discontinuous law"
         )
-    modes = first.find_modes(times[-1]) if answers[0].events is not None else []
-    return CertifiedReference(np.array(times), answers[0].states, modes, methods, difference)
+    return replace(answers[0], events=answers[0].events or [], method=methods, estimated_error=difference)

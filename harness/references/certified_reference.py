@@ -38,7 +38,7 @@ class ReferenceCase:
     name: str
     model: str
     law: str
-    reference_source: "str | CertifiedReference"
+    reference_source: str | Solution
     problem: OdeProblem
     values: dict[str, float] = field(default_factory=dict)
     dry_friction_reference: str | None = None
@@ -50,36 +50,11 @@ class ReferenceCase:
         return "friction" in self.values
 
     @property
-    def reference(self) -> "CertifiedReference":
+    def reference(self) -> Solution:
         """The reference of the law."""
         if isinstance(self.reference_source, str):
             return load_reference(self.reference_source)
         return self.reference_source
-
-
-@dataclass(frozen=True)
-class CertifiedReference:
-    """A certified result in SI units.
-
-    Attributes
-    ----------
-    times : (n,) in s
-    motion : (n, states), position and velocity first
-    modes : (time in s, mode from there on), the first at the start; empty if nothing sticks
-    method : the methods that were compared
-    estimated_error : their largest difference, relative to the largest value of each column
-    """
-
-    times: np.ndarray
-    motion: np.ndarray
-    modes: list[tuple[float, int]]
-    method: str
-    estimated_error: float
-
-    @property
-    def events(self) -> list[tuple[float, int]]:
-        """The changes of mode."""
-        return self.modes[1:]
 
 
 @dataclass(frozen=True)
@@ -100,7 +75,7 @@ class SolutionErrors:
 
 
 @cache
-def load_reference(name: str, folder: Path = FOLDER) -> CertifiedReference:
+def load_reference(name: str, folder: Path = FOLDER) -> Solution:
     """Read the reference of a name."""
     with (folder / f"{name}.csv").open(encoding="utf-8") as file:
         method, label, error = file.readline().strip("# \n").partition(ERROR_LABEL)
@@ -109,18 +84,25 @@ def load_reference(name: str, folder: Path = FOLDER) -> CertifiedReference:
     if events.is_file():
         modes = np.loadtxt(events, delimiter=",", skiprows=1, ndmin=2)
     changes = [(t, int(mode)) for t, mode in modes.tolist()]
-    return CertifiedReference(times, np.array(motion).T, changes, method, float(error) if label else nan)
+    return Solution(
+        times,
+        np.array(motion).T,
+        changes[1:],
+        start_mode=changes[0][1] if changes else None,
+        method=method,
+        estimated_error=float(error) if label else nan,
+    )
 
 
-def compute_errors(answer: Solution, reference: CertifiedReference) -> SolutionErrors:
+def compute_errors(answer: Solution, reference: Solution) -> SolutionErrors:
     """Return the errors of a solution at the times of a reference."""
-    error = relative_errors(answer.states, reference.motion)
+    error = relative_errors(answer.states, reference.states)
     has_events = answer.events is not None
     return SolutionErrors(
         final=float(error[-1]),
         rms=float(np.sqrt(np.mean(error * error))),
         largest=float(error.max()),
-        events=event_time_error(answer.events or [], reference.events) if has_events else None,
+        events=event_time_error(answer.events or [], reference.events or []) if has_events else None,
     )
 
 

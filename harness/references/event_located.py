@@ -7,12 +7,14 @@ event is the zero of a guard.
 """
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from math import cos, exp, pi, sin, sqrt
 from typing import Any
 
 import numpy as np
 
-from .certified_reference import POINTS, CertifiedReference, relative_errors
+from ..running.solution import Solution
+from .certified_reference import POINTS, relative_errors
 
 StateVector = Sequence[float] | np.ndarray
 OVERLOAD = 1e-9  # a load that exceeds its limit by a smaller share is at the limit
@@ -127,16 +129,18 @@ def _guard_function(problem: HybridProblem, modes: list[int], index: int) -> Cal
     return guard
 
 
-def certify_by_two_routes(name: str) -> CertifiedReference:
+def certify_by_two_routes(name: str) -> Solution:
     """Return the default run of a model in fmus/more by an explicit and an implicit method of scipy."""
     problem = PROBLEMS[name]()
     times = np.linspace(0.0, problem.stop, POINTS)
     (states, events), (others, _) = (
         solve(problem, times.tolist(), method, *tolerances) for method, tolerances in TOLERANCES.items()
     )
-    modes = [(0.0, problem.first[0]), *((t, mode) for t, (mode,) in events)] if len(problem.first) == 1 else []
     difference = float(relative_errors(others, states).max())
-    return CertifiedReference(times, states, modes, " and ".join(TOLERANCES), difference)
+    reference = Solution(times, states, [], method=" and ".join(TOLERANCES), estimated_error=difference)
+    if len(problem.first) != 1:
+        return reference
+    return replace(reference, events=[(t, mode) for t, (mode,) in events], start_mode=problem.first[0])
 
 
 class Belt(HybridProblem):

@@ -8,11 +8,12 @@ It shares no code with the FMUs.
 """
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 
 import numpy as np
 
 from ..running.solution import Solution
-from .certified_reference import POINTS, CertifiedReference, ReferenceCase, event_time_error, max_relative_difference
+from .certified_reference import POINTS, ReferenceCase, event_time_error, max_relative_difference
 from .models import MODEL_MODULES
 from .models.pendulum import PendulumProblem
 from .ode_problem import OdeProblem
@@ -28,28 +29,29 @@ UNIT_ROUNDOFF = 2.0**-53
 ZERO = 1e-40  # a smaller value is a zero with the rounding error of 120 digits
 
 
-def generate_reference(case: ReferenceCase) -> CertifiedReference:
+def generate_reference(case: ReferenceCase) -> Solution:
     """Return the reference of a case."""
     problem, name = case.problem, case.reference_source
     assert isinstance(name, str)
     times = np.linspace(0.0, problem.stop, POINTS)
-    answer, method, difference = solve_independently(name, problem, times)
-    start = [(0.0, problem.resolve_mode(0.0, *problem.start))] if problem.has_dry_friction else []
-    return CertifiedReference(times, answer.states, start + (answer.events or []), method, difference)
+    answer = solve_independently(name, problem, times)
+    start_mode = problem.resolve_mode(0.0, *problem.start) if problem.has_dry_friction else None
+    return replace(answer, start_mode=start_mode)
 
 
-def solve_independently(name: str, problem: OdeProblem, times: np.ndarray) -> tuple[Solution, str, float]:
-    """Return the solution, the methods used, and their largest difference relative to the largest of each column."""
+def solve_independently(name: str, problem: OdeProblem, times: np.ndarray) -> Solution:
+    """Return the solution with the methods used and their largest difference."""
     if name in CLOSED_FORMS:
-        return evaluate_closed_form(name, times), "closed form in 40 digits", UNIT_ROUNDOFF
+        return evaluate_closed_form(name, times)
     explicit = solve("scipy", "DOP853", problem, times, 3e-14, 1e-16)  # the smallest tolerance it can meet
     if isinstance(problem, PendulumProblem):
         answer = solve_pendulum(problem, times.tolist())
         late = event_time_error(answer.events or [], explicit.events or []) / times[-1]
         difference = max(max_relative_difference(answer, explicit), late)
-        return answer, "Taylor series in 25 digits and DOP853", difference
+        return replace(answer, method="Taylor series in 25 digits and DOP853", estimated_error=difference)
     implicit = solve("scipy", "Radau", problem, times, 1e-11, 1e-14)
-    return explicit, "DOP853 and Radau", max_relative_difference(explicit, implicit)
+    difference = max_relative_difference(explicit, implicit)
+    return replace(explicit, method="DOP853 and Radau", estimated_error=difference)
 
 
 def evaluate_closed_form(name: str, times: np.ndarray) -> Solution:
@@ -58,4 +60,4 @@ def evaluate_closed_form(name: str, times: np.ndarray) -> Solution:
     motion = sample_segments(segments, times.tolist())
     motion[np.abs(motion) < ZERO] = 0.0
     events = [(t, mode) for t, mode in mode_changes(segments) if t <= times[-1]]
-    return Solution(motion, events, 0)
+    return Solution(times, motion, events, method="closed form in 40 digits", estimated_error=UNIT_ROUNDOFF)

@@ -139,7 +139,7 @@ def solve(
             done = max(done, passed)
             if breakaway <= problem.stop:
                 events.append((t, mode))
-    return Solution(motion, events if problem.has_dry_friction else None, evaluations)
+    return Solution(times, motion, events if problem.has_dry_friction else None, evaluations)
 
 
 def solve_with_scipy(

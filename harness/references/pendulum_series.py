@@ -48,4 +48,4 @@ def solve_pendulum(problem: PendulumProblem, times: list[float]) -> Solution:
         events.append((t, 0))
         motion += [(x, mpf(0)) for s in times if s >= t]
         assert len(motion) == len(times)
-        return Solution(np.array(motion, float), [(float(t), mode) for t, mode in events], 0)
+        return Solution(np.array(times), np.array(motion, float), [(float(t), mode) for t, mode in events])

@@ -1,4 +1,4 @@
-"""Reference trajectories for any parameter values, for the stability table and the benchmarks.
+"""References for any parameter values, for the stability table and the benchmarks.
 
 They are closed forms in 120 digits, or runs of scipy's methods at tolerances of 1e-11 and less, restarted at every
 change of mode or value, as the module of the model in models/ defines.  They share no code with the FMUs.  For a model
@@ -13,28 +13,21 @@ from itertools import pairwise
 import numpy as np
 
 from ..errors import HarnessError
+from ..running.solution import Solution
 from .models import MODEL_MODULES
 from .segments import ParameterSpan, Segment
 
 
-@dataclass(frozen=True)
-class ReferenceTrajectory:
-    """Positions `x` and velocities `v` (n,) at `times` (n,) in s, and `events` as (time, new mode) after the start."""
+def motion_error(reference: Solution, x: np.ndarray, v: np.ndarray) -> float:
+    """Return the largest relative error of positions and velocities (n,); NaN if one of them is NaN.
 
-    times: np.ndarray
-    x: np.ndarray
-    v: np.ndarray
-    events: tuple[tuple[float, int], ...]
-
-    def error(self, x: np.ndarray, v: np.ndarray) -> float:
-        """Return the largest relative error of positions and velocities (n,); NaN if one of them is NaN.
-
-        Positions are relative to the largest position; velocities to the largest velocity, or to the one that covers
-        the largest position within the run if that is larger.
-        """
-        x_max = max_abs(self.x)
-        v_max = max(max_abs(self.v), x_max / (self.times[-1] - self.times[0]))
-        return max_or_nan(max_abs(x - self.x) / (x_max or 1.0), max_abs(v - self.v) / (v_max or 1.0))
+    Positions are relative to the largest position; velocities to the largest velocity, or to the one that covers the
+    largest position within the run if that is larger.
+    """
+    true_x, true_v = reference.states.T
+    x_max = max_abs(true_x)
+    v_max = max(max_abs(true_v), x_max / (reference.times[-1] - reference.times[0]))
+    return max_or_nan(max_abs(x - true_x) / (x_max or 1.0), max_abs(v - true_v) / (v_max or 1.0))
 
 
 def max_abs(values: np.ndarray) -> float:
@@ -72,13 +65,12 @@ class CommunicationGrid:
         return sorted({*even, self.stop, *self.changes, *(events if self.at_events else ())})
 
 
-def compute_reference(model: str, spans: list[ParameterSpan], grid: CommunicationGrid) -> ReferenceTrajectory:
-    """Return the reference trajectory of a model over the spans, at the points of the grid."""
+def compute_reference(model: str, spans: list[ParameterSpan], grid: CommunicationGrid) -> Solution:
+    """Return the reference of a model over the spans, at the points of the grid."""
     segments = list(MODEL_MODULES[model].solve_segments(spans))
     events = mode_changes(segments)
     times = grid.times(t for t, _ in events)
-    x, v = sample_segments(segments, times).T
-    return ReferenceTrajectory(np.array(times), x, v, tuple(events))
+    return Solution(np.array(times), sample_segments(segments, times), events, start_mode=segments[0].mode)
 
 
 def mode_changes(segments: list[Segment]) -> list[tuple[float, int]]:

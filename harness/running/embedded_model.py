@@ -146,7 +146,10 @@ class EmbeddedModel:
         model.solver.report(model.events)
         evaluations = model.solver.evaluations
         has_single_dry_contact = len(model.contacts) == 1 and model.solver.step.is_hybrid
-        return Solution(states, self.find_mode_changes(times[-1]) if has_single_dry_contact else None, evaluations)
+        if not has_single_dry_contact:
+            return Solution(np.array(times), states, None, evaluations)
+        (_, start_mode), *events = self.find_modes(times[-1])
+        return Solution(np.array(times), states, events, evaluations, start_mode)
 
     def find_mode_changes(self, stop: float) -> list[tuple[float, int]]:
         """Return the changes of mode up to the stop as (time in s, new mode), found by following internal steps."""

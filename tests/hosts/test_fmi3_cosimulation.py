@@ -41,7 +41,7 @@ def test_the_default_experiment_in_fmpy_reaches_the_reference(worker, fmus, name
     columns = worker.simulate(fmus / f"{name}.fmu", "CoSimulation", output_interval=interval)
     assert columns["time"] == truth.times.tolist()
     motion = np.array([columns[v] for v in outputs(name)[:2]]).T
-    assert relative_errors(motion, truth.motion).max() < REACH[name]
+    assert relative_errors(motion, truth.states).max() < REACH[name]
     if "mode" in columns:
         assert columns["mode"][-1] == truth.modes[-1][1]
 

@@ -78,13 +78,13 @@ def test_the_error_under_cvode_is_within_its_tolerance_bound(runs):
     name, table = runs
     for rtol, columns, evaluations in table:
         assert columns["time"] == TRUTHS[name].times.tolist()
-        assert relative_errors(motion(name, columns), TRUTHS[name].motion).max() <= bound(name, evaluations, rtol)
+        assert relative_errors(motion(name, columns), TRUTHS[name].states).max() <= bound(name, evaluations, rtol)
 
 
 def test_the_error_under_cvode_falls_with_its_tolerance(runs):
     """With order q it falls with the power q/(q + 1): at least (q = 1) by a factor of 1e3 for a factor of 1e6."""
     name, table = runs
-    errors = [relative_errors(motion(name, columns), TRUTHS[name].motion).max() for _, columns, _ in table]
+    errors = [relative_errors(motion(name, columns), TRUTHS[name].states).max() for _, columns, _ in table]
     assert errors == sorted(errors, reverse=True)
     assert errors[-1] < 1e-3 * errors[0]
 
@@ -138,7 +138,7 @@ def test_a_second_solver_agrees(worker, fmus, name):
     fmu.enter_continuous_time()
     method, rtol = ("Radau", 1e-8) if name == "pacejka" else ("DOP853", 1e-11)
     rows, evaluations = fmu.solve(truth.times.tolist(), outputs(name)[:2], method, rtol, {})
-    assert relative_errors(np.array(rows), truth.motion).max() <= bound(name, evaluations, rtol)
+    assert relative_errors(np.array(rows), truth.states).max() <= bound(name, evaluations, rtol)
     if "mode" in outputs(name):
         assert fmu.get("events.count") == len(truth.events)
     fmu.free()
@@ -275,7 +275,7 @@ def test_every_other_law_agrees_with_its_reference(worker, fmus, case):
     )
     truth = load_reference(case.reference_source)
     assert columns["time"] == truth.times.tolist()
-    assert relative_errors(motion(case.model, columns), truth.motion).max() <= bound(case.model, evaluations, 1e-7)
+    assert relative_errors(motion(case.model, columns), truth.states).max() <= bound(case.model, evaluations, 1e-7)
     if "events.count" in columns:
         starts_to_slide = case.values.get("friction") == SIGN
         assert columns["events.count"][-1] == len(truth.events) + starts_to_slide

@@ -82,7 +82,7 @@ def test_the_default_run_reproduces_the_certified_result(worker, name):
         fmu = worker.instantiate(built(name)).begin(values, stop=truth.times[-1])
         rows = fmu.run(truth.times.tolist(), states(name))
         fmu.free()
-        assert relative_errors(np.array(rows), truth.motion).max() < bound
+        assert relative_errors(np.array(rows), truth.states).max() < bound
 
 
 @pytest.mark.parametrize("name", [name for name in CERTIFIED if event_located.PROBLEMS[name].first])

@@ -24,7 +24,7 @@ DOP853, RODAS = 4, 5
 def test_an_exact_reference_is_the_double_nearest_to_the_closed_form(name):
     truth, problem = load_reference(name), TRUTHS[name].problem
     motion = ClosedFormMotion([(0.0, getattr(independent_solution, name)())], *problem.start, problem.stop)
-    for t, (x, v) in zip(truth.times, truth.motion, strict=True):
+    for t, (x, v) in zip(truth.times, truth.states, strict=True):
         for value, exact in zip((x, v), motion.at(float(t)), strict=True):
             assert abs(value - exact) <= 0.5 * ULP * abs(exact)
     assert [mode for _, mode in truth.events] == [mode for _, mode in motion.events]
@@ -81,7 +81,7 @@ def test_the_threshold_reference_is_the_double_nearest_to_its_segments():
     events = [after for before, after in pairwise(starts) if before[1] != after[1]]
     assert [mode for _, mode in truth.events] == [mode for _, mode in events]
     assert all(abs(t - exact) <= ULP * exact for (t, _), (exact, _) in zip(truth.events, events, strict=True))
-    for t, (x, v) in zip(truth.times[::5], truth.motion[::5], strict=True):
+    for t, (x, v) in zip(truth.times[::5], truth.states[::5], strict=True):
         start, _, position, piece = [item for item in pieces if item[0] <= t][-1]
         y, speed = piece.at(mpf(float(t)) - start)
         assert abs(x - position - y) <= ULP * 0.5
@@ -95,7 +95,7 @@ def test_the_pendulum_references_agree_with_a_third_method(reaction):
         [(0.0, independent_pendulum.Pendulum(reaction))], independent_pendulum.THETA0, 0.0, 5.0
     )
     other = np.array([swing.at(float(t)) for t in truth.times])
-    assert compute_errors(Solution(other, swing.events, 0), truth).largest < 1e-11
+    assert compute_errors(Solution(truth.times, other, swing.events), truth).largest < 1e-11
     assert event_time_error(swing.events, truth.events) < 1e-11
 
 
@@ -108,15 +108,15 @@ def test_the_built_fmu_agrees_with_the_reference(launch, case):
     values = {"solver.method": RODAS if smooth else DOP853, "solver.rtol": 1e-10 if smooth else 1e-12, **case.values}
     fmu = launch(case.model, values, stop=case.problem.stop)
     motion = np.array(fmu.run(truth.times.tolist(), ["x", "v"] if smooth else ["theta", "omega"]))
-    assert compute_errors(Solution(motion, None, 0), truth).largest < (1e-8 if smooth else 1e-11)
+    assert compute_errors(Solution(truth.times, motion), truth).largest < (1e-8 if smooth else 1e-11)
 
 
 @pytest.mark.parametrize("name", TRUTHS)
 def test_every_reference_covers_its_run_and_states_its_uncertainty(name):
     truth, problem = load_reference(name), TRUTHS[name].problem
     assert truth.times.tolist() == np.linspace(0.0, problem.stop, POINTS).tolist()
-    assert truth.motion.shape == (POINTS, 2)
-    assert tuple(truth.motion[0]) == problem.start
+    assert truth.states.shape == (POINTS, 2)
+    assert tuple(truth.states[0]) == problem.start
     assert bool(truth.modes) == problem.has_dry_friction
     assert truth.method
     assert 0.0 < truth.estimated_error < 2e-11
@@ -126,7 +126,7 @@ def test_every_reference_covers_its_run_and_states_its_uncertainty(name):
 def test_the_script_reproduces_the_stored_values(name):
     truth = load_reference(name)
     answer = evaluate_closed_form(name, truth.times)
-    assert answer.states.tolist() == truth.motion.tolist()
+    assert answer.states.tolist() == truth.states.tolist()
     assert answer.events == truth.events
 
 
@@ -148,8 +148,8 @@ def test_a_jacobian_is_the_slope_of_the_rates(problem):
 
 def test_errors_are_relative_to_the_largest_value_of_each_column():
     truth = load_reference("smd")
-    off = truth.motion + np.array([1e-3 * np.abs(truth.motion[:, 0]).max(), 0.0])
-    actual = compute_errors(Solution(off, None, 0), truth)
+    off = truth.states + np.array([1e-3 * np.abs(truth.states[:, 0]).max(), 0.0])
+    actual = compute_errors(Solution(truth.times, off), truth)
     assert [actual.final, actual.rms, actual.largest] == pytest.approx([1e-3] * 3, rel=1e-10)
     assert actual.events is None
 

@@ -1,5 +1,6 @@
 """Work-precision diagrams: measurements, gaps and advice."""
 
+from dataclasses import replace
 from functools import partial
 from itertools import cycle
 from math import nan
@@ -19,7 +20,6 @@ from harness.references.certified_reference import compute_errors, load_referenc
 from harness.references.models import CASES
 from harness.results.provenance import write_provenance
 from harness.running.embedded_model import EmbeddedModel, load_model_class, method_numbers
-from harness.running.solution import Solution
 from harness.studies.precision import advice, law_deviations
 from harness.studies.precision.figure import OTHER, draw
 from harness.studies.precision.literature_problems import load_more_model
@@ -113,7 +113,7 @@ def test_a_failed_run_is_a_gap_and_tighter_ones_after_a_slow_run_are_skipped():
         if rtol == 1e-5:
             sleep(0.06)
             raise HarnessError("it took too long")
-        return Solution(load_reference("smd").motion, None, 7), 0.25
+        return replace(load_reference("smd"), evaluations=7), 0.25
 
     def broken(rtol, extent):
         raise HarnessError("it fell over")
@@ -234,7 +234,7 @@ def test_bristles_creep_and_each_law_has_a_smaller_integration_than_model_error(
     dry = law_deviations.solve_dry_block()
     problem = event_located.DryBlock()
     other, events = event_located.solve(problem, dry.times.tolist(), "Radau", *event_located.TOLERANCES["Radau"])
-    assert relative_errors(other, dry.motion).max() < 1e-9
+    assert relative_errors(other, dry.states).max() < 1e-9
     assert [mode for _, (mode,) in events] == [mode for _, mode in dry.events] == [1, 0, 1, 0]
     for name, law in law_deviations.BRISTLES.items():
         deviation = law_deviations.compare_bristles(name, law, load_more_model(name))
@@ -247,7 +247,7 @@ def test_bristles_creep_and_each_law_has_a_smaller_integration_than_model_error(
 def test_stuck_points_lie_between_a_stop_and_the_next_breakaway():
     truth = load_reference("stickslip")
     stuck = law_deviations.stuck_points(truth)
-    assert np.array_equal(stuck, truth.motion[:, 1] == 0.0)
+    assert np.array_equal(stuck, truth.states[:, 1] == 0.0)
     assert not law_deviations.stuck_points(load_reference("coulomb"))[1:].any()
 
 

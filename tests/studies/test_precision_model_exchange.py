@@ -78,7 +78,7 @@ def amplification(case):
     """
     if case.model not in ("stickslip", "pacejka"):
         return 1.0
-    x, v = np.abs(load_reference("stickslip").motion).max(axis=0)
+    x, v = np.abs(load_reference("stickslip").states).max(axis=0)
     return 2.9546 / 0.034 * x / v
 
 

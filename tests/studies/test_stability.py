@@ -15,8 +15,9 @@ from models import EXAMPLE_MODELS, LARGER_MODELS, MODELS, declared
 
 from harness.process.child_process import ChildProcess, ChildTimeoutError
 from harness.references.models.pacejka import MagicFormula
-from harness.references.reference_trajectory import CommunicationGrid, ReferenceTrajectory, compute_reference
+from harness.references.reference_trajectory import CommunicationGrid, compute_reference
 from harness.results.provenance import load_provenance
+from harness.running.solution import Solution
 from harness.running.step_sequence import RefusalSummary, RefusedRun
 from harness.running.trajectory import Statistics, Trajectory
 from harness.scenes.run_spec import RunSpec
@@ -97,7 +98,7 @@ def test_the_closed_form_agrees_with_the_independent_one(case):
         [(0.0, getattr(independent_solution, name)(**traits))], values["x0"], values["v0"], stop
     )
     expected = np.array([[float(value) for value in motion.at(t)] for t in solution.times]).T
-    np.testing.assert_allclose([solution.x, solution.v], expected, rtol=1e-15, atol=1e-18)
+    np.testing.assert_allclose(solution.states.T, expected, rtol=1e-15, atol=1e-18)
     assert [mode for _, mode in solution.events] == [mode for _, mode in motion.events]
     assert [t for t, _ in solution.events] == pytest.approx([float(t) for t, _ in motion.events], rel=1e-15)
 
@@ -113,7 +114,9 @@ def test_a_change_of_values_starts_a_new_segment():
         *((t, independent_solution.stickslip(**change)) for t, change in changes.items()),
     ]
     motion = independent_solution.ClosedFormMotion(parts, 0.0, 0.0, 16.0)
-    assert list(solution.x) == pytest.approx([float(motion.at(t)[0]) for t in solution.times], rel=1e-15, abs=1e-18)
+    assert list(solution.states[:, 0]) == pytest.approx(
+        [float(motion.at(t)[0]) for t in solution.times], rel=1e-15, abs=1e-18
+    )
 
 
 @pytest.mark.parametrize("reaction", [False, True], ids=["weight", "reaction"])
@@ -123,7 +126,7 @@ def test_the_pendulum_agrees_with_the_independent_one(reaction):
     swing = independent_pendulum.PendulumMotion(
         [(0.0, independent_pendulum.Pendulum(reaction))], values["theta0"], 0.0, 5.0
     )
-    assert list(solution.x) == pytest.approx([swing.at(t)[0] for t in solution.times], abs=1e-11)
+    assert list(solution.states[:, 0]) == pytest.approx([swing.at(t)[0] for t in solution.times], abs=1e-11)
     assert [mode for _, mode in solution.events] == [mode for _, mode in swing.events]
 
 
@@ -131,10 +134,11 @@ def test_the_smooth_sled_creates_no_energy():
     """Radau against the power balance: the work of pull and friction changes the kinetic energy."""
     values = defaults("pacejka")
     solution = compute_reference("pacejka", [(0.0, 8.0, values)], CommunicationGrid(0.0, 8.0, 8000))
-    curve, pull = MagicFormula(values), values["k"] * (values["v_driver"] * solution.times - solution.x)
-    power = [(f - curve.mu(v) * values["m"] * values["g"]) * v for f, v in zip(pull, solution.v, strict=True)]
+    x, speeds = solution.states.T
+    curve, pull = MagicFormula(values), values["k"] * (values["v_driver"] * solution.times - x)
+    power = [(f - curve.mu(v) * values["m"] * values["g"]) * v for f, v in zip(pull, speeds, strict=True)]
     work = np.concatenate([[0.0], np.cumsum(np.diff(solution.times) * (np.array(power[1:]) + power[:-1]) / 2)])
-    np.testing.assert_allclose(0.5 * values["m"] * solution.v**2, work, atol=3e-4)
+    np.testing.assert_allclose(0.5 * values["m"] * speeds**2, work, atol=3e-4)
 
 
 # ---- the verdicts
@@ -149,7 +153,7 @@ CASE = StabilityCase(
     spans=[],
     max_error=1e-3,
 )
-REST = ReferenceTrajectory(np.array([0.0, 0.5, 1.0]), np.ones(3), np.zeros(3), ((0.5, 0),))
+REST = Solution(np.array([0.0, 0.5, 1.0]), np.column_stack([np.ones(3), np.zeros(3)]), [(0.5, 0)])
 GOOD = {"x": np.ones(3), "v": np.zeros(3), "energy": np.zeros(3)}
 COUNTS = Statistics(2, 0, 3, 0.1, events=1, last_event=0.5)
 

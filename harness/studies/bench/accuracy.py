@@ -13,7 +13,7 @@ from ...errors import HarnessError
 from ...references.models import CASES, MODELS
 from ...references.ode_problem import OdeProblem
 from ...references.piecewise_linear import mp
-from ...references.reference_trajectory import CommunicationGrid, compute_reference
+from ...references.reference_trajectory import CommunicationGrid, compute_reference, motion_error
 from ...running.embedded_model import EmbeddedModel, load_model_class
 from ...running.fmu_info import FmuInfo, read_info
 from ...running.step_sequence import RefusedRun, run_steps
@@ -68,7 +68,7 @@ def max_error(model: str, read_info: FmuInfo, chosen: dict[str, float | str]) ->
     values = read_info.resolve_labels({**read_info.start_values, **chosen})
     answer = compute_reference(model, [(0.0, read_info.stop, values)], CommunicationGrid(0.0, read_info.stop, POINTS))
     spec = RunSpec(find_fmu(model), values=values, stop=read_info.stop)
-    return answer.error(*run_through_times(spec, answer.times.tolist()))
+    return motion_error(answer, *run_through_times(spec, answer.times.tolist()))
 
 
 def exact_run_error(model: str, read_info: FmuInfo) -> Benchmark:
@@ -88,14 +88,13 @@ def event_time_error(model: str, read_info: FmuInfo) -> Benchmark:
     reference = compute_reference(
         model, [(0.0, read_info.stop, read_info.start_values)], CommunicationGrid(0.0, read_info.stop, 1)
     )
+    events = reference.events or []
     event_list = EmbeddedModel.create(load_model_class(find_fmu(model)), {}, "exact", 0.0).find_mode_changes(
         read_info.stop
     )
-    if [mode for _, mode in event_list] != [mode for _, mode in reference.events]:
+    if [mode for _, mode in event_list] != [mode for _, mode in events]:
         raise HarnessError(f"{model}: the modes after events are wrong")
-    largest_error = max(
-        abs(t / t_reference - 1) for (t, _), (t_reference, _) in zip(event_list, reference.events, strict=True)
-    )
+    largest_error = max(abs(t / t_reference - 1) for (t, _), (t_reference, _) in zip(event_list, events, strict=True))
     return Benchmark(f"{model}, exact: times of {len(event_list)} events", largest_error, "1", 1e-14, (CLOSED,))
 
 

@@ -210,4 +210,4 @@ def time_through_fmpy(model: str, backend: str, steps: int) -> float:
 def largest_error(case: str, timing: Timing) -> float:
     """Return the largest error at the points of the reference, relative to the largest position and speed."""
     truth = CASES_BY_NAME[case].reference
-    return float(relative_errors(timing.rows[:: COMMUNICATION_STEPS // (len(truth.times) - 1)], truth.motion).max())
+    return float(relative_errors(timing.rows[:: COMMUNICATION_STEPS // (len(truth.times) - 1)], truth.states).max())

@@ -71,14 +71,14 @@ class Scenario:
     def reference_motion(self) -> np.ndarray:
         """Return the reference position and speed (n, 2) at the common times."""
         if self.is_default:
-            return self.case.reference.motion
+            return self.case.reference.states
         info, driven = read_info(self.case.model), [name for name in self.run.inputs if name != "time"]
         values = info.resolve_labels({**info.start_values, **self.run.values})
         spans = [
             (t, end, {**values, **dict.fromkeys(driven, value), "rate": rate}) for t, end, value, rate in self.segments
         ]
-        reference = compute_reference(self.case.model, spans, CommunicationGrid(self.start, self.stop, POINTS - 1))
-        return np.column_stack([reference.x, reference.v])
+        grid = CommunicationGrid(self.start, self.stop, POINTS - 1)
+        return compute_reference(self.case.model, spans, grid).states
 
 
 def make_scenario(

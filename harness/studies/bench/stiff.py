@@ -125,7 +125,7 @@ def reference_motion(case: StiffCase) -> tuple[np.ndarray, np.ndarray]:
     """Return times (n,) in s and states (n, states) of the certified reference, or by scipy's Radau, in 20 s."""
     if case.reference_source:
         reference = load_reference(case.reference_source)
-        return reference.times, reference.motion
+        return reference.times, reference.states
     return solve_by_radau(case.values["x_m"])
 
 

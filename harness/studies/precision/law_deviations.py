@@ -10,7 +10,6 @@ simulation of friction, J. Dyn. Syst. Meas. Control 113 (1991) 354-362.
 
 from dataclasses import dataclass, replace
 from functools import cache, partial
-from math import nan
 
 import numpy as np
 
@@ -18,7 +17,6 @@ from ...analyses.slip import upward_crossings
 from ...references import event_located
 from ...references.certified_reference import (
     POINTS,
-    CertifiedReference,
     ReferenceCase,
     compute_errors,
     load_reference,
@@ -67,7 +65,7 @@ def compare_with_dry_friction(case: ReferenceCase, model: type) -> LawDeviation:
     """Compare the law of a case with dry friction; `model` is the class in the FMU."""
     assert case.dry_friction_reference is not None
     law_reference, dry_reference = load_reference(case.reference_source), load_reference(case.dry_friction_reference)
-    deviation = compute_errors(Solution(law_reference.motion, None, 0), dry_reference)
+    deviation = compute_errors(replace(law_reference, events=None), dry_reference)
     method = CHATTERING_METHOD if case.is_chattering else None
     own_run = EmbeddedModel.create(model, case.values, method, 0.0).solve(law_reference.times.tolist())
     make_result = partial(
@@ -83,7 +81,7 @@ def compare_with_dry_friction(case: ReferenceCase, model: type) -> LawDeviation:
     sticking = stuck_points(dry_reference)
     if not sticking.any():
         return make_result(None, None, None)
-    creep = float(np.median(np.abs(law_reference.motion[sticking, 1])))
+    creep = float(np.median(np.abs(law_reference.states[sticking, 1])))
     if case.problem.has_dry_friction:
         return make_result(creep, float(np.mean(np.diff([t for t, mode in law_reference.modes if mode]))), None)
     times = np.linspace(0.0, case.problem.stop, FINE)
@@ -98,8 +96,8 @@ def compare_with_dry_friction(case: ReferenceCase, model: type) -> LawDeviation:
 def compare_bristles(name: str, law: str, model: type) -> LawDeviation:
     """Compare a model of fmus/more with bristles, in its default run, with a block that sticks."""
     reference, dry = load_reference(f"more/{name}"), solve_dry_block()
-    bristles = replace(reference, motion=reference.motion[:, :2])
-    deviation = compute_errors(Solution(bristles.motion, None, 0), dry)
+    bristles = replace(reference, states=reference.states[:, :2], events=None)
+    deviation = compute_errors(bristles, dry)
     own_run = EmbeddedModel.create(model, {}, None, 0.0).solve(reference.times.tolist())
     times = np.linspace(0.0, float(reference.times[-1]), FINE)
     fine_run = EmbeddedModel.create(model, {}, None, TOLERANCE)
@@ -112,7 +110,7 @@ def compare_bristles(name: str, law: str, model: type) -> LawDeviation:
         deviation.final,
         deviation.rms,
         deviation.largest,
-        creep=float(np.median(np.abs(bristles.motion[stuck_points(dry), 1]))),
+        creep=float(np.median(np.abs(bristles.states[stuck_points(dry), 1]))),
         period=float(np.mean(np.diff(slips))),
         asymmetry=None,
         integration=compute_errors(own_run, reference).largest,
@@ -120,15 +118,15 @@ def compare_bristles(name: str, law: str, model: type) -> LawDeviation:
 
 
 @cache
-def solve_dry_block() -> CertifiedReference:
+def solve_dry_block() -> Solution:
     """Return the motion of the block that sticks, in the default run of the models with bristles."""
     problem, times = event_located.DryBlock(), np.linspace(0.0, event_located.DryBlock.stop, POINTS)
     method = "DOP853"
     states, events = event_located.solve(problem, times.tolist(), method, *event_located.TOLERANCES[method])
-    return CertifiedReference(times, states, [(0.0, 0), *((t, mode) for t, (mode,) in events)], method, nan)
+    return Solution(times, states, [(t, mode) for t, (mode,) in events], start_mode=0, method=method)
 
 
-def stuck_points(truth: CertifiedReference) -> np.ndarray:
+def stuck_points(truth: Solution) -> np.ndarray:
     """Return for each time (n,) of a reference whether the body is stuck."""
     starts, modes = zip(*truth.modes, strict=True)
     return np.array(modes)[np.searchsorted(starts, truth.times, side="right") - 1] == 0

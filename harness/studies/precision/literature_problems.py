@@ -87,7 +87,7 @@ def solve_all() -> Iterator[LiteratureRun]:
 def certified_runs(name: str, model: type, reference: str) -> Iterator[LiteratureRun]:
     """Solve the default run of a model with every method, and compare it with its certified result."""
     truth = load_reference(reference, FOLDER)
-    yield from runtime_runs(name, model, {}, float(truth.times[-1]), tuple(truth.motion[-1]))
+    yield from runtime_runs(name, model, {}, float(truth.times[-1]), tuple(truth.states[-1]))
 
 
 def forced_runs(name: str, steady: SteadyMotion, values: dict[str, float]) -> Iterator[LiteratureRun]:

@@ -205,7 +205,7 @@ class CaseRunner:
         run = simulate(RunSpec(self.file, outputs, values, grid=grid, follow=False, repeat=repeat))
         assert run.statistics  # FMUs of this project report it
         columns = np.column_stack([run.columns[name] for name in outputs])
-        return Solution(columns, None, run.statistics.evaluations), run.statistics.seconds
+        return Solution(self.times, columns, None, run.statistics.evaluations), run.statistics.seconds
 
     def run_fmi3(self, tool: str, rtol: float, settings: SweepSettings) -> tuple[Solution, float]:
         """Run the FMI 3.0 FMU with its own solver and tolerance, or by model exchange.
@@ -225,7 +225,8 @@ class CaseRunner:
         timed = simulate(replace(spec, repeat=repeat)).statistics
         assert timed
         events = recording.find_changes(*modes) if modes else None
-        solution = Solution(recording.sample_at(self.times, names), events, recording.statistics.evaluations)
+        states, evaluations = recording.sample_at(self.times, names), recording.statistics.evaluations
+        solution = Solution(self.times, states, events, evaluations)
         return solution, min(timed.seconds, recording.statistics.seconds)
 
     def run_peer(self, peer: str, method: str, rtol: float, settings: SweepSettings) -> tuple[Solution, float]:

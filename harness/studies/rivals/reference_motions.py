@@ -52,8 +52,8 @@ def solve_model(name: str, values: dict[str, float]) -> Callable[[Scene, np.ndar
     def solve(scene: Scene, times: np.ndarray) -> States:
         grid = CommunicationGrid(0.0, scene.stop, len(times) - 1)
         motion = compute_reference(name, [(0.0, scene.stop, values)], grid)
-        events = [(t, mode) for t, mode in motion.events if t <= scene.stop]
-        return np.column_stack([motion.x, motion.v, np.zeros(len(times))]), 0, events
+        events = [(t, mode) for t, mode in motion.events or [] if t <= scene.stop]
+        return np.column_stack([motion.states, np.zeros(len(times))]), 0, events
 
     return solve
 

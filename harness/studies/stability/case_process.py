@@ -8,8 +8,9 @@ from ...errors import HarnessError
 from ...process.child_process import RequestServer
 from ...references.certification import compute_by_two_methods
 from ...references.models import MODELS
-from ...references.reference_trajectory import CommunicationGrid, ReferenceTrajectory, compute_reference
+from ...references.reference_trajectory import CommunicationGrid, compute_reference
 from ...running.embedded_model import load_model_class
+from ...running.solution import Solution
 from ...running.step_sequence import inject_nonfinite, run_steps
 from ...scenes.fmu_files import find_fmu
 from ...scenes.run_spec import RunSpec
@@ -20,7 +21,7 @@ def read_run(run: dict[str, Any]) -> RunSpec:
     return RunSpec(Path(run["fmu"]), values=run["values"], start=run["start"], stop=run["stop"])
 
 
-def solve_reference(model: str, spans: list[Any], grid: dict[str, Any]) -> ReferenceTrajectory:
+def solve_reference(model: str, spans: list[Any], grid: dict[str, Any]) -> Solution:
     """Return the reference of a model, or the result of two methods of a user model."""
     solve = compute_reference if model in MODELS else compute_by_two_methods
     return solve(model, spans, CommunicationGrid(**grid))

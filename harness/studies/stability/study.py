@@ -18,12 +18,13 @@ import numpy as np
 from ...errors import HarnessError
 from ...process.child_process import ChildProcess, ask_once
 from ...process.interruptible_wait import map_in_threads
-from ...references.reference_trajectory import ReferenceTrajectory, max_or_nan, require_reference_packages
+from ...references.reference_trajectory import max_or_nan, motion_error, require_reference_packages
 from ...results.files import write_csv_rows
 from ...results.folder import replace_folder
 from ...results.provenance import prefix_parameters, write_provenance
 from ...running.description import declared_parameters
 from ...running.fmu_info import FmuInfo, read_info
+from ...running.solution import Solution
 from ...running.step_sequence import CommunicationSteps, RefusalSummary, RefusedRun
 from ...running.trajectory import Statistics, Trajectory
 from ...scenes.fmu_files import check_built, find_fmu
@@ -106,7 +107,7 @@ def grouped_cases(
 
 def run_group(group: Iterable[StabilityCase], process: ChildProcess) -> Iterator[CaseOutcome]:
     """Run cases with a common reference in a process."""
-    reference: ReferenceTrajectory | None = None
+    reference: Solution | None = None
     reference_error = ""
     for case in group:
         try:
@@ -134,12 +135,12 @@ def run_group(group: Iterable[StabilityCase], process: ChildProcess) -> Iterator
             yield CaseOutcome(case, WRONG, str(error))
 
 
-def solve_reference(case: StabilityCase, process: ChildProcess) -> ReferenceTrajectory:
+def solve_reference(case: StabilityCase, process: ChildProcess) -> Solution:
     """Return the reference of a case, computed in a process."""
     request = {"model": case.model, "spans": case.spans, "grid": case.grid}
     reply = process.ask(("reference", request), LIMIT)
-    times, x, v = (np.array(reply[name]) for name in ("times", "x", "v"))
-    return ReferenceTrajectory(times, x, v, tuple((t, mode) for t, mode in reply["events"]))
+    arrays = {name: np.array(reply[name]) for name in ("times", "states")}
+    return Solution(**{**reply, **arrays, "events": [(t, mode) for t, mode in reply["events"]]})
 
 
 def run_case(case: StabilityCase, calls: CommunicationSteps, process: ChildProcess) -> Trajectory | RefusedRun:
@@ -171,22 +172,23 @@ def judge_refusal(case: StabilityCase, ending: RefusedRun) -> CaseOutcome:
     return CaseOutcome(case, REFUSED, ending.message)
 
 
-def judge_solution(case: StabilityCase, motion: Trajectory, reference: ReferenceTrajectory) -> CaseOutcome:
+def judge_solution(case: StabilityCase, motion: Trajectory, reference: Solution) -> CaseOutcome:
     """Check events, error and energy of a finished run."""
     assert case.max_error is not None
     x, v, *energies = motion.columns.values()
     statistics = motion.statistics
     assert statistics is not None  # FMUs of this project provide them
-    error, energy_rise = reference.error(x, v), math.nan
+    error, energy_rise = motion_error(reference, x, v), math.nan
     conserves = not case.is_driven and bool(energies)
     for energy in energies if conserves else ():
         energy_rise = float((energy - np.minimum.accumulate(energy)).max() / (energy.max() or 1.0))
     reasons = []
     if case.events == "all" or case.events == case.method:
-        if statistics.events != len(reference.events):
-            reasons.append(f"{statistics.events} events, not {len(reference.events)}")
-        elif reference.events:
-            delay = abs(statistics.last_event - reference.events[-1][0])
+        events = reference.events or []
+        if statistics.events != len(events):
+            reasons.append(f"{statistics.events} events, not {len(events)}")
+        elif events:
+            delay = abs(statistics.last_event - events[-1][0])
             error = max_or_nan(error, delay / (case.grid.stop - case.grid.start))
     if not error <= case.max_error:
         reasons.append(f"error {error:.2g}, more than {case.max_error:g}")
