@@ -149,7 +149,7 @@ class EmbeddedModel:
         if not has_single_dry_contact:
             return Solution(np.array(times), states, None, evaluations)
         (_, start_mode), *events = self.find_modes(times[-1])
-        return Solution(np.array(times), states, events, evaluations, start_mode)
+        return Solution(np.array(times), states, events, evaluations, start_mode=start_mode)
 
     def find_mode_changes(self, stop: float) -> list[tuple[float, int]]:
         """Return the changes of mode up to the stop as (time in s, new mode), found by following internal steps."""

@@ -22,6 +22,8 @@ class Solution:
         Changes of mode after the start as (time in s, new mode); None if the solver does not report them.
     evaluations : int
         Evaluations of right-hand sides and Jacobians.
+    steps : int
+        Internal steps; 0 if they are not known.
     start_mode : int or None
         Mode at the start; None if nothing sticks or it is not known.
     method : str
@@ -34,6 +36,7 @@ class Solution:
     states: np.ndarray
     events: Events | None = None
     evaluations: int = 0
+    steps: int = 0
     start_mode: int | None = None
     method: str = ""
     estimated_error: float = nan

@@ -18,8 +18,8 @@ from harness.studies.rivals.catalogue import ENGINES, MAX_LINES, OTHERS, OWN, RI
 from harness.studies.rivals.child import RunReply, RunRequest, run_request
 from harness.studies.rivals.comparison import Comparison, Result
 from harness.studies.rivals.measures import match_events, measure
-from harness.studies.rivals.reference_motions import compute_reference_motion
-from harness.studies.rivals.scenes import SCENES, Motion
+from harness.studies.rivals.reference_motions import FINE, compute_reference_motion
+from harness.studies.rivals.scenes import SCENES, Solution, slip_changes
 from harness.studies.rivals.study import run_in_child
 from harness.studies.rivals.table import exact_rivals, gap_lines, rivals_table
 
@@ -47,7 +47,7 @@ def engine(monkeypatch):
 
 def at_rest(scene):
     """A motion that never begins."""
-    return Motion(scene.times, np.tile(scene.start, (len(scene.times), 1)), 7)
+    return Solution(scene.times, np.tile(scene.start, (len(scene.times), 1)), steps=7)
 
 
 @pytest.mark.parametrize("name", CERTIFIED)
@@ -55,10 +55,10 @@ def test_references_agree_with_the_certified_results(references, name):
     certified, scene = load_reference(CERTIFIED[name], FOLDER), SCENES[name]
     common, at, there = np.intersect1d(scene.times.round(9), certified.times.round(9), return_indices=True)
     assert len(common) > 50
-    assert references[name].states[at, :2] == pytest.approx(certified.states[there, :2], abs=1e-9)
-    assert [mode for _, mode in references[name].modes] == [mode for _, mode in certified.events]
+    assert references[name].states[::FINE][at, :2] == pytest.approx(certified.states[there, :2], abs=1e-9)
+    assert [mode for _, mode in references[name].events] == [mode for _, mode in certified.events]
     times = [t for t, _ in certified.events]
-    assert [t for t, _ in references[name].modes] == pytest.approx(times, abs=1e-9)
+    assert [t for t, _ in references[name].events] == pytest.approx(times, abs=1e-9)
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -125,7 +125,7 @@ def test_what_an_engine_raises_is_a_gap(engine):
         raise RuntimeError("the solver fell over\nsecond line")
 
     def diverges(scene, setting):
-        return Motion(scene.times, np.full((len(scene.times), 3), np.nan), 1)
+        return Solution(scene.times, np.full((len(scene.times), 3), np.nan), steps=1)
 
     assert run_request(engine(fails)).gap == "RuntimeError: the solver fell over"
     assert run_request(engine(diverges)).gap == "the result is not finite"
@@ -137,13 +137,13 @@ def test_what_an_engine_raises_is_a_gap(engine):
 BROKEN = """
 import os, sys, time
 from harness.studies.rivals import child
-from harness.studies.rivals.scenes import Motion
+from harness.studies.rivals.scenes import Solution
 import numpy as np
 def simulate(scene, setting):
     print("noise of an engine")
     if scene.name == "sled":
         os._exit(3) if setting["how"] == "dies" else time.sleep(600)
-    return Motion(scene.times, np.zeros((len(scene.times), 3)), 1)
+    return Solution(scene.times, np.zeros((len(scene.times), 3)), steps=1)
 sys.modules[child.__package__ + ".engines.broken"] = sys.modules[__name__]
 child.serve()
 """
@@ -173,8 +173,8 @@ def test_events_are_matched_by_kind_and_time():
 
 def test_a_slip_begins_and_ends_where_it_passes_the_level_even_within_one_step():
     v = np.array([0.0, 1.0, 1.0, -1.0])
-    motion = Motion(np.arange(4.0), np.column_stack([v, v, np.zeros(4)]), 3)
-    changes = motion.slip_changes(0.5)
+    motion = Solution(np.arange(4.0), np.column_stack([v, v, np.zeros(4)]), steps=3)
+    changes = slip_changes(motion, 0.5)
     assert [kind for _, kind in changes] == [1, 0, 1]
     assert [t for t, _ in changes] == pytest.approx([0.5, 2.25, 2.75])
 
@@ -182,7 +182,7 @@ def test_a_slip_begins_and_ends_where_it_passes_the_level_even_within_one_step()
 def test_a_body_that_stays_where_it_should_move_has_its_error_and_no_events(references, engine):
     scene = SCENES["rest"]
     measures = measure(scene, references["rest"], run_request(engine(lambda scene, setting: at_rest(scene))))
-    assert measures.error == pytest.approx(np.abs(references["rest"].states[:, 0] - 0.1).max())
+    assert measures.error == pytest.approx(np.abs(references["rest"].states[::FINE, 0] - 0.1).max())
     assert (measures.missed, measures.spurious, measures.steps) == (32, 0, 7)
 
 
@@ -206,7 +206,7 @@ def reply_of_reference(request):
     if request.module == OWN.module and request.setting:
         return RunReply("it fell over")
     reference = compute_reference_motion(SCENES[request.scene])
-    return RunReply("", reference.states.tolist(), True, reference.modes, 5, 0.5)
+    return RunReply("", reference.states[::FINE].tolist(), True, reference.events, 5, 0.5)
 
 
 def test_an_unknown_rival_is_one_sentence(user_folder, tmp_path):

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...errors import HarnessError, first_line
 from ...process.child_process import RequestServer
-from .scenes import SCENES, Changes, NotOfferedError, Setting
+from .scenes import SCENES, Events, NotOfferedError, Setting, sample, slip_changes
 
 REPEATS = 3  # of short runs
 SHORT = 1.0  # s
@@ -30,7 +30,7 @@ class RunReply:
     Attributes
     ----------
     gap : why there is no result; empty if there is one
-    states : (n, 3) at the times of the scene, as in Motion
+    states : (n, 3) at the times of the scene
     has_modes : whether the changes are those of modes, or those of a slip that passes the level of the scene
     changes : times in s, and what begins there
     steps : number of internal steps
@@ -40,7 +40,7 @@ class RunReply:
     gap: str = ""
     states: list[list[float]] = field(default_factory=list)
     has_modes: bool = False
-    changes: Changes = field(default_factory=list)
+    changes: Events = field(default_factory=list)
     steps: int = 0
     seconds: float = 0.0
 
@@ -61,11 +61,11 @@ def run_request(request: RunRequest) -> RunReply:
         return RunReply(first_line(error))
     except Exception as error:  # of an engine, which may raise anything
         return RunReply(f"{type(error).__name__}: {first_line(error)}")
-    states = motion.sample(scene.times)
+    states = sample(motion, scene.times)
     if not np.isfinite(states).all():
         return RunReply("the result is not finite")
-    has_modes = motion.modes is not None
-    changes = motion.slip_changes(scene.level) if motion.modes is None else motion.modes
+    has_modes = motion.events is not None
+    changes = slip_changes(motion, scene.level) if motion.events is None else motion.events
     return RunReply("", states.tolist(), has_modes, changes, int(motion.steps), min(times))
 
 

@@ -5,9 +5,12 @@ from math import inf, nan
 
 import numpy as np
 
+from ...running.solution import Events, Solution
 from .child import RunReply
-from .reference_motions import ReferenceMotion
-from .scenes import Changes, Scene
+from .reference_motions import FINE
+from .scenes import Scene, slip_changes
+
+ROUNDING = 1e-12  # m/s or rad/s: a smaller slip of a reference is zero
 
 
 @dataclass(frozen=True)
@@ -33,17 +36,18 @@ class Measures:
     seconds: float
 
 
-def measure(scene: Scene, reference: ReferenceMotion, reply: RunReply) -> Measures:
+def measure(scene: Scene, reference: Solution, reply: RunReply) -> Measures:
     """Compare a run with the reference of its scene."""
-    states = np.array(reply.states)
-    error = np.abs(states - reference.states)[:, scene.compared_columns].max()
-    slip = np.abs(states[:, 1] - states[:, 2])[reference.is_stuck]
-    expected = reference.modes if reply.has_modes else reference.slip_changes
+    states, true_states = np.array(reply.states), reference.states[::FINE]
+    error = np.abs(states - true_states)[:, scene.compared_columns].max()
+    is_stuck = np.abs(true_states[:, 1] - true_states[:, 2]) < ROUNDING
+    slip = np.abs(states[:, 1] - states[:, 2])[is_stuck]
+    expected = (reference.events or []) if reply.has_modes else slip_changes(reference, scene.level)
     missed, spurious, event_error = match_events([(t, kind) for t, kind in reply.changes], expected, scene.stop)
     return Measures(float(error), float(np.median(slip)), missed, spurious, event_error, reply.steps, reply.seconds)
 
 
-def match_events(changes: Changes, expected: Changes, stop: float) -> tuple[int, int, float]:
+def match_events(changes: Events, expected: Events, stop: float) -> tuple[int, int, float]:
     """Match events of the same kind by nearest times, at most half the shortest distance of expected ones apart.
 
     Returns

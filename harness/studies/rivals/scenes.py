@@ -6,7 +6,9 @@ In every scene one body rubs on a partner: on the ground, on a belt, or on a sec
     sliding:   F = slide(t, |slip|) sign(slip)
     stuck:     slip = 0 while |F| <= hold(t)
 
-The ground and the belt have an infinite inertia, so that w is constant.
+The ground and the belt have an infinite inertia, so that w is constant. The states of a solution are x, v, w at the
+internal steps, or at least at the compared points; its events are the changes of mode (-1, 0 stuck, 1), None for an
+engine without modes.
 """
 
 from collections.abc import Callable
@@ -19,9 +21,10 @@ from ...references.literature_problems import BeltBlock
 from ...references.models.coulomb import CoulombProblem
 from ...references.models.pendulum import PendulumProblem
 from ...references.models.stickslip import StickslipProblem
+from ...running.solution import Events as Events
+from ...running.solution import Solution as Solution
 
 Setting = dict[str, float | str]  # values of an engine's own options by name; empty for its defaults
-Changes = list[tuple[float, int]]  # times in s, and what begins there
 
 
 class NotOfferedError(Exception):
@@ -82,36 +85,20 @@ class Scene:
         return slice(1, 3) if self.has_second_inertia else slice(0, 1)
 
 
-@dataclass(frozen=True)
-class Motion:
-    """What a rival returns.
+def sample(solution: Solution, times: np.ndarray) -> np.ndarray:
+    """Return the states (len(times), 3), linear between two steps."""
+    return np.column_stack([np.interp(times, solution.times, column) for column in solution.states.T])
 
-    Attributes
-    ----------
-    times : (n,) in s, rising, from 0 to the stop: the internal steps, or at least the compared points of the scene
-    states : (n, 3) position x, speed v, and speed w of the partner
-    steps : number of internal steps
-    modes : changes of mode as (time in s, new mode -1, 0 stuck, 1); None if the engine has no modes
-    """
 
-    times: np.ndarray
-    states: np.ndarray
-    steps: int
-    modes: Changes | None = None
-
-    def sample(self, times: np.ndarray) -> np.ndarray:
-        """Return the states (len(times), 3), linear between two steps."""
-        return np.column_stack([np.interp(times, self.times, column) for column in self.states.T])
-
-    def slip_changes(self, level: float) -> Changes:
-        """Return when a slip begins (1) and ends (0), that is, when its size passes the level."""
-        slip, changes = self.states[:, 1] - self.states[:, 2], Changes()
-        for side in (1, -1):
-            excess = side * slip - level
-            i = np.flatnonzero((excess[1:] > 0.0) != (excess[:-1] > 0.0))
-            times = self.times[i] + excess[i] / (excess[i] - excess[i + 1]) * (self.times[i + 1] - self.times[i])
-            changes += [(t, int(begins)) for t, begins in zip(times.tolist(), excess[i + 1] > 0.0, strict=True)]
-        return sorted(changes)
+def slip_changes(solution: Solution, level: float) -> Events:
+    """Return when a slip begins (1) and ends (0), that is, when its size passes the level."""
+    slip, changes, t = solution.states[:, 1] - solution.states[:, 2], Events(), solution.times
+    for side in (1, -1):
+        excess = side * slip - level
+        i = np.flatnonzero((excess[1:] > 0.0) != (excess[:-1] > 0.0))
+        times = t[i] + excess[i] / (excess[i] - excess[i + 1]) * (t[i + 1] - t[i])
+        changes += [(t, int(begins)) for t, begins in zip(times.tolist(), excess[i + 1] > 0.0, strict=True)]
+    return sorted(changes)
 
 
 REST, SLED, BELT, PENDULUM = CoulombProblem(), StickslipProblem(), BeltBlock(), PendulumProblem()

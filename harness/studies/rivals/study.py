@@ -9,13 +9,14 @@ from ...references.reference_trajectory import require_reference_packages
 from ...results.files import write_csv_rows
 from ...results.folder import replace_folder
 from ...results.provenance import write_provenance
+from ...running.solution import Solution
 from ...scenes.fmu_files import find_fmu
 from .catalogue import Rival, find_rivals
 from .child import RunReply, RunRequest
 from .comparison import Comparison, Result, format_setting
 from .figure import draw
 from .measures import measure
-from .reference_motions import ReferenceMotion, compute_reference_motion
+from .reference_motions import compute_reference_motion
 from .scenes import SCENES
 
 FOLDER, FILE, FIGURE = "rivals", "rivals.csv", "figure.svg"
@@ -50,7 +51,7 @@ def run_rivals(names: tuple[str, ...], timeout: float, out: Path, report: Callab
     return comparison
 
 
-def run_rival(rival: Rival, references: dict[str, ReferenceMotion], timeout: float) -> Iterator[Result]:
+def run_rival(rival: Rival, references: dict[str, Solution], timeout: float) -> Iterator[Result]:
     """Yield the results of a rival, one for each setting and scene."""
     version = rival.installed_version
     for name, setting in rival.settings.items():

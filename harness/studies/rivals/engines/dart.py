@@ -6,12 +6,12 @@ With rewrite=1 the friction, which is one constant force, is written before each
 import numpy as np
 from dartpy import dynamics, simulation
 
-from ..scenes import Motion, NotOfferedError, Scene, Setting
+from ..scenes import NotOfferedError, Scene, Setting, Solution
 
 REST = 1e-9  # m/s or rad/s: a slower slip is at rest
 
 
-def simulate(scene: Scene, setting: Setting) -> Motion:
+def simulate(scene: Scene, setting: Setting) -> Solution:
     """Simulate a scene; `setting` holds time_step and rewrite."""
     rewrites, moves = setting.get("rewrite"), scene.has_second_inertia
     if not (scene.has_one_coefficient or rewrites):
@@ -42,4 +42,4 @@ def simulate(scene: Scene, setting: Setting) -> Motion:
         t, x, v = t + h, skeleton.getPosition(0), skeleton.getVelocity(0)
         rows.append((t, x, v, v + joint.getVelocity(0)) if moves else (t, x + w * t, v + w, w))
     table = np.array(rows)
-    return Motion(table[:, 0], table[:, 1:], len(rows) - 1)
+    return Solution(table[:, 0], table[:, 1:], steps=len(rows) - 1)

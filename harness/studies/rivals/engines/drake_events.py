@@ -6,7 +6,7 @@ import numpy as np
 from pydrake.systems import analysis
 from pydrake.systems.framework import LeafSystem, UnrestrictedUpdateEvent, WitnessFunctionDirection
 
-from ..scenes import Changes, Motion, Scene, Setting
+from ..scenes import Events, Scene, Setting, Solution
 
 
 class Contact(LeafSystem):
@@ -14,7 +14,7 @@ class Contact(LeafSystem):
 
     def __init__(self, scene: Scene) -> None:
         super().__init__()
-        self.scene, self.modes = scene, Changes()
+        self.scene, self.modes = scene, Events()
         self.DeclareContinuousState(3)
         x, v, w = scene.start
         self.mode = int(np.sign(v - w)) or self.mode_at_rest(0.0, x)
@@ -47,7 +47,7 @@ class Contact(LeafSystem):
         self.modes.append((t, self.mode))
 
 
-def simulate(scene: Scene, setting: Setting) -> Motion:
+def simulate(scene: Scene, setting: Setting) -> Solution:
     """Simulate a scene; `setting` holds options of SimulatorConfig."""
     simulator, options = analysis.Simulator(Contact(scene)), analysis.SimulatorConfig(**setting)
     analysis.ApplySimulatorConfig(options, simulator)
@@ -57,4 +57,4 @@ def simulate(scene: Scene, setting: Setting) -> Motion:
     for t in scene.times.tolist():
         simulator.AdvanceTo(t)
         rows.append(context.get_continuous_state_vector().CopyToVector())
-    return Motion(scene.times, np.array(rows), simulator.get_num_steps_taken(), simulator.get_system().modes)
+    return Solution(scene.times, np.array(rows), simulator.get_system().modes, steps=simulator.get_num_steps_taken())

@@ -9,12 +9,12 @@ from pydrake.multibody import plant as multibody
 from pydrake.multibody import tree
 from pydrake.systems import analysis, framework, primitives
 
-from ..scenes import Motion, NotOfferedError, Scene, Setting
+from ..scenes import NotOfferedError, Scene, Setting, Solution
 
 RADIUS, SETTLING = 0.1, 1.0  # m; s in which the ball sinks into the ground before the scene begins
 
 
-def simulate(scene: Scene, setting: Setting) -> Motion:
+def simulate(scene: Scene, setting: Setting) -> Solution:
     """Simulate a scene; `setting` holds options of MultibodyPlantConfig and of SimulatorConfig."""
     if scene.is_rotation:
         raise NotOfferedError("joints have no dry friction")
@@ -56,4 +56,4 @@ def simulate(scene: Scene, setting: Setting) -> Motion:
     simulator.Initialize()  # logs the start
     simulator.AdvanceTo(scene.stop)
     x, _, v, _ = log.data()
-    return Motion(log.sample_times(), np.column_stack([x, v, np.zeros(len(x))]), len(x) - 1)
+    return Solution(log.sample_times(), np.column_stack([x, v, np.zeros(len(x))]), steps=len(x) - 1)

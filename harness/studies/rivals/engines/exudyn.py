@@ -9,12 +9,12 @@ import exudyn
 import exudyn.itemInterface as items
 import numpy as np
 
-from ..scenes import Motion, NotOfferedError, Scene, Setting
+from ..scenes import NotOfferedError, Scene, Setting, Solution
 
 VALUES = exudyn.OutputVariableType
 
 
-def simulate(scene: Scene, setting: Setting) -> Motion:
+def simulate(scene: Scene, setting: Setting) -> Solution:
     """Simulate a scene; `setting` holds step, presliding (of the bristle), decay (of static friction), and rewrite."""
     if not (scene.has_constant_sliding or setting.get("rewrite")):
         raise NotOfferedError("sliding friction is one constant force")
@@ -57,4 +57,4 @@ def simulate(scene: Scene, setting: Setting) -> Motion:
     options.solutionSettings.sensorsWritePeriod, options.solutionSettings.writeSolutionToFile = step, False
     mbs.SolveDynamic(options)
     tables = [mbs.GetSensorStoredData(sensor) for sensor in sensors]
-    return Motion(tables[0][:, 0], np.column_stack([table[:, 1] for table in tables]), n)
+    return Solution(tables[0][:, 0], np.column_stack([table[:, 1] for table in tables]), steps=n)

@@ -6,14 +6,14 @@ With rewrite=1 frictionloss, which is one constant force, is written before each
 import mujoco
 import numpy as np
 
-from ..scenes import Motion, NotOfferedError, Scene, Setting
+from ..scenes import NotOfferedError, Scene, Setting, Solution
 
 BODY = """<body><inertial pos="0 0 0" mass="{inertia}" diaginertia="{inertia} {inertia} {inertia}"/>
   <joint type="{kind}" axis="1 0 0" {friction}/>{child}</body>"""
 REST = 1e-9  # m/s or rad/s: a slower slip is at rest
 
 
-def simulate(scene: Scene, setting: Setting) -> Motion:
+def simulate(scene: Scene, setting: Setting) -> Solution:
     """Simulate a scene; `setting` holds attributes of <option>, solreffriction of the joint, and rewrite."""
     options, friction = dict(setting), f'frictionloss="{scene.hold(0.0)}"'
     rewrites, moves = options.pop("rewrite", 0), scene.has_second_inertia
@@ -45,4 +45,4 @@ def simulate(scene: Scene, setting: Setting) -> Motion:
         else:
             rows.append((t, data.qpos[0] + w * t, data.qvel[0] + w, w))
     table = np.array(rows)
-    return Motion(table[:, 0], table[:, 1:], len(rows) - 1)
+    return Solution(table[:, 0], table[:, 1:], steps=len(rows) - 1)

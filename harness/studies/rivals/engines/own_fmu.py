@@ -5,13 +5,13 @@ import numpy as np
 from ....running.own_fmu import simulate as run_fmu
 from ....scenes.fmu_files import check_built, find_fmu
 from ....scenes.run_spec import RunSpec
-from ..scenes import Motion, Scene, Setting
+from ..scenes import Scene, Setting, Solution
 
 MODELS = {"rest": "coulomb", "held": "stickslip", "sled": "stickslip"}  # the other scenes have the names of models
 OUTPUTS = {"pendulum": ("theta", "omega"), "clutch": ("omega_1", "omega_2")}
 
 
-def simulate(scene: Scene, setting: Setting) -> Motion:
+def simulate(scene: Scene, setting: Setting) -> Solution:
     """Simulate a scene; `setting` holds values of the FMU."""
     fmu = find_fmu(MODELS.get(scene.name, scene.name))
     check_built(fmu)
@@ -26,4 +26,4 @@ def simulate(scene: Scene, setting: Setting) -> Motion:
     changes = np.flatnonzero(np.diff(mode)) + 1
     modes = [(float(run.time[i]), int(mode[i])) for i in changes]
     assert run.statistics
-    return Motion(run.time, np.column_stack(columns), run.statistics.steps, modes)
+    return Solution(run.time, np.column_stack(columns), modes, steps=run.statistics.steps)

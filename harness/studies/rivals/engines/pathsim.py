@@ -7,13 +7,13 @@ from pathsim import Connection, Simulation, solvers
 from pathsim.blocks import ODE, Scope
 from pathsim.events import ZeroCrossing
 
-from ..scenes import Changes, Motion, Scene, Setting
+from ..scenes import Events, Scene, Setting, Solution
 
 
-def simulate(scene: Scene, setting: Setting) -> Motion:
+def simulate(scene: Scene, setting: Setting) -> Solution:
     """Simulate a scene; `setting` holds options of Simulation, and event_tolerance."""
     inertia, partner, options = scene.inertia, scene.partner, dict[str, Any](setting)
-    mode, modes = 0, Changes()
+    mode, modes = 0, Events()
 
     def holding_force(t: float, x: float) -> float:
         return scene.load(t, x) / (1.0 + inertia / partner)
@@ -49,4 +49,4 @@ def simulate(scene: Scene, setting: Setting) -> Motion:
     simulation = Simulation([body, scope], wires, [stops, breaks], log=False, **options)
     steps = simulation.run(scene.stop)["total_steps"]
     times, states = scope.read()
-    return Motion(times, states.T, steps, modes)
+    return Solution(times, states.T, modes, steps=steps)

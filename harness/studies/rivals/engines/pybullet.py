@@ -6,7 +6,7 @@ With rewrite=1 the limit, which is one constant force, is written before each st
 import numpy as np
 import pybullet as bullet
 
-from ..scenes import Motion, NotOfferedError, Scene, Setting
+from ..scenes import NotOfferedError, Scene, Setting, Solution
 
 REST = 1e-9  # m/s or rad/s: a slower slip is at rest
 ZERO = [0.0, 0.0, 0.0]
@@ -17,7 +17,7 @@ LISTS = {  # arguments of createMultiBody with one item for each body
 }  # fmt: skip
 
 
-def simulate(scene: Scene, setting: Setting) -> Motion:
+def simulate(scene: Scene, setting: Setting) -> Solution:
     """Simulate a scene; `setting` holds options of setPhysicsEngineParameter, and rewrite."""
     options, moves = dict(setting), scene.has_second_inertia
     rewrites, inertias = options.pop("rewrite", 0), [scene.inertia, scene.partner][: 1 + moves]
@@ -49,4 +49,4 @@ def simulate(scene: Scene, setting: Setting) -> Motion:
         rows.append((t, x, v, v + relative) if moves else (t, x + w * t, v + w, w))
     bullet.disconnect()
     table = np.array(rows)
-    return Motion(table[:, 0], table[:, 1:], len(rows) - 1)
+    return Solution(table[:, 0], table[:, 1:], steps=len(rows) - 1)

@@ -5,10 +5,10 @@ from typing import Any
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from ..scenes import Changes, Motion, Scene, Setting
+from ..scenes import Events, Scene, Setting, Solution
 
 
-def simulate(scene: Scene, setting: Setting) -> Motion:
+def simulate(scene: Scene, setting: Setting) -> Solution:
     """Simulate a scene; `setting` holds options of solve_ivp."""
     inertia, partner = scene.inertia, scene.partner
 
@@ -34,7 +34,7 @@ def simulate(scene: Scene, setting: Setting) -> Motion:
         attributes: Any = event
         attributes.terminal, attributes.direction = True, -1
     t, y, steps = 0.0, np.array(scene.start), 0
-    mode, modes, rows = int(np.sign(y[1] - y[2])) or mode_at_rest(t, y[0]), Changes(), [y[None].copy()]
+    mode, modes, rows = int(np.sign(y[1] - y[2])) or mode_at_rest(t, y[0]), Events(), [y[None].copy()]
     while t < scene.stop:
         options: Any = {"events": stops if mode else breaks, "dense_output": True} | setting
         run = solve_ivp(rates, (t, scene.stop), y, **options)
@@ -46,4 +46,4 @@ def simulate(scene: Scene, setting: Setting) -> Motion:
                 y[1] = y[2]
             mode = mode_at_rest(t, y[0]) if mode else int(np.sign(holding_force(t, y[0])))
             modes.append((t, mode))
-    return Motion(scene.times, np.concatenate(rows), steps, modes)
+    return Solution(scene.times, np.concatenate(rows), modes, steps=steps)
