@@ -6,7 +6,7 @@ Angles are numbers, so that N.m/rad is N.m. Cycles are not: Hz is neither 1/s no
 import re
 from collections import Counter
 
-from .units import ANGLES, LENGTHS, STANDARD_GRAVITY, TIMES, UNIT_SYNONYMS, find_unit, normalize_unit
+from .units import ANGLES, CHARACTER_SUBSTITUTES, LENGTHS, STANDARD_GRAVITY, TIMES, UNIT_SYNONYMS, find_unit
 
 POUND = 0.45359237  # kg
 Powers = dict[str, int]  # powers of the base units kg, m, s, A and K, and of cycles
@@ -35,35 +35,50 @@ PREFIXED: dict[str, tuple[float, Powers]] = {
     "K": (1.0, {"K": 1}),
 }
 FACTOR = re.compile(r"([^\W\d_]+|°|%)(-?\d+)?|1")
-ALIASES = {"Nm": "N.m", "Nmm": "N.mm", "kNm": "kN.m"}
+TORQUES = {"Nm": "N.m", "Nmm": "N.mm", "kNm": "kN.m"}
+SYNONYMS = UNIT_SYNONYMS | {"°": "deg", "sec": "s"}
+
+
+def unit_factors(text: str) -> Powers | None:
+    """Return the powers of the factors of a unit by name, as in {"m": 1, "s": -2} for m/s2, m.s-2 and m s^-2.
+
+    None if it is not a unit. The names need not be known.
+    """
+    text = text.replace("**", "").translate(CHARACTER_SUBSTITUTES)
+    text = re.sub(r"\b(Nm|Nmm|kNm)\b", lambda match: TORQUES[match[0]], text)
+    powers = Counter[str]()
+    for i, part in enumerate(text.split("/")):
+        for factor in filter(None, re.split(r"[.\s()]+", part)):
+            match = FACTOR.fullmatch(factor)
+            if not match:
+                return None
+            if match[1]:
+                powers[SYNONYMS.get(match[1].lower(), match[1])] += (-1 if i else 1) * int(match[2] or 1)
+    return {name: power for name, power in powers.items() if power}
 
 
 def unit_size(text: str) -> tuple[float, Powers] | None:
     """Return a unit as a multiple of powers of base units, or None if it is not known."""
-    text = re.sub(r"\b(Nm|Nmm|kNm)\b", lambda match: ALIASES[match[0]], text.strip())
-    motion = find_unit(text)
+    motion = find_unit(text) if text.strip() not in TORQUES else None
     if motion is not None:
         powers = {"m": int(motion.base == "m"), "s": -motion.order}
         return motion.size, {base: power for base, power in powers.items() if power}
-    separated = re.sub(r"(?<=\w)[·*](?=\w)|(?<=\w) (?=\w)", ".", text)
-    size, powers = 1.0, Counter[str]()
-    for i, part in enumerate(normalize_unit(separated).split("/")):
-        sign = -1 if i else 1
-        for factor in filter(None, re.split(r"[.()]", part)):
-            match = FACTOR.fullmatch(factor)
-            known = match and ((1.0, {}) if match[1] is None else named_unit(match[1]))
-            if not match or not known:
-                return None
-            power = sign * int(match[2] or 1)
-            size *= known[0] ** power
-            for base, exponent in known[1].items():
-                powers[base] += power * exponent
-    return size, {base: power for base, power in powers.items() if power}
+    factors = unit_factors(text)
+    if factors is None:
+        return None
+    size, totals = 1.0, Counter[str]()
+    for name, power in factors.items():
+        known = named_unit(name)
+        if not known:
+            return None
+        size *= known[0] ** power
+        for base, exponent in known[1].items():
+            totals[base] += power * exponent
+    return size, {base: power for base, power in totals.items() if power}
 
 
 def named_unit(name: str) -> tuple[float, Powers] | None:
     """Return a unit of one word, with a prefix or without."""
-    name = UNIT_SYNONYMS.get(name.lower(), name)
     if name in NAMED:
         return NAMED[name]
     for prefix, factor in PREFIXES.items():
@@ -74,8 +89,12 @@ def named_unit(name: str) -> tuple[float, Powers] | None:
 
 
 def conversion_factor(unit: str, other: str) -> float | None:
-    """Return the factor from `unit` to `other`; None if they differ in dimension or one is not known."""
-    if unit == other:
+    """Return the factor from `unit` to `other`, 1 for two spellings of one unit.
+
+    None if they differ in dimension or one is not known.
+    """
+    factors = unit_factors(unit)
+    if unit == other or (factors is not None and factors == unit_factors(other)):
         return 1.0
     one, two = unit_size(unit), unit_size(other)
     return one[0] / two[0] if one and two and one[1] == two[1] else None

@@ -21,7 +21,7 @@ UNIT_SYNONYMS = {
 }  # fmt: skip
 
 
-CHARACTER_SUBSTITUTES = str.maketrans("º˚µμ²⁻¹·*", "°°uu2-1  ", "^")  # replaced and removed characters
+CHARACTER_SUBSTITUTES = str.maketrans("º˚µμ²³⁻¹·*", "°°uu23-1  ", "^")  # replaced and removed characters
 
 
 class MotionUnit(NamedTuple):

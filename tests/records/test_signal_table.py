@@ -27,6 +27,8 @@ WANTED = {"x": SignalSource("laser", "m"), "F": SignalSource("load", "N")}
         ("mA", "A", 1e-3),
         ("N·m", "N.m", 1.0),
         ("N*m", "kN m", 1e-3),
+        ("m³", "m^3", 1.0),
+        ("furlong/s", "furlong.s-1", 1.0),
         ("mm", "N", None),
         ("Nm", "m", None),
         ("N m", "m", None),

@@ -7,11 +7,11 @@ from math import isnan
 import numpy as np
 
 from ...errors import HarnessError
+from ...records.quantity_units import conversion_factor
 from ...running.trajectory import Trajectory
 from .event_pairs import EventPairs, match_events, stack_events
 from .interpolation import SignalInterpolant, ValueBounds
 from .trajectory_sources import common_span
-from .units import comparison_factor
 
 MIN_COMMON = 0.5  # fraction of common times from which no interpolation is needed
 TIME_TOLERANCE = 1e-9  # times closer than this fraction of the time span are equal
@@ -140,7 +140,7 @@ def units(one: Trajectory, two: Trajectory, name: str) -> tuple[str | None, floa
     if bool(left) != bool(right):
         lacks = (two if left else one).name
         return left or right, 1.0, f"{name} has no unit in {lacks}; assumed {left or right}"
-    factor = comparison_factor(right, left)
+    factor = conversion_factor(right, left)
     if factor is None:
         return None, 1.0, f"{name} is in {left} in {one.name} and in {right} in {two.name}; skipped"
     return left, factor, "" if factor == 1.0 else f"{name} is in {right} in {two.name}; compared in {left}"

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ...records.quantity_units import conversion_factor
 from ...results.quantity import display_unit
 from ...results.style import (
     BLUE,
@@ -19,7 +20,6 @@ from ...results.style import (
     mask_undrawable,
     open_figure,
 )
-from . import units
 from .difference import Comparison, is_string
 
 MAX_VARIABLES = 8  # the variables with the largest relative differences are drawn
@@ -42,7 +42,7 @@ def draw(comparison: Comparison, path: Path) -> None:
                 (comparison.two, {"color": ORANGE, "linestyle": "--"}),
             ):
                 values = mask_undrawable(side.columns[variable.name]) * (
-                    units.comparison_factor(side.units[variable.name], variable.unit) or 1.0
+                    conversion_factor(side.units[variable.name], variable.unit) or 1.0
                 )
                 values_axes.plot(side.time, values / size, label=f"{side.name} ", **style)
             values_axes.set_ylabel(axis_label(variable.name, unit))
