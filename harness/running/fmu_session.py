@@ -10,10 +10,10 @@ from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, redirect_stderr, suppress
 from ctypes import byref, c_bool, c_double, c_int, c_uint, c_void_p
-from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any
+from weakref import WeakValueDictionary
 
 from fmpy import fmi2
 from fmpy.fmi1 import FMICallException as FMICallException  # re-exported for adapters
@@ -25,7 +25,6 @@ from ..errors import HarnessError, first_line
 WARNING, DISCARD = 1, 2  # of the statuses; any status above a warning is a failure
 STATUS_NAMES = ("OK", "Warning", "Discard", "Error", "Fatal", "Pending")
 MAX_MESSAGES = 50  # log messages that are kept
-MESSAGES: deque[tuple[int, str]] = deque(maxlen=MAX_MESSAGES)  # log messages as (status, text), of all instances
 
 
 class StepError(Exception):
@@ -47,22 +46,27 @@ class StepRefusedError(StepError):
 CALL_FAILURES = (FMICallException, StepError)
 
 
-@dataclass(frozen=True)
 class LogCapture:
-    """Log messages of the FMU, and its standard error if that is captured."""
+    """Log messages of an FMU, and its standard error if that is captured."""
 
-    stderr: io.StringIO | None = None
+    def __init__(self, stderr: io.StringIO | None = None) -> None:
+        self.stderr = stderr
+        self.messages: deque[tuple[int, str]] = deque(maxlen=MAX_MESSAGES)  # (status, text)
+
+    def add(self, status: int, text: bytes | None) -> None:
+        """Store a message."""
+        self.messages.append((status, (text or b"").decode("utf-8", "replace")))
 
     @property
     def error_message(self) -> str:
         """Return the last message above a warning, or the last line on standard error, in one line; empty if none."""
-        logged = [text for status, text in MESSAGES if status > WARNING and text.strip()]
+        logged = [text for status, text in self.messages if status > WARNING and text.strip()]
         printed = self.stderr.getvalue().strip().splitlines() if self.stderr else []
         return " ".join((logged or printed or [""])[-1].split())
 
     def clear(self) -> None:
         """Discard all messages."""
-        MESSAGES.clear()
+        self.messages.clear()
         if self.stderr:
             self.stderr.seek(self.stderr.truncate(0))
 
@@ -123,8 +127,11 @@ class FmuSession:
                 modelIdentifier=self.interface.modelIdentifier,
                 instanceName=name,
             )
-            logger = {"callbacks": shared_callbacks()} if self.is_fmi2 else {"logMessage": log_fmi3_message}
-            fmu.instantiate(loggingOn=True, **logger)
+            log = self.log
+            if self.is_fmi2:
+                fmu.instantiate(loggingOn=True, callbacks=fmi2_callbacks(log))
+            else:
+                fmu.instantiate(loggingOn=True, logMessage=lambda where, status, category, text: log.add(status, text))
         except Exception as error:  # fmpy raises bare Exceptions
             hint = "; it needs the tool that made it (needsExecutionTool)" if self.interface.needsExecutionTool else ""
             raise HarnessError(f"{first_line(error).replace(f'{folder}{os.sep}', '')}{hint}") from None
@@ -312,24 +319,35 @@ def set_variable(fmu: Any, description: Any, variable: Any, value: Any) -> None:
     setter([variable.valueReference], value if isinstance(value, list) else [value])
 
 
+LOGS: WeakValueDictionary[int, LogCapture] = WeakValueDictionary()  # by the environment of an instance of FMI 2.0
+
+
+def log_fmi2_message(environment: int | None, name: bytes, status: int, category: bytes, text: bytes) -> None:
+    """Store a log message of FMI 2.0; in the last log if the FMU does not pass its environment on."""
+    log = LOGS.get(environment or 0) or LOGS.get(max(LOGS, default=0))
+    if log is not None:
+        log.add(status, text)
+
+
 @cache
-def shared_callbacks() -> fmi2.fmi2CallbackFunctions:
-    """Return the callbacks of FMI 2.0. They are created once: fmpy's logger proxy always calls the last logger."""
-
-    def log_message(environment: Any, name: bytes, status: int, category: bytes, text: bytes) -> None:
-        MESSAGES.append((status, text.decode("utf-8", "replace")))
-
+def shared_logger() -> Any:
+    """Return the logger of FMI 2.0 with fmpy's proxy. It is created once: the proxy always calls the last logger."""
     functions = fmi2.fmi2CallbackFunctions()
-    functions.logger = fmi2.fmi2CallbackLoggerTYPE(log_message)
-    functions.allocateMemory = fmi2.fmi2CallbackAllocateMemoryTYPE(fmi2.calloc)
-    functions.freeMemory = fmi2.fmi2CallbackFreeMemoryTYPE(fmi2.free)
+    functions.logger = fmi2.fmi2CallbackLoggerTYPE(log_fmi2_message)
     fmi2.addLoggerProxy(byref(functions))
     return functions
 
 
-def log_fmi3_message(environment: Any, status: int, category: bytes, text: bytes) -> None:
-    """Store a log message of FMI 3.0."""
-    MESSAGES.append((status, (text or b"").decode("utf-8", "replace")))
+def fmi2_callbacks(log: LogCapture) -> fmi2.fmi2CallbackFunctions:
+    """Return the callbacks of an instance of FMI 2.0, which must live as long as the instance."""
+    environment = max(LOGS, default=0) + 1
+    LOGS[environment] = log
+    functions = fmi2.fmi2CallbackFunctions()
+    functions.logger = shared_logger().logger
+    functions.allocateMemory = fmi2.fmi2CallbackAllocateMemoryTYPE(fmi2.calloc)
+    functions.freeMemory = fmi2.fmi2CallbackFreeMemoryTYPE(fmi2.free)
+    functions.componentEnvironment = environment
+    return functions
 
 
 @contextmanager

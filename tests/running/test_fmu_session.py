@@ -1,0 +1,31 @@
+"""Sessions of one process do not share their log."""
+
+from contextlib import suppress
+
+import fmi3_fixtures
+import pytest
+
+from harness.running.fmu_session import CALL_FAILURES
+from harness.running.own_fmu import open_session
+from harness.scenes.run_spec import RunSpec
+
+
+def check_logs(folder):
+    """Refuse a value in one of two sessions."""
+    spec = RunSpec(folder / "coulomb.fmu")
+    with open_session(spec) as one, open_session(spec) as other:
+        with suppress(*CALL_FAILURES):
+            one.set(one.variables["m"], -1.0)
+            one.initialize([], 0.0, 1.0)
+            one.step(0.0, 0.1)
+        assert one.log.error_message.startswith("m = -1.0 kg is refused")
+        assert list(other.log.messages) == []
+
+
+def test_a_message_is_in_the_log_of_its_session(backend_fmus):
+    check_logs(backend_fmus)
+
+
+@pytest.mark.slow
+def test_a_message_of_fmi3_is_in_the_log_of_its_session():
+    check_logs(fmi3_fixtures.build_fmi3_fmus())
