@@ -262,12 +262,11 @@ class IsolatedRun:
         """Return the outputs, or None if the FMU refuses the values, crashes or is too slow."""
         inputs = {name: self.store(column) for name, column in request.inputs.items()}
         run = {**vars(request), "t": self.store(request.t), "inputs": inputs}
-        results = self.folder / "y.npy"
         try:
-            has_results = self.process.ask({**self.instance, "run": run, "results": results}, self.timeout)
+            results = self.process.ask({**self.instance, "run": run, "folder": self.folder}, self.timeout)
         except ChildError:
             return None
-        return np.load(results) if has_results else None
+        return np.load(results) if results else None
 
     def close(self) -> None:
         """End the child process."""

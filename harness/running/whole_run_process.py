@@ -23,18 +23,26 @@ def load_array(path: str) -> np.ndarray:
     return array
 
 
+@lru_cache(MAX_PREPARED)
+def open_results(folder: str, shape: tuple[int, ...]) -> np.memmap:
+    """Return an array in a file, which the results of a shape share."""
+    return np.lib.format.open_memmap(f"{folder}/y{shape}.npy", "w+", float, shape)
+
+
 def run_request(
-    fmu: str, settings: dict[str, Any], limit: float, run: dict[str, Any] | None, results: str = ""
-) -> bool:
-    """Run an FMU, or load it if there is no run, and return whether the results were written."""
+    fmu: str, settings: dict[str, Any], limit: float, run: dict[str, Any] | None, folder: str = ""
+) -> str | None:
+    """Run an FMU, or load it if there is no run; return the file of the results, None if there are none."""
     instance = open_run(fmu, tuple(settings.items()), limit)
     if run is None:
-        return False
+        return None
     inputs = {name: load_array(path) for name, path in run["inputs"].items()}
     y = instance.run(RunRequest(**{**run, "t": load_array(run["t"]), "inputs": inputs}))
-    if y is not None:
-        np.save(results, y)
-    return y is not None
+    if y is None:
+        return None
+    results = open_results(folder, y.shape)
+    results[:] = y
+    return str(results.filename)
 
 
 if __name__ == "__main__":
