@@ -45,7 +45,7 @@ OF_COMMANDS = {
     "coulomb": ("run coulomb", "results/coulomb/figure.svg"),
     "pendulum": ("run pendulum", "results/pendulum/figure.svg"),
     "coupled": ("couple two-masses", "results/coupled/two-masses/figure.svg"),
-    "precision": ("precision stickslip --quick", "results/precision/stickslip.svg"),
+    "precision": ("precision stickslip --quick", "results/precision/stickslip/figure.svg"),
     "rivals": ("rivals", "results/rivals/figure.svg"),  # needs the extra rivals
 }
 

@@ -28,8 +28,8 @@ def report(out: Path, quiet: bool, as_json: bool) -> None:
     scenes = [scene for scene in map(load_scene, shipped_scenes()) if scene.published]
     page = write_report(out, [PublishedScene(scene.name, scene.run.fmu.stem, scene.about) for scene in scenes])
     if as_json:
-        print_json({"page": str(page.path), "missing": [name for name, _ in page.missing]})
+        print_json({"page": str(page.path), "missing": [gap.name for gap in page.missing]})
     elif not quiet:
-        for name, command in page.missing:
-            click.echo(f"Missing: {name}; run `{command}`")
+        for gap in page.missing:
+            click.echo(f"Missing: {gap.name}; run `{gap.command}`")
         click.echo(f"Report in {page.path}")

@@ -11,10 +11,19 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from ..errors import HarnessError
 from ..results.provenance import HARNESS, package_version
-from .gallery import build_gallery
-from .method_choice import ACCURACIES, read_method_choices
-from .sections import PublishedScene, Section, build_sections
-from .typeset import typeset
+from ..results.summary import METHODS_TABLE, SKETCH_SIZE, MissingResult
+from .sections import (
+    COLLECTED_TABLES,
+    RUNS,
+    PublishedScene,
+    ResultItem,
+    Section,
+    build_sections,
+    collect_tables,
+    list_missing,
+    read_items,
+)
+from .typeset import is_text_column, typeset
 from .verdicts import build_verdicts
 
 FILE = "report.html"
@@ -30,16 +39,16 @@ ADVICE = (
 ENVIRONMENT = Environment(
     loader=PackageLoader(__package__, "."), autoescape=True, undefined=StrictUndefined, trim_blocks=True
 )
-ENVIRONMENT.filters["typeset"] = typeset
+ENVIRONMENT.filters |= {"typeset": typeset, "is_text_column": is_text_column}
 TEMPLATE = ENVIRONMENT.get_template("page.html")
 
 
 @dataclass(frozen=True)
 class ReportPage:
-    """Path of the written page, and the missing results: name and command of each."""
+    """Path of the written page, and the missing results."""
 
     path: Path
-    missing: tuple[tuple[str, str], ...]
+    missing: tuple[MissingResult, ...]
 
 
 def write_report(results: Path, scenes: Sequence[PublishedScene]) -> ReportPage:
@@ -50,39 +59,46 @@ def write_report(results: Path, scenes: Sequence[PublishedScene]) -> ReportPage:
     HarnessError
         If there are no results or the page cannot be written.
     """
-    page_sections = build_sections(results, scenes)
-    if not any(part.has_results or part.unreadable for section in page_sections for part in section.parts):
+    items = read_items(results)
+    if not items:
         raise HarnessError(f"no results in {results}: run `python -m harness`, or choose another --out")
+    sections = build_sections(items, scenes)
+    missing = list_missing(items, sections, scenes)
     path = results / FILE
     temporary = path.with_suffix(".new")
     try:
-        temporary.write_text(render_page(page_sections, scenes, results), encoding="utf-8", errors="replace")
+        temporary.write_text(render_page(items, sections, missing, scenes, results), encoding="utf-8", errors="replace")
         temporary.replace(path)
     except OSError as error:
         raise HarnessError(f"cannot write {path}: {error.strerror}") from None
-    return ReportPage(path, tuple(gap for section in page_sections for gap in section.missing))
+    return ReportPage(path, tuple(missing))
 
 
-def render_page(page_sections: list[Section], scenes: Sequence[PublishedScene], results: Path) -> str:
+def render_page(
+    items: Sequence[ResultItem],
+    sections: Sequence[Section],
+    missing: Sequence[MissingResult],
+    scenes: Sequence[PublishedScene],
+    results: Path,
+) -> str:
     """Return the HTML of the page. It refers to no other file, so that a copy of it is complete."""
-    sketches = build_gallery(scenes, results)
-    choices = read_method_choices(results)
+    summaries = {item.summary.title: item.summary for item in items if item.summary.sketches}
+    gallery = [(scene, summaries[scene.name].sketches) for scene in scenes if scene.name in summaries and scene.about]
     # without results of the shipped models, the page begins with the runs of the user's models
-    runs = [section for section in page_sections if section.name == "runs" and section.parts]
-    leading = [] if sketches else [replace(section, title="Runs") for section in runs]
-    following = [section for section in page_sections if section.parts and (sketches or section not in runs)]
+    leading = [] if gallery else [replace(section, title="Runs") for section in sections if section.study == RUNS]
     has_live_page = LIVE_PAGE.is_file()
     return TEMPLATE.render(
         relative_path=lambda file: Path(os.path.relpath(file, results)).as_posix(),
         embed_file=embed_file,
         leading=leading,
-        sections=following,
-        missing=[gap for section in page_sections for gap in section.missing],
-        sketches=sketches,
-        verdicts=build_verdicts(results, scenes, choices),
+        sections=[section for section in sections if gallery or section.study != RUNS],
+        missing=missing,
+        gallery=gallery,
+        sketch_size=SKETCH_SIZE,
+        verdicts=build_verdicts([item.summary for item in items]),
         advice=ADVICE,
-        accuracies=ACCURACIES,
-        choices=choices,
+        collected_tables=COLLECTED_TABLES,
+        choices=collect_tables(items, METHODS_TABLE),
         live=LIVE_PAGE.as_posix() if has_live_page else "",
         live_content=LIVE_PAGE.read_text(encoding="utf-8", errors="replace") if has_live_page else "",
         made=f"{date.today()} by {HARNESS} {package_version(HARNESS)}",

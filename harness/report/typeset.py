@@ -1,8 +1,13 @@
-"""Typesets texts of results as HTML: code and powers of ten."""
+"""Typesets texts of results as HTML: code, powers of ten, and columns of texts."""
 
 import re
 
 from markupsafe import Markup, escape
+
+from ..results.summary import SummaryTable
+
+MAX_NUMBER_LENGTH = 32  # characters of a number with its interval; longer cells are texts
+NUMBER_STARTS = (*"0123456789+-<", "nan", "not finite")
 
 POWER = re.compile(r"(?<![\w.])(\d+(?:\.\d+)?)e([+-]\d+)\b")  # a number such as 1e-06
 PERCENT, NO_BREAK = re.compile(r"(?<=\d) (?=%)"), "\N{NO-BREAK SPACE}"  # a number and its percent sign
@@ -30,3 +35,9 @@ def format_power(number: re.Match[str]) -> str:
         return "0"
     power = f"10{str(int(number[2])).translate(SUPERSCRIPTS)}"
     return power if float(number[1]) == 1 else f"{number[1]}·{power}"
+
+
+def is_text_column(table: SummaryTable, column: int) -> bool:
+    """Return whether a column has texts, which are set flush left."""
+    cells = [row[column] for row in table.rows if row[column]]
+    return not any(cell.startswith(NUMBER_STARTS) and len(cell) <= MAX_NUMBER_LENGTH for cell in cells)

@@ -24,6 +24,7 @@ from ..errors import HarnessError
 from ..process.folder_lock import create_locked_folder, lock_path
 from ..process.interrupt import defer_signals
 from .provenance import FILE, load_provenance, note_replaced_result
+from .summary import SUMMARY_FILE
 
 OVERWRITE = ContextVar("overwrite", default=False)  # whether a result of another source may be replaced
 FRESH, OLD = ".new", ".old"  # suffixes of temporary folders, after the result's name and eight characters
@@ -52,7 +53,7 @@ def replace_folder(folder: Path, own_files: Sequence[str], source: str = "") -> 
     """
     try:
         png_files = (name.replace(".svg", ".png") for name in own_files)  # figures of earlier versions
-        own_files = (*own_files, *png_files, FILE)
+        own_files = (*own_files, *png_files, FILE, SUMMARY_FILE)
         check_replaceable(folder, own_files)
         check_same_source(folder, source)
         missing = [parent for parent in folder.absolute().parents if not parent.exists()]
@@ -92,9 +93,9 @@ def check_replaceable(folder: Path, own_files: Collection[str]) -> None:
             )
 
 
-def check_same_source(folder: Path, source: str, file_name: str = FILE) -> None:
+def check_same_source(folder: Path, source: str) -> None:
     """Raise HarnessError if a result of another source exists, unless OVERWRITE is set."""
-    old = load_provenance(folder, file_name)
+    old = load_provenance(folder)
     if old.get("source", source) != source and not OVERWRITE.get():
         origin = f"`{old['command']}`" + (f", from {old['source']}" if old.get("source") else "")
         raise HarnessError(

@@ -37,7 +37,6 @@ def write_provenance(
     files: Iterable[Path],
     parameters: Parameters | None = None,
     scene: object = None,
-    name: str = FILE,
     source: str = "",
     command: str | None = None,
     run: object = None,
@@ -54,8 +53,6 @@ def write_provenance(
         Effective value and unit by name.
     scene : object, optional
         What was analysed and plotted, or the options of a study.
-    name : str
-        Name of the file.
     source : str
         Source of the result, as given on the command line.
     command : str, optional
@@ -75,7 +72,7 @@ def write_provenance(
         "run": run,
         "scene": scene,
     }
-    (folder / name).write_text(to_json(content) + "\n", encoding="utf-8")
+    (folder / FILE).write_text(to_json(content) + "\n", encoding="utf-8")
 
 
 def prefix_parameters(parts: Mapping[str, Parameters]) -> Parameters:
@@ -109,10 +106,10 @@ def package_version(package: str) -> str:
         return "not installed"
 
 
-def load_provenance(folder: Path, name: str = FILE) -> dict[str, Any]:
+def load_provenance(folder: Path) -> dict[str, Any]:
     """Return the provenance of a result; empty if there is none or it is not valid."""
     try:
-        return read_provenance(folder / name)
+        return read_provenance(folder / FILE)
     except (OSError, SceneError):
         return {}
 
@@ -204,23 +201,13 @@ def load_verified_provenance(folder: Path) -> dict[str, Any]:
     return content
 
 
-def summarize_provenance(file: Path) -> tuple[str, ...]:
-    """Return sentences about the origin of a result for readers; none without a file.
-
-    Raises
-    ------
-    SceneError
-        If the content of the file is not valid.
-    """
-    if not file.is_file():
-        return ()
-    content = read_provenance(file)
+def describe_origin(content: dict[str, Any]) -> tuple[str, ...]:
+    """Return sentences for readers about the origin of a result, from the content of its provenance."""
     files = [f"{Path(name).name} (sha256 {digest[:12]})" for name, digest in content["files"].items()]
-    versions = dict.fromkeys((HARNESS, "fmpy", "python"), "unknown") | content.get("versions", {})
-    system = content.get("platform", "an unknown platform")
-    versions_text = f"harness {versions[HARNESS]}, fmpy {versions['fmpy']}, Python {versions['python']}, {system}"
+    versions = content["versions"]
     origin = (
-        f"Made from {', '.join(files) or 'no file'} by {versions_text}, on {content['date'][:10]}: {content['command']}"
+        f"Made from {', '.join(files) or 'no file'} by harness {versions[HARNESS]}, fmpy {versions['fmpy']}, "
+        f"Python {versions['python']}, {content['platform']}, on {content['date'][:10]}: {content['command']}"
     )
     values = [format_parameter(name, **each) for name, each in content["parameters"].items()]
     return (origin, f"Parameters: {', '.join(values)}.") if values else (origin,)

@@ -10,8 +10,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import HarnessError, check_names, optional
-from ..results.files import write_csv, write_signals
-from ..results.quantity import Quantity
+from ..results.files import column_heading, write_csv, write_signals
+from ..results.quantity import Quantity, format_number
+from ..results.step_sizes import step_size_quantities
+from ..results.summary import STEPS_TABLE, Summary, SummaryTable, make_table, write_summary
 from ..scenes.run_spec import RunSpec
 from .contacts import choose_outputs, contact_of_mode
 
@@ -280,7 +282,7 @@ class Trajectory:
         return next((contact for contact in candidates if contact in self.contacts), "")
 
     def save(self, folder: str | Path) -> None:
-        """Write the trajectory, its events, its steps and its provenance into a result folder.
+        """Write the trajectory, its events, its steps, its provenance and its summary into a result folder.
 
         `load_result` reads the folder, and `simulate` repeats the run from it.
 
@@ -308,6 +310,7 @@ class Trajectory:
                 command=PYTHON_API,
                 run=self.spec,
             )
+            write_summary(fresh, summarize_run(self, Path(folder).name))
 
     def sample_at(self, times: np.ndarray, names: Sequence[str]) -> np.ndarray:
         """Return the named outputs, (n, names), at the recorded times nearest to `times` (n,) in s."""
@@ -342,3 +345,25 @@ class Trajectory:
         if self.events:
             columns = [self.events.t, *self.events.modes.values()]
             write_csv(directory / "events.csv", ["t [s]", *self.events.headings], columns)
+
+
+def summarize_run(run: Trajectory, title: str) -> Summary:
+    """Return the summary of a run without analyses."""
+    signals = {"t [s]": run.time} | {column_heading(name, run.units[name]): run.columns[name] for name in run.columns}
+    rows = ((heading, *map(format_value, column[[0, -1]].tolist())) for heading, column in signals.items())
+    tables = make_table(("", "first", "last"), rows) + summarize_steps(run, title)
+    return Summary("run", title, tables=tables, picture=f"{title}: plots of the run")
+
+
+def format_value(value: object) -> str:
+    """Return a number with five digits; anything else as it is."""
+    return format_number(value) if isinstance(value, float) else str(value)
+
+
+def summarize_steps(run: Trajectory, title: str) -> tuple[SummaryTable, ...]:
+    """Return a table with one row, the statistics of the internal steps; nothing if there are none."""
+    if run.steps is None or not len(run.steps.h):
+        return ()
+    quantities = step_size_quantities(run.steps.h, int(run.steps.rejected.sum()))
+    row = (title, *(" ".join(quantity.formatted()).strip() for quantity in quantities))
+    return make_table(("case", *(quantity.text for quantity in quantities)), (row,), STEPS_TABLE)

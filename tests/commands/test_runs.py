@@ -127,7 +127,12 @@ def test_steps_add_up_to_the_run(main_job):
 def test_a_scene_writes_only_the_files_it_requests(scene):
     done, results = scene(BASE + "grid = 0.25\nstop = 2")
     assert (done.returncode, done.stderr) == (0, "")
-    assert {path.name for path in results.iterdir()} == {"trajectory.csv", "figure.svg", "provenance.json"}
+    assert {path.name for path in results.iterdir()} == {
+        "trajectory.csv",
+        "figure.svg",
+        "provenance.json",
+        "summary.json",
+    }
     head, columns = table(results / "trajectory.csv")
     assert head == ["t [s]", "x [m]", "v [m/s]"]
     assert list(columns[0]) == [0.25 * i for i in range(9)]

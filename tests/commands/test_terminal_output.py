@@ -22,7 +22,6 @@ from fmus.packaging.model_lookup import more_model_names
 from harness.commands import commands
 from harness.errors import HarnessError
 from harness.references.models import CASES, MODELS
-from harness.report.sections import round_run_time
 from harness.report.typeset import typeset
 from harness.scenes.coupled import scene as coupled
 from harness.scenes.fmu_files import find_fmu
@@ -40,6 +39,7 @@ from harness.studies.rivals.comparison import Result as RivalResult
 from harness.studies.rivals.measures import Measures
 from harness.studies.rivals.scenes import SCENES
 from harness.studies.rivals.table import rivals_table
+from harness.studies.run.table import round_run_time
 
 WIDTH = 80
 PLAIN = {"COLUMNS": str(WIDTH), "PATH": ""}

@@ -53,8 +53,9 @@ def test_a_certified_result_has_all_states_and_precision_accepts_it(tmp_path):
     assert np.abs(table[-1, 1:] - reference_run(table[-1, 0])).max() < 1e-9
     done = commands.harness(tmp_path, "precision", "lugre.py", "--quick", blank=True)
     assert (done.returncode, done.stderr) == (0, "")
-    expected_files = {"lugre.csv", "lugre.json", "lugre.svg", "lugre.txt"}
-    assert {file.name for file in (tmp_path / "results/precision").iterdir()} == expected_files
+    assert [file.name for file in (tmp_path / "results/precision").iterdir()] == ["lugre"]
+    expected_files = {"points.csv", "figure.svg", "provenance.json", "summary.json"}
+    assert {file.name for file in (tmp_path / "results/precision/lugre").iterdir()} == expected_files
 
 
 def run(fmu, physics, changes):

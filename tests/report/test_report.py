@@ -94,11 +94,11 @@ def test_every_link_of_a_copied_report_leads_to_an_anchor_or_carries_its_file(re
 def test_text_from_results_is_escaped(report_run):
     """A name with markup is shown literally."""
     folder = report_run[0] / "results/decay/coulomb"
-    preserved = (folder / "decay.json").read_text()
-    (folder / "decay.json").write_text(preserved.replace('"record": "coulomb"', '"record": "<b>bold"'))
+    preserved = (folder / "summary.json").read_text()
+    (folder / "summary.json").write_text(preserved.replace('"title": "coulomb"', '"title": "<b>bold"'))
     assert harness(report_run[0], "report", "--quiet").returncode == 0
     assert "&lt;b&gt;bold" in (report_run[0] / "results/report.html").read_text()
-    (folder / "decay.json").write_text(preserved)
+    (folder / "summary.json").write_text(preserved)
     assert harness(report_run[0], "report", "--quiet").returncode == 0
 
 

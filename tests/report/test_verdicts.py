@@ -1,84 +1,109 @@
-"""What the report concludes from stored results: verdicts, the table of methods, and what it shows first."""
+"""What the studies conclude and the report shows: verdicts, the table of methods, and what comes first."""
 
 import re
-from dataclasses import astuple
+from dataclasses import replace
 from math import nan
+from types import SimpleNamespace
 
 import pytest
 
-from harness.report.method_choice import SolverPoint, choose_method, read_method_choices
+from harness.references.models import CASES
 from harness.report.page import write_report
-from harness.report.sections import PublishedScene
 from harness.report.typeset import typeset
 from harness.report.verdicts import build_verdicts
-from harness.results.files import to_json, write_csv_rows
-from harness.studies.precision.study import FMPY, FMU, Point
-from harness.studies.precision.survey import csv_headings, write_table
-from harness.studies.stability.study import write_table as write_stability
+from harness.results.provenance import write_provenance
+from harness.results.summary import Summary, write_summary
+from harness.studies.bench.benchmark import Baseline, Benchmark
+from harness.studies.bench.table import summarize_benchmarks
+from harness.studies.precision.method_choice import choose_method, tabulate_choices
+from harness.studies.precision.study import FMPY, FMU, QUICK, Point, Study
+from harness.studies.run.table import judge_deviations
+from harness.studies.stability.table import summarize_outcomes
 
-QUANTITIES = ["", "measured", "unit", "published (elsewhere)", "difference"]
-SCENES = [PublishedScene(name, "sled", "") for name in ("sled", "sled-rough")]
-
-
-def write_precision(results, points, source="", values=None):
-    """Write the points of a study of the model sled, as the command precision does."""
-    folder = results / "precision"
-    folder.mkdir(parents=True)
-    cases = {point.case: (values or {}).get(point.case, {}) for point in points}
-    (folder / "sled.json").write_text(to_json({"source": source, "scene": cases}))
-    write_table(folder / "sled.csv", csv_headings(Point), map(astuple, points))
+CASE = {case.name: case for case in CASES}
 
 
-def write_quantities(results, case, *rows):
-    (results / case).mkdir(parents=True)
-    write_csv_rows(results / case / "quantities.csv", QUANTITIES, rows)
+def summarize(study, title, outcome):
+    return Summary(study, title, outcome=outcome)
 
 
-def write_stability_outcomes(results, *outcomes):
-    """Write stability.csv with the headings of the command and a line for each outcome."""
-    file = results / "stability/stability.csv"
-    file.parent.mkdir(parents=True)
-    write_stability([], file)
-    lines = [f"sled,scene {i},ode23,finished,{outcome},,,,,,,,it `fell` over" for i, outcome in enumerate(outcomes)]
-    with file.open("a") as text:
-        text.write("\n".join([*lines, ""]))
+def published(title, *rows, **parameters):
+    """The summary of a published case with rows of quantities: name and difference."""
+    run = SimpleNamespace(parameters=parameters)
+    cells = [(name, "1", "", "1", difference) for name, difference in rows]
+    return summarize("run", title, judge_deviations(cells, run))
 
 
-def point(tool, method, seconds, error, case="sled", **others):
+def summarize_stability(*endings):
+    """The summary of a stability study with an outcome for each ending."""
+    return summarize_outcomes(
+        [
+            SimpleNamespace(
+                case=SimpleNamespace(name="sled", title=f"scene {i}", method="ode23"),
+                ended=ending,
+                text="it `fell` over",
+            )
+            for i, ending in enumerate(endings)
+        ]
+    )
+
+
+def make_point(method, seconds, error, tool=FMU, case="stickslip", **others):
     return Point(case, tool, method, 1e-6, 1e-9, seconds=seconds, evaluations=1, largest=error, **others)
 
 
-def test_the_verdicts_are_the_number_reproduced_the_fastest_methods_and_the_cases_passed(tmp_path):
-    write_quantities(tmp_path, "sled", ("period", 3.3, "s", 3.3, "+0.5 %"), ("peak", 0.4, "m", 0.41, "-2 %"))
-    write_quantities(tmp_path, "sled-rough", ("steps", 5, "", 10, "-50 %"), ("run time", 8, "ms", 9, "other CPU"))
-    write_precision(tmp_path, [point(FMU, "exact", 1e-3, 1e-14), point(FMU, "ode23", 2e-3, 1e-7)])
-    write_stability_outcomes(tmp_path, "finished", "refused", "wrong")
-    published, methods, stability = build_verdicts(tmp_path, SCENES, read_method_choices(tmp_path))
-    assert (published.value, published.is_good) == ("1 of 2", False)
-    assert published.details == (
+def make_study(*points, cases=("stickslip",)):
+    return Study("stickslip", tuple(CASE[name] for name in cases), points)
+
+
+def report_on(tmp_path, summary):
+    """The page of one result."""
+    folder = tmp_path / summary.study
+    folder.mkdir()
+    write_provenance(folder, [])
+    write_summary(folder, summary)
+    return write_report(tmp_path, []).path.read_text(encoding="utf-8")
+
+
+def test_the_verdicts_are_the_number_reproduced_the_fastest_methods_and_the_cases_passed():
+    summaries = [
+        published("sled", ("period", "+0.5 %"), ("peak", "-2 %")),
+        published("sled-rough", ("steps", "-50 %"), ("run time", "other CPU")),
+        summarize("precision", "sled", tabulate_choices(make_study(*POINTS), 0.0)[1]),
+        summarize_stability("finished", "refused", "wrong"),
+    ]
+    reproduced, methods, stability = build_verdicts(summaries)
+    assert (reproduced.value, reproduced.is_good) == ("1 of 2", False)
+    assert reproduced.details == (
         "sled-rough: steps differs by -50 %",
-        "worst deviation of the others: -2 %, peak of sled",
+        "largest deviation of the others: sled: peak differs by -2 %",
     )
     assert methods.details == ("sled: exact",)
     assert (stability.value, stability.is_good, stability.details) == ("2 of 3", False, ("1 failed",))
 
 
-def test_a_model_without_an_accurate_method_says_that_none_of_the_measured_ones_reached_the_accuracy(tmp_path):
-    write_precision(tmp_path, [point(FMU, "ode23", 1e-3, 2e-6), point(FMU, "rodas", 1e-3, 5e-6)], source="a quick run")
-    (methods,) = build_verdicts(tmp_path, [], read_method_choices(tmp_path))
+def test_a_law_that_chatters_is_the_reason_why_its_steps_differ_but_not_its_period():
+    outcomes = [published("sled", (name, "+40 %"), friction="sign").outcome for name in ("mean step", "period")]
+    assert outcomes[0].text == "mean step differs by +40 %; its friction chatters, so its steps depend on rounding"
+    assert outcomes[1].text == "period differs by +40 %"
+
+
+def test_a_model_without_an_accurate_method_says_that_none_of_the_measured_ones_reached_the_accuracy():
+    study = make_study(make_point("ode23", 1e-3, 2e-6), make_point("rodas", 1e-3, 5e-6))
+    (methods,) = build_verdicts([summarize("precision", "sled", tabulate_choices(study, QUICK.min_ratio)[1])])
     assert methods.details == ("sled: none of the measured methods reached it",)
 
 
-def test_without_results_there_is_no_verdict(tmp_path):
-    assert build_verdicts(tmp_path, SCENES, read_method_choices(tmp_path)) == []
+def test_without_results_there_is_no_verdict():
+    assert build_verdicts([]) == []
 
 
 POINTS = [
-    SolverPoint(FMU, "exact", 1e-3, 1e-14),
-    SolverPoint(FMU, "ode23", 4e-3, 1e-7),
-    SolverPoint("scipy", "LSODA", 2.6e-3, 1e-4),
+    make_point("exact", 1e-3, 1e-14),
+    make_point("ode23", 4e-3, 1e-7),
+    make_point("LSODA", 2.6e-3, 1e-4, "scipy"),
 ]
-CLOSE = [POINTS[1], SolverPoint(FMU, "rodas", 5e-3, 1e-8)]
+CLOSE = [POINTS[1], make_point("rodas", 5e-3, 1e-8)]
 
 
 @pytest.mark.parametrize(
@@ -89,48 +114,50 @@ CLOSE = [POINTS[1], SolverPoint(FMU, "rodas", 5e-3, 1e-8)]
         (POINTS, 1e-9, False, "exact", ("1 ms", "no other solver reaches it")),
         (POINTS[1:], 1e-3, False, "ode23", ("4 ms", "scipy LSODA is 1.5 times faster")),
         (POINTS[1:], 1e-3, True, "ode23", ("4 ms", "scipy LSODA is 1.5 times faster")),
-        (
-            [*POINTS[1:2], SolverPoint(FMU, "rodas", 5e-3, 1e-8)],
-            1e-6,
-            False,
-            "ode23",
-            ("4 ms", "1.2 times faster than rodas"),
-        ),
-        (
-            [*POINTS[1:2], SolverPoint(FMU, "rodas", 5e-3, 1e-8)],
-            1e-6,
-            True,
-            "ode23",
-            ("4 ms", "rodas is about as fast (quick run)"),
-        ),
+        (CLOSE, 1e-6, False, "ode23", ("4 ms", "1.2 times faster than rodas")),
+        (CLOSE, 1e-6, True, "ode23", ("4 ms", "rodas is about as fast (quick run)")),
         (POINTS[1:], 1e-9, False, "", ("none of the measured methods", "smallest error: 1e-07, with ode23")),
         (POINTS[2:], 1e-3, False, "", ("no method has been measured successfully",)),
     ],
 )
 def test_a_method_is_chosen_by_time_and_compared_with_the_runner_up(points, accuracy, is_quick, method, notes):
-    choice = choose_method(points, accuracy, is_quick)
-    assert (choice.method, choice.notes) == (method, notes)
+    ratio = QUICK.min_ratio if is_quick else 0.0
+    assert choose_method(make_study(*points), CASE["stickslip"], accuracy, ratio) == (method, *notes)
 
 
-def test_failed_runs_and_importers_are_not_compared_and_a_chattering_law_with_true_sticking(tmp_path):
-    points = [
-        point(FMU, "ode23", 3e-3, 1e-7),
-        point(FMPY, "ode23", 1e-3, 1e-7),
-        point(FMU, "rodas", nan, nan, failure="too slow"),
-        point(FMU, "ode23", 1e-3, 1e-7, case="sled-sign", beside_dry=0.02),
-    ]
-    write_precision(tmp_path, points, values={"sled-sign": {"friction": 2}})
-    sled, sign = read_method_choices(tmp_path)
-    assert [choice.notes for choice in sled.choices[:2]] == [("3 ms", "no other solver reaches it")] * 2
-    assert [choice.notes for choice in sign.choices] == [
-        ("none of the measured methods", "smallest error: 0.02, with ode23")
-    ] * 3
-    assert [sled.is_chattering, sign.is_chattering] == [False, True]
+def test_failed_runs_and_importers_are_not_compared_and_a_chattering_law_with_true_sticking():
+    study = make_study(
+        make_point("ode23", 3e-3, 1e-7),
+        make_point("ode23", 1e-3, 1e-7, FMPY),
+        make_point("rodas", nan, nan, failure="too slow"),
+        make_point("ode23", 1e-3, 1e-7, case="stickslip-threshold", beside_dry=0.02),
+        cases=("stickslip", "stickslip-threshold"),
+    )
+    ((table,), outcome) = tabulate_choices(study, 0.0)
+    hybrid, threshold = table.rows
+    assert hybrid[:3] == ("stickslip", *["ode23\n3 ms\nno other solver reaches it"] * 2)
+    assert threshold[0] == "stickslip-threshold\nerror against true stick and slip"
+    assert threshold[1:] == ("\nnone of the measured methods\nsmallest error: 0.02, with ode23",) * 3
+    assert outcome.value == "ode23"
+
+
+def test_the_table_of_methods_has_the_rows_of_all_models(tmp_path):
+    tables, outcome = tabulate_choices(make_study(*POINTS), QUICK.min_ratio)
+    for model in ("one", "two"):
+        folder = tmp_path / "precision" / model
+        folder.mkdir(parents=True)
+        write_provenance(folder, [])
+        rows = tuple((f"{model}\nquick run", *row[1:]) for row in tables[0].rows)
+        write_summary(folder, Summary("precision", model, tables=(replace(tables[0], rows=rows),), outcome=outcome))
+    page = write_report(tmp_path, []).path.read_text(encoding="utf-8")
+    (table,) = re.findall(r'<table class="choices">.*?</table>', page, re.S)
+    cells = [re.findall("<p[^>]*>([^<]*)</p>", cell) for cell in re.findall(r"<t[dh][^>]*>(.*?)</t[dh]>", table, re.S)]
+    assert cells[4:6] == [["one", "quick run"], ["exact", "1 ms", "2.6 times faster than scipy LSODA"]]
+    assert cells[8] == ["two", "quick run"]
 
 
 def test_failed_stability_cases_are_shown_first_with_their_reason(tmp_path):
-    write_stability_outcomes(tmp_path, "finished", "wrong")
-    page = write_report(tmp_path, []).path.read_text(encoding="utf-8")
+    page = report_on(tmp_path, summarize_stability("finished", "wrong"))
     part = page[page.index('<section id="stability">') :]
     assert part.index("1 of 2 stiff") < part.index("scene 1") < part.index("it <code>fell</code> over")
     assert part.index("it <code>fell</code> over") < part.index("Number of outcomes")
@@ -138,16 +165,12 @@ def test_failed_stability_cases_are_shown_first_with_their_reason(tmp_path):
 
 
 def test_missed_benchmarks_are_shown_and_others_folded(tmp_path):
-    (tmp_path / "bench").mkdir()
-    heads = ["benchmark", "measured", "unit", "target", "met", "baseline", "baseline value"]
-    rows = [
-        ("fast", 0.0012345, "s", 0.00125, True, "a peer", 1.5),
-        ("slow", 0.0034567, "s", 0.00125, False, "a peer", 1.5678),
-        ("slow", 0.0034567, "s", 0.00125, False, "another", 2.5),
-        ("skipped", "nan", "1", "nan", False, "not found: a tool", ""),
+    benchmarks = [
+        Benchmark("fast", 0.0012345, "s", 0.00125, (Baseline("a peer", 1.5),)),
+        Benchmark("slow", 0.0034567, "s", 0.00125, (Baseline("a peer", 1.5678), Baseline("another", 2.5))),
+        Benchmark("skipped", nan, "1", nan, (Baseline("not found: a tool"),)),
     ]
-    write_csv_rows(tmp_path / "bench/bench.csv", heads, rows)
-    page = write_report(tmp_path, []).path.read_text(encoding="utf-8")
+    page = report_on(tmp_path, summarize_benchmarks(benchmarks))
     parts = re.split("<summary>(?:Targets that are met|Not measured)</summary>", page[page.index("1 of 2 targets") :])
     shown, met, skipped = (re.findall(r"<td[^>]*>([^<]*)<", part) for part in parts)
     assert shown == ["slow", "0.0035", "0.00125", "s", "a peer 1.6; another 2.5"]

@@ -18,7 +18,7 @@ from models import MODELS
 from harness import load_result
 from harness.errors import HarnessError
 from harness.results.folder import replace_folder
-from harness.results.provenance import summarize_provenance
+from harness.results.summary import read_summary
 from harness.running.resolve import resolve
 from harness.scenes.scene import shipped_scenes
 from harness.studies.run.study import FILES
@@ -123,24 +123,25 @@ def test_the_report_shows_every_run(workspace):
     assert "mine: plots of the run" in page
 
 
-def test_a_damaged_provenance_file_is_reported_in_the_page(workspace, first_run):
-    damaged = ("", "[]", "{}", '{"files": 1}', '{"files": {}, "versions": {}}')
+def test_a_damaged_summary_is_reported_in_the_page(workspace, first_run):
+    damaged = ("", "[]", "{}", '{"version": 1}', '{"version": 1, "study": "run", "title": "smd", "files": 1}')
     for model, content in zip(MODELS, damaged, strict=True):
         shutil.copytree(first_run / "results/smd", workspace / "results" / model)
-        (workspace / "results" / model / "provenance.json").write_text(content)
+        (workspace / "results" / model / "summary.json").write_text(content)
     done = harness(workspace, "report")
     assert (done.returncode, done.stderr) == (0, "")
     page = (workspace / "results/report.html").read_text()
     assert [model for model in MODELS if f"results/{model} cannot be shown" not in page] == []
+    assert page.count("run <code>python -m harness run smd</code> again") == len(MODELS)
 
 
 def files(folder):
-    """Return the files of a result, except the provenance (which has a date) and the quantities (which have a run
-    time)."""
+    """Return the files of a result, except the provenance and the summary (which have a date) and the quantities (which
+    have a run time)."""
     return {
         path.name: path.read_bytes()
         for path in folder.iterdir()
-        if path.name not in ("provenance.json", "quantities.csv")
+        if path.name not in ("provenance.json", "summary.json", "quantities.csv")
     }
 
 
@@ -322,7 +323,7 @@ def test_a_new_result_never_depends_on_the_provenance_of_an_old_one(tmp_path, fi
     shutil.copytree(new, old)
     for text in (DEEP, *altered_files(read_provenance(new))):
         (old / "provenance.json").write_text(text)
-        for read in (load_result, resolve, lambda folder: summarize_provenance(folder / "provenance.json")):
+        for read in (load_result, resolve, read_summary):
             with suppress(HarnessError):
                 read(old)
         with replace_folder(old, FILES, read_source(text)) as folder:

@@ -69,7 +69,7 @@ def test_two_fmus_differ_as_their_closed_forms_do(harness, external_fmu_folder, 
     assert x["largest"] == pytest.approx(off.max(), rel=1e-2)
     assert x["rms"] == pytest.approx(np.sqrt(np.mean(off * off)), rel=1e-2)
     folder = tmp_path / "results/compare/Midpoint-Other"
-    assert {file.name for file in folder.iterdir()} == {"compare.json", "figure.svg", "provenance.json"}
+    assert {file.name for file in folder.iterdir()} == {"compare.json", "figure.svg", "provenance.json", "summary.json"}
     assert harness("compare", *arguments, "--within", 0.1, "--quiet").returncode == 0
     done = harness("compare", *arguments, "--within", 0.01, "--quiet")
     assert (done.returncode, done.stdout) == (1, "")

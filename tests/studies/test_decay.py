@@ -87,7 +87,7 @@ def test_a_scene_writes_quantities_turning_points_fit_and_figure(fmus, tmp_path)
     assert (done.returncode, done.stderr) == (0, "")
     assert "Best described by dry friction" in done.stdout
     folder = tmp_path / "results/decay/coulomb"
-    files = {"decay.json", "turning-points.csv", "fit.csv", "figure.svg", "provenance.json"}
+    files = {"decay.json", "turning-points.csv", "fit.csv", "figure.svg", "provenance.json", "summary.json"}
     assert {file.name for file in folder.iterdir()} == files
     estimates = {item["name"]: item for item in json.loads((folder / "decay.json").read_text())["fit"]}
     assert estimates["f"]["value"] == pytest.approx(0.5, rel=1e-9)

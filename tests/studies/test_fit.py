@@ -203,7 +203,13 @@ def test_the_command_writes_what_it_prints(tmp_path):
     folder = tmp_path / "results" / "fit" / "pull"
     stored = json.loads((folder / "fit.json").read_text())
     assert stored == printed
-    assert {file.name for file in folder.iterdir()} == {"fit.json", "fit.csv", "figure.svg", "provenance.json"}
+    assert {file.name for file in folder.iterdir()} == {
+        "fit.json",
+        "fit.csv",
+        "figure.svg",
+        "provenance.json",
+        "summary.json",
+    }
     estimates = {each["name"]: each for each in stored["fit"]}
     assert {"value", "error", "low", "high", "unit"} <= {*estimates["k"]}
     assert estimates["k"]["low"] < 900.0 < estimates["k"]["high"]

@@ -203,9 +203,9 @@ def test_no_advice_is_given_without_sufficient_evidence():
 
 def test_a_quick_run_does_not_replace_a_full_one(user_folder, tmp_path, monkeypatch):
     monkeypatch.chdir(user_folder)
-    folder = tmp_path / "precision"
-    folder.mkdir()
-    write_provenance(folder, [], name="smd.json")
+    folder = tmp_path / "precision/smd"
+    folder.mkdir(parents=True)
+    write_provenance(folder, [])
     with pytest.raises(HarnessError, match="choose another --out, or replace it with --overwrite"):
         run_survey(["smd"], QUICK, tmp_path, print)
 

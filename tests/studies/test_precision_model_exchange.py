@@ -154,7 +154,7 @@ def two_studies(both, fmus, tmp_path_factory):
     """Two studies of smd with the report: with its FMI 3.0 FMU, and without it.
 
     The second one is of the model file, leaves out peers, and keeps results of another model. Returns the output of
-    each study (the second as JSON), the files of the first, the pages, and the folder of the second.
+    each study (the second as JSON), the tables of the first, the pages, and the folder of all studies.
     """
     (out, without), outputs, pages, files = map(tmp_path_factory.mktemp, ("out", "without")), [], [], {}
     (without / "fmus").symlink_to(fmus)
@@ -162,10 +162,11 @@ def two_studies(both, fmus, tmp_path_factory):
         done = harness(folder, *words, "--quick", "--out", out)  # --json before any command
         assert (done.returncode, done.stderr) == (0, "")
         outputs.append(done.stdout)
-        files = files or {file.name: file.read_text() for file in (out / "precision").glob("*.csv")}
+        files = files or {file.name: file.read_text() for file in (out / "precision/smd").glob("*.csv")}
         assert harness(folder, "report", "--quiet", "--out", out).returncode == 0
         pages.append(unescape((out / "report.html").read_text(encoding="utf-8")))
-        (out / "precision/pendulum.txt").write_text("older")
+        (out / "precision/pendulum").mkdir(exist_ok=True)
+        (out / "precision/pendulum/points.csv").write_text("older")
     return outputs, files, pages, out / "precision"
 
 
@@ -173,14 +174,14 @@ def test_the_command_shows_both_interfaces_and_error_against_tolerance(two_studi
     (output, _), files, *_ = two_studies
     assert "  FMI 3.0 CS: exact  " in output
     assert "  FMI 3.0 ME: fmpy's CVode  " in output
-    rows = [row for row in csv.DictReader(files["smd.csv"].splitlines()) if row["tool"] in (CS, ME)]
+    rows = [row for row in csv.DictReader(files["points.csv"].splitlines()) if row["tool"] in (CS, ME)]
     assert [(row["case"], row["tool"], row["rtol [1]"]) for row in rows] == [
         ("smd", CS, ""),
         *(("smd", ME, rtol) for rtol in ("0.001", "1e-06", "1e-09")),
     ]
     for row in rows:  # on a loaded machine the tightest one may exceed the time limit of --quick, and is reported
         assert "run time" in row["failure"] if row["failure"] else float(row["seconds [s]"]) > 0
-    heads, *table = csv.reader(files["smd-exchange.csv"].splitlines())
+    heads, *table = csv.reader(files["model-exchange.csv"].splitlines())
     assert heads == ["model exchange by fmpy's CVode: largest error at rtol [1]", "smd [1]"]
     assert table == [[row["rtol [1]"], row["largest [1]"]] for row in rows[1:]]
     printed = output.partition("FMI 3.0 model exchange with fmpy's CVode: largest error by rtol")[2]
@@ -207,10 +208,11 @@ def test_the_page_shows_error_against_tolerance_or_the_commands_that_produce_it(
 def test_the_command_writes_every_point_and_advice_and_keeps_results_of_other_models(two_studies):
     (output, incomplete), files, _, folder = two_studies
     assert "smd: use exact: " in output
-    expected_files = {"smd.csv", "smd.json", "smd.svg", "smd.txt", "anchors.csv"}
-    assert {path.name for path in folder.iterdir()} == expected_files | {"pendulum.txt"}
-    assert (folder / "pendulum.txt").read_text() == "older"
-    texts = files["smd.csv"], (folder / "smd.csv").read_text()
+    assert {path.name for path in folder.iterdir()} == {"smd", "literature", "pendulum"}
+    expected_files = {"points.csv", "figure.svg", "provenance.json", "summary.json"}
+    assert {path.name for path in (folder / "smd").iterdir()} == expected_files
+    assert (folder / "pendulum/points.csv").read_text() == "older"
+    texts = files["points.csv"], (folder / "smd/points.csv").read_text()
     rows, later = (list(csv.DictReader(text.splitlines())) for text in texts)
     tools = {FMU, FMPY, *FMI3_TOOLS, "scipy", "cvode"} - peer_solvers.missing_packages().keys()
     assert {row["tool"] for row in rows} == tools

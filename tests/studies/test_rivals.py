@@ -193,7 +193,7 @@ def test_the_command_writes_a_table_a_figure_and_the_gaps(user_folder, tmp_path,
     words = " ".join(done.stdout.split())  # long lines are wrapped
     assert "Exact to 1e-09 in every scene, without missed or spurious events: scipy (default); scipy (best);" in words
     folder = tmp_path / study.FOLDER
-    assert {file.name for file in folder.iterdir()} == {study.FILE, study.FIGURE, "provenance.json"}
+    assert {file.name for file in folder.iterdir()} == {study.FILE, study.FIGURE, "provenance.json", "summary.json"}
     rows = (folder / study.FILE).read_text().splitlines()
     assert len(rows) == 1 + 2 * 2 * len(SCENES)
     assert rows[0].startswith("scene,unit of the error,rival,version,setting,error,")

@@ -292,7 +292,7 @@ def test_a_model_without_position_and_speed_is_refused_by_stability_but_not_by_p
     assert done.stderr == f"Error: relax.py: {output}\n"
     done = commands.harness(tmp_path, "precision", "relax.py", "--quick", blank=True)
     assert (done.returncode, done.stderr) == (0, "")
-    assert (tmp_path / "results/precision/relax.csv").is_file()
+    assert (tmp_path / "results/precision/relax/points.csv").is_file()
 
 
 def test_a_hang_or_crash_is_the_outcome_of_its_case(monkeypatch):

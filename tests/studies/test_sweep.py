@@ -95,7 +95,13 @@ def test_a_map_is_labelled_for_xarray_and_pandas_for_any_number_of_workers(harne
     one, four = (sweep_folder(tmp_path / f"out{workers}", "stickslip-mu_d-v_driver") for workers in (1, 4))
     for file in ("sweep.nc", "sweep.csv"):
         assert (one / file).read_bytes() == (four / file).read_bytes()
-    assert {file.name for file in four.iterdir()} == {"sweep.nc", "sweep.csv", "figure.svg", "provenance.json"}
+    assert {file.name for file in four.iterdir()} == {
+        "sweep.nc",
+        "sweep.csv",
+        "figure.svg",
+        "provenance.json",
+        "summary.json",
+    }
     assert [file.name for file in one.parent.iterdir()] == [one.name]
     data = open_sweep(one)
     assert data["slips"].dims == ("mu_d", "v_driver")

@@ -8,9 +8,11 @@ from ...references.reference_trajectory import require_reference_packages
 from ...results.files import write_csv_rows
 from ...results.folder import replace_folder
 from ...results.provenance import prefix_parameters, write_provenance
+from ...results.summary import write_summary
 from ...running.description import declared_parameters
 from ...scenes.fmu_files import find_fmu
 from .benchmark import Benchmark
+from .table import summarize_benchmarks
 
 FOLDER, FILE = "bench", "bench.csv"
 
@@ -45,6 +47,7 @@ def run_benchmarks(
         save(results, folder / FILE)
         fmus = [fmu for fmu in map(find_fmu, MODELS) if fmu.is_file()]
         write_provenance(folder, fmus, prefix_parameters({fmu.stem: declared_parameters(fmu) for fmu in fmus}))
+        write_summary(folder, summarize_benchmarks(results))
     return results
 
 

@@ -1,4 +1,4 @@
-"""Table of the benchmarks."""
+"""Table of the benchmarks, and their summary."""
 
 from collections.abc import Iterable
 from math import isnan
@@ -7,6 +7,7 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table
 from rich.text import Text
 
+from ...results.summary import Summary, make_table
 from .benchmark import Baseline, Benchmark
 
 
@@ -43,3 +44,28 @@ def format_quantity(value: float, unit: str) -> str:
         size, name = next((s, n) for s, n in ((1.0, "s"), (1e-3, "ms"), (1e-6, "µs"), (0.0, "ns")) if value >= s)
         return f"{value / (size or 1e-9):.3g} {name}"
     return f"{value:.3g}" if unit == "1" else f"{value:.3g} {unit}"
+
+
+def summarize_benchmarks(benchmarks: Iterable[Benchmark]) -> Summary:
+    """Return the summary: the missed targets, those that are met, and what was not measured."""
+    groups: dict[str, list[tuple[str, ...]]] = {"": [], "Targets that are met": [], "Not measured": []}
+    for benchmark in benchmarks:
+        title = "Not measured" if isnan(benchmark.value) else "Targets that are met" if benchmark.is_met else ""
+        groups[title].append(summary_row(benchmark))
+    missed, met, _ = groups.values()
+    sentences = (f"{len(met)} of {len(met) + len(missed)} targets met.", *["Targets that are missed:"][: len(missed)])
+    headings = ("benchmark", "measured", "target", "unit", "baselines")
+    tables = tuple(table for title, rows in groups.items() for table in make_table(headings, rows, title))
+    return Summary("bench", "Targets and measurements", sentences, tables)
+
+
+def summary_row(benchmark: Benchmark) -> tuple[str, ...]:
+    """Return the row of a benchmark, with two digits of what was measured."""
+    measured, target = (
+        "" if isnan(value) else f"{value:{digits}}"
+        for value, digits in ((benchmark.value, ".2g"), (benchmark.target, "g"))
+    )
+    baselines = "; ".join(
+        each.name if each.value is None else f"{each.name} {each.value:.2g}" for each in benchmark.baselines
+    )
+    return benchmark.name, measured, target, "" if benchmark.unit == "1" else benchmark.unit, baselines

@@ -11,6 +11,7 @@ from rich.table import Table
 from ...results.files import to_json
 from ...results.folder import replace_folder
 from ...results.provenance import describe_sources, prefix_parameters, write_provenance
+from ...results.summary import Summary, read_cells, write_summary
 from ...running.own_fmu import ProgressCallback
 from ...scenes.run_spec import RunSpec
 from . import trajectory_sources
@@ -40,6 +41,17 @@ def run_comparison(
             values,
             options.options,
             source=describe_sources(*sources),
+        )
+        title = f"{comparison.one.name} and {comparison.two.name}"
+        write_summary(
+            new_folder,
+            Summary(
+                "compare",
+                title,
+                tuple(filter(None, (comparison.one.accuracy, comparison.two.accuracy, comparison.events))),
+                read_cells(difference_table(comparison)),
+                f"{title}, and their difference",
+            ),
         )
     return comparison, folder
 

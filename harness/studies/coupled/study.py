@@ -18,6 +18,7 @@ from ...results.files import column_heading, write_csv_rows
 from ...results.files import write_csv as write_csv
 from ...results.folder import replace_folder
 from ...results.provenance import describe_sources, write_provenance
+from ...results.summary import Summary, make_table, write_summary
 from ...running.description import read_description
 from ...running.own_fmu import ProgressCallback
 from ...scenes.coupled.scene import CoupledScene, load_coupled_scene
@@ -65,6 +66,7 @@ def run_coupled(source: str, out: Path, stop: float | None, report: ProgressCall
             write_provenance(
                 new_folder, fmus, external_archive.effective_parameters(file), settings, source=describe_sources(source)
             )
+            write_summary(new_folder, summarize_convergence(result, name))
     return result, folder
 
 
@@ -183,3 +185,11 @@ def save(result: Convergence, folder: Path) -> None:
     write_csv_rows(
         folder / "engines.csv", ["engine", *final_heads, column_heading("largest error", result.unit), "why not"], table
     )
+
+
+def summarize_convergence(result: Convergence, name: str) -> Summary:
+    """Return the summary: error over the communication step."""
+    headings = "communication step [s]", column_heading("largest error", result.unit)
+    rows = ((f"{step:g}", f"{error:.4g}") for step, error in zip(result.steps, result.errors, strict=False))
+    text = f"Coupled scene {name}: positions with the {result.reference}, and error over the communication step"
+    return Summary("coupled", name, tables=make_table(headings, rows), picture=text)

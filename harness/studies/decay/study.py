@@ -21,6 +21,8 @@ from ...records.record import Record, check_record
 from ...results import provenance
 from ...results.files import column_heading, to_json, write_csv
 from ...results.folder import replace_folder
+from ...results.summary import write_summary
+from .table import summarize_decay
 
 FOLDER = "decay"
 FILES = ("decay.json", "turning-points.csv", "fit.csv", "figure.svg")
@@ -47,6 +49,7 @@ def identify_decay(
         identified = fit_decay(record, properties, drag, drift, report)
         write_results(identified, new_folder)
         provenance.write_provenance(new_folder, **provenance_data, scene=options, source=named)
+        write_summary(new_folder, summarize_decay(identified))
     return identified, folder
 
 

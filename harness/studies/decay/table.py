@@ -1,11 +1,13 @@
-"""Terminal output of an identified decay: a table of three methods, and remarks."""
+"""An identified decay in the terminal and in its summary: a table of three methods, and remarks."""
 
+import numpy as np
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from ...analyses.decay.identification import DecayIdentification
 from ...analyses.estimation.estimate import Estimate
 from ...results.quantity import format_interval
+from ...results.summary import Summary, make_table, read_cells
 
 
 def decay_table(identified: DecayIdentification) -> Table:
@@ -27,6 +29,30 @@ def decay_table(identified: DecayIdentification) -> Table:
         unit = "" if estimate.unit == "1" else estimate.unit
         result.add_row(f"{estimate.text}, {estimate.name}", format_estimate(estimate), *cells, unit)
     return result
+
+
+def summarize_decay(identified: DecayIdentification) -> Summary:
+    """Return the summary, with a table of the combinations of losses, best first."""
+    sentence, ranked, _ = identified.sentence.partition(" (BIC ")
+    sentence += "." if ranked else ""
+    (values,) = read_cells(decay_table(identified))
+    headings = ("", "whole signal", "turning points", "first and last peak, if this loss acted alone", "unit")
+    samples, scale = len(identified.t), identified.problem.scale
+    laws = (
+        (law.description, f"{law.bic:.1f}", f"{np.sqrt(law.sum_of_squares / samples) * scale:.3g}")
+        for law in identified.laws
+    )
+    law_headings = ("losses", "BIC, smaller is better", f"rms residual [{identified.record.unit}]")
+    return Summary(
+        "decay",
+        identified.record.name,
+        (sentence, *identified.remarks),
+        (
+            *make_table(headings, values.rows),
+            *make_table(law_headings, laws, "Combinations of losses, best first"),
+        ),
+        f"Decay of {identified.record.name}: signal, turning points, envelope and fit, and residuals. {sentence}",
+    )
 
 
 def format_estimate(estimate: Estimate) -> str:

@@ -21,10 +21,12 @@ from ...records.table_files import Table, load_table
 from ...results import provenance
 from ...results.files import column_heading, to_json, write_csv
 from ...results.folder import replace_folder
+from ...results.summary import write_summary
 from ...running.native_equivalent import native_equivalent
 from ...running.whole_run import open_simulator
 from .laws import ResolvedLaws, resolve_laws
 from .request import FitRequest, ResolvedRequest, make_unknowns, record_data
+from .table import summarize_fit
 
 FOLDER = "fit"
 FILES = ("fit.json", "fit.csv", "validation.csv", "figure.svg")
@@ -55,6 +57,7 @@ def fit_files(
         scene = {name: value for name, value in asdict(request).items() if name not in ("fmu", "columns", "against")}
         parameters = {name: (value, "") for name, value in request.fixed.items()}
         provenance.write_provenance(new_folder, files=paths, parameters=parameters, scene=scene, source=source)
+        write_summary(new_folder, summarize_fit(fit))
     return fit, folder
 
 

@@ -1,4 +1,4 @@
-"""Terminal output of a fit: a table of values, and remarks."""
+"""A fit in the terminal and in its summary: a table of values, and remarks."""
 
 from math import isfinite
 
@@ -8,6 +8,7 @@ from rich.table import Table
 from ...analyses.estimation.estimate import Estimate
 from ...analyses.fit.parameter_fit import ColumnResiduals, ParameterFit
 from ...results.quantity import format_interval
+from ...results.summary import Summary, read_cells
 
 
 def fit_table(fit: ParameterFit) -> Table:
@@ -74,3 +75,15 @@ def describe_residuals(column: ColumnResiduals, record: str) -> str:
         f"Residuals of {column.name} in {record}: {column.residual:.3g} {column.unit}".rstrip()
         + f" (noise {column.noise:.3g}, range {column.range:.3g})."
     )
+
+
+def summarize_fit(fit: ParameterFit) -> Summary:
+    """Return the summary, with a table for each law and one of their comparison."""
+    name = ", ".join(record.name for record in fit.records)
+    tables = read_cells(fit_table(fit))
+    for law in fit.against:
+        tables += read_cells(fit_table(law), f"Fit of {law.fmu}")
+    if fit.comparison:
+        tables += read_cells(comparison_table(fit), "Compared laws, best first")
+    text = f"Fit of {fit.fmu} to {name}: record, fitted signal, residuals, and profiles of the values"
+    return Summary("fit", f"{fit.fmu}: {name}", tuple(summary_lines(fit)), tables, text)

@@ -13,6 +13,7 @@ from ...process.interruptible_wait import map_in_threads
 from ...results.files import write_csv_rows
 from ...results.folder import replace_folder
 from ...results.provenance import describe_sources, prefix_parameters, write_provenance
+from ...results.summary import Summary, make_table, write_summary
 from ...running.description import declared_parameters
 from .checks import (
     CHECKS,
@@ -50,7 +51,8 @@ def run_importer_checks(find_fmus: Path, out: Path, report: Callable[[str, float
     """Check the FMUs in a folder, and write the results to out/importers/importers.csv."""
     with replace_folder(out / FOLDER, FILES, describe_sources(str(find_fmus))) as folder:
         results = run_checks(find_fmus, report)
-        save(results, folder / FILES[0])
+        headings, rows = result_rows(results)
+        write_csv_rows(folder / FILES[0], headings, rows)
         files = [find_fmus / f"{name}.fmu" for name in fmu_names(results)]
         write_provenance(
             folder,
@@ -58,6 +60,7 @@ def run_importer_checks(find_fmus: Path, out: Path, report: Callable[[str, float
             prefix_parameters({file.stem: declared_parameters(file) for file in files}),
             source=describe_sources(str(find_fmus)),
         )
+        write_summary(folder, Summary("importers", "Checks", tables=make_table(headings, rows)))
     return results
 
 
@@ -157,9 +160,9 @@ def fmu_names(results: list[CheckResult]) -> tuple[str, ...]:
     return next((row.fmus for row in results if row.fmus), ())
 
 
-def save(results: list[CheckResult], path: Path) -> None:
-    """Write the results as CSV."""
+def result_rows(results: list[CheckResult]) -> tuple[list[str], list[tuple[str, ...]]]:
+    """Return headings and rows of the results, with those of skipped tools."""
     names = fmu_names(results)
     empty_cells = ("",) * len(names)
-    rows = ((row.importer, row.check or f"skipped: {row.reason}", *(row.cells or empty_cells)) for row in results)
-    write_csv_rows(path, ["importer", "check", *names], rows)
+    rows = [(row.importer, row.check or f"skipped: {row.reason}", *(row.cells or empty_cells)) for row in results]
+    return ["importer", "check", *names], rows

@@ -16,16 +16,14 @@ QUICK_RUN_UNCLEAR = "no recommendation from a quick run; use `python -m harness 
 
 def fastest_point(curve: Iterable[Point], target: float, beside_dry: bool = False) -> Point | None:
     """Return the fastest point with an error up to the target, or None."""
-    sufficient = [
-        p for p in curve if (p.beside_dry if beside_dry and p.beside_dry is not None else p.largest) <= target
-    ]
+    sufficient = [point for point in curve if point.error(beside_dry) <= target]
     return min(sufficient, key=lambda point: point.seconds, default=None)
 
 
-def rank_solvers(study: Study, case: ReferenceCase, target: float) -> list[Point]:
+def rank_solvers(study: Study, case: ReferenceCase, target: float, beside_dry: bool = False) -> list[Point]:
     """Return the fastest point of every solver that meets the target, fastest first; runs through fmpy are excluded."""
     curves = [study.curve(case, *solver) for solver in study.solvers(case) if solver[0] not in (FMPY, *FMI3_TOOLS)]
-    points = [point for curve in curves if (point := fastest_point(curve, target))]
+    points = [point for curve in curves if (point := fastest_point(curve, target, beside_dry))]
     return sorted(points, key=lambda point: point.seconds)
 
 

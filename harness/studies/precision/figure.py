@@ -80,9 +80,7 @@ def plot_curves(axes: Axes, study: Study, case: ReferenceCase, cost: str) -> Non
         if is_duplicate or not study.curve(case, tool, method):
             continue
         points = [p for p in study.points if (p.case, p.tool, p.method) == (case.name, tool, method)]
-        errors = [
-            max(p.beside_dry if case.is_chattering and p.beside_dry is not None else p.largest, FLOOR) for p in points
-        ]
+        errors = [max(p.error(case.is_chattering), FLOOR) for p in points]
         costs = [np.nan if p.failure else getattr(p, cost) for p in points]
         if (tool, method) in labelled:
             style = LABELLED[labelled.index((tool, method))] | {"label": f"{tool}: {method}", "markersize": 5}

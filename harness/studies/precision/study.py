@@ -98,6 +98,10 @@ class Point:
     beside_dry: float | None = None
     failure: str = ""
 
+    def error(self, beside_dry: bool) -> float:
+        """Return the largest error; if `beside_dry`, that against dry friction where it is known."""
+        return self.beside_dry if beside_dry and self.beside_dry is not None else self.largest
+
 
 @dataclass(frozen=True)
 class SolverJob:

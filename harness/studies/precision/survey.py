@@ -1,25 +1,30 @@
 """Runs work-precision studies, law deviations and literature problems, and writes the results."""
 
+import re
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import ExitStack
 from dataclasses import astuple, dataclass, fields
 from functools import partial
 from math import isnan
 from pathlib import Path
-from shutil import copytree, ignore_patterns
 
-from ...references.models import CASES
+from ...references.models import CASES, MODELS
 from ...references.peer_solvers import missing_packages
 from ...results.files import column_heading, write_csv_rows
-from ...results.folder import check_same_source, replace_folder
-from ...results.provenance import write_provenance
+from ...results.folder import replace_folder
+from ...results.provenance import load_provenance, write_provenance
+from ...results.summary import MissingResult, Summary, SummaryTable, make_table, write_summary
 from ...running.description import declared_parameters
 from ...running.embedded_model import load_model_class
 from ...scenes.fmu_files import find_fmu
 from . import law_deviations, literature_problems
 from .advice import recommend
+from .method_choice import tabulate_choices
 from .study import QUICK, Point, Study, SweepSettings, study_model
 
-FOLDER = "precision"
+FOLDER, LITERATURE = "precision", "literature"
+FILES = ("points.csv", "model-exchange.csv", "laws.csv", "figure.svg")
+LITERATURE_FILE = "final-errors.csv"
 QUICK_RUN = "a quick run"  # does not replace a full run
 UNITS = {  # of columns; SI means m and m/s, or rad and rad/s
     **dict.fromkeys(("rtol", "final", "rms", "largest", "beside_dry", "asymmetry", "integration"), "1"),
@@ -28,7 +33,7 @@ UNITS = {  # of columns; SI means m and m/s, or rad and rad/s
     "creep": "m/s",
 }
 EXCHANGE_HEADING = "model exchange by fmpy's CVode: largest error at rtol [1]"
-FILE_SUFFIXES = (".csv", ".json", ".svg", ".png", ".txt", "-exchange.csv", "-laws.csv")  # earlier versions drew .png
+EXCHANGE_TABLE = "Model exchange with fmpy's CVode"
 
 
 @dataclass(frozen=True)
@@ -45,19 +50,23 @@ class PrecisionSurvey:
 def run_survey(
     models: Sequence[str], extent: SweepSettings, out: Path, report: Callable[[str, float], None]
 ) -> PrecisionSurvey:
-    """Study the models and write the results to out/precision; results of other models are kept."""
+    """Study the models and write the results to out/precision/<model>; a full run replaces a quick one."""
     files = list(map(find_fmu, models))
-    for file in files:
-        load_model_class(file)
-        if extent == QUICK:
-            check_same_source(out / FOLDER, QUICK_RUN, f"{file.stem}.json")
-    existing = [path.name for path in (out / FOLDER).glob("*") if path.name.endswith(FILE_SUFFIXES)]
-    with replace_folder(out / FOLDER, ["anchors.csv", *existing]) as folder:
-        if (out / FOLDER).exists():
-            replaced_files = ignore_patterns(*(f"{file.stem}[.-]*" for file in files))
-            copytree(out / FOLDER, folder, ignore=replaced_files, dirs_exist_ok=True)
+    with ExitStack() as stack:
+        folders = []
+        for file in files:
+            load_model_class(file)
+            folder = out / FOLDER / file.stem
+            replaced_source = QUICK_RUN if extent == QUICK else load_provenance(folder).get("source", "")
+            folders.append(stack.enter_context(replace_folder(folder, FILES, replaced_source)))
         survey_result = run_studies(models, extent, report)
-        write_results(survey_result, files, folder, QUICK_RUN if extent == QUICK else "")
+        for study, sentence, file, folder in zip(
+            survey_result.studies, survey_result.advice, files, folders, strict=True
+        ):
+            write_study(study, survey_result.deviations, sentence, file, folder, extent)
+    if survey_result.literature:
+        with replace_folder(out / FOLDER / LITERATURE, [LITERATURE_FILE]) as folder:
+            write_literature(survey_result.literature, folder)
     return survey_result
 
 
@@ -103,36 +112,73 @@ def failure_reasons(studies: Iterable[Study]) -> Iterable[str]:
     return dict.fromkeys(p.failure for study in studies for p in study.points if p.failure and isnan(p.rtol))
 
 
-def write_results(results: PrecisionSurvey, files: Sequence[Path], folder: Path, source: str) -> None:
-    """Write tables, figures and provenance for the FMUs in `files`."""
+def write_study(
+    study: Study,
+    deviations: Iterable[law_deviations.LawDeviation],
+    sentence: str,
+    file: Path,
+    folder: Path,
+    extent: SweepSettings,
+) -> None:
+    """Write tables, figure, provenance and summary of a study of the FMU in `file`, with its recommendation."""
     from .figure import draw
 
-    for study, file, sentence in zip(results.studies, files, results.advice, strict=True):
-        values = {case.name: case.values for case in study.cases}
-        write_provenance(folder, [file], declared_parameters(file), values, f"{study.model}.json", source)
-        (folder / f"{study.model}.txt").write_text(f"{sentence}\n", encoding="utf-8")
-        write_table(folder / f"{study.model}.csv", csv_headings(Point), map(astuple, study.points))
-        exchange_errors = study.exchange_errors()
-        if exchange_errors:
-            cases = next(iter(exchange_errors.values()))
-            rows = [[rtol, *errors.values()] for rtol, errors in exchange_errors.items()]
-            write_table(
-                folder / f"{study.model}-exchange.csv", [EXCHANGE_HEADING, *(f"{case} [1]" for case in cases)], rows
-            )
-        model_deviations = [law for law in results.deviations if law.model == study.model]
-        if study.model == "stickslip":
-            model_deviations += [law for law in results.deviations if law.model in law_deviations.BRISTLES]
-        draw(study, model_deviations, folder / f"{study.model}.svg")
-        if model_deviations:
-            write_table(
-                folder / f"{study.model}-laws.csv",
-                csv_headings(law_deviations.LawDeviation),
-                map(astuple, model_deviations),
-            )
-    if results.literature:
-        write_table(
-            folder / "anchors.csv", csv_headings(literature_problems.LiteratureRun), map(astuple, results.literature)
-        )
+    write_table(folder / "points.csv", csv_headings(Point), map(astuple, study.points))
+    exchange: tuple[SummaryTable, ...] = ()
+    if exchange_errors := study.exchange_errors():
+        headings = [EXCHANGE_HEADING, *(f"{case} [1]" for case in next(iter(exchange_errors.values())))]
+        rows = [[rtol, *errors.values()] for rtol, errors in exchange_errors.items()]
+        write_table(folder / "model-exchange.csv", headings, rows)
+        exchange = make_table(headings, ([f"{number:.4g}" for number in row] for row in rows), EXCHANGE_TABLE)
+    laws = {study.model, *(law_deviations.BRISTLES if study.model == "stickslip" else ())}
+    model_deviations = [law for law in deviations if law.model in laws]
+    if model_deviations:
+        headings = csv_headings(law_deviations.LawDeviation)
+        write_table(folder / "laws.csv", headings, map(astuple, model_deviations))
+    draw(study, model_deviations, folder / "figure.svg")
+    values = {case.name: case.values for case in study.cases}
+    source = QUICK_RUN if extent == QUICK else ""
+    write_provenance(folder, [file], declared_parameters(file), values, source=source)
+    choices, outcome = tabulate_choices(study, extent.min_ratio)
+    command = f"python build_fmus.py {study.model} --fmi 3 && python -m harness precision {study.model}"
+    is_incomplete = not exchange and study.model in MODELS
+    write_summary(
+        folder,
+        Summary(
+            "precision",
+            study.model,
+            split_clauses(sentence.removeprefix(f"{study.model}: ")),
+            exchange + choices,
+            f"{study.model}: run time and right-hand side evaluations over the largest error, by method",
+            outcome,
+            missing=(MissingResult(f"{study.model} in model exchange", command),) if is_incomplete else (),
+        ),
+    )
+
+
+def write_literature(runs: Sequence[literature_problems.LiteratureRun], folder: Path) -> None:
+    """Write the table of the literature problems, its provenance and its summary."""
+    headings = csv_headings(literature_problems.LiteratureRun)
+    write_table(folder / LITERATURE_FILE, headings, map(astuple, runs))
+    write_provenance(folder, [])
+    rows = (
+        [
+            "" if cell is None or cell != cell else f"{cell:.4g}" if isinstance(cell, float) else cell
+            for cell in astuple(run)
+        ]
+        for run in runs
+    )
+    write_summary(folder, Summary("precision", "Problems from the literature", tables=make_table(headings, rows)))
+
+
+def split_clauses(text: str) -> tuple[str, ...]:
+    """Split a recommendation at its semicolons, except those in parentheses, into sentences.
+
+    >>> split_clauses("use exact (1e-15; ode45 2 times); no more.")
+    ('Use exact (1e-15; ode45 2 times).', 'No more.')
+    """
+    clauses = re.split(r"; (?![^()]*\))", text.rstrip("."))
+    return tuple(f"{clause[:1].upper()}{clause[1:]}." for clause in clauses if clause)
 
 
 def csv_headings(kind: type) -> list[str]:

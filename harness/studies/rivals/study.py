@@ -9,6 +9,7 @@ from ...references.reference_trajectory import require_reference_packages
 from ...results.files import write_csv_rows
 from ...results.folder import replace_folder
 from ...results.provenance import write_provenance
+from ...results.summary import Summary, read_cells, write_summary
 from ...running.solution import Solution
 from ...scenes.fmu_files import find_fmu
 from .catalogue import Rival, find_rivals
@@ -18,6 +19,7 @@ from .figure import draw
 from .measures import measure
 from .reference_motions import compute_reference_motion
 from .scenes import SCENES
+from .table import rivals_table, sentences
 
 FOLDER, FILE, FIGURE = "rivals", "rivals.csv", "figure.svg"
 OWN_MODELS = ("coulomb", "stickslip", "belt", "clutch", "pendulum")
@@ -48,6 +50,8 @@ def run_rivals(names: tuple[str, ...], timeout: float, out: Path, report: Callab
         save(comparison, folder / FILE)
         draw(comparison, folder / FIGURE)
         write_provenance(folder, map(find_fmu, OWN_MODELS), scene=versions(comparison), source=source)
+        tables, text = read_cells(rivals_table(comparison)), "Error over processor time of each rival, by scene"
+        write_summary(folder, Summary("rivals", "Scenes", tuple(sentences(comparison)), tables, text))
     return comparison
 
 

@@ -14,13 +14,14 @@ from ...process.interrupt import check_interrupt
 from ...results.folder import replace_folder
 from ...results.provenance import describe_sources, write_provenance
 from ...results.quantity import Quantity
+from ...results.summary import write_summary
 from ...running import runner
 from ...running.contacts import choose_outputs
-from ...running.trajectory import Trajectory
+from ...running.trajectory import Trajectory, summarize_run
 from ...scenes.fmu_files import check_built
 from ...scenes.run_spec import RunSpec
 from ...scenes.scene import MAX_DEFAULT_PLOTS, Scene, default_plots, is_panel, load_scene, shipped_scenes
-from .table import SceneOutcome, write_quantities
+from .table import SceneOutcome, summarize_quantities, write_quantities
 
 FILES = (
     "trajectory.csv",
@@ -87,12 +88,19 @@ def run_and_write(scene: Scene, folder: Path, report: Callable[[float], None]) -
     write_provenance(
         folder, [scene.run.fmu], run.effective_parameters, presentation, source=scene.source, run=run_as_done
     )
+    summary = summarize_run(run, scene.name)
+    if scene.about and not run.failure:
+        from .sketch import draw_sketches
+
+        summary = replace(summary, sentences=(scene.about,), sketches=draw_sketches(run))
     if results:
         write_quantities(quantities, scene.published, folder / "quantities.csv")
+        summary = summarize_quantities(summary, quantities, scene.published, run)
     if scene.plots:
         from .figure import draw
 
         draw(scene.title, scene.plots, run, results, folder / "figure.svg", scene.published)
+    write_summary(folder, summary)
     return SceneOutcome(scene.name, scene, run, quantities, run.failure or None)
 
 
@@ -152,6 +160,7 @@ def run_fmu(wanted: RunSpec, out: Path, report: Callable[[float], None]) -> tupl
         trajectory.write_tables(new_folder)
         draw(wanted.fmu.name, choose_plots(trajectory), trajectory, {}, new_folder / "figure.svg")
         write_provenance(new_folder, [wanted.fmu], trajectory.effective_parameters, source=source, run=trajectory.spec)
+        write_summary(new_folder, summarize_run(trajectory, folder.name))
     return trajectory, folder
 
 

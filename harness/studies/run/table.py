@@ -1,7 +1,7 @@
 """Table of measured quantities and published values."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -11,10 +11,14 @@ from rich.text import Text
 
 from ...results.files import write_csv_rows
 from ...results.quantity import Quantity, format_number
+from ...results.summary import MAX_DEVIATION, STEPS_TABLE, Outcome, Summary, make_table
 from ...running.trajectory import Trajectory
 from ...scenes.scene import Scene
 
 OTHER_MACHINE = "other CPU: the published run time was measured on another machine"
+RUN_TIME = "run time"
+CHATTERING_LAWS = ("sign", "threshold")
+STEP_QUANTITIES = ("steps (time points)", "mean step")
 ALWAYS_SHOWN = ("steps", "mean_step", "run_time")  # shown for all published scenes, even without a published value
 
 
@@ -72,13 +76,52 @@ def row(quantity: Quantity, figure: object) -> tuple[str, str, str, str, str]:
     return text, measured, "" if unit == "1" else unit, published, difference
 
 
+def quantity_rows(quantities: Iterable[Quantity], published: dict[str, Any]) -> list[tuple[str, ...]]:
+    """Return description, measured value, unit, and with published values these and the differences."""
+    rows = [row(quantity, published.get(quantity.name)) for quantity in quantities]
+    return [(text.strip(), *cells)[: len(quantity_headings(published))] for text, *cells in rows]
+
+
+def quantity_headings(published: dict[str, Any]) -> list[str]:
+    """Return the headings, with the source of the published values."""
+    return ["", "measured", "unit", *([f"published ({published['source']})", "difference"] if published else ())]
+
+
 def write_quantities(quantities: Iterable[Quantity], published: dict[str, Any], path: Path) -> None:
-    """Write the quantities of a scene as CSV, with the source of the published values in the heading."""
-    rows = [
-        (text.strip(), *cells)
-        for text, *cells in (row(quantity, published.get(quantity.name)) for quantity in quantities)
-    ]
-    if not published:
-        write_csv_rows(path, ["", "measured", "unit"], (cells[:3] for cells in rows))
-        return
-    write_csv_rows(path, ["", "measured", "unit", f"published ({published['source']})", "difference"], rows)
+    """Write the quantities of a scene as CSV."""
+    write_csv_rows(path, quantity_headings(published), quantity_rows(quantities, published))
+
+
+def summarize_quantities(
+    summary: Summary, quantities: Iterable[Quantity], published: dict[str, Any], run: Trajectory
+) -> Summary:
+    """Return the summary of a run with its quantities in place of first and last values.
+
+    Those without a published value have a table of their own, unless no quantity has one.
+    """
+    headings = quantity_headings(published)
+    rows = [round_run_time(cells) for cells in quantity_rows(quantities, published)]
+    compared = [cells for cells in rows if any(cells[3:])] or rows
+    others = [cells[:3] for cells in rows if cells not in compared]
+    tables = make_table(headings, compared) + make_table(headings[:3], others, "Quantities without a published value")
+    steps = tuple(table for table in summary.tables if table.title == STEPS_TABLE)
+    outcome = judge_deviations(rows, run) if published else None
+    return replace(summary, tables=tables + steps, outcome=outcome)
+
+
+def round_run_time(cells: tuple[str, ...]) -> tuple[str, ...]:
+    """Return a row with two digits of a run time: a busy machine makes more of them meaningless."""
+    name, value, *others = cells
+    return (name, f"{float(f'{float(value):.2g}'):g}", *others) if name == RUN_TIME else cells
+
+
+def judge_deviations(rows: Iterable[tuple[str, ...]], run: Trajectory) -> Outcome | None:
+    """Return the largest difference from a published value, and why the steps of a law that chatters differ."""
+    deviations = [(float(cells[-1][:-2]), cells[0]) for cells in rows if cells[-1].endswith(" %")]
+    if not deviations:
+        return None
+    percent, name = max(deviations, key=lambda deviation: abs(deviation[0]))
+    chatters = run.parameters.get("friction") in CHATTERING_LAWS and name in STEP_QUANTITIES
+    reason = "; its friction chatters, so its steps depend on rounding" * chatters
+    is_good = abs(percent) <= MAX_DEVIATION
+    return Outcome(f"{percent:+.2g} %", f"{name} differs by {percent:+.2g} %{reason}", is_good, percent)

@@ -22,6 +22,7 @@ from ...references.reference_trajectory import max_or_nan, motion_error, require
 from ...results.files import write_csv_rows
 from ...results.folder import replace_folder
 from ...results.provenance import prefix_parameters, write_provenance
+from ...results.summary import write_summary
 from ...running.description import declared_parameters
 from ...running.fmu_info import FmuInfo, read_info
 from ...running.solution import Solution
@@ -30,11 +31,12 @@ from ...running.trajectory import Statistics, Trajectory
 from ...scenes.fmu_files import check_built, find_fmu
 from .cases import StabilityCase, generic_scenes, load_scenes, scene_cases
 from .outcomes import FINISHED, REFUSED, WRONG, CaseOutcome, StabilityRegion
+from .table import summarize_outcomes
 
 WORKERS = 2
 LIMIT = 120.0  # s; time limit of a run and of a reference
 CASE_PROCESS = f"{__package__}.case_process"
-FOLDER, FILES = "stability", ("stability.csv", "region.svg")
+FOLDER, FILES = "stability", ("stability.csv", "figure.svg", "region.svg")  # earlier versions wrote region.svg
 REFUSED_STEP = "a communication step of"  # a refused step changes nothing
 
 
@@ -49,10 +51,11 @@ def run_stability(
         regions = stability_regions(outcomes)
         write_table(outcomes, folder / "stability.csv")
         if regions:
-            draw(regions, folder / "region.svg")
+            draw(regions, folder / "figure.svg")
         fmus = {row.case.name: find_fmu(row.case.model) for row in outcomes}
         values = prefix_parameters({name: declared_parameters(fmu) for name, fmu in fmus.items()})
         write_provenance(folder, fmus.values(), values, source=source)
+        write_summary(folder, summarize_outcomes(outcomes))
     return outcomes, regions
 
 

@@ -1,5 +1,6 @@
-"""Tables of the stiff and extreme cases: finished runs and rejected runs."""
+"""Tables of the stiff and extreme cases, and their summary: finished runs and rejected runs."""
 
+from collections import Counter
 from collections.abc import Iterable
 from itertools import groupby
 
@@ -7,7 +8,8 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table
 from rich.text import Text
 
-from .outcomes import REFUSED, CaseOutcome, StabilityRegion
+from ...results.summary import Outcome, Summary, make_table
+from .outcomes import REFUSED, WRONG, CaseOutcome, StabilityRegion
 
 
 def error_table(rows: Iterable[CaseOutcome]) -> Table:
@@ -73,3 +75,25 @@ def summary(rows: list[CaseOutcome], regions: Iterable[StabilityRegion]) -> str:
         growth = f"steps grow as x_m^{region.slope:+.2f} at x_m = {region.stiffness[-1]:g} m/s"
         lines.append(f"{region.method}: {growth}, {bound}.")
     return "\n".join(lines)
+
+
+def summarize_outcomes(rows: list[CaseOutcome]) -> Summary:
+    """Return the summary: the failed cases with their reasons, and the number of outcomes by model and method."""
+    failed = [row for row in rows if row.ended == WRONG]
+    counts = Counter((row.case.name, row.case.method, row.ended) for row in rows)
+    endings = sorted({ending for _, _, ending in counts})
+    pairs = sorted({(model, method) for model, method, _ in counts})
+    headings = ("model", "method", *("failed" if ending == WRONG else ending for ending in endings))
+    cells = ((*pair, *(counts[(*pair, ending)] for ending in endings)) for pair in pairs)
+    reasons = ((row.case.name, row.case.title, row.case.method, row.text) for row in failed)
+    failures = make_table(("model", "case", "method", "reason"), reasons)
+    value = f"{len(rows) - len(failed)} of {len(rows)}"
+    sentences = (f"{value} stiff and extreme cases ended as expected.", *["The other cases:"][: len(failed)])
+    return Summary(
+        "stability",
+        "Outcomes",
+        sentences,
+        failures + make_table(headings, cells, "Number of outcomes by model and method" if failed else ""),
+        "Internal steps of each method over x_m, the speed of maximum friction",
+        Outcome(value, f"{len(failed)} failed" if failed else "none hangs, none ends with a wrong result", not failed),
+    )

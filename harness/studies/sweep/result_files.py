@@ -27,6 +27,7 @@ from ...errors import HarnessError, SceneError, check_names
 from ...results.files import column_heading
 from ...results.folder import replace_folder
 from ...results.provenance import describe_sources, write_provenance
+from ...results.summary import Summary, write_summary
 from ...running.description import read_description
 from ...running.variable_values import REAL_TYPES, variable_unit
 from ...scenes.fmu_files import check_built
@@ -142,6 +143,11 @@ def run_sweep(
         seconds = run_pending(sweep, checkpoint, scheduler, workers, report)
         failures = write_files(sweep, checkpoint, about, new_folder)
         write_provenance(new_folder, [file], about.constants, options, source=source)
+        units = {name: unit for name, (unit, _) in about.varied.items()}
+        units |= {column.name: column.unit for column in about.columns}
+        columns = ", ".join(column_heading(name, "" if unit == "1" else unit) for name, unit in units.items())
+        text = f"{len(points)} runs, {sum(item.runs for item in failures)} failed. Columns: {columns}."
+        write_summary(new_folder, Summary("sweep", folder.name, (text,), picture=f"Sweep {folder.name}. {text}"))
     checkpoint.delete()
     return SweepResult(len(points), folder, n_resumed, checkpoint.damaged, failures, seconds)
 

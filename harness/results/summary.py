@@ -1,0 +1,173 @@
+"""Summaries of results: every study writes summary.json in one schema, and the report reads nothing else."""
+
+import json
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ..errors import HarnessError, SceneError
+from . import provenance
+from .files import to_json
+
+if TYPE_CHECKING:
+    import rich.table
+
+SUMMARY_FILE, PICTURE_FILE = "summary.json", "figure.svg"
+VERSION = 1  # of the schema
+STEPS_TABLE, METHODS_TABLE = "Internal steps of the solver", "Fastest methods"  # rows that the report collects
+MAX_DEVIATION = 5.0  # percent; a published case counts as reproduced up to this difference
+SKETCH_SIZE = 320, 150  # width and height of the box of a sketch
+
+
+@dataclass(frozen=True)
+class SummaryTable:
+    """A table: headings with units, and rows of texts as they are shown. The main table of a result has no title."""
+
+    headings: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    title: str = ""
+
+    def __post_init__(self) -> None:
+        if any(len(row) != len(self.headings) for row in self.rows):
+            raise ValueError("a table whose rows are not as long as its headings")
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a study concludes: a value, and in words; `deviation` in percent is the largest from published values."""
+
+    value: str
+    text: str
+    is_good: bool
+    deviation: float | None = None
+
+
+@dataclass(frozen=True)
+class Sketch:
+    """A small drawing of a motion: points of SVG in a box of SKETCH_SIZE.
+
+    Attributes
+    ----------
+    text
+        Text alternative.
+    curve
+        Points of the whole curve.
+    stuck
+        Points of each part at which the body sticks.
+    zero
+        Height of zero; None if it is not in the box.
+    """
+
+    text: str
+    curve: str
+    stuck: tuple[str, ...]
+    zero: float | None
+
+
+@dataclass(frozen=True)
+class MissingResult:
+    """A result that a study left out, and the command that makes it."""
+
+    name: str
+    command: str
+
+
+@dataclass(frozen=True)
+class Summary:
+    """Summary of a result.
+
+    Attributes
+    ----------
+    study
+        Name of the study, as in `STUDIES` of the report.
+    title
+        Title of the result.
+    sentences
+        Findings and remarks.
+    tables
+        Tables.
+    picture
+        Text alternative of figure.svg in the folder; empty without one.
+    outcome
+        What the study concludes, if anything is judged.
+    sketches
+        Small drawings of a run: position over time, and speed over position.
+    missing
+        Results that the study left out.
+    origin
+        Sentences on the origin: files, versions, date, command, parameters.
+    files
+        Names of the CSV files in the folder.
+    version
+        Version of the schema.
+    """
+
+    study: str
+    title: str
+    sentences: tuple[str, ...] = ()
+    tables: tuple[SummaryTable, ...] = ()
+    picture: str = ""
+    outcome: Outcome | None = None
+    sketches: tuple[Sketch, ...] = ()
+    missing: tuple[MissingResult, ...] = ()
+    origin: tuple[str, ...] = ()
+    files: tuple[str, ...] = ()
+    version: int = VERSION
+
+    def __post_init__(self) -> None:
+        outside = [name for name in self.files if Path(name).name != name]
+        if outside:
+            raise ValueError(f"{outside[0]}, which is not the name of a file in the folder")
+
+
+def make_table(headings: Iterable[str], rows: Iterable[Iterable[object]], title: str = "") -> tuple[SummaryTable, ...]:
+    """Return a table as the only item; nothing if it has no rows."""
+    cells = tuple(tuple(map(str, row)) for row in rows)
+    return (SummaryTable(tuple(headings), cells, title),) if cells else ()
+
+
+def read_cells(table: "rich.table.Table", title: str = "") -> tuple[SummaryTable, ...]:
+    """Return a table of the terminal as the only item; nothing if it has no rows."""
+    rows = zip(*(column.cells for column in table.columns), strict=True)
+    return make_table((str(column.header) for column in table.columns), rows, title)
+
+
+def write_summary(folder: Path, summary: Summary) -> None:
+    """Write the summary of a result, and add its origin and its files, which are complete."""
+    content = json.loads((folder / provenance.FILE).read_text(encoding="utf-8"))
+    complete = replace(
+        summary,
+        picture=summary.picture if (folder / PICTURE_FILE).is_file() else "",
+        origin=provenance.describe_origin(content),
+        files=tuple(sorted(file.name for file in folder.glob("*.csv"))),
+    )
+    (folder / SUMMARY_FILE).write_text(to_json(complete) + "\n", encoding="utf-8")
+
+
+def read_summary(folder: Path) -> Summary:
+    """Read the summary of a result.
+
+    Raises
+    ------
+    HarnessError
+        If it is missing, damaged, or of another program or version.
+    """
+    from ..scenes.schema import parse_table  # only where a file is read: a new result needs no validation
+
+    try:
+        content: Any = json.loads((folder / SUMMARY_FILE).read_text(encoding="utf-8"))
+        if not isinstance(content, dict) or "version" not in content:
+            reason = "is not the summary of a result"
+        elif content["version"] != VERSION:
+            reason = f"is of version {content['version']}, and this program reads version {VERSION}"
+        else:
+            return parse_table(content, Summary)
+    except FileNotFoundError:
+        reason = "is missing, as in results of earlier versions"
+    except (OSError, ValueError, RecursionError):
+        reason = "is not complete"
+    except SceneError as error:
+        reason = f"is not valid ({error})"
+    command = provenance.load_provenance(folder).get("command", "the command that made it")
+    raise HarnessError(f"{SUMMARY_FILE} {reason}: run `{command}` again")
