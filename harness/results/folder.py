@@ -52,8 +52,7 @@ def replace_folder(folder: Path, own_files: Sequence[str], source: str = "") -> 
         If the old folder is a link, contains other files, or is a result of another `source` without OVERWRITE.
     """
     try:
-        png_files = (name.replace(".svg", ".png") for name in own_files)  # figures of earlier versions
-        own_files = (*own_files, *png_files, FILE, SUMMARY_FILE)
+        own_files = (*own_files, FILE, SUMMARY_FILE)
         check_replaceable(folder, own_files)
         check_same_source(folder, source)
         missing = [parent for parent in folder.absolute().parents if not parent.exists()]

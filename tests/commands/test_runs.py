@@ -140,7 +140,7 @@ def test_a_scene_writes_only_the_files_it_requests(scene):
 
 def test_a_scene_without_plots_has_no_figure(scene):
     _, results = scene(BASE + "grid = 1\nplots = []")
-    assert {path.name for path in results.iterdir()} == {"trajectory.csv", "provenance.json"}
+    assert {path.name for path in results.iterdir()} == {"trajectory.csv", "provenance.json", "summary.json"}
 
 
 @pytest.mark.parametrize("model", MODELS)

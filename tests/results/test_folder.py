@@ -1,5 +1,6 @@
 """Result folders are replaced completely or not at all."""
 
+import errno
 import os
 import subprocess
 import sys
@@ -181,6 +182,48 @@ def test_leftovers_of_a_killed_run_are_removed_but_no_other_files(older):
         assert not leftovers[1].exists()
     assert contents(older) == {"b.csv": "of a run that goes on"}
     assert sorted(older.parent.iterdir()) == sorted([older, foreign, leftovers[2]])
+
+
+def test_a_new_folder_that_another_command_takes_for_a_leftover_is_created_again(older, monkeypatch):
+    """The other command may remove it between its creation and its lock."""
+    create, created = folders.create_new_folder, []
+
+    def create_new_folder(folder):
+        created.append(create(folder))
+        if len(created) == 1:
+            created[0].rmdir()
+        return created[-1]
+
+    monkeypatch.setattr(folders, "create_new_folder", create_new_folder)
+    with replace_folder(older, OURS) as fresh:
+        (fresh / "b.csv").write_text("new")
+    assert len(created) == 2
+    assert contents(older) == {"b.csv": "new"}
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="locks are those of POSIX")
+def test_a_file_system_without_locks_holds_results(older, monkeypatch):
+    def refuse(file, operation):
+        raise OSError(errno.ENOLCK, "No locks available")
+
+    monkeypatch.setattr("fcntl.flock", refuse)
+    with replace_folder(older, OURS) as fresh:
+        (fresh / "b.csv").write_text("new")
+    assert contents(older) == {"b.csv": "new"}
+
+
+def test_an_interrupt_in_another_working_directory_leaves_nothing(older, monkeypatch):
+    """fmpy changes the directory while it loads a library."""
+    monkeypatch.chdir(older.parent)
+
+    def interrupt():
+        with replace_folder(Path("case"), OURS):
+            os.chdir("/")
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        interrupt()
+    assert list(older.parent.iterdir()) == [older]
 
 
 @pytest.mark.parametrize("target", ["elsewhere", "nowhere"])
