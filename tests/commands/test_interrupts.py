@@ -28,7 +28,7 @@ SLOW = 'title = "t"\nmodel = "pacejka"\noutputs = ["x", "v"]\ngrid = 5e-6\n[valu
 COMMANDS = {  # and a file or folder that exists once it has started
     "main": ([], "out/.*"),
     "run": (["run", "slow.toml"], "temporary/friction-fmus-fmu-*"),
-    "precision": (["precision", "pacejka"], "out/.precision-*"),
+    "precision": (["precision", "pacejka"], "out/precision/.pacejka-*"),
     "stability": (["stability"], "temporary/friction-fmus-child-*"),
     "bench": (["bench"], "out/.bench-*"),
     "importers": (["importers"], "temporary/friction-fmus-child-*"),
