@@ -95,12 +95,14 @@ def angular_acceleration(a):
     return decay_record(0.01, sine=True, a=a, omega=6.0, noise=0.05, order=2, turn=0.0, t=np.linspace(0, 5, 500))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("drag", [False, True])
 def test_double_peaks_of_angular_acceleration_are_reported_with_a_remedy(drag):
     with pytest.raises(HarnessError, match="two peaks per half cycle: record the angle or the angular velocity"):
         fit_decay(angular_acceleration(3.0), KnownParameters(pendulum=True), drag)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("a", [2.4, 2.8])
 def test_double_peaks_of_angular_acceleration_are_fitted_if_their_cycles_are_found(a):
     fit = fit_decay(angular_acceleration(a), KnownParameters(pendulum=True))

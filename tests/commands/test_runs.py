@@ -284,7 +284,7 @@ PAIR = (
         ["run", "nosuch"],
         ["run", "mine.toml", "--json"],
         ["decay", "swing.csv", "--no-drag", "--json"],
-        ["couple", "pair.toml", "--json"],
+        pytest.param(["couple", "pair.toml", "--json"], marks=pytest.mark.slow),
         ["report", "--help"],
     ],
 )

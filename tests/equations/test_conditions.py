@@ -21,7 +21,9 @@ KINDS = {
     "native": ("--native", "--platform", "linux64"),
     "native/fmi3": ("--fmi", "3", "--platform", "linux64"),
 }
-EVERY_KIND = pytest.mark.parametrize("kind", ["", "native", pytest.param("native/fmi3", marks=pytest.mark.slow)])
+EVERY_KIND = pytest.mark.parametrize(
+    "kind", ["", *(pytest.param(kind, marks=pytest.mark.slow) for kind in ("native", "native/fmi3"))]
+)
 STOP, K, F, GAP, T_ON, MU = 2.0, 100.0, 5.0, 0.1, 0.3, 0.5  # SI, as in the models
 MODEL = '''from fmus import (
     Contact, Fixed, Input, Mode, Model, Output, Parameter, State, choose, exp, fabs, log, sin, sqrt
@@ -221,6 +223,7 @@ def test_equality_counts_as_the_comparison_says(launch):
 # ---- inputs
 
 
+@pytest.mark.slow
 def test_conditions_on_inputs_follow_jumps_at_communication_points(launch):
     """Closed form; python and native."""
     for kind in ("", "native"):
@@ -233,6 +236,7 @@ def test_conditions_on_inputs_follow_jumps_at_communication_points(launch):
         assert abs(fmu.get("x") - sum(0.25 * (a + b) for a, b in pairwise(speeds))) < 1e-14
 
 
+@pytest.mark.slow
 def test_conditions_on_inputs_with_derivatives_change_within_steps(launch):
     """F_ext = 5 N/s t exceeds 1 N at 0.2 s; then the force is constant."""
     fmu = launch("ramped", "native", k=0.0, x0=0.0, rtol=1e-4)
@@ -244,7 +248,10 @@ def test_conditions_on_inputs_with_derivatives_change_within_steps(launch):
 # ---- steps, restarts, saved states
 
 
-@pytest.mark.parametrize("name", ["backlash", "nested", "switched", "lifting", "domain"])
+@pytest.mark.parametrize(
+    "name",
+    ["nested", *(pytest.param(name, marks=pytest.mark.slow) for name in ("backlash", "switched", "lifting", "domain"))],
+)
 def test_results_do_not_depend_on_backend_and_communication_steps(launch, name):
     """Bit for bit, with a parameter changed within a step, and a state restored in mid-step and at an event."""
     names = ["x", "v", "F", "a", "solver.steps", "solver.evaluations"]
@@ -271,6 +278,7 @@ def test_results_do_not_depend_on_backend_and_communication_steps(launch, name):
                 fmu.restore(saved)
 
 
+@pytest.mark.slow
 def test_outputs_before_a_change_use_the_old_condition(launch):
     """Inside a step that ends with the change, and beyond it."""
     for kind in ("", "native"):
@@ -415,6 +423,7 @@ def test_limits_exist_only_where_a_force_may_become_negative(tmp_path, slide):
 # ---- model exchange
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["native", "native/fmi3"])
 @pytest.mark.parametrize("name", ["relay", "backlash", "timed"])
 def test_the_solver_of_an_importer_locates_the_changes(worker, built, name, kind):
@@ -430,6 +439,7 @@ def test_the_solver_of_an_importer_locates_the_changes(worker, built, name, kind
         assert abs(columns["x"][-1] - x) < 100.0 * rtol
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["native", "native/fmi3"])
 def test_model_exchange_refuses_what_co_simulation_refuses(worker, built, kind):
     """Chattering, negative sliding forces, and sliding forces above the holding force at rest."""

@@ -35,11 +35,14 @@ def send(page, touch, kind, x, y):
     return page.browser.call("Input.dispatchTouchEvent", type=kinds[kind], touchPoints=points)
 
 
-@pytest.mark.parametrize(
-    ("width", "height", "zoom", "touch"), [(1280, 900, 1, False), (640, 450, 2, False), (360, 740, 2, True)]
-)
-@pytest.mark.parametrize("name", MODELS)
-def test_a_dragged_body_stays_under_the_pointer(page, name, width, height, zoom, touch):
+DESKTOP, ENLARGED, PHONE = (1280, 900, 1, False), (640, 450, 2, False), (360, 740, 2, True)
+SCREENS = [(name, DESKTOP) for name in MODELS]
+SCREENS += [(name, screen) for name in ("stickslip", "pendulum") for screen in (ENLARGED, PHONE)]  # a line and an arc
+
+
+@pytest.mark.parametrize(("name", "screen"), SCREENS, ids=str)
+def test_a_dragged_body_stays_under_the_pointer(page, name, screen):
+    width, height, zoom, touch = screen
     metrics = {"width": width, "height": height, "deviceScaleFactor": zoom, "mobile": touch}
     page.browser.call("Emulation.setDeviceMetricsOverride", **metrics)
     page.browser.call("Emulation.setTouchEmulationEnabled", enabled=touch)

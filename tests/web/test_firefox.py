@@ -33,6 +33,7 @@ def drag(firefox, host):
     firefox.pointer(("up",))
 
 
+@pytest.mark.slow
 def test_every_model_runs_and_bodies_stay_under_the_pointer_in_firefox(firefox):
     page = web_page.build_page("web")
     firefox.size(1280)

@@ -26,6 +26,7 @@ def some(name, seed):
     return values
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", MODELS)
 def test_random_parameters_and_a_change_during_the_run_match_the_native_fmu(page, worker, name):
     for seed in range(2):

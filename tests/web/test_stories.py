@@ -4,7 +4,6 @@ import re
 
 import pytest
 import web_page
-from build_cache import ROOT
 
 STORIES = ("stops", "chatters", "squeaks", "creeps", "swings")
 DRAGGED = ("opening", "stops", "squeaks", "creeps", "swings")
@@ -128,11 +127,3 @@ def test_a_link_shows_its_run_and_an_untouched_page_opens_with_the_claim_again(p
     page.run("document.querySelector('nav a').click()")
     page.run("new Promise(done => setTimeout(done, 300))")
     assert page.run("[app.state().model, location.hash]") == ["coulomb", "#stops"]
-
-
-def test_a_page_without_the_models_of_the_stories_opens_with_the_panel(quiet):
-    file = ROOT / "tests" / "example_models" / "rotor_brake.py"
-    page = web_page.Page(quiet, web_page.build_page("one", str(file), "--method", "ode45"))
-    page.open()
-    assert page.run("document.getElementById('stories')") is None
-    assert text(page, "h1") == "Dry friction, live"

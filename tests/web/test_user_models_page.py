@@ -28,6 +28,7 @@ def test_a_phase_angle_is_no_driver(name, driver):
     assert list_bodies(find_model(name).analysis)[0].get("driver", "") == driver
 
 
+@pytest.mark.slow
 def test_the_models_of_fmus_more_run_on_a_second_page(quiet):
     """It leaves index.html, the page of the shipped models, as it is."""
     page = web_page.Page(quiet, web_page.build_page("web-more", "--more", file="more.html"))
@@ -43,6 +44,9 @@ def test_the_models_of_fmus_more_run_on_a_second_page(quiet):
 def test_user_models_run_on_a_page_of_their_own(quiet):
     files = [ROOT / "tests" / "example_models" / name for name in ("rotor_brake.py", "larger/blocks.py")]
     page = web_page.Page(quiet, web_page.build_page("users", *map(str, files), "--method", "ode45"))
+    page.open()  # without the models of the stories, it opens with the panel
+    assert page.run("document.getElementById('stories')") is None
+    assert page.run("document.querySelector('h1').textContent") == "Dry friction, live"
     for path, count in zip(files, (1, 2), strict=True):
         page.open(f".model={path.stem}")
         assert page.run("[...document.getElementById('method').options].map(each => each.text)") == ["ode45"]
