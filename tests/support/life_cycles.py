@@ -255,6 +255,11 @@ def run_in_folder(fmu, folder):
     return rows
 
 
+def run_in_folders(fmu, folders):
+    """Run the FMU unpacked into each of these folders."""
+    return [run_in_folder(fmu, folder) for folder in folders]
+
+
 def run_each(fmus):
     """Run each FMU once."""
     return [run_in_folder(fmu, None) for fmu in fmus]
