@@ -19,6 +19,7 @@ def test_nonnegative_intervals_cover_95_percent():
         assert share == pytest.approx(0.95, abs=0.004), mean
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("rho", "means"),
     [

@@ -72,7 +72,10 @@ def test_outliers_are_excluded_and_counted():
 
 @pytest.mark.parametrize(  # a fit with drag tries longest what no fit can reach
     ("value", "run", "drag"),
-    [(-9999.0, 1, False), (0.5, 1, True), (0.0, 5, True)],
+    [
+        (-9999.0, 1, False),
+        *(pytest.param(*values, marks=pytest.mark.slow) for values in ((0.5, 1, True), (0.0, 5, True))),
+    ],
     ids=["marks", "spikes", "dropouts"],
 )
 def test_runs_of_invalid_samples_are_excluded_and_counted(value, run, drag):

@@ -293,7 +293,6 @@ FULL = "Error: No space left on device\n"
     [
         (("list",), "| head -1", 0, ""),
         (("list",), ">&- 2>&-", 0, ""),
-        (("list", "--json"), "| true", 0, ""),
         (("list", "--json"), "> /dev/full", 1, FULL),
         (("run", "mine.toml"), ">&-", 0, ""),
         (("run", "mine.toml"), "> /dev/full", 1, FULL),
@@ -326,7 +325,7 @@ ASCII, C = {"PYTHONIOENCODING": "ascii"}, {"LC_ALL": "C", "PYTHONUTF8": "0", "PY
 @pytest.mark.parametrize(
     ("command", "coding"),
     [
-        (("decay", "swing.csv", "--no-drag"), C),  # draws
+        pytest.param(("decay", "swing.csv", "--no-drag"), C, marks=pytest.mark.slow),  # draws
         (("run", "mine.toml"), ASCII),
         (("sweep", "--help"), C),
     ],

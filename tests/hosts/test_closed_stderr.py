@@ -11,6 +11,7 @@ PROCESSES = [
 ]  # can be tested one after another in one process
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ways", PROCESSES, ids=lambda ways: ways[-1])
 def test_an_error_survives_the_loss_of_standard_error(fmus, ways):
     """The process exits cleanly, too. The instance name is not ASCII."""

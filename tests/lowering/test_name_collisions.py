@@ -61,6 +61,7 @@ def numbers(path, model, names):
     return results
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("text", NAMES, ids=["sled", "belt"])
 def test_names_used_inside_the_numerics_change_nothing(tmp_path, text):
     default_names, path = ("POSITION", "SPEED", "RATE", "MODE"), tmp_path / "mine.py"

@@ -66,14 +66,14 @@ def test_every_model_has_an_icon_and_a_certified_result():
         assert load_reference(name, MORE).estimated_error < 1e-10
 
 
-@pytest.mark.parametrize(
-    "kind", ["python", *(pytest.param(kind, marks=pytest.mark.slow) for kind in ("native", "fmi3"))]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("name", more_model_names())
 def test_fmpy_validates_each_kind(name, kind):
     assert validate_fmu(str(built(name, kind))) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CERTIFIED)
 def test_the_default_run_reproduces_the_certified_result(worker, name):
     """Within ten times the tolerance at 1e-6, and to 1e-9 at a tight one."""
@@ -85,6 +85,7 @@ def test_the_default_run_reproduces_the_certified_result(worker, name):
         assert relative_errors(np.array(rows), truth.states).max() < bound
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name in CERTIFIED if event_located.PROBLEMS[name].first])
 def test_events_are_those_of_the_second_formulation(worker, name):
     problem = event_located.PROBLEMS[name]()
@@ -96,6 +97,7 @@ def test_events_are_those_of_the_second_formulation(worker, name):
     assert np.abs(np.array([t for t, *_ in events]) - [t for t, _ in truth]).max() < 1e-10
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", LAWS)
 def test_the_belt_follows_each_law(worker, law):
     number, problem = LAWS[law][0], LAWS[law][1]()
@@ -108,6 +110,7 @@ def test_the_belt_follows_each_law(worker, law):
     fmu.free()
 
 
+@pytest.mark.slow
 def test_two_sleds_have_the_events_of_a_taylor_series(worker):
     """The system of tests/support/independent_contacts.py, solved by series of order 24: within 1e-10."""
     sleds = System(
@@ -145,6 +148,7 @@ def test_python_native_and_fmi3_agree_bit_for_bit(worker, name):
     assert_identical(rows[0], rows[2], names)
 
 
+@pytest.mark.slow
 def test_commands_know_the_models_by_name(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     listed = commands.harness(tmp_path, "list", "--json").stdout

@@ -58,6 +58,7 @@ def test_a_refused_format_has_its_message(tmp_path, form):
     assert str(refusal.value) == form.refusal
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("file", "share"),
     [

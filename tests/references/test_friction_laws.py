@@ -11,6 +11,8 @@ from harness.references import event_located
 from harness.references.den_hartog import steady_motion_with_stops, steady_motion_without_stops
 from harness.studies.precision.literature_problems import SLIDING, STOPPING
 
+pytestmark = pytest.mark.slow  # builds the FMUs of fmus/more
+
 LOAD, HOLD_TIME, REST = 0.5, 1e5, 10.0  # N, a third of the static friction, and s
 REST_TIME = 0.2  # s after which bristles have come to rest to rounding
 FREE = {"k": 0.0, "v_driver": 0.0, "F_ext": LOAD}  # no spring

@@ -221,6 +221,7 @@ def test_an_existing_interactive_page_is_included_and_every_picture_links_to_it(
     assert "index.html" not in (report_run[0] / "results/report.html").read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("browser_name", ["browser", "firefox"])
 def test_a_link_to_a_published_case_shows_it_in_the_embedded_page(request, browser_name, tmp_path, report_run):
     shutil.copytree(report_run[0] / "results", tmp_path / "results")

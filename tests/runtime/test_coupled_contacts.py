@@ -94,6 +94,7 @@ def test_two_riders_on_one_carrier_break_away_and_stop_together(custom_model):
     assert max(abs(y[2] - y[4]) for _, y, _ in rows) < 1e-12
 
 
+@pytest.mark.slow
 def test_the_order_of_declaration_does_not_matter(custom_model):
     """Three stacked blocks, driven from both sides: at first all contacts carry the same load and have the same
     limit."""
@@ -261,7 +262,7 @@ def test_random_starts_hold_as_many_contacts_as_balance(custom_model):
     assert n_choices > 30
 
 
-@pytest.mark.parametrize("method", [ODE45, DOP853, RODAS])
+@pytest.mark.parametrize("method", [DOP853, *(pytest.param(one, marks=pytest.mark.slow) for one in (ODE45, RODAS))])
 @pytest.mark.parametrize("free", "123")
 def test_a_contact_without_friction_is_no_contact(custom_model, free, method):
     """The run is that of a model without it; it makes no events."""

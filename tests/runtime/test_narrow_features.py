@@ -81,12 +81,13 @@ def assert_resolved(worker, folder, model, blocks):
     fmu.free()
 
 
-@pytest.mark.parametrize("v_s", [1e-2, 1e-3, 1e-4])
+@pytest.mark.parametrize("v_s", [1e-3, *(pytest.param(v_s, marks=pytest.mark.slow) for v_s in (1e-2, 1e-4))])
 @pytest.mark.parametrize(("model", "v_b", "x0"), [("floor", 0.0, 0.3), ("belt", 0.0, 0.3), ("belt", 0.1, 0.0)])
 def test_a_peak_of_any_width_is_resolved(worker, tmp_path, model, v_b, x0, v_s):
     assert_resolved(worker, tmp_path, model, [(v_b, v_s, x0)])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("model", ["two_widths", "other_state"])
 def test_the_smallest_width_counts_for_every_slip(worker, tmp_path, model):
     """Of whatever state it is declared, and whatever contact it belongs to."""

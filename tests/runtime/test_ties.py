@@ -78,7 +78,13 @@ def events(fmu, start, stop):
     return changes
 
 
-@pytest.mark.parametrize(("name", "seed"), [*product(["coulomb", "stickslip"], range(40))])
+@pytest.mark.parametrize(
+    ("name", "seed"),
+    [
+        pytest.param(name, seed, marks=pytest.mark.slow if seed >= 8 else ())
+        for name, seed in product(["coulomb", "stickslip"], range(40))
+    ],
+)
 def test_every_tie_ends_as_in_the_closed_form(pair, name, seed):
     values, start, stop = case(name, seed)
     parameters = {key: value for key, value in values.items() if key not in ("x0", "v0")}

@@ -72,7 +72,7 @@ def test_two_fmus_differ_as_their_closed_forms_do(harness, external_fmu_folder, 
     assert {file.name for file in folder.iterdir()} == {"compare.json", "figure.svg", "provenance.json", "summary.json"}
 
 
-@pytest.mark.parametrize("stop", [10, 9.95])
+@pytest.mark.parametrize("stop", [10, pytest.param(9.95, marks=pytest.mark.slow)])
 def test_fmus_with_one_fixed_internal_step_agree_on_a_shared_grid(harness, external_fmu_folder, tmp_path, stop):
     """FMI 3.0 can declare the step, FMI 2.0 cannot; each way round."""
     declared = {"modelDescription.xml": lambda text: text.replace("<CoSimulation ", DECLARED_STEP)}

@@ -104,9 +104,6 @@ def run(fmus):
 
 
 SCENES = [file.stem for file in shipped_coupled_scenes()]
-EVERY_SCENE = pytest.mark.parametrize(
-    "scene", [pytest.param(scene, marks=() if scene == "driven" else pytest.mark.slow) for scene in SCENES]
-)
 
 
 def engines(folder):
@@ -115,7 +112,8 @@ def engines(folder):
     return {name: ([float(number) for number in numbers], why) for name, *numbers, why in rows}
 
 
-@EVERY_SCENE
+@pytest.mark.slow
+@pytest.mark.parametrize("scene", SCENES)
 def test_a_shipped_scene_converges_to_its_reference_in_every_engine(run, scene):
     """The error is proportional to the step, also in Ecos and libcosim; fmpy passes the first forces one step later."""
     steps, errors = np.loadtxt(run(scene) / "error.csv", delimiter=",", skiprows=1).T
@@ -128,7 +126,8 @@ def test_a_shipped_scene_converges_to_its_reference_in_every_engine(run, scene):
     assert engine_errors["Ecos"][0][-1] < 0.05 * size
 
 
-@EVERY_SCENE
+@pytest.mark.slow
+@pytest.mark.parametrize("scene", SCENES)
 def test_an_archive_avoids_factors_inline_values_and_unusual_names(run, scene):
     (file,) = run(scene).glob("*.ssp")
     system = read_ssd(str(file)).system  # which validates it against the schema
@@ -144,6 +143,7 @@ def test_an_archive_avoids_factors_inline_values_and_unusual_names(run, scene):
     assert len(bound) > 1
 
 
+@pytest.mark.slow
 def test_an_external_archive_is_compared_with_its_finest_run(run, user_folder):
     done = commands.harness(
         user_folder, "couple", run("driven") / "driven.ssp", "--stop", "0.5", "--out", "theirs", "--json", blank=True

@@ -81,11 +81,12 @@ def test_an_installed_rival_simulates_a_scene_that_it_offers(references, rival):
     assert measures.steps > 10
 
 
+@pytest.mark.slow
 def test_our_fmus_are_exact_in_all_scenes(references, fmus, tmp_path, monkeypatch):
     (tmp_path / "fmus").mkdir()
     for file in fmus.glob("*.fmu"):
         (tmp_path / "fmus" / file.name).symlink_to(file)
-    (tmp_path / "fmus" / "more").symlink_to(build_once("more-rivals", "belt", "clutch"))
+    (tmp_path / "fmus" / "more").symlink_to(build_once("more-python", "--more", timeout=600))
     monkeypatch.chdir(tmp_path)
     for name, scene in SCENES.items():
         measures = measure(scene, references[name], run_request(RunRequest(OWN.module, name, OWN.best)))
