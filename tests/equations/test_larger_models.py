@@ -80,9 +80,10 @@ def run(fmu, physics, changes):
     return events, fmu.get(*physics.states)
 
 
-RUNS = [(name, ()) for name in CONTACT_REFERENCES] + [
-    (name, one.changes) for name, one in CONTACT_REFERENCES.items() if one.changes
+CHANGED = [
+    pytest.param(name, one.changes, marks=pytest.mark.slow) for name, one in CONTACT_REFERENCES.items() if one.changes
 ]
+RUNS = [*((name, ()) for name in CONTACT_REFERENCES), *CHANGED]
 
 
 @pytest.mark.parametrize(
@@ -122,7 +123,7 @@ def test_python_and_native_agree_bit_for_bit(worker, name):
         assert_identical(rows, others, names)
 
 
-@pytest.mark.parametrize("kind", ["", "native"])
+@pytest.mark.parametrize("kind", ["", pytest.param("native", marks=pytest.mark.slow)])
 def test_a_sled_with_more_sliding_than_static_friction_is_reported_in_one_sentence(tmp_path, worker, kind):
     words = ["--native", "--platform", "linux64", "--method", "ode45"] if kind else []
     fmu = worker.instantiate(

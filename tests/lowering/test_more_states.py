@@ -27,6 +27,7 @@ def complete_model(file):
     return lowered_model(source, select_features(source, source.analysis.available_methods))
 
 
+@pytest.mark.slow
 @EVERY_METHOD
 @pytest.mark.parametrize("name", STOPS)
 def test_arrays_and_scalars_give_the_same_bits_at_every_step(name, method):

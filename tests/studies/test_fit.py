@@ -116,7 +116,7 @@ def test_a_sensor_with_offset_and_gain_is_identified():
         assert holds(found[name], truth)
 
 
-@pytest.mark.parametrize("delay", [0.084, -0.1])
+@pytest.mark.parametrize("delay", [0.084, pytest.param(-0.1, marks=pytest.mark.slow)])
 def test_the_delay_of_a_sensor_is_identified(delay):
     """The delayed signal is interpolated from a run with 20 times as many samples."""
     fine = np.linspace(0.0, 8.0, 4001)

@@ -3,8 +3,9 @@
 import pytest
 import web_page
 
+pytestmark = pytest.mark.slow
 
-@pytest.mark.slow
+
 def test_a_slow_method_is_previewed_with_a_fast_one(page):
     """For any run time: dragging a slider shows the last value up to the end of the run."""
     page.open(".model=pacejka&x_m=0.001&solver.method=2&solver.rtol=0.001")

@@ -2,6 +2,8 @@
 
 import pytest
 
+pytestmark = pytest.mark.slow
+
 
 def test_the_csv_file_holds_the_run_and_the_picture_is_a_png(page):
     page.open(".model=coulomb&.stop=4&.compare=coulomb&.compare.friction=2&.compare.solver.method=2")

@@ -6,6 +6,8 @@ import pytest
 import web_page
 from models import MODELS, parameters
 
+pytestmark = pytest.mark.slow
+
 WIDTHS = (360, 768, 1280)
 
 CONTROLS = {"button", "checkbox", "combobox", "radio", "slider", "spinbutton", "textbox", "link", "DisclosureTriangle"}

@@ -10,6 +10,8 @@ from harness.running.own_fmu import simulate
 from harness.scenes.scene import load_scene, shipped_scenes
 from harness.studies.run.study import ANALYSES
 
+pytestmark = pytest.mark.slow
+
 
 def test_every_published_case_measures_the_same_as_the_terminal(page):
     """Within 0.1 %, except where chatter makes the steps depend on rounding; the published values are shown as well."""

@@ -5,6 +5,8 @@ import re
 import pytest
 import web_page
 
+pytestmark = pytest.mark.slow
+
 STORIES = ("stops", "chatters", "squeaks", "creeps", "swings")
 DRAGGED = ("opening", "stops", "squeaks", "creeps", "swings")
 TOLERANCE = 3  # CSS pixels
