@@ -70,7 +70,7 @@ def assert_refused(done, status, *sentences):
 
 
 @pytest.mark.parametrize("name", ["Midpoint", "Fmi3Midpoint", "ModelExchangeOnly"])
-@pytest.mark.parametrize("tolerance", [1e-3, 1e-5])
+@pytest.mark.parametrize("tolerance", [1e-3, pytest.param(1e-5, marks=pytest.mark.slow)])
 def test_an_fmu_with_hidden_steps_is_refined_until_two_results_agree(run, name, tolerance):
     done, rows = run(name, "--set", "k=50", "--tolerance", tolerance, blank=True)
     assert_succeeded(done)

@@ -323,7 +323,14 @@ def test_friction_may_vanish_and_return_in_a_run(custom_model, method):
 
 
 @pytest.mark.parametrize(
-    ("method", "rtol"), [(ODE23, 1e-6), *((m, r) for m in (ODE45, DOP853) for r in (1e-6, 1e-12)), (RODAS, 1e-6)]
+    ("method", "rtol"),
+    [
+        (DOP853, 1e-12),
+        *(
+            pytest.param(method, rtol, marks=pytest.mark.slow)
+            for method, rtol in ((ODE23, 1e-6), (ODE45, 1e-6), (ODE45, 1e-12), (DOP853, 1e-6), (RODAS, 1e-6))
+        ),
+    ],
 )
 def test_a_slip_that_only_touches_zero_is_no_event(custom_model, method, rtol):
     """A block on a belt, with equal holding and sliding force, that starts at rest: its speed touches that of the belt
@@ -456,6 +463,7 @@ def test_the_jacobian_of_the_threshold_law_includes_the_load_limit(custom_model,
     assert 20 < limited < 180
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("hold", [5.0, 8.0])
 @pytest.mark.parametrize(("change", "mode"), [(1.0, 1), (0.0, 0), (-1.0, 0)])
 def test_the_second_derivative_decides_where_a_load_starts_at_its_limit(custom_model, hold, change, mode):

@@ -412,11 +412,16 @@ def test_a_name_longer_than_its_column_is_printed_in_full(tmp_path):
     ("pair", "message"),
     [
         (("Midpoint", "ModelExchangeOnly"), "fmpy's CVode at rtol"),
-        (("Fmi3Midpoint", "NonConforming"), "NonConforming: internal steps"),
-        (("FixedStep", "FixedStep"), "fixed internal step"),
-        (("Switching", "Switching"), "says"),
         (("Arrays", "Arrays"), "turn[1,2]"),
-        (("Bouncing", "Bouncing"), "bounces"),
+        *(
+            pytest.param((one, other), message, marks=pytest.mark.slow)
+            for one, other, message in (
+                ("Fmi3Midpoint", "NonConforming", "NonConforming: internal steps"),
+                ("FixedStep", "FixedStep", "fixed internal step"),
+                ("Switching", "Switching", "says"),
+                ("Bouncing", "Bouncing", "bounces"),
+            )
+        ),
     ],
 )
 def test_external_fmus_are_compared(harness, external_fmu_folder, pair, message):

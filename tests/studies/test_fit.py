@@ -53,11 +53,11 @@ def holds(estimate, truth, factor=1.5):
     return abs(estimate.value - truth) <= factor * max(estimate.high - estimate.value, estimate.value - estimate.low)
 
 
-LONG_FITS = ("position, 4 free", "Stribeck", "belt")
+LONG_FITS = ("forced", "position, 4 free", "Stribeck", "belt")
 
 
 @pytest.mark.parametrize(
-    "name", ["force", "forced", "pendulum", *(pytest.param(name, marks=pytest.mark.slow) for name in LONG_FITS)]
+    "name", ["force", "pendulum", *(pytest.param(name, marks=pytest.mark.slow) for name in LONG_FITS)]
 )
 def test_the_parameters_of_a_drawn_record_are_found(name):
     """The seed was drawn once; tests/support/fit_campaign.py fits hundreds of others."""
@@ -303,7 +303,9 @@ def test_the_campaign_summarizes_its_log(tmp_path, capsys):
 LAWS = {"free": ["k", "mu_s", "mu_d", "f_s", "f_d"], "fixed": {"v_driver": 0.04, "v_s": 0.2}}
 
 
-@pytest.mark.parametrize(("record_of", "v_s"), [("stickslip", None), ("stribeck_sled", 0.2)])
+@pytest.mark.parametrize(
+    ("record_of", "v_s"), [pytest.param("stickslip", None, marks=pytest.mark.slow), ("stribeck_sled", 0.2)]
+)
 def test_the_law_that_made_the_record_has_the_lowest_bic(record_of, v_s):
     fmus = [native("stickslip"), native("stribeck_sled")]
     frame = pull(noise=0.003)

@@ -252,7 +252,12 @@ def test_stuck_points_lie_between_a_stop_and_the_next_breakaway():
 
 
 @pytest.mark.parametrize(
-    ("path", "ending"), [*zip(EXAMPLE_MODELS, cycle((".py", ".fmu")))], ids=lambda one: Path(one).name
+    ("path", "ending"),
+    [
+        pytest.param(path, ending, marks=pytest.mark.slow if path.stem != "viscous_pendulum" else ())
+        for path, ending in zip(EXAMPLE_MODELS, cycle((".py", ".fmu")))
+    ],
+    ids=lambda one: Path(one).name,
 )
 def test_a_user_model_is_studied_by_its_path_or_that_of_its_fmu(path, ending):
     """Every check that needs only the equations of the file; the reference is where two of its methods agree."""

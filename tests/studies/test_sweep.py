@@ -140,7 +140,13 @@ REASONS = {  # why some have no run to show
 }
 
 
-@pytest.mark.parametrize("name", external_fmus.SWEEP_AXES)
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=() if name in ("Midpoint", "Arrays", *REASONS) else pytest.mark.slow)
+        for name in external_fmus.SWEEP_AXES
+    ],
+)
 def test_an_external_fmu_is_swept_or_refused_with_a_reason(harness, tmp_path, name):
     """Only numbers are measured: each element of an array, and no strings."""
     fmu, vary = external_fmus.build_external_fmus() / f"{name}.fmu", external_fmus.SWEEP_AXES[name].replace(":3", ":2")

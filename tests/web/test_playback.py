@@ -4,6 +4,8 @@ import pytest
 import web_page
 from models import MODELS, declared
 
+pytestmark = pytest.mark.slow
+
 
 def test_a_change_during_playback_acts_from_then_on_only(page):
     page.open(".model=smd")
