@@ -13,6 +13,8 @@ from harness.records.headings import split_heading
 PIECES = ("x", "t", "time", "mm", "m/s^2", "(", ")", "[", "]", "/", " in ", " ", "\t", "_", "µ", "Run #1", "aB", ",")
 HEADINGS = st.lists(st.sampled_from(PIECES) | st.text(max_size=3), max_size=12).map("".join)
 
+OFTEN = settings(max_examples=100, deadline=None, database=None)  # the checkout may be read-only
+
 
 @pytest.mark.parametrize("text", [" ", "(", "[(", "x (", "_a", " / ", "aB", "9", "\t", "()", "in "])
 def test_the_time_for_a_heading_is_proportional_to_its_length(text):
@@ -24,7 +26,7 @@ def test_the_time_for_a_heading_is_proportional_to_its_length(text):
 
 
 @given(HEADINGS)
-@settings(max_examples=100, deadline=None)
+@OFTEN
 @example("x (mm))")
 @example("x [(mm)")
 @example(",x mm")
@@ -38,7 +40,7 @@ def test_name_and_unit_are_parts_of_the_heading(heading):
 
 
 @given(HEADINGS, st.sampled_from(["mm", "s", "deg", "g", "rpm", "m/s^2", "µm", "m/(s^2)"]))
-@settings(max_examples=100, deadline=None)
+@OFTEN
 def test_a_unit_in_brackets_at_the_end_is_found_after_any_name(name, unit):
     for opening, closing in ("[]", "()"):
         assert split_heading(f"{name} {opening}{unit}{closing}") == (name.strip(), unit)
@@ -46,7 +48,7 @@ def test_a_unit_in_brackets_at_the_end_is_found_after_any_name(name, unit):
 
 @pytest.mark.slow
 @given(HEADINGS, HEADINGS)
-@settings(max_examples=100, deadline=None)
+@OFTEN
 def test_any_headings_give_a_record_or_a_message(tmp_path_factory, first, second):
     path = tmp_path_factory.getbasetemp() / "headings.csv"
     rows = "\n".join(f"{i / 10},{i % 7}" for i in range(20))
