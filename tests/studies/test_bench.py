@@ -180,7 +180,7 @@ def test_radau9_is_faster_than_cvode_at_equal_error(both_backends, monkeypatch):
     (both_backends / "more").mkdir()
     (both_backends / "more" / "lugre.fmu").touch()
     (both_backends / "more" / "native").symlink_to(
-        build_once("more-native", "--more", "--native", "--platform", "linux64", timeout=600)
+        build_once("native-lugre", "lugre", "--native", "--platform", "linux64")
     )
     for name in (name for name, case in stiff.CASES.items() if case.reference_source):
         errors = (1e-4, 1e-6)
