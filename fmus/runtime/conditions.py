@@ -14,11 +14,17 @@ CONDITION_MARGIN, TINY = 4.0 * EPSILON, 1e-300  # margins of conditions: relativ
 SHORTEST_DWELL, MAX_CHATTER = 1e-9, 50
 
 
+def update_margins(model, t, y: StateVector, modes: ContactVector):
+    """Store the margins of all conditions."""
+    location = model.event_location
+    location.margins[:], location.margin_scales[:] = model.condition_margins(t, y, modes)
+
+
 def update_sides(model, t, y: StateVector, modes: ContactVector):
     """Determine which conditions hold; a condition may depend on others."""
     location = model.event_location
     for _ in range(model.n_event_functions + 1):
-        model.update_conditions(t, y, modes)
+        update_margins(model, t, y, modes)
         changed = False
         for j in range(model.n_switches):
             side = 1.0 if location.margins[j] > 0.0 else -1.0
@@ -34,7 +40,7 @@ def check_limits(model, t, y: StateVector, modes: ContactVector):
     """Note the first limit that does not hold."""
     location = model.event_location
     location.violated = -1
-    model.update_conditions(t, y, modes)
+    update_margins(model, t, y, modes)
     for j in range(model.n_event_functions - model.first_condition - model.n_switches):
         k = model.n_switches + j
         if location.violated < 0 and location.margins[k] + CONDITION_MARGIN * location.margin_scales[k] + TINY <= 0.0:

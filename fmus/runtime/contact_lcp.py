@@ -151,9 +151,8 @@ def raise_slip(model, t, y: StateVector, modes: ContactVector, amount, i: Contac
     for j in contact_indices:
         reverse_modes[j] = modes[j]
     reverse_modes[i] = -modes[i]
-    y2 = y
     f = model.rates(t, y, modes)
-    f2 = model.rates(t, y2, reverse_modes)
+    f2 = model.rates(t, y, reverse_modes)
     impulse = f2 - f
     y3 = y + impulse
     slips = model.slip_velocities(t, y)

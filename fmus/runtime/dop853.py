@@ -61,6 +61,14 @@ D713, D714, D715, D716 = -43.53345659001114, 96.32455395918828, -39.177261675615
 class Dop853:
     """Method with an interpolant of degree 7 that matches values and slopes at both ends."""
 
+    f6: StateVector
+    f7: StateVector
+    f8: StateVector
+    f9: StateVector
+    f10: StateVector
+    f11: StateVector
+    f12: StateVector
+
     def __init__(self):
         self.f6 = self.f7 = self.f8 = self.f9 = self.f10 = self.f11 = self.f12 = 0.0
 

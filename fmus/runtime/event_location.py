@@ -11,7 +11,7 @@ computed again with a tighter tolerance (phase_repetition.py).
 
 from math import fabs, inf, pi, sin, sqrt
 
-from . import contact_lcp, stick_slip
+from . import conditions, contact_lcp, stick_slip
 from .codes import ROUNDOFF_MARGIN
 from .conditions import CONDITION_MARGIN, TINY
 from .interpolant import largest_of, smallest_of
@@ -80,7 +80,7 @@ def update_event_functions(model, t, y: StateVector, modes: ContactVector):
         else:
             stick_slip.update_contact_event_functions(model, location, t, y, modes)
     if model.has_conditions:
-        model.update_conditions(t, y, modes)
+        conditions.update_margins(model, t, y, modes)
         for j in range(model.n_event_functions - model.first_condition):
             k = model.first_condition + j
             location.scales[k] = location.margin_scales[j]

@@ -49,6 +49,8 @@ class Integrator(VariableOwner):
     h = Local("s", "size of the current internal step")
     t_next = Local("s", "end of the internal step that covers the time after the current one; computed when read")
 
+    y: StateVector
+    modes: ContactVector
     modes_before_change: ContactVector
 
     def __init__(self):

@@ -28,6 +28,11 @@ D5, D6, D7 = 701980252875.0 / 199316789632.0, -1453857185.0 / 822651844.0, 69997
 class Ode45:
     """Method with a quartic interpolant that matches values and slopes at both ends."""
 
+    f3: StateVector
+    f4: StateVector
+    f5: StateVector
+    f6: StateVector
+
     def __init__(self):
         self.f3 = self.f4 = self.f5 = self.f6 = 0.0
 

@@ -10,7 +10,7 @@ from math import inf
 from typing import Any
 
 from .variable_declarations import Count, Local, VariableOwner
-from .vectors import ContactVector, Derivatives, RateVector, StateVector
+from .vectors import ConditionVector, ContactVector, Derivatives, RateVector, StateVector
 
 
 class Events(VariableOwner):
@@ -72,8 +72,10 @@ class Oscillator(VariableOwner):
     def compute_outputs(self, t: float, y: StateVector, modes: ContactVector) -> bool:
         """Set the outputs; return whether all are finite."""
 
-    def update_conditions(self, t: float, y: StateVector, modes: ContactVector) -> None:
-        """Evaluate the conditions into `event_location`, if there are any."""
+    def condition_margins(
+        self, t: float, y: StateVector, modes: ContactVector
+    ) -> tuple[ConditionVector, ConditionVector]:
+        """Return the margins of the conditions, if there are any, and the sums of the absolute terms of each."""
 
     def linear_coefficients(self) -> tuple[float, float, float, float]:
         """Return m, c, k and u of a linear model: m v' + c v + k x = F + k u t between changes of mode."""

@@ -17,6 +17,7 @@ from .vectors import (
     RateVector,
     StateVector,
     all_of,
+    complete_rates,
     dynamic_part,
     elementwise_max,
     factorize,
@@ -99,6 +100,8 @@ class Radau9:
     p3: StateVector
     p4: StateVector
     p5: StateVector
+    f_start: StateVector
+    f_end: StateVector
 
     def __init__(self):
         self.z1 = self.z2 = self.z3 = self.z4 = self.z5 = 0.0
@@ -310,7 +313,7 @@ class Radau9:
             e = nan * y
             return y, f, e
 
-        # y6 and f6: end of the step
+        # the end of the step
         y6 = select_kinematic(
             y
             + h
@@ -347,7 +350,7 @@ class Radau9:
             d = magnitude(e)
             d = d / size
             error = h * max_of(d) / step.tolerance
-        f6 = select_kinematic(kinematic_rates(y6), (L1 * z1 + L2 * z2 + L3 * z3 + L4 * z4 + L5 * z5) / h)
+        f6 = complete_rates(y6, (L1 * z1 + L2 * z2 + L3 * z3 + L4 * z4 + L5 * z5) / h)
 
         # factors of the step size, for step_control
         safety = SAFETY * (2.0 * MAX_ITERATIONS + 1.0) / (2.0 * MAX_ITERATIONS + iterations)

@@ -15,17 +15,17 @@ from .interpolant import Interpolant, largest_of
 from .linear_closed_form import HIGHER_ORDER_INPUT
 from .vectors import (
     ContactVector,
+    RateVector,
     StateVector,
     all_of,
     any_of,
+    complete_rates,
     contact_indices,
     contact_vector,
     elementwise_max,
-    kinematic_rates,
     magnitude,
     max_of,
     min_of,
-    select_kinematic,
     slip_index,
     sum_of,
 )
@@ -71,6 +71,13 @@ class InternalStep:
     Keep fewer than thirty attributes: CPython 3.11 then stores them inline; with more, a step of ode23 takes a tenth
     longer.
     """
+
+    y0: StateVector
+    f0: RateVector
+    y1: StateVector
+    f1: RateVector
+    modes0: ContactVector
+    modes1: ContactVector
 
     def __init__(self):
         self.active_method = ActiveMethod()
@@ -395,7 +402,7 @@ class InternalStep:
                 return self.end_at(model, end)
             if model.is_coupled and self.is_hybrid:
                 self.y1 = contact_lcp.stop_slips(model, self.t1, self.y1, modes)
-                self.f1 = select_kinematic(kinematic_rates(self.y1), self.f1)
+                self.f1 = complete_rates(self.y1, self.f1)
             phase_repetition.end_phase_in_doubt(model, self)
         return OK
 
@@ -413,7 +420,7 @@ class InternalStep:
         modes = self.modes0
         if model.has_other_laws:
             modes = self.force_modes(modes)
-        y2, f2, e = method.propose(model, modes, self.t0, self.y0, self.f0, h)  # noqa: RUF059  named like y2
+        y2, _f2, e = method.propose(model, modes, self.t0, self.y0, self.f0, h)
         self.n_rhs += method.stages
         scale = magnitude(self.y0)
         scale = elementwise_max(method.error_scale_floor, scale)

@@ -10,10 +10,13 @@ from functools import wraps
 import numpy as np
 import numpy.typing as npt
 
-# Annotations that declare vectors over states or contacts, and the index of a contact.
+# Annotations that declare vectors over states, contacts or conditions, and the index of a contact.  A RateVector holds
+# the rates at the StateVector that is declared last before it, among the attributes of a class, the parameters of a
+# function and its results.  Scalars are not stored twice: those of its rates that are states are read from there.
 StateVector = npt.NDArray[np.float64]
 RateVector = npt.NDArray[np.float64]
 ContactVector = npt.NDArray[np.int64]
+ConditionVector = npt.NDArray[np.float64]
 ContactIndex = int
 Derivatives = tuple[RateVector, npt.NDArray[np.float64]]  # of rates by time, and by the states
 
@@ -92,6 +95,11 @@ def dynamic_part(a):
 def kinematic_rates(y):
     """Return, for states whose rate is a state, that rate."""
     return np.array([y[i] for i in rate_index])
+
+
+def complete_rates(y: StateVector, others) -> RateVector:
+    """Return the rates at y: those that are states from y, the others from a vector."""
+    return select_kinematic(kinematic_rates(y), others)
 
 
 def elementwise(function):

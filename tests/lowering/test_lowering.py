@@ -10,6 +10,7 @@ import pytest
 from internal_steps import array_steps, scalar_steps
 from models import CASES, LARGER_MODELS, MODELS, ROOT, label, model_class
 
+from fmus.packaging import BuildError
 from fmus.packaging.lowering import LoweringError, function_tree, lowered_files, lowered_model, select_features
 from fmus.packaging.lowering.dead_code import prune_assignment, remove_dead_code
 from fmus.packaging.lowering.emit_source import SourceEmitter, SourceLine
@@ -105,9 +106,18 @@ def test_a_traceback_points_into_the_source(name):
     assert frame.line == "duration = t_end - t if t_end < inf else model.stop_time"
 
 
-HEAD = "class Some:\n    def step(self, model, modes: ContactVector, t, y: StateVector, f: RateVector, h):\n        "
+HEAD = """class Some:
+    y1: StateVector
+    f1: RateVector
+
+    def step(self, model, modes: ContactVector, t, y: StateVector, f: RateVector, h):
+        """
+SPEC = ModelLayout({"x": "v", "v": "a"}, {"mode": "v"})
 BODIES = {
-    "f3 = model.rates(t, y, modes)": "must assign the rates at y2 to f2",
+    "z = y + h * f\n        f = model.rates(t, z, modes)": "evaluates f at other states than before",
+    "z = y + h * f\n        step.f1 = model.rates(t, z, modes)": "at other states than their class declares",
+    "slopes = model.rates(t, step.y1, modes)": "at states without a name",
+    "z = y + h * f\n        slopes = model.rates(t, z, modes)\n        z = y": "changes under slopes",
     "y2 = y + h * model.rates(t, y, modes)": "assign it to a name on a separate line",
     "e = magnitude(y + f)": "would evaluate its argument twice",
     "e = y + f\n        e += y": "write c = c + ...",
@@ -123,10 +133,36 @@ BODIES = {
 @pytest.mark.parametrize("body", BODIES)
 def test_an_unsupported_construct_is_refused_with_file_line_and_remedy(body):
     text = HEAD + body + "\n"
-    spec = ModelLayout({"x": "v", "v": "a"}, {"mode": "v"})
     with pytest.raises(LoweringError, match=re.escape(BODIES[body])) as caught:
-        SourceEmitter(spec, SourceSymbols([text, DECLARATIONS], VECTORS), "runtime/some.py", text, True)
-    assert re.match(r"runtime/some\.py:[234]: ", str(caught.value))
+        SourceEmitter(SPEC, SourceSymbols([text, DECLARATIONS], VECTORS), "runtime/some.py", text, True)
+    assert re.match(r"runtime/some\.py:[5678]: ", str(caught.value))
+
+
+def test_rates_and_states_may_have_any_names():
+    text = HEAD + "z = y + h * f\n        slope = model.rates(t, z, modes)\n        e = slope - f\n        return e\n"
+    lines = SourceEmitter(SPEC, SourceSymbols([text, DECLARATIONS], VECTORS), "runtime/some.py", text, True).lines
+    assert [line.strip() for line in lines[-7:]] == [
+        "z_x = x + h * v",
+        "z_v = v + h * a",
+        "slope_v = model.rates(t, z_x, z_v, mode)",
+        "e_x = z_v - v",  # the rate of the position is the speed
+        "e_v = slope_v - a",
+        "return e_x, e_v",
+        "",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("class A:\n    b: StateVector\nclass C:\n    b: ContactVector\n", "another vector"),
+        ("class A:\n    b: StateVector\nclass C:\n    def f(self):\n        self.b = 0.0\n", "C does not declare b"),
+        ("class A:\n    f0: RateVector\n", "follows no StateVector"),
+    ],
+)
+def test_an_attribute_has_one_declared_type(text, message):
+    with pytest.raises(BuildError, match=message):
+        SourceSymbols([text], VECTORS)
 
 
 def test_states_named_like_each_other_at_a_stage_get_distinct_readable_names():

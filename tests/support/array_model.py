@@ -4,7 +4,6 @@ from typing import get_args, get_origin
 
 import numpy as np
 
-from fmus.packaging.lowering.layout import NAMED_VECTOR
 from fmus.runtime.vectors import (
     ContactIndex,
     ContactVector,
@@ -61,12 +60,11 @@ def takes_vectors(types):
 
 def store_vectors_as_arrays(thing):
     """Store the vector attributes of an object, and of all objects that it owns, as arrays."""
-    annotated = {name for one in type(thing).__mro__ for name in vars(one).get("__annotations__", {})}
-    over_contacts = {name for name in annotated if "modes" in name}
+    types = {name: kind for one in type(thing).__mro__ for name, kind in vars(one).get("__annotations__", {}).items()}
 
     def assign(self, name, value):
-        if name in annotated or NAMED_VECTOR.fullmatch(name):
-            long = len(contact_indices) if name in over_contacts or name.startswith("modes") else len(state_indices)
+        if types.get(name) in VECTOR_TYPES:
+            long = len(contact_indices) if types[name] == ContactVector else len(state_indices)
             value = np.full(long, value) if np.ndim(value) == 0 else np.array(value)
         object.__setattr__(self, name, value)
 

@@ -1,7 +1,7 @@
 """Generates the methods that evaluate outputs, modes and conditions at a point."""
 
 from .algebra import rounding_scale
-from .codegen_context import CodegenContext, emit_scales, method_source
+from .codegen_context import CodegenContext, emit_return, emit_scales, method_source
 from .coupled_contact_methods import emit_friction_forces
 from .expressions import Term
 from .model_declaration import THRESHOLD
@@ -60,8 +60,4 @@ def condition_methods(f: CodegenContext) -> list[str]:
     scales = emit_scales(f, s, [rounding_scale(e) for e in margins])
     f.emit_driver(s, scales)
     s.count_uses(*margins, *scales)
-    s.emit("location = self.event_location")
-    for n, (margin, scale) in enumerate(zip(margins, scales, strict=True)):
-        s.emit(f"location.margins[{n}] = {s.text(margin)}")
-        s.emit(f"location.margin_scales[{n}] = {s.text(scale)}")
-    return [method_source("update_conditions", f.arguments, s.lines)]
+    return [method_source("condition_margins", f.arguments, emit_return(s, [*margins, *scales]))]

@@ -11,11 +11,13 @@
     lowered_sources.py     lowers all files of the runtime and the model
     import_hook.py         imports the lowered model into this process
 
-An annotation such as `e: StateVector` of a parameter, result or class attribute declares a vector.  Results of vector
-operations are vectors, and so are the attributes y, f and modes, with or without a number.  Their components are
+An annotation such as `e: StateVector` of a parameter, result or class attribute declares a vector; results of vector
+operations are vectors.  A RateVector holds the rates at the StateVector that is declared last before it; so does the
+result of model.rates(t, y2, modes) at y2.  Those of its rates that are states are read from there.  A vector may have
+any name, which only decides how its components are printed:
 
     y, y2, step.y0           named after the states: x, v;  x2, v2;  step.x0, step.v0
-    f, f2, step.f0           named after the rates: a;  a2;  step.a0.  The rate of x is v, so the rate of x2 is v2
+    f, f2, step.f0           named after the rates: a;  a2;  step.a0
     modes, step.modes0       named after the modes: mode;  step.mode0
     e, k3, self.c2           all others: e_x, e_v;  k3_x, k3_v;  self.c2_x, self.c2_v
 

@@ -7,7 +7,7 @@ from ..syntax_trees import is_same_tree, parsed_module, replace_fields
 from .constant_folding import known_truth
 from .layout import ModelLayout
 from .scalarize import LOOP_RANGES, METHOD_LOOP, Scalarizer
-from .source_symbols import SourceSymbols, annotated_kind, annotated_results, item_label
+from .source_symbols import SourceSymbols, annotated_kind, annotated_results, item_label, pair_rates
 
 MAX_LINE_LENGTH = 120
 
@@ -189,6 +189,8 @@ class SourceEmitter:
         """Lower a function with the contact index `i`."""
         outer, self.scalarizer = self.scalarizer, self.new_scalarizer(dict.fromkeys(counted, i))
         arguments = []
+        pairs = pair_rates([(one.arg, one.annotation) for one in node.args.args])
+        self.scalarizer.states_of_rates |= {rates: ast.Name(states) for rates, states in pairs.items()}
         for one in node.args.args:
             if self.has_vectors and (kind := annotated_kind(one)):
                 self.scalarizer.vector_kinds[one.arg] = kind

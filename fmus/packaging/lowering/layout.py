@@ -3,8 +3,9 @@
 import re
 from dataclasses import dataclass, field
 
-STATES, CONTACTS = "states", "contacts"  # what a vector may run over
-NAMED_VECTOR = re.compile(r"(y|f|modes)(\d*|_\w+)")  # vectors whose components have the names of the model
+STATES, CONTACTS, CONDITIONS = "states", "contacts", "conditions"  # what a vector may run over
+# names of vectors whose components are named after the states, rates and modes of the model
+NAMED_VECTOR = re.compile(r"(y|f|modes)(\d*|_\w+)")
 
 
 def stage_name(name: str, suffix: str) -> str:
@@ -23,6 +24,8 @@ class ModelLayout:
     excluded    labels of excluded methods and laws
     methods     label -> class of the included methods that take steps
     zeros       entries of the Jacobian (index of a state, index of a state) that are always zero
+    n_conditions
+                number of conditions of the equations
     """
 
     states: dict[str, str]
@@ -32,15 +35,25 @@ class ModelLayout:
     excluded: frozenset[str] = frozenset()
     methods: dict[str, str] = field(default_factory=dict)
     zeros: frozenset[tuple[int, int]] = frozenset()
+    n_conditions: int = 0
 
     def component_names(self, kind: str) -> list[str]:
         """Return the names of the states or modes."""
         return list(self.states if kind == STATES else self.contacts)
 
+    def size(self, kind: str) -> int:
+        """Return the number of components of a vector."""
+        return self.n_conditions if kind == CONDITIONS else len(self.component_names(kind))
+
     @property
     def dynamic_states(self) -> list[int]:
         """Indices of states whose rates are computed; the other rates are states."""
         return [place for place, rate in enumerate(self.states.values()) if rate not in self.states]
+
+    @property
+    def kinematic_states(self) -> list[int]:
+        """Indices of states whose rates are states."""
+        return [place for place, rate in enumerate(self.states.values()) if rate in self.states]
 
     @property
     def velocity_states(self) -> list[int]:

@@ -57,7 +57,8 @@ def model_layout(source: ModelFile, features: FeatureSelection) -> ModelLayout:
         for pairs in (model.states, model.contacts)
     )
     layout = ModelLayout(states, contacts, flags, features.choices, features.excluded, features.stepping_methods)
-    return replace(layout, zeros=zero_jacobian_entries(source.generated_source, layout))
+    zeros = zero_jacobian_entries(source.generated_source, layout)
+    return replace(layout, zeros=zeros, n_conditions=model.n_event_functions - model.first_condition)
 
 
 def zero_jacobian_entries(text: str, spec: ModelLayout) -> frozenset[tuple[int, int]]:

@@ -1,7 +1,6 @@
 """Rewrites expressions and simple statements of one function from vectors to scalars."""
 
 import ast
-import re
 from collections.abc import Sequence
 
 from .. import BuildError
@@ -13,7 +12,7 @@ from .elimination import (
     factorization_lines,
     solution_lines,
 )
-from .layout import NAMED_VECTOR, STATES, ModelLayout
+from .layout import CONDITIONS, STATES, ModelLayout
 from .source_symbols import ELEMENTWISE, SELECTIONS, SourceSymbols, annotated_kind
 
 REDUCTIONS = {"max_of": ">", "min_of": "<"}  # reductions to one component
@@ -36,6 +35,7 @@ class Scalarizer(ConstantFolder):
         super().__init__(spec, declared.constants)
         self.declared, self.path, self.has_vectors = declared, path, vectors
         self.vector_kinds: dict[str, str] = {}  # vector names -> what they run over
+        self.states_of_rates: dict[str, ast.Name] = {}  # names of rates -> the states at which they are evaluated
         self.allocated_names: set[str] = set()  # of vectors that are filled by component
         self.loop_indices = dict(index or {})  # loop variables -> current value
         self.scalar_names: set[str] = set()  # names of scalars
@@ -59,7 +59,9 @@ class Scalarizer(ConstantFolder):
             case ast.Name(id=name):
                 return self.vector_kinds.get(name)
             case ast.Attribute(attr=name):
-                return self.declared.attribute_kind(name)
+                return self.declared.vector_attributes.get(name)
+            case ast.Subscript(slice=ast.Slice(lower=None, upper=None)):
+                return CONDITIONS
             case ast.Call():
                 kinds = self.result_kinds(node)
                 return kinds[0] if len(kinds) == 1 else None
@@ -85,20 +87,25 @@ class Scalarizer(ConstantFolder):
 
     def all_indices(self, kind: str) -> range:
         """Return the indices of all components."""
-        return range(len(self.spec.component_names(kind)))
+        return range(self.spec.size(kind))
+
+    def states_of(self, node: ast.AST) -> ast.expr | None:
+        """Return the states at which rates are evaluated; None for another vector."""
+        match node:
+            case ast.Name(id=name):
+                return self.states_of_rates.get(name)
+            case ast.Attribute(value=owner, attr=name) if name in self.declared.states_of_rates:
+                return ast.Attribute(owner, self.declared.states_of_rates[name], ast.Load())
+        return None
 
     def own_indices(self, node: ast.AST, kind: str) -> Sequence[int]:
-        """Return the indices of components stored in the vector itself; kinematic rates of f2 are stored in y2."""
-        name = getattr(node, "attr", getattr(node, "id", ""))
-        stored = self.declared.assigned_attributes if isinstance(node, ast.Attribute) else self.vector_kinds
-        borrows = kind == STATES and re.fullmatch(r"f\d*", name) and "y" + name[1:] in stored
-        return self.spec.dynamic_states if borrows else self.all_indices(kind)
+        """Return the indices of components stored in the vector itself; rates that are states are stored there."""
+        return self.spec.dynamic_states if self.states_of(node) else self.all_indices(kind)
 
     def component_name(self, node: ast.AST, vector: str, kind: str, place: int) -> str:
         """Return the local name of a component of a vector."""
         name = self.spec.component_name(vector, kind, place)
-        borrowed = vector[0] == "f" and name in self.component_owner and self.component_owner[name] == "y" + vector[1:]
-        if not borrowed and self.component_owner.setdefault(name, vector) != vector:
+        if self.component_owner.setdefault(name, vector) != vector:
             raise self.error(
                 node, f"has a component {name}, which is also one of {self.component_owner[name]}; take another name"
             )
@@ -109,7 +116,11 @@ class Scalarizer(ConstantFolder):
         kind = self.vector_kind(node)
         if kind is None:
             return self.visit(node)
+        if (states := self.states_of(node)) and place in self.spec.kinematic_states:
+            return self.component(states, self.spec.rate_place(place))
         match node:
+            case ast.Subscript(value=vector):
+                return ast.Subscript(self.visit(vector), ast.Constant(place), ast.Load())
             case ast.Name(id=vector):
                 name = self.component_name(node, vector, kind, place)
                 return ast.Constant(0.0) if name in self.known_zeros else ast.Name(name, ast.Load())
@@ -123,6 +134,9 @@ class Scalarizer(ConstantFolder):
                 return ast.Compare(self.component(left, place), ops, [self.component(right, place)])
             case ast.Call(func=ast.Name(id="select_kinematic"), args=[moved, other]):
                 return self.component(other if place in self.spec.dynamic_states else moved, place)
+            case ast.Call(func=ast.Name(id="complete_rates"), args=[states, others]):
+                dynamic = place in self.spec.dynamic_states
+                return self.component(others, place) if dynamic else self.component(states, self.spec.rate_place(place))
             case ast.Call(func=ast.Name(id="dynamic_part"), args=[one]):
                 return self.component(one, place) if place in self.spec.dynamic_states else ast.Constant(0.0)
             case ast.Call(func=ast.Name(id="kinematic_rates"), args=[one]):
@@ -225,7 +239,7 @@ class Scalarizer(ConstantFolder):
                 if isinstance(each.iter, ast.Name) and each.iter.id == METHOD_LOOP:
                     return ast.Tuple([self.visit_for_method(item, each.target, label) for label in self.spec.methods])
             case ast.Call(func=ast.Name(id="len"), args=[one]) if kind := self.vector_kind(one):
-                return ast.Constant(len(self.spec.component_names(kind)))
+                return ast.Constant(self.spec.size(kind))
             case ast.Call(func=ast.Name(id="sum_of"), args=args):
                 terms = [ast.unparse(term) for one in args for term in self.all_components(one)]
                 return parse_expression(" + ".join(f"({term})" for term in terms))
@@ -274,8 +288,8 @@ class Scalarizer(ConstantFolder):
                     return [ast.Return(tuple_or_single(self.own_components(value)))]
             case ast.Assign(
                 targets=[ast.Tuple(elts=[ast.Name(id=f_t), ast.Name(id=J)])],
-                value=ast.Call(func=ast.Attribute(attr="jacobian")) as call,
-            ):
+                value=ast.Call(func=ast.Attribute(attr=name)) as call,
+            ) if name in self.declared.jacobians:
                 return self.lower_jacobian(f_t, J, call)
             case ast.Assign(targets=[ast.Name(id=s)], value=ast.Call(func=ast.Name(id="factorize"), args=[g, h, _])):
                 self.systems[s] = ast.unparse(g), ast.unparse(h)
@@ -298,7 +312,7 @@ class Scalarizer(ConstantFolder):
                 value=ast.Call(func=ast.Name(id="solve_complex"), args=[s, r, q]),
             ):
                 self.record_kinds(to, [STATES, STATES])
-                moved = [i for i in self.all_indices(STATES) if i not in self.spec.dynamic_states]
+                moved = self.spec.kinematic_states
                 self.known_zeros |= {self.spec.component_name(name, STATES, i) for name in (k, m) for i in moved}
                 system, right, other = (ast.unparse(one) for one in (s, r, q))
                 return ast.parse("\n".join(complex_solution_lines(k, m, system, right, other, self.spec))).body
@@ -316,9 +330,9 @@ class Scalarizer(ConstantFolder):
                     raise self.error(one, "is a vector elsewhere in the function; take another name")
                 self.scalar_names.add(one.id)
                 continue
-            if kind == STATES and one.id[0] == "y" and "f" + one.id[1:] in self.vector_kinds:
+            if rates := next((rates for rates, states in self.states_of_rates.items() if states.id == one.id), ""):
                 raise self.error(
-                    one, f"changes under f{one.id[1:]}, which takes some of its rates from it; take another name"
+                    one, f"changes under {rates}, which takes some of its rates from it; take another name"
                 )
             if self.vector_kinds.setdefault(one.id, kind) != kind:
                 raise self.error(one, "is another vector elsewhere in the function; take another name")
@@ -353,6 +367,10 @@ class Scalarizer(ConstantFolder):
             for to, one in zip(left, right, strict=True)
         ]
         self.record_kinds(left, kinds)
+        self.record_copied_rates(left, right)
+        for to, one in zip(left, right, strict=True):
+            if isinstance(one, ast.Call):
+                self.record_result_rates(node, [to], one)
         if not any(kinds):
             return [self.visit(node)]
         pairs: list[tuple[ast.expr, ast.expr]] = []
@@ -378,20 +396,32 @@ class Scalarizer(ConstantFolder):
     def lower_unpacking(self, node: ast.Assign, left: list[ast.expr], value: ast.Call) -> list[ast.stmt]:
         """Rewrite the unpacking of a function result."""
         kinds = self.result_kinds(value)
-        if (
-            kinds == [STATES]
-            and len(left) == 1
-            and function_name(value) == "rates"
-            and not is_matching_pair(left[0], value.args[1])
-        ):
-            raise self.error(
-                node, "must assign the rates at y2 to f2 (the same suffix): those that are states are read from y2"
-            )
         if len(kinds) != len(left):
             kinds = [None] * len(left)  # scalars
         self.record_kinds(left, kinds)
+        self.record_result_rates(node, left, value)
         terms = [term for one in left for term in self.own_components(one)]
         return [ast.Assign([tuple_or_single(terms)], self.visit(value))] if terms else [ast.Expr(self.visit(value))]
+
+    def record_result_rates(self, node: ast.stmt, targets: list[ast.expr], call: ast.Call) -> None:
+        """Record at which states a function evaluates the rates that it returns."""
+        for result, place in self.declared.states_of_results.get(function_name(call), {}).items():
+            rates, states = targets[result], targets[place] if place >= 0 else call.args[place]
+            if isinstance(rates, ast.Name) and isinstance(states, ast.Name):
+                if self.states_of_rates.setdefault(rates.id, states).id != states.id:
+                    raise self.error(node, f"evaluates {rates.id} at other states than before; take another name")
+            elif isinstance(rates, ast.Name):
+                raise self.error(node, f"evaluates {rates.id} at states without a name; assign them to a name first")
+            elif not is_same_tree(self.states_of(rates), states):
+                raise self.error(node, "evaluates rates at other states than their class declares")
+
+    def record_copied_rates(self, left: Sequence[ast.expr], right: Sequence[ast.expr]) -> None:
+        """Record the states of rates that are copied together with them, as in y, f = step.y0, step.f0."""
+        for rates, value in zip(left, right, strict=True):
+            if isinstance(rates, ast.Name) and (states := self.states_of(value)):
+                copies = (to for to, one in zip(left, right, strict=True) if is_same_tree(one, states))
+                if (copy := next(copies, None)) and isinstance(copy, ast.Name):
+                    self.states_of_rates[rates.id] = copy
 
     def lower_jacobian(self, f_t: str, J: str, call: ast.Call) -> list[ast.stmt]:
         """Rewrite f_t, J = model.jacobian(...): the derivatives of each dynamic rate, time first."""
@@ -420,12 +450,6 @@ class Scalarizer(ConstantFolder):
 def function_name(call: ast.Call) -> str:
     """Return the unqualified name of a called function."""
     return getattr(call.func, "attr", getattr(call.func, "id", ""))
-
-
-def is_matching_pair(rates: ast.expr, states: ast.expr) -> bool:
-    """Return whether the names are f2 and y2, with equal suffixes."""
-    f, y = (getattr(one, "attr", getattr(one, "id", "")) for one in (rates, states))
-    return f[:1] == "f" and y == "y" + f[1:] and NAMED_VECTOR.fullmatch(y) is not None
 
 
 def parse_expression(text: str) -> ast.expr:

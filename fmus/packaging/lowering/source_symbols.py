@@ -2,24 +2,26 @@
 
 import ast
 import re
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from itertools import count
-from typing import Any, TypeGuard
+from typing import Any, TypeGuard, TypeVar
 
+from .. import BuildError
 from ..syntax_trees import all_nodes, parsed_module, parsed_nodes
-from .layout import CONTACTS, NAMED_VECTOR, STATES, stage_name
+from .layout import CONDITIONS, CONTACTS, NAMED_VECTOR, STATES, stage_name
 
 # functions of vectors, component by component: to scalars; by the kind of rates
 ELEMENTWISE = {
     "magnitude": "{0} if {0} > 0.0 else -{0}",
     "elementwise_max": "{0} if {0} > {1} else {1}",
 }
-SELECTIONS = ("select_kinematic", "dynamic_part", "kinematic_rates")
+SELECTIONS = ("select_kinematic", "dynamic_part", "kinematic_rates", "complete_rates")
 named_vector = cache(NAMED_VECTOR.fullmatch)  # thousands of names, most of them several times
 PREFIX = "own_"  # of names of a model that look like those of vectors
-VECTOR_KINDS = {"StateVector": STATES, "RateVector": STATES, "ContactVector": CONTACTS}
+Key = TypeVar("Key", str, int)
+VECTOR_KINDS = {"StateVector": STATES, "RateVector": STATES, "ContactVector": CONTACTS, "ConditionVector": CONDITIONS}
 
 
 @dataclass(frozen=True)
@@ -43,47 +45,62 @@ class SourceSymbols:
 
     def __init__(self, texts: Iterable[str], vector_operations: str) -> None:
         self.vector_attributes: dict[str, str] = {}
-        self.assigned_attributes: set[str] = set()
+        self.states_of_rates: dict[str, str] = {}  # attribute with rates -> attribute with their states
         self.constants: dict[str, Any] = {}
         self.elementwise: set[str] = set()
         self.module_names: set[str] = set()  # module-level names: constants, functions, classes
         self.scopes: list[Scope] = []  # functions, and attributes of classes
         functions: list[ast.FunctionDef] = []
-        self.result_kinds: dict[str, list[str | None]] = {}
+        self.result_kinds: dict[str, list[str | None]] = {}  # of functions that return vectors
+        # of functions that return rates: place of the rates -> place of their states; negative places are arguments
+        self.states_of_results: dict[str, dict[int, int]] = {}
+        self.jacobians: set[str] = set()  # functions that return the derivatives of the rates
+        scalars: dict[str, str] = {}  # attributes without declaration -> a class that has them
         for function in parsed_module(vector_operations).body:
             if isinstance(function, ast.FunctionDef):
                 self.read_results(function)
         for text in texts:
             self.read_file(parsed_module(text))
             for node in parsed_nodes(text):
-                self.read_node(node)
+                self.read_node(node, scalars)
             functions += [node for node in parsed_nodes(text) if isinstance(node, ast.FunctionDef)]
+        if ambiguous := min(scalars.keys() & self.vector_attributes, default=""):
+            raise BuildError(f"{scalars[ambiguous]} does not declare {ambiguous}, a vector in another class.")
         self.scopes += map(self.function_scope, functions)
         self.suffixes: dict[str, set[str]] = {"y": set(), "f": set(), "modes": set()}  # of vectors named y2, f2, modes0
         for match in (match for scope in self.scopes for match in scope.named_vectors):
             self.suffixes[match[1]].add(match[2])
 
-    def read_node(self, node: ast.AST) -> None:
+    def read_node(self, node: ast.AST, scalars: dict[str, str]) -> None:
         """Collect the symbols of one node."""
         match node:
-            case ast.AnnAssign(target=ast.Name(id=name)) if kind := annotated_kind(node):
-                self.vector_attributes[name] = kind
-            case ast.Attribute(attr=name, ctx=ast.Store()):
-                self.assigned_attributes.add(name)
             case ast.ClassDef():
                 names = {getattr(one.targets[0], "id", "") for one in node.body if isinstance(one, ast.Assign)}
                 names |= {one.attr for one in all_nodes(node) if is_self_assignment(one)}
-                annotated = {getattr(one.target, "id", "") for one in node.body if isinstance(one, ast.AnnAssign)}
-                self.scopes.append(Scope.of(names, annotated & {*self.vector_attributes}))
+                declared = {one.target.id: one for one in node.body if is_vector_declaration(one)}
+                for name, one in declared.items():
+                    kind = annotated_kind(one) or ""
+                    if self.vector_attributes.setdefault(name, kind) != kind:
+                        raise BuildError(f"{node.name} declares {name} as another vector than another class.")
+                pairs = pair_rates([(name, one.annotation) for name, one in declared.items()])
+                self.states_of_rates |= pairs
+                scalars |= dict.fromkeys(names - declared.keys(), node.name)
+                self.scopes.append(Scope.of(names, {*declared}))
             case ast.FunctionDef(name=name):
                 self.read_results(node)
                 if any(isinstance(one, ast.Name) and one.id == "elementwise" for one in node.decorator_list):
                     self.elementwise.add(name)
 
     def read_results(self, node: ast.FunctionDef) -> None:
-        """Collect the kinds of the results of a function."""
+        """Collect the results of a function."""
+        if isinstance(node.returns, ast.Name) and node.returns.id == "Derivatives":
+            self.jacobians.add(node.name)
         if kinds := annotated_results(node):
             self.result_kinds[node.name] = kinds
+            arguments = [one for one in node.args.args if one.arg != "self"]
+            types = [(n - len(arguments), one.annotation) for n, one in enumerate(arguments)]
+            pairs = pair_rates([*types, *enumerate(result_types(node))])
+            self.states_of_results[node.name] = {rates: states for rates, states in pairs.items() if rates >= 0}
 
     def function_scope(self, function: ast.FunctionDef) -> "Scope":
         """Return the names in a function; a name is a vector if it is annotated or a vector is assigned to it."""
@@ -94,7 +111,6 @@ class SourceSymbols:
             elif isinstance(node, ast.Assign):
                 assignments.append(node)
         kinds = {one.arg: annotated_kind(one) for one in function.args.args}
-        kinds |= {one: self.attribute_kind(one) for one in names if named_vector(one)}
         elementwise = {*ELEMENTWISE, *SELECTIONS, *self.elementwise}
 
         def kind_of(e: ast.expr, place: int = 0) -> str | None:
@@ -102,7 +118,7 @@ class SourceSymbols:
                 case ast.Name(id=name):
                     return kinds.get(name)
                 case ast.Attribute(attr=name):
-                    return self.attribute_kind(name)
+                    return self.vector_attributes.get(name)
                 case ast.BinOp(left=left, right=right):
                     return kind_of(left) or kind_of(right)
                 case ast.UnaryOp(operand=operand):
@@ -110,7 +126,7 @@ class SourceSymbols:
                 case ast.Call(func=ast.Name(id=name), args=args) if name in elementwise:
                     return next(filter(None, map(kind_of, args)), None)
                 case ast.Call(func=ast.Name(id=name) | ast.Attribute(attr=name)):
-                    results = self.result_kinds.get(name, [])
+                    results = [STATES] if name in self.jacobians else self.result_kinds.get(name, [])
                     return results[place] if place < len(results) else None
             return None
 
@@ -185,11 +201,6 @@ class SourceSymbols:
                         self.module_names.add(one.id)
                         self.constants[one.id] = item_label(what) or getattr(what, "value", None)
 
-    def attribute_kind(self, name: str) -> str | None:
-        """Return what an attribute runs over (states or contacts); None for a scalar."""
-        stem = named_vector(name)
-        return self.vector_attributes.get(name) or ((CONTACTS if stem[1] == "modes" else STATES) if stem else None)
-
 
 def is_self_assignment(node: ast.AST) -> TypeGuard[ast.Attribute]:
     """Return whether this node sets an attribute of self."""
@@ -198,19 +209,48 @@ def is_self_assignment(node: ast.AST) -> TypeGuard[ast.Attribute]:
     )
 
 
+def is_vector_declaration(node: ast.AST) -> TypeGuard[Any]:
+    """Return whether this declares an attribute of a class as a vector."""
+    return isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name) and annotated_kind(node) is not None
+
+
 def annotated_kind(node: ast.arg | ast.AnnAssign) -> str | None:
     """Return what a name with this annotation runs over."""
-    return VECTOR_KINDS.get(node.annotation.id) if isinstance(node.annotation, ast.Name) else None
+    return VECTOR_KINDS.get(type_name(node.annotation))
 
 
 def annotated_results(node: ast.FunctionDef) -> list[str | None]:
     """Return the kinds in the result annotation; empty if none is a vector."""
+    kinds = [VECTOR_KINDS.get(type_name(one)) for one in result_types(node)]
+    return kinds if any(kinds) else []
+
+
+def result_types(node: ast.FunctionDef) -> list[ast.expr | None]:
+    """Return the types of the results."""
     parts = node.returns
     if isinstance(parts, ast.Subscript):
         parts = parts.slice
-    names = parts.elts if isinstance(parts, ast.Tuple) else [parts]
-    kinds = [VECTOR_KINDS.get(getattr(name, "id", "")) for name in names]
-    return kinds if any(kinds) else []
+    return [*parts.elts] if isinstance(parts, ast.Tuple) else [parts]
+
+
+def type_name(annotation: ast.expr | None) -> str:
+    """Return the name of a simple type, else ""."""
+    return annotation.id if isinstance(annotation, ast.Name) else ""
+
+
+def pair_rates(types: Sequence[tuple[Key, ast.expr | None]]) -> dict[Key, Key]:
+    """Return for each RateVector the StateVector declared last before it."""
+    result, states = {}, None
+    for key, annotation in types:
+        if type_name(annotation) == "StateVector":
+            states = key
+        elif type_name(annotation) == "RateVector":
+            if states is None:
+                raise BuildError(
+                    f"The RateVector {key} follows no StateVector; write StateVector to store it as a whole."
+                )
+            result[key] = states
+    return result
 
 
 def item_label(node: ast.AST) -> str:
