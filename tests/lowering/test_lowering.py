@@ -165,9 +165,20 @@ def test_an_attribute_has_one_declared_type(text, message):
         SourceSymbols([text], VECTORS)
 
 
-def test_states_named_like_each_other_at_a_stage_get_distinct_readable_names():
-    names = runtime_symbols().resolve_names({"x": "v", "x2": "v2", "v": "a", "v2": "b"}, ["mode"])
-    assert names == {name: name for name in ("x", "v", "a", "b", "mode")} | {"x2": "x2_", "v2": "v2_"}
+@pytest.mark.parametrize(
+    ("states", "mode", "separator"),
+    [
+        ({"x": "v", "x1": "v1", "v": "a", "v1": "a1"}, "mode", "_"),
+        ({"x": "v", "x2": "v2", "v": "a", "v2": "b"}, "mode1", "_"),
+        ({"x": "v", "x2": "v2", "v": "a", "v2": "x_2"}, "mode", "__"),
+        ({"x": "v", "x_end": "b", "v": "a"}, "mode", "_"),
+        ({"x1": "v1", "x2": "v2", "v1": "a1", "v2": "a2"}, "mode", ""),
+    ],
+)
+def test_states_keep_their_names_beside_stages_of_other_states(states, mode, separator):
+    symbols, names = runtime_symbols(), {*states, *states.values(), mode}
+    assert symbols.stage_separator(states, [mode]) == separator
+    assert symbols.resolve_names(states, [mode], separator) == {name: name for name in names}
 
 
 def test_a_model_is_lowered_only_once():

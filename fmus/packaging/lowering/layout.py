@@ -8,9 +8,11 @@ STATES, CONTACTS, CONDITIONS = "states", "contacts", "conditions"  # what a vect
 NAMED_VECTOR = re.compile(r"(y|f|modes)(\d*|_\w+)")
 
 
-def stage_name(name: str, suffix: str) -> str:
+def stage_name(name: str, suffix: str, separator: str) -> str:
     """Return the name of a state, rate or mode at a stage of a step: x2, x_end; x1_2 where it ends in a digit."""
-    return name + ("_" if suffix.isdigit() and name[-1].isdigit() else "") + suffix
+    if suffix.isdigit() and name[-1].isdigit():
+        separator = separator or "_"
+    return f"{name}{separator}{suffix}" if suffix else name
 
 
 @dataclass(frozen=True)
@@ -26,6 +28,7 @@ class ModelLayout:
     zeros       entries of the Jacobian (index of a state, index of a state) that are always zero
     n_conditions
                 number of conditions of the equations
+    separator   between the name of a state and the number of a stage
     """
 
     states: dict[str, str]
@@ -36,6 +39,7 @@ class ModelLayout:
     methods: dict[str, str] = field(default_factory=dict)
     zeros: frozenset[tuple[int, int]] = frozenset()
     n_conditions: int = 0
+    separator: str = ""
 
     def component_names(self, kind: str) -> list[str]:
         """Return the names of the states or modes."""
@@ -86,7 +90,7 @@ class ModelLayout:
             return vector + (self.contact_suffix(place) if kind == CONTACTS else f"_{part}")
         stem, suffix = match.groups()
         part = self.states[part] if stem == "f" else part
-        return stage_name(part, suffix)
+        return stage_name(part, suffix, self.separator)
 
     def jacobian_entry(self, rate: int, state: int) -> str:
         """Return the name of an entry of the Jacobian."""

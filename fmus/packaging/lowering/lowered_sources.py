@@ -42,7 +42,12 @@ def runtime_symbols() -> SourceSymbols:
 
 def runtime_names(model: Any) -> dict[str, str]:
     """Return the names of the states, rates and modes of a model class in the runtime."""
-    return runtime_symbols().resolve_names(model.states, model.contacts)
+    return runtime_symbols().resolve_names(model.states, model.contacts, stage_separator(model))
+
+
+def stage_separator(model: Any) -> str:
+    """Return what stands between the name of a state and the number of a stage in the runtime."""
+    return runtime_symbols().stage_separator(model.states, model.contacts)
 
 
 def model_layout(source: ModelFile, features: FeatureSelection) -> ModelLayout:
@@ -58,7 +63,8 @@ def model_layout(source: ModelFile, features: FeatureSelection) -> ModelLayout:
     )
     layout = ModelLayout(states, contacts, flags, features.choices, features.excluded, features.stepping_methods)
     zeros = zero_jacobian_entries(source.generated_source, layout)
-    return replace(layout, zeros=zeros, n_conditions=model.n_event_functions - model.first_condition)
+    n_conditions = model.n_event_functions - model.first_condition
+    return replace(layout, zeros=zeros, n_conditions=n_conditions, separator=stage_separator(model))
 
 
 def zero_jacobian_entries(text: str, spec: ModelLayout) -> frozenset[tuple[int, int]]:

@@ -141,18 +141,26 @@ class SourceSymbols:
         # a vector over a single contact keeps its name
         return Scope.of(names, vectors, {name for name in vectors if kinds[name] == CONTACTS})
 
-    def resolve_names(self, states: Mapping[str, str], modes: Iterable[str]) -> dict[str, str]:
+    def stage_separator(self, states: Mapping[str, str], modes: Iterable[str]) -> str:
+        """Return the separator of names and numbers of stages for which no stage is named like a variable of the model.
+
+        It is empty for most models, and an underscore for one with the states x and x2, whose stages are x_2 and x2_2.
+        """
+        stems = stems_of_names(states, modes)
+        for separator in ("_" * n for n in count()):
+            stages = [self._components(name, own, separator) - {name} for name, own in stems.items()]
+            if len(stems.keys() | set().union(*stages)) == len(stems) + sum(map(len, stages)):
+                return separator
+        raise AssertionError
+
+    def resolve_names(self, states: Mapping[str, str], modes: Iterable[str], separator: str) -> dict[str, str]:
         """Return the names of states, rates and modes in the runtime.
 
         They are those of the model, with underscores where a component of a vector would get a name that has another
-        meaning in the same function or class, or is a component of another vector.  A name like y_1, which is that of a
-        vector whatever follows it, gets a prefix.
+        meaning in the same function or class of the runtime, or is a component of another vector.  A name like y_1,
+        which is that of a vector whatever follows it, gets a prefix.
         """
-        stems: dict[str, set[str]] = {name: set() for name in (*states, *states.values(), *modes)}
-        for stem, names in ("y", states), ("f", states.values()), ("modes", modes):
-            for name in names:
-                stems[name].add(stem)
-        result: dict[str, str] = {}
+        stems, result = stems_of_names(states, modes), {}
         vectors = {vector for scope in self.scopes if scope.named_vectors for vector in scope.other_vectors}
         used = {f"{vector}_{name}" for vector in vectors for name in stems}
         used |= {f"{rate}_{state}" for rate in states.values() for state in states}  # entries of the Jacobian
@@ -163,20 +171,20 @@ class SourceSymbols:
                 one
                 for one in candidates
                 if (one == name or one not in stems)
-                and used.isdisjoint(self._components(one, own))
-                and self._is_free(one, own)
+                and used.isdisjoint(self._components(one, own, separator))
+                and self._is_free(one, own, separator)
             )
-            used |= self._components(result[name], own)
+            used |= self._components(result[name], own, separator)
         return result
 
-    def _components(self, name: str, stems: set[str]) -> set[str]:
+    def _components(self, name: str, stems: set[str], separator: str) -> set[str]:
         """Return the names that the components of all vectors get from a name."""
-        return {stage_name(name, suffix) for stem in stems for suffix in self.suffixes[stem]}
+        return {stage_name(name, suffix, separator) for stem in stems for suffix in self.suffixes[stem]}
 
-    def _is_free(self, name: str, stems: set[str]) -> bool:
+    def _is_free(self, name: str, stems: set[str], separator: str) -> bool:
         """Return whether no component named after `name` has another meaning in the runtime."""
         for scope in self.scopes:
-            components = {stage_name(name, match[2]) for match in scope.named_vectors if match[1] in stems}
+            components = {stage_name(name, match[2], separator) for match in scope.named_vectors if match[1] in stems}
             components |= {f"{one}_{name}" for one in scope.other_vectors}
             if not components.isdisjoint(scope.scalars):
                 return False
@@ -200,6 +208,15 @@ class SourceSymbols:
                     if isinstance(one, ast.Name):
                         self.module_names.add(one.id)
                         self.constants[one.id] = item_label(what) or getattr(what, "value", None)
+
+
+def stems_of_names(states: Mapping[str, str], modes: Iterable[str]) -> dict[str, set[str]]:
+    """Return the names of a model with the stems of the vectors whose components are named after them."""
+    result: dict[str, set[str]] = {name: set() for name in (*states, *states.values(), *modes)}
+    for stem, names in ("y", states), ("f", states.values()), ("modes", modes):
+        for name in names:
+            result[name].add(stem)
+    return result
 
 
 def is_self_assignment(node: ast.AST) -> TypeGuard[ast.Attribute]:
