@@ -247,6 +247,9 @@ class Location:
         self.is_called = False
 """
     model = """
+from .location import Location
+
+
 class Model:
     def __init__(self):
         self.location = Location(1)
@@ -261,10 +264,32 @@ class Model:
     files = {
         path: [SourceLine.of(line, n) for n, line in enumerate(text.split("\n"), 1)] for path, text in texts.items()
     }
-    pruned = {path: "\n".join(lines) for path, lines in remove_dead_code(files, "some.py", {"Model"}).items()}
+    pruned = {path: "\n".join(lines) for path, lines in remove_dead_code(files, "some.py", {"model:Model"}).items()}
     assert pruned["runtime/location.py"] == location.replace("        self.t_last = -inf\n", "")
     assert pruned["runtime/model.py"] == model.replace("self.location.t_last = t", "pass")
     assert pruned["runtime/slave.py"] == layer
+
+
+def test_a_function_is_removed_although_methods_and_functions_of_other_files_share_its_name():
+    texts = {
+        "runtime/conditions.py": "def begin(model):\n    model.sides = 1.0\n\n\ndef start(model):\n    return 1.0\n",
+        "runtime/stages.py": "def begin():\n    return 0.0\n",
+        "runtime/model.py": """from . import conditions
+from .stages import begin as first
+
+
+class Model:
+    def begin(self):
+        return first() + conditions.start(self)
+""",
+        "runtime/slave.py": "def call(model):\n    return model.begin() + model.sides\n",
+    }
+    files = {
+        path: [SourceLine.of(line, n) for n, line in enumerate(text.split("\n"), 1)] for path, text in texts.items()
+    }
+    pruned = {path: "\n".join(lines) for path, lines in remove_dead_code(files, "some.py", {"model:Model"}).items()}
+    assert pruned.pop("runtime/conditions.py").strip() == "def start(model):\n    return 1.0"
+    assert pruned == {path: text for path, text in texts.items() if path in pruned}
 
 
 def test_an_elif_becomes_an_if_where_the_branch_before_is_removed_and_other_tests_are_copied():

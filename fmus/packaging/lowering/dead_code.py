@@ -1,12 +1,15 @@
 """Removes dead code: attributes that are never read, functions and classes that are never used, unused imports.
 
-Uses are matched by name in all embedded files, and in dotted names such as those of variables.
+Functions and classes of modules are symbols with an origin: each use is resolved to the file that defines it
+("conditions:initialize").  Members of objects are matched by name in all embedded files (".initialize"), and in dotted
+names such as those of variables, since the files do not declare the class of every object.
 """
 
 import ast
 import re
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from functools import partial
 
 from ..syntax_trees import all_nodes, child_nodes, parsed_module, parsed_nodes
 from .emit_source import MAX_LINE_LENGTH, SourceLine, wrap_line
@@ -28,8 +31,9 @@ WITHOUT_EFFECT = (
 
 def remove_dead_code(files: Files, model: str, names: Iterable[str]) -> Files:
     """Remove dead code from the files; `model` is the path of the model, `names` are read from outside."""
+    symbols = ModuleSymbols(files)
     used = reachable_names(
-        [one for path, lines in files.items() for one in code_units(path, lines, path == model)], set(names)
+        [one for path, lines in files.items() for one in code_units(path, lines, symbols, path == model)], set(names)
     )
     return {path: prune_file(path, lines, used, path == model) for path, lines in files.items()}
 
@@ -39,9 +43,52 @@ def parse_lines(lines: list[SourceLine]) -> ast.Module:
     return parsed_module("\n".join(lines))
 
 
+class ModuleSymbols:
+    """Module-level names of all files, resolved to the file that defines them."""
+
+    def __init__(self, files: Files) -> None:
+        self.modules = {module_of(path) for path in files}
+        self.imported: dict[str, str] = {}  # "module:name" -> the same where it is imported from
+        self.defined: set[str] = set()
+        for path, lines in files.items():
+            for node in parse_lines(lines).body:
+                if isinstance(node, ast.ImportFrom) and node.level:
+                    source = (node.module or "").rpartition(".")[2]
+                    for alias in node.names:
+                        self.imported[f"{module_of(path)}:{alias.asname or alias.name}"] = f"{source}:{alias.name}"
+                elif isinstance(node, (ast.FunctionDef, ast.ClassDef)):
+                    self.defined.add(f"{module_of(path)}:{node.name}")
+
+    def read_symbol(self, module: str, node: ast.AST) -> str:
+        """Return what a name or attribute in a module refers to: "module:name" or ".attribute"; else ""."""
+        match node:
+            case ast.Name(id=name):
+                return self.origin(f"{module}:{name}")
+            case ast.Attribute(value=ast.Name(id=owner), attr=name) if self.is_module(module, owner):
+                return self.origin(f"{owner}:{name}")
+            case ast.Attribute(attr=name):
+                return "." + name
+        return ""
+
+    def origin(self, symbol: str) -> str:
+        """Follow imports to the definition of a function or class; "" for anything else."""
+        while symbol in self.imported:
+            symbol = self.imported[symbol]
+        return symbol if symbol in self.defined else ""
+
+    def is_module(self, module: str, name: str) -> bool:
+        """Return whether a name in a module is an imported module."""
+        return name in self.modules and f"{module}:{name}" in self.imported
+
+
+def module_of(path: str) -> str:
+    """Return the name of the module in a file."""
+    return path.rpartition("/")[2].removesuffix(".py")
+
+
 @dataclass
 class CodeUnit:
-    """A piece of code and what it reads (".attribute" or "name").
+    """A piece of code and what it reads (".attribute" or "module:name").
 
     It is reachable if at least one name of each set in `needs` is reachable.
     """
@@ -50,20 +97,24 @@ class CodeUnit:
     reads: set[str]
 
 
-def code_units(path: str, lines: list[SourceLine], is_model: bool) -> list[CodeUnit]:
+def code_units(path: str, lines: list[SourceLine], symbols: ModuleSymbols, is_model: bool) -> list[CodeUnit]:
     """Return functions and attribute assignments of a file with what they read; all classes of a model are kept."""
+    module = module_of(path)
+    read_symbol = partial(symbols.read_symbol, module)
     if path in KEPT_WHOLE:
-        return units_of_node(parse_lines(lines), [], True)
+        return units_of_node(parse_lines(lines), [], True, read_symbol)
     result: list[CodeUnit] = []
     for part in parse_lines(lines).body:
         needs: list[set[str]] = []
         pieces: list[ast.AST] = [part]
         if isinstance(part, ast.ClassDef):
-            needs = [] if is_model else [{part.name, "." + part.name}]
+            needs = [] if is_model else [{f"{module}:{part.name}"}]
             pieces = [*part.bases, *part.decorator_list, *part.body]
         for node in pieces:
-            names = [call_names(node)] if isinstance(node, ast.FunctionDef) and not node.name.startswith("__") else []
-            result += units_of_node(node, needs + names, is_model)
+            names = []
+            if isinstance(node, ast.FunctionDef) and not node.name.startswith("__"):
+                names = [{symbol_of(module, node)}]
+            result += units_of_node(node, needs + names, is_model, read_symbol)
     return result
 
 
@@ -77,7 +128,9 @@ def reachable_names(units: list[CodeUnit], names: set[str]) -> set[str]:
         names = more
 
 
-def units_of_node(part: ast.AST, needs: list[set[str]], whole: bool) -> list[CodeUnit]:
+def units_of_node(
+    part: ast.AST, needs: list[set[str]], whole: bool, read_symbol: Callable[[ast.AST], str]
+) -> list[CodeUnit]:
     """Return what a piece of code reads; the parts of dotted names in strings count as attributes.
 
     Unless `whole`, assignments that only set attributes become units of their own.
@@ -86,10 +139,8 @@ def units_of_node(part: ast.AST, needs: list[set[str]], whole: bool) -> list[Cod
     result, pending = [mine], [part]
     for node in pending:  # the list grows during the loop
         match node:
-            case ast.Name(id=name, ctx=ast.Load()):
-                mine.reads.add(name)
-            case ast.Attribute(attr=name, ctx=ast.Load()):
-                mine.reads.add("." + name)
+            case ast.Name(ctx=ast.Load()) | ast.Attribute(ctx=ast.Load()):
+                mine.reads.add(read_symbol(node))
             case ast.Constant(value=str(text)) if DOTTED_NAME.fullmatch(text):
                 mine.reads |= {"." + word for word in text.split(".")}
             case ast.Assign():
@@ -98,7 +149,7 @@ def units_of_node(part: ast.AST, needs: list[set[str]], whole: bool) -> list[Cod
                     if all(is_dead_store(one, value, set()) for one in targets):
                         stored = {"." + one.attr for one in targets if isinstance(one, ast.Attribute)}
                         for piece in (*targets, value):
-                            result += units_of_node(piece, [*needs, stored], True)
+                            result += units_of_node(piece, [*needs, stored], True, read_symbol)
                     else:
                         pending += [*targets, value]
                 if not whole:
@@ -114,7 +165,9 @@ def prune_file(path: str, lines: list[SourceLine], used: set[str], is_model: boo
     if path in KEPT_WHOLE:
         return lines
     whole, lines = parse_lines(lines), list(lines)
-    for node in sorted(removable_nodes(whole, used, is_model), key=lambda one: one.lineno, reverse=True):
+    for node in sorted(
+        removable_nodes(whole, used, module_of(path), is_model), key=lambda one: one.lineno, reverse=True
+    ):
         if isinstance(node, ast.Assign):
             prune_assignment(lines, node, used)
         else:
@@ -122,15 +175,15 @@ def prune_file(path: str, lines: list[SourceLine], used: set[str], is_model: boo
     return prune_imports(lines)
 
 
-def removable_nodes(whole: ast.Module, used: set[str], is_model: bool) -> list[Removable]:
+def removable_nodes(whole: ast.Module, used: set[str], module: str, is_model: bool) -> list[Removable]:
     """Return unused classes and functions, and all assignments outside of them; only functions for a model."""
     result: list[Removable] = []
     pending: list[ast.AST] = [*whole.body]
     for node in pending:  # the list grows during the loop
         match node:
-            case ast.ClassDef(name=name) if not is_model and not {name, "." + name} & used:
+            case ast.ClassDef(name=name) if not is_model and f"{module}:{name}" not in used:
                 result.append(node)
-            case ast.FunctionDef(name=name) if not name.startswith("__") and not call_names(node) & used:
+            case ast.FunctionDef(name=name) if not name.startswith("__") and symbol_of(module, node) not in used:
                 result.append(node)
             case ast.Assign() if not is_model:
                 result.append(node)
@@ -139,9 +192,9 @@ def removable_nodes(whole: ast.Module, used: set[str], is_model: bool) -> list[R
     return result
 
 
-def call_names(node: ast.FunctionDef) -> set[str]:
-    """Return the names by which a function is called; methods only as .name."""
-    return {"." + node.name} if node.col_offset else {"." + node.name, node.name}
+def symbol_of(module: str, node: ast.FunctionDef) -> str:
+    """Return "module:name" of a function, or ".name" of a method."""
+    return f".{node.name}" if node.col_offset else f"{module}:{node.name}"
 
 
 def delete_definition(lines: list[SourceLine], node: ast.ClassDef | ast.FunctionDef) -> None:
