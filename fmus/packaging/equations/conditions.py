@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from .algebra import depends_on, is_constant, is_same_expression, operands, subexpressions
 from .expressions import COMPARISONS, Expression, Operand, Term
-from .model_declaration import Fixed, Input, Parameter
+from .model_declaration import SettableVariable
 
 LIMITED_DOMAIN = ("sqrt", "log", "asin", "acos", "/")  # operations that fail for some operands
 HOLD_TOLERANCE = 1e-9  # the sliding force may exceed the holding force by rounding errors
@@ -77,7 +77,7 @@ def is_nonnegative(e: Operand) -> bool:
     """Return whether the form of an expression shows that it is never negative."""
     if not isinstance(e, Expression):
         return e >= 0.0
-    if isinstance(e, (Parameter, Fixed, Input)):
+    if isinstance(e, SettableVariable):
         return e.low >= 0.0 or e.above >= 0.0
     if not isinstance(e, Term):
         return bool(operands(e)) and all(map(is_nonnegative, operands(e)))

@@ -16,7 +16,7 @@ from .expressions import (
     is_comparison,
     is_number,
 )
-from .model_declaration import Choice, Contact, Fixed, Input, Parameter, Variable
+from .model_declaration import Choice, Contact, SettableVariable, Variable
 from .model_roles import ModelRoles
 from .reserved_names import RESERVED
 
@@ -113,7 +113,7 @@ def _check_variable(an: ModelRoles, e: Variable) -> None:
             f"slip of {e.name} is {e.slip.name}, but a slip is a speed: write slip={an.rate[e.slip].name}",
             e.location,
         )
-    if isinstance(e, (Parameter, Fixed, Input)) and not e.accepts(e.start):
+    if isinstance(e, SettableVariable) and not e.accepts(e.start):
         raise ModelError(f"{e.name} has the start value {e.start!r}; it must be {e.allowed}", e.location)
 
 

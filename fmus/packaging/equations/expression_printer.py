@@ -10,7 +10,7 @@ from typing import Any
 from ...runtime.variable_declarations import VariableDeclaration
 from .algebra import operands
 from .expressions import Expression, ModelError, Operand, Term
-from .model_declaration import Choice, Fixed, Input, Output, Parameter
+from .model_declaration import Choice, Output, SettableVariable
 
 INDENT = "    "
 MAX_INLINE_LENGTH = 50  # characters; longer named subexpressions get a separate line
@@ -159,7 +159,7 @@ class ExpressionPrinter:
             return ast.parse(self.bound_names[e], mode="eval").body
         if (number := self.value_number(e)) in self.local_names:
             return ast.Name(self.local_names[number])
-        if isinstance(e, (Parameter, Fixed, Input, Choice)) or self._is_constant(e):
+        if isinstance(e, (SettableVariable, Choice)) or self._is_constant(e):
             return ast.Attribute(ast.Name("self"), self.name_of(e))
         if isinstance(e, Output):
             return self._to_ast(e.expression)

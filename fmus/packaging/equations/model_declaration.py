@@ -285,6 +285,9 @@ class Contact(Variable, variable_declarations.Output):
             raise ModelError("eps is required with the law THRESHOLD and not allowed without it")
 
 
+KINDS = (Choice, Contact, Fixed, Input, Mode, Output, Parameter, State)  # of declarations
+
+
 class Rule:
     """Parameters that the model refuses.
 

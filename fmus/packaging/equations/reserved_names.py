@@ -7,6 +7,7 @@ from ...runtime.contact_lcp import CoupledFriction
 from ...runtime.method_registry import methods
 from ...runtime.stick_slip import DryFriction
 from .expressions import FUNCTIONS, Expression, ModelError
+from .model_declaration import KINDS
 
 MATH = ("copysign", "inf", "pi", *FUNCTIONS)
 IMPORTS = {  # module -> names that generated code may import
@@ -16,7 +17,7 @@ IMPORTS = {  # module -> names that generated code may import
     "input_polynomial": ("InputPolynomial",),
     "event_location": ("EventLocation",),
     "contact_lcp": ("CoupledFriction",),
-    "variable_declarations": ("Choice", "Contact", "Fixed", "Input", "Mode", "Output", "Parameter", "State"),
+    "variable_declarations": tuple(kind.__name__ for kind in KINDS),
     "integrator": ("Integrator",),
     "active_method": ("EXACT_ITEM", "METHOD_ITEMS"),
     "oscillator": ("Oscillator",),
