@@ -31,13 +31,14 @@ class Scope:
     scalars: set[str]
     named_vectors: list[re.Match[str]]
     other_vectors: set[str]
+    has_jacobian: bool
 
     @classmethod
-    def of(cls, names: set[str], vectors: set[str], kept: Collection[str] = ()) -> "Scope":
+    def of(cls, names: set[str], vectors: set[str], kept: Collection[str] = (), has_jacobian: bool = False) -> "Scope":
         """Sort names by kind; `kept` are vectors that may be lowered to a scalar of the same name."""
         named = [match for match in map(named_vector, names) if match]
         others = vectors - {match[0] for match in named}
-        return cls((names - others).union(kept) - {match[0] for match in named}, named, others)
+        return cls((names - others).union(kept) - {match[0] for match in named}, named, others, has_jacobian)
 
 
 class SourceSymbols:
@@ -105,9 +106,12 @@ class SourceSymbols:
     def function_scope(self, function: ast.FunctionDef) -> "Scope":
         """Return the names in a function; a name is a vector if it is annotated or a vector is assigned to it."""
         names, assignments = {one.arg for one in function.args.args}, []
+        has_jacobian = False
         for node in all_nodes(function):
             if isinstance(node, ast.Name):
                 names.add(node.id)
+            elif isinstance(node, ast.Attribute):
+                has_jacobian = has_jacobian or node.attr in self.jacobians
             elif isinstance(node, ast.Assign):
                 assignments.append(node)
         kinds = {one.arg: annotated_kind(one) for one in function.args.args}
@@ -139,7 +143,7 @@ class SourceSymbols:
                         kinds[one.id] = kind
         vectors = {name for name, kind in kinds.items() if kind}
         # a vector over a single contact keeps its name
-        return Scope.of(names, vectors, {name for name in vectors if kinds[name] == CONTACTS})
+        return Scope.of(names, vectors, {name for name in vectors if kinds[name] == CONTACTS}, has_jacobian)
 
     def stage_separator(self, states: Mapping[str, str], modes: Iterable[str]) -> str:
         """Return the separator of names and numbers of stages for which no stage is named like a variable of the model.
@@ -188,7 +192,7 @@ class SourceSymbols:
             components |= {f"{one}_{name}" for one in scope.other_vectors}
             if not components.isdisjoint(scope.scalars):
                 return False
-            if "J" in scope.scalars and "f" in stems and name in scope.other_vectors:
+            if scope.has_jacobian and "f" in stems and name in scope.other_vectors:
                 return False  # components of this vector would be named like entries of the Jacobian
         return name not in self.module_names and not NAMED_VECTOR.fullmatch(name)
 
