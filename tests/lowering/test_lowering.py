@@ -125,6 +125,7 @@ BODIES = {
     "j = 1\n        t = y[j]": "is an index that is not known at build time",
     "e = y + modes": "loop over contact_indices",
     "y = y + h * f": "changes under f",
+    "self.f2 = f": "declare it in its class",
     "modes = contact_vector()": "write modes = 0 * modes",
     "y2 = y + h * f\n        v2 = t": "uses v2 for a scalar",
 }

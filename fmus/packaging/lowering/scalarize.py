@@ -323,6 +323,8 @@ class Scalarizer(ConstantFolder):
     def record_kinds(self, targets: Sequence[ast.expr], kinds: Sequence[str | None] = ()) -> None:
         """Record the kinds of assigned names; scalars by default."""
         for one, kind in zip(targets, kinds or [None] * len(targets), strict=True):
+            if isinstance(one, ast.Attribute) and kind and not self.vector_kind(one):
+                raise self.error(one, "is assigned a vector; declare it in its class, for example as StateVector")
             if not isinstance(one, ast.Name):
                 continue
             if kind is None:
