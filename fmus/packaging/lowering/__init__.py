@@ -21,6 +21,8 @@ any name, which only decides how its components are printed:
     modes, step.modes0       named after the modes: mode;  step.mode0
     e, k3, self.c2           all others: e_x, e_v;  k3_x, k3_v;  self.c2_x, self.c2_v
 
+A ConditionVector is stored in a list, as in margins[:] = model.condition_margins(t, y, modes).
+
 A loop over contact_indices, state_indices or velocity_indices is unrolled; a function with a parameter
 `i: ContactIndex` is written once for each contact.  A loop over the methods is unrolled for the methods that the FMU
 offers; a loop that tests each of them becomes a chain of conditions.
