@@ -1,5 +1,4 @@
-"""Three states, and two contacts on separate bodies: features that the five models do not use, against independent
-solutions."""
+"""Three states, two contacts on separate bodies, and conditions, which the five models do not use."""
 
 from functools import cache
 from math import exp, fabs
@@ -8,14 +7,16 @@ import numpy as np
 import pytest
 from contact_references import CONTACT_REFERENCES, reference_events
 from internal_steps import array_steps, bits, compute_step, prepared_model, scalar_steps, start, state_values
-from models import DOP853, LARGER_MODELS, ODE23, ODE45, RADAU9, RODAS
+from models import DOP853, LARGER_MODELS, ODE23, ODE45, RADAU9, RODAS, ROOT
 from scipy.integrate import solve_ivp
 
 from fmus.packaging.lowering import lowered_model, select_features
 from fmus.packaging.model_lookup import find_model
 
-FILES = {path.stem: path for path in LARGER_MODELS}
-STOPS = {"lugre": 4.0} | {name: physics.stop for name, physics in CONTACT_REFERENCES.items()}
+WITH_CONDITIONS = (ROOT / "tests" / "example_models" / "bumper.py", ROOT / "fmus" / "more" / "elastoplastic.py")
+FILES = {path.stem: path for path in (*LARGER_MODELS, *WITH_CONDITIONS)}
+STOPS = {name: physics.stop for name, physics in CONTACT_REFERENCES.items()}
+STOPS |= {"lugre": 4.0, "bumper": 3.0, "elastoplastic": 3.0}
 RTOL = {ODE23: 1e-6, ODE45: 1e-9, DOP853: 1e-11, RODAS: 1e-8, RADAU9: 1e-9}
 EVERY_METHOD = pytest.mark.parametrize("method", RTOL)
 STEPS = 200
