@@ -27,6 +27,8 @@ def validate(problem: FitProblem, course: FitCourse, data: Sequence[RecordData])
     fitted = problem.records[0]
     for each in data:
         record = MeasuredRecord(each.name, each.t, each.y, each.inputs, each.sigma, fitted.width > 1)
+        if not record.means_hold(problem.simulate, problem.values(course.z, 0), problem.outputs):
+            record = MeasuredRecord(each.name, each.t, each.y, each.inputs, each.sigma, binned=False)
         record.noise = np.where(np.ptp(record.y, axis=0) > 0.0, record.noise, fitted.noise)  # of a body at rest
         record.subdivide(fitted.subdivision)
         prediction = problem.predict_record(course.z, record, 0, record.all)
