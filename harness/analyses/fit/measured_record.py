@@ -161,6 +161,19 @@ class MeasuredRecord:
             return None
         return np.stack([y[np.searchsorted(times, each), j] for j, each in enumerate(shown)], axis=1)
 
+    def quantisation_errors(self, y: np.ndarray) -> np.ndarray:
+        """Return the errors (n, columns) that the quantisers of a record of the signals y (n, columns) would make.
+
+        Means of neighbouring samples have smaller errors only where the signal moves by a step or more.
+        """
+        errors = np.zeros_like(y)
+        for j in np.flatnonzero(self.step):
+            signal = np.interp(self.sampled_t, self.t, y[:, j]) if self.width > 1 else y[:, j]
+            origin, step = self.sampled_y[0, j], self.step[j]
+            each = np.round((signal - origin) / step) * step + origin - signal
+            errors[:, j] = bin_means(each, self.width) if self.width > 1 else each
+        return errors
+
     def means_hold(self, simulate: Simulate, values: Mapping[str, float], outputs: Sequence[str]) -> bool:
         """Return whether the means of the outputs over the samples are the outputs at the mean times."""
         if self.width == 1 or self.inputs:

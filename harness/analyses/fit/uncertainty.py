@@ -140,8 +140,6 @@ def quantiser_variance(
             continue
         errors = []
         for y, record in zip(predicted, problem.records, strict=True):
-            step = np.where(record.step > 0, record.step, 1e-12)
-            levels = np.round((y - record.sampled_y[0]) / step) * step + record.sampled_y[0]
-            errors.append(((levels - y) / record.noise / np.sqrt(record.width)).ravel())
+            errors.append((record.quantisation_errors(y) / record.noise).ravel())
         shifts.append(inverse @ (jacobian.T @ np.concatenate(errors)))
     return np.mean(np.square(shifts), axis=0) if shifts else np.zeros(len(z))
