@@ -2,6 +2,7 @@
 
 import json
 from math import isfinite
+from pathlib import Path
 
 import build_cache
 import commands
@@ -15,6 +16,7 @@ import harness
 from harness.analyses.fit.parameter_fit import information_criterion
 from harness.errors import HarnessError, SceneError
 from harness.running.whole_run import open_simulator
+from harness.studies.fit.request import FitRequest, resolve_request
 
 T = np.linspace(0.0, 16.0, 201)
 TRUTH = {"mu_s": 0.8, "mu_d": 0.5, "k": 900.0, "v_driver": 0.04}
@@ -53,17 +55,11 @@ def holds(estimate, truth, factor=1.5):
     return abs(estimate.value - truth) <= factor * max(estimate.high - estimate.value, estimate.value - estimate.low)
 
 
-LONG_FITS = ("forced", "position, 4 free", "Stribeck", "belt")
-
-
-@pytest.mark.parametrize(
-    "name", ["force", "pendulum", *(pytest.param(name, marks=pytest.mark.slow) for name in LONG_FITS)]
-)
-def test_the_parameters_of_a_drawn_record_are_found(name):
-    """The seed was drawn once; tests/support/fit_campaign.py fits hundreds of others."""
+def fit_drawn(name, seed, max_samples):
+    """Draw a record of a group of GROUPS and fit it; return the record and the fit."""
     pandas, group = pytest.importorskip("pandas"), GROUPS[name]
     with open_simulator(native(group.model), {}) as simulator:
-        record = draw_record(group, simulator, np.random.default_rng([20261123, len(name)]), max_samples=250)
+        record = draw_record(group, simulator, np.random.default_rng(seed), max_samples=max_samples)
     columns = dict(zip(group.outputs, record.y.T, strict=True)) | record.inputs
     found = harness.fit(
         native(group.model),
@@ -73,11 +69,33 @@ def test_the_parameters_of_a_drawn_record_are_found(name):
         inputs=[*record.inputs],
         fixed=record.fixed,
     )
+    return record, found
+
+
+LONG_FITS = ("forced", "position, 4 free", "Stribeck", "belt")
+
+
+@pytest.mark.parametrize(
+    "name", ["force", "pendulum", *(pytest.param(name, marks=pytest.mark.slow) for name in LONG_FITS)]
+)
+def test_the_parameters_of_a_drawn_record_are_found(name):
+    """The seed was drawn once; tests/support/fit_campaign.py fits hundreds of others."""
+    record, found = fit_drawn(name, [20261123, len(name)], max_samples=250)
     assert found.describes_record
     for parameter, truth in record.truth.items():
         estimate = found[parameter]
         assert not isfinite(estimate.error) or abs(estimate.value - truth) < 5 * estimate.error
         assert estimate.low <= estimate.value <= estimate.high
+
+
+@pytest.mark.slow
+def test_a_long_curved_valley_does_not_hide_the_best_values():
+    """Runs with the default tolerance scattered so much that fits of this record ended halfway along the valley."""
+    record, found = fit_drawn("Stribeck", [8101, 6, 65], max_samples=20_000)
+    for parameter, truth in record.truth.items():
+        assert isfinite(found[parameter].error)
+        assert abs(found[parameter].value - truth) < 5 * found[parameter].error
+    assert found.columns[0].residual < 1.01 * found.columns[0].noise
 
 
 def test_a_position_determines_the_ratio_of_stiffness_and_mass():
@@ -250,6 +268,12 @@ def test_a_bad_request_is_refused_in_one_sentence(changes, message):
         harness.fit(**arguments)
     assert message in str(refused.value)
     assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize(("fixed", "rtol"), [({}, 1e-8), ({"solver.rtol": 1e-5}, 1e-5)])
+def test_runs_have_a_tight_tolerance_unless_the_user_fixes_another(fixed, rtol):
+    request = FitRequest(Path("fmus/stickslip.fmu"), {"k": None}, {"x": "x"}, fixed=fixed)
+    assert resolve_request(request).fixed["solver.rtol"] == rtol
 
 
 def test_a_record_without_such_a_motion_is_refused():

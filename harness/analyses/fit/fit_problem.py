@@ -9,9 +9,12 @@ from .measured_record import MeasuredRecord, Simulate
 from .unknowns import DELAY, GAIN, OFFSET, Unknown
 
 EXACT_STEPS, ROUGH_STEPS = (1e-6, 1e-6), (1e-5, 1e-4)  # of one-sided and central differences
+ALL_STEPS = (EXACT_STEPS, (1e-5, 1e-5), ROUGH_STEPS)
+CLEAR = 0.1  # difference of the logarithms of two determinants
 MAX_COORDINATE = 60.0
 HUBER = 3.0  # residuals in units of the noise, beyond which a robust loss is linear
 LONGEST_STEP = 0.7  # of a coordinate
+PROBE_SHARE, MAX_CORRECTION = 0.1, 0.4  # of a step: where its curvature is measured, and the size of the correction
 MAX_DAMPINGS = 10  # tries of one step
 MIN_DAMPING = 1e-10  # with less, the equations of parameters that are not determined are singular to rounding
 
@@ -150,6 +153,22 @@ class FitProblem:
                 columns[:, j] = (ends[0][0] - ends[1][0]) / (h * (ends[0][1] - ends[1][1]))
         return columns
 
+    def choose_steps(self, z: np.ndarray, e: np.ndarray) -> np.ndarray:
+        """Choose the steps of differences by their errors at z (k,); return the central differences (n, k) of e (n,).
+
+        Steps that are too short or too long add errors, which increase the determinant: a direction that hardly
+        changes the residuals looks better determined than it is.
+        """
+        best, lowest = self.steps, np.inf
+        for steps in ALL_STEPS:
+            self.steps = steps
+            jacobian = self.jacobian(z, e, self.all, np.arange(len(z)), central=True)
+            size = float(np.linalg.slogdet(jacobian.T @ jacobian)[1])
+            if size < lowest - CLEAR or lowest == np.inf:
+                best, lowest, chosen = steps, size, jacobian
+        self.steps = best
+        return chosen
+
     def minimize(
         self,
         z: np.ndarray,
@@ -175,27 +194,59 @@ class FitProblem:
         e, damping = self.residuals(z, selection), 1e-2
         if e is None:
             return np.inf, z
-        squares = float(e @ e)
+        squares, is_stiff = float(e @ e), central or self.central
         for _ in range(max_steps if len(free) else 0):
-            jacobian = self.jacobian(z, e, selection, free, central or self.central)
+            jacobian = self.jacobian(z, e, selection, free, is_stiff)
             matrix, slope = jacobian.T @ jacobian, jacobian.T @ e
             scale = np.diag(np.maximum(np.diag(matrix), 1e-9 * matrix.max() + 1e-30))
-            for _ in range(MAX_DAMPINGS):
+            for n in range(MAX_DAMPINGS):
                 s, step = self.region.constrained_step(matrix + damping * scale, slope, z, free), np.zeros(len(z))
                 if not np.isfinite(s).all():
                     return squares, z
-                step[free] = s * min(1.0, LONGEST_STEP / max(float(np.abs(s).max()), 1e-300))
+                s *= min(1.0, LONGEST_STEP / max(float(np.abs(s).max()), 1e-300))
+                step[free] = s
+                if is_stiff:
+                    step[free] += self.curvature_correction(
+                        z, e, step, jacobian, matrix + damping * scale, selection, free
+                    )
                 new = self.residuals(z + step, selection)
                 if new is not None and new @ new < squares:
                     break
                 if new is None:
                     self.region.learn(self.is_refused, z, step)
-                damping = max(damping * 6, 1e-6)
+                damping = max(damping * 2.0 ** (n + 1), 1e-8)
             else:
                 return squares, z
             gain, z, e = 1 - float(new @ new) / squares, z + step, new
-            damping = max(damping * 0.15, MIN_DAMPING)
+            damping = damping if n else max(damping * 0.1, MIN_DAMPING)
             squares = float(e @ e)
             if gain < min_gain:
                 break
         return squares, z
+
+    def curvature_correction(
+        self,
+        z: np.ndarray,
+        e: np.ndarray,
+        step: np.ndarray,
+        jacobian: np.ndarray,
+        matrix: np.ndarray,
+        selection: Selection,
+        free: np.ndarray,
+    ) -> np.ndarray:
+        """Return the correction of the `free` coordinates of a step that follows a curved valley, or zeros.
+
+        References
+        ----------
+        M. K. Transtrum, J. P. Sethna, Improvements to the Levenberg-Marquardt algorithm for nonlinear least-squares
+        minimization, arXiv:1201.5885 (2012)
+        """
+        none = np.zeros(len(free))
+        near = self.residuals(z + PROBE_SHARE * step, selection)
+        if near is None:
+            return none
+        acceleration = 2 / PROBE_SHARE * ((near - e) / PROBE_SHARE - jacobian @ step[free])
+        correction = self.region.constrained_step(matrix, jacobian.T @ acceleration, z + step, free) / 2
+        scale = np.sqrt(np.diag(matrix))
+        is_small = np.linalg.norm(scale * correction) < MAX_CORRECTION * np.linalg.norm(scale * step[free])
+        return correction if is_small else none

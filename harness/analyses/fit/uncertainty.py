@@ -66,7 +66,7 @@ class Uncertainty:
 def estimate_uncertainty(
     problem: FitProblem, z: np.ndarray, input_error: np.ndarray, min_variance: float
 ) -> Uncertainty:
-    """Return the uncertainty at a minimum; set whether the problem needs central differences.
+    """Return the uncertainty at a minimum; set the steps of differences, and whether they need to be central.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ def estimate_uncertainty(
     """
     e = problem.residuals(z, problem.all)
     assert e is not None
-    jacobian = problem.jacobian(z, e, problem.all, np.arange(len(z)), central=True)
+    jacobian = problem.choose_steps(z, e)
     variance = max(float(e @ e) / max(len(e) - len(z), 1), min_variance)
     eigenvalues, axes = np.linalg.eigh(jacobian.T @ jacobian)
     eigenvalues = np.maximum(eigenvalues, max(1e-12 * eigenvalues.max(), 1e-200))

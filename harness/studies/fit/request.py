@@ -22,6 +22,7 @@ SAMPLES_PER_UNKNOWN = 4
 GAIN_RANGE = (0.5, 2.0)
 DELAY_SHARE = 0.1  # of the shortest record, which is searched for a delay
 READABLE = ("output", "local")  # causalities of variables that can be observed
+TOLERANCE, SOLVER_RTOL = 1e-8, "solver.rtol"  # looser, the steps of the solver roughen the derivatives of residuals
 
 Range = tuple[float, float] | None
 
@@ -124,6 +125,8 @@ def resolve_request(request: FitRequest) -> ResolvedRequest:
         if not (isfinite(value) and value > 0):
             raise SceneError(f"sigma of {name} is {value!r}: it must be a finite number above 0")
     converted = {name: convert_value(declared[name], value) for name, value in request.fixed.items()}
+    if SOLVER_RTOL in variables:
+        converted = {SOLVER_RTOL: TOLERANCE} | converted
     signals = {**request.observe, **request.inputs}
     return ResolvedRequest(
         request,
