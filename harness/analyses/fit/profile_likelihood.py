@@ -5,6 +5,7 @@ References
 D. M. Bates, D. G. Watts, Nonlinear Regression Analysis and Its Applications (1988), section 6.1
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,8 +14,11 @@ from .fit_problem import FitProblem
 from .uncertainty import Uncertainty
 
 MAX_EVALUATIONS = 14
+MAX_STEPS, MIN_GAIN = 40, 5e-4  # of a fit of the other coordinates; least gain of a step, in units of the limit
+FARTHEST = 2.0  # times the farthest point of a profile, up to which a parabola is extrapolated
 CLOSE = 0.02  # relative distance from the limit at which a bound is accepted, in standard errors
-NEAR_LIMIT = 0.05  # distance of a coordinate from the limits of the fit at which there is no bound
+NEAR_LIMIT = 0.05  # distance of a coordinate from the limits of the fit at which it has no bound
+WIDER, NEGLIGIBLE = 0.7, 0.1  # limits of other coordinates, moved by this, lower a profile by less than this share
 
 
 @dataclass(frozen=True)
@@ -50,9 +54,9 @@ def profile_bound(
     def excess(squares: float) -> float:
         return float(np.sqrt(max(squares - uncertainty.squares, 0.0) / target)) - 1
 
-    def fit_others(x: float, last: tuple[float, np.ndarray]) -> tuple[float, np.ndarray]:
-        """Return the squares and coordinates with coordinate i at the distance x, extrapolated from the last ones."""
-        guess = z + (last[1] - z) * (x / last[0])
+    def fit_others(x: float) -> tuple[float, np.ndarray]:
+        """Return the squares and coordinates with coordinate i at the distance x."""
+        guess = extrapolate(path, x) if len(path) > 1 else z + tangent * x
         guess[i] = z[i] + side * x
         into_region = problem.region.constrained_step(np.eye(len(others)), np.zeros(len(others)), guess, others)
         if not np.isfinite(into_region).all():
@@ -60,39 +64,55 @@ def profile_bound(
         guess[others] += into_region
         if problem.residuals(guess, problem.all) is None:
             problem.region.learn(problem.is_refused, z, guess - z)
-        max_steps = 20 if problem.central else 12
-        return problem.minimize(guess, problem.all, max_steps, 0.002 * target / uncertainty.squares, others)
+        return problem.minimize(guess, problem.all, MAX_STEPS, MIN_GAIN * target / uncertainty.squares, others)
 
     tangent = side * covariance[:, i] / max(covariance[i, i], 1e-300)
     x = float(np.clip(np.sqrt(target / uncertainty.variance * covariance[i, i]), 1e-6, 0.5))
-    low, last = (0.0, excess(float(start @ start))), (1.0, z + tangent)
+    low, path, last = (0.0, excess(float(start @ start))), {0.0: z}, z
     high: tuple[float, float] | None = None
     better: np.ndarray | None = None
     profile = []
     for _ in range(MAX_EVALUATIONS):
-        squares, there = fit_others(x, last)
+        squares, there = fit_others(x)
         if squares < uncertainty.squares - 0.02 * target:
             better = there
             if ends_at_better:
                 return Bound(None, better)
         distance = excess(squares)
         if np.isfinite(distance):
-            last = (x, there)
+            path[x] = last = there
             profile.append((float(z[i] + side * x), (1 + distance) ** 2))
+        low, high = ((x, distance), high) if distance < 0 else (low, (x, distance))
         if abs(distance) < CLOSE or (high and high[0] - low[0] < 1e-3 * high[0]):
             break
-        low, high = ((x, distance), high) if distance < 0 else (low, (x, distance))
         if high is None:
             x *= float(np.clip(1 / max(1 + distance, 1e-3), 1.05, 4.0))
         elif np.isfinite(high[1]):
             x = low[0] + (high[0] - low[0]) * float(np.clip(-low[1] / (high[1] - low[1]), 0.1, 0.95))
         else:  # the region ends here
             x = (low[0] + high[0]) / 2
-    end = None if is_at_limit(problem, last[1]) else float(z[i] + side * x)
+    else:
+        x = high[0] if high and np.isfinite(high[1]) else np.inf  # the outer side of the bracket
+    end = None if x == np.inf or depends_on_limits(problem, last, i, target) else float(z[i] + side * x)
     return Bound(end, better, profile=tuple(profile))
 
 
-def is_at_limit(problem: FitProblem, z: np.ndarray) -> bool:
-    """Return whether coordinates are at the limits of the fit."""
+def extrapolate(path: Mapping[float, np.ndarray], x: float) -> np.ndarray:
+    """Return coordinates at the distance x, on the parabola through three points of a path, or the line through two."""
+    near = sorted(path, key=lambda distance: abs(distance - x))[: 3 if x < FARTHEST * max(path) else 2]
+    weights = [np.prod([(x - b) / (a - b) for b in near if b != a]) for a in near]
+    return np.asarray(weights @ np.array([path[a] for a in near]))
+
+
+def depends_on_limits(problem: FitProblem, z: np.ndarray, i: int, target: float) -> bool:
+    """Return whether coordinate i is at a limit of the fit at z (k,), or wider limits of others lower its profile.
+
+    At a minimum within limits, the squares fall by their slope where a limit moves, whatever the others then do.
+    """
     limits = np.array([unknown.limits for unknown in problem.unknowns])
-    return bool(((z < limits[:, 0] + NEAR_LIMIT) | (z > limits[:, 1] - NEAR_LIMIT)).any())
+    outward = np.where(z < limits[:, 0] + NEAR_LIMIT, -1.0, 0.0) + np.where(z > limits[:, 1] - NEAR_LIMIT, 1.0, 0.0)
+    e, others = problem.residuals(z, problem.all), np.flatnonzero(outward)
+    if i in others or e is None:
+        return True
+    slopes = 2 * e @ problem.jacobian(z, e, problem.all, others, central=True)
+    return bool((-slopes * outward[others] * WIDER > NEGLIGIBLE * target).any())

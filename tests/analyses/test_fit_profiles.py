@@ -1,0 +1,81 @@
+"""Least squares, differences and profiles of a fit, whose answers have a closed form."""
+
+import numpy as np
+import pytest
+
+from harness.analyses.fit.feasible_region import FeasibleRegion
+from harness.analyses.fit.fit_problem import EXACT_STEPS, FitProblem
+from harness.analyses.fit.profile_likelihood import profile_bound
+from harness.analyses.fit.uncertainty import Uncertainty
+from harness.analyses.fit.unknowns import Unknown
+
+QUANTILE = 1.96  # for many residuals
+MINIMUM = np.array([1.0, 1.0])
+
+
+class Residuals(FitProblem):
+    """A fit of the coordinates a and b whose residuals are a function of both."""
+
+    def __init__(self, residuals, reach=40.0):
+        self.unknowns = tuple(Unknown(name, name, "", np.exp(-reach), np.exp(reach)) for name in "ab")
+        self.region, self.steps, self.central, self.all = FeasibleRegion(self.unknowns), EXACT_STEPS, False, ()
+        self.function, self.n_runs = residuals, 0
+
+    def residuals(self, z, selection):
+        self.n_runs += 1
+        return np.array(self.function(*z))
+
+
+def uncertainty_at(problem, z):
+    """Return the uncertainty at z with unit variance."""
+    e = problem.residuals(z, ())
+    jacobian = problem.jacobian(z, e, (), np.arange(2), central=True)
+    covariance = np.linalg.inv(jacobian.T @ jacobian)
+    residuals = np.concatenate([e, np.zeros(100_000)])
+    return Uncertainty(float(e @ e), 1.0, covariance, np.ones(2), np.zeros((2, 0)), residuals, 0.0, np.zeros(2))
+
+
+def valley(a, b):
+    """Return the residuals of a narrow curved valley, b = a^2, whose minimum is at a = 1."""
+    return 1000.0 * (b - a * a), 2.0 * (np.exp(a - 1.0) - 1.0), 1.0
+
+
+def test_a_curved_valley_is_followed_to_its_minimum():
+    problem = Residuals(valley)
+    squares, z = problem.minimize(np.array([3.0, 9.0]), (), 60, 1e-12, central=True)
+    assert squares == pytest.approx(1.0, abs=1e-6)
+    assert z == pytest.approx(MINIMUM, abs=1e-4)
+    assert problem.n_runs < 200
+
+
+def test_a_profile_follows_a_curved_valley():
+    """The profile of a is 2 (exp(a - 1) - 1), and that of b follows from b = a^2."""
+    problem = Residuals(valley)
+    uncertainty = uncertainty_at(problem, MINIMUM)
+    ends = {(i, side): profile_bound(problem, MINIMUM, uncertainty, i, side).end for i in (0, 1) for side in (-1, 1)}
+    reached = [2 * (np.exp(a - 1) - 1) for a in (ends[0, -1], ends[0, 1], np.sqrt(ends[1, 1]))]
+    assert reached == pytest.approx([-QUANTILE, QUANTILE, QUANTILE], rel=0.03)
+
+
+def test_a_profile_that_never_reaches_its_limit_has_no_end():
+    problem = Residuals(lambda a, b: (0.5 * np.tanh(a - 1.0), b - 1.0, 1.0))
+    assert profile_bound(problem, MINIMUM, uncertainty_at(problem, MINIMUM), 0, 1).end is None
+
+
+@pytest.mark.parametrize(("coupling", "has_end"), [(0.0, True), (1.0, False)])
+def test_a_limit_of_another_coordinate_ends_a_profile_only_where_it_matters(coupling, has_end):
+    """The record hardly determines b, which is at its limit: of a, or of a sum with b, it determines the value."""
+    problem = Residuals(lambda a, b: (20.0 * (a - 1.0 + coupling * b), 1e-3 * (b - 10.0), 1.0), reach=3.0)
+    _, z = problem.minimize(np.array([0.5, 0.5]), (), 60, 1e-12, central=True)
+    assert z[1] == pytest.approx(problem.unknowns[1].limits[1])
+    assert (profile_bound(problem, z, uncertainty_at(problem, z), 0, -1).end is not None) == has_end
+
+
+def test_differences_of_runs_that_scatter_show_how_weak_a_direction_is():
+    """Residuals scatter by 1e-7, as those of runs with step control do."""
+    random, matrix = np.random.default_rng(1), np.random.default_rng(0).normal(size=(2000, 1)) * [1.0, 1.0]
+    matrix[:, 1] += 0.01 * np.random.default_rng(2).normal(size=2000)
+    problem = Residuals(lambda a, b: matrix @ [a, b] + 1e-7 * random.normal(size=2000))
+    jacobian = problem.choose_steps(MINIMUM, problem.residuals(MINIMUM, ()))
+    errors, expected = (np.sqrt(np.diag(np.linalg.inv(each.T @ each))) for each in (jacobian, matrix))
+    assert errors == pytest.approx(expected, rel=0.1)
