@@ -57,6 +57,18 @@ def test_a_profile_follows_a_curved_valley():
     assert reached == pytest.approx([-QUANTILE, QUANTILE, QUANTILE], rel=0.03)
 
 
+def test_a_profile_returns_from_a_higher_branch():
+    """A straight path to the first trial ends in a second minimum of b, which lies 1.5 above the bent valley."""
+
+    def residuals(a, b):
+        w = b - 1.0 - 0.5 * np.tanh(8.0 * (a - 1.0))
+        return 2.5 * (a - 1.0), 30.0 * w * (w - 1.5), 10.0 * w, 1.0
+
+    problem = Residuals(residuals)
+    end = profile_bound(problem, MINIMUM, uncertainty_at(problem, MINIMUM), 0, 1).end
+    assert end - 1 == pytest.approx(QUANTILE / 2.5, rel=0.03)
+
+
 def test_a_profile_that_never_reaches_its_limit_has_no_end():
     problem = Residuals(lambda a, b: (0.5 * np.tanh(a - 1.0), b - 1.0, 1.0))
     assert profile_bound(problem, MINIMUM, uncertainty_at(problem, MINIMUM), 0, 1).end is None

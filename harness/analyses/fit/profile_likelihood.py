@@ -14,6 +14,7 @@ from .fit_problem import FitProblem
 from .uncertainty import Uncertainty
 
 MAX_EVALUATIONS = 14
+STUCK = 2  # trials in turn that move only the inner side of the bracket: the outer may be on a higher branch
 MAX_STEPS, MIN_GAIN = 40, 5e-4  # of a fit of the other coordinates; least gain of a step, in units of the limit
 FARTHEST = 2.0  # times the farthest point of a profile, up to which a parabola is extrapolated
 CLOSE = 0.02  # relative distance from the limit at which a bound is accepted, in standard errors
@@ -69,11 +70,12 @@ def profile_bound(
     tangent = side * covariance[:, i] / max(covariance[i, i], 1e-300)
     x = float(np.clip(np.sqrt(target / uncertainty.variance * covariance[i, i]), 1e-6, 0.5))
     low, path, last = (0.0, excess(float(start @ start))), {0.0: z}, z
+    before, n_below = low, 0
     high: tuple[float, float] | None = None
     better: np.ndarray | None = None
-    profile = []
+    fits: dict[float, tuple[float, np.ndarray]] = {}
     for _ in range(MAX_EVALUATIONS):
-        squares, there = fit_others(x)
+        squares, there = fits[x] = min(fit_others(x), fits.get(x, (np.inf, z)), key=lambda fit: fit[0])
         if squares < uncertainty.squares - 0.02 * target:
             better = there
             if ends_at_better:
@@ -81,12 +83,17 @@ def profile_bound(
         distance = excess(squares)
         if np.isfinite(distance):
             path[x] = last = there
-            profile.append((float(z[i] + side * x), (1 + distance) ** 2))
-        low, high = ((x, distance), high) if distance < 0 else (low, (x, distance))
+        if distance < 0:
+            before, low, n_below = low, (x, distance), n_below + 1
+            high = high if high and x < high[0] else None
+        else:
+            high, n_below = (x, distance), 0
         if abs(distance) < CLOSE or (high and high[0] - low[0] < 1e-3 * high[0]):
             break
         if high is None:
             x *= float(np.clip(1 / max(1 + distance, 1e-3), 1.05, 4.0))
+        elif np.isfinite(high[1]) and n_below >= STUCK and extend_line(before, low, high[0]) < 0:
+            x, path = high[0], {a: path[a] for a in path if a <= low[0]}  # fit it again, from the inner points
         elif np.isfinite(high[1]):
             x = low[0] + (high[0] - low[0]) * float(np.clip(-low[1] / (high[1] - low[1]), 0.1, 0.95))
         else:  # the region ends here
@@ -94,7 +101,13 @@ def profile_bound(
     else:
         x = high[0] if high and np.isfinite(high[1]) else np.inf  # the outer side of the bracket
     end = None if x == np.inf or depends_on_limits(problem, last, i, target) else float(z[i] + side * x)
-    return Bound(end, better, profile=tuple(profile))
+    profile = [(x, excess(squares)) for x, (squares, _) in fits.items() if np.isfinite(squares)]
+    return Bound(end, better, profile=tuple((float(z[i] + side * x), (1 + distance) ** 2) for x, distance in profile))
+
+
+def extend_line(a: tuple[float, float], b: tuple[float, float], x: float) -> float:
+    """Return the height at x of the line through two points."""
+    return b[1] + (b[1] - a[1]) / (b[0] - a[0]) * (x - b[0])
 
 
 def extrapolate(path: Mapping[float, np.ndarray], x: float) -> np.ndarray:
