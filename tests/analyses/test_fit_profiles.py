@@ -57,12 +57,16 @@ def test_a_profile_follows_a_curved_valley():
     assert reached == pytest.approx([-QUANTILE, QUANTILE, QUANTILE], rel=0.03)
 
 
-def test_a_profile_returns_from_a_higher_branch():
-    """A straight path to the first trial ends in a second minimum of b, which lies 1.5 above the bent valley."""
+@pytest.mark.parametrize("height", [15.0, 3.3])
+def test_a_profile_returns_from_a_higher_branch(height):
+    """A straight path to the first trial ends in a second minimum of b, 1.5 above the bent valley.
+
+    If it is little higher, the next trials, nearer to the minimum of all, end there as well.
+    """
 
     def residuals(a, b):
-        w = b - 1.0 - 0.5 * np.tanh(8.0 * (a - 1.0))
-        return 2.5 * (a - 1.0), 30.0 * w * (w - 1.5), 10.0 * w, 1.0
+        w = (b - 1.0 - 0.5 * np.tanh(8.0 * (a - 1.0))) / 1.5
+        return 2.5 * (a - 1.0), 90.0 * w * (w - 1.0) / (0.5 + np.abs(w)), height * w, 1.0
 
     problem = Residuals(residuals)
     end = profile_bound(problem, MINIMUM, uncertainty_at(problem, MINIMUM), 0, 1).end

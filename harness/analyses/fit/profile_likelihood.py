@@ -14,7 +14,7 @@ from .fit_problem import FitProblem
 from .uncertainty import Uncertainty
 
 MAX_EVALUATIONS = 14
-STUCK = 2  # trials in turn that move only the inner side of the bracket: the outer may be on a higher branch
+STUCK = 2  # trials in turn that move only one side of the bracket: the outer one may be on a higher branch
 MAX_STEPS, MIN_GAIN = 40, 5e-4  # of a fit of the other coordinates; least gain of a step, in units of the limit
 FARTHEST = 2.0  # times the farthest point of a profile, up to which a parabola is extrapolated
 CLOSE = 0.02  # relative distance from the limit at which a bound is accepted, in standard errors
@@ -70,7 +70,7 @@ def profile_bound(
     tangent = side * covariance[:, i] / max(covariance[i, i], 1e-300)
     x = float(np.clip(np.sqrt(target / uncertainty.variance * covariance[i, i]), 1e-6, 0.5))
     low, path, last = (0.0, excess(float(start @ start))), {0.0: z}, z
-    before, n_below = low, 0
+    before, is_below, n_in_turn = low, True, 0
     high: tuple[float, float] | None = None
     better: np.ndarray | None = None
     fits: dict[float, tuple[float, np.ndarray]] = {}
@@ -83,17 +83,22 @@ def profile_bound(
         distance = excess(squares)
         if np.isfinite(distance):
             path[x] = last = there
-        if distance < 0:
-            before, low, n_below = low, (x, distance), n_below + 1
+        n_in_turn = n_in_turn + 1 if (distance < 0) == is_below else 1
+        is_below = distance < 0
+        if is_below:
+            before, low = low, (x, distance)
             high = high if high and x < high[0] else None
         else:
-            high, n_below = (x, distance), 0
+            high = (x, distance)
         if abs(distance) < CLOSE or (high and high[0] - low[0] < 1e-3 * high[0]):
             break
+        is_stuck = high and n_in_turn >= STUCK and (not is_below or extend_line(before, low, high[0]) < 0)
+        if is_stuck:
+            path = {a: path[a] for a in path if a <= low[0]}
         if high is None:
             x *= float(np.clip(1 / max(1 + distance, 1e-3), 1.05, 4.0))
-        elif np.isfinite(high[1]) and n_below >= STUCK and extend_line(before, low, high[0]) < 0:
-            x, path = high[0], {a: path[a] for a in path if a <= low[0]}  # fit it again, from the inner points
+        elif np.isfinite(high[1]) and is_stuck and is_below:
+            x = high[0]  # fit it again, from the inner points
         elif np.isfinite(high[1]):
             x = low[0] + (high[0] - low[0]) * float(np.clip(-low[1] / (high[1] - low[1]), 0.1, 0.95))
         else:  # the region ends here
