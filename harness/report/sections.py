@@ -179,6 +179,7 @@ def find_section(item: ResultItem) -> str:
 
 
 def steps_item(table: SummaryTable) -> ResultItem:
+    """Return the item that shows step statistics of several runs in one table."""
     return ResultItem(Path(), Summary(STEPS, table.title, tables=(replace(table, title=""),)))
 
 

@@ -35,7 +35,7 @@ class SummaryTable:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a study concludes: a value, and in words; `deviation` in percent is the largest from published values."""
+    """What a study concludes, as a value and in words; `deviation` is the largest from published values, in percent."""
 
     value: str
     text: str
@@ -80,7 +80,7 @@ class Summary:
     Attributes
     ----------
     study
-        Name of the study, as in `STUDIES` of the report.
+        Name of the study, as in `SECTIONS` of the report.
     title
         Title of the result.
     sentences

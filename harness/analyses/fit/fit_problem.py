@@ -194,9 +194,9 @@ class FitProblem:
         e, damping = self.residuals(z, selection), 1e-2
         if e is None:
             return np.inf, z
-        squares, is_stiff = float(e @ e), central or self.central
+        squares, is_central = float(e @ e), central or self.central
         for _ in range(max_steps if len(free) else 0):
-            jacobian = self.jacobian(z, e, selection, free, is_stiff)
+            jacobian = self.jacobian(z, e, selection, free, is_central)
             matrix, slope = jacobian.T @ jacobian, jacobian.T @ e
             scale = np.diag(np.maximum(np.diag(matrix), 1e-9 * matrix.max() + 1e-30))
             for n in range(MAX_DAMPINGS):
@@ -205,7 +205,7 @@ class FitProblem:
                     return squares, z
                 s *= min(1.0, LONGEST_STEP / max(float(np.abs(s).max()), 1e-300))
                 step[free] = s
-                if is_stiff:
+                if is_central:
                     step[free] += self.curvature_correction(
                         z, e, step, jacobian, matrix + damping * scale, selection, free
                     )
