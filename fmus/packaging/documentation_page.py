@@ -90,7 +90,7 @@ def typeset(text: str) -> str:
 def readable_unit(unit: str) -> str:
     """Write units with multiplication dots and superscripts.
 
-    >>> readable("kg.m2")
+    >>> readable_unit("kg.m2")
     'kg·m²'
     """
     return re.sub(r"(?<=[a-z])2", "²", re.sub(r"(?<=[A-Za-z])\.", "·", unit)) if unit != "1" else ""

@@ -54,7 +54,7 @@ FACTOR_PATTERN = re.compile(r"([./])(1|[A-Za-z]+)(-?\d{1,2})?")
 def parse_unit(symbol: str) -> Unit | None:
     """Parse a product or quotient of units with optional exponents; return None if invalid.
 
-    >>> derived("N.m.s/rad")
+    >>> parse_unit("N.m.s/rad")
     Unit(quantity='N.m.s/rad', kg=1, m=2, s=-1, rad=-1, display='', factor=1.0)
     """
     factors = FACTOR_PATTERN.findall(f".{symbol}")

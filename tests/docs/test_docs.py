@@ -1,5 +1,7 @@
-"""Every code block of docs/ runs, generated tables are up to date, and the site builds without warnings."""
+"""Every code block of docs/ and every example of a docstring runs, generated tables are up to date, and the site builds
+without warnings."""
 
+import doctest
 import importlib.util
 import os
 import re
@@ -11,6 +13,7 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
+SOURCES = [file for folder in ("fmus", "harness") for file in sorted((ROOT / folder).rglob("*.py"))]
 PAGES = sorted(str(page.relative_to(DOCS)) for page in DOCS.rglob("*.md"))
 ENVIRONMENT = {**os.environ, "PYTHONPATH": str(ROOT), "NO_MKDOCS_2_WARNING": "1"}
 
@@ -42,6 +45,12 @@ def test_code_blocks_run(page, fmus, tmp_path):
     command = [sys.executable, str(DOCS / "run_blocks.py"), str(tmp_path), str(DOCS / page)]
     done = subprocess.run(command, capture_output=True, text=True, env=ENVIRONMENT, timeout=300)
     assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize("source", [str(file.relative_to(ROOT)) for file in SOURCES if ">>> " in file.read_text()])
+def test_examples_of_docstrings_run(source):
+    module = importlib.import_module(source.removesuffix(".py").replace("/", "."))
+    assert doctest.testmod(module).failed == 0
 
 
 def test_each_python_or_sh_block_that_is_not_run_has_a_reason():
