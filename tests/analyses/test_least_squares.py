@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from harness.analyses.decay.law import AMPLITUDE, OMEGA, REST, UNKNOWNS, ZETA, B, R
+from harness.analyses.decay.law import AMPLITUDE, OMEGA, REST, T0, UNKNOWNS, ZETA, B, R
 from harness.analyses.decay.least_squares import FitError, least_squares
 
 T = np.linspace(0.0, 1.0, 21)
@@ -49,6 +49,25 @@ def test_a_step_that_increases_the_squares_is_refused():
     """A Jacobian that is too small makes each undamped step 2.2 times too long, so that the squares grow by half."""
     value, _ = fit(lambda p: (p[REST] - LINE, np.full((len(T), 1), 0.45)))
     assert value == pytest.approx(LINE.mean(), abs=0.1)
+
+
+@pytest.mark.parametrize(
+    ("unknown", "best", "low", "high"),
+    [
+        (OMEGA, 100.0, 1.0, 10.0),
+        (OMEGA, -3.0, 0.1, 1.0),
+        (T0, 50.0, 0.0, 6.3),
+        (T0, -50.0, -6.3, 0.0),
+        (ZETA, 3.0, 0.1, 0.9),
+        (R, 5.0, 0.1, 1.0),
+    ],
+)
+def test_no_step_loses_the_cycles_of_the_record(unknown, best, low, high):
+    """Another frequency, another cycle, and losses without an oscillation are refused, though they fit better."""
+    start = START.copy()
+    start[[ZETA, R]] = 0.1
+    p, _ = least_squares(lambda p: (p[unknown] - (LINE - 3.0 + best), np.ones((len(T), 1))), start, np.array([unknown]))
+    assert low < p[unknown] < high
 
 
 def test_a_loss_that_would_be_negative_is_exactly_zero():

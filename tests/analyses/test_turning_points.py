@@ -57,3 +57,10 @@ def test_of_equal_extremes_the_first_is_the_reversal():
     x = np.array([0.0, 2.0, 2.0, 1.0, -2.0, -2.0, -1.0, 0.5, 0.5, -1.0, -1.0])
     for sign in (1.0, -1.0):
         assert find_reversals(sign * x, 1.0).tolist() == [0, 1, 4, 7]
+
+
+def test_a_reversal_of_exactly_the_threshold_counts():
+    x = np.array([0.0, 1.0, 0.0, 1.0])
+    for sign in (1.0, -1.0):
+        assert find_reversals(sign * x, 1.0).tolist() == [0, 1, 2]
+        assert find_reversals(sign * x, 1.5).tolist() == []
