@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from harness.analyses.fit.measured_record import MeasuredRecord
-from harness.analyses.fit.noise import estimate_noise
+from harness.analyses.fit.noise import correlation_length, estimate_noise, residual_correlation
 
 
 @pytest.mark.parametrize("levels", [[0, 151, 860, 909, 935], [0, 7, 8, 30]])
@@ -19,6 +19,24 @@ def test_a_record_of_long_rests_reveals_the_step_of_its_quantiser(levels):
 def test_levels_without_a_common_step_are_not_quantised():
     x = np.repeat(np.random.default_rng(1).normal(size=6), 40)
     assert estimate_noise(np.arange(len(x)) * 0.01, x)[1] == 0.0
+
+
+@pytest.mark.parametrize("m", [1, 5, 10])
+def test_a_moving_average_of_white_noise_over_m_samples_counts_once_in_m(m):
+    """Its neighbours have the correlation 1 - 1/m."""
+    white = np.random.default_rng(m).normal(size=(200_000, 1))
+    e = np.convolve(white[:, 0], np.full(m, 1.0 / m), "valid")[:, None]
+    assert correlation_length(e) == pytest.approx(m, rel=0.05)
+    assert residual_correlation(e) == pytest.approx(1.0 - 1.0 / m, abs=0.01)
+    assert correlation_length(np.hstack([white[: len(e)], e])) == correlation_length(e)
+
+
+def test_a_slow_drift_below_white_noise_is_found_in_sums():
+    """Its neighbours are hardly correlated."""
+    random, n = np.random.default_rng(3), 20_000
+    drift = 0.12 * np.sin(np.linspace(0.0, 6.0 * np.pi, n))
+    correlation = residual_correlation((random.normal(size=n) + drift)[:, None])
+    assert 0.0 < abs(correlation) < 4.0 / n**0.5
 
 
 def test_means_of_a_quantised_rest_keep_the_error_of_one_sample():

@@ -1,5 +1,6 @@
 """FMUs built with --method, --law and --platform offer only these, carry only their code, and run alike."""
 
+import re
 from zipfile import ZipFile
 
 import pytest
@@ -9,7 +10,8 @@ from models import MODELS, counts, declared, experiment, label, outputs, pairwis
 from row_comparison import assert_identical
 
 from fmus.packaging import archive
-from fmus.packaging.lowering import LAWS, METHODS
+from fmus.packaging.lowering import LAWS, METHODS, lowered_files
+from fmus.packaging.lowering.feature_selection import FeatureSelection
 
 LABELS = {"solver.method": "--method", "friction": "--law"}
 
@@ -65,6 +67,21 @@ def test_a_reduced_fmu_carries_one_method_and_runs_alike(lean, launch, worker, c
     fmu = worker.instantiate(path).begin({v: x for v, x in values.items() if v not in LABELS}, stop=stop)
     assert_identical(fmu.run(times, names), launch(name, values, stop=stop).run(times, names), names)
     fmu.free()
+
+
+@pytest.mark.parametrize(
+    ("name", "methods", "laws", "has_comparisons"),
+    [
+        ("stickslip", ("exact", "ode23"), ("hybrid", "threshold"), True),
+        ("stickslip", ("exact",), ("hybrid",), False),
+        ("pendulum", ("dop853",), ("sign",), False),
+        ("smd", ("ode23",), (), False),
+    ],
+)
+def test_only_choices_with_alternatives_are_compared_in_a_run(name, methods, laws, has_comparisons):
+    text = "\n".join(lowered_files(name, FeatureSelection(methods, laws)).values())
+    assert bool(re.search("(method_number|method|friction) [!=]= ", text)) == has_comparisons
+    assert ("def advance_with_method(" in text) == (methods != ("exact",))
 
 
 def test_several_may_be_selected_and_the_first_is_the_default(tmp_path):

@@ -13,6 +13,7 @@ from harness.references.certified_reference import POINTS, compute_errors, event
 from harness.references.generation import CLOSED_FORMS, evaluate_closed_form
 from harness.references.literature_problems import BeltBlock, ChatteringOscillatorSign, SmoothedBeltBlock
 from harness.references.models import CASES
+from harness.references.reference_trajectory import motion_error
 from harness.running.solution import Solution
 
 ULP = 2.0**-52
@@ -152,6 +153,18 @@ def test_errors_are_relative_to_the_largest_value_of_each_column():
     actual = compute_errors(Solution(truth.times, off), truth)
     assert [actual.final, actual.rms, actual.largest] == pytest.approx([1e-3] * 3, rel=1e-10)
     assert actual.events is None
+
+
+def test_the_error_of_a_motion_is_relative_to_its_largest_position_and_speed():
+    x, v = np.array([0.0, 4.0, -8.0]), np.array([1.0, -2.0, 20.0])
+    truth = Solution(np.array([0.0, 1.0, 2.0]), np.column_stack([x, v]))
+    assert motion_error(truth, x + 0.08, v) == pytest.approx(0.01)
+    assert motion_error(truth, x, v - 0.4) == pytest.approx(0.02)
+    assert np.isnan(motion_error(truth, x, v * [1.0, np.nan, 1.0]))
+    slow = Solution(truth.times, np.column_stack([x, 0.0 * v]))
+    assert motion_error(slow, x, 0.0 * v + 0.4) == pytest.approx(0.1)  # of 8 m in 2 s
+    rest = Solution(truth.times, np.zeros((3, 2)))
+    assert motion_error(rest, 0.0 * x + 0.03, 0.0 * v) == pytest.approx(0.03)
 
 
 def test_event_times_are_compared_only_where_the_modes_agree():

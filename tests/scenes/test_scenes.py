@@ -3,7 +3,6 @@
 import pytest
 
 from harness.errors import SceneError
-from harness.results.quantity import Quantity
 from harness.scenes.coupled.scene import CoupledKeys
 from harness.scenes.scene import load_scene, shipped_scenes
 from harness.scenes.schema import parse_table
@@ -137,9 +136,3 @@ def test_an_unknown_scene_error_lists_the_shipped_names():
 def test_a_missing_file_is_reported():
     with pytest.raises(SceneError, match=r"cannot read the scene nowhere\.toml: No such file"):
         load_scene("nowhere.toml")
-
-
-def test_quantities_change_their_unit_but_not_their_dimension():
-    assert Quantity("T_f", 0.1129848290276167, "N.m", "").to_unit("lbf.in") == pytest.approx(1.0, rel=1e-15)
-    with pytest.raises(KeyError):
-        Quantity("period", 1.0, "s", "").to_unit("deg")
