@@ -3,6 +3,7 @@
 import json
 from math import isfinite
 from pathlib import Path
+from types import SimpleNamespace
 
 import build_cache
 import commands
@@ -13,6 +14,7 @@ from fit_campaign import SOURCES
 from native_fmus import build_native_fmus, require_compiler
 
 import harness
+from harness.analyses.fit.law_comparison import compare_laws
 from harness.analyses.fit.parameter_fit import information_criterion
 from harness.errors import HarnessError, SceneError
 from harness.running.whole_run import open_simulator
@@ -352,6 +354,20 @@ def test_the_bic_of_white_residuals_is_that_of_a_linear_model():
     """For n residuals of variance s2 and k unknowns, BIC = n ln(s2) + k ln(n)."""
     assert information_criterion(200.0, 100, 3, 100.0) == pytest.approx(100 * np.log(2.0) + 3 * np.log(100))
     assert information_criterion(200.0, 100, 3, 25.0) == pytest.approx(25 * np.log(2.0) + 3 * np.log(25))
+
+
+def test_residuals_count_as_those_of_the_law_with_the_smallest():
+    """Those of a wrong law are correlated because it is wrong."""
+
+    def fitted(squares, n_independent, n_unknowns):
+        counts = {"n_samples": 1000, "n_independent": n_independent, "estimates": (None,) * n_unknowns}
+        return SimpleNamespace(fmu=f"{squares}", squares=squares, describes_record=True, **counts)
+
+    right, wrong = fitted(900.0, 500.0, 3), fitted(1800.0, 50.0, 2)
+    for fits in ((right, wrong), (wrong, right)):
+        compared = compare_laws(fits)
+        assert [law.fmu for law in compared.laws] == ["900.0", "1800.0"]
+        assert compared.laws[1].difference == pytest.approx(500 * np.log(2.0) - np.log(500))
 
 
 def test_the_command_writes_the_compared_laws(tmp_path):
