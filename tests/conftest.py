@@ -1,7 +1,8 @@
-"""Fixtures: the FMUs, built once per test run, and a process that runs them."""
+"""Fixtures: the FMUs, built once, and a process that runs them."""
 
 import os
 from pathlib import Path
+from shutil import rmtree
 from tempfile import TemporaryDirectory
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as in a command; must be set before numpy is imported
@@ -15,19 +16,27 @@ from worker_client import Worker
 
 
 def pytest_configure(config):
-    """Create the folder shared by all test processes, or use the one created by the main process."""
+    """Create the folders shared by all test processes, or use those created by the main process."""
     if hasattr(config, "workerinput"):
         build_cache.shared_folder = Path(config.workerinput["shared_folder"])
+        build_cache.kept_folder = Path(config.workerinput["kept_folder"])
     else:
         folder = TemporaryDirectory()
         config.add_cleanup(folder.cleanup)
         build_cache.shared_folder = Path(folder.name)
+        builds, digest = config.cache.mkdir("builds"), build_cache.digest_sources()
+        for outdated in builds.iterdir():
+            if outdated.name != digest:
+                rmtree(outdated)
+        build_cache.kept_folder = builds / digest
+        build_cache.kept_folder.mkdir(exist_ok=True)
 
 
 @pytest.hookimpl(optionalhook=True)  # of pytest-xdist
 def pytest_configure_node(node):
-    """Pass the shared folder to a worker process."""
+    """Pass the shared folders to a worker process."""
     node.workerinput["shared_folder"] = str(build_cache.shared_folder)
+    node.workerinput["kept_folder"] = str(build_cache.kept_folder)
 
 
 @pytest.fixture(scope="session")

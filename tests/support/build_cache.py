@@ -1,18 +1,35 @@
-"""Build each set of FMUs once per test run. All test processes share one folder; the first one that needs a set
-builds it."""
+"""Build each set of FMUs once. All test processes share two folders; the first one that needs a set builds it.
+
+One folder lasts for the test run. The other keeps what is built from the sources alone, in the cache of pytest, so that
+later runs find it there until a source or an installed package changes; `pytest --cache-clear` empties it.
+"""
 
 import json
 import subprocess
 import sys
 from fcntl import LOCK_EX, flock
 from hashlib import sha256
+from importlib.metadata import distributions
 from pathlib import Path
 from tempfile import mkdtemp
 
 import commands
-from commands import ROOT, SUPPORT  # noqa: F401 - imported from here by the tests
+from commands import ROOT, SUPPORT
 
-shared_folder = Path()  # set by conftest.py
+shared_folder = Path()  # of this test run; set by conftest.py
+kept_folder = Path()  # of all test runs with the same sources; set by conftest.py
+
+
+def digest_sources():
+    """Return a digest of the sources of the builds, the Python and all installed packages."""
+    digest = sha256(sys.version.encode())
+    for name, version in sorted((item.name, item.version) for item in distributions()):
+        digest.update(f"{name} {version}".encode())
+    files = [file for folder in (ROOT / "fmus", SUPPORT) for file in folder.rglob("*.*") if file.is_file()]
+    for file in sorted({ROOT / "build_fmus.py", *files}):
+        if file.suffix not in (".fmu", ".pyc"):
+            digest.update(str(file.relative_to(ROOT)).encode() + file.read_bytes())
+    return digest.hexdigest()[:16]
 
 
 def build(root, out, *words, timeout=600):
@@ -28,9 +45,9 @@ def build_once(name, *words, timeout=600):
     it."""
 
     def make(folder):
-        (shared_folder / f"{name}.txt").write_text(build(ROOT, folder, *words, timeout=timeout))
+        (kept_folder / f"{name}.txt").write_text(build(ROOT, folder, *words, timeout=timeout))
 
-    return cached_folder(name, make)
+    return kept(name, make)
 
 
 def build_user_model(path, *words):
@@ -43,7 +60,7 @@ def build_user_model(path, *words):
         assert done.stdout.startswith(f"{path.stem}.fmu ")
 
     digest = sha256(path.read_bytes()).hexdigest()[:12]  # tests may have different models of one name
-    return cached_folder("-".join((path.stem, digest, *words)), make)
+    return kept("-".join((path.stem, digest, *words)), make)
 
 
 def run_published_cases():
@@ -58,12 +75,18 @@ def run_published_cases():
     return cached_folder("published", make)
 
 
-def cached_folder(name, make):
-    """Return the folder `name`; the first process that asks for it calls `make` to fill it."""
-    folder = shared_folder / name
-    with (shared_folder / f"{name}.lock").open("w") as lock:
+def kept(name, make):
+    """Return the folder `name` of all test runs with the same sources; see cached_folder()."""
+    return cached_folder(name, make, kept_folder)
+
+
+def cached_folder(name, make, parent=None):
+    """Return the folder `name` of this test run; the first process that asks for it calls `make` to fill it."""
+    parent = parent or shared_folder
+    folder = parent / name
+    with (parent / f"{name}.lock").open("w") as lock:
         flock(lock, LOCK_EX)
         if not folder.exists():
-            make(fresh := Path(mkdtemp(dir=shared_folder)))
+            make(fresh := Path(mkdtemp(dir=parent)))
             fresh.rename(folder)
     return folder

@@ -4,9 +4,7 @@ tests/external_fmus."""
 import os
 import subprocess
 import sys
-from fcntl import LOCK_EX, flock
 from pathlib import Path
-from tempfile import mkdtemp
 from zipfile import ZIP_DEFLATED, ZipFile
 
 import build_cache
@@ -29,16 +27,13 @@ SWEEP_AXES = {
 
 
 def build_external_fmus():
-    """Return the folder of all eleven FMUs, built once per test run."""
-    folder = build_cache.shared_folder / "foreign"
-    with (build_cache.shared_folder / "foreign.lock").open("w") as lock:
-        flock(lock, LOCK_EX)
-        if not folder.exists():
-            fresh = mkdtemp(dir=build_cache.shared_folder)
-            path = os.environ | {"PYTHONPATH": str(build_cache.ROOT)}
-            subprocess.run([sys.executable, __file__, fresh], check=True, capture_output=True, timeout=120, env=path)
-            Path(fresh).rename(folder)
-    return folder
+    """Return the folder of all eleven FMUs."""
+
+    def make(folder):
+        path = os.environ | {"PYTHONPATH": str(build_cache.ROOT)}
+        subprocess.run([sys.executable, __file__, str(folder)], check=True, capture_output=True, timeout=120, env=path)
+
+    return build_cache.cached_folder("foreign", make)
 
 
 def edited_copy(fmu, copy, changes):
