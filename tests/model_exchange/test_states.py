@@ -4,7 +4,7 @@ reset."""
 import model_exchange_client
 import pytest
 from model_exchange_client import DRIVEN, DRIVER, DRY, K, handle_event_at, single_error
-from models import CASES, MODELS, counts, declared, label, model_class, outputs, push
+from models import FEW_CASES, MODELS, counts, declared, label, model_class, outputs, push
 from row_comparison import assert_identical
 from worker_client import FmiError
 
@@ -45,7 +45,7 @@ def test_start_values_become_the_states(launch, name):
         assert fmu.get("mode") == -1
 
 
-@pytest.mark.parametrize("case", CASES, ids=label)
+@pytest.mark.parametrize("case", FEW_CASES, ids=label)
 def test_it_starts_like_co_simulation(launch, worker, fmus, case):
     name, values, _ = case
     solver = worker.instantiate(fmus / f"{name}.fmu").begin(values)

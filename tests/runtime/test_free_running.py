@@ -4,11 +4,11 @@ import random
 from math import cos, inf, nextafter, sin
 
 import pytest
-from models import CASES, EXACT, SIGN, THRESHOLD, counts, declared, label, outputs, parameters, push, tunable
+from models import CASES, EXACT, FEW_CASES, SIGN, THRESHOLD, counts, declared, label, outputs, parameters, push, tunable
 from row_comparison import assert_close, assert_identical
 
 CHATTER = 1e-6  # m/s: at smaller speeds the threshold law treats the mass as stuck
-SLED = [case for case in CASES if "x_driver" in outputs(case[0])]
+SLED = [case for case in FEW_CASES if "x_driver" in outputs(case[0])]
 
 
 @pytest.fixture(scope="module")
@@ -59,7 +59,7 @@ def test_any_two_communication_grids_agree(launch, following, case, pushed):
         assert_close(launch(name, values, stop=stop).run([0.0, stop], names)[-1:], expected[-1:], names, 1e-12)
 
 
-@pytest.mark.parametrize("case", CASES, ids=label)
+@pytest.mark.parametrize("case", FEW_CASES, ids=label)
 def test_reading_changes_nothing_at_any_time(worker, fmus, case):
     name, values, stop = case
     names = outputs(name) + counts(name)
@@ -79,7 +79,7 @@ def test_reading_changes_nothing_at_any_time(worker, fmus, case):
     curious.free()
 
 
-@pytest.mark.parametrize("case", CASES, ids=label)
+@pytest.mark.parametrize("case", FEW_CASES, ids=label)
 def test_a_change_at_the_end_of_an_internal_step_discards_the_lookahead(launch, following, case):
     name, values, stop = case
     names = outputs(name) + counts(name)
@@ -96,7 +96,7 @@ def test_a_change_at_the_end_of_an_internal_step_discards_the_lookahead(launch, 
     assert_identical(runs[1], runs[0], names)
 
 
-@pytest.mark.parametrize("case", CASES, ids=label)
+@pytest.mark.parametrize("case", FEW_CASES, ids=label)
 def test_the_effective_step_size_is_finite_and_unaffected_by_lookahead_and_setting(launch, case):
     name, values, stop = case
     force, size = push(name)
@@ -111,7 +111,7 @@ def test_the_effective_step_size_is_finite_and_unaffected_by_lookahead_and_setti
         assert step_sizes == [step_size] * 3
 
 
-@pytest.mark.parametrize("case", CASES, ids=label)
+@pytest.mark.parametrize("case", FEW_CASES, ids=label)
 def test_setting_a_value_to_itself_changes_nothing(launch, case):
     name, values, stop = case
     names = outputs(name) + counts(name)
@@ -122,7 +122,7 @@ def test_setting_a_value_to_itself_changes_nothing(launch, case):
     assert_identical(fmu.run_with_changes(times, names, dict.fromkeys(times[1:-1], same)), expected, names)
 
 
-@pytest.mark.parametrize("case", CASES, ids=label)
+@pytest.mark.parametrize("case", FEW_CASES, ids=label)
 def test_following_t_next_shows_every_internal_step(following, case):
     times, rows = following(case)
     assert times[-1] == case[-1]
@@ -130,7 +130,7 @@ def test_following_t_next_shows_every_internal_step(following, case):
     assert all(h == b - a for a, b, (_, h) in zip(times[:-1], times[1:], rows[1:], strict=True))
 
 
-@pytest.mark.parametrize("case", [c for c in CASES if c[1].get("friction") == 1], ids=label)
+@pytest.mark.parametrize("case", [c for c in FEW_CASES if c[1].get("friction") == 1], ids=label)
 def test_a_step_ending_within_rounding_of_an_event_ends_at_it(launch, case):
     name, values, stop = case
     fmu, t, ulp = launch(name, values, stop=stop), 0.0, 0
@@ -143,7 +143,7 @@ def test_a_step_ending_within_rounding_of_an_event_ends_at_it(launch, case):
     assert count >= 3
 
 
-@pytest.mark.parametrize("case", [c for c in CASES if c[1].get("friction", 1) == 1], ids=label)
+@pytest.mark.parametrize("case", [c for c in FEW_CASES if c[1].get("friction", 1) == 1], ids=label)
 def test_a_later_start_time_only_shifts_the_motion(launch, case):
     """Without laws that chatter, where rounding of the time decides."""
     name, values, stop = case
@@ -169,7 +169,7 @@ def test_a_changed_driver_speed_causes_no_jump(launch, case):
     assert before[names.index("x_driver")] == pytest.approx(0.034 * 4.6, rel=1e-12)
 
 
-@pytest.mark.parametrize("case", CASES, ids=label)
+@pytest.mark.parametrize("case", FEW_CASES, ids=label)
 def test_a_run_without_stop_time_continues(launch, case):
     name, values, stop = case
     names = outputs(name)[:2]
@@ -180,7 +180,7 @@ def test_a_run_without_stop_time_continues(launch, case):
     assert all(value == value for row in rows for value in row)
 
 
-@pytest.mark.parametrize("case", CASES, ids=label)
+@pytest.mark.parametrize("case", FEW_CASES, ids=label)
 def test_outputs_satisfy_force_and_energy_balance(launch, case):
     """Forces give the acceleration, and the energy is that of the state, at every point, including the start."""
     name, values, stop = case

@@ -6,7 +6,7 @@ import tracemalloc
 from math import isnan, nextafter
 
 import pytest
-from models import CASES, MODELS, ROOT, SIGN, declared, label, model_class, outputs, runtime
+from models import CASES, FEW_CASES, MODELS, ROOT, SIGN, declared, label, model_class, outputs, runtime
 
 from fmus.packaging.lowering import lowered_files
 from fmus.packaging.model_lookup import find_model
@@ -127,7 +127,7 @@ def number_paths(thing, path, seen):
     return numbers
 
 
-@pytest.mark.parametrize("case", CASES, ids=label)
+@pytest.mark.parametrize("case", FEW_CASES, ids=label)
 def test_attributes_are_created_in_init_and_keep_their_type(case):
     """So that a flat copy of the numbers is the complete state."""
     name, values, stop = case

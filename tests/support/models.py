@@ -90,18 +90,30 @@ def experiment(name, values):
     return name, {**values, "solver.rtol": 1e-3, "solver.atol": 1e-6}, 0.4 * stop
 
 
-def pairwise_cases(name, many=2):
-    """Return a few combinations that contain every pair (`many` = 2) of choices."""
-    groups = [(values, {*choose(values.items(), min(many, len(values)))}) for values in combinations(name)]
-    selected, missing = [], set().union(*(item for _, item in groups))
+def cover(groups):
+    """Return a few of these pairs of a thing and its properties, which have every property: the things."""
+    selected, missing = [], set().union(*(properties for _, properties in groups))
     while missing:
-        values, met = max(groups, key=lambda group: len(group[1] & missing))
-        selected.append(values)
+        thing, met = max(groups, key=lambda group: len(group[1] & missing))
+        selected.append(thing)
         missing -= met
     return selected
 
 
-CASES = [experiment(name, values) for name in MODELS for values in pairwise_cases(name)]
+def pairwise_cases(name, many=2):
+    """Return a few combinations that contain every pair (`many` = 2) of choices."""
+    return cover([(values, {*choose(values.items(), min(many, len(values)))}) for values in combinations(name)])
+
+
+def traits(case):
+    """Return what a case adds to others: the model with its law, the other choices, and a law in closed form."""
+    name, values, _ = case
+    law, method = values.get("friction"), values["solver.method"]
+    return {(name, law), ("method", method), ("pin_load", values.get("pin_load")), (law, method == EXACT)}
+
+
+CASES = [experiment(name, values) for name in MODELS for values in pairwise_cases(name)]  # every pair of choices
+FEW_CASES = cover([(case, traits(case)) for case in CASES])  # every model, law and method
 
 
 def label(case):
