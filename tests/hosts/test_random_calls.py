@@ -3,7 +3,7 @@
 After each call the process must be alive, a refused call must have reported an error, all calculated Reals must be
 finite while the run is healthy and NaN after a failure, and a second instance must be unaffected.
 
-The native FMUs answer allowed calls like the Python FMUs (tests/native/test_call_sequences.py), and random calls in any
+The native FMUs respond like the Python FMUs (tests/native/test_python_native_agreement.py), and random calls in any
 order are made under sanitizers (tests/native/test_sanitizers.py).
 """
 

@@ -1,16 +1,16 @@
-"""A refused call leaves the instance as it was: the next correct call works, and the run goes on bit for bit.
+"""What the FMUs of all backends refuse, with one sentence, and that a refused call leaves the instance as it was.
 
 The native FMUs refuse the call itself.  The layer of a Python FMU can refuse steps only; it refuses the step after a
 wrong setting.
 """
 
-from math import inf, nan
+from math import inf, isfinite, isnan, nan, nextafter
 
 import fmi3_fixtures
 import native_fmus
 import pytest
 import worker_client
-from models import EXACT, declared
+from models import EXACT, MODELS, SIGN, THRESHOLD, Choice, declared, outputs, parameters
 from row_comparison import assert_identical
 from worker_client import FmiError
 
@@ -28,7 +28,17 @@ INVALID_VALUES = [
     *({"x0": 0.5}, {"v0": nan}, {"solver.rtol": 1e-3}, {"solver.method": 3}, {"friction": 2}),  # fixed since the start
     *({"m": 0.0}, {"m": -1.0}, {"k": -1e-3}, {"k": inf}, {"F_ext": nan}, {"F_ext": -inf}),  # out of range
 ]
-INVALID_STEPS = [(0.0, 0.0), (0.0, -0.5), (0.0, nan), (0.0, inf), (0.1, 0.1), (-0.1, 0.1), (nan, 0.1), (0.0, 9.0)]
+INVALID_STEPS = [  # shift of the start from the present time, and size
+    *((0.0, 0.0), (0.0, -0.5), (0.0, nan), (0.0, inf), (0.0, 9.0)),
+    *((0.1, 0.1), (-0.1, 0.1), (nan, 0.1), (3e-7, 0.1), (-3e-7, 0.1)),
+]
+CONTRADICTIONS = [  # model, start values, words of the sentence
+    ("coulomb", {"friction": SIGN, "solver.method": EXACT}, ("friction = 2", "exact", "hybrid")),
+    ("stickslip", {"friction": THRESHOLD, "solver.method": EXACT}, ("friction = 3", "exact", "hybrid")),
+    ("stickslip", {"mu_d": 1.0}, ("mu_d", "1.0", "mu_s", "0.9")),
+    ("pacejka", {"mu_d": 1.0}, ("mu_d", "1.0", "mu_s", "0.9")),
+    ("pacejka", {"mu_d": 0.9}, ("mu_d = mu_s", "the factor C is 1", "no finite E", "x_m")),
+]
 REAL = {"python": "Real", "native": "Real", "FMI 3.0": "Float64"}
 OTHER_TYPES = dict.fromkeys(("python", "native"), ("Integer", "Boolean", "String"))
 OTHER_TYPES["FMI 3.0"] = ("Float32", "Int32", "Int64", "UInt64", "Boolean", "String")
@@ -95,6 +105,52 @@ def wrong_calls(fmu, backend):
     return calls
 
 
+def values_out_of_range(declaration):
+    """Return values just outside the range, far outside it, and nonfinite ones; numbers that no choice has."""
+    if isinstance(declaration, Choice):
+        return [0, 99, -1, 2**31 - 1]
+    values = [nan, inf, -inf]
+    if isfinite(declaration.low):
+        values += [nextafter(declaration.low, -inf), declaration.low - 1e9]
+    if isfinite(declaration.high):
+        values += [nextafter(declaration.high, inf), declaration.high + 1e9]
+    return values + [bound for bound in (declaration.above, declaration.below) if isfinite(bound)]
+
+
+def invalid_starts():
+    """Yield model, start values and words of the sentence."""
+    yield from CONTRADICTIONS
+    for name in MODELS:
+        for variable, declaration in declared(name).items():
+            if variable in parameters(name):
+                words = [variable, declaration.allowed]
+            elif isinstance(declaration, Choice):
+                words = [variable, *(item[0] for item in declaration.items)]
+            else:
+                continue
+            for value in values_out_of_range(declaration):
+                yield name, {variable: value}, [*words, repr(value)]
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_an_invalid_start_value_is_refused_by_name_with_the_allowed_ones(instance, backend, name):
+    """A Python FMU reads NaN until its first step, which is refused."""
+    reals = [v for v in outputs(name) if declared(name)[v].type == "Real"]
+    for model, values, words in invalid_starts():
+        if model != name:
+            continue
+        fmu = instance(name)
+        if backend == "python":
+            fmu.begin(values)
+            assert all(isnan(value) for value in fmu.get(*reals))
+            sentence = refused(fmu, backend, "step", 0.0, 0.1)
+            assert all(isnan(value) for value in fmu.get(*reals, "solver.t_next"))
+        else:
+            sentence = refused(fmu, backend, "begin", values)
+        assert [word for word in words if word not in sentence] == [], sentence
+        fmu.free()
+
+
 def test_every_refused_call_leaves_a_run_as_it_was(instance, backend):
     """Before and between the steps of a run with changes of the force, all wrong calls are made."""
     names = [name for name in declared("coulomb") if name != "solver.t_next"]
@@ -118,7 +174,9 @@ def test_every_refused_call_leaves_a_run_as_it_was(instance, backend):
                     missing = f"value reference {reference} is refused: this FMU has no such variable of type {kind}"
                     assert missing in sentence
             for offset, h in INVALID_STEPS if is_disturbed else []:
-                refused(fmu, backend, "step", t + offset, h)
+                sentence = refused(fmu, backend, "step", t + offset, h)
+                words = ("step", repr(t + offset), repr(h), f"{t!r} s", f"{STOP!r} s")
+                assert [word for word in words if word not in sentence] == [], sentence
             for function, *arguments in wrong_calls(fmu, backend) if is_disturbed else []:
                 refused(fmu, backend, function, *arguments)
             fmu.step(t, 0.25)
