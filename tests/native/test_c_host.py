@@ -3,10 +3,11 @@
 import re
 from collections import Counter
 
+import fmi3_fixtures
 import pytest
 from models import MODELS, declared, model_class, outputs, parameters, push
 from native_fmus import build_native_fmus
-from native_host import SANITIZERS, begin, run_host_script, value_references
+from native_host import SANITIZERS, begin, life_cycle, read_values, run_host_script, value_references
 
 from fmus.runtime.integrator import MAX_EVALUATIONS, MAX_STEPS
 
@@ -53,13 +54,13 @@ def test_the_process_has_no_python_and_agrees_with_the_python_fmu(fmu, fmus, wor
     name = fmu.stem
     stop, names_to_read = model_class(name).stop_time, [v for v in outputs(name) if declared(name)[v].type == "Real"]
     run = f"0 run 0 {stop} 200 {' '.join(str(value_references(name)[v]) for v in names_to_read)}"
-    answers, noise = run_host_script(fmu, [*begin(0, stop=stop), run])
-    mapped = re.findall(r"mapped (.*)", noise)
+    *answers, last = run_host_script(fmu, [*begin(0, stop=stop), "0 libraries", run])[0]
+    mapped = [line for line in answers if line.startswith("mapped ")]
     assert any(path.endswith(f"{name}.so") for path in mapped)
     assert not [path for path in mapped if "python" in path.lower()]
     python = worker.instantiate(fmus / f"{name}.fmu").begin(stop=stop)
     times = [stop * i / 200 for i in range(201)]
-    assert numbers(answers[-1]) == python.run(times, names_to_read)[-1]
+    assert numbers(last) == python.run(times, names_to_read)[-1]
 
 
 def test_two_hundred_instances_do_not_interfere(fmu):
@@ -75,6 +76,55 @@ def test_two_hundred_instances_do_not_interfere(fmu):
 def test_instances_coexist_in_threads(fmu):
     script = [line for i in range(40) for line in [*life(i, fmu.stem), f"{i} free"]]
     assert run_host_script(fmu, script, threads=16)[0] == run_host_script(fmu, script)[0]
+
+
+LIVES, STEPS = 100, 20
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_a_hundred_life_cycles_of_fmi3_agree_with_fmpy(worker, name):
+    """Bit for bit, in co-simulation and in model exchange by Euler steps."""
+    fmu, (x, v, *_), half = fmi3_fixtures.build_fmi3_fmus() / f"{name}.fmu", outputs(name), 0.5
+    half *= model_class(name).stop_time
+    times = [start + half * i / (STEPS // 2) for start in (0.0, half) for i in range(STEPS // 2)] + [2.0 * half]
+    one = worker.instantiate(fmu).begin()
+    (*_, expected) = one.run(times, [x, v])
+    one.free()
+    assert ends_of_lives(fmu, exchange=False) == [expected]
+
+    one = worker.exchange(fmu).begin()
+    for t in times[1:]:
+        one.update_discrete_states()
+        one.enter_continuous_time()
+        h = half / (STEPS // 2)
+        one.set_point(t, [state + h * rate for state, rate in zip(one.get_states(), one.rates(), strict=True)])
+        one.enter_event_mode()
+    expected = one.get(x, v)
+    one.free()
+    assert ends_of_lives(fmu, exchange=True) == [expected]
+
+
+def ends_of_lives(fmu, exchange):
+    """Return the distinct final values of many life cycles."""
+    answers, noise = run_host_script(fmu, LIVES * life_cycle(fmu.stem, STEPS, exchange))
+    assert noise == ""
+    rows = read_values(answers)
+    ends = []
+    for i, row in enumerate(rows):
+        if i % 6 not in (0, 4) and row not in ends:  # the others are those of the first halves
+            ends.append(row)
+    assert len(rows) == 6 * LIVES
+    return ends
+
+
+def test_fmi3_refuses_an_invalid_parameter_and_continues_with_the_valid_one():
+    mass, speed = (value_references("stickslip")[v] for v in ("m", "v"))
+    script = ["0 new", f"0 setr {mass} -1", "0 enter", "0 exit", "0 step 0 1", f"0 getr {mass} {speed}"]
+    (log, status, *answers), _ = run_host_script(fmi3_fixtures.build_fmi3_fmus() / "stickslip.fmu", script)
+    assert log.startswith(f"log {ERROR} logStatusError ")
+    assert "m = -1.0" in log
+    assert status == ERROR
+    assert read_values(answers) == [[model_class("stickslip").m.start, 0.0]]
 
 
 # ---- errors
@@ -154,14 +204,12 @@ def failures(name):
     return script
 
 
-def test_the_sanitizers_report_nothing(fmu):
-    run_failures(fmu, SANITIZERS, 25)
-
-
+@pytest.mark.slow
+@pytest.mark.parametrize(("sanitizers", "n_instances"), [(SANITIZERS, 25), ("thread", 1)])
 @pytest.mark.parametrize("name", ["pacejka", "stickslip"])
-def test_the_thread_sanitizer_reports_nothing(name):
-    """With and without a contact. Threads could only share data of the FMI layer, which is the same for all models."""
-    run_failures(build_native_fmus() / f"{name}.fmu", "thread", 1)
+def test_the_sanitizers_report_nothing(name, sanitizers, n_instances):
+    """With and without a contact: the FMI layer is the same for all models, and test_sanitizers.py runs all of them."""
+    run_failures(build_native_fmus() / f"{name}.fmu", sanitizers, n_instances)
 
 
 def run_failures(fmu, sanitizers, n_instances):

@@ -15,16 +15,17 @@ import pytest
 from models import CASES, HYBRID, MODELS, RADAU9, RODAS, declared, label, model_class, outputs
 from native_fmus import build_native_fmus, require_compiler
 from native_host import (
-    FMI3_HOST_SOURCE,
     HEADERS,
     HOST_SOURCE,
+    VERSION_OPTIONS,
     begin,
-    guid,
-    host_program,
+    life_cycle,
+    read_values,
+    run_host,
     run_host_script,
-    run_life_cycles,
     unpack_cached,
     value_references,
+    version_and_guid,
 )
 
 from fmus.packaging import native
@@ -77,15 +78,16 @@ def machine(request):
     require_compiler()
     (target,) = PLATFORMS[request.param].targets.values()
 
-    def program(source):
+    def program(version):
         def make(folder):
             chosen, (more, options) = PLATFORMS[request.param], PROGRAM[request.param]
             options = [*(option.format(compiler=find_compiler()) for option in chosen.options), *options]
-            sources = [source, *more, *(Path(native.__file__).with_name(file) for file in chosen.sources)]
+            options += VERSION_OPTIONS[version]
+            sources = [HOST_SOURCE, *more, *(Path(native.__file__).with_name(file) for file in chosen.sources)]
             command = [sys.executable, "-m", "ziglang", "cc", "-target", target, "-O1", "-s", *options, f"-I{HEADERS}"]
             subprocess.run([*command, *map(str, sources), "-o", str(folder / "host.exe")], check=True)
 
-        return [emulator, *words, str(build_cache.cached_folder(f"{source.stem}-{request.param}", make) / "host.exe")]
+        return [emulator, *words, str(build_cache.kept(f"host-{version}-{request.param}", make) / "host.exe")]
 
     return request.param, program, os.environ | (windows() if emulator == "wine" else {})
 
@@ -105,33 +107,24 @@ def windows():
     return {"WINEDEBUG": "-all", "WINEDLLOVERRIDES": "wineboot.exe=d", "WINEPREFIX": prefix, "HOME": prefix}
 
 
-def library(fmu, version, platform):
+def library(fmu, platform):
     """Return the library for a platform, built from the sources in the FMU."""
+    version, _ = version_and_guid(fmu)
 
     def make(folder):
         sources = {path.name: path.read_text() for path in (unpack_cached(fmu) / "sources").iterdir()}
         for path, content in compile_binaries(fmu.stem, sources, MAIN_SOURCE[version], platform, version).items():
             (folder / Path(path).name).write_bytes(content)
 
-    return (
-        build_cache.cached_folder(f"{fmu.stem}-{version}-{platform}", make) / f"{fmu.stem}{PLATFORMS[platform].suffix}"
-    )
+    return build_cache.kept(f"{fmu.stem}-{version}-{platform}", make) / f"{fmu.stem}{PLATFORMS[platform].suffix}"
 
 
-def run_host_script_there(machine, name, script):
+def run_host_script_there(machine, fmu, script):
     """Run a script in the host on another platform."""
     platform, program, environment = machine
-    fmu = build_native_fmus() / f"{name}.fmu"
-    done = subprocess.run(
-        [*program(HOST_SOURCE), str(library(fmu, "2", platform)), guid(fmu), "1"],
-        input="\n".join(script),
-        capture_output=True,
-        text=True,
-        timeout=120,
-        env=environment,
-    )
-    assert done.returncode == 0, done.stderr
-    return done.stdout.splitlines()
+    version, _ = version_and_guid(fmu)
+    answers, _ = run_host(program(version), library(fmu, platform), fmu, script, environment=environment)
+    return answers
 
 
 def runs(name):
@@ -166,7 +159,7 @@ def test_results_agree_with_linux_on_x86(machine, name):
     script = runs(name)
     expected, actual = (
         tables(run_host_script(build_native_fmus() / f"{name}.fmu", script)[0]),
-        tables(run_host_script_there(machine, name, script)),
+        tables(run_host_script_there(machine, build_native_fmus() / f"{name}.fmu", script)),
     )
     cases = [case for case in STEADY if case[0] == name]
     for case, table, other in zip(cases, expected, actual, strict=True):
@@ -186,25 +179,19 @@ def test_model_exchange_agrees_with_linux_on_x86(machine, name):
     script = exchange(name)
     (expected,), (actual,) = (
         tables(run_host_script(build_native_fmus() / f"{name}.fmu", script)[0]),
-        tables(run_host_script_there(machine, name, script)),
+        tables(run_host_script_there(machine, build_native_fmus() / f"{name}.fmu", script)),
     )
     assert len(set(expected[0])) > 3  # it moves
     assert relative_difference(expected, actual) <= CLOSE[name]
 
 
-def test_fmi3_agrees_with_linux_on_x86(machine):
-    """Both interfaces for the sled, saved states, and an error. The numerics are those of FMI 2.0, so one method is
-    enough."""
-    platform, program, environment = machine
-    sled = fmi3_fixtures.build_reduced_fmu("stickslip")
-    ends, stderr = run_life_cycles(
-        program(FMI3_HOST_SOURCE), sled, library(sled, "3", platform), 2, 4000, env=environment
-    )
-    expected, sentences = run_life_cycles(
-        [host_program(source=FMI3_HOST_SOURCE)], sled, "x86_64-linux/stickslip.so", 2, 4000
-    )
-    assert ends == [pytest.approx(row, abs=1e-11) for row in expected]
-    assert stderr == sentences
+@pytest.mark.parametrize("exchange", [False, True], ids=["co-simulation", "model exchange"])
+def test_fmi3_agrees_with_linux_on_x86(machine, exchange):
+    """With saved states, for the sled. The numerics are those of FMI 2.0, so one method is enough."""
+    sled, script = fmi3_fixtures.build_reduced_fmu("stickslip"), life_cycle("stickslip", 4000, exchange)
+    expected, _ = run_host_script(sled, script)
+    actual = run_host_script_there(machine, sled, script)
+    assert read_values(actual) == [pytest.approx(row, abs=1e-11) for row in read_values(expected)]
 
 
 def test_messages_agree_with_linux_on_x86(machine):
@@ -224,7 +211,7 @@ def test_messages_agree_with_linux_on_x86(machine):
         script += [f"0 setr {ref['x']} {number}", "0 setup nan 0 1", "0 enter", "0 exit", "0 step 0 0.5", "0 reset"]
     expected, actual = (
         run_host_script(build_native_fmus() / "stickslip.fmu", script)[0],
-        run_host_script_there(machine, "stickslip", script),
+        run_host_script_there(machine, build_native_fmus() / "stickslip.fmu", script),
     )
     assert expected == actual
     assert any("x = 5.684341886080802e-14 is refused" in line for line in expected)

@@ -16,8 +16,8 @@ from models import declared, model_class, outputs
 from fmus.packaging.native.compiler import STRICT
 
 HEADERS = Path(fmpy.__file__).parent / "c-code"
-HOST_SOURCE = Path(__file__).with_name("fmi2_host.c")
-FMI3_HOST_SOURCE = HOST_SOURCE.with_name("fmi3_host.c")
+HOST_SOURCE = Path(__file__).with_name("host.c")
+VERSION_OPTIONS = {"2": [], "3": ["-DFMI3"]}  # of the host, by the version of FMI
 SANITIZERS = "address,undefined,float-cast-overflow"
 # Report the line of undefined behaviour, which ends in a trap. Keep 32 MB of freed memory under watch; more is slow.
 SANITIZER_ENVIRONMENT = os.environ | {"ASAN_OPTIONS": "handle_sigill=1:quarantine_size_mb=32"}
@@ -41,12 +41,13 @@ def compile_cached(name, *words, sanitizers=""):
         command = [compiler(), *STRICT, "-g1", *map(str, words), "-o", str(folder / "made")]
         subprocess.run(command, check=True)
 
-    return build_cache.cached_folder(f"{name} {sanitizers}".strip(), make) / "made"
+    return build_cache.kept(f"{name} {sanitizers}".strip(), make) / "made"
 
 
-def host_program(sanitizers="", source=HOST_SOURCE):
-    """Return the compiled host program."""
-    return compile_cached(source.stem, f"-I{HEADERS}", source, sanitizers=sanitizers)
+def host_program(sanitizers="", version="2"):
+    """Return the compiled host program for a version of FMI."""
+    words = [*VERSION_OPTIONS[version], f"-I{HEADERS}", HOST_SOURCE]
+    return compile_cached(f"host {version}", *words, sanitizers=sanitizers)
 
 
 def compile_sanitized(source, fmu, *how, sanitizers=SANITIZERS):
@@ -68,43 +69,33 @@ def unpack_cached(fmu):
     return build_cache.cached_folder(f"{fmu.parent.name} {fmu.stem}", make)
 
 
-def guid(fmu):
-    return fromstring((unpack_cached(fmu) / "modelDescription.xml").read_bytes()).attrib["guid"]
+def version_and_guid(fmu):
+    """Return the version of FMI, 2 or 3, and the GUID or instantiation token of an FMU."""
+    root = fromstring((unpack_cached(fmu) / "modelDescription.xml").read_bytes())
+    version = root.attrib["fmiVersion"][0]
+    return version, root.attrib["guid" if version == "2" else "instantiationToken"]
 
 
-def run_life_cycles(program, fmu, library, number, steps, **options):
-    """Run life cycles of an FMI 3.0 FMU in fmi3_host.c, started by `program`.
-
-    Returns the final position and speed in co-simulation and in model exchange, and the lines of standard error.
-    """
-    name, folder = fmu.stem, unpack_cached(fmu)
-    token = fromstring((folder / "modelDescription.xml").read_bytes()).attrib["instantiationToken"]
-    read = [value_references(name)[variable] for variable in (*outputs(name)[:2], "m")]
-    words = [
-        folder / "binaries" / library,
-        token,
-        f"{folder / 'resources'}{os.sep}",
-        number,
-        model_class(name).stop_time,
-    ]
-    command = [*program, *map(str, (*words, steps, *read))]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=120, **options)
-    assert done.returncode == 0, done.stderr
-    return [
-        [float.fromhex(word) for word in line.split()] for line in done.stdout.splitlines()
-    ], done.stderr.splitlines()
-
-
-def run_host_script(fmu, script, threads=1, sanitizers=""):
+def run_host_script(fmu, script, threads=1, sanitizers="", environment=None):
     """Run a script in the host; return its output lines and standard error. With sanitizers the sources are
     compiled."""
-    library = unpack_cached(fmu) / "binaries" / "linux64" / f"{fmu.stem}.so"
+    version, _ = version_and_guid(fmu)
+    folder = {"2": "linux64", "3": "x86_64-linux"}[version]
+    library = unpack_cached(fmu) / "binaries" / folder / f"{fmu.stem}.so"
     if sanitizers:
         library = compile_sanitized("fmi2_stress.c", fmu, "-shared", sanitizers=sanitizers)
-    command = [str(host_program(sanitizers)), str(library), guid(fmu), str(threads)]
-    done = subprocess.run(
-        command, input="\n".join(script), capture_output=True, text=True, timeout=120, env=SANITIZER_ENVIRONMENT
-    )
+    environment = environment or SANITIZER_ENVIRONMENT
+    return run_host([host_program(sanitizers, version)], library, fmu, script, threads, environment)
+
+
+def run_host(program, library, fmu, script, threads=1, environment=None):
+    """Run a script in a host, started by the command `program`, on this library of an FMU."""
+    version, guid = version_and_guid(fmu)
+    folder = unpack_cached(fmu) / "resources"
+    resources = folder.as_uri() if version == "2" else f"{folder}{os.sep}"
+    command = [str(word) for word in (*program, library, guid, resources, threads)]
+    options = {"capture_output": True, "text": True, "timeout": 120, "env": environment}
+    done = subprocess.run(command, input="\n".join(script), **options)
     assert done.returncode == 0, done.stderr[-3000:]
     return done.stdout.splitlines(), done.stderr
 
@@ -119,3 +110,25 @@ def begin(instance, values=(), stop="nan"):
     """Return the script from instantiation to the first step; values are (reference, value)."""
     sets = [f"{instance} setr {reference} {value!r}" for reference, value in values]
     return [f"{instance} new", *sets, f"{instance} setup nan 0 {stop}", f"{instance} enter", f"{instance} exit"]
+
+
+def life_cycle(name, steps, exchange=False):
+    """Return the script of an instance of an FMI 3.0 FMU, which reads position and speed.
+
+    The second half of a run is repeated from a saved state and from a serialized one; after a reset, the complete run.
+    In model exchange, Euler steps integrate.
+    """
+    states = len(model_class(name).states) + ("x_driver" in declared(name))
+    how, (x, v, *_) = f"euler {states}" if exchange else "run", outputs(name)
+    stop, read = model_class(name).stop_time, f"{value_references(name)[x]} {value_references(name)[v]}"
+    first, second = (f"{how} {a} {b} {steps // 2} {read}" for a, b in ((0.0, 0.5 * stop), (0.5 * stop, stop)))
+    start = ["enter", "exit", first]
+    script = ["new exchange" if exchange else "new", *start, "save 1", second, "restore 1", second, "serialize 1 2"]
+    script += ["deserialize 3 2", "restore 3", second, "drop 1", "drop 3", "reset", *start, second, "terminate", "free"]
+    return [f"0 {line}" for line in script]
+
+
+def read_values(answers):
+    """Return the values in the answers that have several; all calls must have succeeded."""
+    assert {line.split()[0] for line in answers} == {"0"}, answers
+    return [[float.fromhex(word) for word in line.split()[1:]] for line in answers if " " in line]
