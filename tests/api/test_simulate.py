@@ -86,6 +86,16 @@ def test_an_input_that_jumps_jumps_at_its_time():
     assert run["x"] == pytest.approx(5.0 / SMD["k"] * (1.0 - np.exp(-decay * after) * swing), abs=1e-14)
 
 
+@pytest.mark.parametrize(("interface", "at_jump"), [("CoSimulation", [5.0]), ("ModelExchange", [0.0, 5.0])])
+def test_outputs_at_a_jump_have_the_input_after_it(interface, at_jump):
+    """Model exchange shows both sides, because a jump is an event there."""
+    table = {"time": [0.0, 0.0, 1.0, 1.0, 4.0], "F_ext": [9.0, 0.0, 0.0, 5.0, 5.0]}
+    run = harness.simulate(native_fmus.build_native_fmus() / "smd.fmu", inputs=table, interface=interface)
+    force = SMD["m"] * run["a"] + SMD["c"] * run["v"] + SMD["k"] * run["x"]
+    assert force[run.time == 1.0] == pytest.approx(at_jump, abs=1e-12)
+    assert force[run.time != 1.0] == pytest.approx(np.where(run.time[run.time != 1.0] > 1.0, 5.0, 0.0), abs=1e-12)
+
+
 def test_a_data_frame_drives_inputs():
     pandas = pytest.importorskip("pandas")
     table = pandas.DataFrame({"F_ext": [0.0, 2.0]}, index=pandas.Index([0.0, 4.0], name="time"))
