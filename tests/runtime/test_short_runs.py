@@ -1,21 +1,36 @@
-"""The closed form of a push from rest, at times so short that its terms cancel."""
+"""The closed form of motions from rest, at times so short that its terms cancel."""
 
 import pytest
 from independent_solution import smd as system
+from independent_solution import stickslip
 
 from tests.runtime.test_exact_method import DAMPING, ClosedFormMotion
 
 STEADY = 12.0  # rad/s
 
 
-@pytest.mark.parametrize("run", [1e-1, 1e-2, 1e-3, 1e-4, 1e-5])
+RUNS = [1e-1, 1e-2, 1e-3, 1e-4, 1e-5]  # s
+
+
+@pytest.mark.parametrize("run", RUNS)
 @pytest.mark.parametrize("zeta", [z for z in DAMPING if z >= 1.0])
 def test_a_push_from_rest_keeps_its_digits_in_any_short_run(launch, zeta, run):
     """Overdamped: position and speed are accurate to 1e-13 of their current values."""
     values = {"k": STEADY**2, "c": 2.0 * STEADY * zeta, "F_ext": 3.0}
+    assert_exact(launch("smd", {**values, "x0": 0.0, "v0": 0.0}, stop=run), system(**values), run)
+
+
+@pytest.mark.parametrize("run", RUNS)
+def test_a_pull_from_rest_keeps_its_digits_in_any_short_run(launch, run):
+    """Without friction: the position is that of the driver, less a sine that is nearly as large."""
+    assert_exact(launch("stickslip", {"g": 0.0}, stop=run), stickslip(g=0.0), run)
+
+
+def assert_exact(fmu, system, run):
+    """Check position and speed of a motion from rest at zero, relative to their current values."""
     times = [run * i / 10 for i in range(11)]
-    rows = launch("smd", {**values, "x0": 0.0, "v0": 0.0}, stop=run).run(times, ["x", "v"])
-    motion = ClosedFormMotion([(0.0, system(**values))], 0.0, 0.0, run)
+    rows = fmu.run(times, ["x", "v"])
+    motion = ClosedFormMotion([(0.0, system)], 0.0, 0.0, run)
     for t, row in zip(times[1:], rows[1:], strict=True):
         for value, true in zip(row, motion.at(t), strict=True):
             assert abs(value - true) <= 1e-13 * abs(true)
