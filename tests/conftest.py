@@ -24,10 +24,13 @@ def pytest_configure(config):
         folder = TemporaryDirectory()
         config.add_cleanup(folder.cleanup)
         build_cache.shared_folder = Path(folder.name)
-        builds, digest = config.cache.mkdir("builds"), build_cache.digest_sources()
-        for outdated in builds.iterdir():
-            if outdated.name != digest:
-                rmtree(outdated)
+        if config.pluginmanager.has_plugin("cacheprovider"):
+            builds, digest = config.cache.mkdir("builds"), build_cache.digest_sources()
+            for outdated in builds.iterdir():
+                if outdated.name != digest:
+                    rmtree(outdated)
+        else:  # as with -p no:cacheprovider in a read-only checkout
+            builds, digest = build_cache.shared_folder, "builds"
         build_cache.kept_folder = builds / digest
         build_cache.kept_folder.mkdir(exist_ok=True)
 
