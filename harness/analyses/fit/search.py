@@ -10,14 +10,16 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.optimize import differential_evolution
+from scipy.optimize import OptimizeResult, differential_evolution
 from scipy.stats import qmc
 
 from .fit_problem import FitProblem, Selection
 
 STRETCHES, SURVIVORS, SOBOL_POINTS, SEARCH_SAMPLES = (0.15, 0.3, 0.55, 1.0), (40, 24, 12, 6), 2048, 250
 EVOLUTION = {"popsize": 10, "maxiter": 150, "tol": 1e-2}
-NEAR_KNOWN = 1.2  # times the cost of the known minimum, at which an evolution has found it again
+SMALL_GAIN = 0.01  # relative reduction of the squares below which a minimum is not lower
+PATIENCE = 40  # generations without a lower minimum, after which an evolution ends
+NEAR_KNOWN = 1.2  # times the squares of the known minimum, at which an evolution has found it again
 REFUSED_COST = 1e12
 MAX_SEARCHES, REQUIRED, REQUIRED_IF_ROUGH = 8, 2, 4  # searches in all, and those that must find the same minimum
 EXPLAINED = 6.0  # standard errors of the squares of white noise: a minimum within them explains the records
@@ -55,10 +57,11 @@ def search(
     """
     result, first = SearchResult(), 0
     n = sum(len(index) * record.y.shape[1] for index, record in zip(selection, problem.records, strict=True))
+    explained = n + EXPLAINED * np.sqrt(2 * n)
     for number in range(1, MAX_SEARCHES + 1):
         report((number - 1) / MAX_SEARCHES)
         is_evolution = number % 2 == 0
-        is_known = result.best and (result.best[0] < ROUGH**2 * n or result.n_hits >= REQUIRED)
+        is_known = result.best and (result.best[0] < explained or result.n_hits >= REQUIRED)
         known = result.best[1] if result.best and is_known else None
         candidates = evolve(problem, number, known) if is_evolution else continue_in_time(problem, number, starts)
         minima = [problem.minimize(z, selection, 20, 1e-6) for _, z in candidates[:REFINED]]
@@ -75,7 +78,7 @@ def search(
             result.n_hits, first = 1, number
         result.best = new if not result.best or new[0] < result.best[0] else result.best
         squares = result.best[0]
-        is_explained = squares < n + EXPLAINED * np.sqrt(2 * n) and number >= first + REQUIRED_AFTER
+        is_explained = squares < explained and number >= first + REQUIRED_AFTER
         if is_explained or result.n_hits >= (REQUIRED_IF_ROUGH if squares > ROUGH**2 * n else REQUIRED):
             result.is_agreed = True
             return result
@@ -98,17 +101,34 @@ def continue_in_time(problem: FitProblem, seed: int, starts: np.ndarray) -> list
 
 
 def evolve(problem: FitProblem, seed: int, known: np.ndarray | None) -> list[Minimum]:
-    """Return the minima near the end of a differential evolution of the absolute residuals.
+    """Return the minima near the best members of a differential evolution of the absolute residuals.
+
+    Least squares start from each new best member, which is near a minimum long before the population is.
 
     Parameters
     ----------
     known : numpy.ndarray or None
-        Coordinates (k,) of a minimum that is as small as the noise or that several searches found: the evolution ends
-        when it comes near that cost.
+        Coordinates (k,) of a minimum that explains the records or that several searches found: the evolution ends when
+        it finds one that is about as low.
     """
     part = stretches(problem)[-1]
-    enough = 0.0 if known is None else NEAR_KNOWN * absolute_cost(problem, known, part)
-    last = differential_evolution(
+    enough = 0.0 if known is None else NEAR_KNOWN * problem.minimize(known, part, 6, 1e-3)[0]
+    minima: list[Minimum] = []
+    best_member, last_improvement = np.array([]), 0
+
+    def minimize_from_best(intermediate_result: OptimizeResult) -> bool:
+        """Minimize from a new best member; return whether the evolution can end."""
+        nonlocal best_member, last_improvement
+        if not np.array_equal(intermediate_result.x, best_member):
+            best_member = intermediate_result.x.copy()
+            minimum = problem.minimize(best_member, part, 20, 1e-3)
+            if not minima or minimum[0] < (1 - SMALL_GAIN) * min(squares for squares, _ in minima):
+                last_improvement = intermediate_result.nit
+            minima.append(minimum)
+        is_idle = intermediate_result.nit - last_improvement >= PATIENCE
+        return is_idle or min(squares for squares, _ in minima) < enough
+
+    differential_evolution(
         lambda columns: np.array([absolute_cost(problem, z, part) for z in columns.T]),
         [*zip(problem.low, problem.high, strict=True)],
         seed=seed,
@@ -116,11 +136,10 @@ def evolve(problem: FitProblem, seed: int, known: np.ndarray | None) -> list[Min
         polish=False,
         vectorized=True,
         updating="deferred",
-        callback=lambda intermediate_result: bool(intermediate_result.fun < enough),
+        callback=minimize_from_best,
         **EVOLUTION,
     )
-    order = np.argsort(last.population_energies)[: SURVIVORS[-1]]
-    return distinct([problem.minimize(z, part, 6, 1e-3) for z in last.population[order]], SURVIVORS[-1])
+    return distinct(minima, SURVIVORS[-1])
 
 
 def stretches(problem: FitProblem) -> list[Selection]:
