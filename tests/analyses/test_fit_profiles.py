@@ -57,11 +57,11 @@ def test_a_profile_follows_a_curved_valley():
     assert reached == pytest.approx([-QUANTILE, QUANTILE, QUANTILE], rel=0.03)
 
 
-@pytest.mark.parametrize("height", [15.0, 3.3])
+@pytest.mark.parametrize("height", [15.0, 3.3, 1.5, 1.0])
 def test_a_profile_returns_from_a_higher_branch(height):
-    """A straight path to the first trial ends in a second minimum of b, 1.5 above the bent valley.
+    """A straight path to a trial ends in a second minimum of b, 1.5 above the bent valley.
 
-    If it is little higher, the next trials, nearer to the minimum of all, end there as well.
+    If it is little higher, the next trials, nearer to the minimum of all, can end there as well, even below the limit.
     """
 
     def residuals(a, b):

@@ -5,7 +5,6 @@ References
 D. M. Bates, D. G. Watts, Nonlinear Regression Analysis and Its Applications (1988), section 6.1
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,11 +12,15 @@ import numpy as np
 from .fit_problem import FitProblem
 from .uncertainty import Uncertainty
 
-MAX_EVALUATIONS = 14
-STUCK = 2  # trials in turn that move only one side of the bracket: the outer one may be on a higher branch
+MAX_TRIALS = 20
 MAX_STEPS, MIN_GAIN = 40, 5e-4  # of a fit of the other coordinates; least gain of a step, in units of the limit
-FARTHEST = 2.0  # times the farthest point of a profile, up to which a parabola is extrapolated
-CLOSE = 0.02  # relative distance from the limit at which a bound is accepted, in standard errors
+LONGEST_FIRST_STEP, MIN_GROWTH, MAX_GROWTH = 0.25, 1.05, 4.0  # distance of the first trial; ratios of the next ones
+MIN_SHARE, MAX_SHARE = 0.1, 0.95  # of a bracket, between which the next trial lies
+FARTHEST = 2.0  # times the farthest inner trial, up to which a parabola is extrapolated
+CLOSE = 0.02  # difference of a height from 1 at which a trial is the end
+JUMP, SHORT = 0.1, 0.1  # height above what is expected of a higher branch; relative step that need not be shorter
+NARROW = 1e-3  # relative width of a bracket that needs no more trials
+BETTER = 0.02  # of the limit, by which the squares of a better minimum are lower
 NEAR_LIMIT = 0.05  # distance of a coordinate from the limits of the fit at which it has no bound
 WIDER, NEGLIGIBLE = 0.7, 0.1  # limits of other coordinates, moved by this, lower a profile by less than this share
 
@@ -34,6 +37,115 @@ class Bound:
     profile: tuple[tuple[float, float], ...] = ()
 
 
+@dataclass(frozen=True)
+class Trial:
+    """A fit with one coordinate at a distance from the minimum.
+
+    Attributes
+    ----------
+    distance : float
+    height : float
+        Root of the squares above the minimum, in units of the limit: 1 at the end of the interval, infinite if refused.
+    z : numpy.ndarray
+        Coordinates (k,).
+    n_inner : int
+        Number of inner trials from which its start was extrapolated.
+    """
+
+    distance: float
+    height: float
+    z: np.ndarray
+    n_inner: int
+
+
+class Bracket:
+    """Trials of one side of a profile, about the distance at which it reaches its limit.
+
+    A trial that is much higher than the inner ones let expect may be in a minimum of the other coordinates that lies
+    higher. It is outside until trials nearer to the inner ones show that the profile is as steep.
+
+    Parameters
+    ----------
+    z : numpy.ndarray
+        Coordinates (k,) of the minimum.
+    tangent : numpy.ndarray
+        Change (k,) of the coordinates with the distance, near the minimum.
+    reach : float
+        Distance of the limit if the squares are quadratic.
+
+    Attributes
+    ----------
+    inner : list of Trial
+        Trials below the limit, outwards, from the minimum on.
+    outer : Trial or None
+        The nearest trial outside.
+    """
+
+    def __init__(self, z: np.ndarray, tangent: np.ndarray, reach: float) -> None:
+        self.tangent, self.reach = tangent, reach
+        self.inner: list[Trial] = [Trial(0.0, 0.0, z, 0)]
+        self.outer: Trial | None = None
+
+    @property
+    def slope(self) -> float:
+        """Return the increase of the height with the distance at the last inner trials."""
+        if len(self.inner) < 2:
+            return 1 / self.reach
+        before, last = self.inner[-2:]
+        return max((last.height - before.height) / (last.distance - before.distance), 1e-300)
+
+    def is_jump(self, trial: Trial) -> bool:
+        """Return whether a trial may be on a higher branch."""
+        last = self.inner[-1]
+        step = trial.distance - last.distance
+        return trial.height > last.height + self.slope * step + JUMP and step > SHORT * trial.distance
+
+    def add(self, trial: Trial) -> None:
+        """Add a trial, which lies between the last inner and the outer one, or is the outer one anew."""
+        if trial.height >= 1 or self.is_jump(trial):
+            self.outer = trial
+            return
+        self.inner.append(trial)
+        if self.outer and trial.distance >= self.outer.distance:
+            self.outer = None
+
+    def next_distance(self) -> float:
+        """Return the distance of the next trial."""
+        last, outer = self.inner[-1], self.outer
+        expected = last.distance + (1 - last.height) / self.slope
+        if outer is None and len(self.inner) == 1:
+            return min(self.reach / 2, LONGEST_FIRST_STEP)
+        if outer is None:
+            return float(np.clip(expected, MIN_GROWTH * last.distance, MAX_GROWTH * last.distance))
+        width = outer.distance - last.distance
+        if not np.isfinite(outer.height):
+            return last.distance + width / 2
+        if (outer.height < 1 or expected >= outer.distance) and outer.n_inner < len(self.inner):
+            return outer.distance  # a fit from the last inner trial may be lower
+        if self.is_jump(outer):
+            return last.distance + width / 2
+        share = (1 - last.height) / (outer.height - last.height)
+        return last.distance + width * float(np.clip(share, MIN_SHARE, MAX_SHARE))
+
+    def end(self) -> Trial | None:
+        """Return the trial at the end of the profile, if it is known."""
+        outer, last = self.outer, self.inner[-1]
+        for trial in (last, outer):
+            if trial and abs(trial.height - 1) < CLOSE and not self.is_jump(trial):
+                return trial
+        is_narrow = outer is not None and outer.height >= 1 and outer.distance - last.distance < NARROW * outer.distance
+        return outer if is_narrow else None
+
+    def extrapolate(self, distance: float) -> np.ndarray:
+        """Return coordinates (k,) on the parabola through the last three inner trials, or the line through two."""
+        if len(self.inner) == 1:
+            return self.inner[0].z + self.tangent * distance
+        near = self.inner[-3 if distance < FARTHEST * self.inner[-1].distance else -2 :]
+        x = [trial.distance for trial in near]
+        weights = [np.prod([(distance - b) / (a - b) for b in x if b != a]) for a in x]
+        return np.asarray(weights @ np.array([trial.z for trial in near]))
+
+
 def profile_bound(
     problem: FitProblem, z: np.ndarray, uncertainty: Uncertainty, i: int, side: int, ends_at_better: bool = True
 ) -> Bound:
@@ -48,78 +160,50 @@ def profile_bound(
     """
     others = np.delete(np.arange(len(z)), i)
     target = uncertainty.variance * uncertainty.inflation[i] * uncertainty.quantile**2
-    covariance = uncertainty.covariance
-    start = problem.residuals(z, problem.all)
-    assert start is not None
-
-    def excess(squares: float) -> float:
-        return float(np.sqrt(max(squares - uncertainty.squares, 0.0) / target)) - 1
-
-    def fit_others(x: float) -> tuple[float, np.ndarray]:
-        """Return the squares and coordinates with coordinate i at the distance x."""
-        guess = extrapolate(path, x) if len(path) > 1 else z + tangent * x
-        guess[i] = z[i] + side * x
-        into_region = problem.region.constrained_step(np.eye(len(others)), np.zeros(len(others)), guess, others)
-        if not np.isfinite(into_region).all():
-            return np.inf, guess
-        guess[others] += into_region
-        if problem.residuals(guess, problem.all) is None:
-            problem.region.learn(problem.is_refused, z, guess - z)
-        return problem.minimize(guess, problem.all, MAX_STEPS, MIN_GAIN * target / uncertainty.squares, others)
-
-    tangent = side * covariance[:, i] / max(covariance[i, i], 1e-300)
-    x = float(np.clip(np.sqrt(target / uncertainty.variance * covariance[i, i]), 1e-6, 0.5))
-    low, path, last = (0.0, excess(float(start @ start))), {0.0: z}, z
-    before, is_below, n_in_turn = low, True, 0
-    high: tuple[float, float] | None = None
+    variance = max(uncertainty.covariance[i, i], 1e-300)
+    reach = max(float(np.sqrt(target / uncertainty.variance * variance)), 1e-6)
+    bracket = Bracket(z, side * uncertainty.covariance[:, i] / variance, reach)
     better: np.ndarray | None = None
-    fits: dict[float, tuple[float, np.ndarray]] = {}
-    for _ in range(MAX_EVALUATIONS):
-        squares, there = fits[x] = min(fit_others(x), fits.get(x, (np.inf, z)), key=lambda fit: fit[0])
-        if squares < uncertainty.squares - 0.02 * target:
+    end: Trial | None = None
+    for _ in range(MAX_TRIALS):
+        distance = bracket.next_distance()
+        guess = bracket.extrapolate(distance)
+        guess[i] = z[i] + side * distance
+        squares, there = fit_others(problem, z, guess, others, MIN_GAIN * target / uncertainty.squares)
+        if squares < uncertainty.squares - BETTER * target:
             better = there
             if ends_at_better:
                 return Bound(None, better)
-        distance = excess(squares)
-        if np.isfinite(distance):
-            path[x] = last = there
-        n_in_turn = n_in_turn + 1 if (distance < 0) == is_below else 1
-        is_below = distance < 0
-        if is_below:
-            before, low = low, (x, distance)
-            high = high if high and x < high[0] else None
-        else:
-            high = (x, distance)
-        if abs(distance) < CLOSE or (high and high[0] - low[0] < 1e-3 * high[0]):
+        height = float(np.sqrt(max(squares - uncertainty.squares, 0.0) / target))
+        bracket.add(Trial(distance, height, there, len(bracket.inner)))
+        end = bracket.end()
+        if end:
             break
-        is_stuck = high and n_in_turn >= STUCK and (not is_below or extend_line(before, low, high[0]) < 0)
-        if is_stuck:
-            path = {a: path[a] for a in path if a <= low[0]}
-        if high is None:
-            x *= float(np.clip(1 / max(1 + distance, 1e-3), 1.05, 4.0))
-        elif np.isfinite(high[1]) and is_stuck and is_below:
-            x = high[0]  # fit it again, from the inner points
-        elif np.isfinite(high[1]):
-            x = low[0] + (high[0] - low[0]) * float(np.clip(-low[1] / (high[1] - low[1]), 0.1, 0.95))
-        else:  # the region ends here
-            x = (low[0] + high[0]) / 2
     else:
-        x = high[0] if high and np.isfinite(high[1]) else np.inf  # the outer side of the bracket
-    end = None if x == np.inf or depends_on_limits(problem, last, i, target) else float(z[i] + side * x)
-    profile = [(x, excess(squares)) for x, (squares, _) in fits.items() if np.isfinite(squares)]
-    return Bound(end, better, profile=tuple((float(z[i] + side * x), (1 + distance) ** 2) for x, distance in profile))
+        end = bracket.outer if bracket.outer and 1 <= bracket.outer.height < np.inf else None
+    trials = [*bracket.inner[1:], *([end] if end and end.height >= 1 else [])]
+    profile = tuple((float(trial.z[i]), trial.height**2) for trial in trials if np.isfinite(trial.height))
+    there = next(trial.z for trial in (end, bracket.inner[-1]) if trial and np.isfinite(trial.height))
+    if end is None or depends_on_limits(problem, there, i, target):
+        return Bound(None, better, profile)
+    return Bound(float(z[i] + side * end.distance), better, profile)
 
 
-def extend_line(a: tuple[float, float], b: tuple[float, float], x: float) -> float:
-    """Return the height at x of the line through two points."""
-    return b[1] + (b[1] - a[1]) / (b[0] - a[0]) * (x - b[0])
+def fit_others(
+    problem: FitProblem, z: np.ndarray, guess: np.ndarray, others: np.ndarray, min_gain: float
+) -> tuple[float, np.ndarray]:
+    """Return the least squares and the coordinates from a guess (k,) on, with only the `others` fitted.
 
-
-def extrapolate(path: Mapping[float, np.ndarray], x: float) -> np.ndarray:
-    """Return coordinates at the distance x, on the parabola through three points of a path, or the line through two."""
-    near = sorted(path, key=lambda distance: abs(distance - x))[: 3 if x < FARTHEST * max(path) else 2]
-    weights = [np.prod([(x - b) / (a - b) for b in near if b != a]) for a in near]
-    return np.asarray(weights @ np.array([path[a] for a in near]))
+    The squares are infinite if the region holds no values of the others there. The way from z (k,) to the guess shows
+    where the FMU refuses values.
+    """
+    into_region = problem.region.constrained_step(np.eye(len(others)), np.zeros(len(others)), guess, others)
+    if not np.isfinite(into_region).all():
+        return np.inf, guess
+    guess[others] += into_region
+    if problem.residuals(guess, problem.all) is None:
+        problem.region.learn(problem.is_refused, z, guess - z)
+    return problem.minimize(guess, problem.all, MAX_STEPS, min_gain, others)
 
 
 def depends_on_limits(problem: FitProblem, z: np.ndarray, i: int, target: float) -> bool:
