@@ -4,7 +4,22 @@ import random
 from math import cos, inf, nextafter, sin
 
 import pytest
-from models import CASES, EXACT, FEW_CASES, SIGN, THRESHOLD, counts, declared, label, outputs, parameters, push, tunable
+from models import (
+    CASES,
+    DOP853,
+    EXACT,
+    FEW_CASES,
+    SIGN,
+    THRESHOLD,
+    counts,
+    declared,
+    label,
+    model_class,
+    outputs,
+    parameters,
+    push,
+    tunable,
+)
 from row_comparison import assert_close, assert_identical
 
 CHATTER = 1e-6  # m/s: at smaller speeds the threshold law treats the mass as stuck
@@ -178,6 +193,21 @@ def test_a_run_without_stop_time_continues(launch, case):
     if values["solver.method"] == EXACT:
         assert_close(rows, launch(name, values, stop=stop).run(times, names), names, 1e-12)
     assert all(value == value for row in rows for value in row)
+
+
+def test_the_last_internal_step_ends_at_the_stop_time_without_another_one():
+    """With long steps, the size of the last one is rounded."""
+    draw = random.Random(1)
+    for _ in range(100):
+        model, start, stop = model_class("smd")(), draw.choice([0.0, draw.uniform(-1.0, 0.0)]), draw.uniform(0.5, 3.0)
+        model.solver.method, model.solver.h_max, model.k = DOP853, 1e3, 1.0
+        model.prepare()
+        model.solver.start(model, start, *model.initial_state(start), stop, 1e-3)
+        step = model.solver.step
+        while step.t1 < stop:
+            step.compute_next(model)
+        assert step.t1 == stop
+        assert step.t1 - step.t0 > 1e-3
 
 
 @pytest.mark.parametrize("case", FEW_CASES, ids=label)

@@ -261,6 +261,9 @@ def test_events_are_matched_by_kind_and_time(second, sentence, shift):
     pairs = compare(one, two).pairs
     assert pairs.summary(("one", "two")) == sentence
     assert pairs.shift == pytest.approx(shift, nan_ok=True)
+    reverse = compare(two, one).pairs
+    assert [rows.tolist() for rows in reverse.unmatched] == [rows.tolist() for rows in pairs.unmatched][::-1]
+    assert (reverse.one.tolist(), reverse.two.tolist()) == (pairs.two.tolist(), pairs.one.tolist())
 
 
 def test_events_of_several_contacts_are_matched_per_contact_and_named():
