@@ -2,7 +2,6 @@
 
 import os
 from pathlib import Path
-from shutil import rmtree
 from tempfile import TemporaryDirectory
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as in a command; must be set before numpy is imported
@@ -24,15 +23,10 @@ def pytest_configure(config):
         folder = TemporaryDirectory()
         config.add_cleanup(folder.cleanup)
         build_cache.shared_folder = Path(folder.name)
-        if config.pluginmanager.has_plugin("cacheprovider"):
-            builds, digest = config.cache.mkdir("builds"), build_cache.digest_sources()
-            for outdated in builds.iterdir():
-                if outdated.name != digest:
-                    rmtree(outdated)
-        else:  # as with -p no:cacheprovider in a read-only checkout
-            builds, digest = build_cache.shared_folder, "builds"
-        build_cache.kept_folder = builds / digest
-        build_cache.kept_folder.mkdir(exist_ok=True)
+        cache = getattr(config, "cache", None)  # absent with -p no:cacheprovider, as in a read-only checkout
+        kept = cache.mkdir("builds") if cache else build_cache.shared_folder
+        build_cache.kept_folder, lock = build_cache.open_kept_folder(kept)
+        config.add_cleanup(lock.close)
 
 
 @pytest.hookimpl(optionalhook=True)  # of pytest-xdist

@@ -7,10 +7,11 @@ later runs find it there until a source or an installed package changes; `pytest
 import json
 import subprocess
 import sys
-from fcntl import LOCK_EX, flock
+from fcntl import LOCK_EX, LOCK_NB, LOCK_SH, flock
 from hashlib import sha256
 from importlib.metadata import distributions
 from pathlib import Path
+from shutil import rmtree
 from tempfile import mkdtemp
 
 import commands
@@ -30,6 +31,24 @@ def digest_sources():
         if file.suffix not in (".fmu", ".pyc"):
             digest.update(str(file.relative_to(ROOT)).encode() + file.read_bytes())
     return digest.hexdigest()[:16]
+
+
+def open_kept_folder(parent):
+    """Return the folder in `parent` for builds of the present sources, and its lock; remove those of other sources
+    that no test run uses."""
+    digest = digest_sources()
+    for outdated in (path for path in parent.iterdir() if path.is_dir() and path.name != digest):
+        with (parent / f"{outdated.name}.lock").open("w") as lock:
+            try:
+                flock(lock, LOCK_EX | LOCK_NB)
+            except BlockingIOError:
+                continue
+            rmtree(outdated)
+            Path(lock.name).unlink()
+    lock = (parent / f"{digest}.lock").open("w")
+    flock(lock, LOCK_SH)
+    (parent / digest).mkdir(exist_ok=True)
+    return parent / digest, lock
 
 
 def build(root, out, *words, timeout=600):
