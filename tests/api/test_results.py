@@ -107,23 +107,6 @@ def test_a_decay_is_identified_from_any_source(tmp_path):
         _ = found["mu"]
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        ({"record": [0.0, 1.0]}, "x is missing"),
-        ({"record": [0.0, 1.0], "x": [1.0, 2.0]}, "unit is missing"),
-        ({"record": [0.0, 1.0], "x": [1.0], "unit": "m"}, "equally long"),
-        ({"record": "nowhere.csv"}, "cannot read nowhere.csv"),
-        ({"record": np.arange(20.0), "x": np.arange(20.0), "unit": "m", "k": 1.0, "m": 1.0}, "leave one out"),
-        ({"record": "nowhere.csv", "rate": 0.0}, "rate is 0.0: it must be a positive number"),
-    ],
-)
-def test_an_invalid_record_is_one_sentence(arguments, message):
-    with pytest.raises(harness.HarnessError) as raised:
-        harness.identify_decay(**arguments)
-    assert message in str(raised.value)
-
-
 def test_a_sweep_measures_what_single_runs_measure():
     pytest.importorskip("xarray")
     data = harness.sweep("coulomb", {"f": [0.3, 0.6], "k": [100.0, 200.0, 300.0]}, measures=["final", "events"])
@@ -144,23 +127,6 @@ def test_samples_are_reproducible_and_stored():
     assert first.equals(again)
     (folder,) = (path for path in Path("kept/sweep").iterdir() if not path.name.startswith("."))
     assert harness.load_result(folder).equals(first)
-
-
-@pytest.mark.parametrize(
-    ("grid", "options", "message"),
-    [
-        ({}, {}, "grid is empty"),
-        ({"k": []}, {}, "k has no values"),
-        ({"k": ["stiff"]}, {}, "must be numbers"),
-        ({"kk": [1.0]}, {}, "'kk' (nearest: 'k')"),
-        ({"k": [1.0, 2.0, 3.0]}, {"samples": 4}, "its lower and its upper bound"),
-    ],
-)
-def test_an_invalid_grid_is_one_sentence(grid, options, message):
-    pytest.importorskip("xarray")
-    with pytest.raises(harness.HarnessError) as raised:
-        harness.sweep("smd", grid, **options)
-    assert message in str(raised.value)
 
 
 def test_results_of_commands_load(tmp_path):

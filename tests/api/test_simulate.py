@@ -145,39 +145,6 @@ def test_nothing_is_printed(capfd):
     assert all(0.0 <= share <= 1.0 for share in shares)
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        ({"source": "stickslp"}, "unknown model or scene 'stickslp' (nearest: 'stickslip')"),
-        ({"source": "nowhere.fmu"}, "nowhere.fmu"),
-        ({"source": "fmus"}, "contains no result"),
-        ({"values": {"kk": 1.0}}, "'kk' (nearest: 'k')"),
-        ({"values": {"m": -1.0}}, "m = -1.0 is outside its range"),
-        ({"values": {"m": float("nan")}}, "m = nan"),
-        ({"stop": "8"}, "stop = '8' must be a finite number"),
-        ({"stop": -1.0}, "stop = -1.0 s is not after start"),
-        ({"interval": 0.0}, "interval = 0.0 must be a finite number above 0"),
-        ({"rtol": float("inf")}, "rtol = inf must be a finite number above 0"),
-        ({"timeout": -1}, "timeout = -1 must be"),
-        ({"method": "rk4"}, "'rk4'"),
-        ({"interface": "me"}, "unknown interface 'me'; allowed: CoSimulation, ModelExchange"),
-        ({"interface": "ModelExchange"}, "model exchange is not among them"),
-        ({"outputs": ["y"]}, "unknown output 'y'"),
-        ({"inputs": {"F_ext": [1.0]}}, "inputs has no column 'time'"),
-        ({"inputs": {"time": [0.0], "F": [1.0]}}, "unknown input 'F'"),
-        ({"inputs": {"time": [0.0, 1.0], "F_ext": [1.0]}}, "F_ext has 1 values for 2 times"),
-        ({"inputs": {"time": [1.0, 0.0], "F_ext": [1.0, 1.0]}}, "the time falls"),
-        ({"inputs": {"time": [0.0], "F_ext": [float("nan")]}}, "not a finite number"),
-        ({"inputs": [1.0, 2.0]}, "inputs must be a mapping or a DataFrame"),
-    ],
-)
-def test_an_invalid_argument_is_one_sentence(arguments, message):
-    with pytest.raises(harness.HarnessError) as raised:
-        harness.simulate(**({"source": "smd"} | arguments))
-    assert message in str(raised.value)
-    assert "\n" not in str(raised.value)
-
-
 def test_a_failed_run_raises_the_message_of_the_fmu():
     with pytest.raises(harness.HarnessError, match="mu_d"):
         harness.simulate("stickslip", {"mu_s": 0.5, "mu_d": 0.6})

@@ -108,22 +108,6 @@ def test_a_scene_and_its_fmu_are_run_to_the_same_times(harness):
     assert "(common to both)" in done.stdout
 
 
-@pytest.mark.parametrize(
-    ("arguments", "status", "sentence"),
-    [
-        (["fmus/smd.fmu", "nosuch.csv"], 2, "nosuch.csv does not exist"),
-        (["fmus/smd.fmu", "nosuch.fmu"], 2, "there is no nosuch.fmu"),
-        (["fmus", "fmus/smd.fmu"], 2, "trajectory.csv is missing"),
-        (["nosuch", "fmus/smd.fmu"], 2, "unknown model or scene 'nosuch'"),
-    ],
-)
-def test_an_impossible_comparison_is_one_sentence(harness, arguments, status, sentence):
-    done = harness("compare", *arguments)
-    assert done.returncode == status
-    assert sentence in done.stderr
-    assert done.stderr.count("\n") == 1
-
-
 UNITS = {"x": "m", "v": "m/s", "y": "m", "mode": ""}
 
 

@@ -129,22 +129,3 @@ print(len(draws), [name for name in unnecessary if name in sys.modules])
         timeout=120,
     )
     assert (done.stdout.split(maxsplit=1), done.stderr) == (["1", "[]\n"], "")
-
-
-@pytest.mark.parametrize(
-    ("arguments", "status", "sentence"),
-    [
-        (["decay", "stickslip"], 1, "not a free decay of one oscillator"),
-        (["decay", "nosuch"], 2, "unknown scene 'nosuch'"),
-        (["decay", "nosuch.csv"], 2, "'nosuch.csv' does not exist"),
-        (["decay", "x.csv", "--k", "1", "--m", "1"], 2, "--k and --m"),
-        (["decay", "x.csv", "--velocity", "v", "--position", "x"], 2, "--velocity: only one column is fitted"),
-    ],
-)
-def test_a_wrong_command_line_is_one_sentence(fmus, tmp_path, arguments, status, sentence):
-    (tmp_path / "fmus").symlink_to(fmus)
-    done = harness(tmp_path, *arguments)
-    assert done.returncode == status
-    assert sentence in done.stderr
-    assert "Traceback" not in done.stderr
-    assert not (tmp_path / "results/decay").exists() or not list((tmp_path / "results/decay").iterdir())

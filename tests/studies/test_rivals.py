@@ -143,7 +143,7 @@ import numpy as np
 def simulate(scene, setting):
     print("noise of an engine")
     if scene.name == "sled":
-        os._exit(3) if setting["how"] == "dies" else time.sleep(600)
+        os.kill(os.getpid(), 9) if setting["how"] == "dies" else time.sleep(600)
     return Solution(scene.times, np.zeros((len(scene.times), 3)), steps=1)
 sys.modules[child.__package__ + ".engines.broken"] = sys.modules[__name__]
 child.serve()
@@ -151,7 +151,11 @@ child.serve()
 
 
 @pytest.mark.parametrize(
-    ("how", "reason"), [("dies", "it ended with exit status 3: noise of an engine"), ("hangs", "no answer after 8 s")]
+    ("how", "reason"),
+    [
+        ("dies", "it ended with exit status -9: noise of an engine"),
+        pytest.param("hangs", "no answer after 8 s", marks=pytest.mark.slow),
+    ],
 )
 def test_after_a_rival_that_dies_or_hangs_the_next_scene_runs(tmp_path, monkeypatch, how, reason):
     (tmp_path / "broken.py").write_text(BROKEN)
@@ -208,12 +212,6 @@ def reply_of_reference(request):
         return RunReply("it fell over")
     reference = compute_reference_motion(SCENES[request.scene])
     return RunReply("", reference.states[::FINE].tolist(), True, reference.events, 5, 0.5)
-
-
-def test_an_unknown_rival_is_one_sentence(user_folder, tmp_path):
-    done = commands.harness(user_folder, "rivals", "mujocco", "--out", tmp_path)
-    assert (done.returncode, done.stdout) == (2, "")
-    assert done.stderr.startswith("Error: unknown rival 'mujocco' (nearest: 'mujoco'); allowed: ")
 
 
 def test_other_exact_rivals_are_named_before_ours():

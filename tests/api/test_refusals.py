@@ -1,0 +1,104 @@
+"""Arguments that a function of the public API cannot use are refused in one sentence."""
+
+import numpy as np
+import pytest
+
+import harness
+
+RECORD = {"t": np.linspace(0.0, 16.0, 201), "x": np.sin(np.linspace(0.0, 16.0, 201))}
+SIMULATE = [  # changes of harness.simulate("smd"), and words of the sentence
+    ({"source": "stickslp"}, "unknown model or scene 'stickslp' (nearest: 'stickslip')"),
+    ({"source": "nowhere.fmu"}, "nowhere.fmu"),
+    ({"source": "fmus"}, "contains no result"),
+    ({"values": {"kk": 1.0}}, "'kk' (nearest: 'k')"),
+    ({"values": {"m": -1.0}}, "m = -1.0 is outside its range"),
+    ({"values": {"m": float("nan")}}, "m = nan"),
+    ({"stop": "8"}, "stop = '8' must be a finite number"),
+    ({"stop": -1.0}, "stop = -1.0 s is not after start"),
+    ({"interval": 0.0}, "interval = 0.0 must be a finite number above 0"),
+    ({"rtol": float("inf")}, "rtol = inf must be a finite number above 0"),
+    ({"timeout": -1}, "timeout = -1 must be"),
+    ({"method": "rk4"}, "'rk4'"),
+    ({"interface": "me"}, "unknown interface 'me'; allowed: CoSimulation, ModelExchange"),
+    ({"interface": "ModelExchange"}, "model exchange is not among them"),
+    ({"outputs": ["y"]}, "unknown output 'y'"),
+    ({"inputs": {"F_ext": [1.0]}}, "inputs has no column 'time'"),
+    ({"inputs": {"time": [0.0], "F": [1.0]}}, "unknown input 'F'"),
+    ({"inputs": {"time": [0.0, 1.0], "F_ext": [1.0]}}, "F_ext has 1 values for 2 times"),
+    ({"inputs": {"time": [1.0, 0.0], "F_ext": [1.0, 1.0]}}, "the time falls"),
+    ({"inputs": {"time": [0.0], "F_ext": [float("nan")]}}, "not a finite number"),
+    ({"inputs": [1.0, 2.0]}, "inputs must be a mapping or a DataFrame"),
+]
+IDENTIFY_DECAY = [
+    ({"record": [0.0, 1.0]}, "x is missing"),
+    ({"record": [0.0, 1.0], "x": [1.0, 2.0]}, "unit is missing"),
+    ({"record": [0.0, 1.0], "x": [1.0], "unit": "m"}, "equally long"),
+    ({"record": "nowhere.csv"}, "cannot read nowhere.csv"),
+    ({"record": np.arange(20.0), "x": np.arange(20.0), "unit": "m", "k": 1.0, "m": 1.0}, "leave one out"),
+    ({"record": "nowhere.csv", "rate": 0.0}, "rate is 0.0: it must be a positive number"),
+]
+SWEEP = [  # changes of harness.sweep("smd", {"k": [1.0]})
+    ({"grid": {}}, "grid is empty"),
+    ({"grid": {"k": []}}, "k has no values"),
+    ({"grid": {"k": ["stiff"]}}, "must be numbers"),
+    ({"grid": {"kk": [1.0]}}, "'kk' (nearest: 'k')"),
+    ({"grid": {"k": [1.0, 2.0, 3.0]}, "samples": 4}, "its lower and its upper bound"),
+]
+FIT = [  # changes of a fit of mu_s of the sled to its position
+    ({"free": ["mu_z"]}, "unknown parameter 'mu_z' (nearest: 'mu_s')"),
+    ({"free": []}, "nothing is free"),
+    ({"free": {"mu_s": (-1.0, 1.0)}}, "mu_s = -1.0:1.0 is outside the range of the FMU; allowed: at least 0.0"),
+    ({"free": {"mu_s": (1.0, 0.5)}}, "mu_s = 1.0:0.5 is not a range"),
+    ({"free": ["x0"]}, "x0 has no start value other than 0: give the range to search, as in x0=-1:1"),
+    ({"observe": {"y": "x"}}, "unknown output 'y'"),
+    ({"observe": {"x": "laser"}}, "laser"),
+    ({"observe": {"F_spring": "x"}}, "x is in m, and F_spring of the FMU in N"),
+    ({"inputs": {"x0": "x"}}, "unknown input 'x0'; allowed: F_ext"),
+    ({"fixed": {"mu_s": 0.5}}, "mu_s is fixed, and free: remove one"),
+    ({"fixed": {"m": -1.0}}, "m = -1.0 is outside its range"),
+    ({"start": {"m": 1.0}}, "unknown free parameter 'm'; allowed: mu_s"),
+    ({"free": {"mu_s": (0.1, 2.0)}, "start": {"mu_s": 99.0}}, "the start value 99.0 of mu_s is outside its range"),
+    ({"sigma": {"x": 0.0}}, "sigma of x is 0.0"),
+    ({"free": {"delay(x)": (0.0, 20.0)}}, "delay(x) = 0.0:20.0 reaches beyond the record, which lasts 16 s"),
+    ({"free": ["delay(x)"], "start": {"delay(x)": 5.0}}, "the start value 5.0 of delay(x) is outside its range"),
+    ({"free": ["delay(y)"]}, "unknown parameter 'delay(y)' (nearest: 'delay(x)')"),
+    ({"validate": "missing.csv"}, "missing.csv"),
+    ({"begin": 15.8}, "at least 12 are required"),
+    (
+        {"begin": 14.6, "free": ["mu_s", "mu_d", "k", "v_driver", "m", "g"]},
+        "6 unknowns need at least 24 samples, and there are",
+    ),
+    ({"records": "missing.csv"}, "missing.csv"),
+    ({"records": 3}, "records must be files, DataFrames or trajectories"),
+    ({"against": "stickslip"}, "stickslip is to be compared with itself: give another FMU"),
+    ({"against": "pendulum", "free": ["m"]}, "unknown output of pendulum 'x'"),
+    ({"against": "coulomb"}, "coulomb has none of the free parameters mu_s: free some of its own as well"),
+    ({"against": "coulomb", "free": ["mu_s", "mu_z"]}, "unknown parameter 'mu_z' (nearest: 'mu_s')"),
+    ({"against": ["coulomb", "coulomb"]}, "coulomb is to be compared with itself"),
+    ({"against": "missing.fmu"}, "missing.fmu"),
+]
+CALLS = [
+    *((harness.simulate, {"source": "smd"}, *row) for row in SIMULATE),
+    *((harness.identify_decay, {}, *row) for row in IDENTIFY_DECAY),
+    *((harness.sweep, {"source": "smd", "grid": {"k": [1.0]}}, *row) for row in SWEEP),
+    *((harness.fit, {"source": "stickslip", "free": ["mu_s"], "observe": "x"}, *row) for row in FIT),
+]
+
+
+@pytest.fixture
+def record():
+    """A DataFrame with a record in m, which needs pandas."""
+    frame = pytest.importorskip("pandas").DataFrame(RECORD)
+    frame.attrs["units"] = {"t": "s", "x": "m"}
+    return frame
+
+
+@pytest.mark.parametrize(("function", "arguments", "changes", "message"), CALLS)
+def test_an_invalid_argument_is_one_sentence(user_folder, record, monkeypatch, function, arguments, changes, message):
+    pytest.importorskip("xarray")
+    monkeypatch.chdir(user_folder)
+    records = {"records": record} if function is harness.fit else {}
+    with pytest.raises(harness.HarnessError) as refused:
+        function(**(arguments | records | changes))
+    assert message in str(refused.value)
+    assert "\n" not in str(refused.value)

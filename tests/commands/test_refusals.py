@@ -1,0 +1,130 @@
+"""Sources, options and values that a command cannot use are refused in one sentence.
+
+The tests of an analysis have what its records and scenes cannot hold.
+"""
+
+import commands
+import external_fmus
+import fmi3_fixtures
+import pytest
+
+NO_SUCH = ("nosuch", "nosuch.fmu", "nosuch.py", "nosuch.toml", "nosuch.csv", "nosuch.h5", "results/nosuch")
+COMMANDS = (  # with every argument that names a source
+    ("run",),
+    ("run", "--fmu"),
+    ("compare", "coulomb"),
+    ("decay",),
+    ("sweep", "--vary", "k=1,2"),
+    ("stability",),
+    ("precision",),
+    ("couple",),
+    ("references",),
+    ("build",),
+)
+
+
+def assert_one_sentence(done, status, sentence):
+    assert (done.returncode, done.stdout) == (status, "")
+    assert sentence in done.stderr
+    assert done.stderr.count("Error: ") == 1
+    assert "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize("command", COMMANDS, ids=" ".join)
+def test_a_source_that_does_not_exist_is_called_so(fmus, tmp_path, command):
+    (tmp_path / "fmus").symlink_to(fmus)
+    for source in NO_SUCH:
+        done = commands.harness(tmp_path, *command, source)
+        assert_one_sentence(done, done.returncode, "nosuch")
+        assert done.returncode
+        phrases = ("does not exist", "no file or folder", "there is no", "There is no", "No such file")
+        assert any(phrase in done.stderr for phrase in phrases), (source, done.stderr)
+    assert not (tmp_path / "results").exists()
+
+
+OWN = "fmus/smd.fmu"
+FIT = ["fit", "stickslip", "line.csv", "--observe", "x"]
+SWEEP = ["sweep", "smd", "--vary", "m=1:2:3"]
+
+OPTIONS_WITHOUT_EFFECT = [
+    (["run", "stickslip", "--exchange", "--tolerance", 0.5], "--tolerance"),
+    (["run", "stickslip", "--lenient"], "--lenient"),
+    (["run", "--fmu", OWN, "--timeout", 5], "--timeout"),
+    (["compare", "coulomb", "coulomb-sign", "--exchange"], "--exchange"),
+    (["compare", OWN, "fmus/coulomb.fmu", "--tolerance", 0.5], "--tolerance"),
+    (["compare", "line.csv", "line.csv", "--stop", 2], "--stop"),
+    (["sweep", "smd", "--vary", "m=1,2", "--tolerance", 0.5], "--tolerance"),
+    (["sweep", "smd", "--vary", "m=1,2", "--seed", 5], "--seed"),
+    (["sweep", "smd", "--vary", "m=1,2", "--scheduler", "tcp://127.0.0.1:1", "--workers", 5], "--workers"),
+    (["decay", "coulomb", "--unit", "mm"], "--unit"),
+    (["decay", "coulomb", "--columns", "t,x"], "--columns"),
+    (["decay", "coulomb", "--rate", 100], "--rate"),
+]
+COMMAND_LINES = [  # arguments, exit status, words of the sentence
+    *((arguments, 2, f"{option} has no effect ") for arguments, option in OPTIONS_WITHOUT_EFFECT),
+    (["compare", "fmus", OWN], 2, "trajectory.csv is missing"),
+    (["decay", "stickslip"], 1, "not a free decay of one oscillator"),
+    (["decay", "line.csv", "--k", 1, "--m", 1], 2, "--k and --m"),
+    (["decay", "line.csv", "--velocity", "v", "--position", "x"], 2, "--velocity: only one column is fitted"),
+    ([*FIT, "--free", "k=3"], 2, "--free k=3: give a range, as in k=0.1:2, or fix it by --fixed k=3"),
+    ([*FIT, "--free", "k=3:x"], 2, "--free k=3:x: 'x' is not a finite number"),
+    ([*FIT, "--free", "k,k"], 2, "--free names k twice: remove one"),
+    ([*FIT, "--free", "k", "--fixed", "m"], 2, "--fixed 'm' is not an assignment; write it as in m=3"),
+    (["precision", "stikslip"], 2, "unknown model 'stikslip' (nearest: 'stickslip'); allowed: belt, clutch, "),
+    (["rivals", "mujocco"], 2, "unknown rival 'mujocco' (nearest: 'mujoco'); allowed: "),
+    (["sweep", "smd"], 2, "--vary"),
+    (["sweep", "smd", "--vary", "mm=1:2:3"], 2, "unknown parameter to vary 'mm' (nearest: 'm')"),
+    ([*SWEEP, "--vary", "m=1,2"], 2, "names a parameter twice"),
+    ([*SWEEP, "--set", "m=1"], 2, "both varied and set"),
+    ([*SWEEP, "--set", "k"], 2, "--set k is not an assignment"),
+    ([*SWEEP, "--set", "k=-1"], 2, "k = -1.0 is outside its range"),
+    ([*SWEEP, "--set", "solver.method=euler"], 2, "unknown value of solver.method 'euler'"),
+    ([*SWEEP, "--measure", "stuck"], 2, "unknown measure of smd 'stuck'"),
+    ([*SWEEP, "--stop", "-1"], 2, "stop = -1.0 s is not after start = 0.0 s"),
+    (["sweep", "stickslip", "--vary", "m=1,2", "--measure", "zeta"], 2, "unknown measure of stickslip 'zeta'"),
+    (["sweep", "stickslip", "--vary", "friction=1.5,2"], 2, "friction is an enumeration"),
+    (["sweep", "stickslip", "--vary", "mu_d=1:2:3"], 1, "three test runs of the sweep failed: mu_d is 1.0, above"),
+]
+
+
+@pytest.mark.parametrize(("arguments", "status", "sentence"), COMMAND_LINES)
+def test_an_invalid_command_line_is_one_sentence_and_leaves_no_result(fmus, tmp_path, arguments, status, sentence):
+    (tmp_path / "fmus").symlink_to(fmus)
+    (tmp_path / "line.csv").write_text("t,x\n" + "".join(f"{i},{i}\n" for i in range(20)))
+    done = commands.harness(tmp_path, *arguments)
+    assert_one_sentence(done, status, sentence)
+    assert [file for file in tmp_path.glob("results/**/*") if file.is_file()] == []
+
+
+SCENE = 'title = "a decay"\nfmu = "{fmu}"\noutputs = ["x"]\n{more}\n'
+
+
+@pytest.mark.parametrize("command", ["precision", "stability"])
+def test_a_command_for_the_solver_refuses_an_external_fmu(tmp_path, command):
+    folder = external_fmus.build_external_fmus()
+    for name in ("Midpoint", "Fmi3Midpoint"):
+        done = commands.harness(tmp_path, command, folder / f"{name}.fmu")
+        assert_one_sentence(done, done.returncode, f"{name}.fmu ")
+        assert done.returncode
+        assert " is not an FMU of this project" in done.stderr or "is not an FMI 2.0 co-simulation FMU" in done.stderr
+
+
+def test_the_decay_of_a_scene_of_an_external_fmu_is_identified(tmp_path):
+    fmu = fmi3_fixtures.build_fmi3_fmus() / "smd.fmu"
+    (tmp_path / "mine.toml").write_text(SCENE.format(fmu=fmu, more="[values]\nc = 0.4\nk = 100"))
+    done = commands.harness(tmp_path, "decay", "mine.toml", blank=True, COLUMNS="120")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "zeta" in done.stdout
+    fmu = external_fmus.build_external_fmus() / "Midpoint.fmu"
+    (tmp_path / "mine.toml").write_text(SCENE.format(fmu=fmu, more=""))
+    done = commands.harness(tmp_path, "decay", "mine.toml")
+    assert_one_sentence(done, 2, "x has no unit in Midpoint.fmu")
+
+
+@pytest.mark.parametrize(("value", "hint"), [("0.3", "; write it without quotes"), ("low", "")])
+def test_a_text_in_place_of_a_number_is_called_a_text(fmus, tmp_path, value, hint):
+    scene = f'title = "a text"\nmodel = "stickslip"\noutputs = ["x"]\n[values]\nmu_s = "{value}"\n'
+    (tmp_path / "mine.toml").write_text(scene)
+    (tmp_path / "fmus").symlink_to(fmus)
+    done = commands.harness(tmp_path, "run", "mine.toml")
+    assert_one_sentence(done, 2, f"mu_s = '{value}' is a text, not a number{hint}\n")
