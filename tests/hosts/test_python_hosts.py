@@ -14,9 +14,9 @@ import pytest
 from build_cache import ROOT, SUPPORT
 from fmpy import read_model_description
 from independent_solution import ClosedFormMotion
-from models import CASES, MODELS, counts, declared, label, outputs
+from models import CASES, MODELS, declared, label, outputs
 from row_comparison import assert_close, assert_identical
-from worker_client import FmiError, Worker
+from worker_client import Worker
 
 PYTHONS = ["3.9", "3.10", "3.11", "3.12", "3.13"]
 
@@ -70,23 +70,6 @@ def test_concurrent_instances_do_not_interfere(launch, worker):
             collected.append(row)
     for (_, names), collected, expected in zip(fleet, rows, alone, strict=True):
         assert_identical(collected, expected, names)
-
-
-@pytest.mark.parametrize("name", MODELS)
-def test_twenty_life_cycles_in_one_process_end_alike_and_cleanly(fresh_worker, fmus, name):
-    """Created, run, reset, run again, failed and freed."""
-    first, names = None, outputs(name) + counts(name)
-    for _ in range(20):
-        fmu = fresh_worker.instantiate(fmus / f"{name}.fmu").begin(stop=0.3)
-        rows = fmu.run([0.0, 0.1, 0.2, 0.3], names)
-        first = first or rows
-        assert_identical(rows, first, names)
-        fmu.terminate()
-        fmu.reset()
-        assert_identical(fmu.begin(stop=0.3).run([0.0, 0.1, 0.2, 0.3], names), first, names)
-        with pytest.raises(FmiError):
-            fmu.step(0.3, 1.0)
-        fmu.free()
 
 
 def interpreter(version):

@@ -130,7 +130,7 @@ def test_every_output_agrees_with_co_simulation(runs, worker, fmus):
             assert columns[variable] == solved[variable]
 
 
-@pytest.mark.parametrize("name", CERTIFIED)
+@pytest.mark.parametrize("name", ["stickslip", "pacejka"])
 def test_a_second_solver_agrees(worker, fmus, name):
     """scipy's DOP853, or Radau on stiff models, which also takes at least one evaluation per step."""
     truth, fmu = TRUTHS[name], worker.exchange(fmus / f"{name}.fmu").begin()
@@ -144,7 +144,7 @@ def test_a_second_solver_agrees(worker, fmus, name):
     fmu.free()
 
 
-@pytest.mark.parametrize("name", CERTIFIED)
+@pytest.mark.parametrize("name", ["stickslip", "pendulum"])
 def test_a_later_start_time_only_shifts_the_motion(runs_at, name):
     """The FMU does not use the start time, because the position of the driver is a state."""
     (early, n), (late_, m) = runs_at(name, 0.0), runs_at(name, 5.0)
@@ -222,13 +222,9 @@ def test_a_force_ramp_acts_like_a_faster_driver(worker, fmus):
 
 
 CHANGES = {
-    "driver faster in mid-stick": ("v_driver", DRIVER, 6.0, 0.05),
     "driver back in mid-slip": ("v_driver", DRIVER, 4.5, -0.2),
     "hold lowered to a break-away": ("mu_s", 0.9, 3.0, 0.605),
-    "slippery in mid-slip": ("mu_d", 0.6, 4.5, 0.2),
     "rough in mid-slip": ("mu_d", 0.6, 4.5, 0.85),
-    "lighter in mid-stick": ("m", 12.5, 3.9, 10.0),
-    "softer in mid-slip": ("k", 742.5, 4.5, 500.0),
     "on the moon": ("g", 9.81, 7.0, 1.62),
 }
 
@@ -299,7 +295,7 @@ TIES = [
 ]
 
 
-@pytest.mark.parametrize("rtol", TOLERANCES)
+@pytest.mark.parametrize("rtol", [TOLERANCES[0], TOLERANCES[-1]])
 @pytest.mark.parametrize(("name", "values", "stop"), TIES)
 def test_ties_under_cvode_are_decided_by_physics(worker, fmus, name, values, stop, rtol):
     start = {"v0": 1.0} if name == "coulomb" else {}
@@ -321,16 +317,6 @@ def test_an_invalid_parameter_ends_the_run_before_it_begins(worker, fmus):
             exchange(worker, fmus / f"{name}.fmu", name, start_values={"m": -1.0})
         (line,) = worker.read_stderr().splitlines()
         assert value_message(OUT_OF_RANGE, "m", declared(name)["m"], -1.0) in line
-
-
-@pytest.mark.parametrize("name", CERTIFIED)
-def test_a_nan_input_ends_the_run_in_one_sentence(worker, fmus, name):
-    force = "T_ext" if name == "pendulum" else "F_ext"
-    signal = [[force], [[0.0, 0.0], [0.5, 0.0], [0.5, float("nan")], [1.0, float("nan")]]]
-    with pytest.raises(FmpyError, match="fmi3SetFloat64 failed with status 3"):
-        exchange(worker, fmus / f"{name}.fmu", name, stop_time=1.0, input=signal)
-    (line,) = worker.read_stderr().splitlines()
-    assert f"{force} = nan" in line
 
 
 def test_a_successful_run_logs_nothing(worker, fmus):

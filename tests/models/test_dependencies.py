@@ -19,7 +19,7 @@ from fmus.packaging.lowering import lowered_model
 from fmus.runtime.variable_declarations import variables
 
 EVERY_MODEL = pytest.mark.parametrize("name", MODELS)
-SITUATIONS = 300
+SITUATIONS = 150
 LADDER = (1e-7, 1e-3, 1.0)  # for start values of zero, in their unit or relative to what overcomes friction
 LOADS = (-1.1, -1.0, -0.9, 0.9, 1.0, 1.1)  # of a body at rest, relative to the static limit
 

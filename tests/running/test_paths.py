@@ -31,8 +31,6 @@ def odd_folder(tmp_path, fmus):
     "command",
     [
         ("run", "coulomb"),
-        ("run", "--fmu", "fmus/smd.fmu"),
-        ("compare", "fmus/smd.fmu", "fmus/coulomb.fmu"),
         ("sweep", "smd", "--vary", "m=1:2:2", "--workers", "1"),
         ("couple", "pair.toml", "--stop", "0.1"),
     ],

@@ -61,22 +61,16 @@ class Chain(CoupledFriction):
         return np.all(np.where(stuck, np.abs(force) <= self.limit * (1 + 1e-12), modes * pull >= -1e-12))
 
 
-PROBLEMS = [
-    pytest.param(n, jump, shared, marks=pytest.mark.slow if n == 6 else ())
-    for n, jump, shared in product((1, 2, 3, 4, 6), (1.0, 1.3, 2.0), (False, True))
-]
-
-
-@pytest.mark.parametrize(("n", "jump", "shared"), PROBLEMS)
+@pytest.mark.parametrize(("n", "jump", "shared"), [*product((1, 2, 3, 4), (1.0, 1.3, 2.0), (False, True))])
 def test_consistent_modes_are_found_for_any_order_of_contacts(n, jump, shared):
     """If static and sliding friction are equal, the solution is unique; otherwise every contact that can stick does."""
     draw = np.random.default_rng([n, round(10 * jump), shared])
-    for _ in range(24 if n < 6 else 8):
+    for _ in range(24):
         chain = Chain(draw, n, jump, shared)
         modes, fits = chain.answer()
         assert fits
         assert chain.fits(modes)
-        if jump == 1.0 and n < 5:
+        if jump == 1.0:
             assert [one for one in product((-1, 0, 1), repeat=n) if chain.fits(one)] == [modes]
         for order in list(permutations(range(n)))[:: 1 if n < 4 else 37]:
             other, _ = chain.ordered(order).answer()

@@ -82,7 +82,7 @@ def events(fmu, start, stop):
     ("name", "seed"),
     [
         pytest.param(name, seed, marks=pytest.mark.slow if seed >= 8 else ())
-        for name, seed in product(["coulomb", "stickslip"], range(40))
+        for name, seed in product(["coulomb", "stickslip"], range(16))
     ],
 )
 def test_every_tie_ends_as_in_the_closed_form(pair, name, seed):

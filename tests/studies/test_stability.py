@@ -252,7 +252,9 @@ def test_a_part_of_the_table_ends_as_expected(user_folder, tmp_path, monkeypatch
     assert summary(rows, []).startswith(f"{len(rows)} of {len(rows)} ended as expected.")
 
 
-@pytest.mark.parametrize("name", ["rotor_brake", "sleds", "belt"])
+@pytest.mark.parametrize(
+    "name", ["rotor_brake", *(pytest.param(name, marks=pytest.mark.slow) for name in ("sleds", "belt"))]
+)
 def test_a_user_model_passes_the_standard_scenes(tmp_path, name):
     """Its values, its tolerances and nonfinite numbers, by every method; a rule between two values may refuse them,
     and a belt adds energy."""
