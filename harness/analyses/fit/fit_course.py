@@ -88,7 +88,8 @@ def find_course(
     doubts = []
     if not result.is_agreed:
         doubts.append(
-            f"Only one of {result.n_searches} searches ended at these values: narrow the ranges, or give start values."
+            f"Only {result.n_hits} of {result.n_searches} searches ended at these values: narrow the ranges, or give "
+            "start values."
         )
     z, input_error = result.best[1], subdivide_inputs(problem, result.best[1])
     ends: dict[tuple[int, int], float | None] = {}

@@ -1,13 +1,15 @@
 """Global search for the best values: continuation in time, and differential evolution, in turn.
 
 Continuation in time judges a Sobol set on the first stretch of the record, where the squares have few minima, and
-carries what fits into longer and longer stretches. A search of one kind repeats its own errors, so the search ends
-where searches of both kinds have found the same minimum. A minimum whose residuals are as small as the noise is also
-accepted where two more searches find nothing lower.
+carries what fits into longer and longer stretches. Every other evolution starts from the minima so far, which it
+combines. A search of one kind repeats its own errors, so the search ends where searches of both kinds have found the
+same minimum. A minimum whose residuals are as small as the noise is also accepted where two more searches find nothing
+lower; other residuals are coloured noise or those of a wrong minimum, and more searches must find it.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from math import ceil, log2
 
 import numpy as np
 from scipy.optimize import OptimizeResult, differential_evolution
@@ -16,12 +18,15 @@ from scipy.stats import qmc
 from .fit_problem import FitProblem, Selection
 
 STRETCHES, SURVIVORS, SOBOL_POINTS, SEARCH_SAMPLES = (0.15, 0.3, 0.55, 1.0), (40, 24, 12, 6), 2048, 250
-EVOLUTION = {"popsize": 10, "maxiter": 150, "tol": 1e-2}
+EVOLUTION = {"maxiter": 150, "tol": 1e-2}
+POPULATION = 10  # members of an evolution for each unknown, at least
+COMBINED = 4  # of so many searches in turn, the last one is an evolution that starts from the minima so far
 SMALL_GAIN = 0.01  # relative reduction of the squares below which a minimum is not lower
 PATIENCE = 40  # generations without a lower minimum, after which an evolution ends
 NEAR_KNOWN = 1.2  # times the squares of the known minimum, at which an evolution has found it again
 REFUSED_COST = 1e12
-MAX_SEARCHES, REQUIRED, REQUIRED_IF_ROUGH = 8, 2, 4  # searches in all, and those that must find the same minimum
+MAX_SEARCHES = 8
+REQUIRED, REQUIRED_IF_UNEXPLAINED = 2, 4  # searches that must find the same minimum
 EXPLAINED = 6.0  # standard errors of the squares of white noise: a minimum within them explains the records
 REQUIRED_AFTER = 2  # searches that find nothing lower than such a minimum
 REFINED = 4  # minima of a search that are refined
@@ -61,9 +66,12 @@ def search(
     for number in range(1, MAX_SEARCHES + 1):
         report((number - 1) / MAX_SEARCHES)
         is_evolution = number % 2 == 0
-        is_known = result.best and (result.best[0] < explained or result.n_hits >= REQUIRED)
+        combined = result.minima if number % COMBINED == 0 else []
+        is_known = not combined and ((result.best and result.best[0] < explained) or result.n_hits >= REQUIRED)
         known = result.best[1] if result.best and is_known else None
-        candidates = evolve(problem, number, known) if is_evolution else continue_in_time(problem, number, starts)
+        candidates = (
+            evolve(problem, number, known, combined) if is_evolution else continue_in_time(problem, number, starts)
+        )
         minima = [problem.minimize(z, selection, 20, 1e-6) for _, z in candidates[:REFINED]]
         result.minima += minima
         result.n_searches = number
@@ -77,20 +85,18 @@ def search(
         elif not result.best or new[0] < result.best[0]:
             result.n_hits, first = 1, number
         result.best = new if not result.best or new[0] < result.best[0] else result.best
-        squares = result.best[0]
-        is_explained = squares < explained and number >= first + REQUIRED_AFTER
-        if is_explained or result.n_hits >= (REQUIRED_IF_ROUGH if squares > ROUGH**2 * n else REQUIRED):
+        is_explained = result.best[0] < explained
+        is_confirmed = is_explained and number >= first + REQUIRED_AFTER
+        if is_confirmed or result.n_hits >= (REQUIRED if is_explained else REQUIRED_IF_UNEXPLAINED):
             result.is_agreed = True
-            return result
-    result.is_agreed = result.n_hits >= REQUIRED
+            break
     return result
 
 
 def continue_in_time(problem: FitProblem, seed: int, starts: np.ndarray) -> list[Minimum]:
     """Return the minima that survive from a Sobol set and the `starts` as the record grows."""
     parts = stretches(problem)
-    sobol = qmc.Sobol(len(problem.unknowns), seed=seed).random(SOBOL_POINTS)
-    points = np.vstack([starts, problem.low + (problem.high - problem.low) * sobol])
+    points = np.vstack([starts, sobol_set(problem, seed, SOBOL_POINTS)])
     costs = np.array([absolute_cost(problem, z, parts[0]) for z in points])
     order = [i for i in np.argsort(costs)[: SURVIVORS[0]] if costs[i] < REFUSED_COST]
     order += [i for i in range(len(starts)) if i not in order and costs[i] < REFUSED_COST]
@@ -100,7 +106,12 @@ def continue_in_time(problem: FitProblem, seed: int, starts: np.ndarray) -> list
     return minima
 
 
-def evolve(problem: FitProblem, seed: int, known: np.ndarray | None) -> list[Minimum]:
+def sobol_set(problem: FitProblem, seed: int, count: int) -> np.ndarray:
+    """Return coordinates (count, k) that fill the range of the search evenly; the count is a power of two."""
+    return problem.low + (problem.high - problem.low) * qmc.Sobol(len(problem.unknowns), seed=seed).random(count)
+
+
+def evolve(problem: FitProblem, seed: int, known: np.ndarray | None, combined: list[Minimum]) -> list[Minimum]:
     """Return the minima near the best members of a differential evolution of the absolute residuals.
 
     Least squares start from each new best member, which is near a minimum long before the population is.
@@ -110,11 +121,16 @@ def evolve(problem: FitProblem, seed: int, known: np.ndarray | None) -> list[Min
     known : numpy.ndarray or None
         Coordinates (k,) of a minimum that explains the records or that several searches found: the evolution ends when
         it finds one that is about as low.
+    combined : list of Minimum
+        Minima to start from, in addition to a Sobol set.
     """
     part = stretches(problem)[-1]
     enough = 0.0 if known is None else NEAR_KNOWN * problem.minimize(known, part, 6, 1e-3)[0]
     minima: list[Minimum] = []
     best_member, last_improvement = np.array([]), 0
+    population = sobol_set(problem, seed, 2 ** ceil(log2(POPULATION * len(problem.unknowns))))
+    for i, (_, z) in enumerate(distinct(combined, len(population) // 2)):
+        population[i] = np.clip(z, problem.low, problem.high)
 
     def minimize_from_best(intermediate_result: OptimizeResult) -> bool:
         """Minimize from a new best member; return whether the evolution can end."""
@@ -132,7 +148,7 @@ def evolve(problem: FitProblem, seed: int, known: np.ndarray | None) -> list[Min
         lambda columns: np.array([absolute_cost(problem, z, part) for z in columns.T]),
         [*zip(problem.low, problem.high, strict=True)],
         seed=seed,
-        init="sobol",
+        init=population,
         polish=False,
         vectorized=True,
         updating="deferred",
