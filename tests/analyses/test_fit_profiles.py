@@ -73,6 +73,13 @@ def test_a_profile_returns_from_a_higher_branch(height):
     assert end - 1 == pytest.approx(QUANTILE / 2.5, rel=0.03)
 
 
+@pytest.mark.parametrize("slope", [1.0, 1e-9])
+def test_a_profile_ends_where_the_squares_jump(slope):
+    problem = Residuals(lambda a, b: (slope * (a - 1.0) + 5.0 * (a > 1.3), b - 1.0, 1.0))
+    uncertainty = uncertainty_at(problem, MINIMUM)
+    assert profile_bound(problem, MINIMUM, uncertainty, 0, 1).end == pytest.approx(1.3, abs=0.003)
+
+
 def test_a_profile_that_never_reaches_its_limit_has_no_end():
     problem = Residuals(lambda a, b: (0.5 * np.tanh(a - 1.0), b - 1.0, 1.0))
     assert profile_bound(problem, MINIMUM, uncertainty_at(problem, MINIMUM), 0, 1).end is None

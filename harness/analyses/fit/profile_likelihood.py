@@ -14,12 +14,13 @@ from .uncertainty import Uncertainty
 
 MAX_TRIALS = 20
 MAX_STEPS, MIN_GAIN = 40, 5e-4  # of a fit of the other coordinates; least gain of a step, in units of the limit
-LONGEST_FIRST_STEP, MIN_GROWTH, MAX_GROWTH = 0.25, 1.05, 4.0  # distance of the first trial; ratios of the next ones
+LONGEST_FIRST_STEP = 0.25  # distance of the first trial
+MIN_GROWTH, MAX_GROWTH = 0.05, 2.0  # next step outwards: least share of the distance, and ratio to the last step
 MIN_SHARE, MAX_SHARE = 0.1, 0.95  # of a bracket, between which the next trial lies
 FARTHEST = 2.0  # times the farthest inner trial, up to which a parabola is extrapolated
 CLOSE = 0.02  # difference of a height from 1 at which a trial is the end
 JUMP, SHORT = 0.1, 0.1  # height above what is expected of a higher branch; relative step that need not be shorter
-NARROW = 1e-3  # relative width of a bracket that needs no more trials
+NARROW = 0.01  # relative width of a bracket that needs no more trials, where the squares jump
 BETTER = 0.02  # of the limit, by which the squares of a better minimum are lower
 NEAR_LIMIT = 0.05  # distance of a coordinate from the limits of the fit at which it has no bound
 WIDER, NEGLIGIBLE = 0.7, 0.1  # limits of other coordinates, moved by this, lower a profile by less than this share
@@ -94,6 +95,11 @@ class Bracket:
         before, last = self.inner[-2:]
         return max((last.height - before.height) / (last.distance - before.distance), 1e-300)
 
+    @property
+    def expected_end(self) -> float:
+        """Return the distance at which the line through the last inner trials reaches the limit."""
+        return self.inner[-1].distance + (1 - self.inner[-1].height) / self.slope
+
     def is_jump(self, trial: Trial) -> bool:
         """Return whether a trial may be on a higher branch."""
         last = self.inner[-1]
@@ -102,21 +108,25 @@ class Bracket:
 
     def add(self, trial: Trial) -> None:
         """Add a trial, which lies between the last inner and the outer one, or is the outer one anew."""
-        if trial.height >= 1 or self.is_jump(trial):
-            self.outer = trial
-            return
-        self.inner.append(trial)
-        if self.outer and trial.distance >= self.outer.distance:
+        outer = self.outer
+        if trial.height < 1 and not self.is_jump(trial):
+            self.inner.append(trial)
+            self.outer = outer if outer and trial.distance < outer.distance else None
+        elif outer and outer.height < min(trial.height, 1.0):  # farther, yet lower: it is on the lower branch
+            self.inner.append(outer)
             self.outer = None
+        else:
+            self.outer = trial
 
     def next_distance(self) -> float:
         """Return the distance of the next trial."""
         last, outer = self.inner[-1], self.outer
-        expected = last.distance + (1 - last.height) / self.slope
+        expected = self.expected_end
         if outer is None and len(self.inner) == 1:
             return min(self.reach / 2, LONGEST_FIRST_STEP)
         if outer is None:
-            return float(np.clip(expected, MIN_GROWTH * last.distance, MAX_GROWTH * last.distance))
+            step = max(MAX_GROWTH * (last.distance - self.inner[-2].distance), MIN_GROWTH * last.distance)
+            return float(np.clip(expected, (1 + MIN_GROWTH) * last.distance, last.distance + step))
         width = outer.distance - last.distance
         if not np.isfinite(outer.height):
             return last.distance + width / 2
@@ -135,6 +145,16 @@ class Bracket:
                 return trial
         is_narrow = outer is not None and outer.height >= 1 and outer.distance - last.distance < NARROW * outer.distance
         return outer if is_narrow else None
+
+    def last_resort(self) -> Trial | None:
+        """Return the end of a profile that took too many trials; None if it does not reach its limit.
+
+        Trials on higher branches may have ended it too early: it reaches at least to where the line through its inner
+        trials does.
+        """
+        if self.outer is None:
+            return None
+        return Trial(max(self.outer.distance, self.expected_end), np.inf, self.inner[-1].z, len(self.inner))
 
     def extrapolate(self, distance: float) -> np.ndarray:
         """Return coordinates (k,) on the parabola through the last three inner trials, or the line through two."""
@@ -167,9 +187,10 @@ def profile_bound(
     end: Trial | None = None
     for _ in range(MAX_TRIALS):
         distance = bracket.next_distance()
-        guess = bracket.extrapolate(distance)
-        guess[i] = z[i] + side * distance
-        squares, there = fit_others(problem, z, guess, others, MIN_GAIN * target / uncertainty.squares)
+        starts = [bracket.extrapolate(distance), bracket.inner[-1].z.copy()]
+        for start in starts:
+            start[i] = z[i] + side * distance
+        squares, there = fit_others(problem, z, starts, others, MIN_GAIN * target / uncertainty.squares)
         if squares < uncertainty.squares - BETTER * target:
             better = there
             if ends_at_better:
@@ -180,30 +201,36 @@ def profile_bound(
         if end:
             break
     else:
-        end = bracket.outer if bracket.outer and 1 <= bracket.outer.height < np.inf else None
+        end = bracket.last_resort()
     trials = [*bracket.inner[1:], *([end] if end and end.height >= 1 else [])]
     profile = tuple((float(trial.z[i]), trial.height**2) for trial in trials if np.isfinite(trial.height))
     there = next(trial.z for trial in (end, bracket.inner[-1]) if trial and np.isfinite(trial.height))
     if end is None or depends_on_limits(problem, there, i, target):
         return Bound(None, better, profile)
-    return Bound(float(z[i] + side * end.distance), better, profile)
+    coordinate, (low, high) = float(z[i] + side * end.distance), problem.unknowns[i].limits
+    return Bound(coordinate if low < coordinate < high else None, better, profile)
 
 
 def fit_others(
-    problem: FitProblem, z: np.ndarray, guess: np.ndarray, others: np.ndarray, min_gain: float
+    problem: FitProblem, z: np.ndarray, starts: list[np.ndarray], others: np.ndarray, min_gain: float
 ) -> tuple[float, np.ndarray]:
-    """Return the least squares and the coordinates from a guess (k,) on, with only the `others` fitted.
+    """Return the least squares and the coordinates from the best of the starts (k,) on, with only the `others` fitted.
 
-    The squares are infinite if the region holds no values of the others there. The way from z (k,) to the guess shows
+    The squares are infinite if the region holds no values of the others there. The way from z (k,) to a start shows
     where the FMU refuses values.
     """
-    into_region = problem.region.constrained_step(np.eye(len(others)), np.zeros(len(others)), guess, others)
-    if not np.isfinite(into_region).all():
-        return np.inf, guess
-    guess[others] += into_region
-    if problem.residuals(guess, problem.all) is None:
-        problem.region.learn(problem.is_refused, z, guess - z)
-    return problem.minimize(guess, problem.all, MAX_STEPS, min_gain, others)
+    best, lowest = starts[0], np.inf
+    for start in starts:
+        into_region = problem.region.constrained_step(np.eye(len(others)), np.zeros(len(others)), start, others)
+        if not np.isfinite(into_region).all():
+            return np.inf, start
+        start[others] += into_region
+        e = problem.residuals(start, problem.all)
+        if e is None:
+            problem.region.learn(problem.is_refused, z, start - z)
+        elif e @ e < lowest:
+            best, lowest = start, e @ e
+    return problem.minimize(best, problem.all, MAX_STEPS, min_gain, others)
 
 
 def depends_on_limits(problem: FitProblem, z: np.ndarray, i: int, target: float) -> bool:
