@@ -1,7 +1,8 @@
 """Fit drawn records and print what was found: python tests/support/fit_campaign.py --seed 7 --records 400 --log FILE
 
-"Found": all values within five standard errors of the truth, where the record determines them. "Silent": not found, and
-without a remark. Coverage: share of the finite 95 % intervals that hold the truth.
+"Found": all values within five standard errors of the truth, where the record determines them; "partly": it does not
+determine all. "Silent": not found, and without a remark. "Inputs": a remark that the inputs are uncertain between their
+samples. Coverage: share of the finite 95 % intervals that hold the truth, with its standard error.
 """
 
 import argparse
@@ -110,7 +111,7 @@ def print_summary(rows):
         (kind, [row for row in right if row["noise"].startswith(kind)]) for kind in ("white", "coloured", "quantised")
     ]
     lines.append(("all with the right law", right))
-    print(f"{'':24}records refused partly found      silent remarked coverage       CPU median worst s")
+    print(f"{'':23}records refused partly found    silent remarked inputs coverage             CPU median worst s")
     for name, part in lines:
         if not part:
             continue
@@ -119,13 +120,24 @@ def print_summary(rows):
         found = [row for row in fitted if is_found(row)]
         silent = [row for row in fitted if not is_found(row) and not row["remarks"]]
         remarked = [row for row in fitted if row["remarks"]]
-        covered = [each for row in fitted for each in row["covered"].values()]
+        inputs = [row for row in remarked if any(remark.startswith("The inputs") for remark in row["remarks"])]
         seconds = [row["seconds"] for row in part]
-        share = f"{100 * np.mean(covered):5.1f} % of {len(covered):4}" if covered else " " * 15
         print(
-            f"{name:24}{len(part):7} {len(part) - len(fitted):7} {len(partly):6} {len(found):4}/{len(fitted):<4} "
-            f"{len(silent):6} {len(remarked):8} {share} {np.median(seconds):8.2f} {max(seconds):6.2f}"
+            f"{name:23}{len(part):7} {len(part) - len(fitted):7} {len(partly):6} {len(found):4}/{len(fitted):<4}"
+            f"{len(silent):6} {len(remarked):8} {len(inputs):6} {coverage(fitted):23}{np.median(seconds):7.2f} "
+            f"{max(seconds):7.2f}"
         )
+
+
+def coverage(rows):
+    """Return the share of intervals that hold the truth; its standard error is that of a ratio of sums over records."""
+    counts = np.array([len(row["covered"]) for row in rows])
+    held = np.array([sum(row["covered"].values()) for row in rows])
+    if not counts.sum():
+        return ""
+    share = held.sum() / counts.sum()
+    error = np.sqrt(np.sum((held - share * counts) ** 2)) / counts.sum()
+    return f"{100 * share:5.1f} +- {100 * error:3.1f} % of {counts.sum():4}"
 
 
 def main():
