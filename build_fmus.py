@@ -11,6 +11,7 @@ if __name__ == "__main__" and Path(sys.path[0]) != Path(__file__).parent:  # run
 from harness.__main__ import run_command
 
 if __name__ == "__main__":
+    gc.disable()  # objects of a build live until its end; collecting garbage takes a tenth of the build time
 
     def load_command() -> Any:
         from build_fmus import main  # where a signal is handled, because the imports take half a second
@@ -107,8 +108,6 @@ def main(
       python build_fmus.py cart.py --native --platform linux64
       python build_fmus.py --release dist
     """
-    gc.disable()  # objects of a build live until its end; collecting garbage takes a tenth of the build time
-    click.get_current_context().call_on_close(gc.enable)
     click.get_current_context().with_resource(temporary_files())
     if web and (compiled or platforms or fmi == "3"):
         raise CommandLineError("--web writes a page, not FMUs: remove --native, --platform and --fmi 3.")
