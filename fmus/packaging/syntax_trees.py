@@ -8,22 +8,22 @@ from typing import Any, TypeVar
 Node = TypeVar("Node", bound=ast.AST)
 NON_NODE_FIELDS = {"ctx", "id", "attr", "arg", "name", "asname", "module", "level", "kind", "type_comment"}
 NODE_TYPES = [one for one in vars(ast).values() if isinstance(one, type) and issubclass(one, ast.AST)]
+STATEMENT_FIELDS = ("body", "handlers", "orelse", "finalbody")
 CHILD_FIELDS = {kind: [name for name in kind._fields if name not in NON_NODE_FIELDS] for kind in NODE_TYPES} | {
     ast.Constant: []
 }
 
 
 @lru_cache(200)
+def parsed_module(text: str) -> ast.Module:
+    """Return the parsed source text; callers must not change it."""
+    return ast.parse(text)
+
+
+@lru_cache(200)
 def parsed_nodes(text: str) -> list[ast.AST]:
     """Return all nodes of the source text, the module first; callers must not change them."""
-    return all_nodes(ast.parse(text))
-
-
-def parsed_module(text: str) -> ast.Module:
-    """Return the parsed module."""
-    result = parsed_nodes(text)[0]
-    assert isinstance(result, ast.Module)
-    return result
+    return all_nodes(parsed_module(text))
 
 
 def child_nodes(node: ast.AST) -> list[ast.AST]:
@@ -36,6 +36,11 @@ def child_nodes(node: ast.AST) -> list[ast.AST]:
         elif isinstance(value, ast.AST):
             result.append(value)
     return result
+
+
+def child_statements(node: ast.AST) -> list[ast.stmt | ast.ExceptHandler]:
+    """Return the statements directly inside a statement or a module; those of an exception handler are inside it."""
+    return [one for name in STATEMENT_FIELDS for one in getattr(node, name, ())]
 
 
 def all_nodes(root: ast.AST) -> list[ast.AST]:

@@ -12,8 +12,7 @@ from models import CASES, LARGER_MODELS, MODELS, ROOT, label, model_class
 
 from fmus.packaging import BuildError
 from fmus.packaging.lowering import LoweringError, function_tree, lowered_files, lowered_model, select_features
-from fmus.packaging.lowering.dead_code import prune_assignment, remove_dead_code
-from fmus.packaging.lowering.emit_source import SourceEmitter, SourceLine
+from fmus.packaging.lowering.emit_source import SourceEmitter
 from fmus.packaging.lowering.layout import ModelLayout
 from fmus.packaging.lowering.lowered_sources import lower_all, runtime_symbols
 from fmus.packaging.lowering.source_symbols import SourceSymbols
@@ -210,87 +209,6 @@ def test_the_tree_of_a_function_has_the_line_numbers_of_its_file():
         assert source[tree.lineno - 1].strip().startswith(f"def {function.__name__}(")
         last = tree.body[-1]
         assert source[last.lineno - 1].strip() == ast.unparse(last)
-
-
-@pytest.mark.parametrize(
-    ("text", "expected"),
-    [
-        ("self.a = self.b = self.c = 0.0", "self.a = self.c = 0.0"),
-        ("self.a, self.b, self.c = 1.0, 2.0, 3.0", "self.a, self.c = 1.0, 3.0"),
-        ("self.a, self.b = 1.0, 2.0", "self.a = 1.0"),
-        ("self.b, self.a = 1.0, 2.0", "self.a = 2.0"),
-        ("self.b = 0.0  # unread", ""),
-        ("self.a, self.b = [0.0] * n, [0.0] * n", "self.a = [0.0] * n"),
-        ("model.solver.b = -inf", ""),
-        ("step.b = x if x > 0.0 else inf", ""),
-        ("step.a = step.b = step.c = 0.0", "step.a = step.c = 0.0"),
-        ("self.b = x / y", "self.b = x / y"),
-        ("self.b = x**2.0", "self.b = x**2.0"),
-        ("self.b = x[0]", "self.b = x[0]"),
-        ("self.b = find(x)", "self.b = find(x)"),
-        ("find(x).b = 0.0", "find(x).b = 0.0"),
-        ("self.c[0].b = 0.0", "self.c[0].b = 0.0"),
-    ],
-)
-def test_only_unread_attributes_are_removed_from_an_assignment(text, expected):
-    lines = [SourceLine.of(line, n) for n, line in enumerate(["def f(self):", f"    {text}", "    return 1"], 1)]
-    (node,) = (node for node in ast.walk(ast.parse("\n".join(lines))) if isinstance(node, ast.Assign))
-    prune_assignment(lines, node, {".a", ".c"})
-    assert [line.strip() for line in lines[1:-1]] == [expected] * bool(expected)
-
-
-def test_an_unread_attribute_goes_with_its_first_value_unless_the_fmi_layer_sets_it():
-    location = """
-class Location:
-    def __init__(self, n):
-        self.values = [0.0] * n
-        self.t_last = -inf
-        self.is_called = False
-"""
-    model = """
-from .location import Location
-
-
-class Model:
-    def __init__(self):
-        self.location = Location(1)
-
-    def restart(self, t):
-        if t > 0.0:
-            self.location.t_last = t
-        return self.location.values[0]
-"""
-    layer = "def call(model):\n    model.location.is_called = True\n    return model.restart(0.0)\n"
-    texts = {"runtime/location.py": location, "runtime/model.py": model, "runtime/slave.py": layer}
-    files = {
-        path: [SourceLine.of(line, n) for n, line in enumerate(text.split("\n"), 1)] for path, text in texts.items()
-    }
-    pruned = {path: "\n".join(lines) for path, lines in remove_dead_code(files, "some.py", {"model:Model"}).items()}
-    assert pruned["runtime/location.py"] == location.replace("        self.t_last = -inf\n", "")
-    assert pruned["runtime/model.py"] == model.replace("self.location.t_last = t", "pass")
-    assert pruned["runtime/slave.py"] == layer
-
-
-def test_a_function_is_removed_although_methods_and_functions_of_other_files_share_its_name():
-    texts = {
-        "runtime/conditions.py": "def begin(model):\n    model.sides = 1.0\n\n\ndef start(model):\n    return 1.0\n",
-        "runtime/stages.py": "def begin():\n    return 0.0\n",
-        "runtime/model.py": """from . import conditions
-from .stages import begin as first
-
-
-class Model:
-    def begin(self):
-        return first() + conditions.start(self)
-""",
-        "runtime/slave.py": "def call(model):\n    return model.begin() + model.sides\n",
-    }
-    files = {
-        path: [SourceLine.of(line, n) for n, line in enumerate(text.split("\n"), 1)] for path, text in texts.items()
-    }
-    pruned = {path: "\n".join(lines) for path, lines in remove_dead_code(files, "some.py", {"model:Model"}).items()}
-    assert pruned.pop("runtime/conditions.py").strip() == "def start(model):\n    return 1.0"
-    assert pruned == {path: text for path, text in texts.items() if path in pruned}
 
 
 def test_an_elif_becomes_an_if_where_the_branch_before_is_removed_and_other_tests_are_copied():

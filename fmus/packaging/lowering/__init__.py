@@ -7,6 +7,7 @@
     elimination.py         the linear system of rodas
     constant_folding.py    replaces flags, choices and dependent tests by constants
     emit_source.py         a file, line by line: unchanged lines are copied with their comments
+    symbol_table.py        what each name refers to: a function or class of a file, a member of a class
     dead_code.py           removes unused code
     lowered_sources.py     lowers all files of the runtime and the model
     import_hook.py         imports the lowered model into this process

@@ -91,8 +91,7 @@ def lower_all(source: ModelFile, features: FeatureSelection) -> SourceFiles:
     }
     declared = runtime_symbols()
     files = {path: SourceEmitter(spec, declared, path, text, path != file).lines for path, text in texts.items()}
-    names = {"." + part for variable, _ in variables(source.model()) for part in variable.split(".")}
-    files = remove_dead_code(files, file, names)
+    files = remove_dead_code(files, file, [name for name, _ in variables(source.model())])
     return {path: add_origin_line(path, lines, texts[path], spec) for path, lines in files.items()}
 
 
