@@ -192,7 +192,8 @@ def prune_assignment(lines: list[SourceLine], node: ast.Assign, dead: set[ast.AS
 
 def prune_import(lines: list[SourceLine], node: ast.ImportFrom, dead: set[ast.AST]) -> None:
     """Remove dead names from an import."""
-    names = ", ".join(ast.unparse(alias) for alias in node.names if alias not in dead)
+    kept = [alias for alias in node.names if alias not in dead]
+    names = ", ".join(f"{one.name} as {one.asname}" if one.asname else one.name for one in kept)
     head = f"from {'.' * node.level}{node.module or ''} import "
     text = wrap_line(f"{head}({names})") if len(head + names) > MAX_LINE_LENGTH else head + names
     source = lines[node.lineno - 1].source

@@ -471,6 +471,8 @@ def names_used(node: ast.AST) -> set[str]:
 
 def dotted_name(node: ast.expr) -> str:
     """Return a name or dotted name as text."""
+    if isinstance(node, ast.Attribute):
+        return f"{dotted_name(node.value)}.{node.attr}"
     return node.id if isinstance(node, ast.Name) else ast.unparse(node)
 
 
