@@ -45,6 +45,21 @@ def test_a_step_to_values_that_are_not_finite_is_refused(broken):
     assert 0 < value <= 2
 
 
+def test_a_step_without_any_finite_value_is_refused_for_several_unknowns():
+    """The eigenvalues of a matrix of NaN do not converge."""
+    unknowns = np.array([REST, ZETA, R, B])
+    columns = np.stack([np.ones_like(T), T, T**2, T**3], axis=1)
+    start = START.copy()
+    start[[ZETA, R, B]] = 0.1
+
+    def residual(p):
+        scale = np.nan if p[REST] > 2 else 1.0
+        return scale * (columns @ p[unknowns] - LINE - 0.3 * T), scale * columns
+
+    p, _ = least_squares(residual, start, unknowns)
+    assert 0 < p[REST] <= 2
+
+
 def test_a_step_that_increases_the_squares_is_refused():
     """A Jacobian that is too small makes each undamped step 2.2 times too long, so that the squares grow by half."""
     value, _ = fit(lambda p: (p[REST] - LINE, np.full((len(T), 1), 0.45)))

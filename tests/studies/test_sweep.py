@@ -2,7 +2,8 @@
 
 import json
 from functools import partial
-from math import sqrt
+from math import nan, pi, sqrt
+from pathlib import Path
 
 import commands
 import external_fmus
@@ -13,7 +14,9 @@ from sweep_results import open_sweep, sweep_folder
 pandas = pytest.importorskip("pandas", reason="the extra 'sweep' is not installed")
 
 from harness.errors import SceneError  # noqa: E402
+from harness.running.trajectory import Trajectory  # noqa: E402
 from harness.scenes.run_spec import RunSpec  # noqa: E402
+from harness.studies.sweep.measures import TRAJECTORY_MEASURES  # noqa: E402
 from harness.studies.sweep.runner import SweepSpec, open_runner  # noqa: E402
 from harness.studies.sweep.sampling import SweepPoints, parse_axis  # noqa: E402
 
@@ -85,6 +88,18 @@ def test_decay_measures_match_the_parameters(fmus):
     assert abs(rest) <= 2 / 157.9
     with open_runner(SweepSpec(RunSpec(fmus / "smd.fmu", follow=False), ("c",), ("zeta",))) as rerun:
         assert rerun.run([1.0]) == pytest.approx([1 / (2 * sqrt(157.9))], rel=1e-5)
+
+
+@pytest.mark.parametrize("driver", [0.02, -0.02])
+def test_a_sled_pulled_backward_has_the_measures_of_one_pulled_forward(driver):
+    """A law without modes: three slips of a speed that swings between 0 and three times that of the driver."""
+    time = np.linspace(0.0, 3.0, 3001)
+    v = 1.5 * driver * (1.0 - np.cos(2.0 * pi * time))
+    spec = RunSpec(Path("sled.fmu"), outputs=("x", "v"))
+    run = Trajectory(spec, time, {"x": 0.0 * v, "v": v}, {"x": "m", "v": "m/s"}, {}, {"v_driver": driver})
+    measured = {name: each.measure(run) for name, each in TRAJECTORY_MEASURES.items() if not each.decay}
+    expected = {"slips": 3, "period": 1.0, "unsteady": 1.5, "peak_speed": 0.06, "stuck": nan, "rest": nan}
+    assert measured == pytest.approx(expected, rel=1e-6, nan_ok=True)
 
 
 def test_a_map_is_labelled_for_xarray_and_pandas_for_any_number_of_workers(harness, tmp_path):
