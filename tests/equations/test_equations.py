@@ -10,7 +10,7 @@ import pytest
 from models import EXAMPLE_MODELS, LARGER_MODELS, MODELS, ROOT
 
 import fmus
-from fmus.packaging.equations.algebra import ARITHMETIC
+from fmus.packaging.equations.algebra import ARITHMETIC, rounding_scale
 from fmus.packaging.equations.expressions import FUNCTIONS, Term
 from fmus.packaging.equations.model_declaration import Choice, Contact, Model, Output, Rule, SettableVariable, Variable
 from fmus.packaging.model_lookup import find_model
@@ -104,6 +104,22 @@ def test_generated_code_has_the_bits_of_the_declared_equations(source):
             assert getattr(model, analysis.rate_outputs[c.slip].name) == 0.0
         tried += 1
     assert tried > 100
+
+
+@EVERY_SOURCE
+def test_the_rounding_scale_of_loads_and_rates_bounds_them_and_their_rounding_errors(source):
+    """Also where large terms cancel; the rounding error is the difference from fifty digits."""
+    analysis, model = find_model(source).analysis, find_model(source).model()
+    for values, t, at, mode in situations(analysis, model, 60):
+        values |= at | driver_positions(analysis, model, t) | {m.name: mode for m in analysis.modes}
+        values |= {c.name: mode * Evaluated(analysis, values, math).of(c.slide) for c in analysis.contacts}
+        floats, exact = Evaluated(analysis, values, math), Evaluated(analysis, values, mpmath.mp)
+        for e in (*analysis.load.values(), *analysis.rate_outputs.values()):
+            scale = floats.of(rounding_scale(e))
+            assert abs(floats.of(e)) <= scale * (1.0 + 1e-12)
+            with mpmath.workdps(DIGITS):
+                exact.values = {name: mpmath.mpf(value) for name, value in values.items()}
+                assert abs(exact.of(e) - floats.of(e)) <= 16 * 2.0**-52 * scale
 
 
 @EVERY_SOURCE

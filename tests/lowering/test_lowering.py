@@ -15,6 +15,7 @@ from fmus.packaging.lowering import LoweringError, function_tree, lowered_files,
 from fmus.packaging.lowering.emit_source import SourceEmitter
 from fmus.packaging.lowering.layout import ModelLayout
 from fmus.packaging.lowering.lowered_sources import lower_all, runtime_symbols
+from fmus.packaging.lowering.scalarize import fold_zero
 from fmus.packaging.lowering.source_symbols import SourceSymbols
 from fmus.packaging.model_lookup import find_model
 from fmus.runtime import stick_slip
@@ -136,6 +137,18 @@ def test_an_unsupported_construct_is_refused_with_file_line_and_remedy(body):
     with pytest.raises(LoweringError, match=re.escape(BODIES[body])) as caught:
         SourceEmitter(SPEC, SourceSymbols([text, DECLARATIONS], VECTORS), "runtime/some.py", text, True)
     assert re.match(r"runtime/some\.py:[5678]: ", str(caught.value))
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        *(("a + 0.0", "a"), ("a - 0.0", "a"), ("a * 0.0", "0.0"), ("0.0 * a", "0.0"), ("0.0 * 0.0", "0.0")),
+        *((text, text) for text in ("0.0 - a", "0.0 + a", "0.0 / a", "a + 1.0", "a - b", "a * b")),
+    ],
+)
+def test_operations_with_components_that_are_always_zero_are_simplified(text, expected):
+    e = ast.parse(text, mode="eval").body
+    assert ast.unparse(fold_zero(e.left, e.op, e.right)) == expected
 
 
 def test_rates_and_states_may_have_any_names():

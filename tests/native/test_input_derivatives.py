@@ -263,6 +263,19 @@ def test_a_load_peaking_just_below_the_limit_sticks_and_breaks_away_at_the_oppos
 
 
 @pytest.mark.parametrize("name", LIMITS)
+def test_a_load_that_falls_from_one_limit_breaks_away_at_the_other(launch, name):
+    """The load is 1 - 4 t + 1.5 t^2 of the limit: -1 at 2/3 s, and 1 again at 8/3 s."""
+    values, limit = LIMITS[name]
+    fmu = launch(name, values | {"solver.h_max": 4.0}, stop=None)
+    fmu.set({push(name)[0]: limit})
+    for order, value in (2, 3.0), (1, -4.0):
+        fmu.ramp(push(name)[0], value * limit, order)
+    fmu.step(0.0, 0.7)
+    assert fmu.get("mode", "events.count") == [-1, 1]
+    assert fmu.get("events.t_last") == pytest.approx(2.0 / 3.0, rel=0.0, abs=1e-12)
+
+
+@pytest.mark.parametrize("name", LIMITS)
 def test_a_load_equal_to_the_limit_follows_its_first_nonzero_derivative(launch, name):
     values, limit = LIMITS[name]
     for order, value in (2, 1.0), (3, -1.0), (4, -1.0), (5, 1.0):

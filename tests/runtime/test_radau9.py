@@ -84,14 +84,20 @@ class Damped:
 
 def propose(model, x, v, h, tolerance=1e-10):
     """Return new states and rate, error estimates, and the evaluations that the method reports."""
-    step = runtime("pacejka", "step_control").InternalStep()
-    step.tolerance = tolerance
-    step.active_method.error_scale_floor_x = step.active_method.error_scale_floor_v = 1.0
-    model.solver = SimpleNamespace(step=step)
+    step = begin_step(model, tolerance)
     a = model.rates(0.0, x, v)
     model.evaluations = 0
     method = runtime("pacejka", "radau9").Radau9()
     return method.propose(model, 0.0, x, v, a, h), step.active_method.stages
+
+
+def begin_step(model, tolerance):
+    """Return the step of a solver of a model, with an error scale of 1."""
+    step = runtime("pacejka", "step_control").InternalStep()
+    step.tolerance = tolerance
+    step.active_method.error_scale_floor_x = step.active_method.error_scale_floor_v = 1.0
+    model.solver = SimpleNamespace(step=step)
+    return step
 
 
 def test_it_is_l_stable():
@@ -116,6 +122,31 @@ def test_a_linear_system_takes_two_iterations():
     model = Damped(spring=-4.0, damper=-600.0)
     _, reported = propose(model, 1.0, -0.3, 0.1, tolerance=1e-6)
     assert reported in (10, 11)  # one more where the error is estimated again
+
+
+@pytest.mark.parametrize("rate", [1.0, 30.0, 1e3])
+def test_a_first_error_estimate_above_the_tolerance_is_filtered(rate):
+    """For v' = -rate v, it is divided by 1 + GAMMA rate h once more."""
+    *_, plain = propose(Damped(damper=-rate), 0.0, 1.0, 1.0, tolerance=1.0)[0]
+    *_, filtered = propose(Damped(damper=-rate), 0.0, 1.0, 1.0, tolerance=1e-9)[0]
+    assert filtered == pytest.approx(plain / (1.0 + runtime("pacejka", "radau9").GAMMA * rate), rel=1e-6)
+
+
+def test_a_step_elsewhere_is_that_of_a_new_run():
+    """As after an event: neither the polynomial nor the error of the steps before count."""
+    model = Damped(spring=-4.0, damper=-0.6)
+    step, used, new = begin_step(model, 1e-10), *(runtime("pacejka", "radau9").Radau9() for _ in range(2))
+    control = step.active_method
+
+    def propose_elsewhere(method):
+        result = method.propose(model, 0.7, 0.5, 0.7, model.rates(0.7, 0.5, 0.7), 0.2)
+        return *result, control.stages, control.safety, control.grow, control.shrink_after_rejection
+
+    x, v, a, *_ = used.propose(model, 0.0, 1.0, -0.3, model.rates(0.0, 1.0, -0.3), 0.1)
+    step.n_accepted = 1
+    used.propose(model, 0.1, x, v, a, 0.1)
+    assert used.h_last == 0.1
+    assert propose_elsewhere(used) == propose_elsewhere(new)
 
 
 class Growing(Damped):
