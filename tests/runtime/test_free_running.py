@@ -45,9 +45,13 @@ def following(launch, cache):
     return following
 
 
+GRIDS = [*((case, False) for case in CASES), *((case, True) for case in FEW_CASES)]
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("pushed", [False, True], ids=["free", "pushed"])
-@pytest.mark.parametrize("case", CASES, ids=label)
+@pytest.mark.parametrize(
+    ("case", "pushed"), GRIDS, ids=lambda part: str(part) if isinstance(part, bool) else label(part)
+)
 def test_any_two_communication_grids_agree(launch, following, case, pushed):
     name, values, stop = case
     names, draw = outputs(name) + counts(name), random.Random(label(case))
