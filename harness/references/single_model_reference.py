@@ -56,13 +56,13 @@ def build_bodies(scene: CoupledScene, defaults: dict[str, dict[str, float]]) -> 
     ----------
     defaults : parameter values of each model, which the scene overrides
     """
-    values = [defaults[part.model] | part.values for part in scene.parts]
-    indices = {part.name: i for i, part in enumerate(scene.parts)}
+    values = [defaults[part.model] | part.values for part in scene.parts.values()]
+    indices = {name: i for i, name in enumerate(scene.parts)}
 
     def column(name: str) -> np.ndarray:
         return np.array([value.get(name, 0.0) for value in values])
 
-    laws = [BODY_MODELS[part.model] for part in scene.parts]
+    laws = [BODY_MODELS[part.model] for part in scene.parts.values()]
     limits = [law(value) if law else (0.0, 0.0) for law, value in zip(laws, values, strict=True)]
     slide, hold = np.array(limits).T
     constants = column("m"), column("k"), column("c"), hold, slide, column("v_driver")

@@ -16,6 +16,7 @@ from harness.errors import HarnessError
 from harness.results.provenance import load_provenance
 from harness.running import c_host, stepping_loops
 from harness.running.timing import time_fastest_call
+from harness.scenes.run_spec import RunSpec
 from harness.studies.bench import model_exchange, native, stiff
 from harness.studies.bench import speed as bench_speed
 from harness.studies.bench.accuracy import (
@@ -216,7 +217,7 @@ def test_missing_tools_are_reported_in_their_row_and_fail_nothing(both_backends,
 def test_a_run_refused_by_an_fmu_in_c_reports_its_message(both_backends):
     library = c_host.load_library(both_backends / "native" / "stickslip.fmu")
     with pytest.raises(HarnessError, match=r"m = -1\.0 kg is refused"):
-        native.time_runs(library, {"m": -1.0}, ("x",), 16.0, 10, 1)
+        native.time_runs(library, RunSpec(library.file, ("x",), {"m": -1.0}, stop=16.0, equal_steps=10))
 
 
 EXPLICIT_EVENTS = [

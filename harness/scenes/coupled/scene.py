@@ -28,6 +28,7 @@ from typing import Annotated
 
 from ...errors import SceneError, format_value, unknown_name_message, unknown_source_message
 from ..fmu_files import find_fmu
+from ..run_spec import RunSpec
 from ..schema import NUMBER, POSITIVE, TEXT, TITLE, Constraint, is_names, is_number, parse_table, read_toml
 
 FOLDER = Path(__file__).parent
@@ -83,16 +84,6 @@ class CoupledKeys:
 
 
 @dataclass(frozen=True)
-class Part:
-    """FMU of the scene, and the values to set."""
-
-    name: str
-    model: str
-    fmu: Path
-    values: dict[str, float]
-
-
-@dataclass(frozen=True)
 class CoupledSpring:
     """Spring (`k` in N/m) and damper (`c` in N s/m) from part `a` to part `b`; an end without a part is fixed.
 
@@ -130,7 +121,7 @@ class CoupledScene:
     title: str
     stop: float
     steps: tuple[float, ...]
-    parts: tuple[Part, ...]
+    parts: dict[str, RunSpec]  # the run of each part by its name; all stop with the scene
     springs: tuple[CoupledSpring, ...]
     direct_connections: tuple[Connection, ...]  # from part to part without a factor
 
@@ -223,14 +214,18 @@ def build_coupled_scene(path: Path, keys: CoupledKeys, models: Collection[str]) 
                 f"from = {format_value(connection.from_)}: a connected force needs factor = 1, got {factor!r}"
             )
     scene = CoupledScene(
-        path.stem, keys.title, float(keys.stop), check_communication_steps(keys), (), tuple(springs), tuple(direct)
+        path.stem, keys.title, float(keys.stop), check_communication_steps(keys), {}, tuple(springs), tuple(direct)
     )
     driven = [connection.sink for connection in scene.connections]
     twice = [name for name in keys.parts if driven.count(name) > 1]
     if twice:
         raise SceneError(f"part {twice[0]} is driven twice; an input accepts one connection")
-    values = {name: {key: float(value) for key, value in part.values.items()} for name, part in keys.parts.items()}
-    parts = tuple(Part(name, part.model, find_fmu(part.model), values[name]) for name, part in keys.parts.items())
+    parts = {
+        name: RunSpec(
+            find_fmu(part.model), values={key: float(value) for key, value in part.values.items()}, stop=scene.stop
+        )
+        for name, part in keys.parts.items()
+    }
     return replace(scene, parts=parts)
 
 

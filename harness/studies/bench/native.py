@@ -17,6 +17,7 @@ from ...references.models import CASES, MODELS
 from ...running.c_host import Library, MissingToolError, compile_source, find_compiler, load_library
 from ...running.stepping_loops import COMMUNICATION_STEPS, time_direct_loop, time_per_step
 from ...scenes.fmu_files import find_fmu, list_more_models
+from ...scenes.run_spec import RunSpec
 from .benchmark import SETTINGS, Baseline, Benchmark
 
 Measured = tuple[float, float, tuple[Baseline, ...]]  # value, target, baselines
@@ -141,13 +142,12 @@ class Timing:
     rows: np.ndarray
 
 
-def time_runs(
-    library: Library, values: dict[str, float], read: tuple[str, ...], stop: float, steps: int, repeat: int
-) -> Timing:
-    """Time repeated runs of one instance from 0 to `stop` in equal steps."""
-    words = [f"{'i' * isinstance(value, int)}{library.references[name]}={value!r}" for name, value in values.items()]
-    words += [str(library.references[name]) for name in read]
-    calls = f"0 new bench quiet\n0 time {repeat} {stop!r} {steps} {' '.join(words)}\n0 free\n"
+def time_runs(library: Library, run: RunSpec) -> Timing:
+    """Time the repetitions of a run of one instance from 0 to the stop in equal steps; numbers are set as they are."""
+    references = library.references
+    words = [f"{'i' * isinstance(value, int)}{references[name]}={value!r}" for name, value in run.values.items()]
+    words += [str(references[name]) for name in run.outputs]
+    calls = f"0 new bench quiet\n0 time {run.repeat} {run.stop!r} {run.equal_steps} {' '.join(words)}\n0 free\n"
     (_, seconds), *rows = (line.split() for line in run_host(library, calls).splitlines())
     return Timing(float(seconds), np.array([row[1:] for row in rows], dtype=float))
 
@@ -185,20 +185,21 @@ def build_cvode_fmu(model: str, plain: bool = False, adams: bool = False) -> Lib
 @cache
 def time_fmu(case: str, backend: str, steps: int = COMMUNICATION_STEPS) -> Timing:
     """Time a built FMU with default method and tolerance in the C host."""
-    case_data = CASES_BY_NAME[case]
-    library = load_library(built_fmu(case_data.model, backend))
-    repeat = REPEAT if backend == "native" else REPEAT_PYTHON
-    return time_runs(library, case_data.values, case_data.outputs, case_data.problem.stop, steps, repeat)
+    data = CASES_BY_NAME[case]
+    fmu, repeat = built_fmu(data.model, backend), REPEAT if backend == "native" else REPEAT_PYTHON
+    run = RunSpec(fmu, data.outputs, data.values, stop=data.problem.stop, equal_steps=steps, repeat=repeat)
+    return time_runs(load_library(fmu), run)
 
 
 @cache
 def time_cvode(case: str, rtol: float) -> Timing:
     """Time the CVODE FMU in the C host."""
-    case_data = CASES_BY_NAME[case]
-    values = {**case_data.values, "rtol": rtol, "atol": rtol * case_data.problem.atol_factor}
-    return time_runs(
-        build_cvode_fmu(case_data.model), values, ("x", "v"), case_data.problem.stop, COMMUNICATION_STEPS, REPEAT
-    )
+    data = CASES_BY_NAME[case]
+    library = build_cvode_fmu(data.model)
+    values = {**data.values, "rtol": rtol, "atol": rtol * data.problem.atol_factor}
+    stop = data.problem.stop
+    run = RunSpec(library.file, ("x", "v"), values, stop=stop, equal_steps=COMMUNICATION_STEPS, repeat=REPEAT)
+    return time_runs(library, run)
 
 
 @cache

@@ -6,9 +6,10 @@ tolerances; the fastest run with such an error would be one that errs little by 
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, partial
 from math import inf, nan
+from pathlib import Path
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from ...references.models.pacejka import PacejkaProblem
 from ...references.peer_solvers import solve
 from ...running.c_host import Library, load_library
 from ...running.stepping_loops import COMMUNICATION_STEPS
+from ...scenes.run_spec import RunSpec
 from .benchmark import SETTINGS, Baseline, Benchmark
 from .native import Measured, build_cvode_fmu, built_fmu, measure_or_skip, time_runs
 
@@ -31,26 +33,30 @@ Runs = list[tuple[float, float]]  # run time in s, and largest error relative to
 
 @dataclass(frozen=True)
 class StiffCase:
-    """A model with values.
+    """A run of a model.
 
     Attributes
     ----------
+    run : the model, its values, and the states among its outputs
     scale : smallest scale of the states, m or m/s: the absolute tolerances are relative to it
     reference_source : name of the certified reference; empty if there is none
     """
 
-    model: str
-    values: dict[str, float]
+    run: RunSpec
     scale: float
     reference_source: str
-    outputs: tuple[str, ...] = ("x", "v")
+
+
+def sled_case(x_m: float, reference_source: str) -> StiffCase:
+    """Return the sled on a belt with the velocity scale x_m in m/s."""
+    return StiffCase(RunSpec(Path("pacejka.fmu"), ("x", "v"), {"x_m": x_m}), x_m, reference_source)
 
 
 CASES = {
-    "pacejka, x_m = 0.01 m/s": StiffCase("pacejka", {"x_m": 0.01}, 0.01, "pacejka"),
-    "pacejka, x_m = 0.0001 m/s": StiffCase("pacejka", {"x_m": 0.0001}, 0.0001, "pacejka-0.0001"),
-    "pacejka, x_m = 1e-6 m/s": StiffCase("pacejka", {"x_m": 1e-6}, 1e-6, ""),
-    "lugre": StiffCase("lugre", {}, 1e-5, "more/lugre", ("x", "v", "z")),
+    "pacejka, x_m = 0.01 m/s": sled_case(0.01, "pacejka"),
+    "pacejka, x_m = 0.0001 m/s": sled_case(0.0001, "pacejka-0.0001"),
+    "pacejka, x_m = 1e-6 m/s": sled_case(1e-6, ""),
+    "lugre": StiffCase(RunSpec(Path("lugre.fmu"), ("x", "v", "z")), 1e-5, "more/lugre"),
 }
 
 
@@ -86,9 +92,9 @@ def time_at_error(runs: Runs, error: float) -> float:
 def run_fmu(name: str) -> Runs:
     """Run the built FMU with radau9 at all tolerances."""
     case = CASES[name]
-    library = load_library(built_fmu(case.model, "native"))
+    library = load_library(built_fmu(case.run.model, "native"))
     tolerances = [{"solver.rtol": rtol, "solver.atol": rtol * case.scale} for rtol in TOLERANCES]
-    if "x_m" in case.values:  # the FMU has this scale by default, for the speed alone
+    if "x_m" in case.run.values:  # the FMU has this scale by default, for the speed alone
         tolerances = [{"solver.rtol": rtol} for rtol in TOLERANCES]
     return time_runs_of(case, library, [{"solver.method": RADAU9, **values} for values in tolerances])
 
@@ -99,7 +105,7 @@ def run_cvode(name: str) -> list[Runs]:
     case = CASES[name]
     return [
         time_runs_of(case, library, [{"rtol": rtol, "atol": rtol * case.scale * share} for rtol in TOLERANCES])
-        for library in (build_cvode_fmu(case.model), build_cvode_fmu(case.model, adams=True))
+        for library in (build_cvode_fmu(case.run.model), build_cvode_fmu(case.run.model, adams=True))
         for share in ATOL_SHARES
     ]
 
@@ -107,13 +113,17 @@ def run_cvode(name: str) -> list[Runs]:
 def time_runs_of(case: StiffCase, library: Library, settings: list[dict[str, float]]) -> Runs:
     """Return the runs that do not fail."""
     times, truth = reference_motion(case)
-    time_setting = partial(time_runs, library, read=case.outputs, stop=float(times[-1]), steps=COMMUNICATION_STEPS)
     runs: Runs = []
     for values in settings:
+        run = replace(
+            case.run,
+            values={**case.run.values, **values},
+            stop=float(times[-1]),
+            equal_steps=COMMUNICATION_STEPS,
+        )
         try:
-            seconds = time_setting(values={**case.values, **values}, repeat=1).seconds
-            repeat = min(max(int(RUN_TIME / seconds), LEAST_REPEATS), MOST_REPEATS)
-            timing = time_setting(values={**case.values, **values}, repeat=repeat)
+            repeat = min(max(int(RUN_TIME / time_runs(library, run).seconds), LEAST_REPEATS), MOST_REPEATS)
+            timing = time_runs(library, replace(run, repeat=repeat))
         except HarnessError:  # a tolerance is too loose or too tight for the solver
             continue
         rows = timing.rows[:: COMMUNICATION_STEPS // (len(times) - 1)]
@@ -126,7 +136,7 @@ def reference_motion(case: StiffCase) -> tuple[np.ndarray, np.ndarray]:
     if case.reference_source:
         reference = load_reference(case.reference_source)
         return reference.times, reference.states
-    return solve_by_radau(case.values["x_m"])
+    return solve_by_radau(case.run.values["x_m"])
 
 
 @cache

@@ -64,7 +64,7 @@ def fill_structure(
         connectors = {connection.output: "output" for connection in scene.connections if connection.source == name}
         connectors |= {connection.input: "input" for connection in scene.connections if connection.sink == name}
         connectors |= dict.fromkeys(values.get(name, ()), "parameter")
-        connectors |= {"x": "output"} if name in [part.name for part in scene.parts] else {}
+        connectors |= {"x": "output"} if name in scene.parts else {}
         component.connectors = [
             Connector(None, connector, kind, TypeReal(None)) for connector, kind in connectors.items()
         ]

@@ -14,8 +14,7 @@ from ...errors import HarnessError
 from ...process.subprocess_runner import PROJECT_ROOT, run_module
 from ...process.temporary_directory import temporary_directory
 from ...references.single_model_reference import BODY_MODELS, build_bodies, solve_bodies
-from ...results.files import column_heading, write_csv_rows
-from ...results.files import write_csv as write_csv
+from ...results.files import column_heading, write_csv, write_csv_rows
 from ...results.folder import replace_folder
 from ...results.provenance import describe_sources, write_provenance
 from ...results.summary import Summary, make_table, write_summary
@@ -53,7 +52,7 @@ def run_coupled(source: str, out: Path, stop: float | None, report: ProgressCall
             defaults = {model: start_values(find_fmu(model)) for model in BODY_MODELS}
             check_values(scene, defaults)
             name, file = scene.name, temporary_folder / f"{scene.identifier}.ssp"
-            plan, fmus = unsolved_study(scene), [part.fmu for part in scene.parts]
+            plan, fmus = unsolved_study(scene), [part.fmu for part in scene.parts.values()]
         folder = out / FOLDER / name
         with replace_folder(folder, (*FILES, file.name), describe_sources(source)) as new_folder:
             if scene:
@@ -72,10 +71,10 @@ def run_coupled(source: str, out: Path, stop: float | None, report: ProgressCall
 
 def check_values(scene: CoupledScene, defaults: Starts) -> None:
     """Check that all parameters of the scene exist."""
-    for part in scene.parts:
+    for name, part in scene.parts.items():
         unknown = sorted(set(part.values) - set(defaults[part.model]))
         if unknown:
-            raise HarnessError(f"scene {scene.name}: part {part.name} ({part.model}) has no parameter {unknown[0]}")
+            raise HarnessError(f"scene {scene.name}: part {name} ({part.model}) has no parameter {unknown[0]}")
 
 
 def start_values(fmu: Path) -> dict[str, float]:
@@ -89,8 +88,8 @@ def start_values(fmu: Path) -> dict[str, float]:
 
 def values(scene: CoupledScene, defaults: Starts) -> Starts:
     """Return the values to set in each element; springs start at the positions of their parts."""
-    models = {part.name: defaults[part.model] | part.values for part in scene.parts}
-    values_by_element = {part.name: part.values for part in scene.parts if part.values}
+    models = {name: defaults[part.model] | part.values for name, part in scene.parts.items()}
+    values_by_element = {name: part.values for name, part in scene.parts.items() if part.values}
     for spring in scene.springs:
         ends = {f"x0_{end}": models[part]["x0"] for end, part in (("a", spring.a), ("b", spring.b)) if part}
         values_by_element[spring.name] = {"k": spring.k, "c": spring.c} | ends
@@ -99,7 +98,7 @@ def values(scene: CoupledScene, defaults: Starts) -> Starts:
 
 def element_fmus(scene: CoupledScene, folder: Path) -> dict[str, Path]:
     """Return the FMU of each element; the FMU of the springs is built here."""
-    fmus = {part.name: part.fmu for part in scene.parts}
+    fmus = {name: part.fmu for name, part in scene.parts.items()}
     if scene.springs:
         done = run_module("build_fmus", str(SPRING), "--out", str(folder))
         if done.returncode:
@@ -109,8 +108,8 @@ def element_fmus(scene: CoupledScene, folder: Path) -> dict[str, Path]:
 
 def unsolved_study(scene: CoupledScene) -> Convergence:
     """Return the study to run, which records the positions of the parts."""
-    read = tuple((part.name, "x", reference(part.fmu, "x")) for part in scene.parts)
-    labels = tuple(f"{part.name} ({part.model})" for part in scene.parts)
+    read = tuple((name, "x", reference(part.fmu, "x")) for name, part in scene.parts.items())
+    labels = tuple(f"{name} ({part.model})" for name, part in scene.parts.items())
     return Convergence(scene.title, read, labels, ("m",) * len(read), scene.steps, scene.stop, "monolithic reference")
 
 
