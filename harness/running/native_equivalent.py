@@ -59,7 +59,7 @@ def is_same_model(fmu: Path, other: Path) -> bool:
     t = np.linspace(0.0, resolve_stop(RunSpec(fmu), read_description(fmu)) or 1.0, COMPARED_POINTS)
     runs = []
     for each in (fmu, other):
-        with open_simulator(each, {}) as simulator:
+        with open_simulator(RunSpec(each)) as simulator:
             runs.append(simulator.simulate({}, t, outputs, {}))
     one, two = runs
     return one is not None and two is not None and np.allclose(one, two, rtol=AGREEMENT, atol=AGREEMENT)

@@ -47,11 +47,6 @@ typedef struct {
     double *values;
 } Variables;
 
-void ignore_message(void *environment, const char *name, int status, const char *category, const char *text, ...)
-{
-    (void)environment, (void)name, (void)status, (void)category, (void)text;
-}
-
 static bool set(const Fmu *fmu, const Variables *which, const double *values)
 {
     if (!which->count) return true;

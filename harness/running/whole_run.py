@@ -5,7 +5,7 @@ made from Python, which takes about thirty times as long. The FMU is instantiate
 """
 
 import sys
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from ctypes import CDLL, Structure, addressof, byref, c_double, c_int, c_size_t, c_uint32, c_void_p, cast
 from dataclasses import dataclass
@@ -16,16 +16,15 @@ from time import process_time
 from typing import Any
 
 import numpy as np
-from fmpy import fmi2, fmi3
-from fmpy.fmi1 import FMICallException
 
-from ..errors import HarnessError, first_line
+from ..errors import HarnessError
 from ..process.child_process import ChildError, ChildProcess
 from ..process.subprocess_runner import run_subprocess
 from ..process.temporary_directory import temporary_directory
+from ..scenes.run_spec import RunSpec
 from .c_host import COMPILER
-from .description import REQUIRED_VARIABLES, read_description
-from .fmu_session import capture_stderr, set_variable
+from .description import exposes_solver_steps, read_description
+from .fmu_session import CALL_FAILURES, FmuSession, capture_stderr
 from .unpacking import PROCESS_RESOURCES, unpack_once
 from .variable_values import REAL_TYPES, effective_value, find_bound, variable_unit
 
@@ -37,7 +36,6 @@ FUNCTIONS = {  # in the order of the structs in whole_run.c
 # without the runtime of the compiler, which would have to be built first
 OPTIONS = ("-std=c99", "-O2", "-shared", "-fPIC", "-nostdlib", "-lc")
 MAX_INPUTS = 64  # of whole_run.c
-TIME_LIMIT = 10.0  # s of processor time of one run
 STEPS_PER_CHECK = 16
 MAX_PREPARED = 64
 BUSY_TIME = 20.0  # s that a run in a child process may take beyond its processor time, on a busy machine
@@ -59,9 +57,7 @@ class VariablesStruct(Structure):
 class RealVariable:
     """A scalar Real of an FMU. Start value and bounds are None if the FMU declares none."""
 
-    reference: int
     causality: str
-    variability: str
     start: float | None
     minimum: float | None
     maximum: float | None
@@ -83,66 +79,39 @@ class RunRequest:
 
 
 class RepeatedRun:
-    """An instance of an FMU that is reset and run again and again.
+    """A session that is reset and run again and again.
 
     Parameters
     ----------
-    fmu : pathlib.Path
-    settings : mapping
-        Values of enumerations, Integers, Booleans and Strings, which all runs share.
-    limit : float
-        Seconds of processor time that one run may take.
+    shared : RunSpec
+        The FMU, values of variables of any type, which all runs share, and the seconds of processor time that one run
+        may take.
     """
 
-    def __init__(self, fmu: Path, settings: Mapping[str, Any], limit: float) -> None:
-        description = self.description = read_description(fmu)
-        self.version, self.limit, self.loop = description.fmiVersion, limit, compile_loop()
-        self.variables = real_variables(description)
-        named = {variable.name: variable for variable in description.modelVariables}
-        self.settings = [(named[name], value) for name, value in settings.items()]
-        self.is_new = True
-        self.prepared: dict[tuple[Any, ...], PreparedRun] = {}
-        self.fmu = self.instantiate(fmu)
-        names = FUNCTIONS[self.version]
-        pointers = (cast(getattr(self.fmu.dll, f"fmi{self.version[0]}{name}"), c_void_p) for name in names)
-        self.functions = (c_void_p * len(names))(*pointers)
-        self.handle = FmuStruct(int(self.version[0]), cast(self.functions, c_void_p), self.fmu.component, limit)
-
-    def instantiate(self, fmu: Path) -> Any:
-        """Return a new instance that logs nothing: a refused set of values is not worth a message."""
-        make = fmi2.FMU2Slave if self.version == "2.0" else fmi3.FMU3Slave
+    def __init__(self, shared: RunSpec) -> None:
         try:
-            instance = make(
-                guid=self.description.guid or "",
-                unzipDirectory=str(unpack_once(fmu)),
-                modelIdentifier=self.description.coSimulation.modelIdentifier,
-                instanceName=fmu.stem,
-            )
-            if self.version == "2.0":
-                self.callbacks = fmi2.fmi2CallbackFunctions()
-                logger = fmi2.fmi2CallbackLoggerTYPE
-                self.callbacks.logger = (
-                    cast(self.loop.ignore_message, logger) if self.loop else logger(lambda *message: None)
-                )
-                self.callbacks.allocateMemory = fmi2.fmi2CallbackAllocateMemoryTYPE(fmi2.calloc)
-                self.callbacks.freeMemory = fmi2.fmi2CallbackFreeMemoryTYPE(fmi2.free)
-                instance.instantiate(callbacks=self.callbacks)
-            else:
-                instance.instantiate(logMessage=lambda *message: None)
-        except Exception as error:  # fmpy raises bare Exceptions
-            raise HarnessError(f"{fmu.name} cannot be loaded: {first_line(error)}") from None
-        return instance
+            session = self.session = FmuSession(read_description(shared.fmu), unpack_once(shared.fmu))
+        except HarnessError as error:
+            raise HarnessError(f"{shared.fmu.name} cannot be loaded: {error}") from None
+        self.limit, self.loop, self.is_new = shared.timeout, compile_loop(), True
+        self.settings = [(session.variables[name], value) for name, value in shared.values.items()]
+        self.prepared: dict[tuple[Any, ...], PreparedRun] = {}
+        version = session.description.fmiVersion
+        self.functions = (c_void_p * len(FUNCTIONS[version]))(
+            *(cast(session.function(name), c_void_p) for name in FUNCTIONS[version])
+        )
+        self.handle = FmuStruct(int(version[0]), cast(self.functions, c_void_p), session.instance, self.limit)
 
     def run(self, request: RunRequest) -> np.ndarray | None:
         """Return the outputs (1 + (n - 1)//stride, outputs), or None if the FMU refuses the values or is too slow."""
         try:
             if not self.is_new:
-                self.fmu.reset()
+                self.session.reset()
             self.is_new = False
             for variable, value in self.settings:
-                set_variable(self.fmu, self.description, variable, value)
+                self.session.set(variable, value)
             return self.run_compiled(self.loop, request) if self.loop else self.run_in_python(request)
-        except (FMICallException, RunTimeError):
+        except (*CALL_FAILURES, RunTimeError):
             return None
 
     def run_compiled(self, loop: CDLL, request: RunRequest) -> np.ndarray:
@@ -152,7 +121,7 @@ class RepeatedRun:
         if prepared is None or prepared.request.stride != request.stride:
             if len(self.prepared) >= MAX_PREPARED:
                 self.prepared.clear()
-            prepared = self.prepared[key] = PreparedRun(request, self.handle, self.variables)
+            prepared = self.prepared[key] = PreparedRun(request, self.handle, self.session)
         prepared.x[:-1] = [*request.values.values()]
         if loop.run(*prepared.arguments):
             raise RunTimeError
@@ -161,29 +130,19 @@ class RepeatedRun:
     def run_in_python(self, request: RunRequest) -> np.ndarray:
         """Make the calls of whole_run.c from Python."""
         y = np.empty(((len(request.t) - 1) // request.stride + 1, len(request.outputs)))
-        fmu, t, begun = self.fmu, request.t.tolist(), process_time()
-        is_fmi2 = self.version == "2.0"
-        set_reals, get_reals = (fmu.setReal, fmu.getReal) if is_fmi2 else (fmu.setFloat64, fmu.getFloat64)
-        inputs = [self.variables[name].reference for name in request.inputs]
-        outputs = [self.variables[name].reference for name in request.outputs]
+        session, t, begun = self.session, request.t.tolist(), process_time()
+        inputs = [session.variables[name] for name in request.inputs]
         u = np.stack([*request.inputs.values()], axis=1) if inputs else np.zeros((len(t), 0))
         held = (0.5 * (u[:-1] + u[1:])).tolist()
-        set_reals([self.variables[name].reference for name in request.values], [*request.values.values()])
-        if is_fmi2:
-            fmu.setupExperiment(startTime=t[0], stopTime=t[-1])
-        fmu.enterInitializationMode(**({} if is_fmi2 else {"startTime": t[0], "stopTime": t[-1]}))
-        if inputs:
-            set_reals(inputs, u[0].tolist())
-        fmu.exitInitializationMode()
-        y[0] = get_reals(outputs)
+        values = [(session.variables[name], value) for name, value in request.values.items()]
+        session.initialize([*values, *zip(inputs, u[0].tolist(), strict=True)], t[0], t[-1])
+        y[0] = [session.get(name) for name in request.outputs]
         for i in range(len(t) - 1):
-            if inputs:
-                set_reals(inputs, held[i])
-            ended = fmu.doStep(t[i], t[i + 1] - t[i])
-            if not is_fmi2 and (ended[1] or ended[2]):
-                raise RunTimeError
+            for variable, value in zip(inputs, held[i], strict=True):
+                session.set(variable, value)
+            session.step(t[i], t[i + 1] - t[i])
             if (i + 1) % request.stride == 0:
-                y[(i + 1) // request.stride] = get_reals(outputs)
+                y[(i + 1) // request.stride] = [session.get(name) for name in request.outputs]
             if i % STEPS_PER_CHECK == 0 and process_time() - begun > self.limit:
                 raise RunTimeError
         if not np.isfinite(y).all():
@@ -202,30 +161,27 @@ class PreparedRun:
         Arguments of the function `run` of whole_run.c.
     """
 
-    def __init__(self, request: RunRequest, handle: FmuStruct, variables: Mapping[str, RealVariable]) -> None:
+    def __init__(self, request: RunRequest, handle: FmuStruct, session: FmuSession) -> None:
         self.request = request  # whose arrays must live on: their addresses identify this object
         self.x, self.t = np.zeros(len(request.values) + 1), np.ascontiguousarray(request.t, dtype=float)
         self.u = np.stack([*request.inputs.values()], axis=1).astype(float) if request.inputs else self.x
         self.y = np.empty(((len(self.t) - 1) // request.stride + 1, len(request.outputs)))
         self.structs = [
-            make_struct(names, variables, array)
+            make_struct([session.variables[name].valueReference for name in names], array)
             for names, array in ((request.values, self.x), (request.inputs, self.u), (request.outputs, self.y))
         ]
         pointers = [byref(handle), *(byref(struct) for struct, _ in self.structs), c_void_p(self.t.ctypes.data)]
         self.arguments = (*pointers, c_size_t(len(self.t)), c_size_t(request.stride))
 
 
-def make_struct(
-    names: Iterable[str], variables: Mapping[str, RealVariable], array: np.ndarray
-) -> tuple[VariablesStruct, Any]:
+def make_struct(references: Sequence[int], array: np.ndarray) -> tuple[VariablesStruct, Any]:
     """Return the struct of variables and their values, and the references, which must live as long."""
-    references = [variables[name].reference for name in names]
     array_of_references = (c_uint32 * max(len(references), 1))(*references)
     return VariablesStruct(addressof(array_of_references), len(references), array.ctypes.data), array_of_references
 
 
 class RunTimeError(Exception):
-    """A run does not reach its end in time, the FMU terminates it, or outputs are not finite."""
+    """A run does not reach its end in time, or outputs are not finite."""
 
 
 class IsolatedRun:
@@ -234,16 +190,15 @@ class IsolatedRun:
     Arrays are exchanged by files in `folder`.
     """
 
-    def __init__(self, fmu: Path, settings: Mapping[str, Any], limit: float, folder: Path) -> None:
-        self.process, self.folder = ChildProcess(f"{__package__}.whole_run_process"), folder
-        self.instance = {"fmu": fmu, "settings": settings, "limit": limit}
-        self.timeout = limit + BUSY_TIME
+    def __init__(self, shared: RunSpec, folder: Path) -> None:
+        self.process, self.shared, self.folder = ChildProcess(f"{__package__}.whole_run_process"), shared, folder
+        self.timeout = shared.timeout + BUSY_TIME
         self.files: dict[int, tuple[np.ndarray, Path]] = {}
         self.n_files = 0
         try:
-            self.process.ask({**self.instance, "run": None}, self.timeout)
+            self.process.ask({"shared": shared, "run": None}, self.timeout)
         except ChildError:
-            raise HarnessError(f"{fmu.name} cannot be loaded: it crashes or hangs") from None
+            raise HarnessError(f"{shared.fmu.name} cannot be loaded: it crashes or hangs") from None
 
     def store(self, array: np.ndarray) -> Path:
         """Return the file of an array of a request, which is written once."""
@@ -263,7 +218,7 @@ class IsolatedRun:
         inputs = {name: self.store(column) for name, column in request.inputs.items()}
         run = {**vars(request), "t": self.store(request.t), "inputs": inputs}
         try:
-            results = self.process.ask({**self.instance, "run": run, "folder": self.folder}, self.timeout)
+            results = self.process.ask({"shared": self.shared, "run": run, "folder": self.folder}, self.timeout)
         except ChildError:
             return None
         return np.load(results) if results else None
@@ -320,34 +275,30 @@ class Simulator:
 
 
 @contextmanager
-def open_simulator(fmu: Path, settings: Mapping[str, Any], limit: float = TIME_LIMIT) -> Iterator[Simulator]:
+def open_simulator(shared: RunSpec) -> Iterator[Simulator]:
     """Instantiate an FMU for many runs; one that is not of this project runs in a child process.
 
     Parameters
     ----------
-    fmu : pathlib.Path
-    settings : mapping
-        Values of enumerations, Integers, Booleans and Strings, which all runs share.
-    limit : float
-        Seconds of processor time that one run may take.
+    shared : RunSpec
+        What all runs share: the FMU, values, and as `timeout` the seconds of processor time that one run may take.
 
     Raises
     ------
     HarnessError
         If the FMU offers no co-simulation or cannot be loaded.
     """
-    description = read_description(fmu)
+    fmu, description = shared.fmu, read_description(shared.fmu)
     if description.coSimulation is None:
         raise HarnessError(f"{fmu.name} offers no co-simulation: export it for co-simulation")
-    names = [variable.name for variable in description.modelVariables]
     runner: RepeatedRun | IsolatedRun
     with ExitStack() as stack:
-        if all(name in names for name in REQUIRED_VARIABLES):
+        if exposes_solver_steps(description):
             stack.enter_context(capture_stderr())  # an FMU prints a sentence about each set that it refuses
-            runner = RepeatedRun(fmu, settings, limit)
-            stack.callback(runner.fmu.freeInstance)
+            runner = RepeatedRun(shared)
+            stack.callback(runner.session.close)
         else:
-            runner = IsolatedRun(fmu, settings, limit, stack.enter_context(temporary_directory("fit-")))
+            runner = IsolatedRun(shared, stack.enter_context(temporary_directory("fit-")))
             stack.callback(runner.close)
         yield Simulator(fmu.stem, real_variables(description), runner)
 
@@ -356,9 +307,7 @@ def real_variables(description: Any) -> dict[str, RealVariable]:
     """Return the scalar Reals of an FMU by name."""
     return {
         variable.name: RealVariable(
-            variable.valueReference,
             variable.causality,
-            variable.variability,
             effective_value(variable, variable.start),
             find_bound(variable, "min"),
             find_bound(variable, "max"),

@@ -1,19 +1,20 @@
 """Child process for repeated runs of an external FMU. Arrays are exchanged by files."""
 
+import json
 from functools import cache, lru_cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..process.child_process import RequestServer
+from ..scenes.run_spec import RunSpec
 from .whole_run import MAX_PREPARED, RepeatedRun, RunRequest
 
 
 @cache
-def open_run(fmu: str, settings: tuple[tuple[str, Any], ...], limit: float) -> RepeatedRun:
-    """Return the instance of an FMU with settings."""
-    return RepeatedRun(Path(fmu), dict(settings), limit)
+def open_run(shared: str) -> RepeatedRun:
+    """Return the session of what runs share, a RunSpec as JSON."""
+    return RepeatedRun(RunSpec.from_json(json.loads(shared)))
 
 
 @lru_cache(MAX_PREPARED)
@@ -29,15 +30,13 @@ def open_results(folder: str, shape: tuple[int, ...]) -> np.memmap:
     return np.lib.format.open_memmap(f"{folder}/y{shape}.npy", "w+", float, shape)
 
 
-def run_request(
-    fmu: str, settings: dict[str, Any], limit: float, run: dict[str, Any] | None, folder: str = ""
-) -> str | None:
+def run_request(shared: dict[str, Any], run: dict[str, Any] | None, folder: str = "") -> str | None:
     """Run an FMU, or load it if there is no run; return the file of the results, None if there are none."""
-    instance = open_run(fmu, tuple(settings.items()), limit)
+    runs = open_run(json.dumps(shared))
     if run is None:
         return None
     inputs = {name: load_array(path) for name, path in run["inputs"].items()}
-    y = instance.run(RunRequest(**{**run, "t": load_array(run["t"]), "inputs": inputs}))
+    y = runs.run(RunRequest(**{**run, "t": load_array(run["t"]), "inputs": inputs}))
     if y is None:
         return None
     results = open_results(folder, y.shape)

@@ -18,6 +18,7 @@ from harness.analyses.fit.law_comparison import compare_laws
 from harness.analyses.fit.parameter_fit import information_criterion
 from harness.errors import HarnessError, SceneError
 from harness.running.whole_run import open_simulator
+from harness.scenes.run_spec import RunSpec
 from harness.studies.fit.request import FitRequest, resolve_request
 
 T = np.linspace(0.0, 16.0, 201)
@@ -43,7 +44,7 @@ def native(model):
 def pull(outputs=("x",), values=TRUTH, t=T, noise=0.01, seed=1):
     """Return a DataFrame with a run of stickslip and white noise, a share of the range of each column."""
     pandas = pytest.importorskip("pandas")
-    with open_simulator(native("stickslip"), {}) as simulator:
+    with open_simulator(RunSpec(native("stickslip"))) as simulator:
         y = simulator.simulate(values, t, outputs, {})
         units = {name: simulator.variables[name].unit for name in outputs}
     y = y + noise * np.ptp(y, axis=0) * np.random.default_rng(seed).normal(size=y.shape)
@@ -60,7 +61,7 @@ def holds(estimate, truth, factor=1.5):
 def fit_drawn(name, seed, max_samples):
     """Draw a record of a group of GROUPS and fit it; return the record and the fit."""
     pandas, group = pytest.importorskip("pandas"), GROUPS[name]
-    with open_simulator(native(group.model), {}) as simulator:
+    with open_simulator(RunSpec(native(group.model))) as simulator:
         record = draw_record(group, simulator, np.random.default_rng(seed), max_samples=max_samples)
     columns = dict(zip(group.outputs, record.y.T, strict=True)) | record.inputs
     found = harness.fit(
@@ -140,7 +141,7 @@ def test_a_sensor_with_offset_and_gain_is_identified():
 def test_the_delay_of_a_sensor_is_identified(delay):
     """The delayed signal is interpolated from a run with 20 times as many samples."""
     fine = np.linspace(0.0, 8.0, 4001)
-    with open_simulator(native("coulomb"), {}) as simulator:
+    with open_simulator(RunSpec(native("coulomb"))) as simulator:
         force = shaker(fine)
         x = simulator.simulate({"x0": 0.0, "f": 2.0}, fine, ["x"], {"F_ext": force})[:, 0]
     t = fine[:-200:20]
@@ -285,7 +286,7 @@ def test_the_law_that_made_the_record_has_the_lowest_bic(record_of, v_s):
     frame = pull(noise=0.003)
     if v_s:
         values = {"f_s": 100.0, "f_d": 40.0, "k": 900.0, "v_driver": 0.04, "v_s": v_s}
-        with open_simulator(fmus[1], {}) as simulator:
+        with open_simulator(RunSpec(fmus[1])) as simulator:
             x = simulator.simulate(values, T, ["x"], {})[:, 0]
         frame["x"] = x + 0.003 * np.ptp(x) * np.random.default_rng(2).normal(size=len(T))
     found = harness.fit(fmus[0], frame, observe="x", against=fmus[1], **LAWS)

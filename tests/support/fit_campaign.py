@@ -26,6 +26,7 @@ from harness.records.columns import ColumnOptions  # noqa: E402
 from harness.records.signal_table import parse_signals  # noqa: E402
 from harness.records.table_files import Table  # noqa: E402
 from harness.running.whole_run import open_simulator  # noqa: E402
+from harness.scenes.run_spec import RunSpec  # noqa: E402
 from harness.studies.fit.request import FitRequest, resolve_request  # noqa: E402
 from harness.studies.fit.study import fit_tables  # noqa: E402
 
@@ -55,7 +56,7 @@ def cpu_seconds():
 def fit_drawn_record(group, seed, fmus):
     """Draw a record and fit it; return the record and the fit, or the reason why it was refused."""
     random = np.random.default_rng(seed)
-    with open_simulator(fmus / f"{group.record_of or group.model}.fmu", {}) as simulator:
+    with open_simulator(RunSpec(fmus / f"{group.record_of or group.model}.fmu")) as simulator:
         record = draw_record(group, simulator, random)
     columns = dict(zip(group.outputs, record.y.T, strict=True)) | record.inputs
     table = Table("record", ("t [s]", *columns), (record.t, *columns.values()))

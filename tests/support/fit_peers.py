@@ -38,6 +38,7 @@ from scipy.optimize import differential_evolution  # noqa: E402
 import harness  # noqa: E402
 from harness.process.temporary_directory import temporary_directory  # noqa: E402
 from harness.running.whole_run import open_simulator  # noqa: E402
+from harness.scenes.run_spec import RunSpec  # noqa: E402
 
 KINDS = ("position, 3 free", "forced")
 SEED, MAX_SAMPLES = 20261123, 400
@@ -137,7 +138,7 @@ PEERS = {  # module, function, all functions that a user writes, and whether it 
 def draw_even_record(name, number, fmus):
     """Return the first drawn record of this number with even times, and the start values of the FMU."""
     group = GROUPS[name]
-    with open_simulator(fmus / f"{group.model}.fmu", {}) as simulator:
+    with open_simulator(RunSpec(fmus / f"{group.model}.fmu")) as simulator:
         for attempt in range(100):
             random = np.random.default_rng([SEED, KINDS.index(name), number, attempt])
             record = draw_record(group, simulator, random, max_samples=MAX_SAMPLES)

@@ -24,6 +24,7 @@ from ...results.folder import replace_folder
 from ...results.summary import write_summary
 from ...running.native_equivalent import native_equivalent
 from ...running.whole_run import open_simulator
+from ...scenes.run_spec import RunSpec
 from .laws import ResolvedLaws, resolve_laws
 from .request import FitRequest, ResolvedRequest, make_unknowns, record_data
 from .table import summarize_fit
@@ -180,7 +181,8 @@ def fit_tables(
     data = [record_data(resolved, table) for table in tables]
     unknowns = make_unknowns(resolved, data)
     outputs = [*request.observe]
-    with open_simulator(native_equivalent(request.fmu), resolved.settings, request.timeout) as simulator:
+    shared = RunSpec(native_equivalent(request.fmu), values=dict(resolved.settings), timeout=request.timeout)
+    with open_simulator(shared) as simulator:
         problem, course = fit_records(
             simulator.simulate, data, outputs, unknowns, resolved.fixed, request.robust, report, averages
         )
