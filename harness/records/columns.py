@@ -14,9 +14,8 @@ import numpy as np
 
 from ..errors import SceneError, unknown_name_message
 from .headings import DATE_NAME, MAGNITUDE_NAME, TIME_NAME, order_from_name, split_heading
-from .missing_values import mark_dropouts, mark_sentinels
 from .record import QUANTITIES, Record, check_record
-from .saturation import leave_out_saturated
+from .sample_defects import leave_out_saturated, mark_dropouts, mark_sentinels
 from .table_files import Cells, Table, load_table
 from .text_table import GROUPED_NUMBER, MISSING, TIMESTAMP
 from .timestamps import parse_timestamps, undo_time_rounding

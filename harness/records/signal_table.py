@@ -19,11 +19,11 @@ from .columns import (
     runs_side_by_side,
 )
 from .headings import split_heading
-from .missing_values import mark_dropouts, mark_sentinels
-from .quantity_units import conversion_factor
 from .record import MIN_SAMPLES, Record, check_record
+from .sample_defects import mark_dropouts, mark_sentinels
 from .table_files import Table, load_table
 from .timestamps import undo_time_rounding
+from .units import conversion_factor
 
 MAX_MISSING_SHARE = 0.2  # of the rows
 

@@ -6,9 +6,9 @@ from record_formats import FORMATS, LIBRARIES
 
 from harness.errors import SceneError
 from harness.records.columns import ColumnOptions, find_signal_column, find_time_column, list_columns, read_record
-from harness.records.quantity_units import conversion_factor
 from harness.records.signal_table import SignalSource, parse_signals, read_signals
 from harness.records.table_files import load_table
+from harness.records.units import conversion_factor
 
 WANTED = {"x": SignalSource("laser", "m"), "F": SignalSource("load", "N")}
 

@@ -7,7 +7,7 @@ from math import isnan
 import numpy as np
 
 from ...errors import HarnessError
-from ...records.quantity_units import conversion_factor
+from ...records.units import conversion_factor
 from ...running.trajectory import Trajectory
 from .event_pairs import EventPairs, match_events, stack_events
 from .interpolation import SignalInterpolant, ValueBounds

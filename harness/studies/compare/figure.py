@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...records.quantity_units import conversion_factor
+from ...records.units import conversion_factor
 from ...results.quantity import display_unit
 from ...results.style import (
     BLUE,

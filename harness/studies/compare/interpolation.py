@@ -12,8 +12,8 @@ from functools import cached_property
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
 
+from ...records.units import is_rate_unit
 from ...running.trajectory import Trajectory
-from .units import is_rate_unit
 
 TIME_ROUNDING = 8 * np.finfo(float).eps  # times that differ by this fraction are equal but for rounding
 LARGE_VALUE, REDUCTION = 1e150, 2.0**-600  # larger values are scaled to avoid overflow

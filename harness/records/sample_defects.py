@@ -1,8 +1,11 @@
-"""Values that stand for a missing sample, such as -9999, in place of an empty cell."""
+"""Samples that are no measurements: values such as -9999 that stand for a missing sample, and a saturated sensor."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
+
+from .record import Record
 
 NINES = re.compile(r"9{3,}(\.9+)?")
 MAX_SENTINELS = 3  # different ones in a column
@@ -11,6 +14,8 @@ MIN_DOMINANCE = 5  # times as often as any other value
 MIN_JUMPS, JUMP = 3, 0.1  # times that a value is away from its neighbours, by this share of the range of the others
 MIN_JUMP_SHARE = 0.2  # of the times that the value occurs
 MIN_OTHERS = 3  # different values of the signal
+MIN_STAY = 3  # samples at the largest value, in a peak
+MIN_DWELL = 4.0  # times the samples at the level before the last; 1/(sqrt(2) - 1) = 2.4 at a rounded turning point
 
 
 def mark_sentinels(values: np.ndarray, name: str) -> list[str]:
@@ -64,3 +69,42 @@ def mark_dropouts(values: np.ndarray, name: str) -> list[str]:
         f"{int(is_mark.sum())} of {len(values)} values of {name} are {mark:.15g}, several times far from the samples "
         "beside them: they mark missing samples and are left out."
     ]
+
+
+def leave_out_saturated(record: Record) -> Record:
+    """Return a record without the samples at which the sensor was saturated, and with a note on them."""
+    x = record.x
+    if not len(x):
+        return record
+    is_saturated, levels, peaks = np.zeros(len(x), bool), [], 0
+    for sign in (1.0, -1.0):
+        side, count = find_saturated(sign * x)
+        if count:
+            levels.append(f"{x[side][0]:.6g}")
+            is_saturated, peaks = is_saturated | side, peaks + count
+    if not levels:
+        return record
+    note = (
+        f"The sensor was saturated: {int(is_saturated.sum())} of {len(x)} samples, in {peaks} peaks, are exactly "
+        f"{' or '.join(levels)} {record.unit}. They are left out; --from selects the record after them."
+    )
+    return replace(record, t=record.t[~is_saturated], x=x[~is_saturated], notes=(*record.notes, note))
+
+
+def find_saturated(x: np.ndarray) -> tuple[np.ndarray, int]:
+    """Return which samples of x (n,) are cut off at the largest value, and in how many peaks; none if it is not.
+
+    A motion that is cut off stays at its largest value in several peaks, and is rarely near it otherwise.  A motion
+    that is only rounded passes the level before the last nearly as long; one that is held before its release is at
+    rest in one peak, so the longest stay does not count.
+    """
+    none = np.zeros(len(x), bool), 0
+    is_highest, is_low = x == x.max(), x < (x.max() + x.min()) / 2
+    if not is_low.any():
+        return none
+    peak = np.cumsum(np.diff(is_low.astype(int), prepend=0) < 0)  # number of the peak; the motion is low between two
+    stays = np.bincount(peak[is_highest])
+    stays = np.sort(stays[stays >= MIN_STAY])[:-1]
+    second = x[~is_highest].max()
+    near = int(((x >= second - (x.max() - second) / 2) & ~is_highest).sum())
+    return (is_highest, len(stays) + 1) if stays.sum() > MIN_DWELL * near else none
