@@ -21,7 +21,19 @@ from click.core import ParameterSource
 from ..errors import HarnessError, check_names
 from ..process.interrupt import check_interrupt
 from ..process.temporary_directory import temporary_root
-from .renamed_option import FORMER_TIMEOUT, RenamedOption
+
+FORMER_TIMEOUT = "--patience"
+
+
+class RenamedOption(click.Option):
+    """An option that was renamed: help shows its first name; the others are former names, which still work."""
+
+    def get_help_record(self, ctx: click.Context) -> Any:
+        names, self.opts = self.opts, self.opts[:1]
+        try:
+            return super().get_help_record(ctx)
+        finally:
+            self.opts = names
 
 
 def out_option(text: str) -> Callable[..., Any]:

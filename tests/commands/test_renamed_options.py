@@ -3,7 +3,7 @@
 import pytest
 
 from harness.commands import commands
-from harness.commands.renamed_option import FORMER_TIMEOUT
+from harness.commands.terminal import FORMER_TIMEOUT
 
 
 @pytest.mark.parametrize("command", ["run", "compare a b", "sweep m --vary c=1,2"])
