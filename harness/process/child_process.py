@@ -289,4 +289,4 @@ def exit_when_orphaned(parent: int) -> None:
     """Exit once the process has another parent: the one that started it was killed."""
     while os.getppid() == parent:
         sleep(ORPHAN_INTERVAL)
-    os._exit(1)
+    os._exit(1)  # sys.exit would end this thread only, and the main thread may be in a call of an FMU

@@ -98,7 +98,7 @@ def exit_after_signal() -> None:
     interrupt late.
     """
     if RECEIVED_SIGNALS:
-        os._exit(128 + RECEIVED_SIGNALS[0])
+        os._exit(128 + RECEIVED_SIGNALS[0])  # sys.exit in an exit handler does not set the exit status
 
 
 @contextmanager

@@ -167,4 +167,4 @@ def exit_with_parent(folder: str) -> None:
     if parent:
         parent.join()
         rmtree(folder, ignore_errors=True)
-        os._exit(1)
+        os._exit(1)  # sys.exit would end this thread only, and the main thread may be in a call of an FMU
