@@ -96,6 +96,7 @@ def fit(
     from ..analyses.fit.parameter_fit import ParameterFit
     from ..records.columns import ColumnOptions
     from ..scenes.fmu_files import check_built, find_fmu
+    from ..scenes.run_spec import RunSpec
     from ..studies.fit import study
     from ..studies.fit.laws import resolve_laws
     from ..studies.fit.request import FitRequest
@@ -107,17 +108,15 @@ def fit(
     names = [free] if isinstance(free, str) else free
     values = start.values if isinstance(start, ParameterFit) else start or {}
     request = FitRequest(
-        fmu=fmus[0],
+        run=RunSpec(fmus[0], values=dict(fixed or {}), timeout=timeout),
         against=tuple(fmus[1:]),
         free=dict(names) if isinstance(names, Mapping) else dict.fromkeys(names),
         observe=headings_of(observe),
         inputs=headings_of(inputs),
-        fixed=fixed or {},
         sigma=sigma or {},
         start=values,
         each=tuple(each),
         robust=robust,
-        timeout=timeout,
         columns=ColumnOptions(
             time=time, rate=rate, begin=-inf if begin is None else begin, end=inf if end is None else end
         ),

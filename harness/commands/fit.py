@@ -72,6 +72,7 @@ def fit(
     from ..errors import SceneError
     from ..records.columns import ColumnOptions
     from ..scenes.fmu_files import check_built, find_fmu
+    from ..scenes.run_spec import RunSpec
     from ..studies.fit import options, study
     from ..studies.fit.request import FitRequest
     from ..studies.fit.table import result_parts
@@ -80,17 +81,15 @@ def fit(
     for each_fmu in (fmu, *others):
         check_built(each_fmu, SceneError)
     request = FitRequest(
-        fmu=fmu,
+        run=RunSpec(fmu, values=options.parse_values("--fixed", fixed), timeout=timeout),
         against=tuple(others),
         free=options.parse_ranges(free),
         observe=options.parse_columns("--observe", observe),
         inputs=options.parse_columns("--input", inputs),
-        fixed=options.parse_values("--fixed", fixed),
         sigma=options.parse_numbers("--sigma", sigma),
         start=options.parse_numbers("--start", start),
         each=tuple(filter(None, (name.strip() for name in (each or "").split(",")))),
         robust=robust,
-        timeout=timeout,
         columns=ColumnOptions(**columns),
     )
     with terminal.progress(1) as report:

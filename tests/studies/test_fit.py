@@ -240,7 +240,7 @@ def test_the_command_writes_what_it_prints(tmp_path):
 
 @pytest.mark.parametrize(("fixed", "rtol"), [({}, 1e-8), ({"solver.rtol": 1e-5}, 1e-5)])
 def test_runs_have_a_tight_tolerance_unless_the_user_fixes_another(fixed, rtol):
-    request = FitRequest(Path("fmus/stickslip.fmu"), {"k": None}, {"x": "x"}, fixed=fixed)
+    request = FitRequest(RunSpec(Path("fmus/stickslip.fmu"), values=fixed), {"k": None}, {"x": "x"})
     assert resolve_request(request).fixed["solver.rtol"] == rtol
 
 

@@ -62,7 +62,8 @@ def fit_drawn_record(group, seed, fmus):
     table = Table("record", ("t [s]", *columns), (record.t, *columns.values()))
     observe, inputs = {name: name for name in group.outputs}, {name: name for name in record.inputs}
     fmu = fmus / f"{group.model}.fmu"
-    request = FitRequest(fmu, record.free, observe, inputs, record.fixed, columns=ColumnOptions())
+    run = RunSpec(fmu, values=record.fixed, timeout=10.0)
+    request = FitRequest(run, record.free, observe, inputs, columns=ColumnOptions())
     resolved = resolve_request(request)
     try:
         signals = parse_signals(table, resolved.sources, request.columns, "record")

@@ -34,7 +34,7 @@ def resolve_laws(request: FitRequest) -> ResolvedLaws:
         If a name is unknown in all FMUs, if an FMU has none of the free parameters or lacks an observed output or an
         input, or if two FMUs are the same.
     """
-    fmus = [request.fmu, *request.against]
+    fmus = [request.run.fmu, *request.against]
     names = law_names(fmus)
     if len(fmus) == 1:
         return ResolvedLaws((resolve_request(request),), ((),))
@@ -42,19 +42,22 @@ def resolve_laws(request: FitRequest) -> ResolvedLaws:
     free = [parameter_names(description, request.observe) for description in descriptions]
     settable = [settable_names(description) for description in descriptions]
     check_names("parameter", request.free, {*chain.from_iterable(free)})
-    check_names("parameter", request.fixed, {*chain.from_iterable(settable)})
+    check_names("parameter", request.run.values, {*chain.from_iterable(settable)})
     check_names("free parameter", [*request.start, *request.each], [*request.free])
     laws, notes = [], []
     for fmu, name, description, own, fixable in zip(fmus, names, descriptions, free, settable, strict=True):
         law = replace(
             request,
-            fmu=fmu,
+            run=replace(
+                request.run,
+                fmu=fmu,
+                values={each: value for each, value in request.run.values.items() if each in fixable},
+            ),
             name=name,
             against=(),
             free={each: limits for each, limits in request.free.items() if each in own},
             start={each: value for each, value in request.start.items() if each in own},
             each=tuple(each for each in request.each if each in own),
-            fixed={each: value for each, value in request.fixed.items() if each in fixable},
         )
         for kind, causalities, given in (
             ("output", READABLE, request.observe),
@@ -66,7 +69,7 @@ def resolve_laws(request: FitRequest) -> ResolvedLaws:
                 f"{name} has none of the free parameters {', '.join(request.free)}: free some of its own as well, as "
                 f"in --free {','.join([*request.free, *own[:1]])}"
             )
-        lacking = [each for each in (*request.free, *request.fixed) if each not in own and each not in fixable]
+        lacking = [each for each in (*request.free, *request.run.values) if each not in own and each not in fixable]
         notes.append((f"{name} has no {', '.join(lacking)}: its fit leaves them out.",) if lacking else ())
         try:
             laws.append(resolve_request(law))

@@ -1,7 +1,7 @@
 """Checked request of a fit: what is fitted, fixed, observed and driven."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import inf, isfinite
 from pathlib import Path
 from typing import Any
@@ -17,6 +17,7 @@ from ...records.signal_table import SignalSource, SignalTable
 from ...running.description import read_description
 from ...running.variable_values import convert_value
 from ...running.whole_run import MAX_INPUTS, RealVariable, real_variables
+from ...scenes.run_spec import RunSpec
 
 SAMPLES_PER_UNKNOWN = 4
 GAIN_RANGE = (0.5, 2.0)
@@ -33,12 +34,11 @@ class FitRequest:
 
     Attributes
     ----------
-    fmu : pathlib.Path
+    run : RunSpec
+        The FMU, the values of other variables, and as `timeout` the seconds of processor time that one run may take.
     free : mapping
         Range to search of each unknown, None for the default. ``offset(x)``, ``gain(x)`` and ``delay(x)`` are
         those of the sensor of an observed variable.
-    fixed : mapping
-        Values of other variables by name; enumerations by label or number.
     observe, inputs : mapping
         Headings of the columns of observed variables and of inputs, by variable.
     sigma : mapping
@@ -49,8 +49,6 @@ class FitRequest:
         Unknowns with a value of its own for each record.
     robust : bool
         Whether outliers count little.
-    timeout : float
-        Seconds of processor time that one run may take.
     columns : ColumnOptions
         Options for the time column.
     against : tuple of pathlib.Path
@@ -59,16 +57,14 @@ class FitRequest:
         Name of the FMU in results; by default that of its file.
     """
 
-    fmu: Path
+    run: RunSpec
     free: Mapping[str, Range]
     observe: Mapping[str, str]
     inputs: Mapping[str, str] = field(default_factory=dict)
-    fixed: Mapping[str, Any] = field(default_factory=dict)
     sigma: Mapping[str, float] = field(default_factory=dict)
     start: Mapping[str, float] = field(default_factory=dict)
     each: tuple[str, ...] = ()
     robust: bool = False
-    timeout: float = 10.0
     columns: ColumnOptions = field(default_factory=ColumnOptions)
     against: tuple[Path, ...] = ()
     name: str = ""
@@ -76,18 +72,18 @@ class FitRequest:
 
 @dataclass(frozen=True)
 class ResolvedRequest:
-    """A request that fits the FMU: sources of all signals, fixed Reals, and settings of other types."""
+    """A request that fits the FMU: sources of all signals, fixed Reals, and the run with values of other types only."""
 
     request: FitRequest
     variables: Mapping[str, RealVariable]
     sources: Mapping[str, SignalSource]
     fixed: Mapping[str, float]
-    settings: Mapping[str, Any]
+    shared: RunSpec
 
     @property
     def name(self) -> str:
         """Return the name of the FMU in results."""
-        return self.request.name or self.request.fmu.stem
+        return self.request.name or self.request.run.model
 
 
 def resolve_request(request: FitRequest) -> ResolvedRequest:
@@ -98,7 +94,7 @@ def resolve_request(request: FitRequest) -> ResolvedRequest:
     SceneError
         If a name, a value or a range does not fit.
     """
-    description = read_description(request.fmu)
+    description = read_description(request.run.fmu)
     variables = real_variables(description)
     parameters = parameter_names(description, request.observe)
     inputs = variable_names(description, ("input",))
@@ -115,8 +111,8 @@ def resolve_request(request: FitRequest) -> ResolvedRequest:
     check_names("observed variable", request.sigma, [*request.observe])
     check_names("free parameter", [*request.start, *request.each], [*request.free])
     declared = {variable.name: variable for variable in description.modelVariables}
-    check_names("parameter", request.fixed, settable_names(description))
-    for name in request.fixed:
+    check_names("parameter", request.run.values, settable_names(description))
+    for name in request.run.values:
         if name in request.free or name in request.inputs:
             raise SceneError(
                 f"{name} is fixed, and {'free' if name in request.free else 'driven by a column'}: remove one"
@@ -124,7 +120,7 @@ def resolve_request(request: FitRequest) -> ResolvedRequest:
     for name, value in request.sigma.items():
         if not (isfinite(value) and value > 0):
             raise SceneError(f"sigma of {name} is {value!r}: it must be a finite number above 0")
-    converted = {name: convert_value(declared[name], value) for name, value in request.fixed.items()}
+    converted = {name: convert_value(declared[name], value) for name, value in request.run.values.items()}
     if SOLVER_RTOL in variables:
         converted = {SOLVER_RTOL: TOLERANCE} | converted
     signals = {**request.observe, **request.inputs}
@@ -133,7 +129,7 @@ def resolve_request(request: FitRequest) -> ResolvedRequest:
         variables,
         {name: SignalSource(heading, variables[name].unit) for name, heading in signals.items()},
         {name: value for name, value in converted.items() if name in variables},
-        {name: value for name, value in converted.items() if name not in variables},
+        replace(request.run, values={name: value for name, value in converted.items() if name not in variables}),
     )
 
 

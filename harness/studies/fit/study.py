@@ -24,7 +24,6 @@ from ...results.folder import replace_folder
 from ...results.summary import write_summary
 from ...running.native_equivalent import native_equivalent
 from ...running.whole_run import open_simulator
-from ...scenes.run_spec import RunSpec
 from .laws import ResolvedLaws, resolve_laws
 from .request import FitRequest, ResolvedRequest, make_unknowns, record_data
 from .table import summarize_fit
@@ -54,9 +53,10 @@ def fit_files(
     with replace_folder(folder, FILES, source) as new_folder:
         fit = fit_laws(laws, records, others, report)
         write_results(fit, new_folder)
-        paths = [request.fmu, *request.against, *(Path(file) for file in (*files, *validation) if file != "-")]
-        scene = {name: value for name, value in asdict(request).items() if name not in ("fmu", "columns", "against")}
-        parameters = {name: (value, "") for name, value in request.fixed.items()}
+        paths = [request.run.fmu, *request.against, *(Path(file) for file in (*files, *validation) if file != "-")]
+        scene = {name: value for name, value in vars(request).items() if name not in ("run", "columns", "against")}
+        scene |= {"fixed": request.run.values, "timeout": request.run.timeout}
+        parameters = {name: (value, "") for name, value in request.run.values.items()}
         provenance.write_provenance(new_folder, files=paths, parameters=parameters, scene=scene, source=source)
         write_summary(new_folder, summarize_fit(fit))
     return fit, folder
@@ -181,8 +181,7 @@ def fit_tables(
     data = [record_data(resolved, table) for table in tables]
     unknowns = make_unknowns(resolved, data)
     outputs = [*request.observe]
-    shared = RunSpec(native_equivalent(request.fmu), values=dict(resolved.settings), timeout=request.timeout)
-    with open_simulator(shared) as simulator:
+    with open_simulator(replace(resolved.shared, fmu=native_equivalent(request.run.fmu))) as simulator:
         problem, course = fit_records(
             simulator.simulate, data, outputs, unknowns, resolved.fixed, request.robust, report, averages
         )
