@@ -135,10 +135,7 @@ def run_fmu_file(path: Path, values: tuple[str, ...], options: dict[str, Any], t
         for name, (first, last) in ends.items()
     ]
     if trajectory.events:
-        stuck = {
-            contact: sum(end - begin for begin, end in trajectory.events.sticking(contact, float(trajectory.time[-1])))
-            for contact in trajectory.events.modes
-        }
+        stuck = {contact: sum(end - begin for begin, end in rests) for contact, rests in trajectory.sticking.items()}
         changes = {contact: len(trajectory.events.changes(contact)[0]) - 1 for contact in stuck}
         data["contacts"] = {contact: {"changes": changes[contact], "stuck": stuck[contact]} for contact in stuck}
         lines += [
