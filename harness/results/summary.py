@@ -127,6 +127,14 @@ def make_table(headings: Iterable[str], rows: Iterable[Iterable[object]], title:
     return (SummaryTable(tuple(headings), cells, title),) if cells else ()
 
 
+def make_terminal_table(title: str | None = None) -> "rich.table.Table":
+    """Return an empty table for the terminal, in the style of all studies."""
+    from rich.box import SIMPLE_HEAD
+    from rich.table import Table
+
+    return Table(title=title, title_justify="left", box=SIMPLE_HEAD, show_edge=False, padding=(0, 1, 0, 0))
+
+
 def read_cells(table: "rich.table.Table", title: str = "") -> tuple[SummaryTable, ...]:
     """Return a table of the terminal as the only item; nothing if it has no rows."""
     rows = zip(*(column.cells for column in table.columns), strict=True)

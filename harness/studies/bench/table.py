@@ -3,17 +3,16 @@
 from collections.abc import Iterable
 from math import isnan
 
-from rich.box import SIMPLE_HEAD
 from rich.table import Table
 from rich.text import Text
 
-from ...results.summary import Summary, make_table
+from ...results.summary import Summary, make_table, make_terminal_table
 from .benchmark import Baseline, Benchmark
 
 
 def benchmark_table(benchmarks: Iterable[Benchmark]) -> Table:
     """Return the table of measured values, targets and baselines."""
-    table = Table(box=SIMPLE_HEAD, show_edge=False, padding=(0, 1, 0, 0))
+    table = make_terminal_table()
     table.add_column("benchmark")
     table.add_column("measured", justify="right", no_wrap=True)
     table.add_column("target", justify="right", no_wrap=True)

@@ -5,13 +5,12 @@ from math import isnan
 from pathlib import Path
 from typing import Any
 
-from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from ...results.files import to_json
 from ...results.folder import replace_folder
 from ...results.provenance import describe_sources, prefix_parameters, write_provenance
-from ...results.summary import Summary, read_cells, write_summary
+from ...results.summary import Summary, make_terminal_table, read_cells, write_summary
 from ...running.own_fmu import ProgressCallback
 from ...scenes.run_spec import RunSpec
 from . import trajectory_sources
@@ -91,7 +90,7 @@ def events(comparison: Comparison) -> dict[str, Any]:
 
 def difference_table(comparison: Comparison) -> Table:
     """Return the table of differences, with one row per variable."""
-    result = Table(box=SIMPLE_HEAD, show_edge=False, padding=(0, 1, 0, 0))
+    result = make_terminal_table()
     result.add_column("")
     for head in ("largest difference", "at t [s]", "rms", "relative to largest"):
         result.add_column(head, justify="right", no_wrap=True)

@@ -1,20 +1,17 @@
 """An identified decay in the terminal and in its summary: a table of three methods, and remarks."""
 
 import numpy as np
-from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from ...analyses.decay.identification import DecayIdentification
 from ...analyses.estimation.estimate import Estimate
 from ...results.quantity import format_interval
-from ...results.summary import Summary, make_table, read_cells
+from ...results.summary import Summary, make_table, make_terminal_table, read_cells
 
 
 def decay_table(identified: DecayIdentification) -> Table:
     """Return the table of values with 95 % intervals from the whole signal, turning points, and two peaks."""
-    result = Table(
-        box=SIMPLE_HEAD, show_edge=False, padding=(0, 1, 0, 0), title=identified.record.name, title_justify="left"
-    )
+    result = make_terminal_table(identified.record.name)
     result.add_column("", min_width=14)
     for head in ("whole signal", "turning points", "two peaks"):
         result.add_column(head, justify="right")

@@ -2,21 +2,18 @@
 
 from math import isfinite
 
-from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from ...analyses.estimation.estimate import Estimate
 from ...analyses.fit.parameter_fit import ColumnResiduals, ParameterFit
 from ...results.quantity import format_interval
-from ...results.summary import Summary, read_cells
+from ...results.summary import Summary, make_terminal_table, read_cells
 
 
 def fit_table(fit: ParameterFit) -> Table:
     """Return the table of values with 95 % intervals."""
     names = ", ".join(record.name for record in fit.records)
-    result = Table(
-        box=SIMPLE_HEAD, show_edge=False, padding=(0, 1, 0, 0), title=f"{fit.fmu}: {names}", title_justify="left"
-    )
+    result = make_terminal_table(f"{fit.fmu}: {names}")
     result.add_column("")
     result.add_column("value, 95 % interval", justify="right")
     result.add_column("", no_wrap=True)
@@ -38,7 +35,7 @@ def format_estimate(estimate: Estimate) -> str:
 def comparison_table(fit: ParameterFit) -> Table:
     """Return the table of the compared laws, best first."""
     assert fit.comparison
-    result = Table(box=SIMPLE_HEAD, show_edge=False, padding=(0, 1, 0, 0))
+    result = make_terminal_table()
     result.add_column("law")
     for heading in ("unknowns", "residual/noise", "BIC", "above the best"):
         result.add_column(heading, justify="right")

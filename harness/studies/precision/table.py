@@ -3,10 +3,10 @@
 from collections.abc import Iterable
 from math import isnan
 
-from rich.box import SIMPLE_HEAD
 from rich.table import Table
 from rich.text import Text
 
+from ...results.summary import make_terminal_table
 from .advice import TARGETS, fastest_point, format_power
 from .law_deviations import LawDeviation
 from .literature_problems import LiteratureRun
@@ -76,7 +76,7 @@ def literature_table(rows: Iterable[LiteratureRun]) -> Table:
 
 def empty_table(title: str, first: str) -> Table:
     """Return an empty table with its first column, as wide as the title."""
-    table = Table(title=title, title_justify="left", box=SIMPLE_HEAD, show_edge=False, padding=(0, 1, 0, 0))
+    table = make_terminal_table(title)
     table.min_width = len(title)
     table.add_column(first, no_wrap=True)
     return table
