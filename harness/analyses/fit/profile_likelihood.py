@@ -12,7 +12,7 @@ import numpy as np
 from .fit_problem import FitProblem
 from .uncertainty import Uncertainty
 
-MAX_TRIALS = 20
+MAX_TRIALS = 14
 MAX_STEPS, MIN_GAIN = 40, 5e-4  # of a fit of the other coordinates; least gain of a step, in units of the limit
 LONGEST_FIRST_STEP = 0.25  # distance of the first trial
 MIN_GROWTH, MAX_GROWTH = 0.05, 2.0  # next step outwards: least share of the distance, and ratio to the last step
