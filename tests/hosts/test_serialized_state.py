@@ -24,6 +24,14 @@ REFUSAL = (
 )
 
 
+@pytest.mark.parametrize("limit", [2**63 - 1, -(2**63)])
+def test_integers_beyond_64_bits_are_no_part_of_a_state(limit):
+    """They would raise in the code of the host."""
+    matches_pattern = runtime("smd", "saved_state").matches_pattern
+    assert matches_pattern({"count": [limit]}, {"count": [0]})
+    assert not matches_pattern({"count": [limit + (1 if limit > 0 else -1)]}, {"count": [0]})
+
+
 def running_instance(name):
     """Return the slave class of a model, and an instance during a run."""
     slave_class = runtime(name, "slave").make_slave_class(model_class(name))

@@ -5,8 +5,11 @@ from math import inf, isnan, nan
 import model_exchange_client
 import pytest
 from model_exchange_client import DRIVEN, handle_event_at, single_error
-from models import MODELS, PUSHED, declared, outputs, push
+from models import MODELS, PUSHED, declared, model_class, outputs, push, runtime
 from worker_client import FmiError
+
+from fmus.packaging.lowering import model_exchange_instance
+from fmus.runtime.codes import DIVERGED, OK
 
 fmus, launch, launch_moving = model_exchange_client.FIXTURES
 EVERY_MODEL = pytest.mark.parametrize("name", MODELS)
@@ -31,6 +34,20 @@ def test_a_wild_trial_state_is_no_failure(launch_moving, name):
     assert single_error(fmu) == ""
     fmu.enter_event_mode()
     assert fmu.update_discrete_states() == []
+
+
+@EVERY_MODEL
+@pytest.mark.parametrize(("size", "status"), [(1e90, OK), (1e110, DIVERGED), (1e300, DIVERGED), (nan, DIVERGED)])
+def test_an_accepted_point_of_a_diverging_solution_ends_the_run(name, size, status):
+    """Also where the outputs are finite."""
+    exchange, calls = runtime(name, "model_exchange"), runtime(name, "call_sequence")
+    model, run = model_exchange_instance(model_class(name)), calls.RunState(1e-4)
+    exchange.enable(run)
+    assert calls.exit_initialization(run, model) == OK
+    exchange.begin(model)
+    model.model_exchange.states[0] = size
+    exchange.set_continuous_states(run, model)
+    assert exchange.complete_step(run, model) == status
 
 
 @EVERY_MODEL

@@ -2,7 +2,7 @@
 
 import re
 from contextlib import nullcontext, suppress
-from math import isfinite, isnan
+from math import copysign, inf, isfinite, isnan, nextafter
 from xml.etree import ElementTree
 from zipfile import ZipFile
 
@@ -103,6 +103,22 @@ def test_start_values_are_present_where_required_and_in_range(description, name)
         assert float(kind.get("min", "-inf")) <= float(start) <= float(kind.get("max", "inf"))
         if kind.tag == "Enumeration":
             assert start in [item.get("value") for item in types[kind.get("declaredType")]]
+
+
+@EVERY_MODEL
+def test_the_range_of_a_variable_is_that_of_the_values_it_accepts(description, name):
+    """FMI has no open bounds."""
+    for scalar in description(name).findall("ModelVariables/ScalarVariable"):
+        accepts = declared(name)[scalar.get("name")].accepts
+        if scalar[0].tag != "Real" or scalar.get("causality") not in ("parameter", "input"):
+            continue
+        for bound, outward in ("min", -inf), ("max", inf):
+            if scalar[0].get(bound) is None:
+                assert accepts(copysign(1e300, outward))
+            else:
+                end = float(scalar[0].get(bound))
+                assert accepts(nextafter(end, -outward))
+                assert not accepts(nextafter(end, outward))
 
 
 @EVERY_MODEL
