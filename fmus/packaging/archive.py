@@ -27,8 +27,9 @@ from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
 from . import BuildError, __date__
 from .documentation_page import extra_files
 from .embedded_modules import digest, embedded_files, installed_package
+from .fmi_variables import declared_variables
 from .lowering import lowered_files, lowered_model, select_features
-from .model_description import declared_variables, describe
+from .model_description import describe
 from .model_lookup import find_model
 
 HOST_REQUIREMENTS = """\

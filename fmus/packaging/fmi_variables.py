@@ -7,6 +7,7 @@ from copy import copy
 from typing import Any
 
 from ..runtime.codes import HYBRID
+from ..runtime.run_state import RunState
 from ..runtime.variable_declarations import Local, VariableDeclaration, variables
 
 TIME, TO_REST, TO_BREAK_AWAY = "time", "events.to_rest", "events.to_break_away"
@@ -27,11 +28,12 @@ class ContinuousLocal(Local):
     variability = "continuous"
 
 
-def declared_variables(thing: Any) -> Variables:
-    """Return name and declaration of the variables of an instance; the text of a mode names its contact."""
-    declared = variables(thing)
+def declared_variables(model: Any) -> Variables:
+    """Return name and declaration of the variables of a model class and its solver; a mode names its contact."""
+    instance = model()
+    declared = variables(instance) + variables(RunState(instance))
     forces = [name for name, meaning in declared if meaning.role == "contact"]
-    force_of = dict(zip(thing.contacts, forces, strict=True))
+    force_of = dict(zip(model.contacts, forces, strict=True))
     return [
         (name, name_contact(meaning, force_of[name]) if name in force_of else meaning) for name, meaning in declared
     ]
@@ -54,15 +56,15 @@ def integrated_states(declared: Variables) -> Variables:
     return [(name, meaning) for name, meaning in declared if meaning.role == "state" and not meaning.rate]
 
 
-def all_variables(thing: Any) -> Variables:
-    """Return name and declaration of all variables of a model-exchange instance: declared ones, added ones, time."""
-    declared = declared_variables(thing)
+def all_variables(model: Any) -> Variables:
+    """Return name and declaration of all variables for model exchange: declared ones, added ones, time."""
+    declared = declared_variables(model)
     meanings = dict(declared)
     added: Variables = []
     forces = [meaning.unit for _, meaning in declared if meaning.role == "contact"]
     states = [meaning for _, meaning in integrated_states(declared)]
     speed = next((meaning.unit for meaning in states if meaning.rate_of), states[0].unit)
-    for (mode, slip), force in zip(thing.contacts.items(), forces, strict=True):
+    for (mode, slip), force in zip(model.contacts.items(), forces, strict=True):
         tail, where = (f"_{mode}", f" of {mode}") if len(forces) > 1 else ("", "")
         stick_text = f"event indicator{where}: speed in the direction of sliding; 1 while stuck"
         slip_text = f"event indicator{where}: holding limit minus load on the body at rest; 1 while sliding"
@@ -70,9 +72,9 @@ def all_variables(thing: Any) -> Variables:
             (TO_REST + tail, ContinuousLocal(meanings[slip].unit if slip else speed, stick_text)),
             (TO_BREAK_AWAY + tail, ContinuousLocal(force, slip_text)),
         ]
-    for n in range(thing.n_event_functions - thing.first_condition):
-        text = f"event indicator of condition {n + 1}; falls to zero where {thing.condition_texts[n]}"
-        added.append((CONDITION.format(n + 1), ContinuousLocal(thing.condition_units[n], text)))
+    for n in range(model.n_event_functions - model.first_condition):
+        text = f"event indicator of condition {n + 1}; falls to zero where {model.condition_texts[n]}"
+        added.append((CONDITION.format(n + 1), ContinuousLocal(model.condition_units[n], text)))
     for name, meaning in declared:
         if meaning.rate:
             description = "rate of the " + meaning.text.split(",")[0]

@@ -4,6 +4,7 @@ Python FMUs support co-simulation; native FMUs also model exchange, with additio
 Functions that do not depend on the FMI version are shared with model_description_fmi3.py.
 """
 
+from collections.abc import Sequence
 from datetime import datetime
 from math import isfinite
 from typing import Any
@@ -12,13 +13,14 @@ from xml.etree.ElementTree import Element, SubElement, tostring
 
 from ..runtime.variable_access import SETTABLE_CAUSALITIES
 from ..runtime.variable_declarations import VariableDeclaration, VariableOwner
-from . import __version__, fmi_variables
+from . import __version__
 from .dependencies import output_dependencies
 from .fmi_variables import (
     DERIVATIVE_NAME,
     TIME,
     Variables,
     all_variables,
+    declared_variables,
     derivative_indices,
     event_indicator_indices,
     has_step_events,
@@ -51,7 +53,7 @@ LOG_CATEGORIES = {
 }
 
 
-def describe(model: type[VariableOwner], name: str, code: str, date: datetime, exchange: Any = None) -> bytes:
+def describe(model: Any, name: str, code: str, date: datetime, nominals: Sequence[float] = ()) -> bytes:
     """Return the FMI 2.0 model description of the FMU `name` as XML.
 
     Parameters
@@ -59,22 +61,21 @@ def describe(model: type[VariableOwner], name: str, code: str, date: datetime, e
     code
         Digest of the embedded sources.  The GUID is computed from it and from the description without the date, so
         equal GUIDs mean equal content.
-    exchange
-        Instance for model exchange, if the FMU supports it.
+    nominals
+        Nominal values of the continuous states, if the FMU supports model exchange.
     """
     root = create_root(model, name, "2.0", "guid")
-    exchanging = exchange is not None
-    thing: Any = exchange if exchanging else model()
-    declared = fmi_variables.declared_variables(thing)
+    exchanging = len(nominals) > 0
+    declared = declared_variables(model)
     if exchanging:  # FMI 2.0 needs no time variable, and FMILibrary rejects one
-        declared = [one for one in all_variables(thing) if one[0] != TIME]
+        declared = [one for one in all_variables(model) if one[0] != TIME]
         root.set("numberOfEventIndicators", str(len(event_indicator_indices(declared))))
         step_report = {} if has_step_events(declared) else {"completedIntegratorStepNotNeeded": "true"}
         SubElement(root, "ModelExchange", EXCHANGE_CAPABILITIES | step_report, modelIdentifier=name)
     stepping = (
         STEPPING_CAPABILITIES
         | (DIRECTIONAL_DERIVATIVES | OUTPUT_DERIVATIVES if exchanging else {})
-        | (INPUT_INTERPOLATION if thing.has_input_derivatives else {})
+        | (INPUT_INTERPOLATION if model.has_input_derivatives else {})
     )
     SubElement(root, "CoSimulation", stepping, modelIdentifier=name)
     add_units(root, declared)
@@ -88,7 +89,7 @@ def describe(model: type[VariableOwner], name: str, code: str, date: datetime, e
         if meaning.rate_of:
             of_type.set("derivative", positions[meaning.rate_of])
     rates = derivative_indices(declared) if exchanging else {}
-    mark_states([scalar[0] for scalar in scalars], thing, rates, first=1)
+    mark_states([scalar[0] for scalar in scalars], model, rates, nominals, first=1)
     _add_structure(root, model, declared, rates)
     return serialize(root, "guid", code, date)
 
@@ -117,11 +118,6 @@ def add_log_categories_and_experiment(root: Element, model: type[VariableOwner],
     experiment = SubElement(root, "DefaultExperiment", startTime="0.0")
     for key, attribute in EXPERIMENT_ATTRIBUTES.items():
         experiment.set(key, repr(float(getattr(model, attribute))))
-
-
-def declared_variables(model: type[VariableOwner]) -> Variables:
-    """Return name and declaration of every variable of a model."""
-    return fmi_variables.declared_variables(model())
 
 
 def add_units(root: Element, declared: Variables) -> None:
@@ -198,21 +194,23 @@ def type_attributes(name: str, meaning: VariableDeclaration) -> dict[str, str]:
     return attributes
 
 
-def mark_states(elements: list[Element], thing: Any, rates: dict[int, int], first: int) -> None:
+def mark_states(
+    elements: list[Element], model: Any, rates: dict[int, int], nominals: Sequence[float], first: int
+) -> None:
     """Set `derivative`, `nominal` and `reinit`; variables are numbered from `first`.
 
     Slip speeds have reinit, because events may set them to zero.
     """
     if not rates:
         return
-    for (rate, state), size in zip(rates.items(), thing.model_exchange.nominals, strict=True):
+    for (rate, state), size in zip(rates.items(), nominals, strict=True):
         elements[rate].set("derivative", str(state + first))
         elements[state].set("nominal", repr(size))
-    slips = [slip for slip in thing.contacts.values() if slip]
-    if len(slips) < len(thing.contacts):  # the slip of a contact is an expression: any speed may be set
-        slips = [name for name in thing.states if name in thing.states.values()] or list(thing.states)
+    slips = [slip for slip in model.contacts.values() if slip]
+    if len(slips) < len(model.contacts):  # the slip of a contact is an expression: any speed may be set
+        slips = [name for name in model.states if name in model.states.values()] or list(model.states)
     for slip in slips:
-        elements[list(rates.values())[list(thing.states).index(slip)]].set("reinit", "true")
+        elements[list(rates.values())[list(model.states).index(slip)]].set("reinit", "true")
 
 
 DependencyTable = dict[int, list[int]]  # index of a variable -> indices of the variables that it depends on

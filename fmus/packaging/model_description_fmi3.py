@@ -40,13 +40,13 @@ STEPPING_CAPABILITIES = {
 }
 
 
-def describe(model: type[VariableOwner], name: str, code: str, date: datetime, exchange: Any) -> bytes:
+def describe(model: type[VariableOwner], name: str, code: str, date: datetime, nominals: Sequence[float]) -> bytes:
     """Return the FMI 3.0 model description of the FMU `name` as XML; the token is computed like the GUID of FMI 2.0.
 
-    `exchange` is an instance of the model for model exchange.
+    `nominals` are the nominal values of the continuous states.
     """
     root = shared.create_root(model, name, "3.0", "instantiationToken")
-    declared = all_variables(exchange)
+    declared = all_variables(model)
     step_report = {"needsCompletedIntegratorStep": "true" if has_step_events(declared) else "false"}
     for interface, abilities in ("ModelExchange", step_report), ("CoSimulation", STEPPING_CAPABILITIES):
         SubElement(root, interface, {"modelIdentifier": name} | COMMON_CAPABILITIES | abilities)
@@ -62,8 +62,8 @@ def describe(model: type[VariableOwner], name: str, code: str, date: datetime, e
         element = SubElement(elements, TYPE_ELEMENTS[meaning.type], attributes)
         if meaning.alias:
             SubElement(element, "Alias", name=meaning.alias, description=meaning.text)
-    shared.mark_states(list(elements), exchange, rates, first=0)
-    _add_structure(root, model, exchange, declared, rates)
+    shared.mark_states(list(elements), model, rates, nominals, first=0)
+    _add_structure(root, model, declared, rates)
     return shared.serialize(root, "instantiationToken", code, date)
 
 
@@ -78,9 +78,7 @@ def _add_types(root: Element, declared: Variables) -> None:
             shared.add_enumeration_items(SubElement(types, "EnumerationType", attributes), meaning)
 
 
-def _add_structure(
-    root: Element, model: type[VariableOwner], thing: Any, declared: Variables, rates: dict[int, int]
-) -> None:
+def _add_structure(root: Element, model: Any, declared: Variables, rates: dict[int, int]) -> None:
     """Add ModelStructure with all dependencies; for smooth models also dependenciesKind constant or tunable."""
     structure, states = SubElement(root, "ModelStructure"), list(rates.values())
     outputs, derivatives, at_first = shared.dependency_tables(model, declared, rates, SETTABLE_CAUSALITIES)
@@ -88,7 +86,7 @@ def _add_structure(
         _add_unknown(structure, "Output", place, known)
     for place, known in derivatives.items():
         kind_of_factors = (
-            "" if thing.has_dry_friction else "constant" if place in states else "tunable" if thing.is_linear else ""
+            "" if model.has_dry_friction else "constant" if place in states else "tunable" if model.is_linear else ""
         )
         kinds = ["dependent" if declared[one][1].causality == "parameter" else kind_of_factors for one in known]
         _add_unknown(structure, "ContinuousStateDerivative", place, known, kinds if kind_of_factors else [])
@@ -96,8 +94,8 @@ def _add_structure(
         _add_unknown(structure, "InitialUnknown", place, known)
     places = {name: place for place, (name, _) in enumerate(declared)}
     inputs = [place for place, (_, meaning) in enumerate(declared) if meaning.causality == "input"]
-    slips = [[places[slip]] if slip else states for slip in thing.contacts.values()]
-    at_rest = [state for state in states if not thing.rests_when_stuck or [state] not in slips]
+    slips = [[places[slip]] if slip else states for slip in model.contacts.values()]
+    at_rest = [state for state in states if not model.rests_when_stuck or [state] not in slips]
     slip_of = dict(
         zip(event_indicator_indices(declared), slips, strict=False)
     )  # indicators of coming to rest are first

@@ -32,13 +32,13 @@ class ActiveMethod:
                 self.power, self.safety, self.shrink, self.grow = file.POWER, file.SAFETY, file.SHRINK, file.GROW
 
     def propose(
-        self, model, modes: ContactVector, t, y: StateVector, f: RateVector, h
+        self, model, step, modes: ContactVector, t, y: StateVector, f: RateVector, h
     ) -> tuple[StateVector, RateVector, StateVector]:
         """Propose a step of size h: return the new state, its rates, and e, where h e estimates the error."""
         method_number = self.method_number
         for label, file, _ in methods:
             if method_number == file.NUMBER:
-                return getattr(self, label).propose(model, modes, t, y, f, h)
+                return getattr(self, label).propose(model, step, modes, t, y, f, h)
 
     def build_interpolant(self, model, step):
         """Build the interpolant of the step just computed."""

@@ -17,27 +17,11 @@ from .codes import (
     FAILED,
     FIRST_RULE,
     FIXED,
-    HYBRID_LAW_ONLY,
-    INSTANTIATED,
     MODEL_EXCHANGE,
     OK,
     OUT_OF_RANGE,
     RUNNING,
 )
-
-
-class RunState:
-    """State of a run, besides the numbers of its model."""
-
-    def __init__(self, tolerance):
-        self.phase, self.interface = INSTANTIATED, CO_SIMULATION
-        self.start_time, self.stop_time, self.tolerance = 0.0, inf, tolerance
-        self.n_invalid_values = 0  # variables whose last value was rejected
-        self.has_pending_changes = False  # values were set but not applied yet
-        self.values_changed = False  # values were applied since the last event
-        self.outputs_current = False  # the outputs belong to the current time
-        self.has_failed = False
-
 
 # ---- values
 
@@ -54,7 +38,7 @@ def rejection_reason(run, calculated, fixed, allowed):
 def note_change(run, model):
     """Prepare the model for a change of value: closed-form motions are rebased to the current time."""
     if not run.has_pending_changes and run.phase >= RUNNING:
-        model.rebase(model.solver.t)
+        model.rebase(run.solver.t)
     run.has_pending_changes = True
 
 
@@ -81,8 +65,8 @@ def check_values(run, model):
     if status != OK:
         return status
     status = model.prepare()
-    if status == HYBRID_LAW_ONLY and run.interface != CO_SIMULATION:
-        return OK  # the importer uses its own solver
+    if status == OK and run.interface == CO_SIMULATION:  # in model exchange the importer uses its own solver
+        return run.solver.check_method(model)
     return status
 
 
@@ -101,7 +85,7 @@ def apply_changes(run, model, beginning):
     """Apply the values that were set: start the run, or restart at the current time.  Returns a status."""
     status = check_values(run, model)
     if status == OK:
-        solver = model.solver
+        solver = run.solver
         if beginning:
             y = model.initial_state(run.start_time)
             solver.start(model, run.start_time, y, run.stop_time, run.tolerance)
@@ -141,7 +125,7 @@ def do_step(run, model, t, h):
         status = prepare_to_step(run, model)
         if status != OK:
             return status
-    solver = model.solver
+    solver = run.solver
     end = communication_step_end(run, solver, t, h)
     if not end >= solver.t:
         return BAD_STEP
@@ -187,12 +171,12 @@ def update_outputs(run, model):
 
 def set_outputs(run, model):
     """Compute the outputs at the current time."""
-    solver = model.solver
+    solver = run.solver
     run.outputs_current = model.compute_outputs(solver.t, solver.y, solver.modes)
 
 
-def update_statistics(model, ahead):
+def update_statistics(run, model, ahead):
     """Update the statistics of solver and events to the current time; with `ahead` also solver.t_next."""
-    model.solver.report(model.events)
+    run.solver.report(run.events)
     if ahead:
-        model.solver.update_t_next(model)
+        run.solver.update_t_next(model)

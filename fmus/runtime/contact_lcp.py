@@ -109,15 +109,15 @@ def resolve_after_event(model, step, ends: ContactVector, tie_tolerance) -> tupl
             elif ends[i] <= t or new_modes[i] * slips[i] <= SIMULTANEITY_MARGIN * terms[i]:
                 depth = inf
                 if fabs(force[i]) >= EQUAL_SHARE * limit[i]:
-                    depth = reversal_depth(model, t, y, step.modes0, limit[i], i)
+                    depth = reversal_depth(model, t, y, step.modes0, step.h_max, limit[i], i)
                 if depth <= tie_tolerance * (terms[i] + start_slip(model, step, i) + SLIP_SCALE):
                     y = raise_slip(model, t, y, step.modes0, 2.0 * depth + ROUNDOFF_MARGIN * terms[i], i)
                 else:
                     status[i], new_modes[i] = AT_REST, STUCK
-    return resolve_contacts(model, t, y, step.modes0, new_modes, status, tie_tolerance)
+    return resolve_contacts(model, t, y, step.modes0, new_modes, status, step.h_max, tie_tolerance)
 
 
-def reversal_depth(model, t, y: StateVector, modes: ContactVector, holding_limit, i: ContactIndex):
+def reversal_depth(model, t, y: StateVector, modes: ContactVector, h_max, holding_limit, i: ContactIndex):
     """Return how far a slip velocity, zero now, would go against its mode before it returns; inf if it does not.
 
     With a holding limit equal to the sliding force, the contact breaks away again when the slip would return; after
@@ -131,7 +131,7 @@ def reversal_depth(model, t, y: StateVector, modes: ContactVector, holding_limit
         return 0.0
     if not rate > 0.0:
         return inf
-    delta = PREDICTION_SHARE * model.solver.step.h_max
+    delta = PREDICTION_SHARE * h_max
     f = model.rates(t, y, modes)
     y2 = y + delta * f
     slips = model.slip_velocities(t, y)
@@ -165,7 +165,7 @@ def raise_slip(model, t, y: StateVector, modes: ContactVector, amount, i: Contac
 
 
 def resolve_at_start(
-    model, t, y: StateVector, modes: ContactVector, tie_tolerance, reach
+    model, t, y: StateVector, modes: ContactVector, h_max, tie_tolerance, reach
 ) -> tuple[StateVector, ContactVector, bool]:
     """Return the same at the start of a run or after a change of values: contacts with a slip velocity slide.
 
@@ -177,6 +177,8 @@ def resolve_at_start(
         States.
     modes
         Previous modes.
+    h_max
+        Largest internal step in s.
     tie_tolerance, reach
         Slip velocities below these shares of their absolute terms count as zero, for contacts that were stuck and
         for contacts that slip against their mode.
@@ -194,11 +196,18 @@ def resolve_at_start(
             new_modes[i] = modes[i]
         elif fabs(slips[i]) <= zero_level:
             status[i], new_modes[i] = AT_REST, STUCK
-    return resolve_contacts(model, t, y, modes, new_modes, status, tie_tolerance)
+    return resolve_contacts(model, t, y, modes, new_modes, status, h_max, tie_tolerance)
 
 
 def resolve_contacts(
-    model, t, y: StateVector, modes: ContactVector, new_modes: ContactVector, status: ContactVector, tie_tolerance
+    model,
+    t,
+    y: StateVector,
+    modes: ContactVector,
+    new_modes: ContactVector,
+    status: ContactVector,
+    h_max,
+    tie_tolerance,
 ) -> tuple[StateVector, ContactVector, bool]:
     """Return the states without slip in the contacts at rest, their modes, and whether these are consistent.
 
@@ -215,14 +224,16 @@ def resolve_contacts(
         Modes before.
     new_modes, status
         Modes in which contacts at rest are stuck, and the status of each contact.
+    h_max
+        Largest internal step in s; a share of it is how far slips and loads are predicted.
     tie_tolerance
         See `violations`.
     """
     if model.has_variable_levers:
         slips = model.slip_velocities(t, y)
         _force, limit, terms = model.contact_forces(t, y, new_modes)
-        moving_modes, _consistent = solve_modes(model, t, y, new_modes, status, tie_tolerance)
-        slips_ahead = predict_slips(model, t, y, moving_modes)
+        moving_modes, _consistent = solve_modes(model, t, y, new_modes, status, h_max, tie_tolerance)
+        slips_ahead = predict_slips(model, t, y, moving_modes, h_max)
         for i in contact_indices:
             if status[i] == AT_REST and moving_modes[i] != STUCK:
                 status[i], new_modes[i] = SLIPPING, moving_modes[i]
@@ -231,7 +242,7 @@ def resolve_contacts(
                 elif ROUNDOFF_MARGIN * terms[i] > limit[i] and slips_ahead[i] != 0.0:
                     new_modes[i] = sign(slips_ahead[i])  # at a dead point; the load has rounding errors only
     y = stop_slips(model, t, y, new_modes)
-    resolved_modes, consistent = solve_modes(model, t, y, new_modes, status, tie_tolerance)
+    resolved_modes, consistent = solve_modes(model, t, y, new_modes, status, h_max, tie_tolerance)
     return y, resolved_modes, consistent
 
 
@@ -259,7 +270,7 @@ def stop_slips(model, t, y: StateVector, modes: ContactVector) -> StateVector:
 
 
 def solve_modes(
-    model, t, y: StateVector, modes: ContactVector, status: ContactVector, tie_tolerance
+    model, t, y: StateVector, modes: ContactVector, status: ContactVector, h_max, tie_tolerance
 ) -> tuple[ContactVector, bool]:
     """Solve the complementarity problem for the modes of contacts at rest.
 
@@ -281,7 +292,7 @@ def solve_modes(
         pivot_modes[i], pivot_status[i] = modes[i], status[i]
     consistent = False
     for iteration in range(MAX_ITERATIONS):
-        violation, next_modes = violations(model, t, y, pivot_modes, pivot_status, tie_tolerance)
+        violation, next_modes = violations(model, t, y, pivot_modes, pivot_status, h_max, tie_tolerance)
         highest = max_of(violation)
         if not highest > 0.0:
             consistent = True
@@ -304,10 +315,10 @@ def solve_modes(
     if n_at_rest > MAX_ENUMERATED:
         if not consistent:
             return modes, False
-        relocked_modes = relock(model, t, y, pivot_modes, status, tie_tolerance)
+        relocked_modes = relock(model, t, y, pivot_modes, status, h_max, tie_tolerance)
         return relocked_modes, True
     best_modes, found = most_held(
-        model, t, y, modes, status, tie_tolerance, n_at_rest, n_released if consistent else n_at_rest + 1
+        model, t, y, modes, status, h_max, tie_tolerance, n_at_rest, n_released if consistent else n_at_rest + 1
     )
     if found:
         return best_modes, True
@@ -316,9 +327,9 @@ def solve_modes(
     return modes, False
 
 
-def predict_slips(model, t, y: StateVector, modes: ContactVector) -> ContactVector:
+def predict_slips(model, t, y: StateVector, modes: ContactVector, h_max) -> ContactVector:
     """Return the slip velocities a short time ahead, also if the motion only starts."""
-    delta = PREDICTION_SHARE * model.solver.step.h_max
+    delta = PREDICTION_SHARE * h_max
     f = model.rates(t, y, modes)
     y2 = y + delta * f
     f2 = model.rates(t + delta, y2, modes)
@@ -327,16 +338,18 @@ def predict_slips(model, t, y: StateVector, modes: ContactVector) -> ContactVect
 
 
 def contact_rates_ahead(
-    model, t, y: StateVector, modes: ContactVector
+    model, t, y: StateVector, modes: ContactVector, h_max
 ) -> tuple[ContactVector, ContactVector, ContactVector, ContactVector]:
     """Return the rates a short time ahead, which decide a tie where the rates at t are zero."""
-    delta = PREDICTION_SHARE * model.solver.step.h_max
+    delta = PREDICTION_SHARE * h_max
     f = model.rates(t, y, modes)
     y2 = y + delta * f
     return model.contact_rates(t + delta, y2, modes)
 
 
-def relock(model, t, y: StateVector, modes: ContactVector, status: ContactVector, tie_tolerance) -> ContactVector:
+def relock(
+    model, t, y: StateVector, modes: ContactVector, status: ContactVector, h_max, tie_tolerance
+) -> ContactVector:
     """Return consistent modes in which released contacts are locked again, one after another, where this fits."""
     trial_modes = contact_vector()
     for i in contact_indices:
@@ -344,13 +357,13 @@ def relock(model, t, y: StateVector, modes: ContactVector, status: ContactVector
     for i in contact_indices:
         if status[i] != SLIPPING and modes[i] != STUCK:
             trial_modes[i] = STUCK
-            if not are_consistent(model, t, y, trial_modes, status, tie_tolerance):
+            if not are_consistent(model, t, y, trial_modes, status, h_max, tie_tolerance):
                 trial_modes[i] = modes[i]
     return trial_modes
 
 
 def most_held(
-    model, t, y: StateVector, modes: ContactVector, status: ContactVector, tie_tolerance, n_at_rest, n_released
+    model, t, y: StateVector, modes: ContactVector, status: ContactVector, h_max, tie_tolerance, n_at_rest, n_released
 ) -> tuple[ContactVector, bool]:
     """Return the consistent modes that release the fewest contacts at rest, fewer than `n_released`, if any.
 
@@ -372,7 +385,7 @@ def most_held(
                 if status[i] != SLIPPING and trial_modes[i] != STUCK:
                     n_sliding += 1
             if n_sliding == n:
-                if are_consistent(model, t, y, trial_modes, status, tie_tolerance):
+                if are_consistent(model, t, y, trial_modes, status, h_max, tie_tolerance):
                     force, limit, _terms = model.contact_forces(t, y, trial_modes)
                     highest = 0.0
                     for i in contact_indices:
@@ -395,14 +408,14 @@ def most_held(
     return best_modes, False
 
 
-def are_consistent(model, t, y: StateVector, modes: ContactVector, status: ContactVector, tie_tolerance):
+def are_consistent(model, t, y: StateVector, modes: ContactVector, status: ContactVector, h_max, tie_tolerance):
     """Return whether no contact at rest violates the conditions of its mode."""
-    violation, _next_modes = violations(model, t, y, modes, status, tie_tolerance)
+    violation, _next_modes = violations(model, t, y, modes, status, h_max, tie_tolerance)
     return not max_of(violation) > 0.0
 
 
 def violations(
-    model, t, y: StateVector, modes: ContactVector, status: ContactVector, tie_tolerance
+    model, t, y: StateVector, modes: ContactVector, status: ContactVector, h_max, tie_tolerance
 ) -> tuple[ContactVector, ContactVector]:
     """Return how far each contact at rest violates the conditions of its mode (0: not at all), and its next mode.
 
@@ -411,8 +424,8 @@ def violations(
     """
     force, limit, terms = model.contact_forces(t, y, modes)
     force_rate, limit_rate, residual_force, residual_force_rate = model.contact_rates(t, y, modes)
-    later_force_rate, later_limit_rate, _, later_residual_rate = contact_rates_ahead(model, t, y, modes)
-    delta = PREDICTION_SHARE * model.solver.step.h_max
+    later_force_rate, later_limit_rate, _, later_residual_rate = contact_rates_ahead(model, t, y, modes, h_max)
+    delta = PREDICTION_SHARE * h_max
     violation, next_modes = contact_vector(), contact_vector()
     for i in contact_indices:
         violation[i], next_modes[i] = 0.0, STUCK

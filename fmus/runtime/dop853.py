@@ -73,7 +73,7 @@ class Dop853:
         self.f6 = self.f7 = self.f8 = self.f9 = self.f10 = self.f11 = self.f12 = 0.0
 
     def propose(
-        self, model, modes: ContactVector, t, y: StateVector, f: RateVector, h
+        self, model, step, modes: ContactVector, t, y: StateVector, f: RateVector, h
     ) -> tuple[StateVector, RateVector, StateVector]:
         """Propose a step of size h: return the new state, its rates, and e, where h e estimates the error."""
         y2 = y + h * (A21 * f)

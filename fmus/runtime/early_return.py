@@ -14,8 +14,8 @@ def begin_step(run, model, t, h):
     status = call_sequence.prepare_to_step(run, model)
     if status != OK:
         return status
-    exchange = model.model_exchange
-    solver = model.solver
+    exchange = run.model_exchange
+    solver = run.solver
     step = solver.step
     exchange.step_end = call_sequence.communication_step_end(run, solver, t, h)
     if not exchange.step_end >= solver.t:
@@ -33,8 +33,8 @@ def next_internal_step(run, model, defer_events):
 
     With `defer_events`, an event there is left to the importer (`event_reached`).
     """
-    exchange = model.model_exchange
-    solver = model.solver
+    exchange = run.model_exchange
+    solver = run.solver
     step = solver.step
     run.outputs_current = False
     status = call_sequence.prepare_to_step(run, model)  # an input may have changed
@@ -51,18 +51,20 @@ def next_internal_step(run, model, defer_events):
     if model.has_dry_friction:
         exchange.event_reached = step.event_at_end and solver.t >= step.t1
     if model.has_conditions:
-        exchange.event_reached = exchange.event_reached or (solver.t >= step.t1 and conditions.have_changed(model))
+        exchange.event_reached = exchange.event_reached or (
+            solver.t >= step.t1 and conditions.have_changed(model, step.event_location)
+        )
     if defer_events and exchange.event_reached:
         if model.has_dry_friction:
             solver.modes = step.modes0
         if model.has_conditions:
-            conditions.select_sides(model, False)
+            conditions.select_sides(model, step.event_location, False)
     return status
 
 
 def complete_event(run, model):
     """Complete a deferred event at the current time."""
-    solver = model.solver
+    solver = run.solver
     run.outputs_current = False
     if solver.t >= solver.step.t1:
         solver.move_to_step_end(model)

@@ -46,9 +46,9 @@ class EventLocation:
         # Bernstein coefficients of the cubic Hermite polynomial; largest scale since the last event; first zero
         self.start, self.early, self.late, self.end = [0.0] * n, [0.0] * n, [0.0] * n, [0.0] * n
         self.peaks, self.times = [0.0] * n, [inf] * n
-        # conditions: left minus right side, sum of absolute terms; 1.0 if true else -1.0: now, before and after t1
+        # conditions: left minus right side, sum of absolute terms; 1.0 if true else -1.0, before and after t1
         self.margins, self.margin_scales = [0.0] * n, [0.0] * n
-        self.sides, self.sides_before, self.sides_after = [1.0] * n, [1.0] * n, [1.0] * n
+        self.sides_before, self.sides_after = [1.0] * n, [1.0] * n
         self.is_frictionless = [0.0] * n  # of each contact: 1.0 if it neither slides nor holds with a force
         self.t_condition = -inf  # time of the last change of a condition
         self.n_chatter = 0  # changes of a condition in quick succession
@@ -71,21 +71,20 @@ class EventLocation:
 # ---- event functions
 
 
-def update_event_functions(model, t, y: StateVector, modes: ContactVector):
+def update_event_functions(model, location, t, y: StateVector, modes: ContactVector):
     """Evaluate all event functions."""
-    location = model.event_location
     if model.has_dry_friction:
         if model.is_coupled:
             contact_lcp.update_contact_event_functions(model, location, t, y, modes)
         else:
             stick_slip.update_contact_event_functions(model, location, t, y, modes)
     if model.has_conditions:
-        conditions.update_margins(model, t, y, modes)
+        conditions.update_margins(model, location, t, y, modes)
         for j in range(model.n_event_functions - model.first_condition):
             k = model.first_condition + j
             location.scales[k] = location.margin_scales[j]
             location.values[k] = (
-                location.sides[j] * location.margins[j] + CONDITION_MARGIN * location.margin_scales[j] + TINY
+                model.condition_sides[j] * location.margins[j] + CONDITION_MARGIN * location.margin_scales[j] + TINY
             )
 
 
@@ -95,8 +94,9 @@ def event_function(model, step, t, j):
     if model.has_dry_friction and not model.is_coupled and not model.has_conditions:
         for i in contact_indices:
             return step.modes0[i] * y[slip_index[i]]
-    update_event_functions(model, t, y, step.modes0)
-    return model.event_location.values[j]
+    location = step.event_location
+    update_event_functions(model, location, t, y, step.modes0)
+    return location.values[j]
 
 
 # ---- search of a step
@@ -110,7 +110,7 @@ def locate_events(model, step):
     float
         Time of the first event; inf if there is none.
     """
-    location = model.event_location
+    location = step.event_location
     location.in_doubt = False
     # a single contact without conditions has one function
     n = model.n_event_functions if model.is_coupled or model.has_conditions else 1
@@ -129,28 +129,28 @@ def locate_events(model, step):
 
 def evaluate_on_cubic(model, step):
     """Compute the Bernstein coefficients of all event functions on the cubic Hermite polynomial of the step."""
-    location = model.event_location
+    location = step.event_location
     t0, h = step.t0, step.t1 - step.t0
     y2 = (20.0 * step.y0 + 7.0 * step.y1 + h * (4.0 * step.f0 - 2.0 * step.f1)) / 27.0
     y3 = (7.0 * step.y0 + 20.0 * step.y1 + h * (2.0 * step.f0 - 4.0 * step.f1)) / 27.0
     if model.is_coupled:
         contact_lcp.find_frictionless_contacts(model, location, step)
-    update_event_functions(model, t0, step.y0, step.modes0)
+    update_event_functions(model, location, t0, step.y0, step.modes0)
     for j in range(model.n_event_functions):
         location.start[j] = location.values[j]
         if location.scales[j] > location.peaks[j]:
             location.peaks[j] = location.scales[j]
     y4 = 0.648 * step.y0 + 0.352 * step.y1 + h * (0.144 * step.f0 - 0.096 * step.f1)
-    update_event_functions(model, t0 + 0.4 * h, y4, step.modes0)
+    update_event_functions(model, location, t0 + 0.4 * h, y4, step.modes0)
     for j in range(model.n_event_functions):
         location.near_middle[j] = location.values[j]
-    update_event_functions(model, t0 + h / 3.0, y2, step.modes0)
+    update_event_functions(model, location, t0 + h / 3.0, y2, step.modes0)
     for j in range(model.n_event_functions):
         location.early[j] = location.values[j]
-    update_event_functions(model, t0 + h * 2.0 / 3.0, y3, step.modes0)
+    update_event_functions(model, location, t0 + h * 2.0 / 3.0, y3, step.modes0)
     for j in range(model.n_event_functions):
         location.late[j] = location.values[j]
-    update_event_functions(model, step.t1, step.y1, step.modes0)
+    update_event_functions(model, location, step.t1, step.y1, step.modes0)
     for j in range(model.n_event_functions):
         start, third, two_thirds, end = location.start[j], location.early[j], location.late[j], location.values[j]
         location.end[j] = end
@@ -196,7 +196,7 @@ def search_polynomial(model, step, j):
     largest curvature, so that steps to the zero of that parabola cannot pass a zero.  Where the function is still
     positive at a zero of the polynomial, the polynomial is raised to the function and the search goes on.
     """
-    location = model.event_location
+    location = step.event_location
     fit_polynomial(model, step, j)
     largest_curvature = 0.0
     for k in range(DEGREE - 1):
@@ -251,7 +251,7 @@ def end_of_interpolation_error(location, least, error):
 
 def fit_polynomial(model, step, j):
     """Compute the coefficients of the polynomial through one event function at the nodes, by divided differences."""
-    location = model.event_location
+    location = step.event_location
     step.interpolant.n_event_evals += DEGREE
     location.samples[0], location.samples[DEGREE] = location.start[j], location.end[j]
     for k in range(DEGREE - 1):

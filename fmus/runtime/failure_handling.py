@@ -7,9 +7,9 @@ from math import nan
 from typing import Any
 
 from . import messages
-from .call_sequence import RunState
 from .codes import BAD_VALUE, DIVERGED, FAILED, INTERRUPTED
 from .pythonfmu_workarounds import reraise_later, sanitize, write_to_stderr
+from .run_state import RunState
 from .variable_declarations import VariableDeclaration
 
 ERROR = 3  # status code in all versions of FMI

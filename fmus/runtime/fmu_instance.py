@@ -17,6 +17,7 @@ from weakref import WeakSet
 from . import call_sequence
 from .codes import BAD_STEP, BAD_VALUE, OK, RUNNING
 from .pythonfmu_workarounds import signal_safe
+from .run_state import RunState
 from .saved_state import SavedStateAccess, attribute_tree
 from .variable_declarations import VariableOwner, variables
 
@@ -28,10 +29,12 @@ def make_fmu_class(slave: type[FmuInstance], model: type[VariableOwner]) -> Any:
     object has been accessed, so that of a running instance is never accessed.
     """
     inspected = model()
+    run = RunState(inspected)
     attributes = {
         "Model": model,
-        "variables": variables(inspected),
-        "attribute_tree": attribute_tree(inspected),
+        "variables": variables(inspected) + variables(run),
+        "model_tree": attribute_tree(inspected),
+        "run_tree": attribute_tree(run),
         "__module__": __name__,
     }
     attributes["instances"] = WeakSet()
@@ -63,7 +66,7 @@ class FmuInstance(SavedStateAccess):
         super().__init__(**kwargs)
         self.instances.add(self)
         self.model = self.Model()
-        self.run = call_sequence.RunState(self.model.tolerance)
+        self.run = RunState(self.model)
         self.initialize_access()
 
     @signal_safe
@@ -97,7 +100,7 @@ class FmuInstance(SavedStateAccess):
     def step_without_invalid_values(self, t: float, h: float) -> Any:
         """Do a step of size h from t, without the invalid values for which a step was refused; return a status."""
         run, model = self.run, self.model
-        if not call_sequence.communication_step_end(run, model.solver, t, h) >= model.solver.t:
+        if not call_sequence.communication_step_end(run, run.solver, t, h) >= run.solver.t:
             return BAD_STEP
         self.invalid_values.clear()
         run.n_invalid_values, run.outputs_current = 0, False

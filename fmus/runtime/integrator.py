@@ -8,7 +8,7 @@ from math import inf, nan
 
 from . import conditions, ode23, phase_repetition
 from .active_method import METHOD_ITEMS
-from .codes import DIVERGED, HYBRID, NEEDS_REPETITION, OK, STUCK, TOO_MANY_STEPS
+from .codes import DIVERGED, EXACT, HYBRID, HYBRID_LAW_ONLY, NEEDS_REPETITION, OK, STUCK, TOO_MANY_STEPS
 from .linear_closed_form import HIGHER_ORDER_INPUT
 from .step_control import OVERFLOW_LIMIT, InternalStep
 from .variable_declarations import Choice, Count, Fixed, Local, VariableOwner
@@ -53,9 +53,9 @@ class Integrator(VariableOwner):
     modes: ContactVector
     modes_before_change: ContactVector
 
-    def __init__(self):
+    def __init__(self, model):
         super().__init__()
-        self.step = InternalStep()
+        self.step = InternalStep(model)
         self.t = self.y = 0.0
         self.modes = STUCK
         self.default_duration = 1.0  # duration of the default run (s)
@@ -67,6 +67,12 @@ class Integrator(VariableOwner):
         self.t_event_before_change = nan
 
     # ---- run
+
+    def check_method(self, model):
+        """Return OK, or HYBRID_LAW_ONLY if the method does not cover the friction law."""
+        if model.has_dry_friction and model.friction != HYBRID and self.method == EXACT:
+            return HYBRID_LAW_ONLY
+        return OK
 
     def start(self, model, t, y: StateVector, t_end, tolerance):
         """Start a run.
@@ -128,7 +134,7 @@ class Integrator(VariableOwner):
             )
             self.t_event_before_change, self.modes_before_change = counters.t_event, self.modes
         if model.has_dry_friction or model.has_conditions:
-            phase_repetition.restore_tolerance(model, step)
+            phase_repetition.restore_tolerance(step)
         self.apply_parameters(model)
         if model.has_dry_friction and step.is_hybrid and not model.is_coupled:
             for i in contact_indices:
@@ -147,7 +153,7 @@ class Integrator(VariableOwner):
         step.active_method.error_scale_floor = size
         nominal_velocity = model.nominal_velocity()
         if model.has_dry_friction:
-            model.event_location.feature_width = nominal_velocity if nominal_velocity > 0.0 else inf
+            step.event_location.feature_width = nominal_velocity if nominal_velocity > 0.0 else inf
         if self.atol == 0.0 and nominal_velocity > 0.0 and nominal_velocity < size:
             for i in velocity_indices:
                 step.active_method.error_scale_floor[i] = nominal_velocity
@@ -175,7 +181,7 @@ class Integrator(VariableOwner):
         if t < step.t1:
             self.t, self.modes = t, step.modes0
             if model.has_conditions:
-                conditions.select_sides(model, False)
+                conditions.select_sides(model, step.event_location, False)
             interpolant = step.interpolant
             if interpolant.ready:  # as in step.state_at; saves one call in limit communication steps
                 self.y = interpolant.evaluate(t - step.t0)
@@ -189,9 +195,9 @@ class Integrator(VariableOwner):
 
     def move_to_step_end(self, model):
         """Set the current time to the end of the internal step."""
-        if model.has_conditions:
-            conditions.select_sides(model, True)
         step = self.step
+        if model.has_conditions:
+            conditions.select_sides(model, step.event_location, True)
         self.t, self.y, self.modes = step.t1, step.y1, step.modes1
 
     def advance_past(self, model, t):

@@ -19,8 +19,8 @@ from __future__ import annotations
 from typing import Any
 
 from . import codes
-from .call_sequence import RunState
 from .integrator import MAX_EVALUATIONS, MAX_STEPS
+from .run_state import RunState
 from .variable_declarations import VariableDeclaration
 
 RUN_MESSAGES = {
@@ -80,7 +80,7 @@ def run_message(status: int, run: RunState, model: Any, t: float, h: float) -> s
     """Return the message for a failed run, or for the rule of the model that the values violate."""
     if status not in RUN_MESSAGES:
         return str(model.rules[status]).format_map(vars(model))
-    solver = model.solver
+    solver = run.solver
     times = {"now": solver.t, "t0": solver.step.t0, "t_end": solver.step.t_end}
     return RUN_MESSAGES[status].format(t=t, h=h, start=run.start_time, stop=run.stop_time, **times)
 

@@ -17,6 +17,7 @@ from math import fabs, inf, nan
 from . import call_sequence, conditions, contact_lcp, event_location, stick_slip
 from .codes import DIVERGED, EPSILON, MODEL_EXCHANGE, NO_CONSISTENT_MODES, OK, ROUNDOFF_MARGIN, RUNNING, STUCK
 from .integrator import DEFAULT_NOMINAL
+from .run_state import RunState
 from .step_control import OVERFLOW_LIMIT, TIE_FACTOR
 from .vectors import (
     ContactVector,
@@ -69,12 +70,12 @@ class ModelExchange:
         self.n_internal_steps = self.max_evals = 0
 
 
-class ModelExchangeMixin:
-    """Mixin that gives a model its ModelExchange buffers."""
+class ModelExchangeRun(RunState):
+    """State of a run, with the buffers of the model-exchange interface."""
 
-    def __init__(self):
-        super().__init__()
-        self.model_exchange = ModelExchange(self)
+    def __init__(self, model):
+        super().__init__(model)
+        self.model_exchange = ModelExchange(model)
 
 
 def enable(run):
@@ -82,14 +83,14 @@ def enable(run):
     run.interface, run.tolerance = MODEL_EXCHANGE, DEFAULT_TOLERANCE
 
 
-def begin(model):
+def begin(run, model):
     """Hand over to the solver of the importer: there is no internal step, and its counters are zero."""
-    solver = model.solver
+    solver = run.solver
     step = solver.step
     start_counters = step.start_counters
     start_counters.n_accepted = start_counters.n_rejected = start_counters.n_rhs = 0
     step.t0, step.t1 = solver.t, nan
-    update_nominals(model)
+    update_nominals(run, model)
 
 
 def prepare(run, model):
@@ -104,7 +105,7 @@ def prepare(run, model):
 def set_time(run, model, t):
     """Set the time; the states stay."""
     run.outputs_current = False
-    solver = model.solver
+    solver = run.solver
     solver.t = solver.step.t0 = t
     if model.has_driver:
         model.t_base = t
@@ -113,28 +114,28 @@ def set_time(run, model, t):
 def set_continuous_states(run, model):
     """Copy the continuous states from their buffer into the model, at the current time."""
     run.outputs_current = False
-    exchange = model.model_exchange
-    solver = model.solver
+    exchange = run.model_exchange
+    solver = run.solver
     for i in state_indices:
         solver.y[i] = exchange.states[i]
     if model.has_driver:
         model.x_base = exchange.states[len(solver.y)]
 
 
-def update_states(model):
+def update_states(run, model):
     """Update the buffer of the continuous states."""
-    exchange = model.model_exchange
-    solver = model.solver
+    exchange = run.model_exchange
+    solver = run.solver
     for i in state_indices:
         exchange.states[i] = solver.y[i]
     if model.has_driver:
         exchange.states[len(solver.y)] = model.x_base
 
 
-def update_nominals(model):
+def update_nominals(run, model):
     """Update the nominal values of the continuous states, with the defaults of the internal solver."""
-    exchange = model.model_exchange
-    solver = model.solver
+    exchange = run.model_exchange
+    solver = run.solver
     exchange.nominal_velocity = model.nominal_velocity()
     for i in state_indices:
         exchange.nominals[i] = DEFAULT_NOMINAL
@@ -146,10 +147,10 @@ def update_nominals(model):
         exchange.nominals[len(solver.y)] = DEFAULT_NOMINAL
 
 
-def update_rates(model):
+def update_rates(run, model):
     """Update the derivatives of the continuous states."""
-    exchange = model.model_exchange
-    solver = model.solver
+    exchange = run.model_exchange
+    solver = run.solver
     y = solver.y
     if model.rests_when_stuck and solver.step.is_hybrid and all_of(solver.modes == STUCK):
         for i in state_indices:
@@ -165,16 +166,16 @@ def update_rates(model):
         exchange.rates[len(y)] = model.driver_velocity()
 
 
-def update_input_rates(model):
+def update_input_rates(run, model):
     """Update the rates of inputs that have derivatives."""
     if model.has_input_derivatives:
-        model.set_input_rates(model.solver.t)
+        model.set_input_rates(run.solver.t)
 
 
-def update_indicators(model):
+def update_indicators(run, model):
     """Update the event indicators; they are 1 if the friction law has no modes."""
-    exchange = model.model_exchange
-    solver = model.solver
+    exchange = run.model_exchange
+    solver = run.solver
     to_rest, to_break_away = contact_vector(), contact_vector()
     for i in contact_indices:
         to_rest[i] = to_break_away[i] = 1.0
@@ -200,18 +201,19 @@ def update_indicators(model):
         exchange.indicators[i] = to_rest[i]
         exchange.indicators[len(solver.modes) + i] = to_break_away[i]
     if model.has_conditions:
-        event_location.update_event_functions(model, solver.t, solver.y, solver.modes)
+        location = solver.step.event_location
+        event_location.update_event_functions(model, location, solver.t, solver.y, solver.modes)
         for j in range(model.n_event_functions - model.first_condition):
             k = model.first_condition + j
-            exchange.indicators[k] = model.event_location.values[k]
+            exchange.indicators[k] = location.values[k]
 
 
-def update_variables(model):
+def update_variables(run, model):
     """Update the buffers that are read as variables: indicators and rate of the driver."""
-    exchange = model.model_exchange
-    solver = model.solver
+    exchange = run.model_exchange
+    solver = run.solver
     if model.has_dry_friction or model.has_conditions:
-        update_indicators(model)
+        update_indicators(run, model)
         for i in contact_indices:
             exchange.to_rest[i], exchange.to_break_away[i] = (
                 exchange.indicators[i],
@@ -230,8 +232,8 @@ def handle_event(run, model):
     Changed parameters and inputs also report `states_changed`: some importers restart their solver only then, and fail
     at an input with a jump otherwise.
     """
-    exchange = model.model_exchange
-    solver = model.solver
+    exchange = run.model_exchange
+    solver = run.solver
     exchange.states_changed = exchange.nominals_changed = run.outputs_current = False
     status = call_sequence.prepare_to_step(run, model)
     if status != OK or run.interface != MODEL_EXCHANGE:  # co-simulation continues with the new values
@@ -239,28 +241,30 @@ def handle_event(run, model):
     if not sum_of(magnitude(solver.y)) < OVERFLOW_LIMIT:
         return DIVERGED
     nominal_velocity = exchange.nominal_velocity
-    update_nominals(model)
+    update_nominals(run, model)
     exchange.nominals_changed = exchange.nominal_velocity != nominal_velocity
     exchange.states_changed, run.values_changed = run.values_changed, False
     if model.has_conditions:
-        status = conditions.update_at_event(model, solver.t, solver.y, solver.modes, solver.step.h_max)
+        status = conditions.update_at_event(
+            model, solver.step.event_location, solver.t, solver.y, solver.modes, solver.step.h_max
+        )
         if status != OK:
             return status
-        if conditions.have_changed(model):
+        if conditions.have_changed(model, solver.step.event_location):
             exchange.states_changed = True
     if model.has_dry_friction:
         solver.step.has_consistent_modes = True
     if model.has_dry_friction and solver.step.is_hybrid:
-        if update_modes(model, solver):
+        if update_modes(run, model):
             exchange.states_changed = True
         exchange.t_next_event = next_breakaway(model, solver)
-    if model.has_other_laws and has_step_event(model):
+    if model.has_other_laws and has_step_event(run, model):
         solver.modes = model.law_modes(solver.t, solver.y)
         solver.step.start_counters.n_events += 1
         solver.step.start_counters.t_event = solver.t
     if model.has_conditions:
-        conditions.check_limits(model, solver.t, solver.y, solver.modes)
-        status = conditions.violation_status(model)
+        conditions.check_limits(model, solver.step.event_location, solver.t, solver.y, solver.modes)
+        status = conditions.violation_status(model, solver.step.event_location)
         if status != OK:
             return status
     if model.has_dry_friction and not solver.step.has_consistent_modes:
@@ -276,34 +280,35 @@ def complete_step(run, model):
     status = prepare(run, model)
     if status != OK:
         return status
-    if not sum_of(magnitude(model.solver.y)) < OVERFLOW_LIMIT:
+    if not sum_of(magnitude(run.solver.y)) < OVERFLOW_LIMIT:
         return DIVERGED
     return call_sequence.update_outputs(run, model)
 
 
-def has_step_event(model):
+def has_step_event(run, model):
     """Return whether a mode differs from that of a law without stick and slip, after a step of the importer's solver.
 
     Such a law has no event indicators: where it chatters, a solver would find a zero of them in every step.
     """
-    solver = model.solver
+    solver = run.solver
     if model.has_other_laws and not solver.step.is_hybrid:
         modes = model.law_modes(solver.t, solver.y)
         return any_of(modes != solver.modes)
     return False
 
 
-def update_modes(model, solver):
+def update_modes(run, model):
     """Update the modes at the current time; return whether the solver must restart.
 
     The slip velocity is set to zero where slip ends.  Without a cause nothing changes, so a second call has no effect.
     """
+    solver = run.solver
     tie_tolerance = TIE_FACTOR * solver.step.tolerance
     needs_restart = changed = False
     step = solver.step
     if model.is_coupled:
         y, modes, step.has_consistent_modes = contact_lcp.resolve_at_start(
-            model, solver.t, solver.y, solver.modes, tie_tolerance, OVERSHOOT_TOLERANCE
+            model, solver.t, solver.y, solver.modes, step.h_max, tie_tolerance, OVERSHOOT_TOLERANCE
         )
         needs_restart, changed = any_of(y != solver.y), any_of(modes != solver.modes)
         solver.y, solver.modes = y, modes
@@ -314,9 +319,9 @@ def update_modes(model, solver):
                 if last_mode != STUCK and solver.y[slip_index[i]] != 0.0:
                     solver.y[slip_index[i]] = 0.0
                     needs_restart = True
-                if not stick_slip.is_grazing(model, solver.t, solver.y, solver.modes, 0.0, i):
+                if not stick_slip.is_grazing(model, step.event_location, solver.t, solver.y, solver.modes, 0.0, i):
                     solver.modes[i] = stick_slip.resolve_mode(model, solver.t, solver.y, tie_tolerance, i)
-                if solver.modes[i] == STUCK and solver.t >= model.model_exchange.t_next_event:
+                if solver.modes[i] == STUCK and solver.t >= run.model_exchange.t_next_event:
                     # the load is at the limit, except for rounding errors
                     load, rate, limit = model.stick_load(solver.t, solver.y, i)
                     if load * rate > 0.0 and limit - fabs(load) <= tie_tolerance * limit:
@@ -337,5 +342,5 @@ def next_breakaway(model, solver):
         return inf
     ends, directions = contact_vector(), contact_vector()
     for i in contact_indices:
-        ends[i], directions[i] = stick_slip.breakaway_time(model, solver.t, solver.y, i)
+        ends[i], directions[i] = stick_slip.breakaway_time(model, solver.step, solver.t, solver.y, i)
     return min_of(ends)

@@ -16,7 +16,7 @@ class Ode23:
     """Method with a cubic Hermite interpolant."""
 
     def propose(
-        self, model, modes: ContactVector, t, y: StateVector, f: RateVector, h
+        self, model, step, modes: ContactVector, t, y: StateVector, f: RateVector, h
     ) -> tuple[StateVector, RateVector, StateVector]:
         """Propose a step of size h: return the new state, its rates, and e, where h e estimates the error."""
         y2 = y + 0.5 * h * f

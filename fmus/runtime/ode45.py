@@ -37,7 +37,7 @@ class Ode45:
         self.f3 = self.f4 = self.f5 = self.f6 = 0.0
 
     def propose(
-        self, model, modes: ContactVector, t, y: StateVector, f: RateVector, h
+        self, model, step, modes: ContactVector, t, y: StateVector, f: RateVector, h
     ) -> tuple[StateVector, RateVector, StateVector]:
         """Propose a step of size h: return the new state, its rates, and e, where h e estimates the error."""
         y2 = y + h * A21 * f

@@ -1,5 +1,7 @@
 """Base class of all models: what a model offers to the solver.
 
+A model holds no solver.  `RunState` (run_state.py) creates one for it and passes the model to it in every call.
+
 Methods with a docstring only are declarations: the generated class of a model defines those that its flags require, and
 FMUs do not carry them. stick_slip.py and contact_lcp.py declare the methods of models with dry friction. A state vector
 runs over the states of a model, and a contact vector over its contacts; generated methods take and return their
@@ -9,15 +11,8 @@ components.
 from math import inf
 from typing import Any
 
-from .variable_declarations import Count, Local, VariableOwner
+from .variable_declarations import VariableOwner
 from .vectors import ConditionVector, ContactVector, Derivatives, RateVector, StateVector
-
-
-class Events(VariableOwner):
-    """Statistics of mode changes up to the current time."""
-
-    count = Count("changes of mode up to the current time")
-    t_last = Local("s", "time of the last change of mode; the start time if there is none")
 
 
 class Oscillator(VariableOwner):
@@ -26,9 +21,9 @@ class Oscillator(VariableOwner):
     Its constructor creates all attributes.
     """
 
-    solver: Any  # Integrator
-    event_location: Any  # EventLocation, of models with contacts or conditions
+    solver_class: Any  # Integrator with the methods that suit the model
     friction: int  # friction law, of models with contacts
+    condition_sides: list[float]  # of each condition: 1.0 where it holds, else -1.0; the solver sets them at events
 
     states: dict[str, str] = {"x": "v", "v": "a"}  # state -> its rate, which may be a state
     contacts: dict[str, str] = {}  # mode -> state that is the slip velocity of the contact
@@ -49,10 +44,6 @@ class Oscillator(VariableOwner):
     stop_time = 4.0
     step_size = 0.004
     tolerance = 1e-6
-
-    def __init__(self):
-        super().__init__()
-        self.events = Events()
 
     def prepare(self) -> int:
         """Compute the constants that depend on parameters; return OK, or the status of a violated rule."""

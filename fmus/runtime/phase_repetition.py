@@ -16,10 +16,10 @@ def begin_phase(model, step):
     """Note the start of a motion: its state, and the step size to try."""
     if model.is_coupled or model.has_conditions:
         limit_first_step(model, step)
-    location = model.event_location
+    location = step.event_location
     location.phase_t, location.phase_y, location.phase_f = step.t1, step.y1, step.f1
     location.phase_h = step.h_next
-    restore_tolerance(model, step)
+    restore_tolerance(step)
     location.in_doubt = location.must_repeat = False
     step.largest_slip = 0.0
     if model.has_dry_friction and model.has_input_derivatives and not model.is_coupled:
@@ -33,16 +33,16 @@ def begin_phase(model, step):
             location.peaks[j] = 0.0
 
 
-def restore_tolerance(model, step):
+def restore_tolerance(step):
     """Return to the tolerance of the run."""
-    location = model.event_location
+    location = step.event_location
     if location.tolerance_factor < 1.0:
         step.tolerance, location.tolerance_factor = location.tolerance, 1.0
 
 
-def decide_repetition(model, step):
+def decide_repetition(step):
     """Decide whether the motion since the last event must be repeated with a tighter tolerance."""
-    location = model.event_location
+    location = step.event_location
     if location.in_doubt and location.tolerance_factor == 1.0:
         least = SMALLEST_TOLERANCE / step.tolerance
         factor = REFINEMENT if REFINEMENT > least else least
@@ -53,9 +53,9 @@ def decide_repetition(model, step):
             step.largest_slip = inf  # every step is examined
 
 
-def repeat_phase(model, step):
+def repeat_phase(step):
     """Go back to the start of the motion, to repeat it with the tighter tolerance."""
-    location = model.event_location
+    location = step.event_location
     location.must_repeat = False
     step.t1, step.y1, step.f1, step.modes1 = location.phase_t, location.phase_y, location.phase_f, step.modes0
     step.h_next = location.phase_h * location.tolerance_factor**step.active_method.power
@@ -63,7 +63,7 @@ def repeat_phase(model, step):
 
 def end_phase_in_doubt(model, step):
     """Return to the usual tolerance after a step without doubt."""
-    location = model.event_location
+    location = step.event_location
     if location.tolerance_factor < 1.0 and step.t1 >= location.t_doubt and not location.in_doubt:
         step.h_next *= location.tolerance_factor**-step.active_method.power
         begin_phase(model, step)

@@ -117,13 +117,12 @@ class Radau9:
         self.h_last = 0.0
 
     def propose(
-        self, model, modes: ContactVector, t, y: StateVector, f: RateVector, h
+        self, model, step, modes: ContactVector, t, y: StateVector, f: RateVector, h
     ) -> tuple[StateVector, RateVector, StateVector]:
         """Propose a step of size h: return the new state, its rates, and e, where h e estimates the error.
 
         e is NaN if the iteration does not converge.
         """
-        step = model.solver.step
         control = step.active_method
         is_repeated = False
         if step.n_accepted > 0 and t == self.t1 and all_of(f == self.f_end):

@@ -57,7 +57,7 @@ class Rodas:
         self.k1 = self.k2 = self.k3 = self.k4 = self.k5 = 0.0
 
     def propose(
-        self, model, modes: ContactVector, t, y: StateVector, f: RateVector, h
+        self, model, step, modes: ContactVector, t, y: StateVector, f: RateVector, h
     ) -> tuple[StateVector, RateVector, StateVector]:
         """Propose a step of size h: return the new state, its rates, and e, where h e estimates the error."""
         f_t, J = model.jacobian(t, y, modes)

@@ -7,7 +7,6 @@ from binascii import crc32
 from typing import Any
 from weakref import WeakSet
 
-from . import call_sequence
 from .codes import INVALID_STATE
 from .messages import CALL_MESSAGES
 from .pythonfmu_workarounds import compensate_references, signal_safe, write_to_stderr
@@ -74,9 +73,6 @@ def write_numbers(owner: object, names: AttributeTree, state: dict[str, Any]) ->
             setattr(owner, name, list(value) if isinstance(value, list) else value)
 
 
-RUN_TREE = attribute_tree(call_sequence.RunState(0.0))
-
-
 class InvalidStateError(ValueError):
     """Bytes or object that is no saved state of this FMU; the native layer reports the repr."""
 
@@ -88,7 +84,8 @@ class SavedStateAccess(VariableAccess):
     """Mixin of an FMU instance that saves and restores its state."""
 
     # set by make_fmu_class()
-    attribute_tree: AttributeTree
+    model_tree: AttributeTree
+    run_tree: AttributeTree
     instances: WeakSet[Any]
     plain_class: Any
 
@@ -96,9 +93,9 @@ class SavedStateAccess(VariableAccess):
     def _get_fmu_state(self) -> dict[str, Any]:
         try:
             # outputs are recomputed after restoring
-            run = dict(read_numbers(self.run, RUN_TREE), outputs_current=False)
+            run = dict(read_numbers(self.run, self.run_tree), outputs_current=False)
             state = {"run": run, "origin": __name__, "invalid_values": dict(self.invalid_values)}
-            return state | {"model": read_numbers(self.model, self.attribute_tree)}
+            return state | {"model": read_numbers(self.model, self.model_tree)}
         except BaseException as error:  # as in fmu_instance.py
             self.handle_exception(error)
             return {}
@@ -153,8 +150,8 @@ class SavedStateAccess(VariableAccess):
 
     def restore(self, state: dict[str, Any]) -> None:
         """Restore a valid state."""
-        write_numbers(self.run, RUN_TREE, state["run"])
+        write_numbers(self.run, self.run_tree, state["run"])
         self.invalid_values = dict(state["invalid_values"])
-        write_numbers(self.model, self.attribute_tree, state["model"])
+        write_numbers(self.model, self.model_tree, state["model"])
         if self.run.has_failed:
             self.set_outputs_to_nan()

@@ -10,7 +10,7 @@ from math import inf
 from . import conditions, contact_lcp, event_location, phase_repetition, step_limits, stick_slip
 from .active_method import ActiveMethod
 from .codes import DIVERGED, EPSILON, EXACT, NEEDS_REPETITION, NO_CONSISTENT_MODES, OK, ROUNDOFF_MARGIN, STALLED, STUCK
-from .event_location import INTERPOLANT_SHARE, NEAR_ZERO_SHARE
+from .event_location import INTERPOLANT_SHARE, NEAR_ZERO_SHARE, EventLocation
 from .interpolant import Interpolant, largest_of
 from .linear_closed_form import HIGHER_ORDER_INPUT
 from .vectors import (
@@ -79,8 +79,10 @@ class InternalStep:
     modes0: ContactVector
     modes1: ContactVector
 
-    def __init__(self):
+    def __init__(self, model):
         self.active_method = ActiveMethod()
+        if model.has_dry_friction or model.has_conditions:
+            self.event_location = EventLocation(model.n_event_functions)
         # run: relative tolerance, largest step; stop time (inf if unknown); hybrid law
         self.tolerance = self.h_max = 0.0
         self.t_end = inf
@@ -122,11 +124,11 @@ class InternalStep:
             roundoff.t1 = roundoff.x1 = 0.0
         self.t1, self.y1 = t, y
         if model.has_conditions:
-            conditions.initialize(model, t, self.y1, modes)
+            conditions.initialize(model, self.event_location, t, self.y1, modes)
         if model.has_dry_friction:
             self.update_end_modes(model, modes, tie_tolerance)
         if model.has_conditions:
-            conditions.check_limits(model, t, self.y1, self.modes1)
+            conditions.check_limits(model, self.event_location, t, self.y1, self.modes1)
         self.update_end_rates(model)
         if not (model.rests_when_stuck and self.is_hybrid and all_of(self.modes1 == STUCK)):
             if self.h_next == 0.0 and self.active_method.method_number != EXACT:
@@ -157,10 +159,11 @@ class InternalStep:
             Status; NEEDS_REPETITION if the caller must call `repeat_steps`.
         """
         if model.has_conditions:
-            status = conditions.violation_status(model)  # names the contact if its sliding force exceeds what it holds
+            # names the contact if its sliding force exceeds what it holds
+            status = conditions.violation_status(model, self.event_location)
             if status != OK:
                 return status
-            conditions.begin_step(model)
+            conditions.begin_step(model, self.event_location)
         if model.has_dry_friction and not self.has_consistent_modes:
             return NO_CONSISTENT_MODES
         if model.has_dry_friction and self.event_at_end:
@@ -188,7 +191,7 @@ class InternalStep:
         if model.has_other_laws and not self.is_hybrid and status == OK:
             self.update_law_modes(model)
         if model.has_conditions:
-            conditions.select_sides(model, False)
+            conditions.select_sides(model, self.event_location, False)
         t = self.t0
         if self.t1 - t > 16.0 * EPSILON * (t if t > 0.0 else -t):
             counters.n_stalled = 0
@@ -200,13 +203,13 @@ class InternalStep:
 
     def repeat_steps(self, model):
         """Repeat the step in parts, or the motion since the last event, up to the time reached before."""
-        location = model.event_location
+        location = self.event_location
         t_reported, status, repeats = self.t0, OK, False
         for _ in range(MAX_REPEATED_STEPS):
             if location.must_shorten:
-                step_limits.shorten_step(model, self)
+                step_limits.shorten_step(self)
             elif location.must_repeat:
-                phase_repetition.repeat_phase(model, self)
+                phase_repetition.repeat_phase(self)
                 repeats = True
             elif not repeats or self.t1 > t_reported:
                 break
@@ -244,7 +247,7 @@ class InternalStep:
             self.y1[slip_index[i]] = 0.0
         ends, directions = contact_vector(), contact_vector()
         for i in contact_indices:
-            ends[i], directions[i] = stick_slip.breakaway_time(model, self.t0, self.y1, i)
+            ends[i], directions[i] = stick_slip.breakaway_time(model, self, self.t0, self.y1, i)
         end = min_of(ends)
         if end <= self.t_end and end < inf:
             self.t1 = end
@@ -331,7 +334,7 @@ class InternalStep:
         scale = elementwise_max(method.error_scale_floor, scale)
         attempts = 0
         while True:
-            y1, f1, e = method.propose(model, modes, t, y, f, h)
+            y1, f1, e = method.propose(model, self, modes, t, y, f, h)
             self.n_rhs += method.stages
             size1 = magnitude(y1)
             e = magnitude(e) / elementwise_max(size1, scale)
@@ -377,7 +380,7 @@ class InternalStep:
                 continues = low >= INTERPOLANT_SHARE * total and low >= NEAR_ZERO_SHARE * self.largest_slip
                 if continues or not self.is_hybrid:
                     return OK
-                location = model.event_location
+                location = self.event_location
                 location.start[i], location.early[i], location.late[i], location.end[i] = start, early, late, end
                 if self.largest_slip < inf:
                     location.peaks[i] = self.largest_slip
@@ -387,17 +390,17 @@ class InternalStep:
             if model.is_coupled or model.has_conditions:
                 event_location.evaluate_on_cubic(model, self)
                 step_limits.limit_step(model, self)
-                if model.event_location.must_shorten:
+                if self.event_location.must_shorten:
                     return NEEDS_REPETITION
             end = event_location.locate_events(model, self)
             if self.interpolant.ready:  # the event search built the interpolant
                 self.n_rhs += self.active_method.extra
-            phase_repetition.decide_repetition(model, self)
-            if model.event_location.must_repeat:
+            phase_repetition.decide_repetition(self)
+            if self.event_location.must_repeat:
                 return NEEDS_REPETITION
             if end <= self.t1:
                 if model.checks_event_steps and not self.is_accurate_at(model, end):
-                    model.event_location.must_shorten = True
+                    self.event_location.must_shorten = True
                     return NEEDS_REPETITION
                 return self.end_at(model, end)
             if model.is_coupled and self.is_hybrid:
@@ -420,7 +423,7 @@ class InternalStep:
         modes = self.modes0
         if model.has_other_laws:
             modes = self.force_modes(modes)
-        y2, _f2, e = method.propose(model, modes, self.t0, self.y0, self.f0, h)
+        y2, _f2, e = method.propose(model, self, modes, self.t0, self.y0, self.f0, h)
         self.n_rhs += method.stages
         scale = magnitude(self.y0)
         scale = elementwise_max(method.error_scale_floor, scale)
@@ -437,11 +440,11 @@ class InternalStep:
         self.y1 = self.state_at(model, end)
         self.t1 = end
         if model.has_conditions:
-            status = conditions.update_at_event(model, end, self.y1, self.modes0, self.h_max)
+            status = conditions.update_at_event(model, self.event_location, end, self.y1, self.modes0, self.h_max)
             if status != OK:
                 return status
         if model.has_dry_friction and self.is_hybrid:
-            location = model.event_location
+            location = self.event_location
             ends = contact_vector()
             for i in contact_indices:
                 other = location.times[len(self.modes0) + i]
@@ -479,13 +482,13 @@ class InternalStep:
         if self.is_hybrid:
             if model.is_coupled:
                 self.y1, self.modes1, self.has_consistent_modes = contact_lcp.resolve_at_start(
-                    model, self.t1, self.y1, modes, tie_tolerance, tie_tolerance
+                    model, self.t1, self.y1, modes, self.h_max, tie_tolerance, tie_tolerance
                 )
             else:
                 for i in contact_indices:
                     self.modes1[i] = stick_slip.resolve_mode(model, self.t1, self.y1, tie_tolerance, i)
                     if self.y1[slip_index[i]] == 0.0 and self.modes1[i] != modes[i] != STUCK:
-                        if stick_slip.is_grazing(model, self.t1, self.y1, modes, tie_tolerance, i):
+                        if stick_slip.is_grazing(model, self.event_location, self.t1, self.y1, modes, tie_tolerance, i):
                             self.modes1[i], self.grazes_at_end = modes[i], True
 
     def update_end_rates(self, model):
@@ -514,7 +517,7 @@ class InternalStep:
         """Restart after an event; the step size of the last slip phase is kept, if there was one."""
         self.event_at_end = any_of(self.modes1 != self.modes0)  # no event if the velocity only touches zero
         if model.has_conditions:
-            conditions.check_limits(model, self.t1, self.y1, self.modes1)
+            conditions.check_limits(model, self.event_location, self.t1, self.y1, self.modes1)
         self.update_end_rates(model)
         if self.h_next == 0.0 and self.active_method.method_number != EXACT:
             self.h_next = self.initial_step_size()

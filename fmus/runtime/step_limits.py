@@ -25,7 +25,7 @@ def limit_step(model, step):
     The error control of the method does not see event functions that vary without the states, as a load that
     follows a clock while nothing moves.
     """
-    location = model.event_location
+    location = step.event_location
     largest = 0.0
     for j in range(model.n_event_functions):
         error = location.cubic_errors[j]
@@ -42,18 +42,18 @@ def limit_first_step(model, step):
 
     The slopes of the states do not show how fast a load changes that follows a clock.
     """
-    location = model.event_location
+    location = step.event_location
     delta = DIFFERENCE_STEP * step.h_max
-    update_event_functions(model, step.t1, step.y1, step.modes1)
+    update_event_functions(model, location, step.t1, step.y1, step.modes1)
     for j in range(model.n_event_functions):
         location.start[j] = location.values[j]
         location.peaks[j] = location.scales[j]
     y2 = step.y1 + delta * step.f1
-    update_event_functions(model, step.t1 + delta, y2, step.modes1)
+    update_event_functions(model, location, step.t1 + delta, y2, step.modes1)
     for j in range(model.n_event_functions):
         location.near_middle[j] = location.values[j]
     y3 = step.y1 + 2.0 * delta * step.f1
-    update_event_functions(model, step.t1 + 2.0 * delta, y3, step.modes1)
+    update_event_functions(model, location, step.t1 + 2.0 * delta, y3, step.modes1)
     for i in contact_indices:
         if step.modes1[i] != STUCK:
             location.peaks[i] = location.peaks[len(step.modes1) + i] = 0.0  # the error control resolves slips
@@ -71,9 +71,9 @@ def limit_first_step(model, step):
         step.h_next = h if h < step.h_next else step.h_next
 
 
-def shorten_step(model, step):
+def shorten_step(step):
     """Go back to the start of the step, to try half of it."""
-    model.event_location.must_shorten = False
+    step.event_location.must_shorten = False
     step.h_next = 0.5 * step.h_full
     step.t1, step.y1, step.f1, step.modes1 = step.t0, step.y0, step.f0, step.modes0
     step.n_accepted -= 1
@@ -86,7 +86,7 @@ def narrow_feature_share(model, step, h, y1: StateVector, f1: RateVector):
     A step that begins near the zero of a slip may change it by one width; other steps may only come near.  The cubic
     Hermite polynomial of the step lies between its control points, so that a slip that turns within it is seen too.
     """
-    width = model.event_location.feature_width
+    width = step.event_location.feature_width
     third = h / 3.0
     y2 = step.y0 + third * step.f0
     y3 = y1 - third * f1

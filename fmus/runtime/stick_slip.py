@@ -12,13 +12,11 @@ from math import fabs, inf
 
 from .codes import (
     BACKWARD,
-    EXACT,
     FORWARD,
     HYBRID,
     HYBRID_LAW_ONLY,
     MAX_INPUT_ORDER,
     NO_CONSISTENT_MODES,
-    OK,
     ROUNDOFF_MARGIN,
     SIGN,
     STUCK,
@@ -68,9 +66,6 @@ class DryFriction(Oscillator):
         NO_CONSISTENT_MODES: "no combination of stick and slip satisfies the force balance: a contact slides with a "
         "larger force than it holds; set no sliding force above the holding force",
     }
-
-    def prepare(self):
-        return HYBRID_LAW_ONLY if self.friction != HYBRID and self.solver.method == EXACT else OK
 
     def stick_load(self, t: float, y: StateVector, i: ContactIndex) -> tuple[float, float, float]:
         """Return the load on the contact at rest, its rate, and the holding limit."""
@@ -133,7 +128,7 @@ def stick_balance(model, t, y: StateVector, i: ContactIndex):
     return load, rate, limit, ROUNDOFF_MARGIN * (model.load_magnitude(t, y, i) + limit)
 
 
-def is_grazing(model, t, y: StateVector, modes: ContactVector, tie_tolerance, i: ContactIndex):
+def is_grazing(model, location, t, y: StateVector, modes: ContactVector, tie_tolerance, i: ContactIndex):
     """Return whether the slip velocity only touches zero here and the slip continues.
 
     A contact that holds more than its sliding force comes to rest.  Another one goes on slipping if it would break
@@ -152,7 +147,7 @@ def is_grazing(model, t, y: StateVector, modes: ContactVector, tie_tolerance, i:
     stiffness = J[slip_index[i], position_index[i]]
     if not ((stiffness < 0.0 or delay == 0.0) and -0.5 * stiffness * delay * delay < tie_tolerance):
         return False
-    largest_slip = model.event_location.peaks[i]
+    largest_slip = location.peaks[i]
     reversed_velocity = -0.5 * modes[i] * model.slip_acceleration(t, y, modes, i) * delay
     return largest_slip == 0.0 or reversed_velocity < tie_tolerance * largest_slip
 
@@ -184,11 +179,11 @@ def is_consistent(model, t, y: StateVector, modes: ContactVector, i: ContactInde
     return modes[i] * forward >= -rounding
 
 
-def breakaway_time(model, t, y: StateVector, i: ContactIndex):
+def breakaway_time(model, step, t, y: StateVector, i: ContactIndex):
     """Return when a contact breaks away if nothing moves (inf if never), and the direction."""
     load, rate, limit = model.stick_load(t, y, i)
     if model.has_input_derivatives and model.has_higher_order():
-        return breakaway_time_by_series(model, t, y, load, rate, limit, i)
+        return breakaway_time_by_series(model, step, t, y, load, rate, limit, i)
     if rate == 0.0:
         return inf, STUCK
     direction = FORWARD if rate > 0.0 else BACKWARD
@@ -196,10 +191,10 @@ def breakaway_time(model, t, y: StateVector, i: ContactIndex):
     return t + (delay if delay > 0.0 else 0.0), direction
 
 
-def breakaway_time_by_series(model, t, y: StateVector, load, rate, limit, i: ContactIndex):
+def breakaway_time_by_series(model, step, t, y: StateVector, load, rate, limit, i: ContactIndex):
     """Return the same for inputs of higher order; direction 0 if the search must continue from that time."""
-    series = model.event_location.load_series
-    duration = scale = model.solver.step.h_max
+    series = step.event_location.load_series
+    duration = scale = step.h_max
     series.c[1] = rate * duration
     for n in range(2, MAX_INPUT_ORDER + 1):
         scale *= duration / n

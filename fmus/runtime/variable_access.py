@@ -29,7 +29,7 @@ def make_getter(kind: str, blank: object) -> Any:
                 slave.update_outputs()
             if counts and run.outputs_current:
                 slave.update_statistics(ahead)
-            return values(slave.model)
+            return values(slave.model, run)
         except BaseException as error:  # an exception outside Python would crash the host
             slave.handle_exception(error)
             return [blank for _ in references]
@@ -68,14 +68,10 @@ class VariableAccess(FailureHandling):
         )
         self.invalid_values = {}
 
-    def attribute_path(self, name: str) -> str:
-        """Return the dotted attribute path of a variable in the model."""
-        return name
-
     def locate(self, name: str) -> tuple[object, str]:
         """Return the object that owns a variable, and the name of the attribute."""
-        owner: object = self.model
-        *path, last = self.attribute_path(name).split(".")
+        *path, last = name.split(".")
+        owner: object = self.run if path else self.model
         for part in path:
             owner = getattr(owner, part)
         return owner, last
@@ -102,17 +98,15 @@ class VariableAccess(FailureHandling):
             self.last_readers[kind] = cached
             return cached
         is_known = [self.has_type(kind, reference) for reference in references]
-        paths = [
-            self.attribute_path(self.variables[reference][0]) if known else ""
-            for reference, known in zip(references, is_known)
-        ]
-        terms = ["model." + path if path else "blank" for path in paths]
-        values = eval(f"lambda model: [{', '.join(terms)}]", {"blank": blank})  # the fastest way
+        names = [self.variables[reference][0] if known else "" for reference, known in zip(references, is_known)]
+        owners = ["run" if "." in name else "model" for name in names]
+        terms = [f"{owner}.{name}" if name else "blank" for owner, name in zip(owners, names)]
+        values = eval(f"lambda model, run: [{', '.join(terms)}]", {"blank": blank})  # the fastest way
         compiled = (
             list(references),
             values,
-            any("." in path for path in paths),
-            "solver.t_next" in paths,
+            "run" in owners,
+            "solver.t_next" in names,
         )
         if not all(is_known):
             self.report_error(unknown_reference_message(kind, references[is_known.index(False)]))
@@ -124,7 +118,7 @@ class VariableAccess(FailureHandling):
 
     def update_statistics(self, ahead: bool) -> None:
         """Update the statistics of solver and events to the current time; with `ahead` also solver.t_next."""
-        call_sequence.update_statistics(self.model, ahead)
+        call_sequence.update_statistics(self.run, self.model, ahead)
 
     def update_outputs(self) -> None:
         """Update the outputs to the current time; NaN while values are invalid."""

@@ -175,7 +175,7 @@ def declarations(cls: type) -> list[VariableDeclaration]:
     return list(result.values())
 
 
-def variables(owner: VariableOwner, prefix: str = "") -> list[tuple[str, VariableDeclaration]]:
+def variables(owner: object, prefix: str = "") -> list[tuple[str, VariableDeclaration]]:
     """Return dotted name and declaration of every variable of an object and of the objects it owns, in order."""
     result = [(prefix + declared.name, declared) for declared in declarations(type(owner))]
     for name, part in vars(owner).items():

@@ -53,16 +53,23 @@ def import_model_class(fmu: Path) -> type:
             sys.path.remove(str(resources))
 
 
-def method_numbers(model: type) -> dict[str, int]:
-    """Return the integration methods of a model, by name."""
-    return {name: number for name, number, _ in type(model().solver).method.items}
+def method_numbers(model: Any) -> dict[str, int]:
+    """Return the integration methods of a model class, by name."""
+    return {name: number for name, number, _ in model.solver_class.method.items}
+
+
+def create_run(model: Any) -> Any:
+    """Create the run of a model: its solver and statistics, with the runtime of the model's package."""
+    package = type(model).__module__.partition(".")[0]
+    return import_module(f"{package}.runtime.run_state").RunState(model)
 
 
 @dataclass
 class EmbeddedModel:
-    """Model with its values, ready to run from 0 s; SI units."""
+    """Model with its values and its run, ready to run from 0 s; SI units."""
 
     model: Any
+    run: Any
 
     @classmethod
     def create(
@@ -87,21 +94,22 @@ class EmbeddedModel:
             If the model rejects a value, with its message.
         """
         instance = model()
+        run = create_run(instance)
         for name, value in values.items():
             setattr(instance, name, value)
-        instance.solver.rtol, instance.solver.atol = rtol, atol
+        run.solver.rtol, run.solver.atol = rtol, atol
         if method:
-            instance.solver.method = method_numbers(model)[method]
-        violated = instance.prepare()
+            run.solver.method = method_numbers(model)[method]
+        violated = instance.prepare() or run.solver.check_method(instance)
         if violated:
             raise HarnessError(instance.rules[violated].format_map(vars(instance)))
-        return cls(instance)
+        return cls(instance, run)
 
     def start_run(self, stop: float) -> None:
         """Initialize the model and start its solver at 0 s."""
         initial_states = self.model.initial_state(0.0)  # a number, of a model of one state
         initial_states = initial_states if isinstance(initial_states, tuple) else (initial_states,)
-        self.model.solver.start(self.model, 0.0, *initial_states, stop, self.model.tolerance)
+        self.run.solver.start(self.model, 0.0, *initial_states, stop, self.run.tolerance)
 
     @property
     def state_reader(self) -> Callable[[Any], tuple[float, ...]]:
@@ -113,7 +121,7 @@ class EmbeddedModel:
         """Return the solver's attribute for a state or mode: h_ if h means something else to the solver."""
         others = {*self.model.states, *self.model.contacts} - {name}
         candidates = (f"{prefix}{name}{'_' * n}" for prefix in ("own_", "") for n in (3, 2, 1, 0))
-        return next(one for one in candidates if hasattr(self.model.solver, one) and one not in others)
+        return next(one for one in candidates if hasattr(self.run.solver, one) and one not in others)
 
     def compute_states(self, times: list[float], timeout: float | None = None) -> list[tuple[float, ...]]:
         """Return the states at the times, starting at 0 s.
@@ -123,7 +131,7 @@ class EmbeddedModel:
         HarnessError
             If the run fails or takes longer than `timeout` s.
         """
-        model, solver = self.model, self.model.solver
+        model, solver = self.model, self.run.solver
         self.start_run(times[-1])
         read = self.state_reader
         rows = [read(solver)]
@@ -142,10 +150,10 @@ class EmbeddedModel:
     def solve(self, times: list[float], timeout: float | None = None) -> Solution:
         """Solve the model at the times. Changes of mode are included for a single contact with hybrid dry friction."""
         states = np.array(self.compute_states(times, timeout))
-        model = self.model
-        model.solver.report(model.events)
-        evaluations = model.solver.evaluations
-        has_single_dry_contact = len(model.contacts) == 1 and model.solver.step.is_hybrid
+        solver = self.run.solver
+        solver.report(self.run.events)
+        evaluations = solver.evaluations
+        has_single_dry_contact = len(self.model.contacts) == 1 and solver.step.is_hybrid
         if not has_single_dry_contact:
             return Solution(np.array(times), states, None, evaluations)
         (_, start_mode), *events = self.find_modes(times[-1])
@@ -157,13 +165,14 @@ class EmbeddedModel:
 
     def find_modes(self, stop: float) -> list[tuple[float, int]]:
         """Return the mode at the start, followed by the changes of mode up to the stop."""
-        model, solver, (mode,) = self.model, self.model.solver, map(self.solver_attribute, self.model.contacts)
+        model, solver, events = self.model, self.run.solver, self.run.events
+        (mode,) = map(self.solver_attribute, model.contacts)
         self.start_run(stop)
         changes: list[tuple[float, int]] = [(0.0, getattr(solver, mode))]
         while solver.t < stop:
             solver.update_t_next(model)
             solver.advance(model, solver.t_next)
-            solver.report(model.events)
-            if model.events.count >= len(changes):
+            solver.report(events)
+            if events.count >= len(changes):
                 changes.append((solver.t, getattr(solver, mode)))
         return changes

@@ -7,7 +7,7 @@ from inspect import isfunction, signature
 from pathlib import Path
 
 import pytest
-from internal_steps import array_steps, scalar_steps
+from internal_steps import array_steps, prepared_run, scalar_steps
 from models import CASES, LARGER_MODELS, MODELS, ROOT, label, model_class
 
 from fmus.packaging import BuildError
@@ -98,9 +98,9 @@ def test_unreachable_code_is_removed():
 @EVERY_MODEL
 def test_a_traceback_points_into_the_source(name):
     model = model_class(name)()
-    model.prepare()
+    run = prepared_run(model, {})
     with pytest.raises(TypeError) as caught:
-        model.solver.start(model, 0.0, *model.initial_state(0.0), "never", 1e-6)
+        run.solver.start(model, 0.0, *model.initial_state(0.0), "never", 1e-6)
     frame = traceback.extract_tb(caught.value.__traceback__)[-1]
     assert frame.filename == str(ROOT / "fmus" / "runtime" / "integrator.py")
     assert frame.line == "duration = t_end - t if t_end < inf else model.stop_time"

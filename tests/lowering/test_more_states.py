@@ -7,7 +7,7 @@ from math import exp, fabs
 import numpy as np
 import pytest
 from contact_references import CONTACT_REFERENCES, reference_events
-from internal_steps import array_steps, bits, compute_step, prepared_model, scalar_steps, start, state_values
+from internal_steps import array_steps, bits, compute_step, prepared_run, scalar_steps, start, state_values
 from models import DOP853, LARGER_MODELS, ODE23, ODE45, RADAU9, RODAS, ROOT
 from scipy.integrate import solve_ivp
 
@@ -41,16 +41,14 @@ def test_arrays_and_scalars_give_the_same_bits_at_every_step(name, method):
     assert len(scalars) > 15
 
 
-def run(name, method):
+def integrate(name, method):
     """Run the lowered model; return the state at the stop, and time and modes of every event."""
     one, stop = complete_model(FILES[name])(), STOPS[name]
-    prepared_model(
-        one, {"solver.method": method, "solver.rtol": RTOL[method], "solver.atol": 1e-3 * RTOL[method]}, stop
-    )
-    start(one, one.initial_state(0.0), stop)
-    step, events = one.solver.step, []
+    run = prepared_run(one, {"solver.method": method, "solver.rtol": RTOL[method], "solver.atol": 1e-3 * RTOL[method]})
+    start(one, run, one.initial_state(0.0), stop)
+    step, events = run.solver.step, []
     while step.t1 < stop:
-        assert compute_step(one) == 0
+        assert compute_step(one, run) == 0
         if step.event_at_end:
             events.append((step.t1, *state_values(step, one.contacts)))
     return state_values(step, one.states), events
@@ -71,7 +69,7 @@ def bristles():
 @EVERY_METHOD
 def test_bristles_agree_with_an_independent_solver(method):
     truth = bristles()
-    final, _ = run("lugre", method)
+    final, _ = integrate("lugre", method)
     assert np.abs(np.array(final) - truth).max() < max(2e3 * RTOL[method] * np.abs(truth).max(), 1e-11)
 
 
@@ -79,7 +77,7 @@ def test_bristles_agree_with_an_independent_solver(method):
 @pytest.mark.parametrize("name", CONTACT_REFERENCES)
 def test_contacts_stick_and_slip_as_in_an_independent_solver(name, method):
     events, end = reference_events(name)
-    final, observed_events = run(name, method)
+    final, observed_events = integrate(name, method)
     assert [modes for _, *modes in observed_events] == [modes for _, *modes in events]
     assert observed_events
     tolerance = max(2e3 * RTOL[method], 1e-10)
@@ -89,11 +87,11 @@ def test_contacts_stick_and_slip_as_in_an_independent_solver(name, method):
 
 def test_a_stuck_sled_keeps_zero_speed_while_the_other_moves():
     one = lowered_model(FILES["sleds"])()
-    prepared_model(one, {"solver.method": DOP853, "solver.rtol": 1e-9}, 16.0)
-    start(one, one.initial_state(0.0), 16.0)
-    step, n_stuck = one.solver.step, 0
+    run = prepared_run(one, {"solver.method": DOP853, "solver.rtol": 1e-9})
+    start(one, run, one.initial_state(0.0), 16.0)
+    step, n_stuck = run.solver.step, 0
     while step.t1 < 16.0:
-        assert compute_step(one) == 0
+        assert compute_step(one, run) == 0
         for mode, speed in ("mode1", "v1"), ("mode2", "v2"):
             if getattr(step, f"{mode}_0") == 0:
                 assert bits([getattr(step, f"{speed}_0"), getattr(step, f"{speed}_1")]) == bits([0.0, 0.0])

@@ -4,13 +4,13 @@ import re
 
 import pytest
 from build_cache import build_user_model
-from internal_steps import prepared_model, start
+from internal_steps import prepared_run, start
 from models import DOP853, LARGER_MODELS, RODAS
 
+from fmus.packaging.fmi_variables import declared_variables
 from fmus.packaging.lowering import LAWS, METHODS, lowered_files, lowered_model, select_features, sibling_module
 from fmus.packaging.model_lookup import find_model
 from fmus.packaging.native.model_header import render_model_header
-from fmus.runtime.variable_declarations import variables
 
 BELT = '''"""A model."""
 from fmus import Contact, Mode, Model, Output, Parameter, State
@@ -50,13 +50,13 @@ def numbers(path, model, names):
     """Return ends of steps, and the values of these names there, by two methods."""
     results, rules = [], sibling_module(lowered_model(path), "runtime.call_sequence")
     for method in DOP853, RODAS:
-        prepared_model(model, {"solver.method": method, "solver.rtol": 1e-6}, 2.0)
-        start(model, model.initial_state(0.0), 2.0)
-        solver = model.solver
+        run = prepared_run(model, {"solver.method": method, "solver.rtol": 1e-6})
+        start(model, run, model.initial_state(0.0), 2.0)
+        solver = run.solver
         while solver.t < 1.5:
             solver.update_t_next(model)
             assert solver.advance(model, solver.t_next) == 0
-            rules.set_outputs(rules.RunState(1e-6), model)
+            rules.set_outputs(run, model)
             results.append((solver.t, *(getattr(model, name) for name in names)))
     return results
 
@@ -85,10 +85,11 @@ def test_author_choices_named_like_an_unavailable_method_or_law_are_kept(tmp_pat
     text = SLED.replace("import Contact", "import Choice, Contact").replace("- F)", f"* kind.choose({cases}) - F)")
     path.write_text(text.replace("    m =", f'    kind = Choice("kind", {items})\n    m ='))
     source = find_model(path)
-    model = lowered_model(source, select_features(source, ["ode45"], ["hybrid"]))()
-    offered = {name: [label for label, _, _ in meaning.items] for name, meaning in variables(model) if meaning.items}
+    lowered = lowered_model(source, select_features(source, ["ode45"], ["hybrid"]))
+    items = {name: meaning.items for name, meaning in declared_variables(lowered) if meaning.items}
+    offered = {name: [label for label, _, _ in rows] for name, rows in items.items()}
     assert offered == {"kind": labels, "friction": ["hybrid"], "solver.method": ["ode45"]}
-    rates = set()
+    model, rates = lowered(), set()
     for model.kind in range(1, 9):
         assert model.prepare() == 0
         rates.add(model.rates(0.0, 0.1, 0.0, 1))

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 from contact_references import CONTACT_REFERENCES, integrate_events
-from internal_steps import prepared_model, start
+from internal_steps import prepared_run, start
 from models import DOP853, LARGER_MODELS, write_growing_friction_model
 from scipy.integrate import solve_ivp
 
-from fmus.packaging.lowering import lowered_model, model_exchange_instance, sibling_module
+from fmus.packaging.lowering import lowered_model, model_exchange_run, sibling_module
 
 FILES = {path.stem: path for path in LARGER_MODELS}
 
@@ -15,35 +15,32 @@ FILES = {path.stem: path for path in LARGER_MODELS}
 def integrate_with_indicators(name, stop):
     """Return time and modes of each event and the final state, from scipy with the indicators as event functions."""
     cls = lowered_model(FILES[name])
-    model, exchange, run = (
-        model_exchange_instance(cls),
-        sibling_module(cls, "runtime.model_exchange"),
-        sibling_module(cls, "runtime.call_sequence").RunState(1e-10),
-    )
-    prepared_model(model, {"solver.method": DOP853, "solver.rtol": 1e-10}, stop)
-    start(model, model.initial_state(0.0), stop)
-    solver = model.solver
-    exchange.begin(model)
+    exchange = sibling_module(cls, "runtime.model_exchange")
+    model, run = model_exchange_run(cls)
+    prepared_run(model, {"solver.method": DOP853, "solver.rtol": 1e-10}, run)
+    start(model, run, model.initial_state(0.0), stop)
+    solver = run.solver
+    exchange.begin(run, model)
 
     def at(t, y):
         exchange.set_time(run, model, t)
-        model.model_exchange.states[:] = map(float, y)
+        run.model_exchange.states[:] = map(float, y)
         exchange.set_continuous_states(run, model)
 
     def rates(t, y):
         at(t, y)
-        exchange.update_rates(model)
-        return list(model.model_exchange.rates)
+        exchange.update_rates(run, model)
+        return list(run.model_exchange.rates)
 
     def states():
-        exchange.update_states(model)
-        return list(model.model_exchange.states)
+        exchange.update_states(run, model)
+        return list(run.model_exchange.states)
 
     def indicator(i):
         def left(t, y):
             at(t, y)
-            exchange.update_indicators(model)
-            return model.model_exchange.indicators[i]
+            exchange.update_indicators(run, model)
+            return run.model_exchange.indicators[i]
 
         left.terminal, left.direction = True, -1
         return left
@@ -60,8 +57,8 @@ def integrate_with_indicators(name, stop):
         t, y = t + beyond, y + beyond * np.array(rates(t, y))
         at(t, y)
         before = [getattr(solver, mode) for mode in model.contacts]
-        exchange.update_modes(model, solver)
-        assert not exchange.update_modes(model, solver)
+        exchange.update_modes(run, model)
+        assert not exchange.update_modes(run, model)
         y = states()
         modes = [getattr(solver, mode) for mode in model.contacts]
         if modes != before:
@@ -81,19 +78,16 @@ def test_modes_follow_at_the_events_located_by_an_importer(name):
 def test_modes_that_balance_no_forces_are_reported(tmp_path):
     """A sled whose sliding friction exceeds the static friction once the driver has pulled far enough."""
     cls = lowered_model(write_growing_friction_model(tmp_path))
-    model, exchange, run = (
-        model_exchange_instance(cls),
-        sibling_module(cls, "runtime.model_exchange"),
-        sibling_module(cls, "runtime.call_sequence").RunState(1e-10),
-    )
-    prepared_model(model, {"slide1": 200.0}, 8.0)
-    start(model, model.initial_state(0.0), 8.0)
-    exchange.begin(model)
+    exchange = sibling_module(cls, "runtime.model_exchange")
+    model, run = model_exchange_run(cls)
+    prepared_run(model, {"slide1": 200.0}, run)
+    start(model, run, model.initial_state(0.0), 8.0)
+    exchange.begin(run, model)
     exchange.set_time(run, model, 4.0)
     model.x_base = 0.034 * 4.0
-    assert not exchange.update_modes(model, model.solver)
+    assert not exchange.update_modes(run, model)
     exchange.set_time(run, model, 5.0)
     model.x_base = 0.034 * 5.0
-    assert model.solver.step.has_consistent_modes
-    exchange.update_modes(model, model.solver)
-    assert not model.solver.step.has_consistent_modes
+    assert run.solver.step.has_consistent_modes
+    exchange.update_modes(run, model)
+    assert not run.solver.step.has_consistent_modes

@@ -8,7 +8,7 @@ from model_exchange_client import DRIVEN, handle_event_at, single_error
 from models import MODELS, PUSHED, declared, model_class, outputs, push, runtime
 from worker_client import FmiError
 
-from fmus.packaging.lowering import model_exchange_instance
+from fmus.packaging.lowering import model_exchange_run
 from fmus.runtime.codes import DIVERGED, OK
 
 fmus, launch, launch_moving = model_exchange_client.FIXTURES
@@ -41,11 +41,11 @@ def test_a_wild_trial_state_is_no_failure(launch_moving, name):
 def test_an_accepted_point_of_a_diverging_solution_ends_the_run(name, size, status):
     """Also where the outputs are finite."""
     exchange, calls = runtime(name, "model_exchange"), runtime(name, "call_sequence")
-    model, run = model_exchange_instance(model_class(name)), calls.RunState(1e-4)
+    model, run = model_exchange_run(model_class(name))
     exchange.enable(run)
     assert calls.exit_initialization(run, model) == OK
-    exchange.begin(model)
-    model.model_exchange.states[0] = size
+    exchange.begin(run, model)
+    run.model_exchange.states[0] = size
     exchange.set_continuous_states(run, model)
     assert exchange.complete_step(run, model) == status
 

@@ -1,10 +1,10 @@
 """Static and sliding friction may vary: breakaway is on time, and inconsistent friction is reported."""
 
 import pytest
-from internal_steps import compute_step, prepared_model, start, state_values
+from internal_steps import compute_step, prepared_run, start, state_values
 from models import DOP853, LARGER_MODELS, MODELS, ODE45, RODAS, declared
 
-from fmus.packaging.lowering import lowered_model, model_exchange_instance, sibling_module
+from fmus.packaging.lowering import lowered_model, model_exchange_run, sibling_module
 from fmus.packaging.model_lookup import find_model
 from fmus.runtime.codes import NO_CONSISTENT_MODES
 
@@ -32,11 +32,12 @@ class Slider(Model):
 @pytest.mark.parametrize("method", [ODE45, DOP853, RODAS])
 def test_a_constant_load_breaks_away_when_the_static_limit_drops_to_it(method):
     """A sled under a force, lifted by its driver: breaks away when mu_s (m g - lift u t) equals the force."""
-    model = prepared_model(lowered_model(FILES["lift"])(), {"solver.method": method, "k": 0.0, "F_ext": 60.0}, 16.0)
-    start(model, model.initial_state(0.0), 16.0)
-    step = model.solver.step
+    model = lowered_model(FILES["lift"])()
+    run = prepared_run(model, {"solver.method": method, "k": 0.0, "F_ext": 60.0})
+    start(model, run, model.initial_state(0.0), 16.0)
+    step = run.solver.step
     while not step.event_at_end:
-        assert compute_step(model) == 0
+        assert compute_step(model, run) == 0
         assert step.t1 < 16.0
     assert step.t1 == pytest.approx((12.5 * 9.81 - 60.0 / 0.9) / (300.0 * 0.034), rel=1e-9)
     assert state_values(step, model.contacts) == [1]
@@ -45,14 +46,11 @@ def test_a_constant_load_breaks_away_when_the_static_limit_drops_to_it(method):
 def externally_integrated(source, values):
     """Return a model under an importer's solver, its model-exchange interface, and its run."""
     cls = lowered_model(source)
-    model, exchange, run = (
-        model_exchange_instance(cls),
-        sibling_module(cls, "runtime.model_exchange"),
-        sibling_module(cls, "runtime.call_sequence").RunState(1e-6),
-    )
-    prepared_model(model, {"solver.method": DOP853, "solver.rtol": 1e-6} | values, 1.0)
-    start(model, model.initial_state(0.0), 1.0)
-    exchange.begin(model)
+    exchange = sibling_module(cls, "runtime.model_exchange")
+    model, run = model_exchange_run(cls)
+    prepared_run(model, {"solver.method": DOP853, "solver.rtol": 1e-6} | values, run)
+    start(model, run, model.initial_state(0.0), 1.0)
+    exchange.begin(run, model)
     return model, exchange, run
 
 
@@ -64,10 +62,10 @@ STUCK = [one for one in STUCK if one not in (FILES["belt"], FILES["clutch"])]  #
 def test_no_contact_sticks_while_its_indicator_requires_breakaway(source):
     """For any input, to the last bit: an importer would never notice it otherwise."""
     rest = {name: 0.0 for name, d in declared(source).items() if name in ("x0", "theta0")}
-    model, exchange, _ = externally_integrated(source, rest)
+    model, exchange, run = externally_integrated(source, rest)
     entry = next(name for name, d in declared(source).items() if d.causality == "input" and d.unit in ("N", "N.m"))
     many, tried = len(model.contacts), 0
-    solver = model.solver
+    solver = run.solver
     start_states, start_modes = ([getattr(solver, n) for n in names] for names in (model.states, model.contacts))
 
     def push(force):
@@ -76,11 +74,11 @@ def test_no_contact_sticks_while_its_indicator_requires_breakaway(source):
             for name, number in zip(names, numbers, strict=True):
                 setattr(solver, name, number)
         setattr(model, entry, force)
-        exchange.update_indicators(model)
-        before = min(model.model_exchange.indicators[many : 2 * many])
-        exchange.update_modes(model, solver)
-        exchange.update_indicators(model)
-        return before, min(model.model_exchange.indicators[many : 2 * many])
+        exchange.update_indicators(run, model)
+        before = min(run.model_exchange.indicators[many : 2 * many])
+        exchange.update_modes(run, model)
+        exchange.update_indicators(run, model)
+        return before, min(run.model_exchange.indicators[many : 2 * many])
 
     low, high = getattr(model, entry), 1e4
     assert push(low)[0] > 0.0 >= push(high)[0]
@@ -104,14 +102,15 @@ def test_sliding_friction_above_static_friction_is_reported_and_stops_the_run(sl
     """In co-simulation by any method, and in model exchange."""
     methods = [value for _, value, _ in declared(slider)["solver.method"].items]
     for method in methods:
-        model = prepared_model(lowered_model(slider)(), {"solver.method": method, "press": 5.0, "F_ext": 4.5}, 1.0)
-        start(model, model.initial_state(0.0), 1.0)
-        assert compute_step(model) == NO_CONSISTENT_MODES
-    model, exchange, _ = externally_integrated(slider, {"press": 5.0})
+        model = lowered_model(slider)()
+        run = prepared_run(model, {"solver.method": method, "press": 5.0, "F_ext": 4.5})
+        start(model, run, model.initial_state(0.0), 1.0)
+        assert compute_step(model, run) == NO_CONSISTENT_MODES
+    model, exchange, run = externally_integrated(slider, {"press": 5.0})
     model.F_ext = 4.5
-    exchange.update_modes(model, model.solver)
-    assert not model.solver.step.has_consistent_modes
-    model, exchange, _ = externally_integrated(slider, {"press": 3.9})
+    exchange.update_modes(run, model)
+    assert not run.solver.step.has_consistent_modes
+    model, exchange, run = externally_integrated(slider, {"press": 3.9})
     model.F_ext = 4.5
-    exchange.update_modes(model, model.solver)
-    assert (model.solver.x, model.solver.v, model.solver.mode) == (0.0, 0.0, 1)
+    exchange.update_modes(run, model)
+    assert (run.solver.x, run.solver.v, run.solver.mode) == (0.0, 0.0, 1)

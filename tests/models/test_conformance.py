@@ -150,7 +150,6 @@ def physics(monkeypatch):
         for variable, value in values.items():
             if "." not in variable:
                 setattr(model, variable, value)
-        model.solver.method = ODE23
         t, x, v = (Quantity.of(0.7, unit) for unit in ("s", *(declared(name)[v].unit for v in outputs(name)[:2])))
         assert model.prepare() == 0
         model.initial_state(t)
@@ -206,11 +205,11 @@ def test_the_methods_preserve_dimensions(physics, name):
     a, h = model.rates(t, x, v, *modes), Quantity(1e-4, 0, 0, 1)
     for file in [item for item, number, _ in declared(name)["solver.method"].items if number != EXACT]:
         method = getattr(runtime(name, file), file.capitalize())()
-        x1, v1, a1, e_x, e_v = method.propose(model, *modes, t, x, v, a, h)
+        step = runtime(name, "step_control").InternalStep(model)
+        x1, v1, a1, e_x, e_v = method.propose(model, step, *modes, t, x, v, a, h)
         assert [assert_dimension(*pair) for pair in ((x1, x), (v1, v), (a1, a), (e_x, x / h), (e_v, v / h))] == [
             True
         ] * 5
-        step = runtime(name, "step_control").InternalStep()
         names = [*model.states, list(model.states.values())[-1]]
         for end, values in ("0", (x, v, a)), ("1", (x1, v1, a1)):
             for parameter, value in zip(names, values, strict=True):

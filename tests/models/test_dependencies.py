@@ -15,8 +15,8 @@ from fmi3_as_fmi2 import Slave
 from models import MODELS, ROOT, declared, model_class, outputs, push
 
 from fmus.packaging.dependencies import output_dependencies
+from fmus.packaging.fmi_variables import declared_variables
 from fmus.packaging.lowering import lowered_model
-from fmus.runtime.variable_declarations import variables
 
 EVERY_MODEL = pytest.mark.parametrize("name", MODELS)
 SITUATIONS = 150
@@ -161,6 +161,6 @@ def test_rare_dependencies_are_declared_too(tmp_path):
     more = '    depth = Output("1", "how far beyond the gap", choose(x > gap, log(x / gap), 0.0))\n'
     (tmp_path / "bumper.py").write_text(text + more, encoding="utf-8")
     model = lowered_model(tmp_path / "bumper.py")
-    dependencies = output_dependencies(model, variables(model()), at_start=True)
+    dependencies = output_dependencies(model, declared_variables(model), at_start=True)
     assert {"gap", "s"} <= set(dependencies["a"])
     assert dependencies["depth"] == ["gap"]

@@ -132,7 +132,7 @@ def run_native(worker, path, values, pieces, h):
 def run_lowered(model, values, pieces, h):
     """Return the same for the lowered Python model, whose FMU cannot accept input derivatives."""
     call_sequence, numbers = sibling_module(model, "runtime.call_sequence"), model()
-    run = call_sequence.RunState(numbers.tolerance)
+    run = sibling_module(model, "runtime.run_state").RunState(numbers)
     vars(numbers).update(values)
     call_sequence.set_experiment(run, 0.0, len(pieces) * h, 0.0)
     run.phase = INITIALISING
@@ -146,8 +146,8 @@ def run_lowered(model, values, pieces, h):
         assert call_sequence.do_step(run, numbers, t, h) == OK
         assert call_sequence.update_outputs(run, numbers) == OK
         rows.append([numbers.x, numbers.v])
-    call_sequence.update_statistics(numbers, False)
-    return rows, numbers.events.count
+    call_sequence.update_statistics(run, numbers, False)
+    return rows, run.events.count
 
 
 @pytest.mark.slow

@@ -18,7 +18,8 @@ from lxml import etree
 from models import ROOT, declared, model_class
 from PIL import Image
 
-from fmus.packaging.lowering import model_exchange_instance
+from fmus.packaging.fmi_variables import declared_variables
+from fmus.packaging.lowering import model_exchange_run
 from fmus.packaging.model_lookup import find_model, model_names
 from fmus.packaging.native.sources import FMI_HEADERS, OWN_HEADERS
 from fmus.runtime.variable_declarations import variables
@@ -160,11 +161,11 @@ def test_only_the_speed_may_jump_and_only_with_dry_friction(fmu, name):
 
 @EVERY_MODEL
 def test_nominal_values_are_the_error_scales_of_the_own_solver(fmu, name):
-    model = model_exchange_instance(model_class(name))
-    nominals = model.model_exchange.nominals
+    model, run = model_exchange_run(model_class(name))
+    nominals = run.model_exchange.nominals
     model.prepare()
-    model.solver.start(model, 0.0, *model.initial_state(0.0), inf, model.tolerance)
-    step = model.solver.step
+    run.solver.start(model, 0.0, *model.initial_state(0.0), inf, run.tolerance)
+    step = run.solver.step
     position, speed = (getattr(step.active_method, f"error_scale_floor_{state}") for state in model.states)
     sizes = [position, speed, position][: len(nominals)]
     rates = [unknown.variable for unknown in read_model_description(fmu(name)).derivatives]
@@ -223,7 +224,7 @@ def test_an_instance_starts_with_the_values_of_the_xml_and_accepts_others(fmu, l
     assert starts == {variable: values["starts"][variable] for variable in starts}
     settable = {
         variable
-        for variable, meaning in variables(find_model(name).model())
+        for variable, meaning in declared_variables(find_model(name).model)
         if meaning.causality in ("parameter", "input")
     }
     assert set(values["after"]) == settable == set(starts)

@@ -11,7 +11,6 @@ from io import BytesIO
 from math import pi
 from pathlib import Path, PurePosixPath
 from types import SimpleNamespace
-from typing import ClassVar
 from xml.etree import ElementTree
 from zipfile import ZipFile
 
@@ -24,9 +23,13 @@ from models import declared
 from fmus.packaging import BuildError
 from fmus.packaging.archive import write
 from fmus.packaging.embedded_modules import embedded_files, installed_package
+from fmus.packaging.fmi_variables import declared_variables
 from fmus.packaging.model_description import describe
 from fmus.packaging.model_lookup import find_model, model_names, more_model_names
-from fmus.runtime.variable_declarations import Fixed, Output, Parameter, VariableOwner, variables
+from fmus.runtime.integrator import Integrator
+from fmus.runtime.oscillator import Oscillator
+from fmus.runtime.run_state import RunState
+from fmus.runtime.variable_declarations import Fixed, Output, Parameter, variables
 
 EVERY_MODEL = pytest.mark.parametrize("name", model_names())
 
@@ -109,7 +112,8 @@ def test_validation_reports_no_problems(fmu, name):
 @EVERY_MODEL
 def test_the_xml_matches_the_declarations(fmu, name):
     scalars = description_of(fmu(name)).findall("ModelVariables/ScalarVariable")
-    declared = variables(find_model(name).model())
+    instance = find_model(name).model()
+    declared = variables(instance) + variables(RunState(instance))
     force = next((variable for variable, meaning in declared if meaning.role == "contact"), "")
     for index, (scalar, (variable, meaning)) in enumerate(zip(scalars, declared, strict=True)):
         value = scalar[0]
@@ -152,7 +156,7 @@ def test_enumerations_list_their_items(fmu, name):
 @EVERY_MODEL
 def test_direct_outputs_depend_on_the_input_and_the_others_on_nothing(fmu, name):
     root = description_of(fmu(name))
-    meanings = [meaning for _, meaning in variables(find_model(name).model())]
+    meanings = [meaning for _, meaning in declared_variables(find_model(name).model)]
     (force,) = [index for index, meaning in enumerate(meanings, 1) if meaning.causality == "input"]
     outputs = {int(u.get("index")): u.get("dependencies") for u in root.findall("ModelStructure/Outputs/Unknown")}
     assert outputs == {
@@ -353,15 +357,13 @@ def test_imports_are_followed_through_packages_for_any_line_ends(tmp_path):
     assert "\r" not in "".join(results.values())
 
 
-class Sketch(VariableOwner):
+class Sketch(Oscillator):
     """A model that only has a description.
 
     x' = -x
     """
 
-    stop_time, step_size, tolerance = 1.0, 0.1, 1e-6
-    has_input_derivatives = False
-    contacts: ClassVar[dict[str, str]] = {}
+    solver_class = Integrator
 
 
 def sketch(**declared):

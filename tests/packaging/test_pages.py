@@ -15,7 +15,7 @@ from models import MODELS, declared, model_class, outputs
 
 from fmus.packaging import archive
 from fmus.packaging.documentation_page import documentation_page, typeset
-from fmus.packaging.model_description import declared_variables
+from fmus.packaging.fmi_variables import declared_variables
 from fmus.packaging.native import fmu
 from fmus.packaging.svg_chart import tick_values
 from tests.packaging.test_packaging import entries

@@ -3,6 +3,7 @@
 from itertools import pairwise
 from math import nan
 
+from internal_steps import prepared_run
 from models import LARGER_MODELS, model_class, runtime
 
 from fmus.packaging.lowering import lowered_model, sibling_module
@@ -10,13 +11,12 @@ from fmus.packaging.lowering import lowered_model, sibling_module
 
 def test_a_step_of_the_smallest_size_that_fails_is_not_tried_again():
     model = model_class("smd")()
-    model.solver.method = 2
-    model.prepare()
-    model.solver.start(model, 1.0, 0.1, 0.0, 5.0, 1e-6)
+    solver = prepared_run(model, {"solver.method": 2}).solver
+    solver.start(model, 1.0, 0.1, 0.0, 5.0, 1e-6)
     model.k = nan
-    assert model.solver.step.compute_next(model) == runtime("smd", "codes").DIVERGED
+    assert solver.step.compute_next(model) == runtime("smd", "codes").DIVERGED
     halvings = 60  # of h_max, until it has the size of rounding errors
-    assert 0 < model.solver.step.n_rejected < halvings < runtime("smd", "step_control").MAX_TRIES
+    assert 0 < solver.step.n_rejected < halvings < runtime("smd", "step_control").MAX_TRIES
 
 
 def test_pivots_that_do_not_end_change_one_contact_at_a_time(monkeypatch):
@@ -24,14 +24,14 @@ def test_pivots_that_do_not_end_change_one_contact_at_a_time(monkeypatch):
     (path,) = (path for path in LARGER_MODELS if path.stem == "blocks")
     lowered, modes = lowered_model(path), []
 
-    def violations(model, t, x1, v1, x2, v2, mode1, mode2, status1, status2, tie_tolerance):
+    def violations(model, t, x1, v1, x2, v2, mode1, mode2, status1, status2, h_max, tie_tolerance):
         modes.append((mode1, mode2))
         return 1.0, 1.0, 1 - mode1, 1 - mode2
 
     model, contact_lcp = lowered(), sibling_module(lowered, "runtime.contact_lcp")
     monkeypatch.setattr(contact_lcp, "violations", violations)
     model.prepare()
-    contact_lcp.solve_modes(model, 0.0, 0.0, 0.0, 0.0, 0.0, 0, 0, 1, 1, 1e-9)
+    contact_lcp.solve_modes(model, 0.0, 0.0, 0.0, 0.0, 0.0, 0, 0, 1, 1, 0.1, 1e-9)
     joint = contact_lcp.MAX_JOINT_ITERATIONS
     changes = [(a != c) + (b != d) for (a, b), (c, d) in pairwise(modes)]
     assert changes[:joint] == [2] * joint

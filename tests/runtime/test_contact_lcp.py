@@ -1,7 +1,6 @@
 """Which of several contacts stick: random loads, on the vector sources with numpy arrays."""
 
 from itertools import permutations, product
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,8 +12,6 @@ from fmus.runtime.contact_lcp import AT_REST, CoupledFriction
 
 class Chain(CoupledFriction):
     """n contacts at rest: each body on the ground, or each on the previous one; slips accelerate with b - A F."""
-
-    solver = SimpleNamespace(step=SimpleNamespace(h_max=1.0))
 
     def __init__(self, draw, n, jump, shared):
         bodies = np.eye(n) - (np.eye(n, k=-1) if shared else 0.0)
@@ -51,7 +48,7 @@ class Chain(CoupledFriction):
         """Return the modes, found from all contacts stuck, and whether they are consistent."""
         vectors.contact_indices[:] = range(self.n)
         y, status = np.zeros(self.n), np.full(self.n, AT_REST)
-        modes, fits = contact_lcp.solve_modes(self, 0.0, y, np.zeros(self.n), status, ROUNDOFF_MARGIN)
+        modes, fits = contact_lcp.solve_modes(self, 0.0, y, np.zeros(self.n), status, 1.0, ROUNDOFF_MARGIN)
         return tuple(map(int, modes)), fits
 
     def fits(self, modes):
@@ -132,7 +129,7 @@ def test_with_many_contacts_at_rest_none_is_released_that_could_be_held_alone(mo
         for i in range(7):
             assert modes[i] == STUCK or not chain.fits([STUCK if j == i else mode for j, mode in enumerate(modes)])
         with monkeypatch.context() as patch:
-            patch.setattr(contact_lcp, "relock", lambda model, t, y, modes, status, tie_tolerance: modes)
+            patch.setattr(contact_lcp, "relock", lambda model, t, y, modes, status, h_max, tie_tolerance: modes)
             n_relocked += chain.answer()[0] != modes
     assert n_relocked > 0
 

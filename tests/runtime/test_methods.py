@@ -2,11 +2,11 @@
 
 from itertools import pairwise
 from math import cos, exp, fabs, isnan, log2, nan, sin, sqrt
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import scipy.integrate
+from internal_steps import prepared_run
 from models import MODELS, ROOT, combinations, model_class, runtime
 
 from fmus.runtime import method_registry
@@ -71,11 +71,10 @@ class Solver:
     def step(self, model, t, x, v, h):
         """Take a step; return the new x, v and acceleration, and the error estimates. The interpolant is ready."""
         a = model.rates(t, x, v)
-        step = runtime(TWO_STATES, "step_control").InternalStep()
+        step = runtime(TWO_STATES, "step_control").InternalStep(model_class(TWO_STATES))
         step.tolerance = 1e-12  # of the iteration of implicit methods, with a scale of 1
         step.active_method.error_scale_floor_x = step.active_method.error_scale_floor_v = 1.0
-        model.solver = SimpleNamespace(step=step)
-        new = self.method.propose(model, t, x, v, a, h)
+        new = self.method.propose(model, step, t, x, v, a, h)
         self.evaluations = step.active_method.stages
         step.t0, step.x0, step.v0, step.a0, step.h_full = t, x, v, a, h
         step.x1, step.v1, step.a1 = new[:3]
@@ -304,9 +303,7 @@ def test_every_jacobian_is_the_slope_of_its_acceleration(name):
     d = 1e-6
     for values in combinations(name):
         model = model_class(name)()
-        for choice, value in values.items():
-            setattr(model.solver if "." in choice else model, choice.split(".")[-1], value)
-        assert model.prepare() == 0
+        prepared_run(model, values)
         for t, x, v, mode in ((0.3, 0.02, 0.004, 1), (1.1, -0.7, -0.4, -1), (2.0, 2.9, 1.3, 0)):
             modes = [mode] if model.contacts else []
             slopes = [

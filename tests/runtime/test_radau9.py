@@ -1,10 +1,10 @@
 """The method radau9: its coefficients, its iteration, and its accuracy on stiff friction."""
 
 from math import fabs, isnan
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from internal_steps import prepared_run
 from models import DOP853, RADAU9, RODAS, ROOT, model_class, runtime
 from scipy.integrate import solve_ivp
 
@@ -71,6 +71,8 @@ def test_the_error_estimate_and_the_end_slope_are_those_of_collocation():
 class Damped:
     """x'' = spring x + damper v, with a count of its evaluations."""
 
+    has_dry_friction = has_conditions = False
+
     def __init__(self, spring=0.0, damper=0.0):
         self.spring, self.damper, self.evaluations = spring, damper, 0
 
@@ -88,15 +90,14 @@ def propose(model, x, v, h, tolerance=1e-10):
     a = model.rates(0.0, x, v)
     model.evaluations = 0
     method = runtime("pacejka", "radau9").Radau9()
-    return method.propose(model, 0.0, x, v, a, h), step.active_method.stages
+    return method.propose(model, step, 0.0, x, v, a, h), step.active_method.stages
 
 
 def begin_step(model, tolerance):
     """Return the step of a solver of a model, with an error scale of 1."""
-    step = runtime("pacejka", "step_control").InternalStep()
+    step = runtime("pacejka", "step_control").InternalStep(model)
     step.tolerance = tolerance
     step.active_method.error_scale_floor_x = step.active_method.error_scale_floor_v = 1.0
-    model.solver = SimpleNamespace(step=step)
     return step
 
 
@@ -139,12 +140,12 @@ def test_a_step_elsewhere_is_that_of_a_new_run():
     control = step.active_method
 
     def propose_elsewhere(method):
-        result = method.propose(model, 0.7, 0.5, 0.7, model.rates(0.7, 0.5, 0.7), 0.2)
+        result = method.propose(model, step, 0.7, 0.5, 0.7, model.rates(0.7, 0.5, 0.7), 0.2)
         return *result, control.stages, control.safety, control.grow, control.shrink_after_rejection
 
-    x, v, a, *_ = used.propose(model, 0.0, 1.0, -0.3, model.rates(0.0, 1.0, -0.3), 0.1)
+    x, v, a, *_ = used.propose(model, step, 0.0, 1.0, -0.3, model.rates(0.0, 1.0, -0.3), 0.1)
     step.n_accepted = 1
-    used.propose(model, 0.1, x, v, a, 0.1)
+    used.propose(model, step, 0.1, x, v, a, 0.1)
     assert used.h_last == 0.1
     assert propose_elsewhere(used) == propose_elsewhere(new)
 
@@ -171,21 +172,18 @@ def test_a_divergent_iteration_is_refused_after_few_evaluations():
 # ---- runs of stiff friction
 
 
-def run(name, values, stop, points=400):
+def integrate(name, values, stop, points=400):
     """Return the states of a lowered model at equal times."""
     model = model_class(name)()
-    for variable, value in values.items():
-        owner = model.solver if variable.startswith("solver.") else model
-        setattr(owner, variable.removeprefix("solver."), value)
-    assert model.prepare() == 0
-    solver = model.solver
+    run = prepared_run(model, values)
+    solver = run.solver
     start = model.initial_state(0.0)
     solver.start(model, 0.0, *(start if isinstance(start, tuple) else (start,)), stop, model.tolerance)
     rows = []
     for i in range(1, points + 1):
         assert solver.advance(model, stop * i / points) == 0
         rows.append([getattr(solver, state) for state in model.states])
-    solver.report(model.events)
+    solver.report(run.events)
     return np.array(rows), solver
 
 
@@ -222,16 +220,16 @@ def truth():
 @pytest.mark.parametrize("x_m", [1e-2, 1e-4])
 @pytest.mark.parametrize("rtol", [1e-2, 1e-4, 1e-6, 1e-8])
 def test_the_error_is_below_the_tolerance_at_every_width_of_the_friction_curve(truth, x_m, rtol):
-    rows, _ = run("pacejka", {"x_m": x_m, "solver.method": RADAU9, "solver.rtol": rtol}, 6.0)
+    rows, _ = integrate("pacejka", {"x_m": x_m, "solver.method": RADAU9, "solver.rtol": rtol}, 6.0)
     assert relative_error(rows, truth(x_m)) < max(3.0 * rtol, 1e-9)
 
 
 @pytest.mark.parametrize("x_m", [1e-4, 1e-5])
 def test_no_step_passes_a_stop_because_a_steep_jacobian_hides_the_error(x_m):
     """The predicted fourth stage may lie where friction is steep, although the step begins where it is not."""
-    reference, _ = run("pacejka", {"x_m": x_m, "solver.method": RADAU9, "solver.rtol": 1e-9}, 16.0)
+    reference, _ = integrate("pacejka", {"x_m": x_m, "solver.method": RADAU9, "solver.rtol": 1e-9}, 16.0)
     for rtol in 10.0 ** -np.arange(1.5, 5.1, 0.25):
-        rows, _ = run("pacejka", {"x_m": x_m, "solver.method": RADAU9, "solver.rtol": rtol}, 16.0)
+        rows, _ = integrate("pacejka", {"x_m": x_m, "solver.method": RADAU9, "solver.rtol": rtol}, 16.0)
         assert relative_error(rows, reference) < 10.0 * rtol, rtol
 
 
@@ -240,7 +238,7 @@ def test_it_takes_fewer_steps_than_rodas_for_a_smaller_error(truth, rtol):
     (rows, steps), (others, more) = (
         (rows, solver.steps + solver.rejected)
         for rows, solver in (
-            run("pacejka", {"x_m": 1e-3, "solver.method": method, "solver.rtol": rtol}, 6.0)
+            integrate("pacejka", {"x_m": 1e-3, "solver.method": method, "solver.rtol": rtol}, 6.0)
             for method in (RADAU9, RODAS)
         )
     )
@@ -256,8 +254,8 @@ def test_a_kink_of_the_rates_costs_less_than_ten_tolerances():
 
     The absolute tolerance resolves the bristles, which deflect by 1e-5 m.
     """
-    reference, _ = run(LUGRE, {"solver.method": DOP853, "solver.rtol": 1e-11}, 22.0)
+    reference, _ = integrate(LUGRE, {"solver.method": DOP853, "solver.rtol": 1e-11}, 22.0)
     for rtol in 10.0 ** -np.arange(2, 10, 1.0):
         values = {"solver.method": RADAU9, "solver.rtol": rtol, "solver.atol": 1e-5 * rtol}
-        rows, _ = run(LUGRE, values, 22.0)
+        rows, _ = integrate(LUGRE, values, 22.0)
         assert relative_error(rows[:, :2], reference[:, :2]) < 10.0 * rtol, rtol

@@ -10,8 +10,7 @@ from models import CASES, FEW_CASES, MODELS, ROOT, SIGN, declared, label, model_
 
 from fmus.packaging.lowering import lowered_files
 from fmus.packaging.model_lookup import find_model
-from fmus.runtime.variable_declarations import variables
-from harness.running.embedded_model import load_model_class
+from harness.running.embedded_model import create_run, load_model_class
 
 FMI_SIDE = [
     *("__init__", "failure_handling", "fmu_instance", "messages", "method_registry", "pythonfmu_workarounds"),
@@ -90,7 +89,7 @@ def test_every_while_loop_is_bounded_by_a_counter(name):
 def slave(name, values=None, stop=4.0):
     """Return a slave in this process, after initialisation."""
     instance = runtime(name, "slave").make_slave_class(model_class(name))(instance_name="inside")
-    for reference, (variable, declaration) in enumerate(variables(instance.model)):
+    for reference, (variable, declaration) in enumerate(instance.variables):
         if variable in (values or {}):
             write = instance.set_real if declaration.type == "Real" else instance.set_integer
             write([reference], [values[variable]])
@@ -102,8 +101,8 @@ def slave(name, values=None, stop=4.0):
 
 def read(instance, *names):
     """Return values of Reals and Integers by name."""
-    references = {v: i for i, (v, _) in enumerate(variables(instance.model))}
-    kinds = dict(variables(instance.model))
+    references = {v: i for i, (v, _) in enumerate(instance.variables)}
+    kinds = dict(instance.variables)
     return [
         (instance.get_real if kinds[name].type == "Real" else instance.get_integer)([references[name]])[0]
         for name in names
@@ -144,7 +143,7 @@ def test_turning_points_are_located_to_the_last_bit(case):
     """One float earlier the mass still moves the old way."""
     name, values, stop = case
     instance, turns = slave(name, values, stop), 0
-    step, t = instance.model.solver.step, 0.0
+    step, t = instance.run.solver.step, 0.0
     while t < stop:
         (ahead,) = read(instance, "solver.t_next")
         mode, waiting, event = step.mode0, step.is_stuck, step.event_at_end
@@ -230,7 +229,7 @@ def test_the_cost_of_many_events_is_bounded(monkeypatch, capfd):
     instance = slave("pendulum", {"mu": 0.0}, stop=1e7)
     assert instance.do_step(0.0, 1e7) is False
     assert "right-hand sides" in capfd.readouterr().err
-    step = instance.model.solver.step
+    step = instance.run.solver.step
     assert (
         step.n_accepted == 1 + 2 * integrator.BATCH_STEPS
     )  # with twelve right-hand sides and some event evaluations each
@@ -248,6 +247,6 @@ def test_a_solver_without_progress_is_stopped_with_a_message(capfd):
 @pytest.mark.parametrize("name", MODELS)
 def test_hot_objects_have_fewer_attributes_than_the_inline_limit_of_cpython(name, fmus):
     """With thirty attributes a step takes 10 % longer (Python 3.11)."""
-    solver = load_model_class(fmus / f"{name}.fmu")().solver
+    solver = create_run(load_model_class(fmus / f"{name}.fmu")()).solver
     sizes = {type(item).__name__: len(vars(item)) for item in (solver, solver.step, solver.step.interpolant)}
     assert max(sizes.values()) < 30, sizes

@@ -22,11 +22,11 @@ from fmus.runtime.vectors import (
 VECTOR_TYPES = (StateVector, RateVector, ContactVector)
 
 
-def to_array_model(model):
-    """Return the model with all vectors stored as numpy arrays, as the vector form of the numerics expects.
+def to_array_model(model, run):
+    """Return the model with all vectors of its run stored as numpy arrays, as the vector form of the numerics expects.
 
-    The classes of the model and of the objects that it owns are replaced by subclasses: assigning a scalar to a vector
-    attribute fills the vector, and assigning an array copies it.
+    The classes of the model and of the objects that the run owns are replaced by subclasses: assigning a scalar to a
+    vector attribute fills the vector, and assigning an array copies it.
     """
     states, modes = list(model.states), list(model.contacts)
     rates, slips = list(model.states.values()), list(model.contacts.values())
@@ -36,9 +36,9 @@ def to_array_model(model):
     position_index[:] = [rates.index(name) if name in rates else -1 for name in slips]
     is_dynamic[:] = [name not in states for name in rates]
     rate_index[:] = [states.index(name) if name in states else -1 for name in rates]
-    store_vectors_as_arrays(model.solver)
+    store_vectors_as_arrays(run.solver)
     if model.is_linear:
-        methods = model.solver.step.active_method
+        methods = run.solver.step.active_method
         methods.exact = array_exact_method(methods.exact)
     cls = type(model)
     methods = {name: declaration(cls, name) for name in vars(cls)}

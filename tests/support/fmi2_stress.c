@@ -225,8 +225,10 @@ static void fuzz_states(int turns)
         Instance *it = instance_in_state((int)draw(N_STATES));
         State state = it->state;
         SavedState sealed;
-        double *at = (double *)&state.model;
-        for (uint64_t k = draw(4) + 1; k; k--) at[draw(sizeof state.model / sizeof *at)] = number();
+        bool in_solver = draw(2);
+        double *at = in_solver ? (double *)&state.run.solver : (double *)&state.model;
+        size_t size = in_solver ? sizeof state.run.solver : sizeof state.model;
+        for (uint64_t k = draw(4) + 1; k; k--) at[draw(size / sizeof *at)] = number();
         write_saved_state(&sealed, &state);
         if (fmi2SetFMUstate(it, &sealed) == fmi2OK) {
             for (fmi2ValueReference i = 0; i < VARIABLES; i++) get(it, i);
@@ -291,7 +293,7 @@ static void random_calls(uint64_t seed, int turns)
         int i = (int)draw(N_INSTANCES), k = (int)draw(N_INSTANCES);
         Instance *it = instances[i]; /* may be NULL */
         fmi2ValueReference references[MAX_VALUES];
-        double reals[MAX_VALUES], t = it ? it->state.model.solver.t : 0.0;
+        double reals[MAX_VALUES], t = it ? it->state.run.solver.t : 0.0;
         fmi2Integer integers[MAX_VALUES];
         fmi2String categories[] = {"logAll", NULL, "%s%n"};
         size_t count = draw(MAX_VALUES), size;
@@ -364,7 +366,7 @@ static void random_calls(uint64_t seed, int turns)
         }
         CHECK(status == fmi2OK || status == fmi2Error);
         if (it && status && it->state.run.has_failed == had_failed) { /* refused */
-            CHECK(phase == it->state.run.phase && (t == it->state.model.solver.t || isnan(t)));
+            CHECK(phase == it->state.run.phase && (t == it->state.run.solver.t || isnan(t)));
         }
         if (it && 31 <= call && call <= 34 && !is_model_exchange(&it->state)) CHECK(status == fmi2Error);
         if (it && 37 <= call && call <= 38 && is_model_exchange(&it->state)) CHECK(status == fmi2Error);

@@ -252,7 +252,7 @@ static int walk_in_threads(int threads)
 static void random_call(Context *context)
 {
     const struct Row *row = &rows[draw(2) ? draw(LEADING) : draw(ROWS)];
-    context->t = draw(4) ? context->it->state.model.solver.t : number();
+    context->t = draw(4) ? context->it->state.run.solver.t : number();
     context->h = draw(4) ? (double)draw(100) * 1e-4 : number();
     context->real = number();
     context->requests_return = draw(3) == 0;

@@ -7,21 +7,23 @@ from array_model import to_array_model
 
 from fmus.runtime import vectors
 from fmus.runtime.codes import NEEDS_REPETITION
+from harness.running.embedded_model import create_run
 
 COUNTS = ("n_accepted", "n_rejected", "n_rhs")
 
 
-def prepared_model(model, values, stop):
-    """Return the model with these values set, prepared for a run."""
+def prepared_run(model, values, run=None):
+    """Return a run of a model, by default a new one, with these values of both set and the model prepared."""
+    run = run or create_run(model)
     for variable, value in values.items():
-        owner = model.solver if "." in variable else model
+        owner = run.solver if "." in variable else model
         setattr(owner, variable.split(".")[-1], value)
     assert model.prepare() == 0
-    return model
+    return run
 
 
-def start(model, y, stop):
-    model.solver.start(model, 0.0, *y, stop, model.tolerance)
+def start(model, run, y, stop):
+    run.solver.start(model, 0.0, *y, stop, run.tolerance)
 
 
 def bits(numbers):
@@ -37,44 +39,44 @@ def state_values(step, names):
 def scalar_steps(model, values, stop, most):
     """Return for each internal step its end, states, rates, modes, next step size, counters, and the state in its
     middle."""
-    prepared_model(model, values, stop)
-    start(model, model.initial_state(0.0), stop)
+    run = prepared_run(model, values)
+    start(model, run, model.initial_state(0.0), stop)
     rates = [rate for rate in model.states.values() if rate not in model.states]
 
     def row(step):
         numbers = state_values(step, [*model.states, *rates, *model.contacts])
         return [step.t1, *numbers, step.h_next, *counts(step), *step.state_at(model, 0.5 * (step.t0 + step.t1))]
 
-    return list(steps(model, row, stop, most))
+    return list(steps(model, run, row, stop, most))
 
 
 def array_steps(model, values, stop, most):
     """Return the same for the vector sources."""
-    prepared_model(model, values, stop)
-    model = to_array_model(model)
-    start(model, [model.initial_state(0.0)], stop)
+    run = prepared_run(model, values)
+    model = to_array_model(model, run)
+    start(model, run, [model.initial_state(0.0)], stop)
 
     def row(step):
         middle = step.state_at(model, 0.5 * (step.t0 + step.t1))
         return [step.t1, *step.y1, *step.f1[vectors.is_dynamic], *step.modes1, step.h_next, *counts(step), *middle]
 
     with np.errstate(all="ignore"):
-        return list(steps(model, row, stop, most))
+        return list(steps(model, run, row, stop, most))
 
 
-def compute_step(model):
+def compute_step(model, run):
     """Compute the next internal step of a model, as the integrator does. Returns a status."""
-    status = model.solver.step.compute_next(model)
-    return model.solver.step.repeat_steps(model) if status == NEEDS_REPETITION else status
+    status = run.solver.step.compute_next(model)
+    return run.solver.step.repeat_steps(model) if status == NEEDS_REPETITION else status
 
 
 def counts(step):
     return [*(getattr(step, name, 0) for name in COUNTS), getattr(step.interpolant, "n_event_evals", 0)]
 
 
-def steps(model, row, stop, most):
-    step = model.solver.step
+def steps(model, run, row, stop, most):
+    step = run.solver.step
     while step.t1 < stop and most:
-        assert compute_step(model) == 0
+        assert compute_step(model, run) == 0
         yield bits(row(step))
         most -= 1

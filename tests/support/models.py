@@ -7,9 +7,10 @@ from itertools import product
 import pytest
 from build_cache import ROOT
 
+from fmus.packaging.fmi_variables import declared_variables
 from fmus.packaging.lowering import lowered_model, sibling_module
 from fmus.packaging.model_lookup import find_model
-from fmus.runtime.variable_declarations import Choice, Input, Output, Parameter, variables
+from fmus.runtime.variable_declarations import Choice, Input, Output, Parameter
 
 MODELS = sorted(path.stem for path in (ROOT / "fmus").glob("*.py") if path.stem != "__init__")
 BODIES = [
@@ -34,7 +35,7 @@ def runtime(name, part):
 @cache
 def declared(name):
     """Return name and declaration of every variable of a model, in the order of the XML."""
-    return dict(variables(lowered_model(name)()))
+    return dict(declared_variables(lowered_model(name)))
 
 
 def outputs(name):

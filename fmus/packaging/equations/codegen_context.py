@@ -84,7 +84,7 @@ class CodegenContext:
         given: dict[Expression, str] = {s: s.name for s in an.states} | {m: m.name for m in an.modes} | {TIME: "t"}
         for n, condition in enumerate(an.switches):
             if condition.is_frozen:
-                given |= dict.fromkeys(condition.comparisons, f"self.event_location.sides[{n}] > 0.0")
+                given |= dict.fromkeys(condition.comparisons, f"self.condition_sides[{n}] > 0.0")
         return ExpressionPrinter(given, self.constants, self.used_names, depth, self.names)
 
     def emit_driver(self, s: ExpressionPrinter, targets: Sequence[Operand]) -> None:

@@ -140,7 +140,7 @@ def declaration_arguments(e: Variable) -> str:
 def class_attribute_lines(an: ModelAnalysis) -> list[str]:
     """Return the class attributes that the runtime reads."""
     states = ", ".join(f"{string_literal(s.name)}: {string_literal(an.rate[s].name)}" for s in an.states)
-    lines = [f"states = {{{states}}}"]
+    lines = ["solver_class = Solver", f"states = {{{states}}}"]
     if an.contacts:
         slips = ", ".join(
             f"{string_literal(c.mode.name)}: {string_literal(c.slip.name if an.waits else '')}" for c in an.contacts

@@ -9,7 +9,7 @@ from .expressions import Term
 def setup_methods(f: CodegenContext) -> list[str]:
     """Return the source of all setup methods."""
     return [
-        init_method(f),
+        *init_method(f),
         initial_method(f),
         prepare_method(f),
         *nominal_velocity_method(f),
@@ -18,12 +18,11 @@ def setup_methods(f: CodegenContext) -> list[str]:
     ]
 
 
-def init_method(f: CodegenContext) -> str:
-    """Constructor; creates all attributes."""
-    lines = ["super().__init__()", "self.solver = Solver()"]
-    if n := 2 * len(f.an.contacts) + len(f.an.conditions):
-        lines.append(f"self.event_location = EventLocation({n})")
+def init_method(f: CodegenContext) -> list[str]:
+    """Constructor; creates the attributes that are no variables, if there are any."""
+    lines = []
     if f.an.conditions:
+        lines.append(f"self.condition_sides = [1.0] * {len(f.an.conditions)}")
         lines.append("self.violation_time = self.violation_value = 0.0")
     if f.driver is not None:
         lines.append("self.t_base = self.x_base = 0.0")
@@ -32,7 +31,9 @@ def init_method(f: CodegenContext) -> str:
         lines.append(f"self.t_base = self.{rate.name} = 0.0")
     if f.constants:
         lines.append(" = ".join(f"self.{f.name_of(e)}" for e in f.constants) + " = 0.0")
-    return method_source("__init__", (), [2 * INDENT + line for line in lines])
+    if not lines:
+        return []
+    return [method_source("__init__", (), [2 * INDENT + line for line in ["super().__init__()", *lines]])]
 
 
 def initial_method(f: CodegenContext) -> str:
@@ -65,7 +66,7 @@ def prepare_method(f: CodegenContext) -> str:
         with s.block(f"if {s.text(rule.broken)}:"):
             s.emit(f"return {rule_status(n)}")
     calculate()
-    s.emit("return super().prepare()" if f.an.contacts else "return OK")
+    s.emit("return OK")
     return method_source("prepare", (), s.lines)
 
 

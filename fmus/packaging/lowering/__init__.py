@@ -35,7 +35,7 @@ from .import_hook import (
     function_tree,
     lowered_files,
     lowered_model,
-    model_exchange_instance,
+    model_exchange_run,
     scalar_name,
     sibling_module,
 )
@@ -48,7 +48,7 @@ __all__ = [
     "function_tree",
     "lowered_files",
     "lowered_model",
-    "model_exchange_instance",
+    "model_exchange_run",
     "scalar_name",
     "select_features",
     "sibling_module",

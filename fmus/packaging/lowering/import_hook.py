@@ -92,17 +92,18 @@ def sibling_module(model: type[VariableOwner], path: str) -> Any:
     return import_module(f"{model.__module__.split('.', 1)[0]}.{path}")
 
 
-def model_exchange_instance(model: type[VariableOwner]) -> Any:
-    """Create an instance of a lowered model for model exchange."""
+def model_exchange_run(model: type[VariableOwner]) -> tuple[Any, Any]:
+    """Create an instance of a lowered model and its run for model exchange."""
     exchange = sibling_module(model, "runtime.model_exchange")
-    thing = type(model.__name__, (exchange.ModelExchangeMixin, model), {})()
-    exchange.update_nominals(thing)
-    return thing
+    instance = model()
+    run = exchange.ModelExchangeRun(instance)
+    exchange.update_nominals(run, instance)
+    return instance, run
 
 
-def scalar_name(thing: Any, name: str) -> str:
-    """Return the name of a state or mode in the lowered runtime."""
-    return thing.runtime_names[name]
+def scalar_name(model: Any, name: str) -> str:
+    """Return the name of a state or mode of a model in the lowered runtime."""
+    return model.runtime_names[name]
 
 
 def function_tree(function: FunctionType) -> ast.FunctionDef:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from ...runtime.oscillator import Oscillator
+from ...runtime.run_state import RunState
 from ...runtime.variable_declarations import variables
 from .. import __version__
 from ..equations.model_file import ModelFile
@@ -91,7 +92,8 @@ def lower_all(source: ModelFile, features: FeatureSelection) -> SourceFiles:
     }
     declared = runtime_symbols()
     files = {path: SourceEmitter(spec, declared, path, text, path != file).lines for path, text in texts.items()}
-    files = remove_dead_code(files, file, [name for name, _ in variables(source.model())])
+    model = source.model()
+    files = remove_dead_code(files, file, [name for name, _ in variables(model) + variables(RunState(model))])
     return {path: add_origin_line(path, lines, texts[path], spec) for path, lines in files.items()}
 
 

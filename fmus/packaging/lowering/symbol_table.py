@@ -112,9 +112,11 @@ def object_classes(assignments: list[tuple[str, ast.expr]], classes: Collection[
     """Return the class of the objects that each name refers to."""
     result: defaultdict[str, set[str]] = defaultdict(set)
     others = []  # pairs of a name and another one that is assigned to it
+    names_of_classes = {name: last_name(value) for name, value in assignments if last_name(value) in classes}
     for name, value in assignments:
-        if isinstance(value, ast.Call) and last_name(value.func) in classes:
-            result[name].add(last_name(value.func))
+        called = last_name(value.func) if isinstance(value, ast.Call) else ""
+        if (called := names_of_classes.get(called, called)) in classes:
+            result[name].add(called)
         elif isinstance(value, (ast.Name, ast.Attribute)):
             others.append((name, last_name(value)))
     is_complete = False

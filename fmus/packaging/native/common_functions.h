@@ -22,7 +22,7 @@ Status FMI(SetDebugLogging)(Handle instance, Boolean loggingOn, size_t n, const 
 Status FMI(Terminate)(Handle instance)
 {
     REQUIRE_PHASE(instance, IN_SIMULATION);
-    const struct RunState *run = &self->state.run;
+    const Run *run = &self->state.run;
     /* An importer that completes no steps learns only here that its solution diverged. */
     bool is_open = is_model_exchange(&self->state) && !run->has_failed && !run->has_pending_changes;
     Status status = is_open ? complete_step(self) : STATUS_OK;
@@ -57,7 +57,7 @@ Status FMI(CompletedIntegratorStep)(Handle instance, Boolean noSetFMUStatePriorT
     bool fault = false;
     *enterEventMode = *terminateSimulation = false;
     Status status = complete_step(self);
-    if (status == STATUS_OK) *enterEventMode = model_exchange_has_step_event(&self->state.model, &fault);
+    if (status == STATUS_OK) *enterEventMode = model_exchange_has_step_event(&self->state.run, &self->state.model, &fault);
     return status;
 }
 
@@ -76,7 +76,7 @@ Status FMI(SetContinuousStates)(Handle instance, const double states[], size_t n
     bool fault = false;
     if (n != STATES) return refuse(self, WRONG_LENGTH, __func__, "the number of states");
     REQUIRE_ADDRESS(states);
-    memcpy(self->state.model.model_exchange.states, states, STATES * sizeof *states);
+    memcpy(self->state.run.model_exchange.states, states, STATES * sizeof *states);
     model_exchange_set_continuous_states(&self->state.run, &self->state.model, &fault);
     return STATUS_OK;
 }
@@ -93,10 +93,10 @@ Status FMI(SetContinuousStates)(Handle instance, const double states[], size_t n
         bool fault = false;                                                                               \
         if (n != (COUNT)) return refuse(self, WRONG_LENGTH, __func__, "the number of values");            \
         if (n && !values) return refuse(self, NULL_POINTER, __func__, "the address of the values");         \
-        int64_t status = model_exchange_prepare(&state->run, &state->model, &fault);                              \
-        if (status == OK && !fault) model_exchange_update_##found(&state->model, &fault);                              \
+        int64_t status = model_exchange_prepare(&state->run, &state->model, &fault);                      \
+        if (status == OK && !fault) model_exchange_update_##found(&state->run, &state->model, &fault);    \
         bool is_valid = status == OK && !fault;                                                           \
-        for (size_t i = 0; i < n; i++) values[i] = is_valid ? state->model.model_exchange.found[i] : NAN;       \
+        for (size_t i = 0; i < n; i++) values[i] = is_valid ? state->run.model_exchange.found[i] : NAN;   \
         return status == OK || state->run.phase < RUNNING ? STATUS_OK : fail_run(self, status, NAN, NAN); \
     }
 

@@ -24,7 +24,6 @@ from math import fabs
 from types import FunctionType
 from typing import Any
 
-from ...runtime.variable_declarations import VariableOwner
 from ..equations.expression_printer import ExpressionPrinter
 from ..equations.expressions import FUNCTIONS, Expression, Term
 from ..fmi_variables import DERIVATIVE_NAME, Variables
@@ -52,21 +51,16 @@ def has_tangent(name: str, meaning: Any) -> bool:
     return is_real or name.startswith(DERIVATIVE_NAME[:4])
 
 
-def build_tangent_functions(
-    model: type[VariableOwner], instance: Any, declared: Variables
-) -> tuple[Tangent, dict[str, FunctionType]]:
-    """Build the functions, by name, and an empty Tangent to pass to them.
-
-    `instance` is an object of the model for model exchange.
-    """
-    writer = TangentWriter(instance, declared)
+def build_tangent_functions(model: Any, declared: Variables) -> tuple[Tangent, dict[str, FunctionType]]:
+    """Build the functions, by name, and an empty Tangent to pass to them."""
+    writer = TangentWriter(model, declared)
     start, prepare, outputs = (
         function_tree(model.__dict__[name]).body for name in ("initial_state", "prepare", "compute_outputs")
     )
     read = {node.attr for statement in outputs for node in ast.walk(statement) if isinstance(node, ast.Attribute)}
     constants = [name for name in assigned_attributes(prepare) if name in read]
-    point = {"t": "t"} | {name: scalar_name(instance, name) for name in (*instance.states, *instance.contacts)}
-    begin = parse_statements(f"{name} = self.solver.{number}" for name, number in point.items())
+    point = {"t": "t"} | {name: scalar_name(model, name) for name in (*model.states, *model.contacts)}
+    begin = parse_statements(f"{name} = solver.{number}" for name, number in point.items())
     bodies = {
         "propagate_start_tangent": begin + writer.differentiate_start(start),
         "propagate_constant_tangent": writer.differentiate_constants(prepare, constants),
@@ -89,7 +83,8 @@ def build_tangent_functions(
 
 def function_around(name: str, body: list[ast.stmt]) -> ast.FunctionDef:
     """Wrap statements in a function."""
-    function = ast.parse(f'def {name}(self, {TANGENT}):\n    """Calculate the directional derivative."""').body[0]
+    text = f'def {name}(self, solver, {TANGENT}):\n    """Calculate the directional derivative."""'
+    function = ast.parse(text).body[0]
     assert isinstance(function, ast.FunctionDef)
     function.body += remove_unused(body)
     return function
@@ -137,9 +132,9 @@ def keep_used(statements: list[ast.stmt], read: set[str]) -> list[ast.stmt]:
 class TangentWriter:
     """Differentiates the statements of a function; each derivative comes before its statement."""
 
-    def __init__(self, instance: Any, declared: Variables) -> None:
+    def __init__(self, model: Any, declared: Variables) -> None:
         fields = tangent_fields(declared)
-        self.states, self.contacts = list(instance.states), list(instance.contacts)
+        self.states, self.contacts = list(model.states), list(model.contacts)
         self.drivers = [name for name, meaning in declared if meaning.rate]
         self.outputs: dict[str, str] = {}  # attribute -> tangent that a function calculates
         self.seeds: dict[str, str] = {}  # attribute -> tangent that is given

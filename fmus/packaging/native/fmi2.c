@@ -136,7 +136,7 @@ fmi2Status fmi2GetRealStatus(fmi2Component component, const fmi2StatusKind s, fm
     REQUIRE_PHASE(component, IN_ANY_PHASE);
     REQUIRE_ADDRESS(value);
     if (s != fmi2LastSuccessfulTime) return fmi2Discard;
-    *value = self->state.run.phase < RUNNING ? NAN : self->state.model.solver.t;
+    *value = self->state.run.phase < RUNNING ? NAN : self->state.run.solver.t;
     return fmi2OK;
 }
 
@@ -167,7 +167,7 @@ fmi2Status fmi2SetRealInputDerivatives(fmi2Component component, const fmi2ValueR
     for (size_t i = 0; i < nvr && !fault; i++) {
         const Variable *variable = &variables[vr[i]];
         int64_t *highest = input_order(state, variable);
-        double *derivative = (double *)((char *)&state->model + variable->derivatives_offset) + order[i];
+        double *derivative = (double *)((char *)state + variable->derivatives_offset) + order[i];
         if (*derivative == value[i] && *highest <= order[i]) continue; /* unchanged */
         call_sequence_note_change(&state->run, &state->model, &fault);
         *derivative = value[i];
@@ -198,7 +198,7 @@ fmi2Status fmi2NewDiscreteStates(fmi2Component component, fmi2EventInfo *eventIn
     REQUIRE_PHASE(component, 1 << EVENT);
     REQUIRE_ADDRESS(eventInfo);
     fmi2Status status = handle_event(self);
-    const struct ModelExchange *exchange = &self->state.model.model_exchange;
+    const struct ModelExchange *exchange = &self->state.run.model_exchange;
     *eventInfo = (fmi2EventInfo){.terminateSimulation = status != fmi2OK,
                                  .nominalsOfContinuousStatesChanged = exchange->nominals_changed,
                                  .valuesOfContinuousStatesChanged = exchange->states_changed,

@@ -108,9 +108,9 @@ static void store_discrete_values(Instance *self)
         status = call_sequence_update_outputs(&state->run, &state->model, &fault);
     }
     if (status != OK || fault || state->run.has_failed) return; /* the next step reports it */
-    call_sequence_update_statistics(&state->model, false, &fault);
+    call_sequence_update_statistics(&state->run, &state->model, false, &fault);
     for (int i = 0; i < DISCRETE; i++) {
-        state->discrete_values[i] = variable_value(&state->model, &variables[discrete_variables[i]]);
+        state->discrete_values[i] = variable_value(state, &variables[discrete_variables[i]]);
     }
 }
 
@@ -274,7 +274,7 @@ fmi3Status fmi3UpdateDiscreteStates(fmi3Instance instance, fmi3Boolean *discrete
     REQUIRE_ADDRESS(nextEventTimeDefined);
     REQUIRE_ADDRESS(nextEventTime);
     fmi3Status status = handle_event(self);
-    const struct ModelExchange *exchange = &self->state.model.model_exchange;
+    const struct ModelExchange *exchange = &self->state.run.model_exchange;
     *discreteStatesNeedUpdate = false;
     *terminateSimulation = status != fmi3OK;
     *nominalsOfContinuousStatesChanged = exchange->nominals_changed;
@@ -299,8 +299,8 @@ fmi3Status fmi3EnterStepMode(fmi3Instance instance)
  * read values, set inputs from here on and request an early return. */
 static void call_intermediate_update(Instance *self, bool finished)
 {
-    struct ModelExchange *exchange = &self->state.model.model_exchange;
-    double now = self->state.model.solver.t, return_time = now;
+    struct ModelExchange *exchange = &self->state.run.model_exchange;
+    double now = self->state.run.solver.t, return_time = now;
     bool return_requested = false;
     if (!self->host.intermediate_update) return;
     self->state.run.phase = INTERMEDIATE;
@@ -322,7 +322,7 @@ fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoi
     REQUIRE_ADDRESS(earlyReturn);
     REQUIRE_ADDRESS(lastSuccessfulTime);
     State *state = &self->state;
-    const double *now = &state->model.solver.t;
+    const double *now = &state->run.solver.t;
     double t = currentCommunicationPoint, h = communicationStepSize;
     bool fault = false;
     (void)noSetFMUStatePriorToCurrentPoint;
@@ -332,7 +332,7 @@ fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoi
         *lastSuccessfulTime = *now;
         return status;
     }
-    struct ModelExchange *exchange = &state->model.model_exchange;
+    struct ModelExchange *exchange = &state->run.model_exchange;
     bool event_passed = false;
     if (!self->host.event_mode_used) store_discrete_values(self);
     int64_t status = early_return_begin_step(&state->run, &state->model, t, h, &fault);

@@ -19,8 +19,9 @@ from .. import BuildError
 from ..archive import build_date, license_files, write, zip_entries
 from ..documentation_page import extra_files
 from ..embedded_modules import digest
-from ..lowering import lowered_model, model_exchange_instance, select_features
-from ..model_description import declared_variables, describe
+from ..fmi_variables import declared_variables
+from ..lowering import lowered_model, model_exchange_run, select_features
+from ..model_description import describe
 from ..model_description_fmi3 import describe as describe3
 from ..model_lookup import find_model
 from ..terminals import terminals
@@ -88,11 +89,13 @@ def build(
 def generate_c_sources(model: type[VariableOwner], name: str, date: datetime, fmi: str) -> tuple[dict[str, str], bytes]:
     """Return the C sources of a model by file name, and the matching modelDescription.xml."""
     files = collect_sources(model, fmi)
+    _, run = model_exchange_run(model)
+    nominals = run.model_exchange.nominals
     if fmi == "3":
-        root = fromstring(describe3(model, name, digest(files), date, model_exchange_instance(model)))
+        root = fromstring(describe3(model, name, digest(files), date, nominals))
         files["guid.h"] = render_guid_header(root.attrib["instantiationToken"])
         return files, xml_bytes(root)
-    root = fromstring(describe(model, name, digest(files), date, model_exchange_instance(model)))
+    root = fromstring(describe(model, name, digest(files), date, nominals))
     for interface in root.findall("ModelExchange") + root.findall("CoSimulation"):
         SubElement(SubElement(interface, "SourceFiles"), "File", name=MAIN_SOURCE[fmi])
     files["guid.h"] = render_guid_header(root.attrib["guid"])

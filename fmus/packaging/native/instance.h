@@ -107,10 +107,10 @@ static COLD Status refuse_reference(const Instance *self, uint32_t reference, co
 
 /* ---- failure */
 
-static void set_outputs_to_nan(Model *model)
+static void set_outputs_to_nan(State *state)
 {
     for (const Variable *variable = variables; variable < variables + VARIABLES; variable++) {
-        if (variable->is_real && variable->is_nan_after_failure) *(double *)variable_address(model, variable) = NAN;
+        if (variable->is_real && variable->is_nan_after_failure) *(double *)variable_address(state, variable) = NAN;
     }
 }
 
@@ -127,7 +127,7 @@ static COLD Status fail_run(Instance *self, int64_t status, double t, double h)
     if (!call_sequence_is_refusal(&state->run, status, &fault)) {
         state->run.has_failed = true;
         state->run.outputs_current = false;
-        set_outputs_to_nan(&state->model);
+        set_outputs_to_nan(state);
     }
     report_error(self, &text);
     return STATUS_ERROR;
@@ -173,13 +173,15 @@ static Status prepare_values(Instance *self, const FmiType *type, const uint32_t
     if (!state->run.outputs_current && !state->run.has_failed) {
         int64_t status = call_sequence_update_outputs(&state->run, &state->model, &fault);
         if (status == DIVERGED) fault = true;
-        else if (status != OK) set_outputs_to_nan(&state->model);
+        else if (status != OK) set_outputs_to_nan(state);
     }
-    if (needs_statistics && state->run.outputs_current && !fault) call_sequence_update_statistics(&state->model, needs_t_next, &fault);
-    if (needs_indicators && state->run.outputs_current && !fault) model_exchange_update_variables(&state->model, &fault);
+    if (needs_statistics && state->run.outputs_current && !fault)
+        call_sequence_update_statistics(&state->run, &state->model, needs_t_next, &fault);
+    if (needs_indicators && state->run.outputs_current && !fault)
+        model_exchange_update_variables(&state->run, &state->model, &fault);
     if (!fault) return STATUS_OK;
     if (is_model_exchange(state)) { /* the importer's solver may try states without finite results */
-        set_outputs_to_nan(&state->model);
+        set_outputs_to_nan(state);
         return STATUS_OK;
     }
     fail_run(self, DIVERGED, NAN, NAN);
@@ -189,14 +191,14 @@ static Status prepare_values(Instance *self, const FmiType *type, const uint32_t
 /* Order of the polynomial of an input: its derivatives above this order are zero. */
 static int64_t *input_order(State *state, const Variable *variable)
 {
-    return (int64_t *)((char *)&state->model + variable->order_offset);
+    return (int64_t *)((char *)state + variable->order_offset);
 }
 
 /* Return whether a variable already has the value; an input that follows a polynomial may only happen to have it. */
 static bool has_value(State *state, const Variable *variable, double value)
 {
     bool is_constant = variable->order_offset == NO_OFFSET || *input_order(state, variable) == 0;
-    return is_constant && value == variable_value(&state->model, variable);
+    return is_constant && value == variable_value(state, variable);
 }
 
 /* Refuse a value that the variable cannot have now. */
@@ -224,19 +226,19 @@ static Status write_value(Instance *self, uint32_t reference, double value)
     state->run.outputs_current = false;
     call_sequence_note_change(&state->run, &state->model, &fault);
     if (fault) return fail_run(self, DIVERGED, NAN, NAN);
-    if (variable->is_real) *(double *)variable_address(&state->model, variable) = value;
-    else *(int64_t *)variable_address(&state->model, variable) = (int64_t)value;
+    if (variable->is_real) *(double *)variable_address(state, variable) = value;
+    else *(int64_t *)variable_address(state, variable) = (int64_t)value;
     return STATUS_OK;
 }
 
 static double read_real(const Instance *self, uint32_t reference)
 {
-    return *(const double *)((const char *)&self->state.model + variables[reference].offset);
+    return *(const double *)((const char *)&self->state + variables[reference].offset);
 }
 
 static int64_t read_integer(const Instance *self, uint32_t reference)
 {
-    return *(const int64_t *)((const char *)&self->state.model + variables[reference].offset);
+    return *(const int64_t *)((const char *)&self->state + variables[reference].offset);
 }
 
 /* Bodies of the functions that read and write values; after a fault every value reads `blank`. */
@@ -314,7 +316,7 @@ static Status set_logging(Instance *self, bool logging, size_t n, const char *co
 /* Set start time, stop time (infinite if unknown) and tolerance (0 if unknown) of the run. */
 static Status set_experiment(Instance *self, double start, double stop, double tolerance)
 {
-    struct RunState run = self->state.run;
+    Run run = self->state.run;
     TextBuffer text = {0};
     bool fault = false;
     call_sequence_set_experiment(&run, start, stop, tolerance, &fault);
@@ -334,7 +336,7 @@ static Status begin_run(Instance *self, bool event_mode_used)
     State *state = &self->state;
     bool fault = false;
     int64_t status = call_sequence_exit_initialization(&state->run, &state->model, &fault);
-    if (status == OK && !fault && is_model_exchange(state)) model_exchange_begin(&state->model, &fault);
+    if (status == OK && !fault && is_model_exchange(state)) model_exchange_begin(&state->run, &state->model, &fault);
     if (event_mode_used && state->run.phase == RUNNING) state->run.phase = EVENT;
     return finish_call(self, status, fault, NAN, NAN);
 }
@@ -348,7 +350,7 @@ static Status do_step(Instance *self, double t, double h)
 
 /* ---- events */
 
-/* Handle an event. The results are in the model-exchange part of the model. */
+/* Handle an event. The results are in the model-exchange part of the run. */
 static Status handle_event(Instance *self)
 {
     State *state = &self->state;
@@ -401,10 +403,10 @@ static Status evaluate_tangent(Instance *self, struct Tangent *tangent, bool alo
     int64_t status = model_exchange_prepare(&state->run, &state->model, &fault);
     if (status != OK && state->run.phase >= RUNNING) return fail_run(self, status, NAN, NAN);
     if (status == OK && along_parameters) {
-        if (state->run.phase < RUNNING) propagate_start_tangent(&state->model, tangent, &fault);
-        propagate_constant_tangent(&state->model, tangent, &fault);
+        if (state->run.phase < RUNNING) propagate_start_tangent(&state->model, &state->run.solver, tangent, &fault);
+        propagate_constant_tangent(&state->model, &state->run.solver, tangent, &fault);
     }
-    if (status == OK && !fault) propagate_tangent(&state->model, tangent, &fault);
+    if (status == OK && !fault) propagate_tangent(&state->model, &state->run.solver, tangent, &fault);
     return status == OK && !fault ? STATUS_OK : STATUS_DISCARD;
 }
 
@@ -423,16 +425,16 @@ static Status read_output_derivatives(Instance *self, const uint32_t vr[], size_
         return refuse_call(self, NO_OUTPUT_DERIVATIVE, &(Call){.function = function, .reference = vr[i]});
     }
     int64_t status = model_exchange_prepare(&state->run, &state->model, &fault);
-    if (status == OK && !fault) model_exchange_update_rates(&state->model, &fault);
-    if (status == OK && !fault) model_exchange_update_input_rates(&state->model, &fault);
-    const double *rate = state->model.model_exchange.rates;
+    if (status == OK && !fault) model_exchange_update_rates(&state->run, &state->model, &fault);
+    if (status == OK && !fault) model_exchange_update_input_rates(&state->run, &state->model, &fault);
+    const double *rate = state->run.model_exchange.rates;
     for (const Variable *variable = variables; variable < variables + VARIABLES; variable++) {
         if (!variable->is_state_or_input) continue;
         double *seed = tangent_value(&tangent, (uint32_t)(variable - variables));
         if (variable->is_calculated) *seed = *rate++;
-        else if (variable->rate_offset != NO_OFFSET) *seed = *(double *)((char *)&state->model + variable->rate_offset);
+        else if (variable->rate_offset != NO_OFFSET) *seed = *(double *)((char *)state + variable->rate_offset);
     }
-    if (status == OK && !fault) propagate_tangent(&state->model, &tangent, &fault);
+    if (status == OK && !fault) propagate_tangent(&state->model, &state->run.solver, &tangent, &fault);
     for (size_t i = 0; i < n; i++) value[i] = status == OK && !fault ? *tangent_value(&tangent, vr[i]) : NAN;
     return finish_call(self, status, fault, NAN, NAN);
 }

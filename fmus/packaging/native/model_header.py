@@ -10,7 +10,7 @@ from ...runtime.codes import INTERRUPTED
 from ...runtime.failure_handling import CALCULATED_CAUSALITIES
 from ...runtime.messages import CALL_MESSAGES, PHASE_NAMES, RUN_MESSAGES, VALUE_MESSAGES
 from ...runtime.variable_access import SETTABLE_CAUSALITIES
-from ...runtime.variable_declarations import VariableDeclaration, VariableOwner, variables
+from ...runtime.variable_declarations import VariableDeclaration, VariableOwner
 from ..fmi_variables import (
     CONDITION,
     DERIVATIVE_NAME,
@@ -18,10 +18,11 @@ from ..fmi_variables import (
     TO_BREAK_AWAY,
     TO_REST,
     all_variables,
+    declared_variables,
     derivative_indices,
     event_indicator_indices,
 )
-from ..lowering import model_exchange_instance, scalar_name, sibling_module
+from ..lowering import model_exchange_run, scalar_name, sibling_module
 from ..text_output import c_comment, c_string_literal
 from .c_types import BOOL, FLOAT, INT, CType, StructPointer, c_literal
 from .call_graph import CallGraph
@@ -48,12 +49,9 @@ enum {{
 
 {numerics}
 typedef struct {name} Model;
+typedef struct {run_class} Run;
 
-{items}
 enum {{ VARIABLES = {count}, DECLARED = {declared}, T_NEXT = {ahead}, STATES = {states}, INDICATORS = {indicators} }};
-
-static const Variable variables[VARIABLES] = {{
-{table}}};
 
 enum {{ DISCRETE = {count_of_discrete} }};
 
@@ -63,9 +61,13 @@ static const uint32_t discrete_variables[DISCRETE] = {{{discrete}}};
 /* The state of an instance, which getting and setting FMU states copies. */
 typedef struct {{
     Model model;
-    struct RunState run;
+    Run run;
     double discrete_values[DISCRETE]; /* where they may not change (FMI 3.0) */
 }} State;
+
+{items}
+static const Variable variables[VARIABLES] = {{
+{table}}};
 
 static const State initial = {{
     .model = {image},
@@ -79,8 +81,9 @@ static const Member members[MEMBERS] = {{
 
 /* Append why the run cannot continue, in a communication step of size h from t. */
 static COLD void append_run_message(TextBuffer *text, int64_t status,
-                                    const struct RunState *run, const Model *model, double t, double h)
+                                    const Run *run, const Model *model, double t, double h)
 {{
+    (void)model; /* where no rule has values of the model */
     switch (status) {{
 {statuses}    }}
 }}
@@ -108,8 +111,8 @@ static COLD void append_call_message(TextBuffer *text, int64_t reason, const Cal
 FIELD_CODE = {  # field of a message -> C call that appends it
     **{name: f"append_real(text, {name})" for name in ("t", "h")},
     **{name: f"append_real(text, run->{name}_time)" for name in ("start", "stop")},
-    **{"now": "append_real(text, model->solver.t)", "t0": "append_real(text, model->solver.step.t0)"},
-    **{"t_end": "append_real(text, model->solver.step.t_end)", "value": "append_value(text, variable, value)"},
+    **{"now": "append_real(text, run->solver.t)", "t0": "append_real(text, run->solver.step.t0)"},
+    **{"t_end": "append_real(text, run->solver.step.t_end)", "value": "append_value(text, variable, value)"},
     **{name: f"append(text, variable->{name})" for name in ("name", "unit", "text", "allowed")},
     **{name: f"append(text, call->{name})" for name in ("function", "word", "phase")},
     "reference": "append_integer(text, call->reference)",
@@ -124,13 +127,14 @@ DERIVATIVE_ATTRIBUTES = (
 
 def render_model_header(model: type[VariableOwner], fmi: str) -> str:
     """Return the text of model.h for a version of FMI."""
-    instance = model_exchange_instance(model)
-    run = sibling_module(model, "runtime.call_sequence").RunState(instance.tolerance)
-    declared = all_variables(instance)
-    tangent, tangent_functions = build_tangent_functions(model, instance, declared)
+    instance, run = model_exchange_run(model)
+    declared = all_variables(model)
+    tangent, tangent_functions = build_tangent_functions(model, declared)
     call_graph = CallGraph(instance, run, tangent)
     for function_name, propagate in tangent_functions.items():
-        call_graph.add_model_entry_point(function_name, propagate, StructPointer(Tangent))
+        call_graph.add_model_entry_point(
+            function_name, propagate, StructPointer(type(run.solver)), StructPointer(Tangent)
+        )
     for function, arg_types in entry_point_types(model, StructPointer(type(run)), call_graph.layout.model, fmi).items():
         call_graph.add_entry_point(function, arg_types)
     layout = call_graph.layout
@@ -147,6 +151,7 @@ def render_model_header(model: type[VariableOwner], fmi: str) -> str:
     return HEADER.format(
         sentence=c_comment((inspect.getdoc(model) or "").splitlines()[0]),
         name=model.__name__,
+        run_class=type(run).__name__,
         file=model.__module__.rsplit(".", 1)[-1],
         codes="".join(f"    {name} = {code},\n" for name, code in vars(codes).items() if isinstance(code, int)),
         numerics=call_graph.text(),
@@ -154,7 +159,7 @@ def render_model_header(model: type[VariableOwner], fmi: str) -> str:
         image=layout.initializer(instance, "        "),
         items="".join(_items_array(name, meaning) for name, meaning in declared if meaning.items),
         count=len(names),
-        declared=len(variables(instance)),
+        declared=len(declared_variables(model)),
         ahead=names.index("solver.t_next"),
         states=len(derivative_indices(declared)),
         indicators=len(event_indicator_indices(declared)),
@@ -166,7 +171,7 @@ def render_model_header(model: type[VariableOwner], fmi: str) -> str:
             _variable_row(
                 name,
                 meaning,
-                attribute_path(instance, name),
+                attribute_path(model, name),
                 tangent_fields(declared),
                 hasattr(instance, f"{name}_polynomial"),
             )
@@ -180,18 +185,20 @@ def render_model_header(model: type[VariableOwner], fmi: str) -> str:
     )
 
 
-def attribute_path(thing: Any, name: str) -> str:
-    """Return the attribute path of a variable in a model-exchange instance."""
+def attribute_path(model: Any, name: str) -> str:
+    """Return the path of a variable in State."""
     if name == TIME:
-        return "solver.t"
+        return "run.solver.t"
     for indicator in (TO_REST, TO_BREAK_AWAY):
         if name.startswith(indicator):
             mode = name.removeprefix(indicator)[1:]  # none for a single contact
-            path = indicator.replace("events", "model_exchange", 1)
-            return f"{path}_{scalar_name(thing, mode)}" if mode else path
+            path = indicator.replace("events", "run.model_exchange", 1)
+            return f"{path}_{scalar_name(model, mode)}" if mode else path
     if name.startswith(CONDITION[:-2]):
-        return f"model_exchange.conditions[{int(name.removeprefix(CONDITION[:-2])) - 1}]"
-    return "model_exchange.driver_rate" if name.startswith(DERIVATIVE_NAME[:4]) else name
+        return f"run.model_exchange.conditions[{int(name.removeprefix(CONDITION[:-2])) - 1}]"
+    if name.startswith(DERIVATIVE_NAME[:4]):
+        return "run.model_exchange.driver_rate"
+    return f"run.{name}" if "." in name else f"model.{name}"
 
 
 def _items_array(name: str, meaning: VariableDeclaration) -> str:
@@ -226,11 +233,12 @@ def _variable_row(
     )
     parts = [
         *map(c_string_literal, texts),
-        f"offsetof(Model, {path})",
+        f"offsetof(State, {path})",
         f"offsetof(struct Tangent, {tangent_fields[name]})" if name in tangent_fields else "NO_OFFSET",
         *map(c_literal, flags),
         ", ".join(
-            f"offsetof(Model, {name}_{part})" if has_derivatives else "NO_OFFSET" for part in DERIVATIVE_ATTRIBUTES
+            f"offsetof(State, model.{name}_{part})" if has_derivatives else "NO_OFFSET"
+            for part in DERIVATIVE_ATTRIBUTES
         ),
         *(c_literal(float(bound)) for bound in bounds),
         items,

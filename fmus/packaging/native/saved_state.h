@@ -23,11 +23,11 @@ typedef struct {
 
 /* ---- values */
 
-static void *variable_address(Model *model, const Variable *variable) { return (char *)model + variable->offset; }
+static void *variable_address(State *state, const Variable *variable) { return (char *)state + variable->offset; }
 
-static double variable_value(const Model *model, const Variable *variable)
+static double variable_value(const State *state, const Variable *variable)
 {
-    const void *value = (const char *)model + variable->offset;
+    const void *value = (const char *)state + variable->offset;
     return variable->is_real ? *(const double *)value : (double)*(const int64_t *)value;
 }
 

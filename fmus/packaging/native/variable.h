@@ -13,7 +13,7 @@
 typedef struct {
     const char *name, *text;       /* text: the description */
     const char *unit, *allowed;    /* unit suffix and allowed range, as in messages */
-    size_t offset;                 /* in Model */
+    size_t offset;                 /* in State */
     size_t tangent_offset;         /* in struct Tangent; NO_OFFSET without a derivative */
     bool is_real;                  /* a double; otherwise an int64_t */
     bool is_calculated, is_fixed;
@@ -21,7 +21,7 @@ typedef struct {
     bool is_updated_on_read;       /* solver and event statistics */
     bool is_state_or_input;
     bool is_real_parameter;        /* others have partial derivatives by it, as by states and inputs */
-    /* Of an input that can be interpolated, in Model: its time derivative, the order of its polynomial and the
+    /* Of an input that can be interpolated, in State: its time derivative, the order of its polynomial and the
      * polynomial's derivatives; otherwise NO_OFFSET. */
     size_t rate_offset, order_offset, derivatives_offset;
     double low, high, above, below;   /* low <= value <= high, above < value < below */

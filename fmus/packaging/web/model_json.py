@@ -12,7 +12,7 @@ from ..equations.expressions import Operand
 from ..equations.model_analysis import ModelAnalysis
 from ..equations.model_declaration import Contact, Fixed, Output, Parameter, State
 from ..equations.model_file import ModelFile
-from ..model_description import declared_variables
+from ..fmi_variables import declared_variables
 from ..units import unit_of
 
 FORCES = ("N", "N.m")

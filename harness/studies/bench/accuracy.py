@@ -104,8 +104,8 @@ def last_event_error(model: str, values: dict[str, float], number: int, law: Cal
     t_reference, next_one = (law(embedded_model.model, n) for n in (number, number + 1))
     stop = float((t_reference + next_one) / 2)
     embedded_model.compute_states([stop * i / 10 for i in range(10)] + [stop])
-    embedded_model.model.solver.report(embedded_model.model.events)
-    events = embedded_model.model.events
+    events = embedded_model.run.events
+    embedded_model.run.solver.report(events)
     if events.count != number:
         raise HarnessError(f"{model}: {events.count} events, not {number}")
     largest_error = float(abs(events.t_last - t_reference)) / ulp(events.t_last)

@@ -16,7 +16,7 @@ from ...references.models.stickslip import StickslipProblem
 from ...references.ode_problem import OdeProblem
 from ...running import stepping_loops
 from ...running.description import read_description
-from ...running.embedded_model import EmbeddedModel, load_model_class
+from ...running.embedded_model import EmbeddedModel, create_run, load_model_class
 from ...running.stepping_loops import COMMUNICATION_STEPS
 from ...running.timing import time_call, time_fastest_call
 from ...scenes.fmu_files import find_fmu
@@ -80,8 +80,8 @@ def time_one_step(model_class: type) -> Benchmark:
     problem, rtol = SmdProblem(), 1e-8
     embedded_model = EmbeddedModel.create(model_class, {}, "ode23", rtol, 1e-3 * rtol)
     seconds = time_fastest_call(partial(embedded_model.compute_states, [0.0, problem.stop]), 10)
-    solver = embedded_model.model.solver
-    solver.report(embedded_model.model.events)
+    solver = embedded_model.run.solver
+    solver.report(embedded_model.run.events)
     peer_solver: Any = RK23(problem.rates(1), 0.0, problem.start, problem.stop, rtol=rtol, atol=1e-3 * rtol)
 
     def steps() -> None:
@@ -126,15 +126,16 @@ def time_communication_step(model: str) -> Benchmark:
 def time_many_runs(model_class: type) -> Benchmark:
     """Measure 10 000 runs of the sled with different driver speeds: final state and number of events."""
     model = model_class()
-    solver = model.solver
+    run = create_run(model)
+    solver = run.solver
 
     def one(v_driver: float) -> tuple[float, float, int]:
         model.v_driver = v_driver
         model.prepare()
         solver.start(model, 0.0, *model.initial_state(0.0), model.stop_time, model.tolerance)
         solver.advance(model, model.stop_time)
-        solver.report(model.events)
-        return solver.x, solver.v, model.events.count
+        solver.report(run.events)
+        return solver.x, solver.v, run.events.count
 
     seconds = time_call(lambda: [one(0.02 + 3e-6 * i) for i in range(RUNS)])
     problem = StickslipProblem()

@@ -261,7 +261,8 @@ def solver_jobs(case: ReferenceCase, model_class: Any, file: Path) -> Iterator[S
             yield SolverJob(FMU, method, nan, partial(ask.run_inside, method, run_times), is_swept=is_swept)
             yield SolverJob(FMPY, method, nan, partial(ask.run_through_fmpy, method, run_times), True, is_swept)
     if not case.is_chattering:
-        usual = {number: name for name, number in method_numbers(model_class).items()}[model_class().solver.method]
+        names = {number: name for name, number in method_numbers(model_class).items()}
+        usual = names[model_class.solver_class.method.start]
         for tool, method, is_swept in ((CS, usual, False), (ME, "fmpy's CVode", fmi3_path(file).is_file())):
             yield SolverJob(tool, method, nan, partial(ask.run_fmi3, tool), is_swept=is_swept)
         absent = (
