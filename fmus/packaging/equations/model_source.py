@@ -1,12 +1,12 @@
 """Generates the source of a scalar model class, which is embedded in Python FMUs and translated to C."""
 
 import ast
-from inspect import cleandoc
-from math import isfinite
+from inspect import cleandoc, signature
 from textwrap import indent, wrap
 
 from ...runtime.active_method import EXACT_ITEM
 from ...runtime.oscillator import Oscillator
+from ...runtime.variable_declarations import VariableDeclaration
 from ..text_output import string_literal
 from .codegen_context import CodegenContext, rule_status
 from .conditions import Condition
@@ -45,6 +45,11 @@ class {name}({base_class}):
 '''
 IMPORTS_MARK = "\0"  # marks the place of the imports; model texts cannot contain it
 WIDTH = 105
+DECLARATION_OPTIONS = {
+    one.name: one.default
+    for one in signature(VariableDeclaration.__init__).parameters.values()
+    if one.default is not one.empty
+}
 RUN_SETTINGS = ("stop_time", "step_size", "tolerance")
 
 
@@ -130,11 +135,12 @@ def output_declaration(an: ModelAnalysis, e: Variable) -> str:
 
 
 def declaration_arguments(e: Variable) -> str:
-    """Return the arguments unit, description and range."""
-    bounds = [(key, getattr(e, key)) for key in ("low", "high", "above", "below")]
-    more = [f"{key}={float(bound)!r}" for key, bound in bounds if isfinite(bound)]
-    more += [f"{key}={string_literal(getattr(e, key))}" for key in ("display", "alias") if getattr(e, key)]
-    return ", ".join([string_literal(e.unit), string_literal(e.text), *more])
+    """Return the arguments unit and description, and the options that differ from their defaults."""
+    texts = [string_literal(e.unit), string_literal(e.text)]
+    for name, default in DECLARATION_OPTIONS.items():
+        if (value := getattr(e, name)) != default:
+            texts.append(f"{name}={string_literal(value) if default == '' else repr(type(default)(value))}")
+    return ", ".join(texts)
 
 
 def class_attribute_lines(an: ModelAnalysis) -> list[str]:
