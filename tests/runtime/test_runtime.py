@@ -6,9 +6,9 @@ import tracemalloc
 from math import isnan, nextafter
 
 import pytest
-from models import CASES, FEW_CASES, MODELS, ROOT, SIGN, declared, label, model_class, outputs, runtime
+from models import CASES, FEW_CASES, LARGER_MODELS, MODELS, ROOT, SIGN, declared, label, model_class, outputs, runtime
 
-from fmus.packaging.lowering import lowered_files
+from fmus.packaging.lowering import lowered_files, lowered_model
 from fmus.packaging.model_lookup import find_model
 from harness.running.embedded_model import create_run, load_model_class
 
@@ -242,6 +242,12 @@ def test_a_solver_without_progress_is_stopped_with_a_message(capfd):
     assert instance.do_step(0.0, 4.0) is False
     assert len(capfd.readouterr().err.splitlines()) == 1
     assert isnan(read(instance, "x")[0])
+
+
+@pytest.mark.parametrize("source", [*MODELS, *LARGER_MODELS], ids=lambda source: getattr(source, "stem", source))
+def test_a_model_owns_numbers_only_and_no_part_of_the_solver(source):
+    owned = {type(value) for value in vars(lowered_model(source)()).values()}
+    assert {kind.__name__ for kind in owned} <= {"bool", "float", "int", "list", "InputPolynomial"}
 
 
 @pytest.mark.parametrize("name", MODELS)
