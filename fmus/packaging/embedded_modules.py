@@ -15,7 +15,7 @@ from pathlib import Path, PurePosixPath
 from . import BuildError
 from .equations.model_file import ModelFile
 from .model_lookup import FMUS
-from .syntax_trees import parsed_module, parsed_nodes
+from .syntax_trees import nested_statements, parsed_module
 
 ROOT, VENDORED = "__init__.py", "pythonfmu/__init__.py"  # replaced by generated or empty files
 SLAVE = "runtime/slave.py"  # embedded with every model
@@ -93,10 +93,10 @@ def _embed(path: str, text: str, root: Path) -> tuple[str, list[str]]:
 
 def _imports(path: str, source: str) -> Iterator[ast.Import | ast.ImportFrom]:
     """Yield all import statements; all must be at top level, because hosts may delete the files after loading."""
-    body = parsed_module(source).body
-    for node in parsed_nodes(source):
+    tree = parsed_module(source)
+    for node in nested_statements(tree):
         if isinstance(node, (ast.Import, ast.ImportFrom)):
-            if node not in body:
+            if node not in tree.body:
                 raise BuildError(f"{path} imports inside a block in line {node.lineno}: import at the top of the file.")
             yield node
 

@@ -1,6 +1,7 @@
 """Cached and immutable Python syntax trees: parsed once, and shared where they do not change."""
 
 import ast
+from collections.abc import Iterator
 from functools import lru_cache
 from operator import is_
 from typing import Any, TypeVar
@@ -41,6 +42,13 @@ def child_nodes(node: ast.AST) -> list[ast.AST]:
 def child_statements(node: ast.AST) -> list[ast.stmt | ast.ExceptHandler]:
     """Return the statements directly inside a statement or a module; those of an exception handler are inside it."""
     return [one for name in STATEMENT_FIELDS for one in getattr(node, name, ())]
+
+
+def nested_statements(node: ast.AST) -> Iterator[ast.stmt | ast.ExceptHandler]:
+    """Yield all statements inside a node."""
+    for one in child_statements(node):
+        yield one
+        yield from nested_statements(one)
 
 
 def all_nodes(root: ast.AST) -> list[ast.AST]:

@@ -113,7 +113,10 @@ class DefinitionsAndUses:
         pending = [part]
         for node in pending:  # the list grows during the loop
             match node:
-                case ast.Name() | ast.Attribute():
+                case ast.Name():
+                    reads.add(scope.symbol(node))
+                    continue  # half of all nodes are names, which have no parts
+                case ast.Attribute():
                     reads.add(scope.symbol(node))
                 case ast.Constant(value=str(text)) if DOTTED_NAME.fullmatch(text):
                     reads |= self.table.path_symbols(text)

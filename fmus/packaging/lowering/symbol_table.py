@@ -11,10 +11,10 @@ there is no such assignment, or if there are several with different classes.
 
 import ast
 from collections import defaultdict
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
-from ..syntax_trees import child_statements
+from ..syntax_trees import nested_statements
 
 UNKNOWN = ""  # class
 MODEL = "model"  # name of a model in the runtime
@@ -146,13 +146,6 @@ def imported_module(module: str, node: ast.ImportFrom) -> str:
     """Return the module from which a module imports names."""
     parents = module.split(".")[: -node.level] if node.level else []
     return ".".join([*parents, *([node.module] if node.module else [])])
-
-
-def nested_statements(node: ast.AST) -> Iterator[ast.stmt | ast.ExceptHandler]:
-    """Yield all statements inside a node."""
-    for one in child_statements(node):
-        yield one
-        yield from nested_statements(one)
 
 
 def last_name(node: ast.AST) -> str:
