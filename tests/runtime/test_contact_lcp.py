@@ -144,3 +144,14 @@ def test_a_contact_without_friction_never_sticks():
         assert fits
         assert modes[1] != STUCK
         assert chain.fits(modes)
+
+
+def test_a_contact_without_a_lever_holds_nothing():
+    """At a dead point a load within the limit is the quotient of rounding errors."""
+    chain = Chain(np.random.default_rng(1), 1, 1.0, False)
+    chain.b = chain.A @ (0.5 * chain.limit)
+    chain.has_variable_levers = True
+    assert chain.answer() == ((0,), True)
+    force, limit, _ = chain.contact_forces(0.0, None, np.zeros(1))
+    chain.contact_forces = lambda t, y, modes: (force, limit, np.full(1, 1e20))
+    assert chain.answer() == ((1,), True)
