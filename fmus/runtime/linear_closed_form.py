@@ -33,7 +33,7 @@ class LinearClosedForm:
         self.regime = UNDAMPED
         self.has_input_derivatives = True  # code generation inserts the flag of the model
         self.z = self.n2 = self.drift = self.q = 0.0
-        self.w = self.slow_root = self.upper_root = self.lower_root = 0.0
+        self.w = self.upper_root = self.lower_root = 0.0
         self.oscillates = self.is_steady = False
         self.max_rate = 0.0  # bound of the magnitudes of the roots of s^2 + 2 z s + n^2
         self.max_duration = self.horizon = inf  # of a segment that grows, and of the current one
@@ -56,7 +56,7 @@ class LinearClosedForm:
         self.w = sqrt(fabs(square))
         self.oscillates = square > 0.0
         self.max_rate = fabs(z) + self.w
-        self.slow_root = self.q = 0.0
+        self.upper_root = self.q = 0.0
         self.max_duration = self.horizon = inf
         if z < 0.0 or self.n2 < 0.0:
             self.prepare_growth()
@@ -66,7 +66,7 @@ class LinearClosedForm:
             self.regime = UNDERDAMPED
         else:
             self.regime = OVERDAMPED
-            self.slow_root = -self.n2 / (z + self.w)  # slow root of s^2 + 2 z s + n^2, without cancellation
+            self.upper_root = -self.n2 / (z + self.w)  # slow root of s^2 + 2 z s + n^2, without cancellation
 
     def prepare_growth(self):
         """Set the constants of a motion with negative damping or stiffness."""
@@ -96,11 +96,8 @@ class LinearClosedForm:
         `p` is the acceleration due to the constant force, `x_roundoff` the rounding error of x.
         """
         self.x0, self.v0, self.a0, self.p, self.x_roundoff = x, v, a, p, x_roundoff
+        self.net = p - self.n2 * x if v != 0.0 and self.z != 0.0 else a  # the acceleration without damping
         if self.regime == GROWING:
-            if v != 0.0 and self.z != 0.0:
-                self.net = p - self.n2 * x  # the acceleration without damping
-            else:
-                self.net = a
             self.is_steady = a == 0.0 and self.q - self.n2 * v == 0.0
             self.horizon = inf if self.is_steady else self.max_duration
 
@@ -167,7 +164,7 @@ class LinearClosedForm:
                 self.integral_series(t, t * t * t / 6.0, 3),
             )
         elif self.regime == OVERDAMPED and w > 0.5 * z:
-            g_integral2 = 0.5 * (exp_double_integral(self.slow_root, t) - exp_double_integral(-(z + w), t)) / w
+            g_integral2 = 0.5 * (exp_double_integral(self.upper_root, t) - exp_double_integral(-(z + w), t)) / w
         else:
             g_integral = (1.0 - slope - 2.0 * z * g) / n2
             g_integral2 = (t - 2.0 * z * g_integral - g) / n2
@@ -239,8 +236,8 @@ class LinearClosedForm:
 
     def overdamped_response(self, t):
         """Return G, G' and I from the two real roots, which coincide at critical damping."""
-        z, w, slow_root = self.z, self.w, self.slow_root
-        e = exp(slow_root * t)
+        z, w, upper_root = self.z, self.w, self.upper_root
+        e = exp(upper_root * t)
         u = expm1(-2.0 * w * t)
         g = -0.5 * e * u / w if w > 0.0 else e * t
         mean = e * (1.0 + 0.5 * u)
@@ -248,7 +245,7 @@ class LinearClosedForm:
             integral = self.integral_series(t, 0.5 * t * t, 2)
         elif w > 0.5 * z:
             fast = -(z + w)
-            slow_integral = expm1(slow_root * t) / slow_root if slow_root < 0.0 else t
+            slow_integral = expm1(upper_root * t) / upper_root if upper_root < 0.0 else t
             integral = 0.5 * (slow_integral - expm1(fast * t) / fast) / w
         else:
             integral = (1.0 - mean - z * g) / self.n2
@@ -273,35 +270,24 @@ class LinearClosedForm:
             return self.undamped_standstill(v, a / self.w, mode * self.drift)
         if self.regime == GROWING and self.is_steady:
             return inf
-        if self.regime == GROWING and self.q == 0.0:
-            return self.decay_time(v, a, mode * self.net)
-        if self.regime == GROWING:
+        if self.regime == GROWING and self.q != 0.0:
             return self.growing_standstill(mode, v, a, mode * self.q)
         if self.has_input_derivatives and self.q != 0.0:
             return self.ramped_standstill(mode, v, a, mode * self.q)
-        return self.decay_time(v, a, mode * self.p)
+        return self.decay_time(v, a, mode * self.net)
 
-    def decay_time(self, v, a, p):
+    def decay_time(self, v, a, net):
         """Return when a solution of the homogeneous equation with value v >= 0 and rate a next falls to zero.
 
-        `p` is a + 2 z v, without cancellation.
+        `net` is a + 2 z v, without cancellation.
         """
-        b = a + self.z * v
         w = self.w
         if self.oscillates:
-            return atan2(v * w, -b) / w
-        if self.regime == GROWING:
-            upper_root = p + self.upper_root * v  # weight of the upper root
-            if v == 0.0 or upper_root >= 0.0:
-                return inf
-            return 0.5 * log1p(-2.0 * w * v / upper_root) / w if w > 0.0 else -v / upper_root
-        # weight of the slow root; without a spring it is given by p
-        slow_root = b + w * v if self.n2 > 0.0 else p
-        if v == 0.0 or slow_root >= 0.0:
+            return atan2(v * w, -(a + self.z * v)) / w
+        weight = net + self.upper_root * v  # of the upper root
+        if v == 0.0 or weight >= 0.0:
             return inf
-        if w == 0.0:
-            return -v / b
-        return -0.5 * log1p(2.0 * w * v / (slow_root - 2.0 * w * v)) / w
+        return 0.5 * log1p(-2.0 * w * v / weight) / w if w > 0.0 else -v / weight
 
     def ramped_standstill(self, mode, v, a, q):
         """Return the same for a force with rate q, in the direction of the mode.

@@ -44,6 +44,12 @@ def same_events(fmu, events, start, stop):
         assert t in times
 
 
+@pytest.mark.parametrize(("k", "f"), [(0.0, 1e-3), (0.0, 1e-9), (0.0, 1e-17), (1e-9, 1e-6), (3.0, 1e-6)])
+def test_a_small_friction_force_stops_a_strongly_damped_body_on_time(launch, k, f):
+    """The event time has all digits although the fast part of the motion has decayed by up to 18 powers of ten."""
+    compare(launch, "coulomb", {"k": k, "c": 10.0, "f": f}, v0=1.0, run=10.0)
+
+
 DAMPING = [0.0, 1e-9, 0.08, 0.5, 1 - 1e-6, 1 - 1e-12, 1.0, 1 + 1e-12, 1 + 1e-6, 3.0, 1e3]
 
 
