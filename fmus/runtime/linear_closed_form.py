@@ -17,12 +17,12 @@ body in an equilibrium then stays there exactly.  q includes the moving equilibr
 
 from math import atan2, copysign, cos, exp, expm1, fabs, fmod, inf, log1p, pi, sin, sqrt
 
-from .codes import MAX_INPUT_ORDER, ROUNDOFF_MARGIN
+from .codes import EPSILON, MAX_INPUT_ORDER, ROUNDOFF_MARGIN
 from .power_series import TERMS, PowerSeries
 from .vectors import StateVector
 
 UNDAMPED, UNDERDAMPED, OVERDAMPED, FREE, HIGHER_ORDER_INPUT, GROWING = 1, 2, 3, 4, 5, 6
-MAX_BISECTIONS, MAX_DOUBLINGS = 200, 1000
+MAX_ITERATIONS, MAX_DOUBLINGS = 200, 1000
 MAX_LOG_GROWTH = 30.0  # of a growing motion in one segment, so that a divergence is noticed before any overflow
 
 
@@ -152,25 +152,28 @@ class LinearClosedForm:
     def evaluate_ramp(self, t) -> StateVector:
         """Return position and velocity where the force has a constant rate."""
         z, w, n2 = self.z, self.w, self.n2
-        if self.regime == OVERDAMPED:
-            g, slope, g_integral = self.overdamped_response(t)
-        else:
-            e, g_integral = exp(-z * t), 0.0
-            g = e * sin(w * t) / w if w > 0.0 else t
-            slope = e * cos(w * t) - z * g
-        if (z + w) * t < 0.5:
-            g_integral, g_integral2 = (
-                self.integral_series(t, 0.5 * t * t, 2),
-                self.integral_series(t, t * t * t / 6.0, 3),
-            )
+        if self.max_rate * t < 0.5:
+            g_integral, g_integral2 = self.integrals_at_small_time(t)
+            g = t - 2.0 * z * g_integral - n2 * g_integral2
+            slope = 1.0 - 2.0 * z * g - n2 * g_integral
         elif self.regime == OVERDAMPED and w > 0.5 * z:
-            g_integral2 = 0.5 * (exp_double_integral(self.upper_root, t) - exp_double_integral(-(z + w), t)) / w
+            upper, lower = self.upper_root, -self.max_rate
+            g = 0.5 * (exp(upper * t) - exp(lower * t)) / w
+            slope = 0.5 * (upper * exp(upper * t) - lower * exp(lower * t)) / w
+            g_integral = 0.5 * (exp_integral(upper, t) - exp_integral(lower, t)) / w
+            g_integral2 = 0.5 * (exp_double_integral(upper, t) - exp_double_integral(lower, t)) / w
         else:
+            if self.regime == OVERDAMPED:
+                g, slope, _ = self.overdamped_response(t)
+            else:
+                e = exp(-z * t)
+                g = e * sin(w * t) / w
+                slope = e * cos(w * t) - z * g
             g_integral = (1.0 - slope - 2.0 * z * g) / n2
             g_integral2 = (t - 2.0 * z * g_integral - g) / n2
         return (
             self.x0 * (slope + 2.0 * z * g) + self.v0 * g + self.p * g_integral + self.q * g_integral2,
-            (self.p - n2 * self.x0) * g + self.v0 * slope + self.q * g_integral,
+            self.v0 * slope + self.net * g + self.q * g_integral,
         )
 
     def evaluate_growth(self, t) -> StateVector:
@@ -193,8 +196,7 @@ class LinearClosedForm:
             else:
                 slope = mean - z * g
         if self.max_rate * t < 1.0:
-            g_integral = self.integral_series(t, 0.5 * t * t, 2)
-            g_integral2 = self.integral_series(t, t * t * t / 6.0, 3)
+            g_integral, g_integral2 = self.integrals_at_small_time(t)
         elif self.oscillates or w <= -0.5 * z:
             g_integral = (1.0 - mean - z * g) / self.n2
             g_integral2 = (t - 2.0 * z * g_integral - g) / self.n2
@@ -242,7 +244,7 @@ class LinearClosedForm:
         g = -0.5 * e * u / w if w > 0.0 else e * t
         mean = e * (1.0 + 0.5 * u)
         if (z + w) * t < 0.5:
-            integral = self.integral_series(t, 0.5 * t * t, 2)
+            integral, _ = self.integrals_at_small_time(t)
         elif w > 0.5 * z:
             fast = -(z + w)
             slow_integral = expm1(upper_root * t) / upper_root if upper_root < 0.0 else t
@@ -251,17 +253,18 @@ class LinearClosedForm:
             integral = (1.0 - mean - z * g) / self.n2
         return g, mean - z * g, integral
 
-    def integral_series(self, t, term, power):
-        """Return an integral of G at small t by its series, where the closed form loses digits.
-
-        The first term has the given power of t: 2 for I'' = 1 - 2 z I' - n^2 I, 3 for J'' = t - 2 z J' - n^2 J.
-        """
+    def integrals_at_small_time(self, t):
+        """Return I and J by the series of I, until further terms change nothing."""
         y, y2 = 2.0 * self.z * t, self.n2 * t * t
-        previous, total = 0.0, term
-        for j in range(power, 24):
+        previous, term = 0.0, 0.5 * t * t
+        total, total2 = term, term * t / 3.0
+        for j in range(2, 24):
             term, previous = -(y * j * term + y2 * previous) / ((j + 1.0) * j), term
             total += term
-        return total
+            total2 += term * t / (j + 2.0)
+            if total + (fabs(term) + fabs(previous)) == total:
+                break
+        return total, total2
 
     def next_standstill(self, mode):
         """Return when the velocity, which has the sign of `mode`, next reaches zero; inf if never."""
@@ -292,12 +295,11 @@ class LinearClosedForm:
     def ramped_standstill(self, mode, v, a, q):
         """Return the same for a force with rate q, in the direction of the mode.
 
-        The acceleration obeys the homogeneous equation, so that its zeros have a closed form.  Bisection finds the
-        standstill between two of them.
+        The acceleration obeys the homogeneous equation, so that its zeros have a closed form.  Newton's method finds
+        the standstill between two of them.
         """
         if self.regime == FREE:
             return free_standstill(v, a, q)
-        z, w = self.z, self.w
         low, high = self.falling_interval(v, a, q)
         if not low < inf or (high == inf and q > 0.0):
             return inf  # it rises forever, or falls towards a positive velocity
@@ -306,14 +308,14 @@ class LinearClosedForm:
             if mode * v_min > ROUNDOFF_MARGIN * v:
                 return inf
         else:
-            width = 1.0 / (z + w)
+            width = 1.0 / self.max_rate
             for _ in range(MAX_DOUBLINGS):
                 high = low + width
                 width *= 2.0
                 _, v_min = self.evaluate_ramp(high)
                 if mode * v_min <= 0.0:
                     break
-        return self.bisect_standstill(mode, low, high)
+        return self.locate_standstill(mode, low, high)
 
     def growing_standstill(self, mode, v, a, q):
         """Return the same for a growing motion, inf if it is beyond the horizon."""
@@ -336,7 +338,7 @@ class LinearClosedForm:
             return inf
         high = high if high < self.horizon else self.horizon
         _, v_min = self.evaluate(high)
-        return inf if mode * v_min > ROUNDOFF_MARGIN * v else self.bisect_standstill(mode, low, high)
+        return inf if mode * v_min > ROUNDOFF_MARGIN * v else self.locate_standstill(mode, low, high)
 
     def falling_interval(self, v, a, q):
         """Return when the acceleration becomes negative, and when positive again."""
@@ -351,17 +353,29 @@ class LinearClosedForm:
             high = self.decay_time(fabs(a), -jerk, -net)
         return low, high
 
-    def bisect_standstill(self, mode, low, high):
-        """Return when the velocity in the direction of the mode, positive at `low` only, reaches zero."""
-        for _ in range(MAX_BISECTIONS):
-            middle = 0.5 * (low + high)
-            if not low < middle < high:
-                break
-            _, v_middle = self.evaluate(middle)
-            if mode * v_middle > 0.0:
-                low = middle
+    def locate_standstill(self, mode, low, high):
+        """Return when the velocity in the direction of the mode, which falls from `low` to `high`, reaches zero.
+
+        By Newton's method, or by bisection where that leaves the interval.
+        """
+        t = -self.v0 / self.a0 if low == 0.0 and self.a0 != 0.0 else 0.0
+        if not low < t < high:
+            t = 0.5 * (low + high)
+        for _ in range(MAX_ITERATIONS):
+            x, v = self.evaluate(t)
+            if mode * v > 0.0:
+                low = t
             else:
-                high = middle
+                high = t
+            a = self.p + self.q * t - self.n2 * x - 2.0 * self.z * v
+            t_next = t - v / a if a != 0.0 else low
+            if fabs(t_next - t) <= EPSILON * t:
+                return t_next
+            if not low < t_next < high:
+                t_next = 0.5 * (low + high)
+                if not low < t_next < high:
+                    break
+            t = t_next
         return high
 
     def undamped_standstill(self, v, q, u):
