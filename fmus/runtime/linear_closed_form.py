@@ -37,6 +37,7 @@ class LinearClosedForm:
         self.oscillates = self.is_steady = False
         self.max_rate = 0.0  # bound of the magnitudes of the roots of s^2 + 2 z s + n^2
         self.max_duration = self.horizon = inf  # of a segment that grows, and of the current one
+        self.may_end_early = False  # the next segment need not reach a standstill
         self.x0 = self.v0 = self.a0 = self.p = self.net = self.x_roundoff = 0.0
         self.velocity_series = PowerSeries()  # of the velocity, for inputs of higher order
 
@@ -87,6 +88,7 @@ class LinearClosedForm:
     def set_force_rate(self, q):
         """Set the constant rate q (m/s3) of the acceleration that is due to the force."""
         self.q += q
+        self.may_end_early = True
         if self.regime == UNDAMPED:
             self.drift += q / self.n2  # the equilibrium moves, too
 
@@ -293,13 +295,19 @@ class LinearClosedForm:
         return 0.5 * log1p(-2.0 * w * v / weight) / w if w > 0.0 else -v / weight
 
     def ramped_standstill(self, mode, v, a, q):
-        """Return the same for a force with rate q, in the direction of the mode.
+        """Return the same for a force with rate q, in the direction of the mode; inf if it is beyond the horizon.
 
         The acceleration obeys the homogeneous equation, so that its zeros have a closed form.  Newton's method finds
         the standstill between two of them.
         """
         if self.regime == FREE:
             return free_standstill(v, a, q)
+        self.horizon = inf
+        if self.may_end_early:  # a rate that is set anew in each communication step does not last until a standstill
+            self.may_end_early = False
+            self.horizon = self.sliding_duration(v, a, q)
+            if self.horizon < inf:
+                return inf
         low, high = self.falling_interval(v, a, q)
         if not low < inf or (high == inf and q > 0.0):
             return inf  # it rises forever, or falls towards a positive velocity
@@ -316,6 +324,21 @@ class LinearClosedForm:
                 if mode * v_min <= 0.0:
                     break
         return self.locate_standstill(mode, low, high)
+
+    def sliding_duration(self, v, a, q):
+        """Return a time until which the velocity stays positive; inf if the bound below shows none.
+
+        While max_rate t <= 1, G' + 2 z G lies between 1/2 and 1, and G between 0 and t.  So the acceleration, which is
+        a (G' + 2 z G) + (q - 2 z a - n^2 v) G, stays above a linear function of time.
+        """
+        jerk = q - 2.0 * self.z * a - self.n2 * v
+        least_a, least_jerk = a if a < 0.0 else 0.5 * a, jerk if jerk < 0.0 else 0.0
+        duration = 1.0 / self.max_rate
+        for _ in range(3):
+            if v + (least_a + 0.5 * least_jerk * duration) * duration > ROUNDOFF_MARGIN * v:
+                return duration
+            duration *= 0.5
+        return inf
 
     def growing_standstill(self, mode, v, a, q):
         """Return the same for a growing motion, inf if it is beyond the horizon."""

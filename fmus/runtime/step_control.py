@@ -264,14 +264,16 @@ class InternalStep:
         return OK
 
     def advance_linear_segment(self, model):
-        """Follow the closed form up to the next standstill, the end of the run, or the horizon of a growing motion."""
+        """Follow the closed form up to the next standstill, the end of the run, or the horizon."""
         exact = self.active_method.exact
         roundoff = self.roundoff
         roundoff.carry()
         exact.start_segment(self.y0, self.f0, model.applied_acceleration(self.t0, self.modes0), roundoff.x0)
-        self.t1 = self.t_end if self.t_end - self.t0 <= exact.horizon else self.t0 + exact.horizon
+        duration = inf
         if model.has_dry_friction:
             duration = exact.next_standstill(self.modes0)
+        self.t1 = self.t_end if self.t_end - self.t0 <= exact.horizon else self.t0 + exact.horizon
+        if model.has_dry_friction:
             elapsed = duration + roundoff.t0
             end = self.t0 + elapsed
             if end <= self.t1 and end < inf:

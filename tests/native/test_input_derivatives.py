@@ -175,7 +175,7 @@ def test_random_input_derivatives_never_stall_the_closed_form(worker, fmus, damp
 
 @pytest.mark.parametrize("damping_ratio", [0.08, 1.0, 3.0])
 def test_a_step_with_an_input_rate_evaluates_the_closed_form_a_few_times(monkeypatch, damping_ratio):
-    """The search for a standstill converges fast, with and without a standstill in the communication step."""
+    """Most steps need no search for a standstill, and a search converges fast."""
     model, h, calls = lowered_model(replace(find_model("coulomb"), ramps=True)), 0.03, []
     closed_form = sibling_module(model, "runtime.linear_closed_form").LinearClosedForm
     evaluate = closed_form.evaluate
@@ -183,7 +183,7 @@ def test_a_step_with_an_input_rate_evaluates_the_closed_form_a_few_times(monkeyp
     values = {"m": 1.0, "k": 100.0, "f": 0.3, "c": 20.0 * damping_ratio, "x0": 0.0}
     _, events = run_lowered(model, values, random_force(Random(0), 400, h, 0.3, 1), h)
     assert events > 60
-    assert len(calls) < 8 * 400
+    assert len(calls) < 4 * 400
 
 
 @pytest.mark.parametrize("h_max", [0.0, 3.0])
