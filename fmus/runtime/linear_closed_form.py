@@ -456,6 +456,8 @@ def free_standstill(v, a, q):
 
 def half_angle(over, under):
     """Return the angle in (0, pi] whose tangent is over/under; a tangent of zero gives pi."""
+    if under < over < 0.0:  # a small angle, which would lose its digits below
+        over, under = -over, -under
     y = atan2(over, under)
     if y <= 0.0:
         y += pi

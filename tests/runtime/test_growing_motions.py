@@ -140,6 +140,10 @@ def test_the_next_standstill_is_right_to_rounding(draw_motion, seed):
         horizon = min(closed_form.horizon, 100.0 / rate)
         mode = int(copysign(1.0, start.v or closed_form.a0 or segment.rate))
         got = closed_form.next_standstill(mode)
+        if closed_form.horizon < horizon:  # the first segment with a new rate may end before its standstill
+            end = closed_form.horizon
+            got = closed_form.next_standstill(mode)
+            assert got > end, (start, got, end)
         if start.v == closed_form.a0 == segment.rate == 0.0:
             assert got == inf
             continue
@@ -151,6 +155,15 @@ def test_the_next_standstill_is_right_to_rounding(draw_motion, seed):
             slope = abs(segment.at(true + step)[1] / step)
             assert abs(got - true) <= ROUNDING * (true + largest_terms(start, true)[1] / slope), (start, got, true)
     assert found > 5
+
+
+def test_a_force_that_turns_stops_a_body_that_has_hardly_started():
+    """Without damping, v = 1e-31 falls at a rate that grows with time: v - 90 t^2/2 is zero."""
+    closed_form = LinearClosedForm()
+    closed_form.prepare(1.0, 0.0, 2.0, 0.0)
+    closed_form.set_force_rate(-90.0)
+    closed_form.start_segment(0.0, 1e-31, 0.0, 0.0, 0.0)
+    assert closed_form.next_standstill(1) == pytest.approx((2e-31 / 90.0) ** 0.5, rel=ROUNDING)
 
 
 def test_a_body_at_an_unstable_equilibrium_stays_there():
