@@ -8,6 +8,7 @@ import numpy as np
 from ..errors import SceneError
 
 QUANTITIES = ("position", "velocity", "acceleration")  # by the order of the derivative
+SYMBOLS = ("x", "v", "a")
 MIN_SAMPLES = 12  # samples
 MAX_VALUE = 1e100  # its square is finite
 
@@ -43,6 +44,11 @@ class Record:
         """Return the measured quantity."""
         return QUANTITIES[self.order]
 
+    @property
+    def symbol(self) -> str:
+        """Return the symbol of the measured quantity."""
+        return SYMBOLS[self.order]
+
     def format_time(self, t: float) -> str:
         """Return a time in s for messages, with a resolution of 1e-5 of the record."""
         return f"{t:.{max(5 - int(np.ceil(np.log10(np.ptp(self.t)))), 0)}f}"
@@ -73,4 +79,7 @@ def check_record(record: Record) -> None:
     not_increasing = np.flatnonzero(np.diff(record.t) <= 0)
     if len(not_increasing):
         time = float(record.t[not_increasing[0]])
-        raise SceneError(f"{record.name}: time does not rise after t = {time!r} s; sort the rows and keep one per time")
+        raise SceneError(
+            f"{record.name}: time does not rise after t = {time!r} s; sort the rows and keep one per time, and give a "
+            "second run a file of its own"
+        )

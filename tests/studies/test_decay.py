@@ -10,6 +10,7 @@ from dataclasses import replace
 import commands
 import numpy as np
 import pytest
+from answers import check_shared_keys
 from build_cache import ROOT
 from decays import decay_record
 from matplotlib.figure import Figure
@@ -18,7 +19,8 @@ from harness.analyses.decay.energy_loss import measure_energy_loss
 from harness.analyses.decay.estimates import KnownParameters
 from harness.analyses.decay.identification import fit_decay
 from harness.analyses.decay.law import LAWS
-from harness.studies.decay.figure import MAX_POINTS, draw, extremes
+from harness.analyses.estimation.figure import MAX_POINTS, extremes
+from harness.studies.decay.figure import draw
 from harness.studies.decay.study import identified_as_json
 from harness.studies.decay.table import decay_table
 
@@ -31,6 +33,7 @@ def test_the_table_has_a_row_for_every_value():
 def test_the_quantities_keep_their_names():
     fit = identified_as_json(fit_decay(decay_record(0.02, 0.003, noise=1e-4), KnownParameters()))
     assert {"fit", "remarks", "laws", "sentence", "turning_points", "published"} <= set(fit)
+    check_shared_keys(fit)
     assert {item["name"] for item in fit["fit"]} == {"omega", "zeta", "r", "b", "rest"}
     assert all({"value", "error", "low", "high", "unit"} <= set(item) for item in fit["fit"])
     assert len(fit["laws"]) == 7

@@ -5,13 +5,14 @@ from math import inf, isfinite, nan
 
 import numpy as np
 
+from ..estimation.answer import ColumnResiduals
 from ..estimation.estimate import Estimate
 from .combinations import determined_combinations
 from .fit_course import FitCourse
 from .fit_problem import FitProblem
 from .measured_record import MeasuredRecord
 from .noise import correlation_length
-from .parameter_fit import ColumnResiduals, ParameterFit, Profile
+from .parameter_fit import ParameterFit, Profile
 from .search import ROUGH
 from .uncertainty import INDETERMINATE, Uncertainty, split_residuals
 

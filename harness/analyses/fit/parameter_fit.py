@@ -5,23 +5,12 @@ from math import isfinite, log
 
 import numpy as np
 
+from ..estimation.answer import ColumnResiduals
 from ..estimation.estimate import Estimate
 from .measured_record import MeasuredRecord
 
 CLEAR_DIFFERENCE = 6.0  # of two BIC, which is strong evidence
 SMALLEST_MEAN_SQUARE = 1e-12  # in units of the noise
-
-
-@dataclass(frozen=True)
-class ColumnResiduals:
-    """Residuals of one observed column: root mean square, noise of the record, and range, in the unit of the FMU."""
-
-    record: str
-    name: str
-    unit: str
-    residual: float
-    noise: float
-    range: float
 
 
 @dataclass(frozen=True)

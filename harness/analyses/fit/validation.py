@@ -5,11 +5,12 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from ...errors import HarnessError
+from ..estimation.answer import ColumnResiduals
 from .fit_course import FitCourse
 from .fit_description import column_residuals
 from .fit_problem import FitProblem
 from .measured_record import MeasuredRecord, RecordData
-from .parameter_fit import ColumnResiduals, Validation
+from .parameter_fit import Validation
 from .uncertainty import split_residuals
 
 WORSE = 2.0  # residuals of a validation record over those of the fitted ones, from which there is a remark

@@ -8,11 +8,11 @@ import numpy as np
 from ...analyses.decay.energy_loss import EnergyLoss
 from ...analyses.decay.identification import DecayIdentification
 from ...analyses.decay.law import Terms
+from ...analyses.estimation.figure import MAX_POINTS, extremes, plot_legend, plot_record, plot_residuals, plot_samples
 from ...results.quantity import display_unit
 from ...results.style import BLUE, GREEN, GREY, HEIGHT, ORANGE, WIDTH, Axes, axis_label, open_figure
 
 MARGINS = {"left": 0.105, "right": 0.985, "bottom": 0.055, "top": 0.97, "hspace": 0.35}
-MAX_POINTS = 4000  # points of a line
 COLOURS: dict[Terms, str] = {("zeta",): GREEN, ("r",): BLUE, ("b",): "#CC79A7"}  # colours of the models with one term
 
 
@@ -23,7 +23,11 @@ def draw(identified: DecayIdentification, loss: EnergyLoss, path: Path) -> None:
         signal_axes = figure.add_subplot(grid[0])
         residual_axes = figure.add_subplot(grid[1], sharex=signal_axes)
         plot_signal(signal_axes, identified)
-        plot_residuals(residual_axes, identified)
+        unit, size = display_unit(identified.record.unit)
+        residuals = (identified.x - identified.signal(identified.best, identified.t)) / size
+        noise = identified.problem.noise * identified.problem.scale / size
+        plot_residuals(residual_axes, identified.t, residuals, noise, "", unit)
+        residual_axes.set_xlabel("t [s]")
         plot_energy_loss(figure.add_subplot(grid[2]), identified, loss)
 
 
@@ -32,7 +36,7 @@ def plot_signal(axes: Axes, identified: DecayIdentification) -> None:
     record, t = identified.record, identified.t
     unit, size = display_unit(record.unit)
     used = np.isin(record.t - identified.problem.time_origin, identified.problem.t)
-    plot_samples(axes, t, identified.x / size, color=BLUE, label="record")
+    plot_record(axes, t, identified.x / size, record.name, axis_label(record.symbol, unit))
     if not used.all():
         plot_samples(axes, record.t[~used], record.x[~used] / size, color=GREY, label="excluded")
     fine = np.linspace(t[0], t[-1], MAX_POINTS) if len(t) < MAX_POINTS else t[extremes(identified.x)]
@@ -48,37 +52,7 @@ def plot_signal(axes: Axes, identified: DecayIdentification) -> None:
     if not record.order:
         style: dict[str, Any] = {"color": "black", "fillstyle": "none", "markersize": 5}
         axes.plot(identified.extrema.t, identified.extrema.x / size, "o", label="turning points", **style)
-    axes.set_title(f"{record.name}: {identified.best.description}")
-    axes.set_ylabel(axis_label(("x", "v", "a")[record.order], unit))
-    axes.legend(loc="upper right", ncols=3)
-
-
-def plot_samples(axes: Axes, t: np.ndarray, x: np.ndarray, **style: Any) -> None:
-    """Plot samples, reduced to extremes if there are many."""
-    some = extremes(x)
-    axes.plot(t[some], x[some], ".", markersize=2.5, **style)
-
-
-def extremes(x: np.ndarray) -> np.ndarray:
-    """Return the indices of all samples of x (n,), or of the first, lowest and highest sample of each of MAX_POINTS/2
-    intervals; the others lie between these values."""
-    if len(x) <= MAX_POINTS:
-        return np.arange(len(x))
-    size = -(-2 * len(x) // MAX_POINTS)
-    intervals = np.minimum(np.arange(0, len(x), size)[:, None] + np.arange(size), len(x) - 1)
-    low, high = x[intervals].argmin(axis=1), x[intervals].argmax(axis=1)
-    return np.unique(intervals[:, 0] + [np.zeros_like(low), low, high])
-
-
-def plot_residuals(axes: Axes, identified: DecayIdentification) -> None:
-    """Plot record minus fit."""
-    unit, size = display_unit(identified.record.unit)
-    residual = (identified.x - identified.signal(identified.best, identified.t)) / size
-    plot_samples(axes, identified.t, residual, color=BLUE)
-    axes.axhline(0, color="black", linewidth=0.6)
-    axes.set_title(f"residuals (rms {identified.rms / size:.3g} {unit})")
-    axes.set_ylabel(axis_label("record - fit", unit))
-    axes.set_xlabel("t [s]")
+    plot_legend(axes)
 
 
 def plot_energy_loss(axes: Axes, identified: DecayIdentification, loss: EnergyLoss) -> None:

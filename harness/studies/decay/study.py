@@ -15,6 +15,7 @@ from ...analyses.decay.energy_loss import EnergyLoss, measure_energy_loss
 from ...analyses.decay.estimates import KnownParameters
 from ...analyses.decay.identification import DecayIdentification, fit_decay
 from ...analyses.decay.law import AMPLITUDE, T0
+from ...analyses.estimation.answer import ColumnResiduals, UsedSamples, answer_as_json
 from ...errors import HarnessError, SceneError, format_value
 from ...records.columns import ColumnOptions, read_record
 from ...records.record import Record, check_record
@@ -133,7 +134,7 @@ def write_results(identified: DecayIdentification, folder: Path) -> None:
         [identified.extrema.t, identified.extrema.x],
     )
     fitted = identified.signal(identified.best, identified.t)
-    name = ("x", "v", "a")[identified.record.order]
+    name = identified.record.symbol
     heads = ["t [s]", column_heading(name, unit), column_heading("fit", unit), column_heading("residual", unit)]
     write_csv(folder / "fit.csv", heads, [identified.t, identified.x, fitted, identified.x - fitted])
     draw(identified, loss, folder / "figure.svg")
@@ -143,28 +144,29 @@ def identified_as_json(identified: DecayIdentification, loss: EnergyLoss | None 
     """Return the identified decay for JSON output."""
     problem, record, best = identified.problem, identified.record, identified.best
     loss = loss or measure_energy_loss(identified)
+    used = UsedSamples(record.name, identified.t, len(record.t))
+    column = ColumnResiduals(
+        record.name,
+        record.symbol,
+        record.unit,
+        identified.rms,
+        problem.noise * problem.scale,
+        float(np.ptp(identified.x)),
+    )
     return {
-        "record": record.name,
+        **answer_as_json([used], [column], identified.estimates, identified.remarks),
         "quantity": record.quantity,
         "unit": record.unit,
         "sentence": identified.sentence,
-        "remarks": list(identified.remarks),
         "noise": identified.extrema.noise,
         "residual": identified.rms,
         "turning points": len(identified.extrema.t),
-        "used": {
-            "from": float(identified.t[0]),
-            "until": float(identified.t[-1]),
-            "samples": len(identified.t),
-            "of": len(record.t),
-            "time_unit": "s",
-        },
+        "used": used.as_json(),
         "release": {
             "time": float(best.p[T0]) + problem.time_origin,
             "amplitude": float(best.p[AMPLITUDE]) * problem.scale,
             "unit": record.base,
         },
-        "fit": [asdict(estimate) for estimate in identified.estimates],
         "turning_points": [asdict(estimate) for estimate in identified.extrema_estimates],
         "published": [asdict(estimate) for estimate in identified.two_peak_estimates],
         "why_empty": {name: reason for name, reason in identified.unavailable.items() if reason},

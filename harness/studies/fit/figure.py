@@ -8,11 +8,13 @@ from pathlib import Path
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
+from ...analyses.estimation.answer import ColumnResiduals
 from ...analyses.estimation.estimate import Estimate
+from ...analyses.estimation.figure import plot_legend, plot_record, plot_residuals
 from ...analyses.fit.measured_record import MeasuredRecord
-from ...analyses.fit.parameter_fit import ColumnResiduals, ParameterFit, Profile
+from ...analyses.fit.parameter_fit import ParameterFit, Profile
 from ...results.quantity import display_unit
-from ...results.style import BLUE, GREEN, GREY, HEIGHT, LEGEND_ABOVE, ORANGE, WIDTH, Axes, axis_label, open_figure
+from ...results.style import GREEN, GREY, HEIGHT, ORANGE, WIDTH, Axes, axis_label, open_figure
 
 MAX_COLUMNS, MAX_PROFILES = 6, 12  # that are drawn
 COLOURS = (ORANGE, GREEN, "#CC79A7", "#56B4E9")  # of the laws
@@ -79,7 +81,7 @@ def plot_column(panels: np.ndarray, laws: Sequence[ParameterFit], fitted: Fitted
     record, j = fitted.record, fitted.position
     unit, size = display_unit(fitted.column.unit)
     measured = record.y[:, j] / size
-    panels[0].plot(record.t, measured, ".", markersize=2.5, color=BLUE, label="record")
+    plot_record(panels[0], record.t, measured, fitted.title, axis_label(fitted.column.name, unit))
     for n, (law, signal, axes) in enumerate(zip(laws, fitted.signals, panels[1:], strict=True)):
         label, name = f"fit: {law.fmu}", f" of {law.fmu}" if len(laws) > 1 else ""
         panels[0].plot(record.t, signal / size, color=COLOURS[n % len(COLOURS)], linewidth=0.9, label=label)
@@ -88,19 +90,7 @@ def plot_column(panels: np.ndarray, laws: Sequence[ParameterFit], fitted: Fitted
     limits = [axes.get_ylim() for axes in panels[1:]]
     for axes in panels[1:]:
         axes.set_ylim(min(low for low, _ in limits), max(high for _, high in limits))
-    panels[0].set_title(fitted.title)
-    panels[0].set_ylabel(axis_label(fitted.column.name, unit))
-    panels[0].legend(ncols=len(laws) + 1, **LEGEND_ABOVE)
-
-
-def plot_residuals(axes: Axes, t: np.ndarray, e: np.ndarray, noise: float, name: str, unit: str) -> None:
-    """Plot residuals and the band of the noise."""
-    axes.plot(t, e, ".", markersize=2.5, color=BLUE)
-    axes.axhspan(-noise, noise, color=GREY, alpha=0.2, linewidth=0)
-    axes.axhline(0.0, color="black", linewidth=0.6)
-    rms = float(np.sqrt(np.mean(e**2)))
-    axes.set_title(f"residuals{name} (rms {rms:.3g} {unit}; the band is the noise)")
-    axes.set_ylabel(axis_label("record - fit", unit))
+    plot_legend(panels[0])
 
 
 def plot_profile(axes: Axes, profile: Profile, estimate: Estimate, colour: str) -> None:

@@ -9,11 +9,12 @@ from typing import Any
 
 import numpy as np
 
+from ...analyses.estimation.answer import ColumnResiduals, UsedSamples, answer_as_json
 from ...analyses.fit.fit_course import fit_records
 from ...analyses.fit.fit_description import describe_fit
 from ...analyses.fit.law_comparison import compare_laws
 from ...analyses.fit.measured_record import MeasuredRecord
-from ...analyses.fit.parameter_fit import ColumnResiduals, ParameterFit
+from ...analyses.fit.parameter_fit import ParameterFit
 from ...analyses.fit.validation import validate
 from ...errors import HarnessError, SceneError, format_value
 from ...records.signal_table import SignalTable, parse_signals
@@ -204,31 +205,18 @@ def with_units(columns: Sequence[ColumnResiduals], units: Mapping[str, str]) -> 
 
 
 def fit_as_json(fit: ParameterFit) -> dict[str, Any]:
-    """Return a fit for JSON output, with the keys that `decay` has in common."""
+    """Return a fit for JSON output."""
     comparison = {"against": [fit_as_json(each) for each in fit.against], "comparison": fit.comparison}
+    used = [UsedSamples(each.name, each.sampled_t, len(each.sampled_t), each.width) for each in fit.records]
     return {
         "fmu": fit.fmu,
-        "record": ", ".join(record.name for record in fit.records),
-        "remarks": list(fit.remarks),
+        **answer_as_json(used, fit.columns, fit.estimates, fit.remarks),
         "notes": list(fit.notes),
         "describes_record": fit.describes_record,
-        "used": [
-            {
-                "record": record.name,
-                "from": float(record.sampled_t[0]),
-                "until": float(record.sampled_t[-1]),
-                "samples": len(record.sampled_t),
-                "averaged": record.width,
-                "time_unit": "s",
-            }
-            for record in fit.records
-        ],
-        "fit": [asdict(estimate) for estimate in fit.estimates],
         "undetermined": list(fit.undetermined),
         "combinations": [asdict(estimate) for estimate in fit.combinations],
         "profiles": [asdict(profile) for profile in fit.profiles],
         "correlation": fit.correlation.tolist(),
-        "columns": [asdict(column) for column in fit.columns],
         "validation": [asdict(column) for column in fit.validation.columns] if fit.validation else [],
         "bic": fit.bic,
         "searches": fit.n_searches,
