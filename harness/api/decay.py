@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import SceneError
 from .options import QUIET, Progress
+from .tables import make_table, table_of
 
 if TYPE_CHECKING:
     import pandas
@@ -111,33 +112,21 @@ def record_from(source: Any, x: Any, columns: Any) -> "Record":
     import numpy as np
 
     from ..records.columns import parse_record
-    from ..records.table_files import Table
-    from ..results.files import column_heading
     from ..running.trajectory import Trajectory
 
-    name = "the record"
+    name, table = "the record", table_of(source)
     if isinstance(source, Trajectory):
-        heads = {"time": "t [s]"} | {each: column_heading(each, source.units[each]) for each in source.columns}
-        table, name = {"time": source.time, **source.columns}, source.spec.model
+        name = source.spec.model
         if columns.position is None and columns.quantity is None:
             if "position" not in source.spec.motion_outputs:
                 raise SceneError(f"{name} records no position: add it to the outputs, or name a column")
             columns = replace(columns, position=source.spec.motion_outputs["position"])
-    elif hasattr(source, "columns"):
-        frame = source if source.index.name is None else source.reset_index()
-        units = frame.attrs.get("units", {})
-        table = {str(each): np.asarray(frame[each]) for each in frame.columns}
-        heads = {each: column_heading(each, units.get(each, "")) for each in table}
-    else:
+    elif table is None:
         if x is None:
             raise SceneError("x is missing: identify_decay takes a file, a table, or times and samples, as in (t, x)")
         if columns.unit is None:
             raise SceneError("unit is missing: name the unit of the samples, as in unit='mm'")
-        table, heads = {"t": np.asarray(source), "x": np.asarray(x)}, {"t": "t [s]", "x": "signal"}
+        table = make_table({"t": np.asarray(source), "signal": np.asarray(x)}, {"t": "s"})
         columns = replace(columns, position="signal")
-    cells = []
-    for each, column in table.items():
-        if column.ndim != 1 or len(column) != len(next(iter(table.values()))):
-            raise SceneError(f"{each} has the shape {column.shape}: times and samples must be equally long rows")
-        cells.append(column.astype(float) if column.dtype.kind in "fiub" else [str(cell) for cell in column])
-    return parse_record(Table(name, tuple(heads.values()), tuple(cells)), columns, name)
+    assert table is not None
+    return parse_record(replace(table, name=name), columns, name)

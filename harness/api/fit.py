@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import SceneError
 from .options import QUIET, Progress
+from .tables import table_of
 
 if TYPE_CHECKING:
     from ..analyses.fit.parameter_fit import ParameterFit
@@ -146,18 +147,7 @@ def headings_of(signals: Any) -> dict[str, str]:
 
 def signal_table_of(source: Any) -> "Table":
     """Return the table of a trajectory or a DataFrame."""
-    import numpy as np
-
-    from ..records.table_files import Table
-    from ..results.files import column_heading
-    from ..running.trajectory import Trajectory
-
-    if isinstance(source, Trajectory):
-        columns, units = {"t": source.time, **source.columns}, {"t": "s", **source.units}
-    elif hasattr(source, "columns"):
-        frame = source if source.index.name is None else source.reset_index()
-        columns, units = {str(name): np.asarray(frame[name]) for name in frame.columns}, frame.attrs.get("units", {})
-    else:
+    table = table_of(source)
+    if table is None:
         raise SceneError("records must be files, DataFrames or trajectories")
-    heads = tuple(column_heading(name, units.get(name, "")) for name in columns)
-    return Table("the record", heads, tuple(np.asarray(column, dtype=float) for column in columns.values()))
+    return table

@@ -5,7 +5,7 @@ A heading may have thousands of characters, so every expression here takes a tim
 
 import re
 
-from .units import find_unit, time_unit_size
+from .units import find_unit, time_unit_size, unit_size
 
 TIME_NAME = re.compile(
     r"^(t|times?|zeit|temps|tiempo|tid|timestamp|datetime|date|elapsed|seconds|epoch)(?![^\W_])|(time|zeit|stamp)$",
@@ -33,7 +33,7 @@ def split_heading(heading: str) -> tuple[str, str | None]:
     if start is not None:
         return name[:start].rstrip(), name[start + 1 : -1].strip() or None
     parts = name.rsplit(None, 2)  # x / mm, x in mm
-    if len(parts) == 3 and parts[1] in ("/", "in") and is_unit(parts[2]):
+    if len(parts) == 3 and parts[1] in ("/", "in") and (is_unit(parts[2]) or unit_size(parts[2])):
         return parts[0], parts[2]
     bracketed = BRACKETS.search(name)  # followed by a run, as in x (mm) Run #1
     if bracketed and is_unit(bracketed[1]):

@@ -20,7 +20,7 @@ from .columns import (
 )
 from .headings import split_heading
 from .record import MIN_SAMPLES, Record, check_record
-from .sample_defects import mark_dropouts, mark_sentinels
+from .sample_defects import find_saturated, mark_dropouts, mark_sentinels
 from .table_files import Table, load_table
 from .timestamps import undo_time_rounding
 from .units import conversion_factor
@@ -80,19 +80,42 @@ def parse_signals(table: Table, wanted: Mapping[str, SignalSource], options: Col
     if interval is not None or time_column is None:
         t = np.arange(len(table.columns[first.index])) * (interval or 0.0)
     else:
-        t = read_times(table, time_column, options)
+        t = read_times(table, time_column, options).copy()
+        notes += mark_sentinels(t, time_column.heading)
         if options.time is None and any(table.column_headings) and not is_time_column(time_column):
             notes.append(f"{time_column.heading} is used as time; --time selects another column.")
         if options.time is None:
             notes += runs_side_by_side(candidates, time_column, first)
     columns = {}
     for signal, (column, unit) in selected.items():
-        x = parse_numbers(table, column.index).copy()
-        notes += mark_sentinels(x, column.heading) + mark_dropouts(x, column.heading)
+        x, remarks = mark_missing(parse_numbers(table, column.index), column.heading)
+        notes += remarks
         factor, note = unit_factor(column, unit, wanted[signal].unit, signal, table.name)
         notes += note
         columns[signal] = factor * x
     return select_complete_rows(name, t, columns, options, notes)
+
+
+def mark_missing(values: np.ndarray, name: str) -> tuple[np.ndarray, list[str]]:
+    """Return values (n,) with NaN for those that mark missing samples, and remarks on these and on a saturated sensor.
+
+    A value that most samples have is that of a rest, not a mark: the speed of a body that sticks is often exactly 0.
+    """
+    x = values.copy()
+    notes = mark_sentinels(x, name)
+    marked = x.copy()
+    dropouts = mark_dropouts(marked, name)
+    if np.mean(np.isnan(marked) & ~np.isnan(x)) <= MAX_MISSING_SHARE:
+        x, notes = marked, notes + dropouts
+    finite = x[np.isfinite(x)]
+    for sign in (1.0, -1.0):
+        is_saturated, peaks = find_saturated(sign * finite) if len(finite) else (finite, 0)
+        if peaks:
+            notes.append(
+                f"{name} is exactly {finite[is_saturated][0]:.6g} in {int(is_saturated.sum())} of {len(x)} samples, in "
+                f"{peaks} peaks: if the sensor was saturated there, leave these cells empty."
+            )
+    return x, notes
 
 
 def find_signal(heading: str, table: Table, candidates: list[Column]) -> tuple[Column, str | None]:
@@ -128,7 +151,10 @@ def select_complete_rows(
     complete = np.isfinite(t) & np.all([np.isfinite(x) for x in columns.values()], axis=0)
     used = np.flatnonzero(np.isfinite(t) & np.any([np.isfinite(x) for x in columns.values()], axis=0))
     length = int(used[-1]) + 1 if len(used) else 0  # the table may continue with a longer run
+    empty_tail = int(np.isfinite(t[length:]).sum())
     t, rounding = undo_time_rounding(t[:length])
+    if empty_tail:
+        notes.append(f"The last {empty_tail} rows have a time and no signal; they are left out.")
     complete = complete[:length] & (t >= options.begin) & (t <= options.end)
     in_range = int(((t >= options.begin) & (t <= options.end)).sum())
     missing = in_range - int(complete.sum())

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 
 from ..errors import SceneError
 from .headings import TIME_NAME, is_unit, order_from_name, split_heading
-from .units import COUNT_NAMES, time_unit_size
+from .units import COUNT_NAMES, time_unit_size, unit_size
 
 DELIMITERS = ("\t", ";", ",", "|", " ")
 MISSING = {"", "nan", "na", "n/a", "#n/a", "null", "none", "-", "--", "---", "inf", "-inf", "+inf", "\u221e", "-\u221e"}
@@ -249,7 +249,7 @@ def has_bracketed_unit(heading: str) -> bool:
 def looks_like_unit(cell: str) -> bool:
     """Return whether a cell below a heading is a unit: in brackets, known, or empty."""
     bracketed = cell.startswith(("[", "(")) and cell.endswith(("]", ")"))
-    return bracketed or not cell or is_unit(cell) or cell in (*COUNT_NAMES, "V", "mV", "N", "A", "1")
+    return bracketed or not cell or is_unit(cell) or cell in (*COUNT_NAMES, "1") or unit_size(cell) is not None
 
 
 def find_commented_headings(preceding: list[str], delimiter: str, width: int) -> list[str]:

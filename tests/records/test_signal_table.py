@@ -145,3 +145,55 @@ def test_a_wrong_request_is_refused_in_one_sentence(tmp_path, wanted, options, m
         read_signals(write(tmp_path / "a.csv", rows()), wanted, ColumnOptions(**options), "a")
     assert message in str(refused.value)
     assert "\n" not in str(refused.value)
+
+
+def table(tmp_path, text, encoding="utf-8"):
+    """Return the position and the force in a file that has the text."""
+    (tmp_path / "record.csv").write_text(text, encoding=encoding)
+    wanted = {"x": SignalSource("Weg", "m"), "F": SignalSource("Kraft", "N")}
+    return read_signals(str(tmp_path / "record.csv"), wanted, ColumnOptions(), "record")
+
+
+@pytest.mark.parametrize(
+    ("head", "unit"),
+    [
+        ("Zeit in s;Weg in mm;Kraft in kN\n", 1e3),
+        ("Zeit / s;Weg / mm;Kraft / N\n", 1.0),
+        ("# Prüfstand A\nZeit;Weg;Kraft\ns;mm;kN\n", 1e3),
+    ],
+)
+def test_units_of_forces_are_read_as_those_of_motions(tmp_path, head, unit):
+    rows = [f"{0.01 * i:.2f};{i % 7},5;{i % 5},25\n".replace(".", ",") for i in range(50)]
+    signals = table(tmp_path, head + "".join(rows), "cp1252")
+    assert signals.columns["x"][:3] == pytest.approx([0.5e-3, 1.5e-3, 2.5e-3])
+    assert signals.columns["F"][:3] == pytest.approx([0.25 * unit, 1.25 * unit, 2.25 * unit])
+    assert not signals.notes
+
+
+def test_marks_of_missing_times_and_rows_after_the_signals_are_left_out(tmp_path):
+    times = [-9999.0 if i in (7, 8) else 0.01 * i for i in range(60)]
+    rows = [f"{t},{np.sin(i)},{np.cos(i)}\n" if i < 50 else f"{t},,\n" for i, t in enumerate(times)]
+    signals = table(tmp_path, "t [s],Weg [m],Kraft [N]\n" + "".join(rows))
+    assert signals.t == pytest.approx([0.01 * i for i in range(50) if i not in (7, 8)])
+    assert "2 of 60 values of t [s] are -9999" in signals.notes[0]
+    assert "The last 10 rows have a time and no signal" in " ".join(signals.notes)
+
+
+def test_a_body_at_rest_has_no_missing_samples(tmp_path):
+    """The speed of a body that sticks is exactly 0 between short slips."""
+    random = np.random.default_rng(0)
+    v = np.zeros(3000)
+    for start in range(50, 3000, 100):
+        v[start : start + 6] = np.round(random.uniform(0.2, 0.4) * np.sin(np.pi * (np.arange(6) + 0.5) / 6), 4)
+    rows = "".join(f"{0.01 * i:.2f},{each},{np.sin(i):.6f}\n" for i, each in enumerate(v))
+    signals = table(tmp_path, "t [s],Weg [m],Kraft [N]\n" + rows)
+    assert np.array_equal(signals.columns["x"], v)
+
+
+def test_a_sensor_at_the_end_of_its_range_is_named_and_its_samples_kept(tmp_path):
+    t = 0.01 * np.arange(600)
+    x = np.minimum(np.cos(6 * t) * np.exp(-0.1 * t), 0.6)
+    rows = "".join(f"{a:.2f},{b:.4f},{np.sin(a):.6f}\n" for a, b in zip(t, x, strict=True))
+    signals = table(tmp_path, "t [s],Weg [m],Kraft [N]\n" + rows)
+    assert len(signals.t) == 600
+    assert "Weg [m] is exactly 0.6" in signals.notes[0]
