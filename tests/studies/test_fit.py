@@ -9,6 +9,7 @@ import build_cache
 import commands
 import numpy as np
 import pytest
+from answers import check_shared_keys
 from drawn_records import GROUPS, draw_record
 from fit_campaign import SOURCES
 from native_fmus import build_native_fmus, require_compiler
@@ -232,7 +233,7 @@ def test_the_command_writes_what_it_prints(tmp_path):
         "summary.json",
     }
     estimates = {each["name"]: each for each in stored["fit"]}
-    assert {"value", "error", "low", "high", "unit"} <= {*estimates["k"]}
+    check_shared_keys(stored)
     assert estimates["k"]["low"] < 900.0 < estimates["k"]["high"]
     assert estimates["mu_s"]["low"] < 0.8 < estimates["mu_s"]["high"]
     assert harness.load_result(folder) == stored
@@ -341,16 +342,28 @@ def test_the_command_writes_the_compared_laws(tmp_path):
     assert printed["comparison"]["verdict"] in " ".join(table.split())
 
 
-def test_a_peer_that_is_missing_or_fails_is_a_gap(monkeypatch):
+def test_a_peer_that_fails_has_its_reason_in_the_table(capsys):
     pytest.importorskip("pandas")
     import fit_peers
 
-    def failing_fit(*arguments):
+    def fail(*arguments):
         raise AttributeError("no such thing")
 
-    peers = {"absent": ("no-such-package", None, (), False), "broken": ("numpy", failing_fit, (), True)}
-    monkeypatch.setattr(fit_peers, "PEERS", peers)
-    count, seconds, gaps = fit_peers.compare(1, build_native_fmus(), [*peers])
-    assert count == {"harness.fit": 1, "absent": 0, "broken": 0}
-    assert gaps == {"absent": "no-such-package is not installed", "broken": "fails: AttributeError: no such thing"}
-    assert [len(each) for each in seconds.values()] == [1, 0, 0]
+    def know(t, x, free, known, force):
+        record, _ = fit_peers.draw_even_record(fit_peers.KINDS[0], 0, build_native_fmus())
+        return record.truth
+
+    peers = {"broken": fit_peers.Peer("numpy", fail, (), True), "exact": fit_peers.Peer("numpy", know, ())}
+    attempts = fit_peers.fit_record(0, build_native_fmus(), peers)
+    assert {tool: (each.is_found, each.failure) for tool, each in attempts.items()} == {
+        "harness.fit": (True, ""),
+        "broken": (False, "AttributeError: no such thing"),
+        "exact": (True, ""),
+    }
+    fit_peers.print_table([attempts], dict.fromkeys(attempts, 1), dict.fromkeys(attempts, "1.0"))
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split()[:5] for line in lines[1:3]] == [
+        ["harness.fit", "1.0", "1/1", "0", "0"],
+        ["broken", "1.0", "0/1", "0", "1"],
+    ]
+    assert lines[3].strip() == "failed: AttributeError: no such thing"

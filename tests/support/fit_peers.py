@@ -1,9 +1,9 @@
 """Fit ten drawn records with `harness.fit` and with other tools: python tests/support/fit_peers.py [--records 10]
 
 Peers: least squares of lmfit and differential evolution of scipy, both with scipy's solve_ivp and friction smoothed by
-tanh, and ModestPy, which runs the same FMU as `harness.fit`. Each may take ten times the processor time of the fit, at
-least 10 s. "Found": each value is within 5 % of the truth or five standard errors of the fit. A package that is not
-installed, or fails, is a gap, with its reason.
+tanh, and ModestPy, which runs the same FMU as `harness.fit`. Each may take ten times the processor time of the fit,
+at least 20 s. "Found": each value is within 5 % of the truth or five standard errors of the fit. What a package cannot
+fit is a failure, with its reason. `--modestpy` names the Python of an environment with ModestPy (fit_modestpy.py).
 
 The records are drawn as in fit_campaign.py, those with even times: stick-slip by position with three unknowns, and
 forced Coulomb friction with four.
@@ -13,25 +13,31 @@ import argparse
 import contextlib
 import inspect
 import io
-import multiprocessing
+import json
 import os
 import platform
 import resource
+import signal
+import subprocess
 import sys
-import tempfile
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from functools import partial
 from importlib.metadata import PackageNotFoundError, version
-from math import isfinite
+from math import exp, isfinite, tanh
+from multiprocessing import get_context
 from pathlib import Path
-from time import process_time
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 ROOT = Path(__file__).parents[2]
 sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "support")]
 
+import fit_modestpy  # noqa: E402
 import numpy as np  # noqa: E402
 import pandas  # noqa: E402
 from drawn_records import GROUPS, draw_record  # noqa: E402
-from fit_campaign import build_fmus  # noqa: E402
+from fit_campaign import build_fmus, cpu_seconds  # noqa: E402
 from scipy.integrate import solve_ivp  # noqa: E402
 from scipy.optimize import differential_evolution  # noqa: E402
 
@@ -42,25 +48,24 @@ from harness.scenes.run_spec import RunSpec  # noqa: E402
 
 KINDS = ("position, 3 free", "forced")
 SEED, MAX_SAMPLES = 20261123, 400
-BUDGET, LEAST_BUDGET = 10, 10.0  # times the processor time of the fit; s
+BUDGET, LEAST_BUDGET = 10, 20.0  # times the processor time of the fit; s
 CLOSE, ERRORS = 0.05, 5.0
-SPEED = 1e-3  # m/s, at which smoothed friction is complete
 
 
 # ---- what a user of each tool writes
 
 
 def stickslip_rates(t, y, m, k, mu_s, mu_d, v_driver, g=9.81):
-    """Return the rates of a pulled block with smoothed friction."""
-    x, v = y
-    mu = (mu_d + (mu_s - mu_d) * np.exp(-((v / (5 * SPEED)) ** 2))) * np.tanh(v / SPEED)
+    """Return the rates of a pulled block, with friction that is smoothed far below the speeds of its slips."""
+    x, v = y.tolist()
+    mu = (mu_d + (mu_s - mu_d) * exp(-((v / 1e-4) ** 2))) * tanh(v / 1e-6)
     return [v, (k * (v_driver * t - x) - mu * m * g) / m]
 
 
 def coulomb_rates(t, y, m, k, f, c, times, force):
     """Return the rates of a forced oscillator with smoothed friction."""
-    x, v = y
-    return [v, (np.interp(t, times, force) - k * x - c * v - f * np.tanh(v / SPEED)) / m]
+    x, v = y.tolist()
+    return [v, (np.interp(t, times, force) - k * x - c * v - f * tanh(v / 1e-3)) / m]
 
 
 def smoothed_run(t, free, known, force):
@@ -96,19 +101,6 @@ def fit_with_scipy(t, x, free, known, force):
     return dict(zip(free, found.x, strict=True))
 
 
-def fit_with_modestpy(t, x, free, known, force, fmu):
-    """Fit by a genetic algorithm and pattern search."""
-    from modestpy import Estimation
-
-    index = pandas.Index(t, name="time")
-    inputs = pandas.DataFrame({"F_ext": np.zeros(len(t)) if force is None else force}, index=index)
-    measured = pandas.DataFrame({"x": x}, index=index)
-    one_process = {"workers": 1}
-    estimation = Estimation(os.getcwd(), str(fmu), inputs, known, free, measured, modestga_opts=one_process)
-    estimates, _ = estimation.estimate()
-    return estimates
-
-
 def fit_with_harness(t, x, free, known, force, fmu):
     """Fit in the ranges."""
     frame = pandas.DataFrame({"t": t, "x": x, "F_ext": 0.0 if force is None else force})
@@ -117,6 +109,48 @@ def fit_with_harness(t, x, free, known, force, fmu):
 
 
 # ---- the comparison
+
+
+@dataclass(frozen=True)
+class Peer:
+    """A tool: its package, the function that fits, all functions that a user writes, and whether it runs the FMU."""
+
+    package: str
+    fit: Callable
+    functions: tuple[Callable, ...]
+    runs_fmu: bool = False
+
+
+@dataclass(frozen=True)
+class Attempt:
+    """A fit of one record by one tool: its values, or why it has none, and its processor time in s."""
+
+    values: dict[str, float]
+    failure: str
+    seconds: float
+    is_found: bool = False
+
+
+def run_modestpy(python, t, x, free, known, force, fmu):
+    """Fit with ModestPy in the environment of an interpreter."""
+    record = {"t": t.tolist(), "x": x.tolist(), "force": None if force is None else force.tolist()}
+    request = json.dumps(record | {"free": free, "known": known, "fmu": str(fmu)})
+    done = subprocess.run(
+        [python, "-W", "ignore", fit_modestpy.__file__], input=request, capture_output=True, text=True
+    )
+    if done.returncode == -signal.SIGXCPU:
+        raise TimeoutError("stopped")
+    if done.returncode:
+        raise RuntimeError((done.stderr.strip() or "no message").splitlines()[-1])
+    return json.loads(done.stdout.splitlines()[-1])
+
+
+MODELS = (smoothed_run, stickslip_rates, coulomb_rates)
+PEERS = {
+    "lmfit": Peer("lmfit", fit_with_lmfit, (fit_with_lmfit, *MODELS)),
+    "scipy": Peer("scipy", fit_with_scipy, (fit_with_scipy, *MODELS)),
+    "ModestPy": Peer("modestpy", partial(run_modestpy, sys.executable), (fit_modestpy.fit_with_modestpy,), True),
+}
 
 
 def lines_of_code(*functions):
@@ -128,11 +162,16 @@ def lines_of_code(*functions):
     return total
 
 
-PEERS = {  # module, function, all functions that a user writes, and whether it runs the FMU
-    "lmfit": ("lmfit", fit_with_lmfit, (fit_with_lmfit, smoothed_run, stickslip_rates, coulomb_rates), False),
-    "scipy": ("scipy", fit_with_scipy, (fit_with_scipy, smoothed_run, stickslip_rates, coulomb_rates), False),
-    "ModestPy": ("modestpy", fit_with_modestpy, (fit_with_modestpy,), True),
-}
+def version_of(package, python):
+    """Return the version of a package of an interpreter, or None if it is not installed."""
+    if python == sys.executable:
+        try:
+            return version(package)
+        except PackageNotFoundError:
+            return None
+    code = f"from importlib.metadata import version; print(version({package!r}))"
+    done = subprocess.run([python, "-c", code], capture_output=True, text=True)
+    return None if done.returncode else done.stdout.strip()
 
 
 def draw_even_record(name, number, fmus):
@@ -148,22 +187,24 @@ def draw_even_record(name, number, fmus):
 
 
 def run_peer(function, arguments, budget, connection):
-    """Send the values and the processor time of a peer; it ends by a signal when its time is used."""
-    resource.setrlimit(resource.RLIMIT_CPU, (int(process_time() + budget), int(process_time() + budget) + 1))
-    begun = process_time()
-    with tempfile.TemporaryDirectory() as folder, contextlib.redirect_stdout(io.StringIO()):
-        os.chdir(folder)
+    """Send the values or a failure, and the processor time, of a peer; a signal ends it when its time is used."""
+    begun = cpu_seconds()
+    limit = int(begun + budget)
+    resource.setrlimit(resource.RLIMIT_CPU, (limit, limit + 1))
+    values, failure = {}, ""
+    with contextlib.redirect_stdout(io.StringIO()):
         try:
             values = {name: float(value) for name, value in function(*arguments).items()}
+        except TimeoutError:
+            return
         except Exception as error:  # a package may fail in any way
-            values = f"fails: {type(error).__name__}: {error}"
-        os.chdir("/")
-    connection.send((values, process_time() - begun))
+            failure = f"{type(error).__name__}: {error}"
+    connection.send(Attempt(values, failure, cpu_seconds() - begun))
 
 
 def call_peer(function, arguments, budget):
-    """Return the values, None if the time was used or a text if the peer failed, and the processor time."""
-    context = multiprocessing.get_context("fork")
+    """Return the attempt of a peer in a child process."""
+    context = get_context("fork")
     receiver, sender = context.Pipe(duplex=False)
     process = context.Process(target=run_peer, args=(function, arguments, budget, sender))
     process.start()
@@ -171,58 +212,61 @@ def call_peer(function, arguments, budget):
     try:
         return receiver.recv()
     except EOFError:
-        return None, budget
+        return Attempt({}, "stopped", budget)
     finally:
         process.join()
 
 
-def is_found(values, found, truth):
+def is_found(values, fit, truth):
     """Return whether all values are close to the truth."""
-    errors = {name: found[name].error if isfinite(found[name].error) else 0.0 for name in truth}
+    errors = {name: fit[name].error if isfinite(fit[name].error) else 0.0 for name in truth}
     return all(
         abs(values[name] - true) <= max(CLOSE * abs(true), ERRORS * errors[name]) for name, true in truth.items()
     )
 
 
-def compare(n_records, fmus, peers):
-    """Fit the records with all tools; return a line of results for each tool."""
-    count = dict.fromkeys(("harness.fit", *PEERS), 0)
-    seconds = {name: [] for name in count}
-    gaps = {}
-    for number in range(n_records):
-        name = KINDS[number % len(KINDS)]
-        record, start = draw_even_record(name, number // len(KINDS), fmus)
-        fmu = fmus / f"{GROUPS[name].model}.fmu"
-        free = {key: (start[key], start[key] / 4, 4 * start[key]) for key in record.truth if start[key]}
-        free |= {key: (sum(ends) / 2, *ends) for key, ends in record.free.items() if ends and key not in free}
-        force, x = record.inputs.get("F_ext"), record.y[:, 0]
-        begun = process_time()
-        found = fit_with_harness(record.t, x, free, record.fixed, force, fmu)
-        seconds["harness.fit"].append(process_time() - begun)
-        count["harness.fit"] += is_found(found.values, found, record.truth)
-        budget = max(LEAST_BUDGET, BUDGET * seconds["harness.fit"][-1])
-        for peer, (package, function, _, runs_fmu) in PEERS.items():
-            if peer in gaps or peer not in peers:
-                continue
-            try:
-                version(package)
-            except PackageNotFoundError:
-                gaps[peer] = f"{package} is not installed"
-                continue
-            known = dict(record.fixed)
-            if not runs_fmu:
-                names = ("m", "k", "mu_s", "mu_d", "v_driver") if force is None else ("m", "k", "f", "c")
-                known |= {key: start[key] for key in names if key not in free}
-            arguments = (record.t, x, free, known, force, *((fmu,) if runs_fmu else ()))
-            values, used = call_peer(function, arguments, budget)
-            if isinstance(values, str):
-                gaps[peer] = values
-                continue
-            seconds[peer].append(used)
-            count[peer] += values is not None and is_found(values, found, record.truth)
-        print(number + 1, name, record.noise, {key: round(each[-1], 1) for key, each in seconds.items() if each}, count)
-        sys.stdout.flush()
-    return count, seconds, gaps
+def fit_record(number, fmus, peers):
+    """Fit a record with `harness.fit` and the peers; return the attempts by tool."""
+    name = KINDS[number % len(KINDS)]
+    record, start = draw_even_record(name, number // len(KINDS), fmus)
+    fmu = fmus / f"{GROUPS[name].model}.fmu"
+    free = {key: (start[key], start[key] / 4, 4 * start[key]) for key in record.truth if start[key]}
+    free |= {key: (sum(ends) / 2, *ends) for key, ends in record.free.items() if ends and key not in free}
+    force, x = record.inputs.get("F_ext"), record.y[:, 0]
+    begun = cpu_seconds()
+    fit = fit_with_harness(record.t, x, free, record.fixed, force, fmu)
+    seconds = cpu_seconds() - begun
+    attempts = {"harness.fit": Attempt(fit.values, "", seconds, is_found(fit.values, fit, record.truth))}
+    for tool, peer in peers.items():
+        known = dict(record.fixed)
+        if not peer.runs_fmu:
+            names = ("m", "k", "mu_s", "mu_d", "v_driver") if force is None else ("m", "k", "f", "c")
+            known |= {key: start[key] for key in names if key not in free}
+        arguments = (record.t, x, free, known, force, *((fmu,) if peer.runs_fmu else ()))
+        attempt = call_peer(peer.fit, arguments, max(LEAST_BUDGET, BUDGET * seconds))
+        found = not attempt.failure and is_found(attempt.values, fit, record.truth)
+        attempts[tool] = Attempt(attempt.values, attempt.failure, attempt.seconds, found)
+    return attempts
+
+
+def print_table(attempts, lines, versions):
+    """Print a line for each tool: successes, processor time, and lines of code."""
+    own = float(np.median([each["harness.fit"].seconds for each in attempts]))
+    print(f"{'':14}{'version':10}{'found':>8}{'stopped':>9}{'failed':>8}{'median s':>10}{'ratio':>8}{'lines':>7}")
+    for tool in attempts[0]:
+        tries = [each[tool] for each in attempts]
+        failures = [each.failure for each in tries if each.failure not in ("", "stopped")]
+        stopped, median = (
+            sum(each.failure == "stopped" for each in tries),
+            float(np.median([each.seconds for each in tries])),
+        )
+        found = f"{sum(each.is_found for each in tries)}/{len(tries)}"
+        print(
+            f"{tool:14}{versions[tool]:10}{found:>8}{stopped:9}{len(failures):8}{median:10.1f}{median / own:8.1f}"
+            f"{lines[tool]:7}"
+        )
+        for failure in dict.fromkeys(failures):
+            print(f"{'':14}failed: {failure}")
 
 
 def main():
@@ -231,21 +275,32 @@ def main():
     options.add_argument("--records", type=int, default=10)
     options.add_argument("--fmus", type=Path, help="folder of native FMUs that exist already")
     options.add_argument("--peer", action="append", choices=[*PEERS], help="only this peer; repeatable")
+    options.add_argument("--modestpy", metavar="PYTHON", default=sys.executable, help="interpreter that has ModestPy")
+    options.add_argument("--processes", type=int, default=1, help="number of records that are fitted at the same time")
     given = options.parse_args()
-    with temporary_directory("peers-") as folder:
-        count, seconds, gaps = compare(given.records, given.fmus or build_fmus(folder), given.peer or [*PEERS])
-    functions = {"harness.fit": (fit_with_harness,)} | {name: peer[2] for name, peer in PEERS.items()}
-    packages = {"harness.fit": "friction-fmus"} | {name: peer[0] for name, peer in PEERS.items()}
-    own = float(np.median(seconds["harness.fit"]))
-    print(f"Python {platform.python_version()}, {platform.machine()}")
-    print(f"{'':14}{'version':10}{'found':>8}{'median s':>10}{'ratio':>8}{'lines':>7}")
-    for name in filter(lambda name: name in gaps or seconds[name], count):
-        if name in gaps:
-            print(f"{name:14}{gaps[name]}")
-            continue
-        median, lines = float(np.median(seconds[name])), lines_of_code(*functions[name])
-        found = f"{count[name]}/{given.records}"
-        print(f"{name:14}{version(packages[name]):10}{found:>8}{median:10.1f}{median / own:8.1f}{lines:7}")
+    peers = {tool: PEERS[tool] for tool in given.peer or PEERS}
+    versions = {"harness.fit": version("friction-fmus")}
+    for tool, peer in [*peers.items()]:
+        python = given.modestpy if tool == "ModestPy" else sys.executable
+        versions[tool] = version_of(peer.package, python)
+        if versions[tool] is None:
+            print(f"{tool} is skipped: {peer.package} is not installed")
+            del peers[tool]
+        elif tool == "ModestPy":
+            peers[tool] = Peer(peer.package, partial(run_modestpy, python), peer.functions, peer.runs_fmu)
+    attempts = []
+    with temporary_directory("peers-") as folder, ProcessPoolExecutor(given.processes) as pool:
+        fmus = given.fmus or build_fmus(folder)
+        for each in pool.map(partial(fit_record, fmus=fmus, peers=peers), range(given.records)):
+            attempts.append(each)
+            print(
+                len(attempts),
+                {tool: (try_.is_found, round(try_.seconds, 1), try_.failure) for tool, try_ in each.items()},
+            )
+            sys.stdout.flush()
+    print(f"Python {platform.python_version()}, {platform.machine()}, scipy {version('scipy')}")
+    lines = {"harness.fit": lines_of_code(fit_with_harness)}
+    print_table(attempts, lines | {tool: lines_of_code(*peer.functions) for tool, peer in peers.items()}, versions)
 
 
 if __name__ == "__main__":
