@@ -147,7 +147,7 @@ def zip_entries(entries: dict[str, bytes], date: datetime) -> bytes:
             info = ZipInfo(path, date.timetuple()[:6])
             info.compress_type, info.create_system = ZIP_DEFLATED, 3  # 3 is Unix, where permissions are honoured
             info.external_attr = (S_IFREG | (0o755 if path.startswith("binaries/") else 0o644)) << 16
-            archive.writestr(info, entries[path], compresslevel=9)
+            archive.writestr(info, entries[path])
     return buffer.getvalue()
 
 
