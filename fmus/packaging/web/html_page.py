@@ -72,23 +72,28 @@ def build(
     file
         Name of the page.
     """
-    with ThreadPoolExecutor() as pool:
-        models = list(pool.map(lambda source: model_with_code(source, methods, laws), sources))
+    models, compiled = [], []
+    with ThreadPoolExecutor() as pool:  # for the compiler only: ast.parse may fail in threads of Python 3.11
+        for source in sources:
+            model, files = model_with_sources(source, methods, laws)
+            models.append(model)
+            compiled.append(pool.submit(compile_to_base64, source.name, files))
     data = {
         "version": __version__,
-        "models": models,
+        "models": [model | {"code": code.result()} for model, code in zip(models, compiled, strict=True)],
         "presets": read_presets(scenes, [source.name for source in sources]),
     }
     is_complete = not methods and not laws and {source.name for source in sources}.issuperset(STORY_MODELS)
     return write(folder / file, render_page(data, with_stories=is_complete).encode())
 
 
-def model_with_code(source: ModelFile, methods: Sequence[str], laws: Sequence[str]) -> ModelJson:
-    """Return a model for the page, with its compiled code."""
+def model_with_sources(
+    source: ModelFile, methods: Sequence[str], laws: Sequence[str]
+) -> tuple[ModelJson, Mapping[str, str]]:
+    """Return a model for the page, and its C sources by file name."""
     model = lowered_model(source, select_features(source, methods, laws))
     files, description = generate_c_sources(model, source.name, build_date(), "2")
-    described = build_model_json(source, model)
-    return described | {"guid": fromstring(description).attrib["guid"], "code": compile_to_base64(source.name, files)}
+    return build_model_json(source, model) | {"guid": fromstring(description).attrib["guid"]}, files
 
 
 def render_page(data: object, with_stories: bool) -> str:
