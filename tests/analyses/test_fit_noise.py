@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from harness.analyses.fit.measured_record import MeasuredRecord
-from harness.analyses.fit.noise import correlation_length, estimate_noise, residual_correlation
+from harness.analyses.fit.noise import correlation_length, estimate_noise, significant_correlation
 
 
 @pytest.mark.parametrize("levels", [[0, 151, 860, 909, 935], [0, 7, 8, 30]])
@@ -27,7 +27,7 @@ def test_a_moving_average_of_white_noise_over_m_samples_counts_once_in_m(m):
     white = np.random.default_rng(m).normal(size=(200_000, 1))
     e = np.convolve(white[:, 0], np.full(m, 1.0 / m), "valid")[:, None]
     assert correlation_length(e) == pytest.approx(m, rel=0.05)
-    assert residual_correlation(e) == pytest.approx(1.0 - 1.0 / m, abs=0.01)
+    assert significant_correlation(e) == pytest.approx(1.0 - 1.0 / m, abs=0.01)
     assert correlation_length(np.hstack([white[: len(e)], e])) == correlation_length(e)
 
 
@@ -35,7 +35,7 @@ def test_a_slow_drift_below_white_noise_is_found_in_sums():
     """Its neighbours are hardly correlated."""
     random, n = np.random.default_rng(3), 20_000
     drift = 0.12 * np.sin(np.linspace(0.0, 6.0 * np.pi, n))
-    correlation = residual_correlation((random.normal(size=n) + drift)[:, None])
+    correlation = significant_correlation((random.normal(size=n) + drift)[:, None])
     assert 0.0 < abs(correlation) < 4.0 / n**0.5
 
 

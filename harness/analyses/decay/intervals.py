@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..estimation.estimate import NORMAL_QUANTILE, student_quantile
+from ..estimation.noise import block_scores, residual_correlation
 from . import thresholds
 from .fit_problem import FitProblem
 from .law import OMEGA, ZETA, Terms
@@ -57,7 +58,7 @@ def estimate_uncertainty(problem: FitProblem, p: np.ndarray, terms: Terms) -> Fi
     white = np.diag(inverse) * (float(e @ e) / degrees_of_freedom + problem.residual_floor**2)
     half_period = np.pi / p[OMEGA]
     quarter = max(int(half_period / 4 / float(np.median(np.diff(problem.t)))), 1)
-    neighbour_correlation, is_correlated = residual_correlation(e, quarter)
+    neighbour_correlation, is_correlated = residual_correlation(e, [quarter])
     variance = white
     if is_correlated:
         half_cycles = (problem.t[-1] - problem.t[0]) / half_period
@@ -87,28 +88,10 @@ def to_correlation(covariance: np.ndarray) -> np.ndarray:
     return covariance / np.outer(deviations, deviations)
 
 
-def residual_correlation(e: np.ndarray, width: int) -> tuple[float, bool]:
-    """Return the correlation of neighbouring residuals e (n,), and whether they differ from white noise.
-
-    They do if this correlation, or the variance of their sums over `width` samples, is significantly large.
-    """
-    squares = float(e @ e)
-    if squares == 0:
-        return 0.0, False
-    n = len(e)
-    rho = float(e[:-1] @ e[1:]) / squares
-    sums = np.add.reduceat(e, np.arange(0, n, width))
-    ratio = float(np.mean(sums**2)) / (width * squares / n)
-    is_neighbour_correlated = abs(rho) > thresholds.SIGNIFICANT_CORRELATION / np.sqrt(n)
-    return rho, is_neighbour_correlated or ratio > 1 + thresholds.SIGNIFICANT_SUMS * np.sqrt(2 * width / n)
-
-
 def block_variances(jacobian: np.ndarray, e: np.ndarray, inverse: np.ndarray, count: int) -> np.ndarray:
     """Return the variances of the unknowns, from scores summed over `count` blocks of residuals."""
-    edges = np.unique(np.linspace(0, len(e), count + 1).astype(int))[:-1]
-    scores = np.add.reduceat(jacobian * e[:, None], edges, axis=0)
-    degrees_of_freedom = max(len(edges) - jacobian.shape[1], 1)
-    return np.diag(inverse @ (scores.T @ scores) @ inverse) * len(edges) / degrees_of_freedom
+    scores, factor = block_scores(jacobian, e, count, jacobian.shape[1])
+    return np.diag(inverse @ (scores.T @ scores) @ inverse) * factor
 
 
 def confidence_interval(

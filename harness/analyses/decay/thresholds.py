@@ -68,8 +68,6 @@ EQUAL_DEVIANCE = 1.0  # of n ln(squares): no value of two such laws differs by m
 # --- Intervals (intervals.py, nonnegative_intervals.py) ---
 BLOCKS_PER_HALF_CYCLE = (1.0, 0.3, 0.1, 0.03)  # lengths on which residuals may be correlated
 MIN_BLOCKS, MAX_BLOCKS = 24, 400  # fewer leave the variance uncertain; more are shorter than any correlation
-SIGNIFICANT_CORRELATION = 4.5  # standard deviations of the correlation of white residuals: one record of 1e5
-SIGNIFICANT_SUMS = 5.0  # standard deviations of the variance of sums of white residuals
 NEGLIGIBLE_BOUND = 4.0  # standard errors above zero: the bound at zero no longer matters
 MAX_BOUND = 8.0  # standard errors above the most likely value: no end of an interval is beyond
 INTERVAL_PRECISION = 1e-4  # standard errors: of the ends of an interval, well below what the draws leave uncertain

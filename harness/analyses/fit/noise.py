@@ -2,15 +2,13 @@
 
 import numpy as np
 
-from ..estimation.noise import interpolation_residuals, robust_std
+from ..estimation.noise import interpolation_residuals, residual_correlation, robust_std
 
 MAX_DIVISOR = 8  # of the smallest difference of two levels that is tried as the step of a quantiser
 MAX_STEP_ERROR = 0.02  # of a step, by which levels may miss multiples of it
 FEW_LEVELS = 100  # at most, none a step apart perhaps: larger divisors are tried, with levels that hit multiples
 MAX_DIVISOR_OF_FEW, MAX_STEP_ERROR_OF_FEW = 10_000, 1e-5
 SMALLEST_NOISE = 1e-9  # of the range
-CORRELATED = 4.0  # standard errors of the correlation of white noise
-VARIANCE_EXCESS = 5.0  # standard errors of the variance of sums of white noise
 SUMMED_SHARES = (20, 60, 200)  # sums are over so many parts of the record
 SHORTEST_CORRELATION = 0.05  # at which the sum of correlations ends
 
@@ -46,21 +44,13 @@ def quantiser_step(x: np.ndarray) -> float:
     return 0.0
 
 
-def residual_correlation(e: np.ndarray) -> float:
-    """Return the correlation of neighbouring residuals e (n, columns); 0 if they are white noise.
-
-    Residuals are not white if neighbours, or sums over longer stretches, vary more than those of white noise do.
-    """
-    n = len(e)
+def significant_correlation(e: np.ndarray) -> float:
+    """Return the correlation of neighbouring residuals e (n, columns); 0 if they are white noise."""
+    widths = {max(len(e) // parts, 2) for parts in SUMMED_SHARES}
     for column in e.T:
-        correlation = float(column[:-1] @ column[1:] / max(column @ column, 1e-300))
-        if abs(correlation) > CORRELATED / np.sqrt(n):
+        correlation, is_correlated = residual_correlation(column, widths)
+        if is_correlated:
             return correlation
-        for width in {max(n // parts, 2) for parts in SUMMED_SHARES}:
-            sums = np.add.reduceat(column, np.arange(0, n, width))
-            ratio = np.mean(sums**2) / (width * np.mean(column**2) + 1e-300)
-            if ratio > 1 + VARIANCE_EXCESS * np.sqrt(2 * width / n):
-                return correlation
     return 0.0
 
 

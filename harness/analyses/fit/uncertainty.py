@@ -7,10 +7,11 @@ blocks. A quantiser makes errors that depend on the signal: they are computed fo
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import t as student
 
+from ..estimation.estimate import student_quantile
+from ..estimation.noise import block_scores
 from .fit_problem import FitProblem
-from .noise import correlation_length, residual_correlation
+from .noise import correlation_length, significant_correlation
 
 STIFF = 100.0  # ratio of the axes of the squares from which one-sided differences are too coarse
 INDETERMINATE = 0.5  # relative standard error of what cannot be determined
@@ -55,7 +56,7 @@ class Uncertainty:
     def quantile(self) -> float:
         """Return the quantile of Student's distribution for 95 %."""
         degrees = max(len(self.residuals) - len(self.inflation), 1)
-        return float(student.ppf(0.975, min(degrees, CORRELATED_DEGREES_OF_FREEDOM) if self.correlation else degrees))
+        return student_quantile(min(degrees, CORRELATED_DEGREES_OF_FREEDOM) if self.correlation else degrees)
 
     @property
     def deviations(self) -> np.ndarray:
@@ -85,7 +86,7 @@ def estimate_uncertainty(
     problem.central = bool(eigenvalues.max() > STIFF**2 * eigenvalues.min())
     white = np.diag(inverse) * variance + 1e-300
     by_record = split_residuals(problem, e)
-    correlation = max((residual_correlation(each) for each in by_record), key=abs)
+    correlation = max((significant_correlation(each) for each in by_record), key=abs)
     inflation = np.ones(len(z))
     if correlation:
         inflation *= max(map(correlation_length, by_record))
@@ -112,13 +113,10 @@ def score_inflation(
     """Return the factors (k,) by which the scores, summed over blocks of several sizes, exceed white noise."""
     inflation = np.ones(len(white))
     for count in {int(np.clip(len(e) / size, MIN_BLOCKS, MAX_BLOCKS)) for size in BLOCK_SIZES}:
-        edges = np.unique(np.linspace(0, len(e), count + 1).astype(int))[:-1]
-        share = len(edges) / max(len(edges) - len(white), 1)
-        scores = np.add.reduceat(jacobian * e[:, None], edges, axis=0)
-        along = np.add.reduceat(jacobian @ axes * e[:, None], edges, axis=0)
+        scores, factor = block_scores(jacobian, e, count, len(white))
         norms = np.maximum(((jacobian @ axes) ** 2).sum(axis=0), 1e-300)
-        typical = np.median((along**2).sum(axis=0) / norms) * share / variance
-        single = ((scores @ inverse) ** 2).sum(axis=0) * share / white
+        typical = np.median(((scores @ axes) ** 2).sum(axis=0) / norms) * factor / variance
+        single = ((scores @ inverse) ** 2).sum(axis=0) * factor / white
         inflation = np.maximum(inflation, np.maximum(typical, single))
     return inflation
 
