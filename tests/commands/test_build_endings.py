@@ -6,7 +6,6 @@ import subprocess
 import sys
 import time
 from functools import partial
-from itertools import product
 
 import pytest
 from build_cache import ROOT
@@ -34,11 +33,12 @@ def wait_for_directory(process, tmp_path):
         time.sleep(0.01)
 
 
-@pytest.mark.parametrize(("options", "number"), [*product([(), ("--native",)], [signal.SIGINT, signal.SIGTERM])])
-def test_a_signal_ends_a_build_and_leaves_nothing_behind(environment, tmp_path, options, number):
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize(("options", "delay"), [((), 0.05), (("--native",), 0.5)])  # within the build, of 0.3 s and 3 s
+def test_a_signal_ends_a_build_and_leaves_nothing_behind(environment, tmp_path, options, delay, number):
     process = start_build(environment, "smd", *options, "--out", tmp_path / "out")
     wait_for_directory(process, tmp_path)
-    time.sleep(0.3)  # into the code generation or the compiler
+    time.sleep(delay)  # into the code generation or the compiler
     os.killpg(process.pid, number)
     stdout, stderr = process.communicate(timeout=60)
     sentence = {signal.SIGINT: "Error: interrupted", signal.SIGTERM: "Error: terminated"}[number]
