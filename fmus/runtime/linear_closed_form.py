@@ -248,9 +248,7 @@ class LinearClosedForm:
         if (z + w) * t < 0.5:
             integral, _ = self.integrals_at_small_time(t)
         elif w > 0.5 * z:
-            fast = -(z + w)
-            slow_integral = expm1(upper_root * t) / upper_root if upper_root < 0.0 else t
-            integral = 0.5 * (slow_integral - expm1(fast * t) / fast) / w
+            integral = 0.5 * (exp_integral(upper_root, t) - exp_integral(-(z + w), t)) / w
         else:
             integral = (1.0 - mean - z * g) / self.n2
         return g, mean - z * g, integral

@@ -121,7 +121,7 @@ def test_random_models_agree_with_an_independent_solver(worker, number):
         _, refused = random_campaign.build([structure], folder)
         assert not refused, refused[0].text
 
-    folder = build_cache.kept(structure.name, make)
+    folder = build_cache.keep_build(structure.name, make)
     paths = {(number, backend): folder / backend / f"{structure.name}.fmu" for backend in random_campaign.BACKENDS}
     compared = 0
     for seed in VALUES:

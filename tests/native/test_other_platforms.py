@@ -87,7 +87,7 @@ def machine(request):
             command = [sys.executable, "-m", "ziglang", "cc", "-target", target, "-O1", "-s", *options, f"-I{HEADERS}"]
             subprocess.run([*command, *map(str, sources), "-o", str(folder / "host.exe")], check=True)
 
-        return [emulator, *words, str(build_cache.kept(f"host-{version}-{request.param}", make) / "host.exe")]
+        return [emulator, *words, str(build_cache.keep_build(f"host-{version}-{request.param}", make) / "host.exe")]
 
     return request.param, program, os.environ | (windows() if emulator == "wine" else {})
 
@@ -116,7 +116,7 @@ def library(fmu, platform):
         for path, content in compile_binaries(fmu.stem, sources, MAIN_SOURCE[version], platform, version).items():
             (folder / Path(path).name).write_bytes(content)
 
-    return build_cache.kept(f"{fmu.stem}-{version}-{platform}", make) / f"{fmu.stem}{PLATFORMS[platform].suffix}"
+    return build_cache.keep_build(f"{fmu.stem}-{version}-{platform}", make) / f"{fmu.stem}{PLATFORMS[platform].suffix}"
 
 
 def run_host_script_there(machine, fmu, script):

@@ -66,7 +66,7 @@ def build_once(name, *words, timeout=600):
     def make(folder):
         (kept_folder / f"{name}.txt").write_text(build(ROOT, folder, *words, timeout=timeout))
 
-    return kept(name, make)
+    return keep_build(name, make)
 
 
 def build_user_model(path, *words):
@@ -79,7 +79,7 @@ def build_user_model(path, *words):
         assert done.stdout.startswith(f"{path.stem}.fmu ")
 
     digest = sha256(path.read_bytes()).hexdigest()[:12]  # tests may have different models of one name
-    return kept("-".join((path.stem, digest, *words)), make)
+    return keep_build("-".join((path.stem, digest, *words)), make)
 
 
 def run_published_cases():
@@ -94,7 +94,7 @@ def run_published_cases():
     return cached_folder("published", make)
 
 
-def kept(name, make):
+def keep_build(name, make):
     """Return the folder `name` of all test runs with the same sources; see cached_folder()."""
     return cached_folder(name, make, kept_folder)
 

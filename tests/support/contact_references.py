@@ -142,7 +142,7 @@ def reference_events(name, changes=()):
         events, end = integrate_events(CONTACT_REFERENCES[name](), changes)
         (folder / "reference.json").write_text(json.dumps([events, list(end)]))
 
-    return json.loads((build_cache.kept(f"{name}-reference{len(changes)}", make) / "reference.json").read_text())
+    return json.loads((build_cache.keep_build(f"{name}-reference{len(changes)}", make) / "reference.json").read_text())
 
 
 def integrate_events(physics, changes=()):

@@ -32,7 +32,7 @@ def build_reduced_fmu(name):
         done = commands.build("--fmi", "3", name, *chosen, "--out", folder)
         assert done.returncode == 0, done.stderr
 
-    return build_cache.kept(f"lean fmi3 {name}", make) / f"{name}.fmu"
+    return build_cache.keep_build(f"lean fmi3 {name}", make) / f"{name}.fmu"
 
 
 @pytest.fixture(scope="module")

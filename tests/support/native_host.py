@@ -41,7 +41,7 @@ def compile_cached(name, *words, sanitizers=""):
         command = [compiler(), *STRICT, "-g1", *map(str, words), "-o", str(folder / "made")]
         subprocess.run(command, check=True)
 
-    return build_cache.kept(f"{name} {sanitizers}".strip(), make) / "made"
+    return build_cache.keep_build(f"{name} {sanitizers}".strip(), make) / "made"
 
 
 def host_program(sanitizers="", version="2"):

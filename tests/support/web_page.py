@@ -26,7 +26,7 @@ def build_page(name, *words, file="index.html"):
         done = commands.build("--web", *words, "--out", folder)
         assert done.returncode == 0, done.stderr
 
-    return build_cache.kept(name, make) / file
+    return build_cache.keep_build(name, make) / file
 
 
 class Page:

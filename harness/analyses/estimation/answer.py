@@ -18,7 +18,7 @@ class UsedSamples:
     record : str
     t : numpy.ndarray
         Their times (n,) in s.
-    of : int
+    n_record : int
         Number of samples in the record.
     averaged : int
         Number of neighbouring samples whose mean was fitted.
@@ -26,7 +26,7 @@ class UsedSamples:
 
     record: str
     t: np.ndarray
-    of: int
+    n_record: int
     averaged: int = 1
 
     def as_json(self) -> dict[str, Any]:
@@ -36,7 +36,7 @@ class UsedSamples:
             "from": float(self.t[0]),
             "until": float(self.t[-1]),
             "samples": len(self.t),
-            "of": self.of,
+            "of": self.n_record,
             "averaged": self.averaged,
             "time_unit": "s",
         }
