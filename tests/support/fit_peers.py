@@ -2,8 +2,9 @@
 
 Peers: least squares of lmfit and differential evolution of scipy, both with scipy's solve_ivp and friction smoothed by
 tanh, and ModestPy, which runs the same FMU as `harness.fit`. Each may take ten times the processor time of the fit,
-at least 20 s. "Found": each value is within 5 % of the truth or five standard errors of the fit. What a package cannot
-fit is a failure, with its reason. `--modestpy` names the Python of an environment with ModestPy (fit_modestpy.py).
+at least 20 s; `--budget` changes the 20 s. "Found": each value is within 5 % of the truth or five standard errors of
+the fit. What a package cannot fit is a failure, with its reason. `--modestpy` names the Python of an environment with
+ModestPy (fit_modestpy.py).
 
 The records are drawn as in fit_campaign.py, those with even times: stick-slip by position with three unknowns, and
 forced Coulomb friction with four.
@@ -225,7 +226,7 @@ def is_found(values, fit, truth):
     )
 
 
-def fit_record(number, fmus, peers):
+def fit_record(number, fmus, peers, least_budget=LEAST_BUDGET):
     """Fit a record with `harness.fit` and the peers; return the attempts by tool."""
     name = KINDS[number % len(KINDS)]
     record, start = draw_even_record(name, number // len(KINDS), fmus)
@@ -243,7 +244,7 @@ def fit_record(number, fmus, peers):
             names = ("m", "k", "mu_s", "mu_d", "v_driver") if force is None else ("m", "k", "f", "c")
             known |= {key: start[key] for key in names if key not in free}
         arguments = (record.t, x, free, known, force, *((fmu,) if peer.runs_fmu else ()))
-        attempt = call_peer(peer.fit, arguments, max(LEAST_BUDGET, BUDGET * seconds))
+        attempt = call_peer(peer.fit, arguments, max(least_budget, BUDGET * seconds))
         found = not attempt.failure and is_found(attempt.values, fit, record.truth)
         attempts[tool] = Attempt(attempt.values, attempt.failure, attempt.seconds, found)
     return attempts
@@ -276,6 +277,7 @@ def main():
     options.add_argument("--fmus", type=Path, help="folder of native FMUs that exist already")
     options.add_argument("--peer", action="append", choices=[*PEERS], help="only this peer; repeatable")
     options.add_argument("--modestpy", metavar="PYTHON", default=sys.executable, help="interpreter that has ModestPy")
+    options.add_argument("--budget", type=float, default=LEAST_BUDGET, help="least processor time in s of a peer")
     options.add_argument("--processes", type=int, default=1, help="number of records that are fitted at the same time")
     given = options.parse_args()
     peers = {tool: PEERS[tool] for tool in given.peer or PEERS}
@@ -291,7 +293,8 @@ def main():
     attempts = []
     with temporary_directory("peers-") as folder, ProcessPoolExecutor(given.processes) as pool:
         fmus = given.fmus or build_fmus(folder)
-        for each in pool.map(partial(fit_record, fmus=fmus, peers=peers), range(given.records)):
+        compare = partial(fit_record, fmus=fmus, peers=peers, least_budget=given.budget)
+        for each in pool.map(compare, range(given.records)):
             attempts.append(each)
             print(
                 len(attempts),
