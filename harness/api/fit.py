@@ -22,7 +22,7 @@ def fit(
     inputs: "Sequence[str] | Mapping[str, str]" = (),
     fixed: Mapping[str, float | str] | None = None,
     sigma: Mapping[str, float] | None = None,
-    start: "Mapping[str, float] | ParameterFit | None" = None,
+    start: "Mapping[str, float] | ParameterFit | str | Path | None" = None,
     each: Sequence[str] = (),
     against: "str | Path | Sequence[str | Path]" = (),
     validate: Any = (),
@@ -56,8 +56,9 @@ def fit(
     sigma : mapping, optional
         Known standard deviations of the noise by output, in the units of the FMU; by default the scatter of
         neighbouring samples.
-    start : mapping or ParameterFit, optional
-        Values to start from, in addition to those of the search.
+    start : mapping, ParameterFit or path, optional
+        Values to start from, in addition to those of the search. Of an earlier fit, or the folder of its result, those
+        of the parameters that are free again.
     each : sequence of str
         Parameters with a value of their own for each record.
     against : str, path or sequence of these
@@ -100,6 +101,7 @@ def fit(
     from ..scenes.run_spec import RunSpec
     from ..studies.fit import study
     from ..studies.fit.laws import resolve_laws
+    from ..studies.fit.options import read_fitted_values, select_starts
     from ..studies.fit.request import FitRequest
 
     others = [against] if isinstance(against, str | Path) else [*against]
@@ -107,15 +109,18 @@ def fit(
     for fmu in fmus:
         check_built(fmu, SceneError)
     names = [free] if isinstance(free, str) else free
-    values = start.values if isinstance(start, ParameterFit) else start or {}
+    ranges = dict(names) if isinstance(names, Mapping) else dict.fromkeys(names)
+    if isinstance(start, ParameterFit | str | Path):
+        earlier = start.values if isinstance(start, ParameterFit) else read_fitted_values(Path(start))
+        start = select_starts(earlier, ranges, each)
     request = FitRequest(
         run=RunSpec(fmus[0], values=dict(fixed or {}), timeout=timeout),
         against=tuple(fmus[1:]),
-        free=dict(names) if isinstance(names, Mapping) else dict.fromkeys(names),
+        free=ranges,
         observe=headings_of(observe),
         inputs=headings_of(inputs),
         sigma=sigma or {},
-        start=values,
+        start=start or {},
         each=tuple(each),
         robust=robust,
         columns=ColumnOptions(

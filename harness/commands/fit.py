@@ -14,7 +14,12 @@ from .terminal import POSITIVE, Terminal, result_options
 @click.option("--fixed", multiple=True, metavar="NAME=VALUE,...", help="Values of other parameters.")
 @click.option("--observe", multiple=True, metavar="OUTPUT=COLUMN", help="Measured output and its column; repeatable.")
 @click.option("--input", "inputs", multiple=True, metavar="INPUT=COLUMN", help="Input and its column; repeatable.")
-@click.option("--start", multiple=True, metavar="NAME=VALUE,...", help="Values to start from.")
+@click.option(
+    "--start",
+    multiple=True,
+    metavar="NAME=VALUE,...|RESULT",
+    help="Values to start from, or the folder of an earlier fit; repeatable.",
+)
 @click.option("--each", metavar="NAME,...", help="Parameters with a value of their own for each record.")
 @click.option("--sigma", multiple=True, metavar="OUTPUT=NOISE,...", help="Known noise, in the unit of the FMU.")
 @click.option("--against", multiple=True, metavar="MODEL|FMU", help="Other law to fit and compare; repeatable.")
@@ -80,15 +85,17 @@ def fit(
     fmu, *others = map(find_fmu, (model, *against))
     for each_fmu in (fmu, *others):
         check_built(each_fmu, SceneError)
+    ranges = options.parse_ranges(free)
+    each_record = tuple(options.split_list([each or ""]))
     request = FitRequest(
         run=RunSpec(fmu, values=options.parse_values("--fixed", fixed), timeout=timeout),
         against=tuple(others),
-        free=options.parse_ranges(free),
+        free=ranges,
         observe=options.parse_columns("--observe", observe),
         inputs=options.parse_columns("--input", inputs),
         sigma=options.parse_numbers("--sigma", sigma),
-        start=options.parse_numbers("--start", start),
-        each=tuple(filter(None, (name.strip() for name in (each or "").split(",")))),
+        start=options.parse_starts(start, ranges, each_record),
+        each=each_record,
         robust=robust,
         columns=ColumnOptions(**columns),
     )

@@ -70,6 +70,8 @@ COMMAND_LINES = [  # arguments, exit status, words of the sentence
     ([*FIT, "--free", "k=3:x"], 2, "--free k=3:x: 'x' is not a finite number"),
     ([*FIT, "--free", "k,k"], 2, "--free names k twice: remove one"),
     ([*FIT, "--free", "k", "--fixed", "m"], 2, "--fixed 'm' is not an assignment; write it as in m=3"),
+    ([*FIT, "--free", "k", "--start", "k=3,m=2"], 2, "unknown free parameter 'm'"),
+    ([*FIT, "--free", "k", "--start", "fmus"], 2, "fmus holds no result of a fit: name its folder or its fit.json"),
     (["precision", "stikslip"], 2, "unknown model 'stikslip' (nearest: 'stickslip'); allowed: belt, clutch, "),
     (["rivals", "mujocco"], 2, "unknown rival 'mujocco' (nearest: 'mujoco'); allowed: "),
     (["sweep", "smd"], 2, "--vary"),

@@ -16,11 +16,14 @@ from native_fmus import build_native_fmus, require_compiler
 
 import harness
 from harness.analyses.fit.law_comparison import compare_laws
+from harness.analyses.fit.measured_record import RecordData
 from harness.analyses.fit.parameter_fit import information_criterion
 from harness.errors import HarnessError, SceneError
 from harness.running.whole_run import open_simulator
 from harness.scenes.run_spec import RunSpec
-from harness.studies.fit.request import FitRequest, resolve_request
+from harness.studies.fit import study
+from harness.studies.fit.options import parse_starts
+from harness.studies.fit.request import FitRequest, make_unknowns, resolve_request
 
 T = np.linspace(0.0, 16.0, 201)
 TRUTH = {"mu_s": 0.8, "mu_d": 0.5, "k": 900.0, "v_driver": 0.04}
@@ -127,6 +130,34 @@ def test_several_records_share_parameters_and_have_some_of_their_own():
     assert [each.name for each in found.estimates] == ["mu_s", "v_driver[1]", "v_driver[2]"]
     for number, speed in enumerate(speeds, 1):
         assert holds(found[f"v_driver[{number}]"], speed)
+
+
+@pytest.mark.parametrize(
+    ("free", "each", "started"),
+    [
+        (("mu_s", "v_driver"), ("v_driver",), ("mu_s", "v_driver[1]", "v_driver[2]")),
+        (("mu_s", "mu_d"), (), ("mu_s",)),
+    ],
+)
+def test_a_fit_starts_from_an_earlier_one(tmp_path, monkeypatch, free, each, started):
+    values = {"mu_s": 0.7, "v_driver[1]": 0.031, "v_driver[2]": 0.052}
+    estimates = [{"name": name, "value": value} for name, value in values.items()]
+    (tmp_path / "fit.json").write_text(json.dumps({"fit": estimates}))
+    requests = []
+    monkeypatch.setattr(study, "fit_laws", lambda laws, *_: requests.append(laws.requests[0]))
+    frames = [pull(), pull(seed=2)]
+    harness.fit("stickslip", frames, free, observe="x", each=each, start=tmp_path)
+    records = [
+        RecordData(f"record {i}", frame["t"].to_numpy(), frame[["x"]].to_numpy(), {}, (None,))
+        for i, frame in enumerate(frames)
+    ]
+    starts = {unknown.name: unknown.start for unknown in make_unknowns(requests[0], records)}
+    assert {name: start for name, start in starts.items() if start is not None} == {
+        name: values[name] for name in started
+    }
+    for paths in ([str(tmp_path)], [str(tmp_path / "fit.json")]):
+        assert parse_starts(paths, free, each) == requests[0].request.start
+    assert parse_starts([str(tmp_path), "mu_s=0.6"], free, each)["mu_s"] == 0.6
 
 
 def test_a_sensor_with_offset_and_gain_is_identified():

@@ -10,6 +10,8 @@ from .request import (
     READABLE,
     FitRequest,
     ResolvedRequest,
+    check_starts,
+    is_unknown,
     parameter_names,
     resolve_request,
     settable_names,
@@ -43,7 +45,8 @@ def resolve_laws(request: FitRequest) -> ResolvedLaws:
     settable = [settable_names(description) for description in descriptions]
     check_names("parameter", request.free, {*chain.from_iterable(free)})
     check_names("parameter", request.run.values, {*chain.from_iterable(settable)})
-    check_names("free parameter", [*request.start, *request.each], [*request.free])
+    check_names("free parameter", request.each, [*request.free])
+    check_starts(request)
     laws, notes = [], []
     for fmu, name, description, own, fixable in zip(fmus, names, descriptions, free, settable, strict=True):
         law = replace(
@@ -56,7 +59,7 @@ def resolve_laws(request: FitRequest) -> ResolvedLaws:
             name=name,
             against=(),
             free={each: limits for each, limits in request.free.items() if each in own},
-            start={each: value for each, value in request.start.items() if each in own},
+            start={each: value for each, value in request.start.items() if is_unknown(each, own, own)},
             each=tuple(each for each in request.each if each in own),
         )
         for kind, causalities, given in (

@@ -1,10 +1,13 @@
-"""Options of the command fit: ranges, assignments and columns as text."""
+"""Options of the command fit: ranges, assignments, columns and values to start from."""
 
-from collections.abc import Iterable
+import json
+from collections.abc import Iterable, Mapping
 from math import isfinite
+from pathlib import Path
 from typing import Any
 
 from ...errors import SceneError, format_value
+from .request import is_unknown
 
 
 def split_list(texts: Iterable[str]) -> list[str]:
@@ -45,6 +48,40 @@ def parse_numbers(option: str, texts: Iterable[str]) -> dict[str, float]:
     return {
         name: parse_number(option, f"{name}={value}", str(value)) for name, value in parse_values(option, texts).items()
     }
+
+
+def parse_starts(texts: Iterable[str], free: Iterable[str], each: Iterable[str]) -> dict[str, float]:
+    """Return the values to start from: assignments, and the values of stored fits that are free again."""
+    starts: dict[str, float] = {}
+    assignments = []
+    for text in texts:
+        path = Path(text)
+        if path.is_dir() or path.suffix == ".json":
+            starts |= select_starts(read_fitted_values(path), free, each)
+        else:
+            assignments.append(text)
+    return starts | parse_numbers("--start", assignments)
+
+
+def select_starts(values: Mapping[str, float], free: Iterable[str], each: Iterable[str]) -> dict[str, float]:
+    """Return those values of an earlier fit that are free again."""
+    return {name: value for name, value in values.items() if is_unknown(name, free, each)}
+
+
+def read_fitted_values(path: Path) -> dict[str, float]:
+    """Return the values of a stored fit by name, from its folder or its fit.json.
+
+    Raises
+    ------
+    SceneError
+        If there is no fit.
+    """
+    file = path / "fit.json" if path.is_dir() else path
+    try:
+        fitted = json.loads(file.read_text(encoding="utf-8"))["fit"]
+        return {estimate["name"]: float(estimate["value"]) for estimate in fitted if estimate["value"] is not None}
+    except (OSError, ValueError, KeyError, TypeError):
+        raise SceneError(f"{path} holds no result of a fit: name its folder or its fit.json") from None
 
 
 def parse_number(option: str, item: str, text: str) -> float:

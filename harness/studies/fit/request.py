@@ -44,7 +44,7 @@ class FitRequest:
     sigma : mapping
         Known standard deviations of the noise, by observed variable, in the units of the FMU.
     start : mapping
-        Values to start from, by unknown.
+        Values to start from, by free parameter; for one record of several, by a name as in ``x0[1]``.
     each : tuple of str
         Unknowns with a value of its own for each record.
     robust : bool
@@ -109,7 +109,8 @@ def resolve_request(request: FitRequest) -> ResolvedRequest:
     check_names("input", request.inputs, inputs)
     check_names("parameter", request.free, parameters)
     check_names("observed variable", request.sigma, [*request.observe])
-    check_names("free parameter", [*request.start, *request.each], [*request.free])
+    check_names("free parameter", request.each, [*request.free])
+    check_starts(request)
     declared = {variable.name: variable for variable in description.modelVariables}
     check_names("parameter", request.run.values, settable_names(description))
     for name in request.run.values:
@@ -133,6 +134,20 @@ def resolve_request(request: FitRequest) -> ResolvedRequest:
     )
 
 
+def is_unknown(name: str, free: Iterable[str], each: Iterable[str]) -> bool:
+    """Return whether a name is that of an unknown: a free parameter, or its value in one record, as in x0[1]."""
+    return name in free or (name.endswith("]") and name.rpartition("[")[0] in each)
+
+
+def check_starts(request: FitRequest) -> None:
+    """Raise SceneError if a value to start from is not that of an unknown."""
+    check_names(
+        "free parameter",
+        [name for name in request.start if not is_unknown(name, request.free, request.each)],
+        [*request.free],
+    )
+
+
 def variable_names(description: Any, causalities: Sequence[str]) -> list[str]:
     """Return the names of the scalar Reals of an FMU with one of the causalities."""
     return [name for name, variable in real_variables(description).items() if variable.causality in causalities]
@@ -153,12 +168,14 @@ def make_unknowns(resolved: ResolvedRequest, records: Sequence[RecordData]) -> t
     """Return the unknowns; one that is free in each record once for each, named as in x0[1]."""
     request, unknowns = resolved.request, []
     for name, limits in request.free.items():
-        unknown = make_unknown(name, limits, resolved, records)
+        start = request.start.get(name)
         if name in request.each and len(records) > 1:
             for i in range(len(records)):
-                unknowns.append(Unknown(**vars(unknown) | {"name": f"{name}[{i + 1}]", "record": i}))
+                own_name = f"{name}[{i + 1}]"
+                unknown = make_unknown(name, limits, request.start.get(own_name, start), resolved, records)
+                unknowns.append(replace(unknown, name=own_name, record=i))
         else:
-            unknowns.append(unknown)
+            unknowns.append(make_unknown(name, limits, start, resolved, records))
     samples = sum(record.y.size for record in records)
     if samples < max(MIN_SAMPLES, SAMPLES_PER_UNKNOWN * len(unknowns)):
         raise SceneError(
@@ -168,11 +185,12 @@ def make_unknowns(resolved: ResolvedRequest, records: Sequence[RecordData]) -> t
     return tuple(unknowns)
 
 
-def make_unknown(name: str, limits: Range, resolved: ResolvedRequest, records: Sequence[RecordData]) -> Unknown:
+def make_unknown(
+    name: str, limits: Range, start: float | None, resolved: ResolvedRequest, records: Sequence[RecordData]
+) -> Unknown:
     """Return an unknown with the range to search; raise SceneError if the range is not valid."""
     observed = [*resolved.request.observe]
     kind, _, argument = name.partition("(")
-    start = resolved.request.start.get(name)
     if argument and argument.removesuffix(")") in observed:
         column = observed.index(argument.removesuffix(")"))
         size = max(float(np.ptp(record.y[:, column])) for record in records)
