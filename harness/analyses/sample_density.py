@@ -7,14 +7,14 @@ from ..errors import HarnessError
 MIN_SAMPLES = 8  # in a half cycle or a slip: a parabola through the top samples is then accurate to 1e-4
 
 
-def require_dense_sampling(t: np.ndarray, starts: np.ndarray, ends: np.ndarray, measured: str) -> None:
+def require_dense_sampling(t: np.ndarray, starts: np.ndarray, ends: np.ndarray, interval_name: str) -> None:
     """Raise HarnessError if one of the intervals has fewer than MIN_SAMPLES samples.
 
     Parameters
     ----------
     t : (m,) sample times in s
     starts, ends : (n,) bounds of the intervals in s
-    measured : what an interval is, for the message
+    interval_name : what an interval is, for the message
     """
     counts = np.searchsorted(t, ends, "right") - np.searchsorted(t, starts, "left")
     if len(counts) and counts.min() < MIN_SAMPLES:
@@ -22,6 +22,6 @@ def require_dense_sampling(t: np.ndarray, starts: np.ndarray, ends: np.ndarray, 
         # half the step that would do: with few samples the bounds of an interval are uncertain themselves
         step = 0.5 * float((ends - starts).min()) / MIN_SAMPLES
         raise HarnessError(
-            f"each {measured} needs at least {MIN_SAMPLES} samples, and the one from t = {starts[i]:.6g} s to "
+            f"each {interval_name} needs at least {MIN_SAMPLES} samples, and the one from t = {starts[i]:.6g} s to "
             f"{ends[i]:.6g} s has {counts[i]}: set grid to {step:.1g} s or less"
         )

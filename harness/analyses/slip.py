@@ -28,18 +28,18 @@ def analyse(run: Trajectory) -> AnalysisResult:
     v = run.column_of_role("velocity")
     if not driver:
         raise HarnessError("the analysis 'slip' needs a moving driver, and v_driver is 0 m/s: set it in [values]")
-    lead = v * np.sign(driver) - abs(driver)  # speed of the sled relative to the driver
+    relative_speed = v * np.sign(driver) - abs(driver)  # speed of the sled relative to the driver
     if run.events is not None and len(run.events.t) > 1:
         starts, durations = slips_from_modes(run.events.t, run.events.mode)
         ends = starts[: len(durations)] + durations
     else:
-        starts, durations = upward_crossings(run.time, lead), np.array([])
-        ends = upward_crossings(run.time, -lead)
+        starts, durations = upward_crossings(run.time, relative_speed), np.array([])
+        ends = upward_crossings(run.time, -relative_speed)
         ends = ends[np.searchsorted(ends, starts[:1]).sum() :]  # ignore a slip that began before the run
     if len(starts) < 2:
         raise HarnessError(f"the analysis 'slip' needs two slips, and the run has {len(starts)}: set a later stop")
     sample_density.require_dense_sampling(run.time, starts[: len(ends)], ends, "slip")
-    slipping = lead >= 0
+    slipping = relative_speed >= 0
     quantities = [
         Quantity("slips", len(starts), "", "slips"),
         Quantity("first_slip", float(starts[0]), "s", "first slip"),

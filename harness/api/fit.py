@@ -129,14 +129,14 @@ def fit(
     )
     laws = resolve_laws(request)
 
-    def load(given: Any, name: str) -> list[study.RecordTable]:
-        sources = given if isinstance(given, list | tuple) else [given]
+    def load(argument: Any, name: str) -> list[study.RecordTable]:
+        sources = argument if isinstance(argument, list | tuple) else [argument]
         names = [name] if len(sources) == 1 else [f"{name} {i + 1}" for i in range(len(sources))]
         return [
             study.load_record(str(source), request)
             if isinstance(source, str | Path)
-            else study.RecordTable(own_name, signal_table_of(source))
-            for source, own_name in zip(sources, names, strict=True)
+            else study.RecordTable(record_name, signal_table_of(source))
+            for source, record_name in zip(sources, names, strict=True)
         ]
 
     fitted, predicted = load(records, "the record"), load(validate, "the validation record")

@@ -56,16 +56,16 @@ def stored_run(folder: Path) -> "Trajectory":
     from ..scenes.run_spec import RunSpec
     from ..studies.compare.trajectory_files import read_trajectory
 
-    found, origin = read_trajectory(folder), load_provenance(folder)
-    parameters = {name: each["value"] for name, each in origin.get("parameters", {}).items()}
-    units = found.units | {name: each["unit"] for name, each in origin.get("parameters", {}).items()}
+    signals, origin = read_trajectory(folder), load_provenance(folder)
+    parameters = {name: parameter["value"] for name, parameter in origin.get("parameters", {}).items()}
+    units = signals.units | {name: parameter["unit"] for name, parameter in origin.get("parameters", {}).items()}
     try:
         spec = RunSpec.from_json(origin.get("run") or {})
     except SceneError:  # of an earlier version, or of another tool
-        spec = RunSpec(Path(f"{folder.name}.fmu"), outputs=tuple(found.columns))
+        spec = RunSpec(Path(f"{folder.name}.fmu"), outputs=tuple(signals.columns))
     steps = None
     if (folder / "steps.csv").is_file():
         ends, sizes, rejected = read_numeric(folder / "steps.csv")[1].T
-        steps = SolverSteps(np.append(found.time[0], ends), sizes, rejected.astype(int))
-    names = {name: name for name in found.columns}
-    return Trajectory(spec, found.time, found.columns, units, names, parameters, steps, found.events)
+        steps = SolverSteps(np.append(signals.time[0], ends), sizes, rejected.astype(int))
+    names = {name: name for name in signals.columns}
+    return Trajectory(spec, signals.time, signals.columns, units, names, parameters, steps, signals.events)

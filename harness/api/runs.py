@@ -91,10 +91,10 @@ def simulate(
     spec = with_options(spec, stop, interval, outputs, method, rtol, interface, timeout)
     if interval is not None and spec.inputs:
         spec = replace(spec, grid=fine_step(spec, interval))
-    done = runner.run(spec, progress or QUIET)
-    if done.failure:
-        raise HarnessError(done.failure)
-    return done
+    trajectory = runner.run(spec, progress or QUIET)
+    if trajectory.failure:
+        raise HarnessError(trajectory.failure)
+    return trajectory
 
 
 def compare(
@@ -134,15 +134,15 @@ def compare(
     from ..studies.compare.difference import compare as difference
     from ..studies.compare.trajectory_sources import display_names, load_both
 
-    how = with_options(RunSpec(Path()), stop=stop, interface=interface, timeout=timeout)
+    options = with_options(RunSpec(Path()), stop=stop, interface=interface, timeout=timeout)
     if rtol is not None:
-        how = replace(how, tolerance=rtol)
+        options = replace(options, tolerance=rtol)
     first, second = load_both(
-        tuple(each if isinstance(each, Trajectory) else str(each) for each in (a, b)),
-        how,
+        tuple(side if isinstance(side, Trajectory) else str(side) for side in (a, b)),
+        options,
         progress or QUIET,
     )
-    paths = [each for each in (a, b) if not isinstance(each, Trajectory)]
+    paths = [side for side in (a, b) if not isinstance(side, Trajectory)]
     if len(paths) == 2:
         one, two = display_names((str(a), str(b)))
         first, second = replace(first, label=one), replace(second, label=two)

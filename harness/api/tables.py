@@ -31,7 +31,7 @@ def table_of(source: Any) -> "Table | None":
         frame = source if source.index.name is None else source.reset_index()
         units = {str(name): str(unit) for name, unit in frame.attrs.get("units", {}).items()}
         columns = {str(name): np.asarray(frame[name]) for name in frame.columns}
-        return make_table({column_heading(name, units.get(name, "")): each for name, each in columns.items()}, {})
+        return make_table({column_heading(name, units.get(name, "")): column for name, column in columns.items()}, {})
     return None
 
 

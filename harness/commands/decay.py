@@ -89,10 +89,10 @@ def decay(
         columns |= {"position": velocity, "quantity": "velocity"}
     if columns["rate"] is not None and (columns["time"] is not None or columns["time_unit"] is not None):
         raise click.UsageError("--rate replaces the times in the file: omit --time and --time-unit")
-    columns_spec, known = ColumnOptions(**columns), KnownParameters(k, m, pendulum)
+    columns_spec, parameters = ColumnOptions(**columns), KnownParameters(k, m, pendulum)
     with decays.gc_paused(), terminal.progress(1) as report:
         progress = partial(report, "standard input" if source == "-" else source)
-        result, folder = decays.identify_decay(source, columns_spec, known, drag, drift, terminal.out, progress)
+        result, folder = decays.identify_decay(source, columns_spec, parameters, drag, drift, terminal.out, progress)
     terminal.print_result(
         decays.identified_as_json(result), decay_table(result), "", *summary_lines(result), folder=folder
     )

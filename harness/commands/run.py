@@ -76,13 +76,13 @@ def run(
 
     folder_path = Path(scene)
     if folder_path.is_dir() and scene not in scenes:
-        stored = load_verified_provenance(folder_path)
-        if not (folder_path / study.FILES[0]).is_file() or "title" not in (stored["scene"] or {}):
-            if stored["command"] == PYTHON_API:
+        provenance = load_verified_provenance(folder_path)
+        if not (folder_path / study.FILES[0]).is_file() or "title" not in (provenance["scene"] or {}):
+            if provenance["command"] == PYTHON_API:
                 raise HarnessError(f"{scene} was written from Python: repeat its run by harness.simulate('{scene}')")
-            repeat_call(context, folder_path, stored, terminal)
+            repeat_call(context, folder_path, provenance, terminal)
             return
-        selected_scene = scene_from_provenance(stored)
+        selected_scene = scene_from_provenance(provenance)
         if context.get_parameter_source("out") is not ParameterSource.COMMANDLINE:
             terminal = replace(terminal, out=folder_path.parent)
     else:
@@ -95,11 +95,13 @@ def run(
     terminal.print_result(outcome_as_json(outcome, terminal.out), table, *notes, folder=folder, failed=failed)
 
 
-def repeat_call(context: click.Context, folder: Path, stored: dict[str, Any], terminal: Terminal) -> None:
+def repeat_call(context: click.Context, folder: Path, provenance: dict[str, Any], terminal: Terminal) -> None:
     """Repeat the recorded call of a command; the recorded text of the command is for readers and is never run."""
-    root, call = context.find_root(), stored.get("call")
+    root, call = context.find_root(), provenance.get("call")
     if call is None or call["name"] not in FOLDER_DEPTHS:
-        raise HarnessError(f"{folder} does not hold the run of one scene or FMU; its command was `{stored['command']}`")
+        raise HarnessError(
+            f"{folder} does not hold the run of one scene or FMU; its command was `{provenance['command']}`"
+        )
     command = root.command.commands[call["name"]]  # type: ignore[attr-defined]
     out = folder.absolute().parents[FOLDER_DEPTHS[call["name"]] - 1]
     if context.get_parameter_source("out") is ParameterSource.COMMANDLINE:

@@ -28,7 +28,7 @@ def stability(models: tuple[str, ...], terminal: Terminal) -> None:
     groups = grouped_cases(models=models)
     with terminal.progress(sum(map(len, groups))) as report:
         rows, regions = run_stability(terminal.out, report, groups, describe_sources(*models))
-    results = [{"scene": row.case.label, "passed": row.passed, "ended": row.ended} for row in rows]
+    results = [{"scene": row.case.label, "passed": row.has_passed, "ended": row.ended} for row in rows]
     output = (tables.error_table(rows), "", tables.refusal_table(rows), "", tables.summary(rows, regions))
-    failures = (f"{row.case.label}: {row.text}" for row in rows if not row.passed)
+    failures = (f"{row.case.label}: {row.text}" for row in rows if not row.has_passed)
     terminal.print_result(results, *output, folder=terminal.out / FOLDER, failed=failures)

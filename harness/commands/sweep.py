@@ -107,7 +107,7 @@ def describe_failures(result: "SweepResult") -> Iterator[str]:
     """Yield one sentence for each kind of failure."""
     yield f"{result.failed} of {result.runs} runs failed; see the error column of {result.folder / 'sweep.csv'}"
     for failure in result.failures[:MAX_FAILURE_KINDS]:
-        where = ", ".join(f"{name} = {value!r}" for name, value in failure.where.items())
-        yield f"{failure.runs} run{'s' * (failure.runs > 1)}, such as {where}: {failure.sentence}"
+        point = ", ".join(f"{name} = {value!r}" for name, value in failure.where.items())
+        yield f"{failure.runs} run{'s' * (failure.runs > 1)}, such as {point}: {failure.sentence}"
     if len(result.failures) > MAX_FAILURE_KINDS:
         yield f"and {len(result.failures) - MAX_FAILURE_KINDS} other kinds of failures"

@@ -81,12 +81,12 @@ def record_call(context: click.Context) -> None:
     """Record the arguments and options of a command as data, for the provenance of its results."""
     from ..results.provenance import CALL
 
-    given = {
+    options = {
         name: [*value] if isinstance(value, tuple) else str(value) if isinstance(value, Path) else value
         for name, value in context.params.items()
         if is_given(context, name) and name not in COMMON_OPTIONS
     }
-    CALL.set({"name": context.command.name, "options": given})
+    CALL.set({"name": context.command.name, "options": options})
 
 
 def build_arguments(command: click.Command, options: Mapping[str, Any]) -> list[str]:
@@ -180,7 +180,7 @@ def refuse_ignored_options(context: click.Context, fmus: Iterable[Path]) -> None
 
 
 def run_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add the options of commands that run FMUs; they are fields of a Specification."""
+    """Add the options of commands that run FMUs; they are fields of RunSpec."""
     for option in reversed((STOP_OPTION, *EXTERNAL_FMU_OPTIONS)):
         command = option(command)
     return command
@@ -218,13 +218,13 @@ def progress(quiet: bool, total: int) -> Iterator[Callable[[str, float], None]]:
         Progress(*columns, console=console, transient=True, redirect_stderr=False) as bar,
     ):
         task = bar.add_task("", total=total)
-        done: list[str] = []
+        started: list[str] = []
 
         def report(name: str, share: float) -> None:
             check_interrupt()
-            if name not in done:
-                done.append(name)
-            bar.update(task, description=name, completed=len(done) - 1 + share)
+            if name not in started:
+                started.append(name)
+            bar.update(task, description=name, completed=len(started) - 1 + share)
 
         yield report
 
@@ -247,7 +247,7 @@ class Terminal:
     def progress(self, total: int) -> AbstractContextManager[Callable[[str, float], None]]:
         return progress(self.quiet or self.as_json, total)
 
-    def print_result(self, result: Any, *shown: Any, folder: Path | None = None, failed: Iterable[str] = ()) -> None:
+    def print_result(self, result: Any, *blocks: Any, folder: Path | None = None, failed: Iterable[str] = ()) -> None:
         """Print the result as JSON, or as tables and sentences unless quiet.
 
         Parameters
@@ -273,7 +273,7 @@ class Terminal:
             print_json(result)
         elif not self.quiet:
             console = Console(markup=False, highlight=False)  # brackets in units and names are not markup
-            for block in shown:
+            for block in blocks:
                 for column in block.columns if isinstance(block, Table) else ():
                     column.overflow = "fold"  # wrap long names instead of cutting them
                 console.print(block)

@@ -61,7 +61,7 @@ def record_signal(number: int, frame: Any) -> None:
 def defer_signals() -> Iterator[None]:
     """Defer signals to the end of the block, for actions that must not be left half done."""
     handled = current_thread() is main_thread() and [
-        each for each in SIGNALS if signal.getsignal(each) == handle_signal
+        number for number in SIGNALS if signal.getsignal(number) == handle_signal
     ]
     before = len(RECEIVED_SIGNALS)
     for number in handled or ():
@@ -82,7 +82,7 @@ def ignore_sigint() -> Iterator[None]:
     from multiprocessing import resource_tracker
 
     resource_tracker.ensure_running()  # multiprocessing would start it in the block, and unblock the signal
-    mask = getattr(signal, "pthread_sigmask", lambda how, signals: None)  # none on Windows
+    mask = getattr(signal, "pthread_sigmask", lambda operation, signals: None)  # none on Windows
     with defer_signals():
         mask(signal.SIG_BLOCK, [SIGINT])  # child processes inherit it
         try:

@@ -22,9 +22,9 @@ POLL_INTERVAL = 0.1  # s between two checks for signals, which a blocked thread 
 class SubprocessTimeoutError(HarnessError):
     """The process timed out and was killed. `process` holds its output up to then."""
 
-    def __init__(self, timeout: float, done: subprocess.CompletedProcess[str]) -> None:
+    def __init__(self, timeout: float, process: subprocess.CompletedProcess[str]) -> None:
         super().__init__(f"no answer after {timeout:g} s")
-        self.process = done
+        self.process = process
 
 
 def run_subprocess(
@@ -86,9 +86,9 @@ def run_subprocess(
         raise SubprocessTimeoutError(timeout, subprocess.CompletedProcess(command, process.returncode, stdout, stderr))
 
 
-def run_module(module: str, *arguments: str, **how: Any) -> subprocess.CompletedProcess[str]:
+def run_module(module: str, *arguments: str, **options: Any) -> subprocess.CompletedProcess[str]:
     """Run a module of this project with the present interpreter, from any working directory; see `run_subprocess`."""
-    return run_subprocess([sys.executable, "-m", module, *arguments], environment=project_environment(), **how)
+    return run_subprocess([sys.executable, "-m", module, *arguments], environment=project_environment(), **options)
 
 
 def project_environment() -> dict[str, str]:

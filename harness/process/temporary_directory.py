@@ -30,12 +30,12 @@ def has_plain_uri(directory: Path) -> bool:
 def temporary_root() -> Path:
     """Return the system's temporary directory, or a fallback if its path is not plain."""
     try:
-        usual = Path(gettempdir())
+        directory = Path(gettempdir())
     except OSError:
         raise HarnessError("no temporary directory is writable; set one, as in TMPDIR=/tmp") from None
-    if has_plain_uri(usual):
-        return usual
-    return next((Path(path) for path in FALLBACK_DIRECTORIES if os.access(path, os.W_OK | os.X_OK)), usual)
+    if has_plain_uri(directory):
+        return directory
+    return next((Path(path) for path in FALLBACK_DIRECTORIES if os.access(path, os.W_OK | os.X_OK)), directory)
 
 
 @contextmanager

@@ -113,8 +113,8 @@ class WorkerPool:
 
     def wait_for_any(self, futures: Collection[Future[Any]]) -> set[Future[Any]]:
         """Return the futures that are done, once one is done or after `POLL_INTERVAL` s."""
-        ready = wait([*self.busy], POLL_INTERVAL)
-        for connection in [each for each in self.busy if each in ready]:
+        readable = wait([*self.busy], POLL_INTERVAL)
+        for connection in [connection for connection in self.busy if connection in readable]:
             worker, future = self.busy.pop(connection)
             try:
                 result = worker.receive_result()

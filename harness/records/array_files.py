@@ -148,7 +148,7 @@ def read_parquet(data: bytes, name: str) -> dict[str, Any]:
     is_read = (types.is_integer, types.is_floating, types.is_boolean, types.is_timestamp, types.is_duration)
     names = [field.name for field in file.schema_arrow if any(is_type(field.type) for is_type in is_read)]
     columns: dict[str, Any] = {}
-    for key in sorted(names, key=lambda each: each not in index):
+    for key in sorted(names, key=lambda name: name not in index):
         column = file.read([key]).column(0)
         columns["index" if key.startswith("__index_level_") else key] = column.to_numpy()
         field = {k.decode().lower(): v.decode() for k, v in (file.schema_arrow.field(key).metadata or {}).items()}

@@ -311,11 +311,11 @@ def find_signal_column(
         order: int | None = QUANTITIES.index(columns.quantity)
     else:
         order = min((part.order for part in others if part.order is not None), default=None)
-    chosen = [part for part in others if part.order == order]
-    chosen = [part for part in chosen if not MAGNITUDE_NAME.search(part.name)] or chosen or others
-    if chosen[0].order is None:
-        return chosen[0], []  # no heading indicates a quantity: use the first
-    same_unit = [part for part in chosen if part.unit == chosen[0].unit]
+    motions = [part for part in others if part.order == order]
+    motions = [part for part in motions if not MAGNITUDE_NAME.search(part.name)] or motions or others
+    if motions[0].order is None:
+        return motions[0], []  # no heading indicates a quantity: use the first
+    same_unit = [part for part in motions if part.unit == motions[0].unit]
     if len(same_unit) == 1 or (order == 0 and same_unit[0].name.lower() in ("x", "theta")):
         return same_unit[0], []
     deviations = [np.nanstd(parse_numbers(table, part.index, strict=False)) for part in same_unit]

@@ -46,14 +46,14 @@ class SignalTable:
     notes: tuple[str, ...] = ()
 
 
-def read_signals(source: str, wanted: Mapping[str, SignalSource], options: ColumnOptions, name: str) -> SignalTable:
+def read_signals(source: str, sources: Mapping[str, SignalSource], options: ColumnOptions, name: str) -> SignalTable:
     """Read signals from a file.
 
     Parameters
     ----------
     source : str
         Path of the file; "-" for standard input.
-    wanted : mapping
+    sources : mapping
         The column and unit of each signal, by the name of the signal.
     options : ColumnOptions
         Options for the time: its column, unit, sampling rate and range.
@@ -65,13 +65,13 @@ def read_signals(source: str, wanted: Mapping[str, SignalSource], options: Colum
     SceneError
         If the file lacks a column, or its numbers or units do not fit.
     """
-    return parse_signals(load_table(source, options.names), wanted, options, name)
+    return parse_signals(load_table(source, options.names), sources, options, name)
 
 
-def parse_signals(table: Table, wanted: Mapping[str, SignalSource], options: ColumnOptions, name: str) -> SignalTable:
+def parse_signals(table: Table, sources: Mapping[str, SignalSource], options: ColumnOptions, name: str) -> SignalTable:
     """Return the signals in a table; see `read_signals`."""
     notes, candidates = list(table.notes), list_columns(table)
-    selected = {signal: find_signal(each.heading, table, candidates) for signal, each in wanted.items()}
+    selected = {signal: find_signal(source.heading, table, candidates) for signal, source in sources.items()}
     first = min((column for column, _ in selected.values()), key=lambda column: column.index)
     time_column = find_time_column(table, candidates, replace(options, position=first.heading))
     interval = 1 / options.rate if options.rate else None if time_column else table.interval
@@ -90,7 +90,7 @@ def parse_signals(table: Table, wanted: Mapping[str, SignalSource], options: Col
     for signal, (column, unit) in selected.items():
         x, remarks = mark_missing(parse_numbers(table, column.index), column.heading)
         notes += remarks
-        factor, note = unit_factor(column, unit, wanted[signal].unit, signal, table.name)
+        factor, note = unit_factor(column, unit, sources[signal].unit, signal, table.name)
         notes += note
         columns[signal] = factor * x
     return select_complete_rows(name, t, columns, options, notes)
@@ -149,8 +149,8 @@ def select_complete_rows(
 ) -> SignalTable:
     """Return the rows that have a time in the range of the options and all signals."""
     complete = np.isfinite(t) & np.all([np.isfinite(x) for x in columns.values()], axis=0)
-    used = np.flatnonzero(np.isfinite(t) & np.any([np.isfinite(x) for x in columns.values()], axis=0))
-    length = int(used[-1]) + 1 if len(used) else 0  # the table may continue with a longer run
+    filled_rows = np.flatnonzero(np.isfinite(t) & np.any([np.isfinite(x) for x in columns.values()], axis=0))
+    length = int(filled_rows[-1]) + 1 if len(filled_rows) else 0  # the table may continue with a longer run
     empty_tail = int(np.isfinite(t[length:]).sum())
     t, rounding = undo_time_rounding(t[:length])
     if empty_tail:

@@ -266,7 +266,7 @@ def find_commented_headings(preceding: list[str], delimiter: str, width: int) ->
         for last in range(len(rows), 0, -1):
             headings = find_headings(rows[:last], width)
             if any(map(is_time_heading, headings)):
-                best = max(best, (sum(map(count_known_parts, headings)), headings), key=lambda each: each[0])
+                best = max(best, (sum(map(count_known_parts, headings)), headings), key=lambda candidate: candidate[0])
     if best[1]:
         return best[1]
     row = split_cells(comments[-1:], delimiter, "the file")

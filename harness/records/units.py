@@ -147,11 +147,11 @@ def unit_size(text: str) -> tuple[float, Powers] | None:
         return None
     size, totals = 1.0, Counter[str]()
     for name, power in factors.items():
-        known = named_unit(name)
-        if not known:
+        factor_size = named_unit(name)
+        if not factor_size:
             return None
-        size *= known[0] ** power
-        for base, exponent in known[1].items():
+        size *= factor_size[0] ** power
+        for base, exponent in factor_size[1].items():
             totals[base] += power * exponent
     return size, {base: power for base, power in totals.items() if power}
 
@@ -180,10 +180,10 @@ def conversion_factor(unit: str, other: str) -> float | None:
 
 
 @cache
-def is_rate_unit(unit: str, of: str) -> bool:
-    """Return whether `unit` is `of` per second; two empty units match."""
-    powers = unit_factors(of)
-    if powers is None or not (unit and of):
-        return unit == of == ""
+def is_rate_unit(unit: str, base: str) -> bool:
+    """Return whether `unit` is `base` per second; two empty units match."""
+    powers = unit_factors(base)
+    if powers is None or not (unit and base):
+        return unit == base == ""
     slower = powers | {"s": powers.get("s", 0) - 1}
     return {name: power for name, power in slower.items() if power} == unit_factors(unit)

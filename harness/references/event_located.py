@@ -74,10 +74,12 @@ class HybridProblem:
         self.stop_slip(y, modes)
         while True:
             table = self.contacts(t, y, modes)
-            over = [i for i, (_, f, hold) in enumerate(table) if modes[i] == 0 and abs(f) > hold * (1.0 + OVERLOAD)]
-            if not over:
+            overloaded = [
+                i for i, (_, f, hold) in enumerate(table) if modes[i] == 0 and abs(f) > hold * (1.0 + OVERLOAD)
+            ]
+            if not overloaded:
                 return
-            modes[over[0]] = 1 if table[over[0]][1] > 0.0 else -1
+            modes[overloaded[0]] = 1 if table[overloaded[0]][1] > 0.0 else -1
 
 
 Events = list[tuple[float, tuple[int, ...]]]
@@ -109,8 +111,8 @@ def solve(
             t, y = float(run.t[-1]), run.y[:, -1].copy()
             if run.status == 1:
                 before = modes[:n]
-                for index, found in enumerate(run.t_events):
-                    if len(found):
+                for index, event_times in enumerate(run.t_events):
+                    if len(event_times):
                         problem.change(index, modes)
                         break
                 problem.resolve(t, y, modes)

@@ -120,12 +120,12 @@ def solve(
     motion = np.empty((len(times), 2))
     motion[0] = state
     events: list[tuple[float, int]] = []
-    evaluations, done = 0, 1  # `done` samples are filled
+    evaluations, n_filled = 0, 1  # the first sample is filled
     while t < problem.stop:
         if mode:
-            interval = solve_mode(mode, t, state, times[done:])
-            motion[done : done + len(interval.samples)] = interval.samples
-            done += len(interval.samples)
+            interval = solve_mode(mode, t, state, times[n_filled:])
+            motion[n_filled : n_filled + len(interval.samples)] = interval.samples
+            n_filled += len(interval.samples)
             evaluations += interval.evaluations
             t, state = interval.end, interval.state
             if interval.has_stopped:
@@ -134,9 +134,9 @@ def solve(
         else:
             breakaway, mode = problem.breakaway(t, state[0])
             t = min(breakaway, problem.stop)
-            passed = int(np.searchsorted(times, t, side="right"))
-            motion[done:passed] = state
-            done = max(done, passed)
+            n_passed = int(np.searchsorted(times, t, side="right"))
+            motion[n_filled:n_passed] = state
+            n_filled = max(n_filled, n_passed)
             if breakaway <= problem.stop:
                 events.append((t, mode))
     return Solution(times, motion, events if problem.has_dry_friction else None, evaluations)

@@ -193,17 +193,17 @@ def list_missing(
     items: Iterable[ResultItem], sections: Sequence[Section], scenes: Sequence[PublishedScene]
 ) -> list[MissingResult]:
     """Return the missing results, and what the studies left out."""
-    found = [(find_section(item), item.summary.title) for item in items]
+    titles = [(find_section(item), item.summary.title) for item in items]
     missing = [
-        MissingResult(scene.name, f"run {scene.name}") for scene in scenes if (PUBLISHED, scene.name) not in found
+        MissingResult(scene.name, f"run {scene.name}") for scene in scenes if (PUBLISHED, scene.name) not in titles
     ]
     models = sorted({scene.model for scene in scenes})
-    missing += [MissingResult(model, f"precision {model}") for model in models if ("precision", model) not in found]
-    shown = [section.study for section in sections]
+    missing += [MissingResult(model, f"precision {model}") for model in models if ("precision", model) not in titles]
+    studies = [section.study for section in sections]
     missing += [
         MissingResult(section.missing_name, section.command)
         for section in SECTIONS
-        if section.command and section.study not in shown
+        if section.command and section.study not in studies
     ]
     left_out = [gap for item in items for gap in item.summary.missing]
     return [MissingResult(gap.name, f"python -m harness {gap.command}") for gap in missing] + left_out

@@ -23,9 +23,9 @@ def typeset(text: str) -> Markup:
     parts = str(text).split("`")
     if len(parts) % 2 == 0:  # a backtick without its counterpart is literal
         parts[-2:] = ["`".join(parts[-2:])]
-    plain = (escape(PERCENT.sub(NO_BREAK, POWER.sub(format_power, part))) for part in parts[::2])
+    texts = (escape(PERCENT.sub(NO_BREAK, POWER.sub(format_power, part))) for part in parts[::2])
     code = (Markup("<code>{}</code>").format(part) for part in parts[1::2])
-    pieces = [piece for pair in zip(plain, [*code, ""], strict=True) for piece in pair]
+    pieces = [piece for pair in zip(texts, [*code, ""], strict=True) for piece in pair]
     return Markup("").join(pieces)
 
 

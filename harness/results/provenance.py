@@ -157,8 +157,10 @@ def note_replaced_result(old_folder: Path, new_folder: Path, file: str) -> None:
     if differences:
         sentence = f"It replaces the result of {before['date']}, which had {', '.join(sorted(differences))}."
     elif options:
-        same = (old_folder / file).is_file() and file_digest(old_folder / file) == file_digest(new_folder / file)
-        comparison = "the same, bit for bit" if same else "not the same bit for bit"
+        is_identical = (old_folder / file).is_file() and file_digest(old_folder / file) == file_digest(
+            new_folder / file
+        )
+        comparison = "the same, bit for bit" if is_identical else "not the same bit for bit"
         sentence = f"The result of {before['date']} was {comparison}."
     else:
         return
@@ -209,7 +211,7 @@ def describe_origin(content: dict[str, Any]) -> tuple[str, ...]:
         f"Made from {', '.join(files) or 'no file'} by harness {versions[HARNESS]}, fmpy {versions['fmpy']}, "
         f"Python {versions['python']}, {content['platform']}, on {content['date'][:10]}: {content['command']}"
     )
-    values = [format_parameter(name, **each) for name, each in content["parameters"].items()]
+    values = [format_parameter(name, **parameter) for name, parameter in content["parameters"].items()]
     return (origin, f"Parameters: {', '.join(values)}.") if values else (origin,)
 
 

@@ -121,7 +121,7 @@ class EmbeddedModel:
         """Return the solver's attribute for a state or mode: h_ if h means something else to the solver."""
         others = {*self.model.states, *self.model.contacts} - {name}
         candidates = (f"{prefix}{name}{'_' * n}" for prefix in ("own_", "") for n in (3, 2, 1, 0))
-        return next(one for one in candidates if hasattr(self.run.solver, one) and one not in others)
+        return next(name for name in candidates if hasattr(self.run.solver, name) and name not in others)
 
     def compute_states(self, times: list[float], timeout: float | None = None) -> list[tuple[float, ...]]:
         """Return the states at the times, starting at 0 s.

@@ -131,7 +131,9 @@ class FmuSession:
             if self.is_fmi2:
                 fmu.instantiate(loggingOn=True, callbacks=fmi2_callbacks(log))
             else:
-                fmu.instantiate(loggingOn=True, logMessage=lambda where, status, category, text: log.add(status, text))
+                fmu.instantiate(
+                    loggingOn=True, logMessage=lambda instance, status, category, text: log.add(status, text)
+                )
         except Exception as error:  # fmpy raises bare Exceptions
             hint = "; it needs the tool that made it (needsExecutionTool)" if self.interface.needsExecutionTool else ""
             raise HarnessError(f"{first_line(error).replace(f'{folder}{os.sep}', '')}{hint}") from None

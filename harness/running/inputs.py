@@ -34,7 +34,9 @@ def check_inputs(inputs: Inputs, variables: Mapping[str, Any]) -> None:
         return
     if TIME not in inputs:
         raise SceneError("inputs has no column 'time': add the times in s, as in {'time': [0, 1], 'F_ext': [0, 5]}")
-    names = [name for name, one in variables.items() if one.causality == "input" and one.type in REAL_TYPES]
+    names = [
+        name for name, variable in variables.items() if variable.causality == "input" and variable.type in REAL_TYPES
+    ]
     check_names("input", [name for name in inputs if name != TIME], [name for name in names if name != TIME])
     rows = len(inputs[TIME])
     for name, column in inputs.items():

@@ -124,21 +124,21 @@ class ModelExchange:
     def advance(self, t: float, target: float) -> float:
         jump = self.signals.next_jump(t) if self.signals else inf
         target = min(target, self.next_event, jump)
-        has_root, _, reached = self.solver.step(t, target)
-        reached = target if abs(reached - target) <= self.grid.tolerance else reached
-        self.fmu.setTime(reached)
+        has_root, _, t_end = self.solver.step(t, target)
+        t_end = target if abs(t_end - target) <= self.grid.tolerance else t_end
+        self.fmu.setTime(t_end)
         if self.signals:
-            self.signals.apply(reached)
+            self.signals.apply(t_end)
         needs_event = terminated = False
         if self.session.interface.needsCompletedIntegratorStep:
             needs_event, terminated = self.fmu.completedIntegratorStep()
         if terminated:
-            raise TerminatedError(reached, "it returned terminateSimulation from a completed step")
-        self.is_event = has_root or needs_event or reached >= min(self.next_event, jump)
-        self.n_stalled = 0 if reached > t else self.n_stalled + 1
+            raise TerminatedError(t_end, "it returned terminateSimulation from a completed step")
+        self.is_event = has_root or needs_event or t_end >= min(self.next_event, jump)
+        self.n_stalled = 0 if t_end > t else self.n_stalled + 1
         if self.n_stalled > MAX_EVENTS:
-            raise HarnessError(f"{MAX_EVENTS} events in a row at t = {reached:.9g} s")
-        return reached
+            raise HarnessError(f"{MAX_EVENTS} events in a row at t = {t_end:.9g} s")
+        return t_end
 
     def handle_event(self, t: float) -> None:
         self.fmu.enterEventMode()

@@ -28,9 +28,9 @@ def native_equivalent(fmu: Path) -> Path:
     """
     if not is_python_fmu(unpack_once(fmu)):
         return fmu
-    built = fmu.parent / "native" / fmu.name
-    if built.is_file() and is_same_model(fmu, built):
-        return built
+    native_fmu = fmu.parent / "native" / fmu.name
+    if native_fmu.is_file() and is_same_model(fmu, native_fmu):
+        return native_fmu
     candidates = (fmu.with_suffix(".py"), *(folder / f"{fmu.stem}.py" for folder in FOLDERS))
     source = next(filter(Path.is_file, candidates), None)
     if source is None:
@@ -39,11 +39,11 @@ def native_equivalent(fmu: Path) -> Path:
     platform = ("--platform", fmpy.platform) if fmpy.platform in ("linux64", "win64", "darwin64") else ()
     arguments = (str(source), "--native", *platform, "--out", str(folder))
     try:
-        done = run_module("build_fmus", *arguments, timeout=BUILD_TIMEOUT)
+        build = run_module("build_fmus", *arguments, timeout=BUILD_TIMEOUT)
     except SubprocessTimeoutError:
         return fmu
-    built = folder / fmu.name
-    return built if not done.returncode and built.is_file() and is_same_model(fmu, built) else fmu
+    native_fmu = folder / fmu.name
+    return native_fmu if not build.returncode and native_fmu.is_file() and is_same_model(fmu, native_fmu) else fmu
 
 
 def is_same_model(fmu: Path, other: Path) -> bool:
@@ -58,8 +58,8 @@ def is_same_model(fmu: Path, other: Path) -> bool:
     ]
     t = np.linspace(0.0, resolve_stop(RunSpec(fmu), read_description(fmu)) or 1.0, COMPARED_POINTS)
     runs = []
-    for each in (fmu, other):
-        with open_simulator(RunSpec(each)) as simulator:
+    for path in (fmu, other):
+        with open_simulator(RunSpec(path)) as simulator:
             runs.append(simulator.simulate({}, t, outputs, {}))
     one, two = runs
     return one is not None and two is not None and np.allclose(one, two, rtol=AGREEMENT, atol=AGREEMENT)

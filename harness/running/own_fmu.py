@@ -176,8 +176,8 @@ def run_repeats(plan: RunPlan, session: FmuSession, report: ProgressCallback) ->
     """Run the plan `repeat` times in one session; return the last run with the fastest time."""
     repeat, grid = plan.spec.repeat, plan.grid
     values = plan.settings
-    stored = {variable.name: effective_value(variable, value) for variable, value in values}
-    plan = replace(plan, spec=replace(plan.spec, values=stored))
+    effective_values = {variable.name: effective_value(variable, value) for variable, value in values}
+    plan = replace(plan, spec=replace(plan.spec, values=effective_values))
     seconds: list[float] = []
 
     def report_run(share: float) -> None:
@@ -195,19 +195,19 @@ def run_repeats(plan: RunPlan, session: FmuSession, report: ProgressCallback) ->
 
 def record_run(plan: RunPlan, session: FmuSession, report: ProgressCallback) -> RecordedRun:
     """Step from start to stop and record every point."""
-    spec, grid, chosen, rows = plan.spec, plan.grid, plan.chosen, io.BytesIO()
-    recorder, signals = Recorder(session, chosen, rows.write), input_signals(spec.inputs, session)
+    spec, grid, selection, rows = plan.spec, plan.grid, plan.chosen, io.BytesIO()
+    recorder, signals = Recorder(session, selection, rows.write), input_signals(spec.inputs, session)
     if spec.exchange:
         from .model_exchange import ModelExchange  # loads CVode
 
         exchange = ModelExchange(session, grid, spec.tolerance, check_interrupt, signals, MAX_CVODE_STEPS)
         step_to_stop(exchange, grid, recorder.record, report)
-        return RecordedRun(*read_rows(rows.getbuffer(), chosen, session.is_fmi2), exchange.solver.n_rhs)
+        return RecordedRun(*read_rows(rows.getbuffer(), selection, session.is_fmi2), exchange.solver.n_rhs)
     next_step = recorder.cell("solver.t_next") if spec.follow else None
     stepper = CoSimulation(session, grid, signals, next_step)
     interval = max(1, min(REPORT_INTERVAL, grid.whole_count // MIN_REPORTS)) if grid.h < inf else REPORT_INTERVAL
     step_to_stop(stepper, grid, recorder.record, report, interval)
-    return RecordedRun(*read_rows(rows.getbuffer(), chosen, session.is_fmi2), session.get("solver.evaluations"))
+    return RecordedRun(*read_rows(rows.getbuffer(), selection, session.is_fmi2), session.get("solver.evaluations"))
 
 
 def build_trajectory(plan: RunPlan, session: FmuSession, recorded: RecordedRun, seconds: float) -> Trajectory:
@@ -246,8 +246,10 @@ def find_step_ends(time: np.ndarray, next_step: np.ndarray, tolerance: float) ->
 
     `next_step` (n,) is `solver.t_next` at the times (n,), in s; an internal step may end a rounding after the stop.
     """
-    reached, expected = time[1:], next_step[:-1]
-    is_end = (reached == expected) | ((reached == time[-1]) & (reached < expected) & (expected <= reached + tolerance))
+    end_times, expected = time[1:], next_step[:-1]
+    is_end = (end_times == expected) | (
+        (end_times == time[-1]) & (end_times < expected) & (expected <= end_times + tolerance)
+    )
     return np.append(0, np.flatnonzero(is_end) + 1)
 
 

@@ -44,7 +44,7 @@ def plot(run: Any, names: Sequence[str], inputs: Sequence[str]) -> np.ndarray:
         for begin, end in run.sticking.get(run.contact_of(name), ()):
             panel.axvspan(begin, end, color="0.5", alpha=0.15, linewidth=0)
     for panel, name in zip(panels[len(names) :], inputs, strict=False):
-        unit = next(variable_unit(each) for each in declared_variables(run) if each.name == name)
+        unit = next(variable_unit(variable) for variable in declared_variables(run) if variable.name == name)
         panel.plot(run.spec.inputs["time"], run.spec.inputs[name])
         panel.set_ylabel(column_heading(name, unit))
     if has_contacts:

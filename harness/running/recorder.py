@@ -88,22 +88,22 @@ def select_variables(spec: RunSpec, variables: Mapping[str, Any], values: Mappin
         raise SceneError(f"{spec.fmu.name}: the outputs have {count} elements; record at most {MAX_COLUMNS}")
     owner = {element: name for name in named for element in (name, *element_names(name, shapes[name]))}
     check_names("output", [name for name in spec.outputs if name not in owner], shapes)
-    chosen = dict.fromkeys(owner[name] for name in spec.outputs)
-    return [(variables[name], shapes[name]) for name in chosen]
+    names = dict.fromkeys(owner[name] for name in spec.outputs)
+    return [(variables[name], shapes[name]) for name in names]
 
 
-def group_by_type(chosen: Sequence[ShapedVariable]) -> Iterator[tuple[str, list[Any], list[str]]]:
+def group_by_type(selection: Sequence[ShapedVariable]) -> Iterator[tuple[str, list[Any], list[str]]]:
     """Yield each type with its variables and the names of their elements, in the order of a row."""
-    for type_name in dict.fromkeys(variable.type for variable, _ in chosen):
-        group = [(variable, shape) for variable, shape in chosen if variable.type == type_name]
+    for type_name in dict.fromkeys(variable.type for variable, _ in selection):
+        group = [(variable, shape) for variable, shape in selection if variable.type == type_name]
         names = [name for variable, shape in group for name in element_names(variable.name, shape)]
         yield type_name, [variable for variable, _ in group], names
 
 
-def row_type(chosen: Sequence[ShapedVariable], is_fmi2: bool) -> np.dtype:
+def row_type(selection: Sequence[ShapedVariable], is_fmi2: bool) -> np.dtype:
     """Return the type of a row: the time in s and the values of each type."""
     types = C_TYPES | (FMI2_TYPES if is_fmi2 else {})
-    groups = [(type_name, types[type_name], (len(names),)) for type_name, _, names in group_by_type(chosen)]
+    groups = [(type_name, types[type_name], (len(names),)) for type_name, _, names in group_by_type(selection)]
     return np.dtype([("time", c_double), *groups], align=True)
 
 
@@ -125,18 +125,18 @@ class Recorder:
     def __init__(
         self,
         session: FmuSession,
-        chosen: Sequence[ShapedVariable],
+        selection: Sequence[ShapedVariable],
         write: Callable[[bytearray], object],
         strings: "StringTable | None" = None,
         only_finite: bool = False,
     ) -> None:
-        layout = row_type(chosen, session.is_fmi2)
+        layout = row_type(selection, session.is_fmi2)
         self.row, self.write, self.strings, self.only_finite = bytearray(layout.itemsize), write, strings, only_finite
         self.time = c_double.from_buffer(self.row)
         self.calls: list[tuple[str, Any, tuple[Any, ...]]] = []
         self.cells: dict[str, tuple[Any, int]] = {}  # of Reals: buffer and index
         self.texts: list[tuple[Any, Any]] = []  # of Strings: pointers and indices
-        for type_name, variables, names in group_by_type(chosen):
+        for type_name, variables, names in group_by_type(selection):
             kind, offset = layout.fields[type_name][0].base, layout.fields[type_name][1]  # type: ignore[index]
             buffer = (np.ctypeslib.as_ctypes_type(kind) * len(names)).from_buffer(self.row, offset)
             if type_name in REAL_TYPES:
@@ -188,12 +188,14 @@ class StringTable:
         return self.indices[text]
 
 
-def read_rows(data: bytes | memoryview, chosen: Sequence[ShapedVariable], is_fmi2: bool) -> tuple[np.ndarray, Columns]:
+def read_rows(
+    data: bytes | memoryview, selection: Sequence[ShapedVariable], is_fmi2: bool
+) -> tuple[np.ndarray, Columns]:
     """Return time (n,) in s and columns of the rows of a run; ignore an incomplete last row."""
-    layout = row_type(chosen, is_fmi2)
+    layout = row_type(selection, is_fmi2)
     rows = np.frombuffer(data, layout, count=len(data) // layout.itemsize)
     columns: Columns = {}
-    for type_name, _, names in group_by_type(chosen):
+    for type_name, _, names in group_by_type(selection):
         values = rows[type_name].astype(COLUMN_TYPES[type_name])
         columns |= zip(names, values.T, strict=True)
     return np.array(rows["time"]), columns

@@ -50,11 +50,11 @@ def resolve(source: str | Path, options: RunSpec | None = None, scenes_first: bo
 
 def read_stored_run(folder: Path) -> RunSpec:
     """Return the run that made a stored result; HarnessError if its files have changed since."""
-    stored = load_verified_provenance(folder)
-    scene = stored["scene"] or {}
+    provenance = load_verified_provenance(folder)
+    scene = provenance["scene"] or {}
     try:
-        if "title" in scene and not stored.get("run"):  # of an earlier version
-            return scene_from_provenance(stored).run
-        return RunSpec.from_json(stored.get("run") or scene)
+        if "title" in scene and not provenance.get("run"):  # of an earlier version
+            return scene_from_provenance(provenance).run
+        return RunSpec.from_json(provenance.get("run") or scene)
     except SceneError as error:
         raise SceneError(f"{folder} does not hold the result of one run ({error}): name another folder") from None

@@ -107,8 +107,8 @@ def run_steps(spec: RunSpec, steps: CommunicationSteps, changes: ScheduledChange
     with open_reusable_session(spec) as session:
         outputs, rows = find_outputs(session), io.BytesIO()
         recorded = [session.variables[name] for name in outputs]
-        chosen: list[ShapedVariable] = [(variable, ()) for variable in recorded]
-        recorder = Recorder(session, chosen, rows.write)
+        selection: list[ShapedVariable] = [(variable, ()) for variable in recorded]
+        recorder = Recorder(session, selection, rows.write)
         started = perf_counter()
         try:
             initialize(session, spec)
@@ -122,7 +122,7 @@ def run_steps(spec: RunSpec, steps: CommunicationSteps, changes: ScheduledChange
         seconds = perf_counter() - started
         return Trajectory(
             replace(spec, outputs=outputs),
-            *read_rows(rows.getbuffer(), chosen, session.is_fmi2),
+            *read_rows(rows.getbuffer(), selection, session.is_fmi2),
             {variable.name: variable_unit(variable) for variable in recorded},
             {variable.name: variable.description or variable.name for variable in recorded},
             {},

@@ -74,8 +74,8 @@ class ModeChanges:
     def changes(self, contact: str) -> tuple[np.ndarray, np.ndarray]:
         """Return times (m,) in s and modes (m,) of one contact, without the changes of the others."""
         modes = self.modes[contact]
-        kept = np.append(True, (np.diff(modes) != 0) | (len(self.modes) == 1))
-        return self.t[kept], modes[kept]
+        is_change = np.append(True, (np.diff(modes) != 0) | (len(self.modes) == 1))
+        return self.t[is_change], modes[is_change]
 
     def sticking(self, contact: str, stop: float) -> list[tuple[float, float]]:
         """Return the intervals of time in s in which a contact sticks, up to the stop."""
@@ -300,17 +300,17 @@ class Trajectory:
         from ..results.provenance import PYTHON_API, describe_sources, write_provenance
 
         fmu = self.spec.fmu
-        with replace_folder(Path(folder), FILES, describe_sources(str(fmu))) as fresh:
-            self.write_tables(fresh)
+        with replace_folder(Path(folder), FILES, describe_sources(str(fmu))) as new_folder:
+            self.write_tables(new_folder)
             write_provenance(
-                fresh,
+                new_folder,
                 [fmu],
                 self.effective_parameters,
                 source=describe_sources(str(fmu)),
                 command=PYTHON_API,
                 run=self.spec,
             )
-            write_summary(fresh, summarize_run(self, Path(folder).name))
+            write_summary(new_folder, summarize_run(self, Path(folder).name))
 
     def sample_at(self, times: np.ndarray, names: Sequence[str]) -> np.ndarray:
         """Return the named outputs, (n, names), at the recorded times nearest to `times` (n,) in s."""

@@ -39,7 +39,7 @@ def unpack(fmu: Path) -> Iterator[Path]:
     with temporary_directory() as directory:
         try:
             with ZipFile(fmu) as archive:
-                size = sum(each.file_size for each in archive.infolist())
+                size = sum(member.file_size for member in archive.infolist())
             if size > disk_usage(directory).free:
                 raise OSError(f"its {size:.3g} bytes do not fit into the temporary directory")
             fmpy.extract(fmu, directory)

@@ -167,12 +167,12 @@ def load_scene(scene: str | Path) -> Scene:
         raise SceneError(f"scene {path.stem}: {error}") from None
 
 
-def scene_from_provenance(stored: dict[str, Any]) -> Scene:
+def scene_from_provenance(provenance: dict[str, Any]) -> Scene:
     """Return the scene of a stored result, with its run.
 
     Parameters
     ----------
-    stored : dict
+    provenance : dict
         Provenance of the result. In results of earlier versions, the keys of the run are among those of the scene.
 
     Raises
@@ -181,7 +181,7 @@ def scene_from_provenance(stored: dict[str, Any]) -> Scene:
         If the result has no valid scene.
     """
     try:
-        scene, run = dict(stored["scene"]), stored.get("run")
+        scene, run = dict(provenance["scene"]), provenance.get("run")
         path, source, file = Path(scene["name"]), str(scene["source"]), Path((run or scene)["fmu" if run else "file"])
         scene["decay"] = {name: value for name, value in scene["decay"].items() if value is not None}
         if run is None:
@@ -227,13 +227,13 @@ def is_panel(name: str, outputs: Collection[str]) -> bool:
     return name in PLOTS and name not in outputs
 
 
-def default_plots(outputs: tuple[str, ...], chosen: tuple[str, ...] = ()) -> tuple[str, ...]:
-    """Return the plots of a scene that names none: the `chosen` outputs or the first ones, and the phase plane."""
+def default_plots(outputs: tuple[str, ...], preferred_outputs: tuple[str, ...] = ()) -> tuple[str, ...]:
+    """Return the plots of a scene that names none: the preferred outputs or the first ones, and the phase plane."""
     motion = find_roles(outputs)
     names = {output: role for role, output in motion.items() if is_panel(role, outputs)}
     has_phase = is_panel("phase", outputs) and all(role in motion for role in PLOTS["phase"])
     phase = ("phase",) if has_phase else ()
-    return (*[names.get(output, output) for output in chosen or outputs[:MAX_DEFAULT_PLOTS]], *phase)
+    return (*[names.get(output, output) for output in preferred_outputs or outputs[:MAX_DEFAULT_PLOTS]], *phase)
 
 
 def check_requirements(scene: Scene) -> None:

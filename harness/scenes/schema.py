@@ -113,7 +113,7 @@ def make_table_hook(annotation: Any) -> Hook:
 
 def field_names(schema: Any) -> list[str]:
     """Return the names of the fields of a dataclass."""
-    return [each.name for each in fields(schema)]
+    return [field.name for field in fields(schema)]
 
 
 def make_mapping_hook(annotation: Any) -> Hook:

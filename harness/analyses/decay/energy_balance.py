@@ -34,15 +34,15 @@ def estimate_losses(a: np.ndarray, terms: Terms, is_pendulum: bool) -> np.ndarra
         speed = 2 * k * np.cos(phi)
         stretch = 1 / np.sqrt(1 - (k * np.sin(phi)) ** 2)  # dtheta = stretch dphi
         squared, cubed = 2 * (speed**2 * stretch) @ weights, 2 * (speed**3 * stretch) @ weights
-        lost, slope = np.cos(a[1:]) - np.cos(a[:-1]), np.maximum(np.sin(mean), 1e-2)
+        energy_loss, slope = np.cos(a[1:]) - np.cos(a[:-1]), np.maximum(np.sin(mean), 1e-2)
     else:
         squared, cubed = np.pi / 2 * mean**2, 4 / 3 * mean**3
-        lost, slope = mean * (a[:-1] - a[1:]), mean
+        energy_loss, slope = mean * (a[:-1] - a[1:]), mean
     columns = np.stack([2 * squared, 2 * mean, cubed], axis=1) / slope[:, None]
     indices = [TERMS.index(term) for term in terms]
     scale = np.linalg.norm(columns[:, indices], axis=0)
     losses = np.zeros(len(TERMS))
-    losses[indices] = optimize.nnls(columns[:, indices] / scale, lost / slope)[0] / scale
+    losses[indices] = optimize.nnls(columns[:, indices] / scale, energy_loss / slope)[0] / scale
     return losses
 
 

@@ -31,18 +31,18 @@ class EnergyLoss:
 def measure_energy_loss(identification: DecayIdentification) -> EnergyLoss:
     """Return the energy lost between the turning points of a record, and by each law fitted to it."""
     problem = identification.problem
-    measured = np.zeros((2, 0))
+    points = np.zeros((2, 0))
     if not identification.record.order:
         extrema = identification.extrema
         displacement = extrema.x - identification.rest(identification.best, extrema.t)
         sign = np.sign(displacement[0]) * (-1.0) ** np.arange(len(displacement))
-        measured = np.array(loss_fractions(sign * displacement, problem.model.is_pendulum))
+        points = np.array(loss_fractions(sign * displacement, problem.model.is_pendulum))
     curves = {}
     for law in identification.laws:
         amplitudes, starts = problem.half_cycles(law.p)
         during_record = amplitudes[starts <= problem.t[-1]] * problem.scale
         curves[law.terms] = loss_fractions(during_record, problem.model.is_pendulum)
-    return EnergyLoss(measured[0], measured[1], curves)
+    return EnergyLoss(points[0], points[1], curves)
 
 
 def loss_fractions(a: np.ndarray, is_pendulum: bool) -> tuple[np.ndarray, np.ndarray]:

@@ -99,9 +99,9 @@ class FitProblem:
 
     def fit_growing_windows(self, p: np.ndarray, terms: Terms) -> np.ndarray:
         """Return the values of UNKNOWNS after fits to growing windows, none shorter than five half cycles."""
-        least = int(np.searchsorted(self.t, self.t[0] + thresholds.MIN_WINDOW * self.half_period))
+        min_size = int(np.searchsorted(self.t, self.t[0] + thresholds.MIN_WINDOW * self.half_period))
         for share in thresholds.FIT_WINDOWS:
-            size = max(int(share * len(self.t)), min(len(self.t), least))
+            size = max(int(share * len(self.t)), min(len(self.t), min_size))
             p, _ = self.subset(slice(size)).fit(p, terms, thresholds.FIT_WINDOW_STEPS)
         return p
 
@@ -111,8 +111,8 @@ class FitProblem:
 
     def half_cycles(self, p: np.ndarray, max_count: int = MAX_HALF_CYCLES) -> tuple[np.ndarray, np.ndarray]:
         """Return amplitudes and start times (N + 1,), in s, of the half cycles up to the end of the samples."""
-        until = p[OMEGA] * (self.t[-1] - p[T0])
-        sequence = iterate_return_map(p[None, LAW], self.model.is_pendulum, self.model.min_amplitude, max_count, until)
+        end = p[OMEGA] * (self.t[-1] - p[T0])
+        sequence = iterate_return_map(p[None, LAW], self.model.is_pendulum, self.model.min_amplitude, max_count, end)
         return sequence.amplitudes[:, 0], p[T0] + sequence.starts[:, 0] / p[OMEGA]
 
     def skip_half_cycles(self, p: np.ndarray, count: int) -> tuple[Self, np.ndarray]:
@@ -192,11 +192,11 @@ def fit_numbered_extrema(
 
     def residuals(p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         at, x, jacobian = model.predict_extrema(p, unknowns, len(times))
-        reached = np.isfinite(at)
-        in_time = np.where(reached, (np.where(reached, at, 0.0) - times) * weights, thresholds.UNREACHED)
-        in_position = np.where(reached, (np.where(reached, x, 0.0) - positions) / error, thresholds.UNREACHED)
+        is_reached = np.isfinite(at)
+        in_time = np.where(is_reached, (np.where(is_reached, at, 0.0) - times) * weights, thresholds.UNREACHED)
+        in_position = np.where(is_reached, (np.where(is_reached, x, 0.0) - positions) / error, thresholds.UNREACHED)
         slopes = (
-            np.where(reached[None, :, None], jacobian, 0.0)
+            np.where(is_reached[None, :, None], jacobian, 0.0)
             * np.stack([weights, np.full_like(weights, 1 / error)])[..., None]
         )
         return np.concatenate([in_time, in_position]), slopes.reshape(-1, len(unknowns))

@@ -121,8 +121,8 @@ def fit_certain_samples(motion: FreeMotion) -> FreeMotion:
 def truncate_at_stop(motion: FreeMotion) -> FreeMotion:
     """Select the available samples up to the stop of the motion."""
     available = motion.available
-    used = available.subset(available.t <= last_usable_time(available, motion.p))
-    return replace(motion, problem=used) if len(used.t) == len(motion.problem.t) else motion.fit(used)
+    selection = available.subset(available.t <= last_usable_time(available, motion.p))
+    return replace(motion, problem=selection) if len(selection.t) == len(motion.problem.t) else motion.fit(selection)
 
 
 def last_usable_time(problem: FitProblem, p: np.ndarray) -> float:
@@ -132,9 +132,9 @@ def last_usable_time(problem: FitProblem, p: np.ndarray) -> float:
     """
     amplitudes, starts = problem.half_cycles(p)
     spans = (amplitudes[:-1] + amplitudes[1:]) * p[OMEGA] ** problem.model.order
-    lost = np.flatnonzero(spans < thresholds.MIN_QUANTISER_STEPS * problem.quantiser_step / problem.scale)
+    unusable = np.flatnonzero(spans < thresholds.MIN_QUANTISER_STEPS * problem.quantiser_step / problem.scale)
     stop = len(starts) - (1 if starts[-1] > problem.t[-1] else 2)
-    last = min(int(lost[0]), stop) if len(lost) else stop
+    last = min(int(unusable[0]), stop) if len(unusable) else stop
     return float(starts[max(last, min(3, len(starts) - 1))])
 
 
@@ -162,8 +162,8 @@ def skip_disturbed_start(motion: FreeMotion) -> FreeMotion:
     if len(starts) < 2 or not 3 <= first.sum() < len(e) - 12:
         return motion
     rest = float(np.sqrt(np.mean(e[~first] ** 2)))
-    usual = max(problem.noise, rest, problem.residual_floor)
-    if not np.sqrt(np.mean(e[first] ** 2)) > thresholds.DISTURBED_START * usual:
+    expected_rms = max(problem.noise, rest, problem.residual_floor)
+    if not np.sqrt(np.mean(e[first] ** 2)) > thresholds.DISTURBED_START * expected_rms:
         return motion
     later, p = problem.skip_half_cycles(motion.p, 1)
     later = later.subset(~first)
@@ -178,17 +178,17 @@ def skip_disturbed_start(motion: FreeMotion) -> FreeMotion:
 
 def truncate_at_disturbance(motion: FreeMotion) -> FreeMotion:
     """Select the samples before the record departs from the law that it follows until then, if it does."""
-    used, extrema, terms = motion.problem, motion.extrema, motion.terms
-    rms = float(np.sqrt(motion.sum_of_squares / len(used.t)))
-    if rms <= thresholds.DISTURBED * used.noise:
+    selection, extrema, terms = motion.problem, motion.extrema, motion.terms
+    rms = float(np.sqrt(motion.sum_of_squares / len(selection.t)))
+    if rms <= thresholds.DISTURBED * selection.noise:
         return motion
-    start, rms = used.t[0] + used.time_origin, rms * used.scale
+    start, rms = selection.t[0] + selection.time_origin, rms * selection.scale
     for share in thresholds.UNDISTURBED_PARTS:
         count = int(share * len(extrema.t))
         if count < thresholds.MIN_UNDISTURBED:
             return motion
         first = replace(extrema, t=extrema.t[:count], x=extrema.x[:count])
-        problem, p = initial_problem(motion.record, first, terms, used.model.is_pendulum, used.drift)
+        problem, p = initial_problem(motion.record, first, terms, selection.model.is_pendulum, selection.drift)
         problem = problem.subset(problem.t >= start - problem.time_origin)
         last = float(first.t[-1] - problem.time_origin)
         if np.searchsorted(problem.t, last, "right") < MIN_SAMPLES:

@@ -87,11 +87,11 @@ def differentiate_series(series: np.ndarray) -> np.ndarray:
 def compute_powers(h: np.ndarray, count: int) -> np.ndarray:
     """Return h (L,) to the powers 0 to count - 1, as (count, L)."""
     result = np.empty((count, len(h)))
-    result[0], result[1], done = 1.0, h, 2
-    while done < count:
-        batch = min(done - 1, count - done)
-        np.multiply(result[done - 1], result[1 : batch + 1], out=result[done : done + batch])
-        done += batch
+    result[0], result[1], n_powers = 1.0, h, 2
+    while n_powers < count:
+        batch = min(n_powers - 1, count - n_powers)
+        np.multiply(result[n_powers - 1], result[1 : batch + 1], out=result[n_powers : n_powers + batch])
+        n_powers += batch
     return result
 
 

@@ -66,12 +66,12 @@ class DecayIdentification:
 
     def __repr__(self) -> str:
         """Describe the result in one line; its arrays may be long."""
-        values = ", ".join(f"{each.name} = {each.value:.4g} {each.unit}" for each in self.estimates)
+        values = ", ".join(f"{estimate.name} = {estimate.value:.4g} {estimate.unit}" for estimate in self.estimates)
         return f"<DecayIdentification of {self.record.name}: {values}>"
 
     def __getitem__(self, name: str) -> Estimate:
         """Return the estimate of a constant from the whole signal, as ``result["zeta"]``."""
-        estimates = {each.name: each for each in self.estimates}
+        estimates = {estimate.name: estimate for estimate in self.estimates}
         check_names("estimate", [name], estimates)
         return estimates[name]
 
@@ -108,7 +108,10 @@ class DecayIdentification:
     @property
     def sentence(self) -> str:
         """The selected law, and by how much it is better than the others."""
-        if not any(each.low > 0 for each in self.estimates if each.name in TERMS) and not self.best.p[5:].any():
+        if (
+            not any(estimate.low > 0 for estimate in self.estimates if estimate.name in TERMS)
+            and not self.best.p[5:].any()
+        ):
             return "No loss stands out of the noise; the intervals give upper limits."
         others = [f"{law.description} {law.bic - self.best.bic:+.1f}" for law in self.laws[1:]]
         rest = f"; {', '.join(others)})" if others else ")"
@@ -159,7 +162,9 @@ def suggest_remedy(record: Record, parameters: KnownParameters, drag: bool, drif
     if not drift:
         with suppress(HarnessError):
             with_drift = identify_record(record, parameters, drag, True, lambda share: None)
-            total = next(each.value for each in with_drift.estimates if each.name == "drift") * np.ptp(record.t)
+            total = next(estimate.value for estimate in with_drift.estimates if estimate.name == "drift") * np.ptp(
+                record.t
+            )
             if not with_drift.problem.exceeds_noise(with_drift.best.sum_of_squares):
                 return f"the rest position drifts by {total:.3g} {record.unit} over the record: add --drift"
     return ""

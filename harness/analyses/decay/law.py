@@ -35,8 +35,8 @@ def unknown_indices(terms: Terms, drift: bool) -> np.ndarray:
 
 def describe_law(terms: Terms) -> str:
     """Return the names of the terms, as in 'viscous damping and dry friction'."""
-    *most, last = (TERM_NAMES[term] for term in terms)
-    return f"{', '.join(most)} and {last}" if most else last
+    *others, last = (TERM_NAMES[term] for term in terms)
+    return f"{', '.join(others)} and {last}" if others else last
 
 
 def sticking_limit(r: np.ndarray, is_pendulum: bool) -> np.ndarray:

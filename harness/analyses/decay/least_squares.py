@@ -80,16 +80,16 @@ def least_squares(
     scale = column_norms(fit.jac)
     inverse = np.linalg.pinv((fit.jac / scale).T @ (fit.jac / scale))
     errors = np.sqrt(np.diag(inverse) * 2 * fit.cost / degrees_of_freedom) / scale
-    absent = (lowest == 0) & (fit.x <= thresholds.ABSENT_LOSS * errors) & (fit.grad >= 0)
-    if not absent.any():
+    is_zero = (lowest == 0) & (fit.x <= thresholds.ABSENT_LOSS * errors) & (fit.grad >= 0)
+    if not is_zero.any():
         return p, 2 * float(fit.cost)
-    p[unknowns[absent]] = 0.0
+    p[unknowns[is_zero]] = 0.0
 
     def residual_of_others(q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         r, jacobian = residual(q)
-        return r, jacobian[:, ~absent]
+        return r, jacobian[:, ~is_zero]
 
-    return least_squares(residual_of_others, p, unknowns[~absent], max_steps)
+    return least_squares(residual_of_others, p, unknowns[~is_zero], max_steps)
 
 
 def compress(r: np.ndarray, jacobian: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

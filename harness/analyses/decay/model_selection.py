@@ -41,8 +41,8 @@ def select_reported_law(laws: tuple[FittedLaw, ...], full: FittedLaw, problem: F
 
 def deviance_difference(problem: FitProblem, law: FittedLaw, other: FittedLaw) -> float:
     """Return n ln(squares) of a law minus that of another, with squares no smaller than the accuracy of the model."""
-    n, least = len(problem.t), len(problem.t) * problem.residual_floor**2
-    return n * float(np.log(max(law.sum_of_squares, least) / max(other.sum_of_squares, least)))
+    n, floor = len(problem.t), len(problem.t) * problem.residual_floor**2
+    return n * float(np.log(max(law.sum_of_squares, floor) / max(other.sum_of_squares, floor)))
 
 
 def fit_all_laws(
@@ -58,16 +58,16 @@ def fit_all_laws(
     """
     laws = sublaws(terms)
     fits = {terms: full}
-    for done, law in enumerate(laws):
-        report(done / len(laws))
-        absent = [term for term in terms if term not in law and full[0][ZETA + TERMS.index(term)] > 0]
-        if not absent:
+    for i, law in enumerate(laws):
+        report(i / len(laws))
+        other_terms = [term for term in terms if term not in law and full[0][ZETA + TERMS.index(term)] > 0]
+        if not other_terms:
             fits[law] = full
             continue
-        without, start = full[0].copy(), full[0].copy()
-        without[[ZETA + TERMS.index(term) for term in absent]] = 0.0
+        reduced, start = full[0].copy(), full[0].copy()
+        reduced[[ZETA + TERMS.index(term) for term in other_terms]] = 0.0
         start[ZETA:] = estimate_losses(amplitudes, law, problem.model.is_pendulum)
-        best = min(without, start, key=lambda p: float(np.sum(problem.residuals(p, law)[0] ** 2)))
+        best = min(reduced, start, key=lambda p: float(np.sum(problem.residuals(p, law)[0] ** 2)))
         fits[law] = problem.fit(best, law)
     for _ in range(thresholds.MAX_REFITS):
         for part, whole in permutations(laws, 2):

@@ -36,7 +36,7 @@ def nonnegative_interval(z: np.ndarray, correlation: np.ndarray) -> tuple[float,
     low, high : bounds in standard errors
     """
     cone = NonnegativeCone(correlation)
-    most_likely, least = cone.nearest(z)
+    most_likely, min_distance = cone.nearest(z)
     eigenvalues, axes = np.linalg.eigh(correlation)
     # the symmetric square root does not depend on the signs of the eigenvectors
     draws = axes * np.sqrt(np.maximum(eigenvalues, 0.0)) @ axes.T @ quasirandom_normal(len(z))
@@ -44,10 +44,10 @@ def nonnegative_interval(z: np.ndarray, correlation: np.ndarray) -> tuple[float,
     def excess_distance(m: float) -> float:
         """Return how much farther z is from the means with first mean m than 95 % of the draws from them."""
         means, square = cone.nearest(z, m)
-        drawn = means[:, None] + draws
-        increase = cone.squared_distances(drawn, m) - cone.squared_distances(drawn)
+        points = means[:, None] + draws
+        increase = cone.squared_distances(points, m) - cone.squared_distances(points)
         limit = np.partition(increase, int(0.95 * N_DRAWS))[int(0.95 * N_DRAWS)]
-        return float(np.sqrt(max(square - least, 0.0)) - np.sqrt(max(limit, 0.0)))
+        return float(np.sqrt(max(square - min_distance, 0.0)) - np.sqrt(max(limit, 0.0)))
 
     best, precision = float(most_likely[0]), thresholds.INTERVAL_PRECISION
     high = optimize.brentq(excess_distance, best, best + thresholds.MAX_BOUND, xtol=precision)
@@ -62,7 +62,7 @@ class NonnegativeCone:
     def __init__(self, correlation: np.ndarray) -> None:
         k = len(correlation)
         self.faces = []
-        for held in (list(some) for size in range(k + 1) for some in combinations(range(k), size)):
+        for held in (list(indices) for size in range(k + 1) for indices in combinations(range(k), size)):
             free = [i for i in range(k) if i not in held]
             weight = np.linalg.pinv(correlation[np.ix_(held, held)])
             self.faces.append((held, free, weight, correlation[np.ix_(free, held)] @ weight))

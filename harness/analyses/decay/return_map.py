@@ -60,7 +60,7 @@ def iterate_return_map(
     is_pendulum: bool,
     min_amplitude: float,
     max_count: int = MAX_HALF_CYCLES,
-    until: float = np.inf,
+    end: float = np.inf,
 ) -> HalfCycleSequence:
     """Return the half cycles of several laws; the first law decides how many.
 
@@ -69,12 +69,12 @@ def iterate_return_map(
     laws : (P, 4) rows of A, zeta, r, b
     min_amplitude : half cycles from a smaller amplitude, or from one that friction holds, are left out
     max_count : maximum number of half cycles
-    until : half cycles that start later, in theta, are left out
+    end : half cycles that start later, in theta, are left out
     """
     first, _, r, b = laws.T
     low = sticking_limit(r, is_pendulum)
-    few, many = (NODES_PENDULUM, NODES_LARGE) if is_pendulum else (NODES_LINEAR, NODES_DRAG)
-    count = many if (first.max() > LARGE_ANGLE if is_pendulum else b.any()) else few
+    n_small, n_large = (NODES_PENDULUM, NODES_LARGE) if is_pendulum else (NODES_LINEAR, NODES_DRAG)
+    count = n_large if (first.max() > LARGE_ANGLE if is_pendulum else b.any()) else n_small
     order = np.arange(float(count))
     angle = np.pi * (order + 0.5) / count
     scale = 2 / (first - low)
@@ -87,7 +87,7 @@ def iterate_return_map(
     ones = np.ones(len(laws))
     shares, durations, min_share, at = [ones], [np.zeros(len(laws))], min_amplitude * scale[0] - 1, 0.0
     polynomials: list[np.ndarray] = []
-    while first[0] > low[0] and len(polynomials) < max_count and shares[-1][0] > min_share and at <= until:
+    while first[0] > low[0] and len(polynomials) < max_count and shares[-1][0] > min_share and at <= end:
         angle = np.arccos(np.minimum(np.maximum(shares[-1], -ones), ones))
         polynomials.append(np.cos(np.multiply.outer(angle, order)))
         share, duration = np.vecdot(polynomials[-1], coefficients)

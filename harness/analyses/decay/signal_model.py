@@ -59,8 +59,8 @@ class SignalModel:
         """Return the signal (n,) at rising times t (n,) in s, and its Jacobian (n, k) for k of the UNKNOWNS."""
         laws, changed, changes = self.perturbed_laws(p, unknowns)
         theta = p[OMEGA] * (t - p[T0])
-        until = float(theta[-1]) if len(t) else 0.0
-        sequence = iterate_return_map(laws, self.is_pendulum, self.min_amplitude, until=until)
+        end = float(theta[-1]) if len(t) else 0.0
+        sequence = iterate_return_map(laws, self.is_pendulum, self.min_amplitude, end=end)
         amplitudes, starts, series = sequence.amplitudes, sequence.starts, sequence.series(self.order)
         count = len(amplitudes) - 1
 

@@ -55,15 +55,15 @@ class ColumnResiduals:
 
 
 def answer_as_json(
-    used: Sequence[UsedSamples],
+    samples: Sequence[UsedSamples],
     columns: Sequence[ColumnResiduals],
     estimates: Sequence[Estimate],
     remarks: Sequence[str],
 ) -> dict[str, Any]:
     """Return the keys that the answers of `decay` and of `fit` share."""
     return {
-        "record": ", ".join(each.record for each in used),
-        "records": [each.as_json() for each in used],
+        "record": ", ".join(each.record for each in samples),
+        "records": [each.as_json() for each in samples],
         "columns": [asdict(column) for column in columns],
         "fit": [asdict(estimate) for estimate in estimates],
         "remarks": [*remarks],

@@ -33,8 +33,8 @@ def plot_residuals(axes: Axes, t: np.ndarray, e: np.ndarray, noise: float, name:
 
 def plot_samples(axes: Axes, t: np.ndarray, x: np.ndarray, **style: Any) -> None:
     """Plot samples, reduced to extremes if there are many."""
-    some = extremes(x)
-    axes.plot(t[some], x[some], ".", markersize=2.5, **style)
+    index = extremes(x)
+    axes.plot(t[index], x[index], ".", markersize=2.5, **style)
 
 
 def extremes(x: np.ndarray) -> np.ndarray:

@@ -85,12 +85,12 @@ class ExternalFmu:
         message = first_line(cause) if cause else ""
         path.touch()
         time, columns = read_rows(path.read_bytes(), self.chosen, self.description.fmiVersion == "2.0")
-        for older in self.directory.glob(f"{ROWS_PREFIX}*") if not message else ():
-            if older != path:
-                older.unlink()  # superseded by a complete run
+        for file in self.directory.glob(f"{ROWS_PREFIX}*") if not message else ():
+            if file != path:
+                file.unlink()  # superseded by a complete run
         if message:
-            where = f" at t = {time[-1]:.9g} s" if len(time) and " at t = " not in message else ""
-            message = ": ".join(filter(None, (message + where, log.error_message)))
+            time_text = f" at t = {time[-1]:.9g} s" if len(time) and " at t = " not in message else ""
+            message = ": ".join(filter(None, (message + time_text, log.error_message)))
         self.n_runs += 1
         terminated, step_refused = isinstance(cause, TerminatedError), isinstance(cause, StepRefusedError)
         return RefinementRun(number, time, columns, message, terminated, step_refused)

@@ -53,19 +53,19 @@ def simulate(spec: RunSpec, description: Any, report: Callable[[float], None]) -
     variables = {variable.name: variable for variable in description.modelVariables}
     exchange = spec.exchange or description.coSimulation is None
     if exchange and description.modelExchange is None:
-        offered = " and ".join(offered_interfaces(description)) or "no interface"
+        interfaces = " and ".join(offered_interfaces(description)) or "no interface"
         lacks = "model exchange is not among them" if spec.exchange else "neither co-simulation nor model exchange"
-        raise HarnessError(f"{spec.fmu.name} offers {offered}; {lacks}")
+        raise HarnessError(f"{spec.fmu.name} offers {interfaces}; {lacks}")
     values = convert_values(spec, variables)
     check_inputs(spec.inputs, variables)
-    chosen = select_variables(spec, variables, values)
+    selection = select_variables(spec, variables, values)
     start, stop = check_time_span(spec, description)
     with unpack(spec.fmu) as folder, temporary_directory("rows-") as directory:
         check_library(spec.fmu, description, exchange, folder)
         inputs = {name: tuple(map(float, column)) for name, column in spec.inputs.items()}
         resolved = replace(spec, exchange=exchange, start=start, stop=stop, values=values, inputs=inputs)
         outcome, printed = run_fmu_process(resolved, folder, directory, report)
-        time, columns = read_longest_rows(directory, outcome.run_number, chosen, description.fmiVersion == "2.0")
+        time, columns = read_longest_rows(directory, outcome.run_number, selection, description.fmiVersion == "2.0")
         texts = [json.loads(line) for line in read_lines(directory / STRINGS_FILE)]
     failed = f"{spec.fmu.name}: {outcome.failure}" if outcome.failure else ""
     if failed and len(time) and " at t = " not in failed:
@@ -74,14 +74,14 @@ def simulate(spec: RunSpec, description: Any, report: Callable[[float], None]) -
         raise HarnessError(failed or f"{spec.fmu.name} returns no values")
     note_on_output = f"it printed: {printed[-1][:MAX_VALUE_LENGTH]}" if printed else ""
     note = "; ".join(filter(None, (outcome.note, note_on_output)))
-    trajectory = build_trajectory(spec, variables, values, chosen, time, columns, texts)
+    trajectory = build_trajectory(spec, variables, values, selection, time, columns, texts)
     return replace(trajectory, note=note, failure=failed)
 
 
 def offered_interfaces(description: Any) -> list[str]:
     """Return the interfaces of an FMU without model exchange."""
-    offered = {"co-simulation": description.coSimulation, "scheduled execution": description.scheduledExecution}
-    return [name for name, interface in offered.items() if interface]
+    interfaces = {"co-simulation": description.coSimulation, "scheduled execution": description.scheduledExecution}
+    return [name for name, interface in interfaces.items() if interface]
 
 
 def check_time_span(spec: RunSpec, description: Any) -> tuple[float, float]:
@@ -140,11 +140,11 @@ def run_fmu_process(
 
 
 def read_longest_rows(
-    directory: Path, run_number: int | None, chosen: list[ShapedVariable], is_fmi2: bool
+    directory: Path, run_number: int | None, selection: list[ShapedVariable], is_fmi2: bool
 ) -> tuple[np.ndarray, Columns]:
     """Return time and columns of the selected run; for None those of the longest run, which may be empty."""
     files = [directory / f"{ROWS_PREFIX}{run_number}"] if run_number is not None else directory.glob(f"{ROWS_PREFIX}*")
-    runs = [read_rows(file.read_bytes(), chosen, is_fmi2) for file in files]
+    runs = [read_rows(file.read_bytes(), selection, is_fmi2) for file in files]
     return max((run for run in runs if len(run[0])), key=lambda run: float(run[0][-1]), default=(np.zeros(0), {}))
 
 
@@ -157,14 +157,14 @@ def build_trajectory(
     spec: RunSpec,
     variables: Values,
     values: Values,
-    chosen: list[ShapedVariable],
+    selection: list[ShapedVariable],
     time: np.ndarray,
     recorded: Columns,
     texts: list[str],
 ) -> Trajectory:
     """Build the trajectory of a run from what was recorded."""
     columns, units, descriptions = {}, {}, {}
-    for variable, shape in chosen:
+    for variable, shape in selection:
         for name in element_names(variable.name, shape):
             if name in spec.outputs or variable.name in spec.outputs:
                 column = recorded[name]
@@ -178,8 +178,8 @@ def build_trajectory(
                 effective_value(variable, set_values.get(alias_key(variable), variable.start)),
                 variable_unit(variable),
             )
-    stored = {name: effective_value(variables[name], value) for name, value in values.items()}
-    as_done = replace(spec, outputs=tuple(columns), values=stored)
+    effective_values = {name: effective_value(variables[name], value) for name, value in values.items()}
+    as_done = replace(spec, outputs=tuple(columns), values=effective_values)
     return Trajectory(as_done, time, columns, units, descriptions, parameters)
 
 

@@ -161,8 +161,8 @@ def no_agreement(change: str, current: RefinementRun, difference: float, spec: R
 
 def keep_longest_run(previous: RefinementRun | None, current: RefinementRun) -> RefinementResult:
     """Report why the last run is incomplete and select the longer of the two."""
-    candidates = [each for each in (current, previous) if each and len(each.time) > 1]
-    longest = max(candidates, key=lambda each: float(each.time[-1]), default=None)
+    candidates = [run for run in (current, previous) if run and len(run.time) > 1]
+    longest = max(candidates, key=lambda run: float(run.time[-1]), default=None)
     return RefinementResult(longest.number if longest else None, "", current.message)
 
 
@@ -229,7 +229,7 @@ def refine_tolerance(spec: RunSpec, h: float, run: RunFunction) -> RefinementRes
 def max_difference(first: RefinementRun, second: RefinementRun, spec: RunSpec) -> float:
     """Return the largest difference of two runs at the coarsest times, relative to each variable's largest value."""
     grid = coarsest_grid(spec)
-    end = min(each.time[-1] if len(each.time) else grid.start for each in (first, second))
+    end = min(run.time[-1] if len(run.time) else grid.start for run in (first, second))
     tolerance = 1e-9 * grid.duration
     times = np.append(np.arange(grid.start, grid.stop - tolerance, grid.h), grid.stop)
     times = times[times <= end + tolerance]

@@ -27,24 +27,24 @@ CLOSED = Baseline("closed form in 120 digits")
 
 def accuracy_benchmarks() -> list[Callable[[], Benchmark]]:
     """Return the accuracy benchmarks."""
-    cards = {model: read_info(model) for model in MODELS}
-    closed = [model for model in MODELS if "exact" in cards[model].methods]
+    infos = {model: read_info(model) for model in MODELS}
+    closed = [model for model in MODELS if "exact" in infos[model].methods]
     return [
-        *(partial(exact_run_error, model, cards[model]) for model in closed),
+        *(partial(exact_run_error, model, infos[model]) for model in closed),
         *(
-            partial(event_time_error, model, cards[model])
+            partial(event_time_error, model, infos[model])
             for model in closed
-            if "friction" in cards[model].enumerations
+            if "friction" in infos[model].enumerations
         ),
         partial(last_event_error, "coulomb", {"f": 1e-7}, 300_000, turning_time),
         partial(last_event_error, "stickslip", {}, 200_000, slip_event_time),
         *(
-            partial(default_run_error, "pendulum", cards["pendulum"], "pin_load", load, 1e-9)
+            partial(default_run_error, "pendulum", infos["pendulum"], "pin_load", load, 1e-9)
             for load in ("weight", "reaction")
         ),
-        *(partial(default_run_error, "pacejka", cards["pacejka"], "x_m", 10.0**-n, 1e-7) for n in range(2, 7)),
-        *(partial(between_grids, model, cards[model]) for model in MODELS),
-        *(partial(stuck_drift, model, cards[model], values) for model, values in SETTINGS["stuck"].items()),
+        *(partial(default_run_error, "pacejka", infos["pacejka"], "x_m", 10.0**-n, 1e-7) for n in range(2, 7)),
+        *(partial(between_grids, model, infos[model]) for model in MODELS),
+        *(partial(stuck_drift, model, infos[model], values) for model, values in SETTINGS["stuck"].items()),
     ]
 
 
@@ -63,9 +63,9 @@ def run_through_times(spec: RunSpec, times: list[float]) -> tuple[np.ndarray, np
     return x, v
 
 
-def max_error(model: str, read_info: FmuInfo, chosen: dict[str, float | str]) -> float:
+def max_error(model: str, read_info: FmuInfo, settings: dict[str, float | str]) -> float:
     """Return the largest error of the default experiment, relative to the largest value."""
-    values = read_info.resolve_labels({**read_info.start_values, **chosen})
+    values = read_info.resolve_labels({**read_info.start_values, **settings})
     answer = compute_reference(model, [(0.0, read_info.stop, values)], CommunicationGrid(0.0, read_info.stop, POINTS))
     spec = RunSpec(find_fmu(model), values=values, stop=read_info.stop)
     return motion_error(answer, *run_through_times(spec, answer.times.tolist()))
@@ -145,9 +145,9 @@ def between_grids(model: str, read_info: FmuInfo) -> Benchmark:
     )
 
 
-def stuck_drift(model: str, read_info: FmuInfo, chosen: dict[str, float]) -> Benchmark:
+def stuck_drift(model: str, read_info: FmuInfo, settings: dict[str, float]) -> Benchmark:
     """Measure the displacement of a stuck body."""
-    spec = RunSpec(find_fmu(model), values={**read_info.start_values, **chosen}, stop=1e6)
+    spec = RunSpec(find_fmu(model), values={**read_info.start_values, **settings}, stop=1e6)
     x, _ = run_through_times(spec, [1e4 * i for i in range(101)])
     displacement = float(np.abs(x - x[0]).max())
     return Benchmark(f"{model}, stuck for 1e6 s: displacement", displacement, equations_of(model).unit, 0.0, ())

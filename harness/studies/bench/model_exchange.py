@@ -105,7 +105,7 @@ def largest_error_of(scene: Scenario, result: Trajectory | np.ndarray) -> float:
 
 def run_cvode(scene: Scenario, rtol: float) -> np.ndarray:
     """Run CVODE in C; return position and speed (n, 2) at the common times."""
-    its, library = scene.case, build_cvode_fmu(scene.case.model, plain=True)
+    case, library = scene.case, build_cvode_fmu(scene.case.model, plain=True)
 
     def set_values(**values: float) -> list[str]:
         return [f"0 setr {library.references[name]} {value!r}" for name, value in values.items()]
@@ -113,7 +113,7 @@ def run_cvode(scene: Scenario, rtol: float) -> np.ndarray:
     read = "0 getr {} {}".format(*map(library.references.__getitem__, ("x", "v")))
     input_calls = {t: set_values(force=value, rate=rate) for t, _, value, rate in scene.segments}
     common_times = {*scene.times.tolist()}
-    calls = ["0 new hand quiet", *set_values(**its.values, rtol=rtol, atol=rtol * its.problem.atol_factor)]
+    calls = ["0 new cvode quiet", *set_values(**case.values, rtol=rtol, atol=rtol * case.problem.atol_factor)]
     calls += [*input_calls.pop(scene.start), f"0 begin {scene.start!r}", read]
     for t, ahead in pairwise(sorted(common_times | input_calls.keys())):
         calls += [*input_calls.get(t, []), f"0 step {t!r} {ahead - t!r}", *[read] * (ahead in common_times)]
@@ -130,7 +130,7 @@ def run_fmpy(scene: Scenario, rtol: float, exchange: bool = True) -> Trajectory:
 
 def run_fmusim(scene: Scenario, rtol: float) -> Trajectory:
     """Run the FMI 3.0 FMU with fmusim."""
-    program, its = shutil.which("fmusim"), scene.case
+    program, case = shutil.which("fmusim"), scene.case
     if program is None:
         raise MissingToolError("not installed: fmusim")
     if scene.has_ramps:
@@ -147,14 +147,14 @@ def run_fmusim(scene: Scenario, rtol: float) -> Trajectory:
             rows = np.column_stack([*inputs.values()])
             np.savetxt(input_file, rows, "%.17g", ",", header=",".join(inputs), comments="")
             command += ["--input-file", str(input_file)]
-        process = run_subprocess([*command, str(fmi3_fmu(its.model))])
+        process = run_subprocess([*command, str(fmi3_fmu(case.model))])
         if process.returncode:
             raise HarnessError(
                 " ".join((process.stderr or process.stdout).split()) or "fmusim failed without a message"
             )
         rows = np.genfromtxt(file, delimiter=",", names=True)
-        spec = scene.run_with(fmi3_fmu(its.model), rtol, exchange=True)
-        return Trajectory(spec, rows["time"], {name: rows[name] for name in its.outputs}, {}, {}, {})
+        spec = scene.run_with(fmi3_fmu(case.model), rtol, exchange=True)
+        return Trajectory(spec, rows["time"], {name: rows[name] for name in case.outputs}, {}, {}, {})
 
 
 def difference_from_cosimulation(scene: Scenario) -> Benchmark:
@@ -188,16 +188,17 @@ def call_overhead(model: str) -> Benchmark:
         states = len(root.findall("ModelStructure/Derivatives/Unknown"))
         indicators = int(root.attrib["numberOfEventIndicators"])
         original, reference = (
-            time_calls(build_bouncing_ball(of), *BOUNCING_BALL_SIZES, BOUNCING_BALL_START) for of in ("force", equation)
+            time_calls(build_bouncing_ball(acceleration), *BOUNCING_BALL_SIZES, BOUNCING_BALL_START)
+            for acceleration in ("force", equation)
         )
-        own = time_calls(library, states, indicators, SETTINGS["moving"].get(model, {}))
+        fmu_times = time_calls(library, states, indicators, SETTINGS["moving"].get(model, {}))
         baselines = [
-            Baseline(f"BouncingBall with this equation, {call}", its)
-            for call, its in zip(CALLS, reference, strict=True)
+            Baseline(f"BouncingBall with this equation, {call}", seconds)
+            for call, seconds in zip(CALLS, reference, strict=True)
         ]
-        baselines += [Baseline(f"this FMU, {call}", its) for call, its in zip(CALLS, own, strict=True)]
-        baselines.append(Baseline(f"ratio to the original BouncingBall {sum(own) / sum(original):.3g}"))
-        return sum(own) / sum(reference), 1.1, tuple(baselines)
+        baselines += [Baseline(f"this FMU, {call}", seconds) for call, seconds in zip(CALLS, fmu_times, strict=True)]
+        baselines.append(Baseline(f"ratio to the original BouncingBall {sum(fmu_times) / sum(original):.3g}"))
+        return sum(fmu_times) / sum(reference), 1.1, tuple(baselines)
 
     return measure_or_skip(
         f"{model}, model exchange: one call of each kind in C, ratio to a Reference FMU", "1", figures
@@ -208,8 +209,8 @@ def time_calls(library: Library, states: int, indicators: int, values: dict[str,
     """Measure the time of each call in s, with values set."""
     sets = [f"setr {library.references[name]} {value!r}" for name, value in values.items()]
     lines = ["new bench quiet exchange", *sets, "begin", f"calls {states} {indicators} {REPEATS}", "free"]
-    done = run_host(library, "".join(f"0 {line}\n" for line in lines))
-    return [float(word) for word in done.split()[1:]]
+    output = run_host(library, "".join(f"0 {line}\n" for line in lines))
+    return [float(word) for word in output.split()[1:]]
 
 
 @cache

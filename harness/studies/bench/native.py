@@ -98,10 +98,10 @@ def compare_with_cvode(case: str) -> Benchmark:
     method = "BDF" if CASES_BY_NAME[case].problem.is_stiff else "Adams"
 
     def figures() -> Measured:
-        own, peers = time_fmu(case, "native"), [time_cvode(case, rtol) for rtol in TOLERANCES]
-        error, errors = largest_error(case, own), [largest_error(case, peer) for peer in peers]
-        ratio = max(own.seconds / min(peer.seconds for peer in peers), error / min(errors))
-        baselines = [Baseline(f"this FMU, error {error:.1e}", own.seconds)]
+        timing, peers = time_fmu(case, "native"), [time_cvode(case, rtol) for rtol in TOLERANCES]
+        error, errors = largest_error(case, timing), [largest_error(case, peer) for peer in peers]
+        ratio = max(timing.seconds / min(peer.seconds for peer in peers), error / min(errors))
+        baselines = [Baseline(f"this FMU, error {error:.1e}", timing.seconds)]
         for rtol, peer, peer_error in zip(TOLERANCES, peers, errors, strict=True):
             baselines.append(Baseline(f"CVODE FMU, {method} at {rtol:.0e}, error {peer_error:.1e}", peer.seconds))
         return ratio, 1.0, tuple(baselines)
@@ -115,13 +115,13 @@ def compare_backends(seconds: Callable[[str], float]) -> Measured:
     return native, python, (Baseline("FMU in Python", python),)
 
 
-def measure_or_skip(what: str, unit: str, figures: Callable[[], Measured]) -> Benchmark:
+def measure_or_skip(title: str, unit: str, figures: Callable[[], Measured]) -> Benchmark:
     """Run a measurement; if a tool is missing, return a benchmark with the reason."""
     try:
-        value, reach, baselines = figures()
+        value, target, baselines = figures()
     except MissingToolError as error:
-        return Benchmark(what, nan, unit, nan, (Baseline(str(error)),))
-    return Benchmark(what, value, unit, reach, baselines)
+        return Benchmark(title, nan, unit, nan, (Baseline(str(error)),))
+    return Benchmark(title, value, unit, target, baselines)
 
 
 def built_fmu(model: str, backend: str) -> Path:

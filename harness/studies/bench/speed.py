@@ -52,7 +52,7 @@ def time_in_process(
     problem: OdeProblem,
     values: dict[str, float],
 ) -> Benchmark:
-    """Measure a run with 1600 points without fmpy; `rivals` are methods of scipy and CVODE."""
+    """Measure a run with 1600 points without fmpy; `peer_methods` are those of scipy and CVODE."""
     times = np.linspace(0.0, problem.stop, COMMUNICATION_STEPS + 1)
     embedded_model = EmbeddedModel.create(model_class, values, method, RTOL, ATOL)
     seconds = time_fastest_call(partial(embedded_model.compute_states, times.tolist()), 20)
@@ -94,7 +94,7 @@ def time_one_step(model_class: type) -> Benchmark:
 
 def time_communication_step(model: str) -> Benchmark:
     """Measure a communication step through fmpy with all outputs recorded, relative to that of an empty FMU."""
-    own = find_fmu(model)
+    fmu_file = find_fmu(model)
     with TemporaryDirectory(prefix="fmu-") as folder:
         fmu_description = read_description(find_fmu(model))
         stop = float(fmu_description.defaultExperiment.stopTime)
@@ -105,22 +105,22 @@ def time_communication_step(model: str) -> Benchmark:
         variants = [
             (loop, fmu)
             for loop in (stepping_loops.time_fmpy_loop, stepping_loops.time_direct_loop)
-            for fmu in (own, empty_fmu)
+            for fmu in (fmu_file, empty_fmu)
         ]
         rounds = []
         for _ in range(3):  # alternating, so that other load affects all
             rounds.append(
                 [stepping_loops.time_per_step(loop(fmu, COMMUNICATION_STEPS), loop(fmu, 1)) for loop, fmu in variants]
             )
-    usual, empty, lean, lean_empty = map(min, zip(*rounds, strict=True))
+    fmpy_time, empty, lean, lean_empty = map(min, zip(*rounds, strict=True))
     baselines = (
-        Baseline("this FMU", usual),
+        Baseline("this FMU", fmpy_time),
         Baseline("empty pythonfmu FMU", empty),
         Baseline("this FMU in the loop of the harness", lean),
         Baseline("empty pythonfmu FMU in the loop of the harness", lean_empty),
     )
     name = f"{model}: communication step through fmpy, ratio to an empty one"
-    return Benchmark(name, usual / empty, "1", 1.25, baselines)
+    return Benchmark(name, fmpy_time / empty, "1", 1.25, baselines)
 
 
 def time_many_runs(model_class: type) -> Benchmark:
@@ -129,7 +129,7 @@ def time_many_runs(model_class: type) -> Benchmark:
     run = create_run(model)
     solver = run.solver
 
-    def one(v_driver: float) -> tuple[float, float, int]:
+    def run_to_stop(v_driver: float) -> tuple[float, float, int]:
         model.v_driver = v_driver
         model.prepare()
         solver.start(model, 0.0, *model.initial_state(0.0), model.stop_time, model.tolerance)
@@ -137,8 +137,8 @@ def time_many_runs(model_class: type) -> Benchmark:
         solver.report(run.events)
         return solver.x, solver.v, run.events.count
 
-    seconds = time_call(lambda: [one(0.02 + 3e-6 * i) for i in range(RUNS)])
+    seconds = time_call(lambda: [run_to_stop(0.02 + 3e-6 * i) for i in range(RUNS)])
     problem = StickslipProblem()
-    ask = partial(peer_solvers.solve, "scipy", "RK23", problem, np.array([0.0, problem.stop]), RTOL, ATOL)
-    rival = Baseline(f"scipy RK23 at {RTOL:g}, one run times {RUNS}", RUNS * time_fastest_call(ask, 5))
-    return Benchmark(f"stickslip, exact: {RUNS} runs of {problem.stop:g} s, one core", seconds, "s", 10.0, (rival,))
+    solve = partial(peer_solvers.solve, "scipy", "RK23", problem, np.array([0.0, problem.stop]), RTOL, ATOL)
+    baseline = Baseline(f"scipy RK23 at {RTOL:g}, one run times {RUNS}", RUNS * time_fastest_call(solve, 5))
+    return Benchmark(f"stickslip, exact: {RUNS} runs of {problem.stop:g} s, one core", seconds, "s", 10.0, (baseline,))

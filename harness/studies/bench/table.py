@@ -65,6 +65,7 @@ def summary_row(benchmark: Benchmark) -> tuple[str, ...]:
         for value, digits in ((benchmark.value, ".2g"), (benchmark.target, "g"))
     )
     baselines = "; ".join(
-        each.name if each.value is None else f"{each.name} {each.value:.2g}" for each in benchmark.baselines
+        baseline.name if baseline.value is None else f"{baseline.name} {baseline.value:.2g}"
+        for baseline in benchmark.baselines
     )
     return benchmark.name, measured, target, "" if benchmark.unit == "1" else benchmark.unit, baselines

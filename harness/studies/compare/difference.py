@@ -146,8 +146,8 @@ def units(one: Trajectory, two: Trajectory, name: str) -> tuple[str | None, floa
     return left, factor, "" if factor == 1.0 else f"{name} is in {right} in {two.name}; compared in {left}"
 
 
-def is_string(path: Trajectory, name: str) -> bool:
-    return path.columns[name].dtype.kind == "U"
+def is_string(trajectory: Trajectory, name: str) -> bool:
+    return trajectory.columns[name].dtype.kind == "U"
 
 
 def encode_strings(one: Trajectory, two: Trajectory) -> Iterator[SignalInterpolant]:
@@ -200,9 +200,9 @@ def events(
 
     Such an interval extends between the two times of a matched event; an unmatched event is an interval of length zero.
     """
-    known = [side.events for side in (one, two) if side.events is not None]
-    names = list(dict.fromkeys(contact for changes in known for contact in changes.modes))
-    contacts = names if any(len(changes.modes) > 1 for changes in known) else []
+    mode_changes = [side.events for side in (one, two) if side.events is not None]
+    names = list(dict.fromkeys(contact for changes in mode_changes for contact in changes.modes))
+    contacts = names if any(len(changes.modes) > 1 for changes in mode_changes) else []
     first, second = (
         np.empty((0, 3)) if side.events is None else stack_events(side.events, contacts, begin, end)
         for side in (one, two)

@@ -33,7 +33,7 @@ class ValueBounds:
 class SignalInterpolant:
     """Interpolates a trajectory between its samples."""
 
-    path: Trajectory
+    trajectory: Trajectory
 
     def bounds_at(self, name: str, at: np.ndarray, jumps: np.ndarray) -> ValueBounds:
         """Return the bounds of a variable at given times.
@@ -47,7 +47,7 @@ class SignalInterpolant:
         jumps : (k, 2)
             Time intervals in s, in each of which the variable jumps once.
         """
-        t, y = self.path.time, self.path.columns[name]
+        t, y = self.trajectory.time, self.trajectory.columns[name]
         index = self.sample_indices(at)
         if not np.isfinite(y).all():
             held = np.where(index < 0, np.nan, y[index])  # unknown between samples
@@ -62,9 +62,9 @@ class SignalInterpolant:
         low, high = smooth.copy(), smooth.copy()
 
         def widen(begin: float, end: float, first: int, last: int) -> None:
-            here = slice(int(np.searchsorted(at, begin, "left")), int(np.searchsorted(at, end, "right")))
-            low[here] = np.minimum(low[here], y[first : last + 1].min())
-            high[here] = np.maximum(high[here], y[first : last + 1].max())
+            interval = slice(int(np.searchsorted(at, begin, "left")), int(np.searchsorted(at, end, "right")))
+            low[interval] = np.minimum(low[interval], y[first : last + 1].min())
+            high[interval] = np.maximum(high[interval], y[first : last + 1].max())
 
         for begin, end in jumps:
             first = max(int(np.searchsorted(t, begin, "left")) - 1, 0)
@@ -79,7 +79,7 @@ class SignalInterpolant:
 
         The times of one grid may differ by rounding in two runs.
         """
-        t = self.path.time
+        t = self.trajectory.time
         before = np.searchsorted(t, at, "right") - 1
         after = np.minimum(before + 1, len(t) - 1)
         nearest = np.where(np.abs(t[after] - at) < np.abs(t[before] - at), after, before)
@@ -90,8 +90,8 @@ class SignalInterpolant:
 
         A rate has the unit of the variable per second, and its integral matches the change of the variable.
         """
-        columns, units = self.path.columns, self.path.units
-        h, change = np.diff(self.path.time), np.diff(scale * columns[name])
+        columns, units = self.trajectory.columns, self.trajectory.units
+        h, change = np.diff(self.trajectory.time), np.diff(scale * columns[name])
         change = np.where(h > 0, change, 0.0)
         tolerance, changes = RATE_TOLERANCE * np.abs(change).sum(), np.add.reduceat(change, self.parts)
         candidates = {}
@@ -109,21 +109,23 @@ class SignalInterpolant:
     @cached_property
     def parts(self) -> np.ndarray:
         """Return the first indices (p,) of the parts over which integrals are compared first."""
-        return np.unique(np.linspace(0, len(self.path.time) - 1, N_PARTS, endpoint=False).astype(int))
+        return np.unique(np.linspace(0, len(self.trajectory.time) - 1, N_PARTS, endpoint=False).astype(int))
 
     @cached_property
     def integrals(self) -> dict[str, np.ndarray]:
         """Return the integrals (p,) over the parts, for every column that may be a rate."""
-        h = np.diff(self.path.time)
-        finite = {name: y for name, y in self.path.columns.items() if y.dtype.kind != "U" and np.isfinite(y).all()}
+        h = np.diff(self.trajectory.time)
+        finite = {
+            name: y for name, y in self.trajectory.columns.items() if y.dtype.kind != "U" and np.isfinite(y).all()
+        }
         with np.errstate(over="ignore"):
             return {name: np.add.reduceat(h * (y[1:] / 2 + y[:-1] / 2), self.parts) for name, y in finite.items()}
 
 
 def interpolate(t: np.ndarray, y: np.ndarray, slope: np.ndarray | None, at: np.ndarray) -> np.ndarray:
     """Interpolate at the times `at`; if a time occurs twice, its second value counts."""
-    holds = np.append(np.diff(t) > 0, True)
-    t, y = t[holds], y[holds]
+    is_last = np.append(np.diff(t) > 0, True)
+    t, y = t[is_last], y[is_last]
     if slope is None:
         return PchipInterpolator(t, y)(at)
-    return CubicHermiteSpline(t, y, slope[holds])(at)
+    return CubicHermiteSpline(t, y, slope[is_last])(at)

@@ -20,7 +20,7 @@ from .difference import Comparison, compare
 def run_comparison(
     sources: tuple[str, str], options: RunSpec, out: Path, report: ProgressCallback
 ) -> tuple[Comparison, Path]:
-    """Compare two sources and write the differences to out/compare/<one>-<two>; FMUs are run with the options `how`."""
+    """Compare two sources and write the differences to out/compare/<one>-<two>; FMUs are run with the `options`."""
     from .figure import draw
 
     names = trajectory_sources.display_names(sources)

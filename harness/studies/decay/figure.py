@@ -35,20 +35,20 @@ def plot_signal(axes: Axes, identified: DecayIdentification) -> None:
     """Plot record, fit, rest position, turning points, and excluded samples."""
     record, t = identified.record, identified.t
     unit, size = display_unit(record.unit)
-    used = np.isin(record.t - identified.problem.time_origin, identified.problem.t)
+    is_fitted = np.isin(record.t - identified.problem.time_origin, identified.problem.t)
     plot_record(axes, t, identified.x / size, record.name, axis_label(record.symbol, unit))
-    if not used.all():
-        plot_samples(axes, record.t[~used], record.x[~used] / size, color=GREY, label="excluded")
-    fine = np.linspace(t[0], t[-1], MAX_POINTS) if len(t) < MAX_POINTS else t[extremes(identified.x)]
+    if not is_fitted.all():
+        plot_samples(axes, record.t[~is_fitted], record.x[~is_fitted] / size, color=GREY, label="excluded")
+    times = np.linspace(t[0], t[-1], MAX_POINTS) if len(t) < MAX_POINTS else t[extremes(identified.x)]
     axes.plot(
-        fine,
-        identified.signal(identified.best, fine) / size,
+        times,
+        identified.signal(identified.best, times) / size,
         color=ORANGE,
         linewidth=0.9,
         label=f"fit: {identified.best.description}",
     )
-    rest = identified.rest(identified.best, fine[[0, -1]]) / size
-    axes.plot(fine[[0, -1]], rest, color=GREY, linestyle="--", linewidth=0.8, label="rest")
+    rest = identified.rest(identified.best, times[[0, -1]]) / size
+    axes.plot(times[[0, -1]], rest, color=GREY, linestyle="--", linewidth=0.8, label="rest")
     if not record.order:
         style: dict[str, Any] = {"color": "black", "fillstyle": "none", "markersize": 5}
         axes.plot(identified.extrema.t, identified.extrema.x / size, "o", label="turning points", **style)

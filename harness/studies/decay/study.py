@@ -35,15 +35,15 @@ LoadedRecord = tuple[Record, KnownParameters, dict[str, Any]]  # with provenance
 def identify_decay(
     source: str,
     columns: ColumnOptions,
-    known: KnownParameters,
+    parameters: KnownParameters,
     drag: bool,
     drift: bool,
     out: Path,
     report: Callable[[float], None],
 ) -> tuple[DecayIdentification, Path]:
     """Identify the decay of a record file or a scene, and write the results to out/decay/<name>."""
-    record, properties, provenance_data = load_record(source, columns, known, report)
-    options = vars(columns) | vars(known) | {"drag": drag, "drift": drift}
+    record, properties, provenance_data = load_record(source, columns, parameters, report)
+    options = vars(columns) | vars(parameters) | {"drag": drag, "drift": drift}
     folder = out / FOLDER / record.name
     named = provenance.describe_sources(source)
     with replace_folder(folder, FILES, named) as new_folder:  # before the fit, so that conflicts are reported at once
@@ -66,20 +66,20 @@ def gc_paused() -> Iterator[None]:
 
 
 def load_record(
-    source: str, columns: ColumnOptions, known: KnownParameters, report: Callable[[float], None]
+    source: str, columns: ColumnOptions, parameters: KnownParameters, report: Callable[[float], None]
 ) -> LoadedRecord:
     """Load the record of a file, or run a scene and take the stiffness from its model."""
     path = Path(source)
     if source == "-":
-        return read_record(source, columns, "stdin"), known, {"files": ()}
+        return read_record(source, columns, "stdin"), parameters, {"files": ()}
     if is_record_file(source):
         if not exists(source):
             raise SceneError(f"{format_value(source)} does not exist: give an existing record, or a scene")
         name = path.stem.encode("utf-8", "replace").decode()
-        return read_record(source, columns, name), known, {"files": (path,)}
+        return read_record(source, columns, name), parameters, {"files": (path,)}
     if path.is_dir():
         raise SceneError(f"{source} is a folder; give a file in it")
-    return record_of_scene(source, columns, known, report)
+    return record_of_scene(source, columns, parameters, report)
 
 
 def is_record_file(source: str) -> bool:
@@ -89,7 +89,7 @@ def is_record_file(source: str) -> bool:
 
 
 def record_of_scene(
-    source: str, columns: ColumnOptions, known: KnownParameters, report: Callable[[float], None]
+    source: str, columns: ColumnOptions, parameters: KnownParameters, report: Callable[[float], None]
 ) -> LoadedRecord:
     """Run a scene and return its position as a record."""
     from ...running.runner import run as run_fmu
@@ -115,10 +115,12 @@ def record_of_scene(
     )
     check_record(record)
     provenance_data = {"files": (run.spec.fmu,), "parameters": run.effective_parameters, "run": run.spec}
-    if known.k is None and known.m is None:
+    if parameters.k is None and parameters.m is None:
         with suppress(HarnessError):  # a model without stiffness has no friction force
-            known = KnownParameters(k=stiffness(run, unit == "rad", "the decay of a scene"), pendulum=unit == "rad")
-    return record, known, provenance_data
+            parameters = KnownParameters(
+                k=stiffness(run, unit == "rad", "the decay of a scene"), pendulum=unit == "rad"
+            )
+    return record, parameters, provenance_data
 
 
 def write_results(identified: DecayIdentification, folder: Path) -> None:
@@ -144,7 +146,7 @@ def identified_as_json(identified: DecayIdentification, loss: EnergyLoss | None 
     """Return the identified decay for JSON output."""
     problem, record, best = identified.problem, identified.record, identified.best
     loss = loss or measure_energy_loss(identified)
-    used = UsedSamples(record.name, identified.t, len(record.t))
+    samples = UsedSamples(record.name, identified.t, len(record.t))
     column = ColumnResiduals(
         record.name,
         record.symbol,
@@ -154,14 +156,14 @@ def identified_as_json(identified: DecayIdentification, loss: EnergyLoss | None 
         float(np.ptp(identified.x)),
     )
     return {
-        **answer_as_json([used], [column], identified.estimates, identified.remarks),
+        **answer_as_json([samples], [column], identified.estimates, identified.remarks),
         "quantity": record.quantity,
         "unit": record.unit,
         "sentence": identified.sentence,
         "noise": identified.extrema.noise,
         "residual": identified.rms,
         "turning points": len(identified.extrema.t),
-        "used": used.as_json(),
+        "used": samples.as_json(),
         "release": {
             "time": float(best.p[T0]) + problem.time_origin,
             "amplitude": float(best.p[AMPLITUDE]) * problem.scale,

@@ -65,11 +65,11 @@ def summary_lines(identified: DecayIdentification) -> list[str]:
         lines.append(
             "The two-peak values attribute the whole loss to one mechanism; with combined mechanisms each is too large."
         )
-    used, record = identified.t, identified.record
-    n_excluded = len(record.t) - len(used)
+    t, record = identified.t, identified.record
+    n_excluded = len(record.t) - len(t)
     if n_excluded:
         lines.append(
-            f"Fitted to {record.quantity} from t = {record.format_time(used[0])} to {record.format_time(used[-1])} s; "
+            f"Fitted to {record.quantity} from t = {record.format_time(t[0])} to {record.format_time(t[-1])} s; "
             f"{n_excluded} of {len(record.t)} samples are excluded (before release, after the last reliable cycle, or "
             "outliers)."
         )

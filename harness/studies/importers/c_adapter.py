@@ -14,10 +14,10 @@ def run_request(request: ImporterRequest, timeout: float) -> tuple[ImporterReply
     """Run a request in the C program; return the reply and what the program printed on standard error."""
     library = load_library(request.run.fmu)
     calls = [*(reset_cycle_calls(request) * request.reset_cycles or runs(request)), "0 unload"]
-    done = run_subprocess(library.command, "".join(f"{call}\n" for call in calls), library.environment, timeout)
-    if done.returncode:
-        raise ChildDiedError(done.returncode, done.stderr)
-    return reply(request, done.stdout), done.stderr
+    process = run_subprocess(library.command, "".join(f"{call}\n" for call in calls), library.environment, timeout)
+    if process.returncode:
+        raise ChildDiedError(process.returncode, process.stderr)
+    return reply(request, process.stdout), process.stderr
 
 
 def reply(request: ImporterRequest, text: str) -> ImporterReply:

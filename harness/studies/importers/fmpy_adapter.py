@@ -16,7 +16,7 @@ from .request import ImporterReply, ImporterRequest, serve
 
 
 def run_request(request: ImporterRequest, prefixes: tuple[str, ...] = ("",)) -> ImporterReply:
-    """Execute a request; print log messages that start with one of `logged`."""
+    """Execute a request; print log messages that start with one of `prefixes`."""
     fmu_description = read_description(request.run.fmu)
     callbacks = logging(prefixes)
     arguments = {
@@ -87,7 +87,7 @@ def run(
 
 
 def logging(prefixes: tuple[str, ...]) -> fmi2.fmi2CallbackFunctions:
-    """Return callbacks that print log messages that start with one of `logged`."""
+    """Return callbacks that print log messages that start with one of `prefixes`."""
 
     def print_message(environment: Any, name: bytes, status: int, category: bytes, text: bytes) -> None:
         if text.decode().startswith(prefixes):

@@ -24,9 +24,9 @@ class ImporterRequest:
     reset_cycles: int = 0  # C program only: number of reset cycles to run instead; three last rows of each
 
     @classmethod
-    def from_json(cls, stored: dict[str, Any]) -> "ImporterRequest":
+    def from_json(cls, table: dict[str, Any]) -> "ImporterRequest":
         """Return the request in a table."""
-        return cls(**{**stored, "run": RunSpec.from_json(stored["run"])})
+        return cls(**{**table, "run": RunSpec.from_json(table["run"])})
 
     @property
     def step(self) -> float:

@@ -28,7 +28,7 @@ def rank_solvers(study: Study, case: ReferenceCase, target: float, beside_dry: b
 
 
 def recommend(study: Study, laws: Iterable[LawDeviation], min_ratio: float = 0.0) -> str:
-    """Return a sentence with the recommendation for a model; run times must differ by the factor `clear`."""
+    """Return a sentence with the recommendation for a model; run times must differ by the factor `min_ratio`."""
     best = [(case, rank_solvers(study, case, TARGET)) for case in study.cases if not case.is_chattering]
     no_method = QUICK_RUN_UNCLEAR.format(study.cases[0].model) if min_ratio else NONE_REACHES
     parts = []
@@ -61,8 +61,8 @@ def describe_cost(case: ReferenceCase, ranks: list[Point]) -> str:
     own_points = [point for point in ranks if point.tool == FMU]
     peers = [point for point in ranks if point.tool != FMU]
     first = own_points[0]
-    where = "" if isnan(first.rtol) else f" at rtol {format_power(first.rtol)}"
-    text = f"error {format_power(first.largest)} in {1e3 * first.seconds:.2g} ms{where} ({case.law}"
+    tolerance_text = "" if isnan(first.rtol) else f" at rtol {format_power(first.rtol)}"
+    text = f"error {format_power(first.largest)} in {1e3 * first.seconds:.2g} ms{tolerance_text} ({case.law}"
     others = [(point.method, point) for point in own_points[1:2]]
     others += [(f"{point.tool} {point.method}", point) for point in peers[:1]]
     ratios = [(name, point.seconds / first.seconds) for name, point in others]

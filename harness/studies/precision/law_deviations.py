@@ -37,7 +37,7 @@ class LawDeviation:
     Attributes
     ----------
     final, rms, largest
-        Errors of the solution of the law, without integration error, as in reference.Errors.
+        Errors of the solution of the law, without integration error, as in certified_reference.SolutionErrors.
     creep
         Median speed in m/s while dry friction sticks.
     period

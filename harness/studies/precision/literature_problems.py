@@ -100,9 +100,9 @@ def forced_runs(name: str, steady: SteadyMotion, values: dict[str, float]) -> It
 def load_more_model(name: str) -> type:
     """Build the FMU of a model of fmus/more and return the model class in it."""
     with temporary_directory(f"{name}-") as folder:
-        done = run_module("build_fmus", name, "--out", str(folder))
-        if done.returncode:
-            raise HarnessError(f"cannot build {name}: {(done.stderr.splitlines() or ['?'])[-1]}")
+        build = run_module("build_fmus", name, "--out", str(folder))
+        if build.returncode:
+            raise HarnessError(f"cannot build {name}: {(build.stderr.splitlines() or ['?'])[-1]}")
         return load_model_class(folder / f"{name}.fmu")
 
 

@@ -77,7 +77,7 @@ class Point:
     evaluations
         Number of right-hand side and Jacobian evaluations.
     final, rms, largest, events
-        Errors as in reference.Errors.
+        Errors as in certified_reference.SolutionErrors.
     beside_dry
         Largest error against dry friction.
     failure
@@ -236,8 +236,8 @@ class CaseRunner:
     def run_peer(self, peer: str, method: str, rtol: float, settings: SweepSettings) -> tuple[Solution, float]:
         """Run a peer solver."""
         problem = self.case.problem
-        ask = partial(peer_solvers.solve, peer, method, problem, self.times, rtol, problem.atol_factor * rtol)
-        return ask(peer_solvers.limit_run_time(settings.timeout)), best_time(ask, settings.budget)
+        solve = partial(peer_solvers.solve, peer, method, problem, self.times, rtol, problem.atol_factor * rtol)
+        return solve(peer_solvers.limit_run_time(settings.timeout)), best_time(solve, settings.budget)
 
 
 def limit_run_time(timeout: float, stop: float) -> Callable[[float], None]:
@@ -253,27 +253,27 @@ def limit_run_time(timeout: float, stop: float) -> Callable[[float], None]:
 
 def solver_jobs(case: ReferenceCase, model_class: Any, file: Path) -> Iterator[SolverJob]:
     """Yield the runs of every solver for a case."""
-    ask, absolute = CaseRunner(case, model_class, file), case.problem.atol_factor
+    runner, absolute = CaseRunner(case, model_class, file), case.problem.atol_factor
     for method in method_numbers(model_class):
         if not (method == "exact" and case.is_chattering):
             run_times: dict[float, float] = {}  # run times in s by rtol, passed from the first job to the second
             is_swept = method != "exact"
-            yield SolverJob(FMU, method, nan, partial(ask.run_inside, method, run_times), is_swept=is_swept)
-            yield SolverJob(FMPY, method, nan, partial(ask.run_through_fmpy, method, run_times), True, is_swept)
+            yield SolverJob(FMU, method, nan, partial(runner.run_inside, method, run_times), is_swept=is_swept)
+            yield SolverJob(FMPY, method, nan, partial(runner.run_through_fmpy, method, run_times), True, is_swept)
     if not case.is_chattering:
         names = {number: name for name, number in method_numbers(model_class).items()}
-        usual = names[model_class.solver_class.method.start]
-        for tool, method, is_swept in ((CS, usual, False), (ME, "fmpy's CVode", fmi3_path(file).is_file())):
-            yield SolverJob(tool, method, nan, partial(ask.run_fmi3, tool), is_swept=is_swept)
-        absent = (
+        default_method = names[model_class.solver_class.method.start]
+        for tool, method, is_swept in ((CS, default_method, False), (ME, "fmpy's CVode", fmi3_path(file).is_file())):
+            yield SolverJob(tool, method, nan, partial(runner.run_fmi3, tool), is_swept=is_swept)
+        excluded_peers = (
             peer_solvers.PACKAGES if isinstance(case.problem, UnspecifiedProblem) else peer_solvers.missing_packages()
         )
         for peer, methods in (
             ("scipy", peer_solvers.SCIPY),
             ("cvode", ("BDF",) if case.problem.is_stiff else ("Adams",)),
         ):
-            for method in methods if peer not in absent else ():
-                yield SolverJob(peer, method, absolute, partial(ask.run_peer, peer, method))
+            for method in methods if peer not in excluded_peers else ():
+                yield SolverJob(peer, method, absolute, partial(runner.run_peer, peer, method))
 
 
 def sweep_tolerances(case: ReferenceCase, job: SolverJob, settings: SweepSettings) -> Iterator[Point]:

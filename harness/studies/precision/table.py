@@ -53,7 +53,9 @@ def deviation_table(deviations: Iterable[LawDeviation]) -> Table:
     for law in deviations:
         errors = ((law.rms, ".2g"), (law.largest, ".2g"), (law.integration, ".0e"))
         figures = (*errors, (law.creep, ".2g"), (law.period, ".4f"), (law.asymmetry, ".3f"))
-        table.add_row(law.case, *("" if value is None else f"{value:{how}}" for value, how in figures))
+        table.add_row(
+            law.case, *("" if value is None else f"{value:{number_format}}" for value, number_format in figures)
+        )
     return table
 
 

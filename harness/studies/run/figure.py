@@ -127,14 +127,14 @@ def refine(run: Trajectory) -> Trajectory:
     Additional communication points do not change the internal steps of the FMU.
     """
     start, stop = run.time[[0, -1]].tolist()
-    fine = np.diff(run.time).max() <= 2 * (stop - start) / CURVE_POINTS
-    if fine or run.failure or not exposes_solver_steps(read_description(run.spec.fmu)):
+    is_fine = np.diff(run.time).max() <= 2 * (stop - start) / CURVE_POINTS
+    if is_fine or run.failure or not exposes_solver_steps(read_description(run.spec.fmu)):
         return run
-    finer = simulate(
+    fine_run = simulate(
         replace(run.spec, start=start, stop=stop, grid=(stop - start) / CURVE_POINTS, follow=False, repeat=1)
     )
-    time, order = np.unique(np.append(run.time, finer.time), return_index=True)
-    columns = {name: np.append(column, finer.columns[name])[order] for name, column in run.columns.items()}
+    time, order = np.unique(np.append(run.time, fine_run.time), return_index=True)
+    columns = {name: np.append(column, fine_run.columns[name])[order] for name, column in run.columns.items()}
     return replace(run, time=time, columns=columns)
 
 

@@ -115,17 +115,17 @@ def check_steps(scene: Scene, run: Trajectory) -> None:
 
 def check_published(scene: Scene, quantities: tuple[Quantity, ...]) -> None:
     """Check that every published value has a measured quantity with a compatible unit."""
-    measured = {quantity.name: quantity for quantity in quantities}
+    quantities_by_name = {quantity.name: quantity for quantity in quantities}
     for name, value in scene.published.items():
         if name == "source":
             continue
-        if name not in measured:
-            raise SceneError(unknown_name_message("name in [published]", name, measured))
+        if name not in quantities_by_name:
+            raise SceneError(unknown_name_message("name in [published]", name, quantities_by_name))
         if isinstance(value, tuple):
             try:
-                measured[name].to_unit(value[1])
+                quantities_by_name[name].to_unit(value[1])
             except KeyError:
-                unit = measured[name].unit
+                unit = quantities_by_name[name].unit
                 raise SceneError(
                     f"published {name} in '{value[1]}' is incompatible with the measured unit '{unit}'"
                 ) from None
@@ -150,16 +150,16 @@ def run_scenes(names: Iterable[str], out: Path, report: Callable[[str, float], N
             yield SceneOutcome(name, None, None, (), str(error))
 
 
-def run_fmu(wanted: RunSpec, out: Path, report: Callable[[float], None]) -> tuple[Trajectory, Path]:
+def run_fmu(spec: RunSpec, out: Path, report: Callable[[float], None]) -> tuple[Trajectory, Path]:
     """Run one FMU and write its outputs to out/<name of the FMU>."""
     from .figure import draw
 
-    folder, source = out / wanted.model, describe_sources(str(wanted.fmu))
+    folder, source = out / spec.model, describe_sources(str(spec.fmu))
     with replace_folder(folder, FILES, source) as new_folder:
-        trajectory = runner.run(wanted, report)
+        trajectory = runner.run(spec, report)
         trajectory.write_tables(new_folder)
-        draw(wanted.fmu.name, choose_plots(trajectory), trajectory, {}, new_folder / "figure.svg")
-        write_provenance(new_folder, [wanted.fmu], trajectory.effective_parameters, source=source, run=trajectory.spec)
+        draw(spec.fmu.name, choose_plots(trajectory), trajectory, {}, new_folder / "figure.svg")
+        write_provenance(new_folder, [spec.fmu], trajectory.effective_parameters, source=source, run=trajectory.spec)
         write_summary(new_folder, summarize_run(trajectory, folder.name))
     return trajectory, folder
 

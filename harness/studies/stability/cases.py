@@ -58,15 +58,15 @@ class StabilityCase:
 def load_scenes(file: Path = FILE) -> tuple[list[dict[str, Any]], dict[str, float]]:
     """Load the scenes, expanded to one model and one value each, and the default error bounds."""
     table = tomllib.loads(file.read_text(encoding="utf-8"))
-    return [one for scene in table["scene"] for one in expand_scene(scene)], table["finish"]
+    return [case for scene in table["scene"] for case in expand_scene(scene)], table["finish"]
 
 
-def generic_scenes(model: str, card: FmuInfo, settled: bool) -> list[dict[str, Any]]:
+def generic_scenes(model: str, info: FmuInfo, has_comparable_events: bool) -> list[dict[str, Any]]:
     """Return scenes for a user model: parameters scaled by 0.1 and 10, tolerances, few communication steps, and values
-    that are not finite.  `settled`: whether its events are comparable."""
-    common = {"model": model, "either": True, "driven": True, "events": "all" if settled else "none"}
+    that are not finite.  `has_comparable_events`: whether its events are comparable."""
+    common = {"model": model, "either": True, "driven": True, "events": "all" if has_comparable_events else "none"}
     parameters = {
-        n: x for n, x in card.start_values.items() if x and n not in card.enumerations and not n.startswith("solver.")
+        n: x for n, x in info.start_values.items() if x and n not in info.enumerations and not n.startswith("solver.")
     }
     generated: list[dict[str, Any]] = [{"title": "as it comes"}, {"title": "one communication step", "points": 1}]
     generated += [{"title": f"rtol = {rtol:g}", "rtol": rtol, "finish": {}} for rtol in (1e-3, 1e-9)]
@@ -98,34 +98,34 @@ def expand_scene(scene: dict[str, Any]) -> Iterator[dict[str, Any]]:
             yield {**scene, **varied_keys, "model": model, **labels}
 
 
-def scene_cases(scene: dict[str, Any], card: FmuInfo, finish: dict[str, float]) -> list[StabilityCase]:
+def scene_cases(scene: dict[str, Any], info: FmuInfo, finish: dict[str, float]) -> list[StabilityCase]:
     """Return the cases of one scene, for its methods among those of the FMU."""
-    methods = scene.get("methods", card.methods)
-    methods = [card.default_method if method == "default" else method for method in methods]
+    methods = scene.get("methods", info.methods)
+    methods = [info.default_method if method == "default" else method for method in methods]
     return [
-        make_case(scene, card, method, allowed_error(scene, method, finish))
+        make_case(scene, info, method, allowed_error(scene, method, finish))
         for method in methods
-        if method in card.methods
+        if method in info.methods
     ]
 
 
 def allowed_error(scene: dict[str, Any], method: str, finish: dict[str, float]) -> float:
     """Return the allowed error of a method: that of the scene, or the default for its tolerance."""
-    own = scene.get("finish", {})
-    if not isinstance(own, dict):
-        return own
+    max_error = scene.get("finish", {})
+    if not isinstance(max_error, dict):
+        return max_error
     if method == "exact":
-        return own.get("exact", finish["exact"])
-    return own.get("other", max(finish["tolerances"] * scene.get("rtol", RTOL), finish["least"]))
+        return max_error.get("exact", finish["exact"])
+    return max_error.get("other", max(finish["tolerances"] * scene.get("rtol", RTOL), finish["least"]))
 
 
-def make_case(scene: dict[str, Any], card: FmuInfo, method: str, finish: float) -> StabilityCase:
+def make_case(scene: dict[str, Any], info: FmuInfo, method: str, finish: float) -> StabilityCase:
     """Return the case of a scene and a method."""
-    chosen = {"solver.rtol": scene.get("rtol", RTOL), **scene.get("values", {}), "solver.method": method}
-    values = card.resolve_labels({**card.start_values, **chosen})
-    start, stop = scene.get("start", 0.0), scene.get("stop", card.stop)
+    settings = {"solver.rtol": scene.get("rtol", RTOL), **scene.get("values", {}), "solver.method": method}
+    values = info.resolve_labels({**info.start_values, **settings})
+    start, stop = scene.get("start", 0.0), scene.get("stop", info.stop)
     changes = {
-        row["t"]: card.resolve_labels({k: v for k, v in row.items() if k != "t"}) for row in scene.get("changes", ())
+        row["t"]: info.resolve_labels({k: v for k, v in row.items() if k != "t"}) for row in scene.get("changes", ())
     }
     points = round((stop - start) / scene["step"]) if "step" in scene else scene.get("points", POINTS)
     ends = not ("refuse" in scene or "inject_nonfinite" in scene)

@@ -40,7 +40,7 @@ class CaseOutcome:
         return f"finished within {case.max_error:g}{', or refused' * case.may_be_refused}"
 
     @property
-    def passed(self) -> bool:
+    def has_passed(self) -> bool:
         """Return whether the case ended as expected."""
         if self.case.may_be_refused and self.ended != WRONG:
             return True

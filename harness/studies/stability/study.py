@@ -59,7 +59,7 @@ def run_stability(
     return outcomes, regions
 
 
-def run_cases(report: Callable[[str, float], None], chosen: list[list[StabilityCase]]) -> list[CaseOutcome]:
+def run_cases(report: Callable[[str, float], None], groups: list[list[StabilityCase]]) -> list[CaseOutcome]:
     """Run groups of cases in parallel; `report` receives the label of each finished case."""
     idle: SimpleQueue[ChildProcess] = SimpleQueue()  # starting a process takes longer than most runs
 
@@ -76,7 +76,7 @@ def run_cases(report: Callable[[str, float], None], chosen: list[list[StabilityC
     with ExitStack() as processes:
         for _ in range(WORKERS):
             idle.put(processes.enter_context(ChildProcess(CASE_PROCESS)))
-        outcomes = [row for outcomes in map_in_threads(WORKERS, rows, chosen) for row in outcomes]
+        outcomes = [row for outcomes in map_in_threads(WORKERS, rows, groups) for row in outcomes]
     return sorted(outcomes, key=lambda row: row.case.order)
 
 
@@ -94,15 +94,15 @@ def grouped_cases(
     selected_scenes = [
         scene for scene in selected_scenes if is_selected(scene) and (not models or scene["model"] in models)
     ]
-    cards: dict[str, FmuInfo] = {}
+    infos: dict[str, FmuInfo] = {}
     for model in dict.fromkeys((*models, *(scene["model"] for scene in selected_scenes))):
-        cards[model] = read_info(model)
+        infos[model] = read_info(model)
         if model not in [scene["model"] for scene in selected_scenes]:
             has_comparable_events = len(ask_once(CASE_PROCESS, ("modes", {"model": model}), LIMIT)) < 2
-            selected_scenes += generic_scenes(model, cards[model], has_comparable_events)
+            selected_scenes += generic_scenes(model, infos[model], has_comparable_events)
     groups: dict[str, list[StabilityCase]] = {}
     for order, scene in enumerate(selected_scenes):
-        for case in scene_cases(scene, cards[scene["model"]], bounds):
+        for case in scene_cases(scene, infos[scene["model"]], bounds):
             key = repr((case.model, case.spans, case.grid))
             groups.setdefault(key, []).append(replace(case, order=order))
     return list(groups.values())
@@ -226,6 +226,6 @@ def table_line(row: CaseOutcome) -> list[Any]:
     case, motion = row.case, row.motion
     counts: tuple[Any, ...] = ("", "", "", "", math.nan)
     if motion and motion.statistics:
-        done = motion.statistics
-        counts = (done.events, done.steps, done.rejected, done.evaluations, done.seconds)
+        statistics = motion.statistics
+        counts = (statistics.events, statistics.steps, statistics.rejected, statistics.evaluations, statistics.seconds)
     return [case.name, case.title, case.method, row.expected, row.ended, row.error, row.energy_rise, *counts, row.text]

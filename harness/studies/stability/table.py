@@ -38,9 +38,9 @@ def empty_table(title: str) -> Table:
 
 def format_cell(row: CaseOutcome) -> Text:
     """Format the outcome of one run."""
-    if row.passed and row.ended == REFUSED:
+    if row.has_passed and row.ended == REFUSED:
         return Text("refused")
-    if not row.passed or row.motion is None:
+    if not row.has_passed or row.motion is None:
         return Text("wrong", style="bold red")
     return Text(f"{f'{row.error:.0e}' if row.error else '0'}\n{row.steps}")
 
@@ -56,14 +56,14 @@ def refusal_table(rows: Iterable[CaseOutcome]) -> Table:
             groups.setdefault(row.case.title, []).append(row)
     for title, group in groups.items():
         models = ", ".join(dict.fromkeys(row.case.name for row in group))
-        failed = [row for row in group if not row.passed]
+        failed = [row for row in group if not row.has_passed]
         table.add_row(title, models, Text((failed or group)[0].text, style="red" if failed else ""))
     return table
 
 
 def summary(rows: list[CaseOutcome], regions: Iterable[StabilityRegion]) -> str:
     """Return a summary of outcomes, energy, and steps bounded by stability."""
-    n_passed = sum(row.passed for row in rows)
+    n_passed = sum(row.has_passed for row in rows)
     lines = [f"{n_passed} of {len(rows)} ended as expected."]
     exact = [row.energy_rise for row in rows if row.case.method == "exact" and row.energy_rise >= 0.0]
     others = [row.energy_rise / row.case.rtol for row in rows if row.case.method != "exact" and row.energy_rise >= 0.0]

@@ -103,7 +103,7 @@ def parse_arithmetic(text: str) -> Arithmetic:
 
 
 def read_boundaries(fmu: Path, varied: tuple[str, ...], others: Mapping[str, Any]) -> tuple[Boundary, ...]:
-    """Read the boundaries that depend on a varied parameter and otherwise only on `there`, the other parameters.
+    """Read the boundaries that depend on a varied parameter and otherwise only on `others`, the other parameters.
 
     Raises
     ------

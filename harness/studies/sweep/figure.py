@@ -27,17 +27,17 @@ FINE_POINTS = 401  # points along an axis at which boundaries are evaluated
 def draw(file: Path, path: Path, boundaries: Sequence[Boundary], failed: int) -> None:
     """Save the figure of a netCDF file: one panel per measure, or per measure and parameter in scatter plots."""
     with xarray.open_dataset(file, engine="scipy", drop_variables="error") as dataset:
-        many = len(dataset.dims)
-        limit = MAX_CELLS if many == 2 else int(MAX_POINTS ** (1 / many))
+        n_axes = len(dataset.dims)
+        limit = MAX_CELLS if n_axes == 2 else int(MAX_POINTS ** (1 / n_axes))
         data = dataset.isel({name: slice(None, None, -(-size // limit)) for name, size in dataset.sizes.items()}).load()
     measures, varied = [str(name) for name in data.data_vars], [str(name) for name in data.coords]
     scattered = "run" in data.dims or len(varied) > 2
-    across = len(varied) if scattered else min(len(measures), 2)
-    down = len(measures) if scattered else -(-len(measures) // 2)
+    n_columns = len(varied) if scattered else min(len(measures), 2)
+    n_rows = len(measures) if scattered else -(-len(measures) // 2)
     height = HEIGHT * (1.2 if scattered or len(varied) == 1 else 1.7)
-    with open_figure(path, max(1.2, across) * WIDTH, height * down + 0.6) as figure:
+    with open_figure(path, max(1.2, n_columns) * WIDTH, height * n_rows + 0.6) as figure:
         figure.suptitle(f"{data.attrs['title']}{f' ({failed} runs failed)' if failed else ''}", fontsize=11)
-        panels = figure.subplots(down, across, squeeze=False)
+        panels = figure.subplots(n_rows, n_columns, squeeze=False)
         if scattered:
             for row, measure in zip(panels, measures, strict=True):
                 for axes, name in zip(row, varied, strict=True):
@@ -49,18 +49,18 @@ def draw(file: Path, path: Path, boundaries: Sequence[Boundary], failed: int) ->
                 axes.remove()
         legend: dict[str, Artist] = {}
         for axes in figure.axes:
-            legend |= {text: drawn for drawn, text in zip(*axes.get_legend_handles_labels(), strict=True)}
+            legend |= {text: artist for artist, text in zip(*axes.get_legend_handles_labels(), strict=True)}
         if legend:
             figure.legend(handles=list(legend.values()), labels=list(legend), loc="outside lower center", ncols=2)
 
 
-def label_axes(axes: Axes, data: xarray.Dataset, across: str, up: str) -> None:
+def label_axes(axes: Axes, data: xarray.Dataset, x_name: str, y_name: str) -> None:
     """Set labels and scales of the axes."""
     axes.set(
-        xscale=axis_scale(data, across),
-        yscale=axis_scale(data, up),
-        xlabel=label_with_unit(data, across),
-        ylabel=label_with_unit(data, up),
+        xscale=axis_scale(data, x_name),
+        yscale=axis_scale(data, y_name),
+        xlabel=label_with_unit(data, x_name),
+        ylabel=label_with_unit(data, y_name),
     )
 
 
@@ -107,17 +107,19 @@ def draw_map(axes: Axes, data: xarray.Dataset, measure: str, boundaries: Sequenc
 
     Failed runs are grey, known boundaries are dashed, and the regions below them are hatched.
     """
-    across, up = map(str, data.dims)
+    x_name, y_name = map(str, data.dims)
     axes.set_facecolor(FAILED_COLOUR)
     image = axes.pcolormesh(
-        *(data[name].to_numpy() for name in (across, up)),
+        *(data[name].to_numpy() for name in (x_name, y_name)),
         data[measure].to_numpy().T,
         shading="nearest",
         cmap="viridis",
         norm=axis_scale(data, measure),
     )
     axes.figure.colorbar(image, ax=axes, label=label_with_unit(data, measure))
-    plane = dict(zip((across, up), np.meshgrid(sampled_range(data, across), sampled_range(data, up)), strict=True))
+    plane = dict(
+        zip((x_name, y_name), np.meshgrid(sampled_range(data, x_name), sampled_range(data, y_name)), strict=True)
+    )
     for boundary, color, hatch in zip(boundaries, BOUNDARY_COLOURS, HATCHES, strict=False):
         values = quantity(boundary, data, plane)
         if np.nanmin(values) < 1 < np.nanmax(values):
@@ -126,7 +128,7 @@ def draw_map(axes: Axes, data: xarray.Dataset, measure: str, boundaries: Sequenc
             shade.set_edgecolor(color)
             axes.plot([], [], color=color, linestyle="--", label=boundary.text)
             axes.fill([], [], facecolor="none", edgecolor=color, hatch=hatch, linewidth=0, label=boundary.below)
-    label_axes(axes, data, across, up)
+    label_axes(axes, data, x_name, y_name)
     axes.grid(visible=False)
     axes.set_title(data[measure].attrs["long_name"])
 

@@ -35,8 +35,8 @@ class TrajectoryMeasure:
 
     Attributes
     ----------
-    needs
-        Required variables.
+    variables
+        Variables that the FMU must have.
     unit, text
         Unit and description.
     measure
@@ -45,17 +45,17 @@ class TrajectoryMeasure:
         Whether the friction law must have modes.
     decay
         Whether the model must not have a driver.
-    like
+    role
         Role of the output that has the same unit.
     """
 
-    needs: tuple[str, ...]
+    variables: tuple[str, ...]
     unit: str
     text: str
     measure: Callable[[Trajectory], float]
     modes: bool = False
     decay: bool = False
-    like: str = ""
+    role: str = ""
 
 
 def slip_starts(run: Trajectory) -> np.ndarray:
@@ -129,11 +129,11 @@ TRAJECTORY_MEASURES = {
     "slips": TrajectoryMeasure((DRIVER,), "", "slips", lambda run: float(len(slip_starts(run)))),
     "period": TrajectoryMeasure((DRIVER,), "s", "slip period", period),
     "unsteady": TrajectoryMeasure((DRIVER,), "1", SWING, unsteady),
-    "peak_speed": TrajectoryMeasure((), "", "peak speed", peak_speed, like="velocity"),
+    "peak_speed": TrajectoryMeasure((), "", "peak speed", peak_speed, role="velocity"),
     "stuck": TrajectoryMeasure(("mode",), "s", "time stuck", stuck, modes=True),
-    "rest": TrajectoryMeasure(("mode",), "", "rest position", rest, modes=True, like="position"),
+    "rest": TrajectoryMeasure(("mode",), "", "rest position", rest, modes=True, role="position"),
     "zeta": TrajectoryMeasure(("c",), "1", "damping ratio by logarithmic decrement", zeta, decay=True),
-    "f_over_k": TrajectoryMeasure(("mode",), "", ENVELOPE, f_over_k, decay=True, like="position"),
+    "f_over_k": TrajectoryMeasure(("mode",), "", ENVELOPE, f_over_k, decay=True, role="position"),
 }
 OUTPUT_MEASURES: dict[
     str, tuple[Callable[[np.ndarray], Any], str]
@@ -145,19 +145,19 @@ OUTPUT_MEASURES: dict[
 DEFAULT_MEASURES = ("final", "events")
 
 
-def available_measures(variables: Collection[str], ours: bool, values: Mapping[str, object]) -> list[str]:
+def available_measures(variables: Collection[str], is_own_fmu: bool, values: Mapping[str, object]) -> list[str]:
     """Return the measures available for an FMU with these variables and values.
 
-    `ours` is false for external FMUs, which expose neither internal steps nor modes.
+    `is_own_fmu` is false for external FMUs, which expose neither internal steps nor modes.
     """
     names = [*OUTPUT_MEASURES, "run_time"]
-    if not ours:
+    if not is_own_fmu:
         return names
     names += [name for name, (_, variable) in FINAL_MEASURES.items() if variable in variables]
     if {"position", "velocity"} <= set(find_roles(variables)):
-        for name, path in TRAJECTORY_MEASURES.items():
-            has_law = not path.modes or values.get("friction", "hybrid") in ("hybrid", 1)
-            if has_law and set(path.needs) <= set(variables) and not (path.decay and DRIVER in variables):
+        for name, measure in TRAJECTORY_MEASURES.items():
+            has_law = not measure.modes or values.get("friction", "hybrid") in ("hybrid", 1)
+            if has_law and set(measure.variables) <= set(variables) and not (measure.decay and DRIVER in variables):
                 names.append(name)
     return names
 
@@ -178,9 +178,10 @@ def measure_columns(
         elif measure in FINAL_MEASURES:
             columns.append(FINAL_MEASURES[measure][0])
         else:
-            path = TRAJECTORY_MEASURES[measure]
-            like = find_roles(variables).get(path.like) if not path.unit else None
-            columns.append(MeasureColumn(measure, variable_unit(variables[like]) if like else path.unit, path.text))
+            declared = TRAJECTORY_MEASURES[measure]
+            output = find_roles(variables).get(declared.role) if not declared.unit else None
+            unit = variable_unit(variables[output]) if output else declared.unit
+            columns.append(MeasureColumn(measure, unit, declared.text))
     return tuple(columns)
 
 

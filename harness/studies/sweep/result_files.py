@@ -169,11 +169,11 @@ def describe(runs: SweepSpec, points: SweepPoints) -> SweepDescription:
     with open_runner(runs) as runner:
         for number in (len(points) - 1, len(points) // 2, 0):
             (point,) = points.coordinates(number, number + 1).tolist()
-            measured = runner.run(point)
-            if not isinstance(measured, str):
+            measures = runner.run(point)
+            if not isinstance(measures, str):
                 break
         else:
-            raise HarnessError(f"three test runs of the sweep failed: {measured}")
+            raise HarnessError(f"three test runs of the sweep failed: {measures}")
         constants = {name: value for name, value in runner.constants().items() if name not in runs.varied}
         varied = {name: (variable_unit(variables[name]), variables[name].description or name) for name in runs.varied}
         numbers = {name: value for name, (value, _) in constants.items() if isinstance(value, float)}

@@ -47,7 +47,7 @@ class OwnFmuRunner:
 
     def __init__(self, runs: SweepSpec, session: FmuSession) -> None:
         self.session, self.variables, fmu_description = session, session.variables, session.description
-        measures = select_measures(runs, self.variables, ours=True)
+        measures = select_measures(runs, self.variables, is_own_fmu=True)
         motion = find_roles(self.variables)
         outputs = tuple(motion[role] for role in ("position", "velocity") if role in motion)
         if len(outputs) < 2:
@@ -114,7 +114,7 @@ class ExternalFmuRunner:
     def __init__(self, runs: SweepSpec, fmu_description: Any) -> None:
         self.varied, self.stop = runs.varied, 0.0
         self.variables = {variable.name: variable for variable in fmu_description.modelVariables}
-        self.measures = select_measures(runs, self.variables, ours=False)
+        self.measures = select_measures(runs, self.variables, is_own_fmu=False)
         texts = {name for name, variable in self.variables.items() if variable.type == "String"}
         outputs = tuple(name for name in runner.default_outputs(fmu_description) if name not in texts)
         self.shared = replace(runs.run, outputs=outputs, follow=True)
@@ -144,9 +144,9 @@ class ExternalFmuRunner:
 Runner = OwnFmuRunner | ExternalFmuRunner
 
 
-def select_measures(runs: SweepSpec, variables: dict[str, Any], ours: bool) -> tuple[str, ...]:
+def select_measures(runs: SweepSpec, variables: dict[str, Any], is_own_fmu: bool) -> tuple[str, ...]:
     """Return the measures of a sweep; SceneError if one is not available."""
-    available = available_measures(variables, ours, runs.run.values)
+    available = available_measures(variables, is_own_fmu, runs.run.values)
     check_names(f"measure of {runs.run.model}", runs.measures, available)
     return runs.measures or tuple(name for name in DEFAULT_MEASURES if name in available)
 

@@ -67,10 +67,10 @@ def axis_from_numbers(name: str, column: Any, random: bool) -> SweepAxis:
     return SweepAxis(name, check_distinct(values, f"grid: {name}"))
 
 
-def check_distinct(values: tuple[float, ...], what: str) -> tuple[float, ...]:
+def check_distinct(values: tuple[float, ...], label: str) -> tuple[float, ...]:
     """Return the values; SceneError if one of them occurs twice."""
     if len(set(values)) < len(values):
-        raise SceneError(f"{what}: a value occurs twice")
+        raise SceneError(f"{label}: a value occurs twice")
     return values
 
 

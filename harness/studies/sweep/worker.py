@@ -45,11 +45,11 @@ def run_block(points: np.ndarray, runs: SweepSpec, digest: str, fmu: bytes) -> B
         start = perf_counter()
         values, messages = np.full((len(points), len(runner.columns)), np.nan), {}
         for i, point in enumerate(points.tolist()):
-            measured = runner.run(point)
-            if isinstance(measured, str):
-                messages[i] = measured
+            measures = runner.run(point)
+            if isinstance(measures, str):
+                messages[i] = measures
             else:
-                values[i] = measured
+                values[i] = measures
         return BlockResult(values, messages, perf_counter() - start)
 
 
