@@ -102,11 +102,11 @@ def main(
 
     \b
     Examples:
-      python build_fmus.py
-      python build_fmus.py stickslip --out elsewhere
-      python build_fmus.py --more
-      python build_fmus.py cart.py --native --platform linux64
-      python build_fmus.py --release dist
+      friction-fmus build
+      friction-fmus build stickslip --out elsewhere
+      friction-fmus build --more
+      friction-fmus build cart.py --native --platform linux64
+      friction-fmus build --release dist
     """
     click.get_current_context().with_resource(temporary_files())
     if web and (compiled or platforms or fmi == "3"):

@@ -41,10 +41,10 @@ def commands(context: click.Context, terminal: Terminal) -> None:
 
     \b
     Examples:
-      python -m harness
-      python -m harness run stickslip
-      python -m harness run my-scene.toml --out elsewhere
-      python -m harness list
+      friction-fmus
+      friction-fmus run stickslip
+      friction-fmus run my-scene.toml --out elsewhere
+      friction-fmus list
     """
     context.default_map = dict.fromkeys(
         commands.commands, vars(terminal)

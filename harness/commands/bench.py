@@ -12,7 +12,7 @@ def bench(terminal: Terminal) -> None:
 
     \b
     Example:
-      python -m harness bench
+      friction-fmus bench
     """
     from ..studies.bench import study as work
     from ..studies.bench.table import benchmark_table

@@ -41,9 +41,9 @@ def compare(
 
     \b
     Examples:
-      python -m harness compare results/stickslip results/stickslip-threshold
-      python -m harness compare fmus/coulomb.fmu other.fmu --stop 2
-      python -m harness compare results/smd measured.csv --rtol 1e-3 --atol 1e-6
+      friction-fmus compare results/stickslip results/stickslip-threshold
+      friction-fmus compare fmus/coulomb.fmu other.fmu --stop 2
+      friction-fmus compare results/smd measured.csv --rtol 1e-3 --atol 1e-6
     """
     from ..running.resolve import FMU_SUFFIXES
     from ..scenes.fmu_files import find_fmu

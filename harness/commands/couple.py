@@ -20,9 +20,9 @@ def couple(scene: str, stop: float | None, terminal: Terminal) -> None:
 
     \b
     Examples:
-      python -m harness couple two-masses
-      python -m harness couple my-pair.toml --out elsewhere
-      python -m harness couple other.ssp --stop 10
+      friction-fmus couple two-masses
+      friction-fmus couple my-pair.toml --out elsewhere
+      friction-fmus couple other.ssp --stop 10
     """
     from ..studies.coupled.study import run_coupled
 

@@ -68,11 +68,11 @@ def decay(
 
     \b
     Examples:
-      a phone on a spring:    python -m harness decay "Raw Data.csv" --m 0.35
-      a spreadsheet:          python -m harness decay swing.xlsx --position "laser (mm)" --k 157.9
-      a pendulum's encoder:   python -m harness decay swing.txt --pendulum --per-count 0.36deg --columns t,count
-      standard input:         zcat swing.gz | python -m harness decay - --unit mm --from 2.5
-      a scene:                python -m harness decay coulomb
+      a phone on a spring:    friction-fmus decay "Raw Data.csv" --m 0.35
+      a spreadsheet:          friction-fmus decay swing.xlsx --position "laser (mm)" --k 157.9
+      a pendulum's encoder:   friction-fmus decay swing.txt --pendulum --per-count 0.36deg --columns t,count
+      standard input:         zcat swing.gz | friction-fmus decay - --unit mm --from 2.5
+      a scene:                friction-fmus decay coulomb
     """
     from ..analyses.decay.estimates import KnownParameters
     from ..records.columns import ColumnOptions

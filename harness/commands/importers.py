@@ -17,8 +17,8 @@ def importers(fmus: Path, terminal: Terminal) -> None:
 
     \b
     Examples:
-      python -m harness importers
-      python -m harness importers --fmus fmus/native
+      friction-fmus importers
+      friction-fmus importers --fmus fmus/native
     """
     from ..studies.importers import table as work
     from ..studies.importers.checks import IMPORTERS

@@ -14,7 +14,7 @@ def list_(as_json: bool) -> None:
 
     \b
     Example:
-      python -m harness list --json
+      friction-fmus list --json
     """
     from rich.table import Table
 

@@ -18,9 +18,9 @@ def precision(models: tuple[str, ...], terminal: Terminal, quick: bool) -> None:
 
     \b
     Examples:
-      python -m harness precision
-      python -m harness precision pacejka --quick
-      python -m harness precision path/to/belt.py
+      friction-fmus precision
+      friction-fmus precision pacejka --quick
+      friction-fmus precision path/to/belt.py
     """
     from ..references.models import MODELS
     from ..studies.precision import table as tables

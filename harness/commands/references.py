@@ -23,7 +23,7 @@ def references(files: tuple[Path, ...], quiet: bool, as_json: bool) -> None:
 
     \b
     Example:
-      python -m harness references belt.py
+      friction-fmus references belt.py
     """
     from ..references.certification import certify
 

@@ -15,11 +15,11 @@ def report(out: Path, quiet: bool, as_json: bool) -> None:
     """Write report.html, a self-contained page of all results.
 
     Nothing is run: missing results are listed with the commands that produce them.  The page includes the interactive
-    web page if `python build_fmus.py --web` has built it.
+    web page if `friction-fmus build --web` has built it.
 
     \b
     Example:
-      python -m harness && python -m harness decay coulomb && python -m harness report
+      friction-fmus && friction-fmus decay coulomb && friction-fmus report
     """
     from ..report.page import write_report
     from ..report.sections import PublishedScene

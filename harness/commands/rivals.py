@@ -24,8 +24,8 @@ def rivals(names: tuple[str, ...], timeout: float, terminal: Terminal) -> None:
 
     \b
     Examples:
-      python -m harness rivals
-      python -m harness rivals scipy mujoco
+      friction-fmus rivals
+      friction-fmus rivals scipy mujoco
     """
     from ..studies.rivals import study as work
     from ..studies.rivals.catalogue import find_rivals

@@ -47,10 +47,10 @@ def run(
 
     \b
     Examples:
-      python -m harness run pendulum
-      python -m harness run ./my-scene.toml --out elsewhere
-      python -m harness run results/pendulum
-      python -m harness run --fmu other.fmu --set mass=2 --stop 10 --tolerance 1e-4
+      friction-fmus run pendulum
+      friction-fmus run ./my-scene.toml --out elsewhere
+      friction-fmus run results/pendulum
+      friction-fmus run --fmu other.fmu --set mass=2 --stop 10 --tolerance 1e-4
     """
     from ..scenes.fmu_files import find_fmu, list_models
     from ..scenes.scene import load_scene, scene_from_provenance, shipped_scenes

@@ -18,8 +18,8 @@ def stability(models: tuple[str, ...], terminal: Terminal) -> None:
 
     \b
     Examples:
-      python -m harness stability
-      python -m harness stability stickslip path/to/belt.py
+      friction-fmus stability
+      friction-fmus stability stickslip path/to/belt.py
     """
     from ..results.provenance import describe_sources
     from ..studies.stability import table as tables

@@ -62,10 +62,10 @@ def sweep(
 
     \b
     Examples:
-      python -m harness sweep stickslip --vary mu_d=0.3:0.9:60 --vary v_driver=0.01:0.5:60 --measure slips,period
-      python -m harness sweep pacejka --vary x_m=0.001:0.1:40:log --measure unsteady,steps
-      python -m harness sweep other.fmu --vary mu=0,0.1,0.2 --measure final,largest
-      python -m harness sweep coulomb --vary f=0.1:2 --vary k=50:500 --random 1000 --scheduler tcp://host:8786
+      friction-fmus sweep stickslip --vary mu_d=0.3:0.9:60 --vary v_driver=0.01:0.5:60 --measure slips,period
+      friction-fmus sweep pacejka --vary x_m=0.001:0.1:40:log --measure unsteady,steps
+      friction-fmus sweep other.fmu --vary mu=0,0.1,0.2 --measure final,largest
+      friction-fmus sweep coulomb --vary f=0.1:2 --vary k=50:500 --random 1000 --scheduler tcp://host:8786
     """
     if name is not None and (name.startswith(".") or Path(name).name != name):
         raise click.UsageError(

@@ -45,7 +45,7 @@ def certify(file: Path) -> list[CertifiedFile]:
     """
     fmu = file.with_suffix(".fmu")
     if not fmu.is_file():
-        raise HarnessError(f"there is no {fmu}: build it with `python build_fmus.py {file}`")
+        raise HarnessError(f"there is no {fmu}: build it with `friction-fmus build {file}`")
     model = load_model_class(fmu)
     references = generate_all(file) or {file.stem: certify_default_run(model, file)}
     heads = ["t [s]", *(column_heading(name, unit) for name, unit in states(model))]

@@ -61,7 +61,7 @@ def write_report(results: Path, scenes: Sequence[PublishedScene]) -> ReportPage:
     """
     items = read_items(results)
     if not items:
-        raise HarnessError(f"no results in {results}: run `python -m harness`, or choose another --out")
+        raise HarnessError(f"no results in {results}: run `friction-fmus`, or choose another --out")
     sections = build_sections(items, scenes)
     missing = list_missing(items, sections, scenes)
     path = results / FILE

@@ -206,4 +206,4 @@ def list_missing(
         if section.command and section.study not in studies
     ]
     left_out = [gap for item in items for gap in item.summary.missing]
-    return [MissingResult(gap.name, f"python -m harness {gap.command}") for gap in missing] + left_out
+    return [MissingResult(gap.name, f"friction-fmus {gap.command}") for gap in missing] + left_out

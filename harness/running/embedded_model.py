@@ -43,7 +43,7 @@ def import_model_class(fmu: Path) -> type:
         resources = directory / "resources"
         if not (resources / SCRIPT_NAME_FILE).is_file():
             raise HarnessError(
-                f"{fmu.name} is a native FMU; give the one in Python, which `python build_fmus.py` builds"
+                f"{fmu.name} is a native FMU; give the one in Python, which `friction-fmus build` builds"
             )
         package = (resources / SCRIPT_NAME_FILE).read_text(encoding="utf-8").removesuffix("_fmu")
         sys.path.insert(0, str(resources))

@@ -65,5 +65,5 @@ def check_built(fmu: Path, error: type[HarnessError] = HarnessError) -> None:
         else:
             object_name, argument = "the FMUs", ""
         raise error(
-            f"there is no {fmu}: build {object_name} with `python build_fmus.py{argument}`, or specify another file"
+            f"there is no {fmu}: build {object_name} with `friction-fmus build{argument}`, or specify another file"
         )

@@ -24,7 +24,7 @@ from cattrs.gen import make_dict_structure_fn, make_mapping_structure_fn, overri
 
 from ..errors import SceneError, format_value, unknown_name_message
 
-LIST_HINT = "`python -m harness list` lists the available scenes"
+LIST_HINT = "`friction-fmus list` lists the available scenes"
 MAX_TITLE_LENGTH = 200  # letters
 MAX_FILE_BYTES = 1_000_000  # bytes
 Schema = TypeVar("Schema")

@@ -268,7 +268,7 @@ def test_a_missing_fmu_error_explains_how_to_build_it(tmp_path):
     (tmp_path / "mine.toml").write_text(BASE.replace("stickslip", "absent"))
     done = harness(tmp_path, "run", "mine.toml")
     assert done.returncode == 1
-    assert "there is no fmus/absent.fmu: build the FMUs with `python build_fmus.py`" in done.stderr
+    assert "there is no fmus/absent.fmu: build the FMUs with `friction-fmus build`" in done.stderr
 
 
 PAIR = (

@@ -199,7 +199,7 @@ def harness(*arguments, cwd):
 
 def test_a_result_is_certified_by_two_agreeing_methods_and_packed_by_the_next_build(oil):
     assert harness("references", "pendulum.py", cwd=oil).stderr == (
-        "Error: there is no pendulum.fmu: build it with `python build_fmus.py pendulum.py`\n"
+        "Error: there is no pendulum.fmu: build it with `friction-fmus build pendulum.py`\n"
     )
     assert command("pendulum.py", cwd=oil).returncode == 0
     process = harness("references", "pendulum.py", cwd=oil)
@@ -275,7 +275,7 @@ def test_every_command_takes_its_path_and_explains_how_to_build_it(tmp_path, wor
     done = harness(*words, "brake.py", cwd=tmp_path)
     assert done.returncode
     assert done.stderr.count("\n") == 1
-    assert "there is no brake.fmu: build it with `python build_fmus.py brake.py`" in done.stderr
+    assert "there is no brake.fmu: build it with `friction-fmus build brake.py`" in done.stderr
 
 
 def test_it_is_run_and_compared_by_its_path_like_its_fmu(tmp_path):

@@ -153,7 +153,7 @@ def test_commands_know_the_models_by_name(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     listed = commands.harness(tmp_path, "list", "--json").stdout
     assert all(f'"model": "{name}"' in listed for name in CERTIFIED)
-    with pytest.raises(HarnessError, match=r"no fmus/more/belt.fmu: build it with `python build_fmus.py belt`"):
+    with pytest.raises(HarnessError, match=r"no fmus/more/belt.fmu: build it with `friction-fmus build belt`"):
         check_built(Path("fmus/more/belt.fmu"))
     (tmp_path / "fmus" / "more").mkdir(parents=True)
     (tmp_path / "fmus" / "more" / "belt.fmu").write_bytes(built("belt").read_bytes())

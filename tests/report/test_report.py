@@ -58,10 +58,10 @@ class Tags(HTMLParser):
 def test_existing_results_are_shown_and_missing_ones_listed_with_their_command(report_run, page):
     done = report_run[1]
     assert (done.returncode, done.stderr) == (0, "")
-    assert "Missing: smd; run `python -m harness run smd`" in done.stdout
-    assert "Missing: stability; run `python -m harness stability`" in done.stdout
-    assert "`python -m harness run coulomb`" not in done.stdout
-    assert "python -m harness run smd" in page
+    assert "Missing: smd; run `friction-fmus run smd`" in done.stdout
+    assert "Missing: stability; run `friction-fmus stability`" in done.stdout
+    assert "`friction-fmus run coulomb`" not in done.stdout
+    assert "friction-fmus run smd" in page
     assert "friction force, 7.5 cycles" in page
     assert "Best described by dry friction" in page
 
@@ -189,7 +189,7 @@ def test_a_decay_marks_what_holds_only_for_a_single_loss(page):
 def test_missing_results_are_listed_once_at_the_end_and_have_no_section(page):
     last = page[page.index('<details class="missing"') :]
     assert "Not in this report: pacejka-0.001, " in last
-    assert "stability: <code>python -m harness stability</code>" in last
+    assert "stability: <code>friction-fmus stability</code>" in last
     assert "<section" not in last
     assert 'id="stability"' not in page
 

@@ -204,7 +204,7 @@ def test_missing_tools_are_reported_in_their_row_and_fail_nothing(both_backends,
     measures += [stiff.compare_at_equal_error(name, 1e-6) for name in ("pacejka, x_m = 0.01 m/s", "lugre")]
     assert [measure.is_met for measure in measures] == [False] * 5
     assert [measure.baselines[0].name.split(":")[0] for measure in measures] == ["not built"] * 5
-    assert measures[-1].baselines[0].name.endswith("(python build_fmus.py lugre --native)")
+    assert measures[-1].baselines[0].name.endswith("(friction-fmus build lugre --native)")
     with pytest.raises(c_host.MissingToolError, match="not installed: a C compiler"):
         native.time_cvode("smd", 1e-6)
     monkeypatch.setattr(c_host, "COMPILER", "false")  # one that finds no header

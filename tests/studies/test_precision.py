@@ -192,7 +192,7 @@ def test_a_figure_labels_three_solvers_per_case_and_draws_the_others_in_grey(tmp
 def test_no_advice_is_given_without_sufficient_evidence():
     """A quick run gives no advice if another solver comes close to the best method; a full run names a better peer."""
     own, slower = make_point("rodas", 2e-3, 1e-7), make_point("ode23", 4e-3, 1e-7)
-    untold = "stickslip: no recommendation from a quick run; use `python -m harness precision stickslip`."
+    untold = "stickslip: no recommendation from a quick run; use `friction-fmus precision stickslip`."
     for peer, carried in ((1.7e-3, False), (2.5e-3, False), (4e-3, True)):
         study = Study("stickslip", (CASE["stickslip"],), (own, slower, make_point("LSODA", peer, 1e-7, "scipy")))
         quick, complete = (advice.recommend(study, [], clear) for clear in (QUICK.min_ratio, FULL.min_ratio))

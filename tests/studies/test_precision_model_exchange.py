@@ -197,7 +197,7 @@ def test_json_holds_all_results(two_studies):
 
 def test_the_page_shows_error_against_tolerance_or_the_commands_that_produce_it(two_studies):
     head = "model exchange by fmpy's CVode: largest error at rtol"
-    commands = "python build_fmus.py smd --fmi 3 && python -m harness precision smd"
+    commands = "friction-fmus build smd --fmi 3 && friction-fmus precision smd"
     complete, incomplete = two_studies[2]
     assert head in complete
     assert commands not in complete
@@ -216,7 +216,7 @@ def test_the_command_writes_every_point_and_advice_and_keeps_results_of_other_mo
     rows, later = (list(csv.DictReader(text.splitlines())) for text in texts)
     tools = {FMU, FMPY, *FMI3_TOOLS, "scipy", "cvode"} - peer_solvers.missing_packages().keys()
     assert {row["tool"] for row in rows} == tools
-    unbuilt = "not built: fmus/native/fmi3/smd.fmu (python build_fmus.py --fmi 3)"
+    unbuilt = "not built: fmus/native/fmi3/smd.fmu (friction-fmus build --fmi 3)"
     assert [row["failure"] for row in later if row["tool"] in FMI3_TOOLS] == [unbuilt, unbuilt]
     assert [item for item in json.loads(incomplete)["missing"] if unbuilt in item] == [unbuilt]
     inside, outside = ([row for row in rows if row["tool"] == tool] for tool in (FMU, FMPY))

@@ -233,5 +233,5 @@ def fmi3_fmu(model: str) -> Path:
     """Return the FMI 3.0 FMU of a model."""
     file = fmi3_path(find_fmu(model))
     if not file.is_file():
-        raise MissingToolError(f"not built: {file} (python build_fmus.py --fmi 3)")
+        raise MissingToolError(f"not built: {file} (friction-fmus build --fmi 3)")
     return file

@@ -130,7 +130,7 @@ def built_fmu(model: str, backend: str) -> Path:
     if backend == "native":
         path, option = path.parent / "native" / path.name, f"{option} --native"
     if not path.is_file():
-        raise MissingToolError(f"not built: {path} (python build_fmus.py{option})")
+        raise MissingToolError(f"not built: {path} (friction-fmus build{option})")
     return path
 
 

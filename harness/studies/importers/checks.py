@@ -168,7 +168,7 @@ class UnsuitableFmuError(HarnessError):
 def describe_fmu(fmu: Path) -> FmuUnderTest:
     """Read the description of an FMU and return the data for the checks."""
     if not fmu.is_file():
-        raise HarnessError(f"{fmu} does not exist: build the FMUs with `python build_fmus.py`, or give another folder")
+        raise HarnessError(f"{fmu} does not exist: build the FMUs with `friction-fmus build`, or give another folder")
     fmu_description = read_description(fmu)
     if fmu_description.fmiVersion != "2.0":
         raise HarnessError(f"{fmu} is an FMU for FMI {fmu_description.fmiVersion}; the checks require FMI 2.0")

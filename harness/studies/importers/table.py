@@ -110,7 +110,7 @@ def find_fmus(folder: Path) -> list[Path]:
     files = sorted(folder.glob("*.fmu"))
     if not files:
         raise HarnessError(
-            f"there is no FMU in {folder}: build them with `python build_fmus.py`, or give another folder"
+            f"there is no FMU in {folder}: build them with `friction-fmus build`, or give another folder"
         )
     return files
 

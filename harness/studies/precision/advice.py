@@ -11,7 +11,7 @@ from .study import FMI3_TOOLS, FMPY, FMU, Point, Study
 TARGET = 1e-6
 TARGETS = (1e-3, TARGET, 1e-9)
 NONE_REACHES = "no method of the FMU reaches an error of 1e-6"
-QUICK_RUN_UNCLEAR = "no recommendation from a quick run; use `python -m harness precision {}`"
+QUICK_RUN_UNCLEAR = "no recommendation from a quick run; use `friction-fmus precision {}`"
 
 
 def fastest_point(curve: Iterable[Point], target: float, beside_dry: bool = False) -> Point | None:

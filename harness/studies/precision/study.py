@@ -222,7 +222,7 @@ class CaseRunner:
         spec = RunSpec(file, names + modes, values, stop=stop, grid=grid, follow=False, exchange=exchange)
         spec = replace(spec, tolerance=rtol) if exchange else spec
         if not file.is_file():
-            raise HarnessError(f"not built: {file} (python build_fmus.py --fmi 3)")
+            raise HarnessError(f"not built: {file} (friction-fmus build --fmi 3)")
         recording = simulate(spec, limit_run_time(settings.timeout, stop))
         assert recording.statistics  # FMUs of this project report it
         repeat = repeats(recording.statistics.seconds, settings.budget)

@@ -140,7 +140,7 @@ def write_study(
     source = QUICK_RUN if extent == QUICK else ""
     write_provenance(folder, [file], declared_parameters(file), values, source=source)
     choices, outcome = tabulate_choices(study, extent.min_ratio)
-    command = f"python build_fmus.py {study.model} --fmi 3 && python -m harness precision {study.model}"
+    command = f"friction-fmus build {study.model} --fmi 3 && friction-fmus precision {study.model}"
     is_incomplete = not exchange and study.model in MODELS
     write_summary(
         folder,
