@@ -19,7 +19,7 @@ class EnergyLoss:
     Attributes
     ----------
     amplitude : (n,) mean amplitudes of the half cycles between the turning points of the record
-    fraction : (n,) fraction of the energy that each of them loses
+    fraction : (n,) energy that each of them loses, relative to the mean of its energies at both ends
     curves : amplitudes and fractions for each law
     """
 
@@ -46,9 +46,10 @@ def measure_energy_loss(identification: DecayIdentification) -> EnergyLoss:
 
 
 def loss_fractions(a: np.ndarray, is_pendulum: bool) -> tuple[np.ndarray, np.ndarray]:
-    """Return mean amplitudes (n,) and lost fractions (n,) of the potential energy, from amplitudes a (n + 1,).
+    """Return mean amplitudes (n,) and losses (n,) of potential energy, from amplitudes a (n + 1,).
 
-    The last half cycle is left out if it ends on the side where it started.
+    A loss is relative to the mean of the energies at both ends, so it may exceed 1. The last half cycle is left out if
+    it ends on the side where it started.
     """
     a = a[: int(np.argmin(a > 0))] if (a <= 0).any() else a
     energy = 2 * np.sin(a / 2) ** 2 if is_pendulum else a * a / 2

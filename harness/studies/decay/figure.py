@@ -13,7 +13,7 @@ from ...results.quantity import display_unit
 from ...results.style import BLUE, GREEN, GREY, HEIGHT, ORANGE, WIDTH, Axes, axis_label, open_figure
 
 MARGINS = {"left": 0.105, "right": 0.985, "bottom": 0.055, "top": 0.97, "hspace": 0.35}
-COLOURS: dict[Terms, str] = {("zeta",): GREEN, ("r",): BLUE, ("b",): "#CC79A7"}  # colours of the models with one term
+COLOURS: dict[Terms, str] = {("zeta",): GREEN, ("r",): BLUE, ("b",): "#CC79A7"}  # colours of the laws with one term
 
 
 def draw(identified: DecayIdentification, loss: EnergyLoss, path: Path) -> None:
@@ -56,7 +56,7 @@ def plot_signal(axes: Axes, identified: DecayIdentification) -> None:
 
 
 def plot_energy_loss(axes: Axes, identified: DecayIdentification, loss: EnergyLoss) -> None:
-    """Plot the relative energy loss per half cycle, with the curves of all models."""
+    """Plot the relative energy loss per half cycle, with the curves of all laws."""
     best, others = identified.best, identified.laws[1:]
     unit, size = display_unit(identified.record.base)
 
@@ -67,7 +67,7 @@ def plot_energy_loss(axes: Axes, identified: DecayIdentification, loss: EnergyLo
     for law in (law for law in others if law.terms in COLOURS):
         axes.plot(*curve(loss.curves[law.terms]), color=COLOURS[law.terms], linestyle="--", label=law.description)
     for i, law in enumerate(law for law in others if law.terms not in COLOURS):
-        label_once = "" if i else "other combined models"
+        label_once = "" if i else "other combinations"
         axes.plot(*curve(loss.curves[law.terms]), color=GREY, linestyle=":", label=label_once)
     axes.plot(*curve(loss.curves[best.terms]), color=ORANGE, linewidth=2, label=f"fit: {best.description}")
     if len(loss.amplitude):
@@ -78,6 +78,6 @@ def plot_energy_loss(axes: Axes, identified: DecayIdentification, loss: EnergyLo
         margin = 0.4 * (high - low) + 0.1 * abs(high) + 1e-9
         axes.set_ylim(min(low - margin, 0.0), high + margin)
     axes.set_title("energy loss per half cycle over amplitude")
-    axes.set_ylabel("energy loss [%]")
+    axes.set_ylabel("loss, % of the mean energy")
     axes.set_xlabel(axis_label("amplitude", unit))
     axes.legend(loc="best", ncols=2)
