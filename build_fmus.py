@@ -170,11 +170,11 @@ def default_folder(model: str, source: ModelFile) -> Path:
     return FMUS if model in model_names() else source.path.parent
 
 
-def show_progress(what: str) -> AbstractContextManager[Any]:
+def show_progress(text: str) -> AbstractContextManager[Any]:
     """Show a status message at the terminal while the block runs."""
     from rich.console import Console
 
-    return Console(stderr=True).status(what)
+    return Console(stderr=True).status(text)
 
 
 def print_summary(path: Path, weight: str = "") -> None:

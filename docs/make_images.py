@@ -62,19 +62,19 @@ def of_page(page: str, folder: Path) -> None:
     """Run the code blocks of a page in a folder."""
     (folder / "fmus").symlink_to(FMUS.resolve())
     (folder / "docs").symlink_to(DOCS)
-    here = os.getcwd()
+    working_directory = os.getcwd()
     os.chdir(folder)
     try:
         faults = run_page(DOCS / page)
     finally:
-        os.chdir(here)
+        os.chdir(working_directory)
     if faults:
         sys.exit("\n".join(faults))
 
 
-def copy(found: Path, picture: Path) -> None:
+def copy(figure: Path, picture: Path) -> None:
     """Copy a figure with coordinates of a tenth of a point, which halves long curves."""
-    text = found.read_text(encoding="utf-8")
+    text = figure.read_text(encoding="utf-8")
     text = re.sub(r' d="[^"]*"', lambda line: re.sub(r"(\.\d)\d+", r"\1", line[0]), text)
     picture.write_text(text, encoding="utf-8")
 
@@ -142,20 +142,20 @@ def draw_stick(runs: dict[str, dict[str, np.ndarray]], colours: dict[str, str], 
         whole = figure.add_subplot(grid[0, :])
         creep, speed, count = (figure.add_subplot(grid[1, i]) for i in range(3))
         for law in ("sign", "hybrid"):
-            run, look = runs[law], {"color": colours[law], "zorder": 3 if law == "hybrid" else 2}
+            run, style = runs[law], {"color": colours[law], "zorder": 3 if law == "hybrid" else 2}
             t, x, v = run["t"], run["x"], run["v"]
             even = np.unique(np.searchsorted(t, np.arange(0.0, 6.0, 0.01)))
-            whole.plot(t[even], 100 * x[even], lw=1.8 if law == "hybrid" else 3.4, label=labels[law], **look)
+            whole.plot(t[even], 100 * x[even], lw=1.8 if law == "hybrid" else 3.4, label=labels[law], **style)
             late = even[t[even] >= begin]
-            creep.plot(t[late], 1e6 * (x[late] - x[late[0]]), lw=1.8, **look)
+            creep.plot(t[late], 1e6 * (x[late] - x[late[0]]), lw=1.8, **style)
             near = (t >= begin) & (t <= begin + span)
             if law == "sign":
-                speed.plot(1e3 * (t[near] - begin), 1e6 * v[near], lw=1.4, **look)
+                speed.plot(1e3 * (t[near] - begin), 1e6 * v[near], lw=1.4, **style)
             else:  # one internal step covers the standstill
-                speed.plot([0.0, 1e3 * span], [0.0, 0.0], lw=1.8, **look)
+                speed.plot([0.0, 1e3 * span], [0.0, 0.0], lw=1.8, **style)
             steps = run["steps"]
-            some = np.unique(np.searchsorted(steps, np.linspace(0.0, 6.0, 301)[1:]).clip(0, len(steps) - 1))
-            count.plot(steps[some], some + 1, lw=1.8, **look)
+            indices = np.unique(np.searchsorted(steps, np.linspace(0.0, 6.0, 301)[1:]).clip(0, len(steps) - 1))
+            count.plot(steps[indices], indices + 1, lw=1.8, **style)
             count.annotate(
                 f"{len(steps):,}".replace(",", " "), (5.95, 1.3 * len(steps)), ha="right", color=colours[law]
             )
@@ -221,11 +221,11 @@ def friction_laws(folder: Path) -> None:
             fmu = FMUS / ("more" if "sigma_2" in values else "") / f"{name}.fmu"
             run = api.simulate(fmu, values | {"m": 1.0, "k": 2.0, "v_driver": 0.1}, stop=10.0, rtol=1e-6)
             near = run.time > 7.2
-            look = {"color": colours[name], "label": label}
-            slip.plot(run.time[near], run.columns["v"][near], **look)
+            style = {"color": colours[name], "label": label}
+            slip.plot(run.time[near], run.columns["v"][near], **style)
             free = values | {"m": 1.0, "k": 0.0, "v_driver": 0.0}
             run = api.simulate(fmu, free, stop=40.0, interval=0.1, inputs=load, rtol=1e-8)
-            held.plot(run.time, 1e6 * np.asarray(run.columns["x"]), **look)
+            held.plot(run.time, 1e6 * np.asarray(run.columns["x"]), **style)
         slip.set(title="The first slip", xlabel="time, s", ylabel="speed, m/s")
         slip.legend(fontsize=8)
         held.set(title="Under 0.5 N, on and off", xlabel="time, s", ylabel="displacement, µm", ylim=(-0.5, 12.0))
@@ -250,7 +250,7 @@ def report(folder: Path) -> None:
 
 def photograph(page: Path, picture: Path, folder: Path, height: int) -> None:
     """Save a picture of a page, as chromium shows it."""
-    chromium = next((found for word in ("chromium", "google-chrome") if (found := shutil.which(word))), None)
+    chromium = next((path for word in ("chromium", "google-chrome") if (path := shutil.which(word))), None)
     if chromium is None:
         print(f"{picture.name}: skipped, chromium is not installed")
         return
@@ -296,22 +296,22 @@ def main() -> None:
     """Make the pictures."""
     bin = str(Path(sys.executable).parent)
     os.environ.update(PATH=f"{bin}{os.pathsep}{os.environ['PATH']}", MPLBACKEND="agg", COLUMNS="80")
-    wanted = sys.argv[1:] or [*OF_PAGES, *OF_COMMANDS, *DRAWN]
+    names = sys.argv[1:] or [*OF_PAGES, *OF_COMMANDS, *DRAWN]
     IMAGES.mkdir(exist_ok=True)
-    for page in dict.fromkeys(page for name, (page, _) in OF_PAGES.items() if name in wanted):
+    for page in dict.fromkeys(page for name, (page, _) in OF_PAGES.items() if name in names):
         with TemporaryDirectory() as folder:
             of_page(page, Path(folder))
             for name, (source, file) in OF_PAGES.items():
-                if source == page and name in wanted:
-                    (found,) = Path(folder).glob(file)
-                    copy(found, IMAGES / f"{name}.svg")
+                if source == page and name in names:
+                    (figure,) = Path(folder).glob(file)
+                    copy(figure, IMAGES / f"{name}.svg")
     for name, (command, file) in OF_COMMANDS.items():
-        if name in wanted:
+        if name in names:
             with TemporaryDirectory() as folder:
                 harness(Path(folder), command)
                 copy(Path(folder, file), IMAGES / f"{name}.svg")
     for name, draw in DRAWN.items():
-        if name in wanted:
+        if name in names:
             with TemporaryDirectory() as folder:
                 draw(Path(folder))
     for picture in sorted(IMAGES.iterdir()):

@@ -88,21 +88,21 @@ def variables(fmus: Path, model: str) -> str:
 
     description = read_model_description(str(fmus / f"{model}.fmu"))
     rows = []
-    for each in description.modelVariables:
-        if each.name.startswith(("solver.", "events.")):
+    for variable in description.modelVariables:
+        if variable.name.startswith(("solver.", "events.")):
             continue
-        start, unit = number(each.start), each.unit or ""
-        if each.type == "Enumeration":
-            items = [f"{item.value} {item.name}" for item in each.declaredType.items]
+        start, unit = number(variable.start), variable.unit or ""
+        if variable.type == "Enumeration":
+            items = [f"{item.value} {item.name}" for item in variable.declaredType.items]
             start, unit = start and items[int(float(start)) - 1], ", ".join(items)
-        kind = {"parameter": each.variability, "output": "output", "input": "input"}[each.causality]
+        kind = {"parameter": variable.variability, "output": "output", "input": "input"}[variable.causality]
         rows.append(
             (
-                f"`{each.name}`",
+                f"`{variable.name}`",
                 kind if kind in ("output", "input") else f"{kind} parameter",
                 start,
                 unit,
-                each.description,
+                variable.description,
             )
         )
     return table(("name", "kind", "start", "unit or items", "description"), rows)
@@ -114,9 +114,15 @@ def common_variables(fmus: Path) -> str:
 
     description = read_model_description(str(fmus / "stickslip.fmu"))
     rows = [
-        (f"`{each.name}`", each.type, f"{each.variability} {each.causality}", each.unit or "", each.description)
-        for each in description.modelVariables
-        if each.name.startswith(("solver.", "events."))
+        (
+            f"`{variable.name}`",
+            variable.type,
+            f"{variable.variability} {variable.causality}",
+            variable.unit or "",
+            variable.description,
+        )
+        for variable in description.modelVariables
+        if variable.name.startswith(("solver.", "events."))
     ]
     return table(("name", "type", "kind", "unit", "description"), rows)
 
@@ -125,16 +131,16 @@ def enumerations(fmus: Path) -> str:
     """The items of all enumerations, with the FMUs that have them."""
     from fmpy import read_model_description
 
-    found: dict[tuple[str, str, str, str], list[str]] = {}
+    labels: dict[tuple[str, str, str, str], list[str]] = {}
     for model in MODELS:
-        for each in read_model_description(str(fmus / f"{model}.fmu")).modelVariables:
-            for item in each.declaredType.items if each.type == "Enumeration" else ():
-                default = int(float(each.start)) == int(item.value)
+        for variable in read_model_description(str(fmus / f"{model}.fmu")).modelVariables:
+            for item in variable.declaredType.items if variable.type == "Enumeration" else ():
+                default = int(float(variable.start)) == int(item.value)
                 name = f"`{model}`" + (" (default)" if default else "")
-                found.setdefault((each.name, str(item.value), item.name, item.description), []).append(name)
+                labels.setdefault((variable.name, str(item.value), item.name, item.description), []).append(name)
     rows = [
         (f"`{name}`", value, item, text, ", ".join(models))
-        for (name, value, item, text), models in sorted(found.items())
+        for (name, value, item, text), models in sorted(labels.items())
     ]
     return table(("variable", "value", "name", "meaning", "FMUs"), rows)
 
@@ -147,37 +153,37 @@ def constraints(annotation: Any) -> list[str]:
 
 def schema_within(schema: Any, key: str) -> Any:
     """The dataclass of the tables under a key."""
-    annotation = next(each.type for each in fields(schema) if each.name == key)
+    annotation = next(field.type for field in fields(schema) if field.name == key)
     return next((part for part in get_args(annotation) if is_dataclass(part)), annotation)
 
 
 def keys(texts: dict[str, str], *schemas: Any) -> str:
     """The keys with a text, which are fields of the dataclasses that are the schema."""
-    declared = {each.name.rstrip("_"): each for schema in schemas for each in fields(schema)}
+    declared = {field.name.rstrip("_"): field for schema in schemas for field in fields(schema)}
     rows = []
     for name, text in texts.items():
-        each = declared[name]
-        words = next(iter(constraints(each.type)), "a table")
-        inner = [text for part in get_args(each.type) for text in constraints(part)]
+        field = declared[name]
+        words = next(iter(constraints(field.type)), "a table")
+        inner = [text for part in get_args(field.type) for text in constraints(part)]
         if words == "a table" and inner:
             words = f"a table; each value is {inner[0]}"
-        if words == "a table" and str(each.type).startswith("tuple"):
+        if words == "a table" and str(field.type).startswith("tuple"):
             words = "a list of tables"
-        needed = each.default is MISSING and each.default_factory is MISSING
-        default = each.default
-        if needed:
-            shown = "**required**"
+        is_required = field.default is MISSING and field.default_factory is MISSING
+        default = field.default
+        if is_required:
+            default_text = "**required**"
         elif default is None or default is MISSING or default in ((), "") or "Default:" in text:
-            shown = ""
+            default_text = ""
         else:
-            shown = f"`{str(default).lower() if isinstance(default, bool) else default}`"
-        rows.append((f"`{name}`", words, shown, text))
+            default_text = f"`{str(default).lower() if isinstance(default, bool) else default}`"
+        rows.append((f"`{name}`", words, default_text, text))
     return table(("key", "value", "default", "meaning"), rows)
 
 
 def coupled_keys(schema: Any) -> str:
     """The keys of a table of a coupled scene."""
-    names = [each.name.rstrip("_") for each in fields(schema)]
+    names = [field.name.rstrip("_") for field in fields(schema)]
     return keys({name: COUPLED_TEXTS[name] for name in names}, schema)
 
 
@@ -235,11 +241,15 @@ def command_text(name: str, command: Any) -> str:
         verbatim = paragraph.startswith("\b\n")
         lines.append(f"```text\n{paragraph[2:]}\n```\n" if verbatim else f"{' '.join(paragraph.split())}\n")
     lines.append(f"```text\n{name} {' '.join(command.collect_usage_pieces(context))}\n```\n")
-    records = [each.get_help_record(context) for each in command.get_params(context) if "--help" not in each.opts]
+    records = [
+        parameter.get_help_record(context)
+        for parameter in command.get_params(context)
+        if "--help" not in parameter.opts
+    ]
     return (
         "\n".join(lines)
         + "\n"
-        + table(("option", "meaning"), ((f"`{what}`", text) for what, text in filter(None, records) if text))
+        + table(("option", "meaning"), ((f"`{option}`", text) for option, text in filter(None, records) if text))
     )
 
 
@@ -249,13 +259,22 @@ def record_formats() -> str:
     from record_formats import FORMATS
 
     rows = []
-    for each in FORMATS:
-        words = (f"--{RECORD_OPTIONS.get(key, key)} {shlex.quote(f'{value}')}" for key, value in each.options.items())
+    for record_format in FORMATS:
+        words = (
+            f"--{RECORD_OPTIONS.get(key, key)} {shlex.quote(f'{value}')}"
+            for key, value in record_format.options.items()
+        )
         options = " ".join(f"`{word}`" for word in words)
         answer = "read" + (f" with {options}" if options else "")
-        if each.base == "units":
+        if record_format.base == "units":
             answer += "; has no unit, `--unit` sets it"
-        rows.append((each.text, f"`{each.file}`", f"refused: {each.refusal}" if each.refusal else answer))
+        rows.append(
+            (
+                record_format.text,
+                f"`{record_format.file}`",
+                f"refused: {record_format.refusal}" if record_format.refusal else answer,
+            )
+        )
     return table(("format", "example", "answer"), rows)
 
 

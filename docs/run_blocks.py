@@ -42,26 +42,26 @@ class Block:
 
 def blocks(page: str) -> list[Block]:
     """All code blocks of a page."""
-    found = []
+    result = []
     for fence in FENCE.finditer(page):
         skip = SKIP.search(page[: fence.start()])
         indent = fence["indent"]
         text = "".join(line.removeprefix(indent) for line in fence["text"].splitlines(keepends=True))
         line = page.count("\n", 0, fence.start()) + 1
         reason = skip[1] if skip else ""
-        found.append(Block(fence["language"], fence["title"] or "", text, line, indent, fence.span("text"), reason))
-    return found
+        result.append(Block(fence["language"], fence["title"] or "", text, line, indent, fence.span("text"), reason))
+    return result
 
 
 def run(block: Block, page: Path, names: dict[str, object]) -> str:
     """Run one block in the current folder; its output.  RuntimeError if it fails."""
     if block.language == "sh":
-        done = subprocess.run(
+        process = subprocess.run(
             ["bash", "-euo", "pipefail", "-c", block.text], capture_output=True, text=True, timeout=TIMEOUT
         )
-        if done.returncode or done.stderr:
-            raise RuntimeError(f"exit status {done.returncode}\n{block.text}{done.stdout}{done.stderr}")
-        return done.stdout
+        if process.returncode or process.stderr:
+            raise RuntimeError(f"exit status {process.returncode}\n{block.text}{process.stdout}{process.stderr}")
+        return process.stdout
     with redirect_stdout(StringIO()) as output:
         exec(compile("\n" * block.line + block.text, str(page), "exec"), names)
     return output.getvalue()

@@ -107,26 +107,26 @@ def build_date() -> datetime:
 def _binaries(name: str, platforms: Sequence[str]) -> dict[str, bytes]:
     """Return the native layer of pythonfmu for the given platforms, by default for all."""
     files = (installed_package(PYTHONFMU) / "resources" / "binaries").glob("*/*")
-    there = {path.parent.name: path for path in sorted(files) if path.suffix in (".so", ".dll", ".dylib")}
-    if not there:
+    libraries = {path.parent.name: path for path in sorted(files) if path.suffix in (".so", ".dll", ".dylib")}
+    if not libraries:
         raise BuildError(f"The installed {PYTHONFMU} has no binaries: try 'pip install --force-reinstall {PYTHONFMU}'.")
     for platform in platforms:
-        if platform not in there:
-            known = ", ".join(there)
-            raise BuildError(f"{PYTHONFMU} has no binary for {platform}, only for {known}: add --native.")
-    chosen = [there[platform] for platform in platforms or there]
-    return {f"binaries/{path.parent.name}/{name}{path.suffix}": path.read_bytes() for path in chosen}
+        if platform not in libraries:
+            platform_names = ", ".join(libraries)
+            raise BuildError(f"{PYTHONFMU} has no binary for {platform}, only for {platform_names}: add --native.")
+    selection = [libraries[platform] for platform in platforms or libraries]
+    return {f"binaries/{path.parent.name}/{name}{path.suffix}": path.read_bytes() for path in selection}
 
 
 def license_files() -> dict[str, bytes]:
     """Return the licences of this project and of pythonfmu, by path in the FMU."""
-    ours, kept = Path(__file__).resolve().parents[2], "{}-*.dist-info/**/LICENSE"
+    project_folder, license_pattern = Path(__file__).resolve().parents[2], "{}-*.dist-info/**/LICENSE"
     return {
         "documentation/licenses/license.txt": _license(
-            ours, kept.format("friction_fmus"), "LICENSE"
+            project_folder, license_pattern.format("friction_fmus"), "LICENSE"
         ),  # the last pattern is for a clone
         f"documentation/licenses/{PYTHONFMU}.txt": _license(
-            installed_package(PYTHONFMU).parent, kept.format(PYTHONFMU)
+            installed_package(PYTHONFMU).parent, license_pattern.format(PYTHONFMU)
         ),
     }
 

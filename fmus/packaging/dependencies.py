@@ -49,10 +49,10 @@ def output_dependencies(model: type[VariableOwner], declared: Variables, at_star
         contact_variables = [
             of_force(c) if c in variables else of_mode(c) for c in an.contacts if {c, c.mode} & variables
         ]
-        names = {one.name for part in (variables, *contact_variables) for one in part}
+        names = {variable.name for part in (variables, *contact_variables) for variable in part}
         return names | {"friction"} if contact_variables and laws[1:] else names
 
     equations = {e.name: follows(e) for e in an.declared if e.name in outputs}
-    known = {name for name, meaning in declared if meaning.causality in SETTABLE_CAUSALITIES}
-    known |= set() if at_start else {name for name, meaning in declared if meaning.role == "state"}
-    return {output: [name for name, _ in declared if name in known & equations[output]] for output in outputs}
+    knowns = {name for name, meaning in declared if meaning.causality in SETTABLE_CAUSALITIES}
+    knowns |= set() if at_start else {name for name, meaning in declared if meaning.role == "state"}
+    return {output: [name for name, _ in declared if name in knowns & equations[output]] for output in outputs}

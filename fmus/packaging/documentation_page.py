@@ -54,14 +54,14 @@ def documentation_page(
     choices = [(variable, meaning) for variable, meaning in declared if meaning.items]
     for variable, meaning in choices:
         parts.append(_enumeration_table(variable, meaning))
-    plain = [(variable, meaning) for variable, meaning in declared if not meaning.items]
-    for title, chosen in (
-        ("Parameters", [pair for pair in plain if pair[1].causality == "parameter" and "." not in pair[0]]),
-        ("Input", [pair for pair in plain if pair[1].causality == "input"]),
-        ("Outputs", [pair for pair in plain if pair[1].causality == "output"]),
-        ("Solver and events", [pair for pair in plain if "." in pair[0]]),
+    numbers = [(variable, meaning) for variable, meaning in declared if not meaning.items]
+    for title, rows in (
+        ("Parameters", [pair for pair in numbers if pair[1].causality == "parameter" and "." not in pair[0]]),
+        ("Input", [pair for pair in numbers if pair[1].causality == "input"]),
+        ("Outputs", [pair for pair in numbers if pair[1].causality == "output"]),
+        ("Solver and events", [pair for pair in numbers if "." in pair[0]]),
     ):
-        parts += [f"<h2>{title}</h2>", _variable_table(chosen)]
+        parts += [f"<h2>{title}</h2>", _variable_table(rows)]
     parts += ["<h2>Use</h2>", USAGE + use, _capabilities_table(), _footer(model, result)]
     head = f"<meta charset='utf-8'><meta name='viewport' content='width=device-width'><title>{escape(name)}</title>"
     style = STYLE.read_text(encoding="utf-8")
@@ -101,10 +101,10 @@ def _result_figure(result: CertifiedResult, declared: Variables) -> list[str]:
     times, *columns = ([float(word) for word in column] for column in zip(*result.rows, strict=True))
     parts = ["<h2>Default run</h2>", "<figure>"]
     for values, (variable, meaning) in zip(columns, integrated_states(declared), strict=True):
-        shown, factor = meaning.unit, 1.0
+        unit, factor = meaning.unit, 1.0
         if meaning.display:
-            shown, factor = meaning.display, unit_of(variable, meaning.unit).factor
-        parts.append(draw_chart(times, [factor * value for value in values], f"{variable} in {readable_unit(shown)}"))
+            unit, factor = meaning.display, unit_of(variable, meaning.unit).factor
+        parts.append(draw_chart(times, [factor * value for value in values], f"{variable} in {readable_unit(unit)}"))
     return [*parts, f"<figcaption>{escape(result.caption)}</figcaption></figure>"]
 
 
@@ -120,10 +120,10 @@ def _enumeration_table(variable: str, meaning: VariableDeclaration) -> str:
     return f"<h2>{escape(title)}: <code>{escape(variable)}</code></h2>\n<table>{head}{rows}</table>"
 
 
-def _variable_table(chosen: Variables) -> str:
+def _variable_table(variables: Variables) -> str:
     """Return a table of name, default, unit, description and range of each variable."""
     rows = []
-    for variable, meaning in chosen:
+    for variable, meaning in variables:
         unit = readable_unit(meaning.unit)
         settable = meaning.causality in SETTABLE_CAUSALITIES
         value = f"{meaning.start:.10g}" if settable else ""
@@ -136,7 +136,7 @@ def _variable_table(chosen: Variables) -> str:
         text = escape(meaning.text) + (f" <small>({escape('; '.join(notes))})</small>" if notes else "")
         cells = (f"<code>{escape(variable)}</code>", f"{value} {escape(unit)}".strip(), text)
         rows.append("<tr><td>{}</td><td class='number'>{}</td><td>{}</td></tr>".format(*cells))
-    set_ = [meaning.causality in SETTABLE_CAUSALITIES for _, meaning in chosen]
+    set_ = [meaning.causality in SETTABLE_CAUSALITIES for _, meaning in variables]
     value = "default" if all(set_) else "default, unit" if any(set_) else "unit"
     head = f"<thead><tr><th>name</th><th>{value}</th><th>description</th></tr></thead>"
     return f"<table>{head}{''.join(rows)}</table>"

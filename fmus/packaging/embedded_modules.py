@@ -51,8 +51,8 @@ def embedded_files(source: ModelFile, texts: Mapping[str, str], root: Path = FMU
             files[path] = ""
         elif path not in files:
             text = texts[path] if path in texts else _on_disk(path, root).read_text(encoding="utf-8")
-            files[path], needed = _embed(path, text, root)
-            pending += needed
+            files[path], imports = _embed(path, text, root)
+            pending += imports
     return files
 
 
@@ -71,8 +71,8 @@ def _embed(path: str, text: str, root: Path) -> tuple[str, list[str]]:
     """Return the text of a file as embedded, and the paths of the files that it imports."""
     # Text mode converts line ends to "\n", so checkouts on all systems build the same bytes.
     lines = text.splitlines(keepends=True)
-    inside = PurePosixPath(path).parts
-    needed = ["/".join((*inside[:depth], "__init__.py")) for depth in range(1, len(inside))]
+    parts = PurePosixPath(path).parts
+    imports = ["/".join((*parts[:depth], "__init__.py")) for depth in range(1, len(parts))]
     for node in _imports(path, "".join(lines)):
         if isinstance(node, ast.Import):
             for alias in node.names:
@@ -80,15 +80,15 @@ def _embed(path: str, text: str, root: Path) -> tuple[str, list[str]]:
             continue
         base = tuple(node.module.split(".")) if node.module else ()
         if node.level:
-            base = (*inside[: len(inside) - node.level], *base)
+            base = (*parts[: len(parts) - node.level], *base)
         elif base[0] == "pythonfmu":
-            here = "." * len(inside)
-            lines[node.lineno - 1] = lines[node.lineno - 1].replace("from pythonfmu", f"from {here}pythonfmu", 1)
+            dots = "." * len(parts)
+            lines[node.lineno - 1] = lines[node.lineno - 1].replace("from pythonfmu", f"from {dots}pythonfmu", 1)
         else:
             _standard(path, base[0])
             continue
-        needed += [_resolve(path, base, alias.name, root) for alias in node.names]
-    return "".join(lines), needed
+        imports += [_resolve(path, base, alias.name, root) for alias in node.names]
+    return "".join(lines), imports
 
 
 def _imports(path: str, source: str) -> Iterator[ast.Import | ast.ImportFrom]:

@@ -65,9 +65,9 @@ def all_variables(model: Any) -> Variables:
     states = [meaning for _, meaning in integrated_states(declared)]
     speed = next((meaning.unit for meaning in states if meaning.rate_of), states[0].unit)
     for (mode, slip), force in zip(model.contacts.items(), forces, strict=True):
-        tail, where = (f"_{mode}", f" of {mode}") if len(forces) > 1 else ("", "")
-        stick_text = f"event indicator{where}: speed in the direction of sliding; 1 while stuck"
-        slip_text = f"event indicator{where}: holding limit minus load on the body at rest; 1 while sliding"
+        tail, of_mode = (f"_{mode}", f" of {mode}") if len(forces) > 1 else ("", "")
+        stick_text = f"event indicator{of_mode}: speed in the direction of sliding; 1 while stuck"
+        slip_text = f"event indicator{of_mode}: holding limit minus load on the body at rest; 1 while sliding"
         added += [
             (TO_REST + tail, ContinuousLocal(meanings[slip].unit if slip else speed, stick_text)),
             (TO_BREAK_AWAY + tail, ContinuousLocal(force, slip_text)),

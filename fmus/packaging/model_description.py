@@ -68,7 +68,7 @@ def describe(model: Any, name: str, code: str, date: datetime, nominals: Sequenc
     exchanging = len(nominals) > 0
     declared = declared_variables(model)
     if exchanging:  # FMI 2.0 needs no time variable, and FMILibrary rejects one
-        declared = [one for one in all_variables(model) if one[0] != TIME]
+        declared = [pair for pair in all_variables(model) if pair[0] != TIME]
         root.set("numberOfEventIndicators", str(len(event_indicator_indices(declared))))
         step_report = {} if has_step_events(declared) else {"completedIntegratorStepNotNeeded": "true"}
         SubElement(root, "ModelExchange", EXCHANGE_CAPABILITIES | step_report, modelIdentifier=name)
@@ -148,7 +148,7 @@ def quantities(declared: Variables) -> list[dict[str, str]]:
     quantity_attributes = [
         {"quantity": u.quantity, "unit": symbol, "displayUnit": u.display} for symbol, u in used_units(declared)
     ]
-    return [{key: value for key, value in one.items() if value} for one in quantity_attributes]
+    return [{key: value for key, value in attributes.items() if value} for attributes in quantity_attributes]
 
 
 def used_units(declared: Variables) -> list[tuple[str, Unit]]:
@@ -231,7 +231,7 @@ def dependency_tables(
     """
     places = {name: place for place, (name, _) in enumerate(declared)}
     outputs = [place for place, (_, meaning) in enumerate(declared) if meaning.causality == "output"]
-    driver_rates = {DERIVATIVE_NAME.format(name): [one.rate] for name, one in declared if one.rate}
+    driver_rates = {DERIVATIVE_NAME.format(name): [meaning.rate] for name, meaning in declared if meaning.rate}
     later_knowns = {place for place, (_, meaning) in enumerate(declared) if meaning.causality in causalities}
     tables = []
     for unknowns, at_start, knowns in (
@@ -240,7 +240,9 @@ def dependency_tables(
         (sorted({*outputs, *rates}), True, {*places.values()}),
     ):
         names = output_dependencies(model, declared, at_start) | driver_rates
-        tables.append({one: sorted({places[n] for n in names[declared[one][0]]} & knowns) for one in unknowns})
+        tables.append(
+            {unknown: sorted({places[n] for n in names[declared[unknown][0]]} & knowns) for unknown in unknowns}
+        )
     return tables
 
 
@@ -251,6 +253,6 @@ def _add_structure(root: Element, model: type[VariableOwner], declared: Variable
     kinds = {"Outputs": outputs} | ({"Derivatives": derivatives} if rates else {}) | {"InitialUnknowns": at_first}
     for kind, unknown in kinds.items():
         element = SubElement(structure, kind)
-        for place, known in unknown.items():
-            dependencies = " ".join(str(one + 1) for one in known)  # FMI 2.0 counts from 1
+        for place, knowns in unknown.items():
+            dependencies = " ".join(str(known + 1) for known in knowns)  # FMI 2.0 counts from 1
             SubElement(element, "Unknown", index=str(place + 1), dependencies=dependencies)

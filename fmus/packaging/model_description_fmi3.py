@@ -88,7 +88,7 @@ def _add_structure(root: Element, model: Any, declared: Variables, rates: dict[i
         kind_of_factors = (
             "" if model.has_dry_friction else "constant" if place in states else "tunable" if model.is_linear else ""
         )
-        kinds = ["dependent" if declared[one][1].causality == "parameter" else kind_of_factors for one in known]
+        kinds = ["dependent" if declared[index][1].causality == "parameter" else kind_of_factors for index in known]
         _add_unknown(structure, "ContinuousStateDerivative", place, known, kinds if kind_of_factors else [])
     for place, known in at_first.items():
         _add_unknown(structure, "InitialUnknown", place, known)
@@ -105,7 +105,7 @@ def _add_structure(root: Element, model: Any, declared: Variables, rates: dict[i
         _add_unknown(structure, "EventIndicator", place, known if name.startswith(TO_REST) else known + inputs)
 
 
-def _add_unknown(structure: Element, kind: str, reference: int, known: list[int], factors: Sequence[str] = ()) -> None:
+def _add_unknown(structure: Element, kind: str, reference: int, knowns: list[int], factors: Sequence[str] = ()) -> None:
     """Add an unknown with its dependencies and, if given, their kinds."""
-    attributes = {"valueReference": str(reference), "dependencies": " ".join(map(str, known))}
+    attributes = {"valueReference": str(reference), "dependencies": " ".join(map(str, knowns))}
     SubElement(structure, kind, attributes | ({"dependenciesKind": " ".join(factors)} if factors else {}))

@@ -8,7 +8,9 @@ from typing import Any, TypeVar
 
 Node = TypeVar("Node", bound=ast.AST)
 NON_NODE_FIELDS = {"ctx", "id", "attr", "arg", "name", "asname", "module", "level", "kind", "type_comment"}
-NODE_TYPES = [one for one in vars(ast).values() if isinstance(one, type) and issubclass(one, ast.AST)]
+NODE_TYPES = [
+    node_type for node_type in vars(ast).values() if isinstance(node_type, type) and issubclass(node_type, ast.AST)
+]
 STATEMENT_FIELDS = ("body", "handlers", "orelse", "finalbody")
 CHILD_FIELDS = {kind: [name for name in kind._fields if name not in NON_NODE_FIELDS] for kind in NODE_TYPES} | {
     ast.Constant: []
@@ -33,7 +35,7 @@ def child_nodes(node: ast.AST) -> list[ast.AST]:
     for name in CHILD_FIELDS[type(node)]:
         value = getattr(node, name, None)
         if isinstance(value, list):
-            result += [one for one in value if isinstance(one, ast.AST)]
+            result += [node_type for node_type in value if isinstance(node_type, ast.AST)]
         elif isinstance(value, ast.AST):
             result.append(value)
     return result
@@ -41,14 +43,14 @@ def child_nodes(node: ast.AST) -> list[ast.AST]:
 
 def child_statements(node: ast.AST) -> list[ast.stmt | ast.ExceptHandler]:
     """Return the statements directly inside a statement or a module; those of an exception handler are inside it."""
-    return [one for name in STATEMENT_FIELDS for one in getattr(node, name, ())]
+    return [node_type for name in STATEMENT_FIELDS for node_type in getattr(node, name, ())]
 
 
 def nested_statements(node: ast.AST) -> Iterator[ast.stmt | ast.ExceptHandler]:
     """Yield all statements inside a node."""
-    for one in child_statements(node):
-        yield one
-        yield from nested_statements(one)
+    for statement in child_statements(node):
+        yield statement
+        yield from nested_statements(statement)
 
 
 def all_nodes(root: ast.AST) -> list[ast.AST]:
@@ -70,7 +72,9 @@ class TreeTransformer:
         for name in CHILD_FIELDS[type(node)]:
             value = getattr(node, name, None)
             if isinstance(value, list):
-                result[name] = [self.visit(one) if isinstance(one, ast.AST) else one for one in value]
+                result[name] = [
+                    self.visit(node_type) if isinstance(node_type, ast.AST) else node_type for node_type in value
+                ]
             elif isinstance(value, ast.AST):
                 result[name] = self.visit(value)
         return replace_fields(node, **result) if result else node

@@ -61,8 +61,8 @@ def parse_unit(symbol: str) -> Unit | None:
     if "".join(map("".join, factors)) != f".{symbol}" or any(part not in SYMBOLS for _, part, _ in factors):
         return None
     times = [int(power or "1") * (1 if sign == "." else -1) for sign, _, power in factors]
-    each = [[n * power for power in SYMBOLS[part]] for n, (_, part, _) in zip(times, factors, strict=True)]
-    kg, m, s, rad = map(sum, zip(*each, strict=True))
+    exponents = [[n * power for power in SYMBOLS[part]] for n, (_, part, _) in zip(times, factors, strict=True)]
+    kg, m, s, rad = map(sum, zip(*exponents, strict=True))
     return Unit(symbol, kg, m, s, rad)
 
 

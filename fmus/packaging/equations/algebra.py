@@ -31,8 +31,8 @@ def depends_on(e: Operand, variables: Collection[Expression]) -> bool:
 
 def has_condition_on(e: Operand, variables: Collection[Expression]) -> bool:
     """Return whether a condition in an expression depends on the variables; derivatives do not show this."""
-    conditions = (one for one in subexpressions(e).values() if isinstance(one, Term) and one.op in COMPARISONS)
-    return any(depends_on(one, variables) for one in conditions)
+    conditions = (term for term in subexpressions(e).values() if isinstance(term, Term) and term.op in COMPARISONS)
+    return any(depends_on(term, variables) for term in conditions)
 
 
 def subexpressions(e: Operand, result: Memo | None = None) -> Memo:
@@ -40,34 +40,36 @@ def subexpressions(e: Operand, result: Memo | None = None) -> Memo:
     result = {} if result is None else result
     if id(e) not in result:
         result[id(e)] = e
-        for one in operands(e):
-            subexpressions(one, result)
+        for operand in operands(e):
+            subexpressions(operand, result)
     return result
 
 
 def variables_in(e: Operand) -> list[Expression]:
     """Return the distinct declared variables in an expression."""
     return [
-        one for one in subexpressions(e).values() if isinstance(one, Expression) and not isinstance(one, (Term, Output))
+        leaf
+        for leaf in subexpressions(e).values()
+        if isinstance(leaf, Expression) and not isinstance(leaf, (Term, Output))
     ]
 
 
 def factors(e: Operand) -> list[Operand]:
     """Return the factors of a product; e is 0 if one of them is 0."""
     if isinstance(e, Term) and e.op == "*":
-        return [one for part in e.args for one in factors(part)]
+        return [factor for part in e.args for factor in factors(part)]
     return factors(e.args[0]) if isinstance(e, Term) and e.op in ("neg", "/", "fabs", "sqrt") else [e]
 
 
 def unconditional_quotients(targets: Collection[Operand]) -> list[Term]:
     """Return the quotients that every evaluation of the targets calculates: those outside the cases of choose()."""
     result: list[Term] = []
-    seen: Memo = {}
+    visited: Memo = {}
     stack = list(targets)
     while stack:
         e = stack.pop()
-        if id(e) not in seen:
-            seen[id(e)] = e
+        if id(e) not in visited:
+            visited[id(e)] = e
             is_choose = isinstance(e, Term) and e.op == "choose"
             stack += operands(e)[:1] if is_choose else operands(e)
             if isinstance(e, Term) and e.op == "/":
@@ -77,7 +79,7 @@ def unconditional_quotients(targets: Collection[Operand]) -> list[Term]:
 
 def count_occurrences(e: Operand, leaf: Expression) -> int:
     """Return how often a variable occurs in an expression."""
-    return 1 if e is leaf else sum(count_occurrences(one, leaf) for one in operands(e))
+    return 1 if e is leaf else sum(count_occurrences(operand, leaf) for operand in operands(e))
 
 
 def is_same_expression(a: Operand, b: Operand) -> bool:
@@ -99,7 +101,7 @@ def substitute(e: Operand, values: Mapping[Expression, Operand], memo: Memo | No
         new = substitute(e.expression, values, memo)
         new = e if new is e.expression else new
     elif isinstance(e, Term):
-        args = [substitute(one, values, memo) for one in e.args]
+        args = [substitute(argument, values, memo) for argument in e.args]
         new = e if all(a is b for a, b in zip(args, e.args, strict=True)) else build_term(e.op, *args)
     memo[id(e)] = new
     return new
@@ -187,8 +189,8 @@ def differentiate(
     if not isinstance(e, Expression) or e in by or not depends_on(e, by):
         return by.get(e, 0.0)
 
-    def slope(one: Operand) -> Operand:
-        return differentiate(one, by, names, memo)
+    def slope(operand: Operand) -> Operand:
+        return differentiate(operand, by, names, memo)
 
     if isinstance(e, Output):
         new = slope(e.expression)
@@ -227,7 +229,7 @@ def _differentiate_term(e: Term, slope: Callable[[Operand], Operand]) -> Operand
 def _apply_chain_rule(outer: Operand, inner: Operand) -> Operand:
     """Return outer * inner, with inner in the numerator where outer is a quotient."""
     if isinstance(outer, Term) and outer.op == "choose":
-        return build_term("choose", outer.args[0], *(_apply_chain_rule(one, inner) for one in outer.args[1:]))
+        return build_term("choose", outer.args[0], *(_apply_chain_rule(case, inner) for case in outer.args[1:]))
     if isinstance(outer, Term) and outer.op == "/":
         return build_term("/", _apply_chain_rule(outer.args[0], inner), outer.args[1])
     return build_term("*", outer, inner)
@@ -241,17 +243,17 @@ def solve_for(e: Operand, leaf: Expression) -> Operand:
             e = e.expression
             continue
         a, b = e.args[0], e.args[-1]
-        left = count_occurrences(a, leaf) > 0
+        is_in_first = count_occurrences(a, leaf) > 0
         match e.op:
             case "+":
-                e, right = (a, build_term("-", right, b)) if left else (b, build_term("-", right, a))
+                e, right = (a, build_term("-", right, b)) if is_in_first else (b, build_term("-", right, a))
             case "-":
-                e, right = (a, build_term("+", right, b)) if left else (b, build_term("-", a, right))
+                e, right = (a, build_term("+", right, b)) if is_in_first else (b, build_term("-", a, right))
             case "neg":
                 e, right = a, build_term("neg", right)
             case "*":
-                e, right = (a, build_term("/", right, b)) if left else (b, build_term("/", right, a))
-            case "/" if left:
+                e, right = (a, build_term("/", right, b)) if is_in_first else (b, build_term("/", right, a))
+            case "/" if is_in_first:
                 e, right = a, build_term("*", right, b)
             case _:
                 raise ModelError(f"{leaf.name} must enter the rates linearly, not through {e.op}", e.location)
@@ -261,19 +263,21 @@ def solve_for(e: Operand, leaf: Expression) -> Operand:
 def is_summand(e: Operand, leaf: Expression) -> bool:
     """Return whether the variable is a summand of the expression."""
     if not isinstance(e, Term):
-        return e is leaf or any(is_summand(one, leaf) for one in operands(e))
+        return e is leaf or any(is_summand(operand, leaf) for operand in operands(e))
     return (
-        count_occurrences(e, leaf) == 1 and e.op in ("+", "-", "neg") and any(is_summand(one, leaf) for one in e.args)
+        count_occurrences(e, leaf) == 1
+        and e.op in ("+", "-", "neg")
+        and any(is_summand(operand, leaf) for operand in e.args)
     )
 
 
 def is_factor(e: Operand, leaf: Expression) -> bool:
     """Return whether the expression is a product of the variable and other factors that do not contain it."""
     if not isinstance(e, Term):
-        return e is leaf or any(is_factor(one, leaf) for one in operands(e))
+        return e is leaf or any(is_factor(operand, leaf) for operand in operands(e))
     if count_occurrences(e, leaf) != 1 or e.op not in ("*", "/", "neg"):
         return False
-    return any(is_factor(one, leaf) for one in (e.args[:1] if e.op == "/" else e.args))
+    return any(is_factor(operand, leaf) for operand in (e.args[:1] if e.op == "/" else e.args))
 
 
 def rounding_scale(e: Operand) -> Operand:
@@ -313,16 +317,16 @@ def growth_exponent(e: Operand, moving: Collection[Expression]) -> float:
         return 0.0
     if not isinstance(e, (Term, Output)):
         return 1.0
-    grown = [growth_exponent(one, moving) for one in operands(e)]
+    exponents = [growth_exponent(operand, moving) for operand in operands(e)]
     match getattr(e, "op", "neg"):
         case "+" | "-" | "neg" | "fabs" | "choose":
-            return max(grown)
+            return max(exponents)
         case "*":
-            return sum(grown)
-        case "/" if grown[1] == 0.0:
-            return grown[0]
+            return sum(exponents)
+        case "/" if exponents[1] == 0.0:
+            return exponents[0]
         case "sqrt":
-            return 0.5 * grown[0]
+            return 0.5 * exponents[0]
         case "sin" | "cos" | "atan" | "tanh" | "copysign":
             return 0.0
     return float("inf")

@@ -21,25 +21,25 @@ class CodegenContext:
         self.an = an
         self.rate_expressions = [an.rate_outputs[s] for s in an.dynamic_states]  # outputs that are rates of states
         self.driver = an.drivers[0] if an.drivers else None
-        taken = {e.name for e in an.declared}
+        declared_names = {e.name for e in an.declared}
         self.names = an.names  # of terms that the model does not name
         for c in an.contacts:
             for name, e in ("load", an.load.get(c)), ("slide", c.slide), ("limit", an.holding_limit[c]):
                 name += "" if an.waits else f"_{c.name}"
-                if isinstance(e, Term) and not self.name_of(e) and name not in taken:
+                if isinstance(e, Term) and not self.name_of(e) and name not in declared_names:
                     self.names[e] = name
         for (c, d), e in an.A.items():
             if (
                 isinstance(e, Term)
                 and not self.name_of(e)
                 and not depends_on(e, an.inputs)
-                and f"A_{c.name}_{d.name}" not in taken
+                and f"A_{c.name}_{d.name}" not in declared_names
             ):
                 self.names[e] = f"A_{c.name}_{d.name}"
         self.states = [s.name for s in an.states]
         self.modes = [c.mode.name for c in an.contacts]
         self.arguments = ["t", *self.states, *self.modes]
-        self.used_names = taken | {"self", *self.arguments}
+        self.used_names = declared_names | {"self", *self.arguments}
         self.constants = self._constants()
 
     def name_of(self, e: Expression) -> str:
@@ -66,8 +66,8 @@ class CodegenContext:
                 return
             if isinstance(e, Term) and e.op == "/" and not in_case:
                 safe_divisors.add(id(e.args[1]))
-            for one in operands(e):
-                walk(one, in_case)
+            for operand in operands(e):
+                walk(operand, in_case)
 
         for c in an.contacts:
             for e in (c.slide, an.holding_limit[c], c.eps, *(an.A[c, d] for d in an.contacts if not an.waits)):
@@ -81,20 +81,20 @@ class CodegenContext:
     def printer(self, depth: int = 2) -> ExpressionPrinter:
         """Create a printer for a method, or for a block in it."""
         an = self.an
-        given: dict[Expression, str] = {s: s.name for s in an.states} | {m: m.name for m in an.modes} | {TIME: "t"}
+        names: dict[Expression, str] = {s: s.name for s in an.states} | {m: m.name for m in an.modes} | {TIME: "t"}
         for n, condition in enumerate(an.switches):
             if condition.is_frozen:
-                given |= dict.fromkeys(condition.comparisons, f"self.condition_sides[{n}] > 0.0")
-        return ExpressionPrinter(given, self.constants, self.used_names, depth, self.names)
+                names |= dict.fromkeys(condition.comparisons, f"self.condition_sides[{n}] > 0.0")
+        return ExpressionPrinter(names, self.constants, self.used_names, depth, self.names)
 
     def emit_driver(self, s: ExpressionPrinter, targets: Sequence[Operand]) -> None:
         """Emit the position of the driver and time-dependent inputs, if the targets need them."""
         for e, rate in self.an.ramps.items():
             course = f"self.{e.name}_polynomial"
-            if e not in s.bound_names and any(depends_on(one, (e,)) for one in targets):
+            if e not in s.bound_names and any(depends_on(target, (e,)) for target in targets):
                 s.bound_names[e] = e.name
                 s.emit(f"{e.name} = {course}.value_at(t - self.t_base)")
-            if rate not in s.bound_names and any(depends_on(one, (rate,)) for one in targets):
+            if rate not in s.bound_names and any(depends_on(target, (rate,)) for target in targets):
                 s.bound_names[rate] = rate.name
                 s.emit(f"{rate.name} = {course}.rate_at(t - self.t_base)")
         if self.driver is not None and any(depends_on(e, (self.driver,)) for e in targets):
@@ -156,7 +156,8 @@ def emit_scales(f: CodegenContext, s: ExpressionPrinter, sizes: list[Operand]) -
     s.emit(f"{scale.name} = fabs(self.x_base) + fabs(self.{drive.constant_rate.name}) * (fabs(t) + fabs(self.t_base))")
     s.bound_names[scale] = scale.name
     return [
-        substitute(e, {one: scale for one in subexpressions(e).values() if is_magnitude_of(one, drive)}) for e in sizes
+        substitute(e, {term: scale for term in subexpressions(e).values() if is_magnitude_of(term, drive)})
+        for e in sizes
     ]
 
 
@@ -178,12 +179,12 @@ def rule_status(n: int) -> str:
 def can_fail(e: Operand, safe_divisors: Collection[int]) -> bool:
     """Return whether an operation in the expression may raise an error for some values of the parameters."""
     return any(
-        isinstance(one, Term)
-        and (one.op in OVERFLOWING or (one.op in LIMITED_DOMAIN and id(one.args[-1]) not in safe_divisors))
-        for one in subexpressions(e).values()
+        isinstance(term, Term)
+        and (term.op in OVERFLOWING or (term.op in LIMITED_DOMAIN and id(term.args[-1]) not in safe_divisors))
+        for term in subexpressions(e).values()
     )
 
 
 def find_choice_test(e: Operand) -> Term | None:
     """Return a comparison with a choice in the expression, or None."""
-    return next((one for one in subexpressions(e).values() if isinstance(one, Term) and one.op == "=="), None)
+    return next((term for term in subexpressions(e).values() if isinstance(term, Term) and term.op == "=="), None)

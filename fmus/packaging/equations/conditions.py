@@ -34,12 +34,12 @@ def find_conditions(targets: Iterable[Operand], varying: Iterable[Expression]) -
     groups: list[list[Term]] = []
     for e in terms:
         if e.op in COMPARISONS and depends_on(e, varying):
-            group = next((one for one in groups if is_same_expression(one[0], e)), None)
+            group = next((candidate for candidate in groups if is_same_expression(candidate[0], e)), None)
             if group is None:
                 groups.append([e])
             else:
                 group.append(e)
-    protecting = {id(one) for e in terms for one in protected_comparisons(e, varying)}
+    protecting = {id(comparison) for e in terms for comparison in protected_comparisons(e, varying)}
     return [
         Condition(comparison_margin(group[0]), group[0].args, tuple(group), not any(id(e) in protecting for e in group))
         for group in groups
@@ -61,10 +61,10 @@ def protected_comparisons(e: Term, varying: tuple[Expression, ...]) -> list[Term
     These are the conditions around the operation and those inside its operand.
     """
     if e.op == "choose":
-        inside = [one for case in e.args[1:] for one in subexpressions(case).values()]
-        return [e.args[0]] if any(has_limited_domain(one, varying) for one in inside) else []
+        inside = [term for case in e.args[1:] for term in subexpressions(case).values()]
+        return [e.args[0]] if any(has_limited_domain(term, varying) for term in inside) else []
     if has_limited_domain(e, varying):
-        return [one for one in subexpressions(e).values() if isinstance(one, Term) and one.op in COMPARISONS]
+        return [term for term in subexpressions(e).values() if isinstance(term, Term) and term.op in COMPARISONS]
     return []
 
 

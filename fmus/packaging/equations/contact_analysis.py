@@ -40,10 +40,10 @@ class ContactAnalysis(ModelRoles):
             if depends_on(c.slip, forces) or depends_on(c.slide, self.contacts):
                 raise ModelError(f"slip and slide of {c.name} must not depend on the force of a contact", c.location)
             for d in self.contacts:
-                acts = self.derivative(self.slip_rate[c], {d: 1.0})
-                if depends_on(acts, forces):
+                effect = self.derivative(self.slip_rate[c], {d: 1.0})
+                if depends_on(effect, forces):
                     raise ModelError(f"{d.name} must enter the rate of the slip of {c.name} linearly", d.location)
-                self.A[c, d] = negate(acts)
+                self.A[c, d] = negate(effect)
             if is_same_expression(self.A[c, c], 0.0):
                 raise ModelError(f"{c.name} does not act on its own slip, so it can never stick", c.location)
             moved = [s for s in self.dynamic_states if depends_on(self.rate_outputs[s], (c,))]
@@ -99,7 +99,7 @@ class ContactAnalysis(ModelRoles):
     @cached_property
     def waits(self) -> bool:
         """Whether the model rests while its only contact sticks, with a load linear in time and a constant limit."""
-        if any(len(one) != 1 for one in (self.contacts, self.positions, self.dynamic_states)):
+        if any(len(group) != 1 for group in (self.contacts, self.positions, self.dynamic_states)):
             return False
         (c,), by_time = self.contacts, (TIME, *self.drivers)
         if self.dynamic_states[0] is not c.slip:
@@ -117,20 +117,20 @@ class ContactAnalysis(ModelRoles):
         and for slips that are the product of a lever and a speed.
         """
         result: list[tuple[Contact, State, Operand]] = []
-        left = list(self.contacts)
+        remaining = list(self.contacts)
         while True:
             alone = [
                 (c, s)
-                for c in left
+                for c in remaining
                 for s in self.dynamic_states
                 if (is_summand(c.slip, s) or (is_factor(c.slip, s) and depends_on(self.rate_outputs[s], (c,))))
-                and not any(depends_on(d.slip, (s,)) for d in left if d is not c)
+                and not any(depends_on(d.slip, (s,)) for d in remaining if d is not c)
             ]
             if not alone:
                 return result
             c, s = alone[0]
             result.insert(0, (c, s, solve_for(c.slip, s) if is_summand(c.slip, s) else 0.0))
-            left = [d for d in left if d is not c]
+            remaining = [d for d in remaining if d is not c]
 
     def _dynamic_expressions(self) -> list[Operand]:
         """Return the expressions that determine the motion."""
@@ -203,9 +203,9 @@ class ContactAnalysis(ModelRoles):
         start |= {s: substitute(s.start_expression, start) for s in self.states}
         for c in self.contacts:
             least = min(
-                one
-                for one in (substitute(c.slide, start), substitute(self.holding_limit[c], start), 0.0)
-                if isinstance(one, float)
+                expression
+                for expression in (substitute(c.slide, start), substitute(self.holding_limit[c], start), 0.0)
+                if isinstance(expression, float)
             )
             if least < 0.0:
                 raise ModelError(f"slide or hold of {c.name} is negative at the start values", c.location)
@@ -213,12 +213,12 @@ class ContactAnalysis(ModelRoles):
         if any(isinstance(e, Expression) for e in A.values()):
             return  # depends on a choice: cannot be decided at build time
         contacts = [c for c in self.contacts if not is_among(c, self.variable_lever_contacts) or A[c, c] != 0.0]
-        left = {c: A[c, c] for c in contacts}
+        diagonal = {c: A[c, c] for c in contacts}
         for n, c in enumerate(contacts):
-            if not left[c] > 0.0:
+            if not diagonal[c] > 0.0:
                 sentence = f"{c.name} accelerates its own slip instead of opposing it: change its sign in the rates"
                 raise ModelError(sentence, c.location)
-            if not A[c, c] > 1e-12 * left[c]:
+            if not A[c, c] > 1e-12 * diagonal[c]:
                 others = " and ".join(d.name for d in contacts[:n] if not is_same_expression(self.A[c, d], 0.0))
                 raise ModelError(
                     f"{c.name} and {others} hold the same motion at rest, so their forces are not determined: remove "

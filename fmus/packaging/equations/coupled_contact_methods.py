@@ -96,11 +96,11 @@ def emit_solution(
         if s.is_shared(unknowns[n].stuck_values[c]):
             s.local_variable(unknowns[n].stuck_values[c])
     for c in f.an.contacts:
-        own = [n for n in range(len(unknowns)) if (n, c) in names]
+        indices = [n for n in range(len(unknowns)) if (n, c) in names]
         test = f"{c.mode.name} == 0" + (" and self.friction == HYBRID" if law and SIGN in c.laws else "")
-        for head, attribute in ((f"if {test}:", "stuck_values"), ("else:", "sliding_values")) if own else ():
+        for head, attribute in ((f"if {test}:", "stuck_values"), ("else:", "sliding_values")) if indices else ():
             with s.block(head):
-                for n in own:
+                for n in indices:
                     s.emit(f"{names[n, c]} = {s.text(getattr(unknowns[n], attribute)[c])}")
                 for d in shared if is_among(c, shared) else []:
                     s.emit(f"{matrix[c, d]} = {s.text(f.an.A[c, d] if attribute == 'stuck_values' else float(c is d))}")

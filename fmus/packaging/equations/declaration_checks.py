@@ -70,11 +70,11 @@ def check_declarations(an: ModelRoles) -> None:
             ) from None
     if an.model.method not in ("", *METHODS):
         raise ModelError(f"method = {an.model.method!r} is unknown; available methods: {', '.join(METHODS)}", location)
-    for word, most in ("stop_time", inf), ("step_size", inf), ("tolerance", 1.0):
+    for word, limit in ("stop_time", inf), ("step_size", inf), ("tolerance", 1.0):
         value = getattr(an.model, word)
-        if not is_number(value) or not 0.0 < value < most:
+        if not is_number(value) or not 0.0 < value < limit:
             raise ModelError(
-                f"{word} = {describe(value)} is invalid: it must be a number above 0 and below {most:g}", location
+                f"{word} = {describe(value)} is invalid: it must be a number above 0 and below {limit:g}", location
             )
     if not (an.model.__doc__ or "").strip():
         raise ModelError(
@@ -86,8 +86,8 @@ def check_declarations(an: ModelRoles) -> None:
 
 def _check_choices(e: Variable, part: Operand) -> None:
     """Check that an expression does not calculate with the number of a Choice."""
-    for one in subexpressions(part).values():
-        parts = one.args if isinstance(one, Term) and one.op != "==" else ()
+    for term in subexpressions(part).values():
+        parts = term.args if isinstance(term, Term) and term.op != "==" else ()
         for choice in (*parts, part):
             if isinstance(choice, Choice):
                 cases = ", ".join(f"{label}=..." for label, _, _ in choice.items)
@@ -102,9 +102,9 @@ def _check_variable(an: ModelRoles, e: Variable) -> None:
     if not e.text:
         raise ModelError(f"{e.name} has an empty description: write a text", e.location)
     _check_printable(e.name, e.location, e.text, *(sentence for _, _, sentence in e.items))
-    for one in (e.start, e.low, e.high, e.above, e.below):
-        if not is_number(one) or (isinstance(one, int) and abs(one) > LARGEST_FLOAT):
-            got = "an expression" if isinstance(one, Expression) else describe(one)
+    for value in (e.start, e.low, e.high, e.above, e.below):
+        if not is_number(value) or (isinstance(value, int) and abs(value) > LARGEST_FLOAT):
+            got = "an expression" if isinstance(value, Expression) else describe(value)
             raise ModelError(f"{e.name}: start value and bounds must be numbers, got {got}", e.location)
     if not max(e.low, e.above) <= min(e.high, e.below):
         raise ModelError(f"{e.name} has an empty range: no number is {e.allowed}", e.location)
@@ -119,8 +119,8 @@ def _check_variable(an: ModelRoles, e: Variable) -> None:
 
 def _check_alias(an: ModelRoles, e: Variable) -> None:
     """Check that the alias is an identifier that nothing else uses."""
-    known = [word for each in an.declared for word in (each.name, each.alias)]
-    if e.alias and (not e.alias.isidentifier() or known.count(e.alias) > 1 or e.alias in RESERVED):
+    names = [word for variable in an.declared for word in (variable.name, variable.alias)]
+    if e.alias and (not e.alias.isidentifier() or names.count(e.alias) > 1 or e.alias in RESERVED):
         raise ModelError(
             f"{e.name} has the alias {e.alias!r}: it must be an identifier that nothing else uses", e.location
         )

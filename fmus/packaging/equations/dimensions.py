@@ -21,11 +21,11 @@ PRECEDENCE = {"+": 1, "-": 1, "*": 2, "/": 2, "neg": 3} | dict.fromkeys(COMPARIS
 
 def check_units(an: ModelAnalysis) -> None:
     """Check the units of all outputs, rates, start values, slips and forces."""
-    known: dict[int, Dimensions | None] = {}
+    memo: dict[int, Dimensions | None] = {}
     for e in an.declared:
         own, prefix = declared_dimensions(e), f"{e.name} is declared in {e.unit}, but"
         if isinstance(e, Output):
-            check_dimensions(e, e.expression, own, prefix, known)
+            check_dimensions(e, e.expression, own, prefix, memo)
         if (
             isinstance(e, (State, Output))
             and e.integrates is not None
@@ -35,23 +35,23 @@ def check_units(an: ModelAnalysis) -> None:
                 f"{e.name} in {e.unit} cannot be the rate of {e.integrates.name} in {e.integrates.unit}", e.location
             )
         if isinstance(e, State):
-            check_dimensions(e, e.start_expression, own, f"{prefix} its start", known)
-            check_dimensions(e, e.nominal_velocity, own, f"{prefix} its nominal_velocity", known)
-            check_dimensions(e, e.constant_rate, quotient(own, SECOND), f"{prefix} its rate", known)
+            check_dimensions(e, e.start_expression, own, f"{prefix} its start", memo)
+            check_dimensions(e, e.nominal_velocity, own, f"{prefix} its nominal_velocity", memo)
+            check_dimensions(e, e.constant_rate, quotient(own, SECOND), f"{prefix} its rate", memo)
         if isinstance(e, Contact):
-            slip = dimensions_of(e.slip, known)
-            for word, one in ("slide", e.slide), ("hold", e.hold):
-                check_dimensions(e, one, own, f"{prefix} {word}", known)
-            check_dimensions(e, e.eps, slip, f"the slip of {e.name} is in {dimensions_text(slip)}, but eps", known)
+            slip = dimensions_of(e.slip, memo)
+            for word, force in ("slide", e.slide), ("hold", e.hold):
+                check_dimensions(e, force, own, f"{prefix} {word}", memo)
+            check_dimensions(e, e.eps, slip, f"the slip of {e.name} is in {dimensions_text(slip)}, but eps", memo)
     for rule in an.rules:
-        dimensions_of(rule.broken, known)
+        dimensions_of(rule.broken, memo)
 
 
 def check_dimensions(
-    owner: Expression, e: Operand, expected: Dimensions | None, prefix: str, known: dict[Any, Any]
+    owner: Expression, e: Operand, expected: Dimensions | None, prefix: str, memo: dict[Any, Any]
 ) -> None:
     """Raise ModelError if an expression has another unit than expected; numbers have any unit."""
-    dimensions = dimensions_of(e, known) if isinstance(e, Expression) else None
+    dimensions = dimensions_of(e, memo) if isinstance(e, Expression) else None
     if None not in (dimensions, expected) and dimensions != expected:
         raise ModelError(f"{prefix} {expression_text(e)} is in {dimensions_text(dimensions)}", owner.location)
 
@@ -77,10 +77,10 @@ def unit_hint(unit: str, text: str) -> str:
         return 'use rad instead of deg, and display="deg" to show degrees'
     if unit.strip() in ("", "-"):
         return 'a pure number has the unit "1"'
-    plain = unit.strip().replace("**", "").replace("^", "")
-    plain = re.sub(r"[ *\u00b7]+", ".", plain)
-    plain = re.sub("[A-Za-z]+", lambda match: UNIT_SPELLINGS.get(match[0].lower(), match[0]), plain)
-    return f'write "{plain}"' if parse_unit(plain) else ""
+    symbol = unit.strip().replace("**", "").replace("^", "")
+    symbol = re.sub(r"[ *\u00b7]+", ".", symbol)
+    symbol = re.sub("[A-Za-z]+", lambda match: UNIT_SPELLINGS.get(match[0].lower(), match[0]), symbol)
+    return f'write "{symbol}"' if parse_unit(symbol) else ""
 
 
 def quotient(a: Dimensions, b: Dimensions) -> Dimensions:
@@ -92,21 +92,21 @@ def dimensions_text(dimensions: Dimensions | None) -> str:
     """Format exponents, for example as kg m/s^2."""
     named = list(zip(BASE_UNITS, dimensions or DIMENSIONLESS, strict=True))
     above, below = ([n if abs(p) == 1 else f"{n}^{abs(p)}" for n, p in named if sign * p > 0] for sign in (1, -1))
-    return " ".join(above or ["1"]) + "".join(f"/{one}" for one in below) if above or below else "1"
+    return " ".join(above or ["1"]) + "".join(f"/{unit}" for unit in below) if above or below else "1"
 
 
-def dimensions_of(e: Operand, known: dict[int, Dimensions | None]) -> Dimensions | None:
+def dimensions_of(e: Operand, memo: dict[int, Dimensions | None]) -> Dimensions | None:
     """Return the exponents of an expression; None for zero, which has any unit."""
     if not isinstance(e, Expression):
         return DIMENSIONLESS if e else None
-    if id(e) not in known:
-        known[id(e)] = declared_dimensions(e) if isinstance(e, Variable) else _term_dimensions(e, known)
-    return known[id(e)]
+    if id(e) not in memo:
+        memo[id(e)] = declared_dimensions(e) if isinstance(e, Variable) else _term_dimensions(e, memo)
+    return memo[id(e)]
 
 
-def _term_dimensions(e: Expression, known: dict[int, Dimensions | None]) -> Dimensions | None:
+def _term_dimensions(e: Expression, memo: dict[int, Dimensions | None]) -> Dimensions | None:
     assert isinstance(e, Term)
-    dimensions = [dimensions_of(one, known) for one in e.args]
+    dimensions = [dimensions_of(argument, memo) for argument in e.args]
     a, b = dimensions[0], dimensions[-1]
     match e.op:
         case "==":

@@ -103,7 +103,7 @@ class ExpressionPrinter:
         return e.name or self.names.get(e, "")
 
     def _is_constant(self, e: Operand) -> bool:
-        return isinstance(e, Expression) and any(e is one for one in self.constants)
+        return isinstance(e, Expression) and any(e is constant for constant in self.constants)
 
     def _is_leaf(self, e: Operand) -> bool:
         return not isinstance(e, (Term, Output)) or e in self.bound_names or self._is_constant(e)
@@ -181,7 +181,7 @@ class ExpressionPrinter:
         return ast.Name(name)
 
     def _build_node(self, e: Term) -> ast.expr:
-        args = [self._to_ast(one) for one in e.args]
+        args = [self._to_ast(argument) for argument in e.args]
         if e.op in BINARY_OPERATORS:
             return binary_node(e.op, *args)
         if e.op == "neg":

@@ -156,7 +156,7 @@ def is_comparison(e: Operand) -> bool:
 
 def is_among(e: object, expressions: Iterable[Expression]) -> bool:
     """Return whether an object is one of some expressions."""
-    return any(e is one for one in expressions)
+    return any(e is expression for expression in expressions)
 
 
 def describe(value: object) -> str:

@@ -80,9 +80,9 @@ class ModelAnalysis(ContactAnalysis):
         if not self.closed_form:
             return True
         constants = (*self.closed_form, *(c.slide for c in self.contacts))
-        acts = self.derivative(self.rate_outputs[self.dynamic_states[0]].expression, {e: 1.0})
-        return not any(depends_on(one, (e,)) for one in constants) and not depends_on(
-            acts, (*self.time_varying, *self.inputs)
+        effect = self.derivative(self.rate_outputs[self.dynamic_states[0]].expression, {e: 1.0})
+        return not any(depends_on(constant, (e,)) for constant in constants) and not depends_on(
+            effect, (*self.time_varying, *self.inputs)
         )
 
     @cached_property
@@ -145,7 +145,7 @@ class ModelAnalysis(ContactAnalysis):
         """Return whether an output depends directly on an input."""
         if isinstance(e, (Contact, Mode)):
             (c,) = (c for c in self.contacts if e is c or e is c.mode)
-            return any(depends_on(one, self.inputs) for one in (*self.load_expressions(c), c.slide))
+            return any(depends_on(expression, self.inputs) for expression in (*self.load_expressions(c), c.slide))
         return depends_on(e, self.inputs) or any(
             depends_on(e, (c,)) and self.has_direct_feedthrough(c) for c in self.contacts
         )

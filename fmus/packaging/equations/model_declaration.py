@@ -19,8 +19,8 @@ FUNCTION_TYPES = (FunctionType, property, staticmethod, classmethod, cached_prop
 def signature_text(function: Callable[..., object]) -> str:
     """Return the arguments of a function or class, with those that can be left out as name=."""
     texts = [
-        str(one).split(":")[0] if one.default is one.empty else f"{one.name}="
-        for one in signature(function).parameters.values()
+        str(parameter).split(":")[0] if parameter.default is parameter.empty else f"{parameter.name}="
+        for parameter in signature(function).parameters.values()
     ]
     return f"({', '.join(texts)})"
 
@@ -340,9 +340,9 @@ class _ClassBody(dict[str, Any]):
             elif isinstance(value, Rule):
                 sentence = f"nothing uses the rule {name}: write rules = Rule(...), or a tuple of rules"
             else:
-                shown = f" = {value!r}" if isinstance(value, (int, float)) else ""
+                value_text = f" = {value!r}" if isinstance(value, (int, float)) else ""
                 sentence = (
-                    f"nothing uses {name}{shown}: declare it as Parameter and use it in an equation, or remove it"
+                    f"nothing uses {name}{value_text}: declare it as Parameter and use it in an equation, or remove it"
                 )
             raise ModelError(sentence, location)
 

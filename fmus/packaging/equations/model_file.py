@@ -88,8 +88,8 @@ class ModelFile:
         """Raise BuildError if the equations cannot be evaluated at the start values."""
         try:
             status = thing.prepare()
-            begins = thing.initial_state(0.0)
-            states = begins if isinstance(begins, tuple) else (begins,)  # a model with one state returns a number
+            initial = thing.initial_state(0.0)
+            states = initial if isinstance(initial, tuple) else (initial,)  # a model with one state returns a number
             thing.compute_outputs(0.0, *states, *(0 for _ in self.analysis.contacts))
         except (ArithmeticError, ValueError) as error:
             mistake = ModelError(
@@ -113,9 +113,9 @@ class ModelFile:
             or iskeyword(self.name)
             or self.name in RESERVED_FILE_NAMES
         ):
-            taken = f", and not {' or '.join(RESERVED_FILE_NAMES)}" if self.name in RESERVED_FILE_NAMES else ""
+            exceptions = f", and not {' or '.join(RESERVED_FILE_NAMES)}" if self.name in RESERVED_FILE_NAMES else ""
             raise BuildError(
-                f"{self.path}: the file name is the model name: use only ASCII letters, digits and _{taken}."
+                f"{self.path}: the file name is the model name: use only ASCII letters, digits and _{exceptions}."
             )
         module = ModuleType(f"{PACKAGE}.model_files.{self.name}")
         module.__file__ = str(self.path)
@@ -128,14 +128,14 @@ class ModelFile:
         except (Exception, SystemExit) as error:
             raise explain(error, ast.parse(self.source), str(self.path)) from error
         models = [
-            one
-            for one in vars(module).values()
-            if isinstance(one, type) and issubclass(one, Model) and one.__module__ == module.__name__
+            model
+            for model in vars(module).values()
+            if isinstance(model, type) and issubclass(model, Model) and model.__module__ == module.__name__
         ]
         if len(models) != 1:
-            what = f"has {len(models)}: {', '.join(one.__name__ for one in models)}" if models else "has none"
+            content = f"has {len(models)}: {', '.join(model.__name__ for model in models)}" if models else "has none"
             raise BuildError(
-                f"{self.path}: a model file must define exactly one class derived from Model; this one {what}."
+                f"{self.path}: a model file must define exactly one class derived from Model; this one {content}."
             )
         check_statements(ast.parse(self.source), models[0].__name__, str(self.path))
         return models[0]
@@ -143,8 +143,8 @@ class ModelFile:
     def _build_error(self, mistake: ModelError) -> BuildError:
         """Return a BuildError with file and line in front of the message."""
         file, line = mistake.location
-        where = f"{self.path}, line {line}" if file == str(self.path) else str(self.path)
-        return BuildError(f"{where}: {mistake}.")
+        location = f"{self.path}, line {line}" if file == str(self.path) else str(self.path)
+        return BuildError(f"{location}: {mistake}.")
 
 
 _loaded: dict[Path, ModelFile] = {}
@@ -156,7 +156,7 @@ def load_model_file(path: Path) -> ModelFile:
         source = path.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
         raise BuildError(f"{path} cannot be read: {getattr(error, 'strerror', None) or error}.") from error
-    known = _loaded.get(path.resolve())
-    if known is None or (known.path, known.source) != (path, source):
-        known = _loaded[path.resolve()] = ModelFile(path, source)
-    return known
+    cached = _loaded.get(path.resolve())
+    if cached is None or (cached.path, cached.source) != (path, source):
+        cached = _loaded[path.resolve()] = ModelFile(path, source)
+    return cached

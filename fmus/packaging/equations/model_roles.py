@@ -105,16 +105,20 @@ class ModelRoles:
         if isinstance(e, Output):
             return [e.expression]
         if isinstance(e, State):
-            return [one for one in (e.start_expression, e.constant_rate, e.nominal_velocity) if one is not None]
+            return [
+                expression
+                for expression in (e.start_expression, e.constant_rate, e.nominal_velocity)
+                if expression is not None
+            ]
         if isinstance(e, Contact):
-            return [one for one in (e.mode, e.slip, e.slide, e.hold, e.eps) if one is not None]
+            return [expression for expression in (e.mode, e.slip, e.slide, e.hold, e.eps) if expression is not None]
         return []
 
     def _input_rate(self, e: Input) -> Parameter | None:
         """Return a symbol for the rate of an input, or None if its names are in use or the input has a range."""
         rate = Parameter(0.0, f"{e.unit}/s", f"rate of {e.name}")
         rate.name = f"{e.name}_rate"
-        is_taken = any(one.name in (rate.name, f"{e.name}_polynomial") for one in self.declared)
+        is_taken = any(variable.name in (rate.name, f"{e.name}_polynomial") for variable in self.declared)
         return None if is_taken or any(map(isfinite, (e.low, e.high, e.above, e.below))) else rate
 
     @property

@@ -46,9 +46,9 @@ class {name}({base_class}):
 IMPORTS_MARK = "\0"  # marks the place of the imports; model texts cannot contain it
 WIDTH = 105
 DECLARATION_OPTIONS = {
-    one.name: one.default
-    for one in signature(VariableDeclaration.__init__).parameters.values()
-    if one.default is not one.empty
+    parameter.name: parameter.default
+    for parameter in signature(VariableDeclaration.__init__).parameters.values()
+    if parameter.default is not parameter.empty
 }
 RUN_SETTINGS = ("stop_time", "step_size", "tolerance")
 
@@ -172,9 +172,7 @@ def class_attribute_lines(an: ModelAnalysis) -> list[str]:
         )
     if an.conditions:
         lines.append(f"condition_texts = ({', '.join(map(string_literal, condition_texts(an)))},)")
-        lines.append(
-            f"condition_units = ({', '.join(string_literal(condition_unit(an, one)) for one in an.conditions)},)"
-        )
+        lines.append(f"condition_units = ({', '.join(string_literal(condition_unit(an, e)) for e in an.conditions)},)")
     if an.limits:
         lines.append(f"first_limit_rule = {rule_status(len(an.rules))}")
     for word in RUN_SETTINGS:
@@ -195,14 +193,14 @@ def n_event_functions(an: ModelAnalysis) -> int:
 
 def condition_texts(an: ModelAnalysis) -> list[str]:
     """Return what changes where the event function of a condition falls to zero."""
-    switches = [f"{expression_text(one.comparisons[0])} changes" for one in an.switches]
-    return switches + [one.sentence.partition(" at t =")[0] for one in an.limits]
+    switches = [f"{expression_text(condition.comparisons[0])} changes" for condition in an.switches]
+    return switches + [condition.sentence.partition(" at t =")[0] for condition in an.limits]
 
 
 def condition_unit(an: ModelAnalysis, condition: Condition) -> str:
     """Return the unit of the margin of a condition: that of a variable with the same dimensions, else 1."""
-    known: dict[int, Dimensions | None] = {}
-    dimensions = next((d for e in condition.sides if (d := dimensions_of(e, known)) is not None), None)
+    memo: dict[int, Dimensions | None] = {}
+    dimensions = next((d for e in condition.sides if (d := dimensions_of(e, memo)) is not None), None)
     return next((e.unit for e in an.declared if declared_dimensions(e) == dimensions), "1")
 
 

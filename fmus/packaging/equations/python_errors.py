@@ -47,17 +47,17 @@ def explain(error: BaseException, tree: ast.Module, file: str) -> ModelError:
 
 def explain_name(name: str, tree: ast.Module, line: int) -> str:
     """Return the message for an undefined name."""
-    stored = {
+    assigned_lines = {
         node.id: node.lineno
         for node in ast.walk(tree)
         if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)
     }
-    if stored.get(name) == line:
+    if assigned_lines.get(name) == line:
         return f"{name} is used in its own declaration: it gets a value only at the end of this line"
-    if stored.get(name, 0) > line:
+    if assigned_lines.get(name, 0) > line:
         return (
-            f"{name} is used before its declaration in line {stored[name]}: Python runs the file from top to bottom, "
-            "so declare each name before the line that uses it"
+            f"{name} is used before its declaration in line {assigned_lines[name]}: Python runs the file from top to "
+            "bottom, so declare each name before the line that uses it"
         )
     if name in ("t", "time"):
         return f'{name} is not defined: for the time, declare a state such as clock = State("s", "time", rate=1.0)'
@@ -67,7 +67,7 @@ def explain_name(name: str, tree: ast.Module, line: int) -> str:
         return f"{name} is not imported: write from fmus import {name}"
     if name == "sign":
         return "sign is not defined: declare dry friction as a Contact, and write other laws with choose or tanh"
-    close = get_close_matches(name, [*stored, *DECLARATIONS, *FUNCTIONS], 1, 0.7)
+    close = get_close_matches(name, [*assigned_lines, *DECLARATIONS, *FUNCTIONS], 1, 0.7)
     return f"{name} is not defined: " + (f"the nearest name is {close[0]}" if close else "declare it before this line")
 
 
@@ -85,17 +85,21 @@ def explain_arguments(name: str, function: Any, call: ast.Call) -> str:
     """Return the message for arguments that do not fit the signature."""
     arguments = signature(function).parameters
     usage = f"write {name}{signature_text(function)}"
-    by_position = [one for one in arguments.values() if one.kind is Argument.POSITIONAL_OR_KEYWORD]
-    given = [one.name for one in by_position[: len(call.args)]] + [one.arg or "" for one in call.keywords]
+    by_position = [argument for argument in arguments.values() if argument.kind is Argument.POSITIONAL_OR_KEYWORD]
+    names = [argument.name for argument in by_position[: len(call.args)]] + [
+        argument.arg or "" for argument in call.keywords
+    ]
     if len(call.args) > len(by_position):
         return f"{name} takes at most {len(by_position)} arguments without a name, got {len(call.args)}: {usage}"
-    takes_all = any(one.kind is Argument.VAR_KEYWORD for one in arguments.values())
-    for word in given if not takes_all else ():
+    takes_all = any(argument.kind is Argument.VAR_KEYWORD for argument in arguments.values())
+    for word in names if not takes_all else ():
         if word not in arguments:
             close = [OTHER_NAMES.get(word, ""), *get_close_matches(word, arguments, 1)]
-            nearest = next((f", the nearest is {one}" for one in close if one in arguments), "")
+            nearest = next((f", the nearest is {argument}" for argument in close if argument in arguments), "")
             return f"{name} has no argument {word}{nearest}: {usage}"
-    if missing := [one.name for one in by_position if one.default is one.empty and one.name not in given]:
+    if missing := [
+        argument.name for argument in by_position if argument.default is argument.empty and argument.name not in names
+    ]:
         return f"{name} lacks the argument {' and '.join(missing)}: {usage}"
     return ""
 

@@ -86,13 +86,13 @@ def coupled_jacobian_lines(
     emit_friction_forces(f, s)
     emit_solution(f, s, forces, law=True)
     for c in f.an.contacts:
-        known = [
+        columns = [
             (u.symbols[c], by) for u, by in zip(forces, directions, strict=True) if isinstance(u.symbols[c], Expression)
         ]
-        if THRESHOLD in c.laws and known:
+        if THRESHOLD in c.laws and columns:
             clips = f"fabs({c.name}) >= {s.text(f.an.holding_limit[c])}"
             with s.block(f"if {c.mode.name} == 0 and self.friction != HYBRID and {clips}:"):
-                for e, by in known:
+                for e, by in columns:
                     s.emit(f"{s.text(e)} = {s.text(clipped_force_derivative(f, c, by))}")
     return emit_return(s, targets)
 

@@ -55,9 +55,9 @@ def prepare_method(f: CodegenContext) -> str:
         s.emit(f"self.{e.name}_polynomial.set_value(self.{e.name})")
     s.count_uses(*f.constants, *(rule.broken for rule in f.an.rules))
 
-    def calculate(needed: Memo | None = None) -> None:
+    def calculate(selection: Memo | None = None) -> None:
         for e in f.constants:
-            if (needed is None or id(e) in needed) and not any(e is one for one in computed):
+            if (selection is None or id(e) in selection) and not any(e is constant for constant in computed):
                 s.emit_assignment(f"self.{f.name_of(e)}", e)
                 computed.append(e)
 
@@ -73,12 +73,12 @@ def prepare_method(f: CodegenContext) -> str:
 def nominal_velocity_method(f: CodegenContext) -> list[str]:
     """Smallest speed that the tolerance must resolve."""
     states = (*f.an.states, *f.an.drivers)
-    wanted = [state.nominal_velocity for state in states if state.nominal_velocity is not None]
-    if not wanted:
+    velocities = [state.nominal_velocity for state in states if state.nominal_velocity is not None]
+    if not velocities:
         return []
-    smallest = wanted[0]
-    for one in wanted[1:]:
-        smallest = Term("choose", Term("<", smallest, one), smallest, one)
+    smallest = velocities[0]
+    for velocity in velocities[1:]:
+        smallest = Term("choose", Term("<", smallest, velocity), smallest, velocity)
     return [method_source("nominal_velocity", (), f.return_lines(f.printer(), [smallest]))]
 
 

@@ -20,12 +20,12 @@ def single_contact_methods(f: CodegenContext) -> list[str]:
 def load_method(f: CodegenContext, c: Contact) -> str:
     """Load on the body at rest, its rate, and the holding limit."""
     an = f.an
-    wanted = [
+    targets = [
         an.load[c],
         substitute(f.an.derivative(an.load[c], an.coasting_derivatives), {c.slip: 0.0}),
         an.holding_limit[c],
     ]
-    return method_source("stick_load", ["t", *f.states], f.return_lines(f.printer(), wanted))
+    return method_source("stick_load", ["t", *f.states], f.return_lines(f.printer(), targets))
 
 
 def load_rate_method(f: CodegenContext, c: Contact) -> list[str]:

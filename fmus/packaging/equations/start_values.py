@@ -23,33 +23,33 @@ def check_evaluation(an: ModelAnalysis) -> None:
     """Raise ModelError for the first expression without a value at the start values; contact forces count as 0."""
     values: dict[Expression, float] = dict.fromkeys(an.time_varying, 0.0)
     values |= {e: float(e.start) for e in (*an.parameters, *an.choices, *an.inputs)}
-    known: dict[int, float] = {}
+    memo: dict[int, float] = {}
     for s in an.states:
-        values[s] = evaluate(s.start_expression, values, known)
+        values[s] = evaluate(s.start_expression, values, memo)
     for e in an.outputs:
-        evaluate(e, values, known)
+        evaluate(e, values, memo)
 
 
-def evaluate(e: Operand, values: dict[Expression, float], known: dict[int, float]) -> float:
+def evaluate(e: Operand, values: dict[Expression, float], memo: dict[int, float]) -> float:
     """Return the value of an expression; raise ModelError where it has none."""
     if not isinstance(e, Expression):
         return float(e)
     if e in values:
         return values[e]
-    if id(e) not in known:
+    if id(e) not in memo:
         if isinstance(e, Output):
-            known[id(e)] = evaluate(e.expression, values, known)
+            memo[id(e)] = evaluate(e.expression, values, memo)
         else:
             assert isinstance(e, Term)
-            known[id(e)] = _evaluate_term(e, values, known)
-    return known[id(e)]
+            memo[id(e)] = _evaluate_term(e, values, memo)
+    return memo[id(e)]
 
 
-def _evaluate_term(e: Term, values: dict[Expression, float], known: dict[int, float]) -> float:
+def _evaluate_term(e: Term, values: dict[Expression, float], memo: dict[int, float]) -> float:
     if e.op == "choose":
         condition, this, that = e.args
-        return evaluate(this if evaluate(condition, values, known) else that, values, known)
-    args = [evaluate(one, values, known) for one in e.args]
+        return evaluate(this if evaluate(condition, values, memo) else that, values, memo)
+    args = [evaluate(argument, values, memo) for argument in e.args]
     function = OPERATIONS[e.op] if e.op in OPERATIONS else getattr(math, e.op)
     try:
         return float(function(*args))

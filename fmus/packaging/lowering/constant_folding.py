@@ -16,8 +16,8 @@ class ConstantFolder(TreeTransformer):
 
     def visit_Attribute(self, node: ast.Attribute) -> ast.AST:
         node = self.generic_visit(node)
-        known = self.spec.flags.get(node.attr)
-        return node if known is None or not isinstance(node.ctx, ast.Load) else ast.Constant(known)
+        value = self.spec.flags.get(node.attr)
+        return node if value is None or not isinstance(node.ctx, ast.Load) else ast.Constant(value)
 
     def visit_Compare(self, node: ast.Compare) -> ast.AST:
         match node:
@@ -31,9 +31,9 @@ class ConstantFolder(TreeTransformer):
     def visit_BoolOp(self, node: ast.BoolOp) -> ast.AST:
         node = self.generic_visit(node)
         decides = isinstance(node.op, ast.Or)
-        if any(known_truth(one) is decides for one in node.values):
+        if any(known_truth(value) is decides for value in node.values):
             return ast.Constant(decides)
-        values = [one for one in node.values if known_truth(one) is None]
+        values = [value for value in node.values if known_truth(value) is None]
         return (
             replace_fields(node, values=values)
             if len(values) > 1
@@ -44,16 +44,16 @@ class ConstantFolder(TreeTransformer):
 
     def visit_UnaryOp(self, node: ast.UnaryOp) -> ast.AST:
         node = self.generic_visit(node)
-        known = known_truth(node.operand)
-        if isinstance(node.op, ast.Not) and known is not None:
-            return ast.Constant(not known)
+        truth = known_truth(node.operand)
+        if isinstance(node.op, ast.Not) and truth is not None:
+            return ast.Constant(not truth)
         return node
 
     def visit_IfExp(self, node: ast.IfExp) -> ast.AST:
         test = self.visit(node.test)
-        if (known := known_truth(test)) is None:
+        if (truth := known_truth(test)) is None:
             return replace_fields(node, test=test, body=self.visit(node.body), orelse=self.visit(node.orelse))
-        return self.visit(node.body if known else node.orelse)
+        return self.visit(node.body if truth else node.orelse)
 
 
 def known_truth(node: ast.AST) -> bool | None:

@@ -94,8 +94,8 @@ class DefinitionsAndUses:
                 members = scope.inside(part)
                 for node in (*part.bases, *part.decorator_list, *part.body):
                     is_method = isinstance(node, ast.FunctionDef) and not node.name.startswith("__")
-                    own = [self.define(node, members)] if is_method and not is_fmi_layer else []
-                    self.add_code(node, needs + own, members, is_fixed)
+                    symbols = [self.define(node, members)] if is_method and not is_fmi_layer else []
+                    self.add_code(node, needs + symbols, members, is_fixed)
             elif isinstance(part, ast.FunctionDef) and not is_fmi_layer:
                 self.add_code(part, [self.define(part, scope)], scope, is_fixed)
             elif isinstance(part, ast.ImportFrom):
@@ -123,9 +123,9 @@ class DefinitionsAndUses:
                 case ast.Assign() if not is_fixed:
                     for targets, value in assignment_pairs(node):
                         if all(is_removable(target, value, scope) for target in targets):
-                            stored = set().union(*(self.define(target, scope) for target in targets))
-                            for one in (*(part for target in targets for part in child_nodes(target)), value):
-                                self.add_code(one, [*needs, stored], scope, True)
+                            symbols = set().union(*(self.define(target, scope) for target in targets))
+                            for child in (*(part for target in targets for part in child_nodes(target)), value):
+                                self.add_code(child, [*needs, symbols], scope, True)
                         else:
                             pending += [*targets, value]
                     continue
@@ -138,13 +138,13 @@ def is_removable(target: ast.expr, value: ast.expr, scope: Scope) -> bool:
         return False
     is_new = isinstance(value, ast.Call) and isinstance(value.func, ast.Name) and not value.args
     parts = all_nodes(target) + ([] if is_new else all_nodes(value))
-    return all(isinstance(one, WITHOUT_EFFECT) for one in parts)
+    return all(isinstance(part, WITHOUT_EFFECT) for part in parts)
 
 
 def prune_file(lines: list[SourceLine], tree: ast.Module, dead: set[ast.AST]) -> list[SourceLine]:
     """Remove dead definitions from a file."""
     lines = list(lines)
-    for node in sorted(statements_with_dead_code(tree, dead), key=lambda one: one.lineno, reverse=True):
+    for node in sorted(statements_with_dead_code(tree, dead), key=lambda statement: statement.lineno, reverse=True):
         if isinstance(node, ast.Assign):
             prune_assignment(lines, node, dead)
         elif isinstance(node, ast.ImportFrom):
@@ -179,11 +179,13 @@ def delete_definition(lines: list[SourceLine], node: ast.stmt | ast.ExceptHandle
 def prune_assignment(lines: list[SourceLine], node: ast.Assign, dead: set[ast.AST]) -> None:
     """Remove dead targets from an assignment."""
     pairs = assignment_pairs(node)
-    kept = [([target for target in targets if target not in dead], value) for targets, value in pairs]
+    live_pairs = [([target for target in targets if target not in dead], value) for targets, value in pairs]
     if len(pairs) > 1:
-        sides = [", ".join(map(ast.unparse, side)) for side in zip(*((t[0], v) for t, v in kept if t), strict=True)]
+        sides = [
+            ", ".join(map(ast.unparse, side)) for side in zip(*((t[0], v) for t, v in live_pairs if t), strict=True)
+        ]
     else:
-        sides = [ast.unparse(one) for one in (*kept[0][0], kept[0][1])]
+        sides = [ast.unparse(part) for part in (*live_pairs[0][0], live_pairs[0][1])]
     old, end = lines[node.lineno - 1], node.end_lineno or 0
     comment = re.search(r"  #.*$", lines[end - 1])
     text = " = ".join(sides) + (comment[0] if comment else "") if len(sides) > 1 else ""
@@ -195,8 +197,8 @@ def prune_assignment(lines: list[SourceLine], node: ast.Assign, dead: set[ast.AS
 
 def prune_import(lines: list[SourceLine], node: ast.ImportFrom, dead: set[ast.AST]) -> None:
     """Remove dead names from an import."""
-    kept = [alias for alias in node.names if alias not in dead]
-    names = ", ".join(f"{one.name} as {one.asname}" if one.asname else one.name for one in kept)
+    aliases = [alias for alias in node.names if alias not in dead]
+    names = ", ".join(f"{alias.name} as {alias.asname}" if alias.asname else alias.name for alias in aliases)
     head = f"from {'.' * node.level}{node.module or ''} import "
     text = wrap_line(f"{head}({names})") if len(head + names) > MAX_LINE_LENGTH else head + names
     source = lines[node.lineno - 1].source

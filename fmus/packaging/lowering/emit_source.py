@@ -61,7 +61,7 @@ class SourceEmitter:
     @staticmethod
     def first_line(node: ast.stmt) -> int:
         """Return the zero-based first line of a statement, including decorators."""
-        return min([node.lineno, *(one.lineno for one in getattr(node, "decorator_list", []))]) - 1
+        return min([node.lineno, *(decorator.lineno for decorator in getattr(node, "decorator_list", []))]) - 1
 
     def trailing_comment(self, node: ast.AST) -> str:
         """Return the comment at the end of a line."""
@@ -94,7 +94,7 @@ class SourceEmitter:
             case ast.FunctionDef(body=[ast.Expr(ast.Constant(str()))]):
                 pass  # a declaration
             case ast.FunctionDef():
-                counted = [one.arg for one in node.args.args if is_contact(one)]
+                counted = [argument.arg for argument in node.args.args if is_contact(argument)]
                 for i in range(len(self.spec.contacts)) if counted else [0]:
                     self.lower_function(node, depth, counted, i)
             case ast.For(target=ast.Name(id=name), iter=ast.Name(id=over)) if over in self.ranges:
@@ -114,10 +114,13 @@ class SourceEmitter:
                 self.lower_simple(node, depth)
         return isinstance(node, (ast.Return, ast.Raise))
 
-    def unroll_indices(self, node: ast.For, name: str, over: str, depth: int) -> None:
+    def unroll_indices(self, node: ast.For, name: str, indices: str, depth: int) -> None:
         """Unroll a loop over states or contacts."""
-        many = {"contact_indices": range(len(self.spec.contacts)), "state_indices": range(len(self.spec.states))}
-        for i in many.get(over, self.spec.velocity_states):
+        index_ranges = {
+            "contact_indices": range(len(self.spec.contacts)),
+            "state_indices": range(len(self.spec.states)),
+        }
+        for i in index_ranges.get(indices, self.spec.velocity_states):
             self.scalarizer.loop_indices[name] = i
             self.after = self.first_line(node.body[0])
             self.lower_block(node.body, depth)
@@ -135,16 +138,16 @@ class SourceEmitter:
         """Turn a loop that finds the selected method into a chain of tests with a final else."""
         (test,) = node.body
         assert isinstance(test, ast.If)
-        many, leaves = len(self.spec.methods), True
+        count, leaves = len(self.spec.methods), True
         for n, name in enumerate(self.spec.methods, 1):
             self.scalarizer.bind_method(node.target, name)
-            if many > 1:
+            if count > 1:
                 head = f"{'if' if n == 1 else 'elif'} {ast.unparse(self.scalarizer.visit(test.test))}:"
-                self.write_lines(" " * depth + (head if n < many else "else:"), test)
+                self.write_lines(" " * depth + (head if n < count else "else:"), test)
             self.after = self.first_line(test.body[0])
-            leaves = self.lower_block(test.body, depth + (4 if many > 1 else 0)) and leaves
+            leaves = self.lower_block(test.body, depth + (4 if count > 1 else 0)) and leaves
         self.scalarizer.method_bindings = {}
-        return leaves and many > 0
+        return leaves and count > 0
 
     def lower_simple(self, node: ast.stmt, depth: int) -> None:
         """Lower a simple statement; copied if it does not change."""
@@ -162,9 +165,9 @@ class SourceEmitter:
         if len(new) == 1 and is_same_tree(new[0], node):
             self.copy_lines(node.end_lineno or 0, node.col_offset - depth)
             return
-        for n, one in enumerate(new):
-            whole = ast.unparse(ast.copy_location(one, node))
-            text = " " * depth + unparse_bare(one, whole)
+        for n, line in enumerate(new):
+            whole = ast.unparse(ast.copy_location(line, node))
+            text = " " * depth + unparse_bare(line, whole)
             text = text if len(text) <= MAX_LINE_LENGTH else wrap_line(" " * depth + whole)
             self.write_lines(text + self.trailing_comment(node) * (n == 0), node)
 
@@ -189,18 +192,18 @@ class SourceEmitter:
         """Lower a function with the contact index `i`."""
         outer, self.scalarizer = self.scalarizer, self.new_scalarizer(dict.fromkeys(counted, i))
         arguments = []
-        pairs = pair_rates([(one.arg, one.annotation) for one in node.args.args])
+        pairs = pair_rates([(argument.arg, argument.annotation) for argument in node.args.args])
         self.scalarizer.states_of_rates |= {rates: ast.Name(states) for rates, states in pairs.items()}
-        for one in node.args.args:
-            if self.has_vectors and (kind := annotated_kind(one)):
-                self.scalarizer.vector_kinds[one.arg] = kind
-                arguments += [ast.unparse(term) for term in self.scalarizer.own_components(ast.Name(one.arg))]
-            elif one.arg not in counted:
-                arguments.append(one.arg)
+        for argument in node.args.args:
+            if self.has_vectors and (kind := annotated_kind(argument)):
+                self.scalarizer.vector_kinds[argument.arg] = kind
+                arguments += [ast.unparse(term) for term in self.scalarizer.own_components(ast.Name(argument.arg))]
+            elif argument.arg not in counted:
+                arguments.append(argument.arg)
         body = self.first_line(node.body[0])
-        if any(isinstance(one, ast.Name) and one.id == "elementwise" for one in node.decorator_list):
+        if any(isinstance(mark, ast.Name) and mark.id == "elementwise" for mark in node.decorator_list):
             self.after = node.lineno - 1
-        if arguments == [one.arg for one in node.args.args] and not (
+        if arguments == [argument.arg for argument in node.args.args] and not (
             annotated_results(node) or any(map(annotated_kind, node.args.args))
         ):
             self.copy_lines(body, node.col_offset - depth)
@@ -224,11 +227,11 @@ class SourceEmitter:
         """Lower an if statement; return whether all branches leave the function."""
         test = self.scalarizer.visit(node.test)
         if known_truth(test) is not None:
-            chosen = node.body if known_truth(test) else node.orelse
-            if not chosen:
+            branch = node.body if known_truth(test) else node.orelse
+            if not branch:
                 return False
-            self.after = self.first_line(chosen[0])
-            return self.lower_block(chosen, depth)
+            self.after = self.first_line(branch[0])
+            return self.lower_block(branch, depth)
         self.emit_head(node, depth, word, test)
         start = len(self.lines)
         leaves = self.lower_block(node.body, depth + 4)
@@ -261,7 +264,7 @@ class SourceEmitter:
                 if not is_included and self.declared.constants.get(getattr(start, "id", "")) not in possible:
                     start = ast.Constant(possible[0])
                 if isinstance(items, ast.Tuple):
-                    items = replace_fields(items, elts=[one for one in items.elts if not self.is_gone(one)])
+                    items = replace_fields(items, elts=[item for item in items.elts if not self.is_gone(item)])
                 return replace_fields(node, value=replace_fields(choice, args=[start, text, items]))
         return node
 

@@ -44,7 +44,7 @@ class FeatureSelection:
 
 def select_features(source: ModelFile, methods: Sequence[str] = (), laws: Sequence[str] = ()) -> FeatureSelection:
     """Select methods and laws, by default all that the model offers; raise BuildError for those that it cannot have."""
-    an, chosen = source.analysis, []
+    an, selections = source.analysis, []
     for word, default, has, requested in (
         ("method", an.methods, an.available_methods, methods),
         ("friction law", an.laws, an.laws, laws),
@@ -52,10 +52,10 @@ def select_features(source: ModelFile, methods: Sequence[str] = (), laws: Sequen
         for label in requested:
             if label not in has:
                 raise BuildError(f"{source.name} has no {word} {label!r}; it has {', '.join(has) or 'none to choose'}.")
-        chosen.append(tuple(label for label in has if label in (requested or default)))
-    kept, ruling = chosen
+        selections.append(tuple(label for label in has if label in (requested or default)))
+    selection, ruling = selections
     if ruling and HYBRID not in ruling:  # the closed form requires the hybrid law
-        kept = tuple(label for label in kept if label != EXACT)
-        if not kept:
+        selection = tuple(label for label in selection if label != EXACT)
+        if not selection:
             raise BuildError(f"{source.name}: the method {EXACT!r} needs the law {HYBRID!r}: add --law {HYBRID}.")
-    return FeatureSelection(kept, ruling)
+    return FeatureSelection(selection, ruling)

@@ -114,6 +114,6 @@ def function_tree(function: FunctionType) -> ast.FunctionDef:
     else:
         result = function.__globals__[TREE_NAME]
         for name in function.__qualname__.split("."):
-            result = next(one for one in reversed(result.body) if getattr(one, "name", "") == name)
+            result = next(statement for statement in reversed(result.body) if getattr(statement, "name", "") == name)
     assert isinstance(result, ast.FunctionDef)
     return result

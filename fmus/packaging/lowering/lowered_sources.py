@@ -72,9 +72,10 @@ def zero_jacobian_entries(text: str, spec: ModelLayout) -> frozenset[tuple[int, 
     """Return the entries of the Jacobian for which the source of a model returns the number 0.0 on every path."""
     (method,) = (node for node in parsed_nodes(text) if isinstance(node, ast.FunctionDef) and node.name == "jacobian")
     returned = [node.value for node in all_nodes(method) if isinstance(node, ast.Return)]
-    rows = [one.elts for one in returned if isinstance(one, ast.Tuple)]
+    rows = [value.elts for value in returned if isinstance(value, ast.Tuple)]
     is_zero = [
-        all(isinstance(one, ast.Constant) and one.value == 0.0 for one in column) for column in zip(*rows, strict=True)
+        all(isinstance(value, ast.Constant) and value.value == 0.0 for value in column)
+        for column in zip(*rows, strict=True)
     ]
     places = [(i, j) for i in spec.dynamic_states for j in range(-1, len(spec.states))]  # -1: derivative by time
     return frozenset(place for place, zero in zip(places, is_zero, strict=True) if zero and place[1] >= 0)

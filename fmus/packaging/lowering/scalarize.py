@@ -45,9 +45,9 @@ class Scalarizer(ConstantFolder):
         self.jacobians: set[str] = set()  # names of Jacobians
         self.method_bindings: dict[str, ast.expr] = {}  # in a loop over methods: loop variable -> value
 
-    def error(self, node: ast.AST, why: str) -> LoweringError:
+    def error(self, node: ast.AST, reason: str) -> LoweringError:
         """Return a LoweringError with location and source text."""
-        return LoweringError(f"{self.path}:{getattr(node, 'lineno', '?')}: '{ast.unparse(node)[:60]}' {why}.")
+        return LoweringError(f"{self.path}:{getattr(node, 'lineno', '?')}: '{ast.unparse(node)[:60]}' {reason}.")
 
     # ---- vectors and their components
 
@@ -70,8 +70,8 @@ class Scalarizer(ConstantFolder):
                 if len(result) > 1:
                     raise self.error(node, "mixes a vector of states and one of contacts; loop over contact_indices")
                 return result.pop() if result else None
-            case ast.UnaryOp(op=ast.USub(), operand=one):
-                return self.vector_kind(one)
+            case ast.UnaryOp(op=ast.USub(), operand=operand):
+                return self.vector_kind(operand)
         return None
 
     def is_elementwise(self, node: ast.AST) -> bool:
@@ -128,8 +128,8 @@ class Scalarizer(ConstantFolder):
                 return ast.Attribute(self.visit(owner), self.spec.component_name(vector, kind, place), ast.Load())
             case ast.BinOp(left=left, op=op, right=right):
                 return fold_zero(self.component(left, place), op, self.component(right, place))
-            case ast.UnaryOp(op=op, operand=one):
-                return ast.UnaryOp(op, self.component(one, place))
+            case ast.UnaryOp(op=op, operand=operand):
+                return ast.UnaryOp(op, self.component(operand, place))
             case ast.Compare(left=left, ops=ops, comparators=[right]):
                 return ast.Compare(self.component(left, place), ops, [self.component(right, place)])
             case ast.Call(func=ast.Name(id="select_kinematic"), args=[moved, other]):
@@ -137,18 +137,18 @@ class Scalarizer(ConstantFolder):
             case ast.Call(func=ast.Name(id="complete_rates"), args=[states, others]):
                 dynamic = place in self.spec.dynamic_states
                 return self.component(others, place) if dynamic else self.component(states, self.spec.rate_place(place))
-            case ast.Call(func=ast.Name(id="dynamic_part"), args=[one]):
-                return self.component(one, place) if place in self.spec.dynamic_states else ast.Constant(0.0)
-            case ast.Call(func=ast.Name(id="kinematic_rates"), args=[one]):
-                return self.component(one, self.spec.rate_place(place))
+            case ast.Call(func=ast.Name(id="dynamic_part"), args=[argument]):
+                return self.component(argument, place) if place in self.spec.dynamic_states else ast.Constant(0.0)
+            case ast.Call(func=ast.Name(id="kinematic_rates"), args=[argument]):
+                return self.component(argument, self.spec.rate_place(place))
             case ast.Call(func=ast.Name(id=name), args=args) if name in ELEMENTWISE:
-                if not all(isinstance(one, (ast.Name, ast.Attribute)) for one in args):
+                if not all(isinstance(argument, (ast.Name, ast.Attribute)) for argument in args):
                     raise self.error(node, "would evaluate its argument twice; assign the argument to a name first")
                 return parse_expression(
-                    ELEMENTWISE[name].format(*(ast.unparse(self.component(one, place)) for one in args))
+                    ELEMENTWISE[name].format(*(ast.unparse(self.component(argument, place)) for argument in args))
                 )
             case ast.Call(func=function, args=args) if self.is_elementwise(node):
-                return ast.Call(function, [self.component(one, place) for one in args], [])
+                return ast.Call(function, [self.component(argument, place) for argument in args], [])
             case _:
                 raise self.error(node, "is a vector inside an expression; assign it to a name on a separate line")
 
@@ -226,9 +226,11 @@ class Scalarizer(ConstantFolder):
     def expand_stars(self, parts: list[ast.expr]) -> list[ast.expr]:
         """Rewrite the elements of a row; *y expands to all components of y."""
         result: list[ast.expr] = []
-        for one in parts:
-            starred = isinstance(one, ast.Starred) and self.vector_kind(one.value)
-            result += self.all_components(one.value) if isinstance(one, ast.Starred) and starred else [self.visit(one)]
+        for part in parts:
+            starred = isinstance(part, ast.Starred) and self.vector_kind(part.value)
+            result += (
+                self.all_components(part.value) if isinstance(part, ast.Starred) and starred else [self.visit(part)]
+            )
         return result
 
     def visit_Call(self, node: ast.Call) -> ast.AST:
@@ -238,33 +240,40 @@ class Scalarizer(ConstantFolder):
             case ast.Call(func=ast.Name(id="tuple"), args=[ast.GeneratorExp(elt=item, generators=[each])]):
                 if isinstance(each.iter, ast.Name) and each.iter.id == METHOD_LOOP:
                     return ast.Tuple([self.visit_for_method(item, each.target, label) for label in self.spec.methods])
-            case ast.Call(func=ast.Name(id="len"), args=[one]) if kind := self.vector_kind(one):
+            case ast.Call(func=ast.Name(id="len"), args=[argument]) if kind := self.vector_kind(argument):
                 return ast.Constant(self.spec.size(kind))
             case ast.Call(func=ast.Name(id="sum_of"), args=args):
-                terms = [ast.unparse(term) for one in args for term in self.all_components(one)]
+                terms = [ast.unparse(term) for argument in args for term in self.all_components(argument)]
                 return parse_expression(" + ".join(f"({term})" for term in terms))
-            case ast.Call(func=ast.Name(id="all_of" | "any_of" as name), args=[one]):
-                tests = self.all_components(one)
+            case ast.Call(func=ast.Name(id="all_of" | "any_of" as name), args=[argument]):
+                tests = self.all_components(argument)
                 return ConstantFolder.visit_BoolOp(self, ast.BoolOp(ast.And() if name == "all_of" else ast.Or(), tests))
-            case ast.Call(func=ast.Name(id=name), args=[ast.Name() as one]) if name in REDUCTIONS:
-                *terms, text = [ast.unparse(term) for term in self.all_components(one)] or ["inf"]
+            case ast.Call(func=ast.Name(id=name), args=[ast.Name() as argument]) if name in REDUCTIONS:
+                *terms, text = [ast.unparse(term) for term in self.all_components(argument)] or ["inf"]
                 others = [text]
                 for term in reversed(terms):
-                    text = f"{term} if {' and '.join(f'{term} {REDUCTIONS[name]} {one}' for one in others)} else {text}"
+                    test = " and ".join(f"{term} {REDUCTIONS[name]} {other}" for other in others)
+                    text = f"{term} if {test} else {text}"
                     others.insert(0, term)
                 return parse_expression(text)
         function = node.func
-        contacts = [one.id for one in node.args if isinstance(one, ast.Name) and one.id in self.loop_indices]
+        contacts = [
+            argument.id for argument in node.args if isinstance(argument, ast.Name) and argument.id in self.loop_indices
+        ]
         if contacts:
             tail = self.spec.contact_suffix(self.loop_indices[contacts[0]])
             if isinstance(function, ast.Attribute):
                 function = replace_fields(function, attr=function.attr + tail)
             elif isinstance(function, ast.Name):
                 function = replace_fields(function, id=function.id + tail)
-        kept = [one for one in node.args if not (isinstance(one, ast.Name) and one.id in self.loop_indices)]
-        args = [term for one in kept for term in self.own_components(one)]
+        vector_arguments = [
+            argument
+            for argument in node.args
+            if not (isinstance(argument, ast.Name) and argument.id in self.loop_indices)
+        ]
+        args = [term for argument in vector_arguments for term in self.own_components(argument)]
         return replace_fields(
-            node, func=self.visit(function), args=args, keywords=[self.visit(one) for one in node.keywords]
+            node, func=self.visit(function), args=args, keywords=[self.visit(keyword) for keyword in node.keywords]
         )
 
     # ---- simple statements
@@ -282,7 +291,7 @@ class Scalarizer(ConstantFolder):
                 place = ast.Attribute(self.visit(thing), ast.literal_eval(self.method_bindings[name]), ast.Store())
                 return [ast.Assign([place], self.visit(value))]
             case ast.Return(value=ast.Tuple(elts=parts)):
-                return [ast.Return(tuple_or_single([term for one in parts for term in self.own_components(one)]))]
+                return [ast.Return(tuple_or_single([term for part in parts for term in self.own_components(part)]))]
             case ast.Return(value=value) if value and self.vector_kind(value):
                 if self.is_elementwise(value) or not isinstance(value, ast.Call):
                     return [ast.Return(tuple_or_single(self.own_components(value)))]
@@ -314,7 +323,7 @@ class Scalarizer(ConstantFolder):
                 self.record_kinds(to, [STATES, STATES])
                 moved = self.spec.kinematic_states
                 self.known_zeros |= {self.spec.component_name(name, STATES, i) for name in (k, m) for i in moved}
-                system, right, other = (ast.unparse(one) for one in (s, r, q))
+                system, right, other = (ast.unparse(part) for part in (s, r, q))
                 return ast.parse("\n".join(complex_solution_lines(k, m, system, right, other, self.spec))).body
             case ast.Assign():
                 return self.lower_assignment(node)
@@ -322,39 +331,47 @@ class Scalarizer(ConstantFolder):
 
     def record_kinds(self, targets: Sequence[ast.expr], kinds: Sequence[str | None] = ()) -> None:
         """Record the kinds of assigned names; scalars by default."""
-        for one, kind in zip(targets, kinds or [None] * len(targets), strict=True):
-            if isinstance(one, ast.Attribute) and kind and not self.vector_kind(one):
-                raise self.error(one, "is assigned a vector; declare it in its class, for example as StateVector")
-            if not isinstance(one, ast.Name):
+        for target_node, kind in zip(targets, kinds or [None] * len(targets), strict=True):
+            if isinstance(target_node, ast.Attribute) and kind and not self.vector_kind(target_node):
+                raise self.error(
+                    target_node, "is assigned a vector; declare it in its class, for example as StateVector"
+                )
+            if not isinstance(target_node, ast.Name):
                 continue
             if kind is None:
-                if one.id in self.vector_kinds:
-                    raise self.error(one, "is a vector elsewhere in the function; take another name")
-                self.scalar_names.add(one.id)
+                if target_node.id in self.vector_kinds:
+                    raise self.error(target_node, "is a vector elsewhere in the function; take another name")
+                self.scalar_names.add(target_node.id)
                 continue
-            if rates := next((rates for rates, states in self.states_of_rates.items() if states.id == one.id), ""):
+            if rates := next(
+                (rates for rates, states in self.states_of_rates.items() if states.id == target_node.id), ""
+            ):
                 raise self.error(
-                    one, f"changes under {rates}, which takes some of its rates from it; take another name"
+                    target_node, f"changes under {rates}, which takes some of its rates from it; take another name"
                 )
-            if self.vector_kinds.setdefault(one.id, kind) != kind:
-                raise self.error(one, "is another vector elsewhere in the function; take another name")
+            if self.vector_kinds.setdefault(target_node.id, kind) != kind:
+                raise self.error(target_node, "is another vector elsewhere in the function; take another name")
 
     def lower_assignment(self, node: ast.Assign) -> list[ast.stmt]:
         """Rewrite an assignment by component; as one tuple assignment where components depend on each other."""
         value, target = node.value, node.targets[0]
         if len(node.targets) > 1:  # self.c1 = self.c2 = 0.0
-            terms = [term for one in node.targets for term in self.own_components(one)]
+            terms = [term for target in node.targets for term in self.own_components(target)]
             return [ast.Assign(terms, self.visit(value))] if terms else []
         left = target.elts if isinstance(target, ast.Tuple) else [target]
         right = value.elts if isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple) else [value]
         if len(left) == len(right) and all(
-            isinstance(one, ast.Call) and function_name(one) in ALLOCATORS for one in right
+            isinstance(value, ast.Call) and function_name(value) in ALLOCATORS for value in right
         ):
-            for one in left:
-                if isinstance(one, ast.Name) and one.id in self.vector_kinds and one.id not in self.allocated_names:
-                    raise self.error(one, f"would keep its values; write {one.id} = 0 * {one.id}")
-                self.allocated_names.add(ast.unparse(one))
-            self.record_kinds(left, [self.vector_kind(one) for one in right])
+            for target in left:
+                if (
+                    isinstance(target, ast.Name)
+                    and target.id in self.vector_kinds
+                    and target.id not in self.allocated_names
+                ):
+                    raise self.error(target, f"would keep its values; write {target.id} = 0 * {target.id}")
+                self.allocated_names.add(ast.unparse(target))
+            self.record_kinds(left, [self.vector_kind(value) for value in right])
             return []
         if (
             isinstance(value, ast.Call)
@@ -365,44 +382,45 @@ class Scalarizer(ConstantFolder):
         if len(left) != len(right):
             return [self.visit(node)]
         kinds = [
-            self.vector_kind(one) or (self.vector_kind(to) if not isinstance(to, ast.Name) else None)
-            for to, one in zip(left, right, strict=True)
+            self.vector_kind(value) or (self.vector_kind(target) if not isinstance(target, ast.Name) else None)
+            for target, value in zip(left, right, strict=True)
         ]
         self.record_kinds(left, kinds)
         self.record_copied_rates(left, right)
-        for to, one in zip(left, right, strict=True):
-            if isinstance(one, ast.Call):
-                self.record_result_rates(node, [to], one)
+        for target, value in zip(left, right, strict=True):
+            if isinstance(value, ast.Call):
+                self.record_result_rates(node, [target], value)
         if not any(kinds):
             return [self.visit(node)]
         pairs: list[tuple[ast.expr, ast.expr]] = []
-        for to, one, kind in zip(left, right, kinds, strict=True):
-            for i in self.own_indices(to, kind) if kind else [-1]:
-                number = self.component(one, i) if kind else self.visit(one)
-                if isinstance(to, ast.Name) and kind and isinstance(number, ast.Constant) and number.value == 0.0:
-                    self.known_zeros.add(self.component_name(to, to.id, kind, i))
+        for target, value, kind in zip(left, right, kinds, strict=True):
+            for i in self.own_indices(target, kind) if kind else [-1]:
+                number = self.component(value, i) if kind else self.visit(value)
+                if isinstance(target, ast.Name) and kind and isinstance(number, ast.Constant) and number.value == 0.0:
+                    self.known_zeros.add(self.component_name(target, target.id, kind, i))
                 else:
-                    pairs.append((self.component(to, i) if kind else self.visit(to), number))
-        pairs = [(to, number) for to, number in pairs if not is_same_tree(to, number)]
+                    pairs.append((self.component(target, i) if kind else self.visit(target), number))
+        pairs = [(target, number) for target, number in pairs if not is_same_tree(target, number)]
         changed: set[str] = set()
-        for to, number in pairs:
+        for target, number in pairs:
             if changed and changed & names_used(number):
                 return [
                     ast.Assign(
-                        [tuple_or_single([to for to, _ in pairs])], tuple_or_single([number for _, number in pairs])
+                        [tuple_or_single([target for target, _ in pairs])],
+                        tuple_or_single([number for _, number in pairs]),
                     )
                 ]
-            changed.add(dotted_name(to))
-        return [ast.Assign([to], number) for to, number in pairs]
+            changed.add(dotted_name(target))
+        return [ast.Assign([target], number) for target, number in pairs]
 
-    def lower_unpacking(self, node: ast.Assign, left: list[ast.expr], value: ast.Call) -> list[ast.stmt]:
+    def lower_unpacking(self, node: ast.Assign, targets: list[ast.expr], value: ast.Call) -> list[ast.stmt]:
         """Rewrite the unpacking of a function result."""
         kinds = self.result_kinds(value)
-        if len(kinds) != len(left):
-            kinds = [None] * len(left)  # scalars
-        self.record_kinds(left, kinds)
-        self.record_result_rates(node, left, value)
-        terms = [term for one in left for term in self.own_components(one)]
+        if len(kinds) != len(targets):
+            kinds = [None] * len(targets)  # scalars
+        self.record_kinds(targets, kinds)
+        self.record_result_rates(node, targets, value)
+        terms = [term for target in targets for term in self.own_components(target)]
         return [ast.Assign([tuple_or_single(terms)], self.visit(value))] if terms else [ast.Expr(self.visit(value))]
 
     def record_result_rates(self, node: ast.stmt, targets: list[ast.expr], call: ast.Call) -> None:
@@ -421,7 +439,7 @@ class Scalarizer(ConstantFolder):
         """Record the states of rates that are copied together with them, as in y, f = step.y0, step.f0."""
         for rates, value in zip(left, right, strict=True):
             if isinstance(rates, ast.Name) and (states := self.states_of(value)):
-                copies = (to for to, one in zip(left, right, strict=True) if is_same_tree(one, states))
+                copies = (target for target, value in zip(left, right, strict=True) if is_same_tree(value, states))
                 if (copy := next(copies, None)) and isinstance(copy, ast.Name):
                     self.states_of_rates[rates.id] = copy
 
@@ -429,11 +447,11 @@ class Scalarizer(ConstantFolder):
         """Rewrite f_t, J = model.jacobian(...): the derivatives of each dynamic rate, time first."""
         self.vector_kinds[f_t] = STATES
         self.jacobians.add(J)
-        own = self.spec.dynamic_states
+        dynamic = self.spec.dynamic_states
         named = {i: self.spec.component_name(f_t, STATES, i) for i in self.all_indices(STATES)}
-        self.known_zeros |= {name for i, name in named.items() if i not in own}
+        self.known_zeros |= {name for i, name in named.items() if i not in dynamic}
         names = []
-        for i in own:
+        for i in dynamic:
             zero = [(i, j) in self.spec.zeros for j in self.all_indices(STATES)]
             names += [named[i], *("_" if is_zero else self.spec.jacobian_entry(i, j) for j, is_zero in enumerate(zero))]
         for name in {*names} - {"_"}:
@@ -441,7 +459,7 @@ class Scalarizer(ConstantFolder):
                 raise self.error(
                     call, f"has a Jacobian entry {name}, which is also a component of {self.component_owner[name]}"
                 )
-        self.component_owner.update(dict.fromkeys((named[i] for i in own), f_t))
+        self.component_owner.update(dict.fromkeys((named[i] for i in dynamic), f_t))
         return [ast.Assign([tuple_or_single([ast.Name(name) for name in names])], self.visit(call))]
 
     def find_name_clash(self) -> str:
@@ -466,7 +484,7 @@ def tuple_or_single(terms: list[ast.expr]) -> ast.expr:
 
 def names_used(node: ast.AST) -> set[str]:
     """Return all names in a tree, dotted ones as a whole."""
-    return {dotted_name(one) for one in all_nodes(node) if isinstance(one, (ast.Name, ast.Attribute))}
+    return {dotted_name(part) for part in all_nodes(node) if isinstance(part, (ast.Name, ast.Attribute))}
 
 
 def dotted_name(node: ast.expr) -> str:
@@ -478,7 +496,7 @@ def dotted_name(node: ast.expr) -> str:
 
 def fold_zero(left: ast.expr, op: ast.operator, right: ast.expr) -> ast.expr:
     """Return left op right, simplified where an operand is zero."""
-    zero = [isinstance(one, ast.Constant) and one.value == 0.0 for one in (left, right)]
+    zero = [isinstance(operand, ast.Constant) and operand.value == 0.0 for operand in (left, right)]
     if isinstance(op, ast.Mult) and any(zero):
         return ast.Constant(0.0)
     return left if isinstance(op, (ast.Add, ast.Sub)) and zero[1] else ast.BinOp(left, op, right)

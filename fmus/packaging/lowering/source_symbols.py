@@ -76,20 +76,20 @@ class SourceSymbols:
         """Collect the symbols of one node."""
         match node:
             case ast.ClassDef():
-                names = {getattr(one.targets[0], "id", "") for one in node.body if isinstance(one, ast.Assign)}
-                names |= {one.attr for one in all_nodes(node) if is_self_assignment(one)}
-                declared = {one.target.id: one for one in node.body if is_vector_declaration(one)}
-                for name, one in declared.items():
-                    kind = annotated_kind(one) or ""
+                names = {getattr(part.targets[0], "id", "") for part in node.body if isinstance(part, ast.Assign)}
+                names |= {part.attr for part in all_nodes(node) if is_self_assignment(part)}
+                declared = {part.target.id: part for part in node.body if is_vector_declaration(part)}
+                for name, part in declared.items():
+                    kind = annotated_kind(part) or ""
                     if self.vector_attributes.setdefault(name, kind) != kind:
                         raise BuildError(f"{node.name} declares {name} as another vector than another class.")
-                pairs = pair_rates([(name, one.annotation) for name, one in declared.items()])
+                pairs = pair_rates([(name, part.annotation) for name, part in declared.items()])
                 self.states_of_rates |= pairs
                 scalars |= dict.fromkeys(names - declared.keys(), node.name)
                 self.scopes.append(Scope.of(names, {*declared}))
             case ast.FunctionDef(name=name):
                 self.read_results(node)
-                if any(isinstance(one, ast.Name) and one.id == "elementwise" for one in node.decorator_list):
+                if any(isinstance(mark, ast.Name) and mark.id == "elementwise" for mark in node.decorator_list):
                     self.elementwise.add(name)
 
     def read_results(self, node: ast.FunctionDef) -> None:
@@ -98,14 +98,14 @@ class SourceSymbols:
             self.jacobians.add(node.name)
         if kinds := annotated_results(node):
             self.result_kinds[node.name] = kinds
-            arguments = [one for one in node.args.args if one.arg != "self"]
-            types = [(n - len(arguments), one.annotation) for n, one in enumerate(arguments)]
+            arguments = [argument for argument in node.args.args if argument.arg != "self"]
+            types = [(n - len(arguments), argument.annotation) for n, argument in enumerate(arguments)]
             pairs = pair_rates([*types, *enumerate(result_types(node))])
             self.states_of_results[node.name] = {rates: states for rates, states in pairs.items() if rates >= 0}
 
     def function_scope(self, function: ast.FunctionDef) -> "Scope":
         """Return the names in a function; a name is a vector if it is annotated or a vector is assigned to it."""
-        names, assignments = {one.arg for one in function.args.args}, []
+        names, assignments = {argument.arg for argument in function.args.args}, []
         has_jacobian = False
         for node in all_nodes(function):
             if isinstance(node, ast.Name):
@@ -114,7 +114,7 @@ class SourceSymbols:
                 has_jacobian = has_jacobian or node.attr in self.jacobians
             elif isinstance(node, ast.Assign):
                 assignments.append(node)
-        kinds = {one.arg: annotated_kind(one) for one in function.args.args}
+        kinds = {argument.arg: annotated_kind(argument) for argument in function.args.args}
         elementwise = {*ELEMENTWISE, *SELECTIONS, *self.elementwise}
 
         def kind_of(e: ast.expr, place: int = 0) -> str | None:
@@ -134,13 +134,13 @@ class SourceSymbols:
                     return results[place] if place < len(results) else None
             return None
 
-        for node in sorted(assignments, key=lambda one: one.lineno):
+        for node in sorted(assignments, key=lambda node: node.lineno):
             for target in node.targets:
                 targets = target.elts if isinstance(target, ast.Tuple) else [target]
                 values = node.value.elts if isinstance(node.value, ast.Tuple) else [node.value] * len(targets)
-                for place, (one, value) in enumerate(zip(targets, values, strict=False)):
-                    if isinstance(one, ast.Name) and (kind := kind_of(value, place)):
-                        kinds[one.id] = kind
+                for place, (target, value) in enumerate(zip(targets, values, strict=False)):
+                    if isinstance(target, ast.Name) and (kind := kind_of(value, place)):
+                        kinds[target.id] = kind
         vectors = {name for name, kind in kinds.items() if kind}
         # a vector over a single contact keeps its name
         return Scope.of(names, vectors, {name for name in vectors if kinds[name] == CONTACTS}, has_jacobian)
@@ -152,7 +152,7 @@ class SourceSymbols:
         """
         stems = stems_of_names(states, modes)
         for separator in ("_" * n for n in count()):
-            stages = [self._components(name, own, separator) - {name} for name, own in stems.items()]
+            stages = [self._components(name, stem_names, separator) - {name} for name, stem_names in stems.items()]
             if len(stems.keys() | set().union(*stages)) == len(stems) + sum(map(len, stages)):
                 return separator
         raise AssertionError
@@ -166,19 +166,19 @@ class SourceSymbols:
         """
         stems, result = stems_of_names(states, modes), {}
         vectors = {vector for scope in self.scopes if scope.named_vectors for vector in scope.other_vectors}
-        used = {f"{vector}_{name}" for vector in vectors for name in stems}
-        used |= {f"{rate}_{state}" for rate in states.values() for state in states}  # entries of the Jacobian
-        for name, own in stems.items():
+        used_names = {f"{vector}_{name}" for vector in vectors for name in stems}
+        used_names |= {f"{rate}_{state}" for rate in states.values() for state in states}  # entries of the Jacobian
+        for name, stem_names in stems.items():
             first = f"{PREFIX}{name}" if NAMED_VECTOR.fullmatch(f"{name}_") else name
             candidates = (first + "_" * n for n in count())
             result[name] = next(
-                one
-                for one in candidates
-                if (one == name or one not in stems)
-                and used.isdisjoint(self._components(one, own, separator))
-                and self._is_free(one, own, separator)
+                candidate
+                for candidate in candidates
+                if (candidate == name or candidate not in stems)
+                and used_names.isdisjoint(self._components(candidate, stem_names, separator))
+                and self._is_free(candidate, stem_names, separator)
             )
-            used |= self._components(result[name], own, separator)
+            used_names |= self._components(result[name], stem_names, separator)
         return result
 
     def _components(self, name: str, stems: set[str], separator: str) -> set[str]:
@@ -189,7 +189,7 @@ class SourceSymbols:
         """Return whether no component named after `name` has another meaning in the runtime."""
         for scope in self.scopes:
             components = {stage_name(name, match[2], separator) for match in scope.named_vectors if match[1] in stems}
-            components |= {f"{one}_{name}" for one in scope.other_vectors}
+            components |= {f"{vector}_{name}" for vector in scope.other_vectors}
             if not components.isdisjoint(scope.scalars):
                 return False
             if scope.has_jacobian and "f" in stems and name in scope.other_vectors:
@@ -208,10 +208,10 @@ class SourceSymbols:
                 pairs = [(target, value)]
                 if isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple):
                     pairs = list(zip(target.elts, value.elts, strict=True))
-                for one, what in pairs:
-                    if isinstance(one, ast.Name):
-                        self.module_names.add(one.id)
-                        self.constants[one.id] = item_label(what) or getattr(what, "value", None)
+                for name, constant in pairs:
+                    if isinstance(name, ast.Name):
+                        self.module_names.add(name.id)
+                        self.constants[name.id] = item_label(constant) or getattr(constant, "value", None)
 
 
 def stems_of_names(states: Mapping[str, str], modes: Iterable[str]) -> dict[str, set[str]]:
@@ -242,7 +242,7 @@ def annotated_kind(node: ast.arg | ast.AnnAssign) -> str | None:
 
 def annotated_results(node: ast.FunctionDef) -> list[str | None]:
     """Return the kinds in the result annotation; empty if none is a vector."""
-    kinds = [VECTOR_KINDS.get(type_name(one)) for one in result_types(node)]
+    kinds = [VECTOR_KINDS.get(type_name(annotation)) for annotation in result_types(node)]
     return kinds if any(kinds) else []
 
 

@@ -60,7 +60,7 @@ class SymbolTable:
         if ":" in symbol:
             return {symbol}
         owner, _, name = symbol.partition(".")
-        return {f"{one}.{name}" for one in self.classes[owner]}
+        return {f"{relative}.{name}" for relative in self.classes[owner]}
 
     def path_symbols(self, path: str, owner: str = UNKNOWN) -> set[str]:
         """Return the symbols of the members in a dotted name such as solver.steps."""
@@ -126,7 +126,7 @@ def object_classes(assignments: list[tuple[str, ast.expr]], classes: Collection[
             if not result[other] <= result[name]:
                 result[name] |= result[other]
                 is_complete = False
-    return {name: min(found) for name, found in result.items() if name and len(found) == 1}
+    return {name: min(candidates) for name, candidates in result.items() if name and len(candidates) == 1}
 
 
 def related_classes(bases: Mapping[str, list[str]]) -> dict[str, set[str]]:
@@ -157,7 +157,7 @@ def assignment_pairs(node: ast.Assign) -> list[tuple[list[ast.expr], ast.expr]]:
     """Return pairs of targets and value."""
     target, value = node.targets[0], node.value
     if isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple) and len(target.elts) == len(value.elts):
-        return [([one], what) for one, what in zip(target.elts, value.elts, strict=True)]
+        return [([element], element_value) for element, element_value in zip(target.elts, value.elts, strict=True)]
     return [(node.targets, value)]
 
 

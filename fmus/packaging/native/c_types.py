@@ -113,8 +113,8 @@ def source_location(function: FunctionType, line: int = 0) -> str:
     return f"{path}:{line or function.__code__.co_firstlineno}"
 
 
-def unsupported(function: FunctionType, node: ast.AST, why: str, instead: str) -> UnsupportedConstructError:
+def unsupported(function: FunctionType, node: ast.AST, reason: str, remedy: str) -> UnsupportedConstructError:
     """Return the error for a node in the source of a function."""
     return UnsupportedConstructError(
-        f"{source_location(function, getattr(node, 'lineno', 0))}: '{ast.unparse(node)[:60]}' {why}; {instead}."
+        f"{source_location(function, getattr(node, 'lineno', 0))}: '{ast.unparse(node)[:60]}' {reason}; {remedy}."
     )

@@ -88,11 +88,11 @@ def compile_binaries(name: str, files: Mapping[str, str], main: str, platform: s
 def compile_libraries(name: str, files: Mapping[str, str], main: str, platform: str) -> dict[str, bytes]:
     """Compile the source `main` for the processors of a platform. Returns libraries by folder of FMI 3.0."""
     chosen, out = PLATFORMS[platform], f"{name}{PLATFORMS[platform].suffix}"
-    own = {source: Path(__file__).with_name(source).read_text(encoding="utf-8") for source in chosen.sources}
+    own_sources = {source: Path(__file__).with_name(source).read_text(encoding="utf-8") for source in chosen.sources}
     is_large = sum(map(len, files.values())) > LARGE_SOURCE
-    options = (*SHARED_LIBRARY, *own, *chosen.options, *(LARGE_SOURCE_OPTIONS if is_large else INLINING))
+    options = (*SHARED_LIBRARY, *own_sources, *chosen.options, *(LARGE_SOURCE_OPTIONS if is_large else INLINING))
     return {
-        folder: compile_and_link({**files, **own}, main, target, out, options)
+        folder: compile_and_link({**files, **own_sources}, main, target, out, options)
         for folder, target in chosen.targets.items()
     }
 

@@ -97,9 +97,9 @@ class ExpressionTranslator(ast.NodeVisitor):
         self.conditional_depth = 0  # nesting depth of operands that are evaluated conditionally
         self.statement_call: ast.AST | None = None  # a call that is the whole right-hand side
 
-    def unsupported(self, node: ast.AST, why: str, instead: str) -> UnsupportedConstructError:
+    def unsupported(self, node: ast.AST, reason: str, remedy: str) -> UnsupportedConstructError:
         """Return the error for a node of this function."""
-        return unsupported(self.function, node, why, instead)
+        return unsupported(self.function, node, reason, remedy)
 
     def generic_visit(self, node: ast.AST) -> NoReturn:
         raise self.unsupported(node, "cannot be translated to C", "use numbers, attributes, calls and if")
@@ -222,8 +222,8 @@ class ExpressionTranslator(ast.NodeVisitor):
             return CExpression(BOOL, "!" + self.boolean(node.operand).as_operand(PRIMARY), UNARY)
         value = self.visit(node.operand)
         if isinstance(value.ctype, CompileTimeValue) and scalar_type_of(value.ctype.value) in (FLOAT, INT):
-            known: Any = value.ctype.value
-            return CExpression(CompileTimeValue(-known if isinstance(node.op, ast.USub) else known))
+            value_type: Any = value.ctype.value
+            return CExpression(CompileTimeValue(-value_type if isinstance(node.op, ast.USub) else value_type))
         if not isinstance(node.op, ast.USub):
             raise self.unsupported(node, "has an operator that cannot be translated to C", "remove the operator")
         return CExpression(self.arithmetic_operand(node.operand, value).ctype, "-" + value.as_operand(PRIMARY), UNARY)
@@ -353,23 +353,23 @@ class ExpressionTranslator(ast.NodeVisitor):
             raise self.unsupported(
                 node, f"passes {len(values)} arguments to a function of {count}", "pass every argument"
             )
-        given = [
+        arguments = [
             self.to_run_time(node, value)
             if isinstance(value.ctype, CompileTimeValue) and scalar_type_of(value.ctype.value)
             else value
             for value in values
         ]
-        if not all(isinstance(value.ctype, (Scalar, StructPointer, CompileTimeValue)) for value in given):
+        if not all(isinstance(value.ctype, (Scalar, StructPointer, CompileTimeValue)) for value in arguments):
             raise self.unsupported(
                 node, "passes a tuple or list as one argument", "pass each number, or the object that owns them"
             )
-        compiled = self.call_graph.specialise(function, [value.ctype for value in given])
+        compiled = self.call_graph.specialise(function, [value.ctype for value in arguments])
         if compiled is None:
             raise self.unsupported(node, "is recursive", "write a loop")
         if self.may_fault and not compiled.is_pure:  # after a fault in the arguments, the call must not have effects
-            given = [self.in_local(value) if isinstance(value.ctype, Scalar) else value for value in given]
+            arguments = [self.in_local(value) if isinstance(value.ctype, Scalar) else value for value in arguments]
             self.emit_fault_check()
-        texts = [value.text for value in given if not isinstance(value.ctype, CompileTimeValue)]
+        texts = [value.text for value in arguments if not isinstance(value.ctype, CompileTimeValue)]
         if compiled.can_fault:
             texts.append(self.fault_argument())
         text = f"{compiled.name}({', '.join(texts)})"

@@ -26,11 +26,11 @@ FMI_HEADERS = {  # 2-clause BSD license
 
 def collect_sources(model: type[VariableOwner], fmi: str) -> dict[str, str]:
     """Return names and texts of all files except guid.h, which depends on their content."""
-    here = Path(__file__).parent
-    own = {name: (here / name).read_text(encoding="utf-8") for name in (MAIN_SOURCE[fmi], *OWN_HEADERS)}
+    folder = Path(__file__).parent
+    own_files = {name: (folder / name).read_text(encoding="utf-8") for name in (MAIN_SOURCE[fmi], *OWN_HEADERS)}
     fmi_headers = installed_package("fmpy") / "c-code"
     headers = {name: (fmi_headers / name).read_text(encoding="utf-8") for name in FMI_HEADERS[fmi]}
-    return own | headers | {"model.h": render_model_header(model, fmi)}
+    return own_files | headers | {"model.h": render_model_header(model, fmi)}
 
 
 def render_guid_header(guid: str) -> str:

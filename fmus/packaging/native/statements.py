@@ -63,19 +63,31 @@ class FunctionTranslator(ExpressionTranslator):
         head = c_declaration(self.result, name) if self.result else f"void {name}"
         leave = f"return {self.zero_result()};" if self.result else "return;"
         body = [line.format(leave=leave) if line.lstrip() == FAULT_CHECK else line for line in self.lines]
-        given = ", ".join(parameters) or "void"
+        parameter_list = ", ".join(parameters) or "void"
         body = remove_unused_assignments(body, {*self.local_types} - {*self.parameters})
         names = names_in_lines(body)
-        unused = [f"(void){name}" for name in (one.split()[-1].lstrip("*") for one in parameters) if name not in names]
+        unused = [
+            f"(void){name}"
+            for name in (parameter.split()[-1].lstrip("*") for parameter in parameters)
+            if name not in names
+        ]
         about_unused = [f"    {', '.join(unused)};"] if unused else []
-        lines = [f"/* {about} */", f"static {head}({given})", "{", *self.declarations(names), *about_unused, *body, "}"]
+        lines = [
+            f"/* {about} */",
+            f"static {head}({parameter_list})",
+            "{",
+            *self.declarations(names),
+            *about_unused,
+            *body,
+            "}",
+        ]
         return "".join(f"{line}\n" for line in lines)
 
-    def declarations(self, used: set[str]) -> list[str]:
+    def declarations(self, used_names: set[str]) -> list[str]:
         """Declare the local variables that are used, one line per type."""
         names_by_type: dict[str, list[str]] = {}
         for name, ctype in self.local_types.items():
-            if name not in self.parameters and name in used:
+            if name not in self.parameters and name in used_names:
                 names_by_type.setdefault(c_spelling(ctype), []).append(name)
         return [f"    {declaration_list(c, names)}" for c, names in names_by_type.items()]
 
@@ -213,12 +225,12 @@ class FunctionTranslator(ExpressionTranslator):
             raise self.unsupported(node, f"uses {name}, a C keyword or macro", "use another name")
         self.require_same_type(node, self.local_types.setdefault(name, ctype), ctype)
 
-    def require_same_type(self, node: ast.AST, old: CType, new: CType) -> None:
+    def require_same_type(self, node: ast.AST, old_type: CType, new_type: CType) -> None:
         """Raise an error if a variable would change its type."""
-        if old == new and isinstance(new, (Scalar, StructPointer, CompileTimeValue)):
+        if old_type == new_type and isinstance(new_type, (Scalar, StructPointer, CompileTimeValue)):
             return
-        words = [getattr(ctype, "name", "non-number") for ctype in (old, new)]
-        instead = "write 0.0, not 0" if (old, new) == (FLOAT, INT) else "use another name"
+        words = [getattr(ctype, "name", "non-number") for ctype in (old_type, new_type)]
+        instead = "write 0.0, not 0" if (old_type, new_type) == (FLOAT, INT) else "use another name"
         raise self.unsupported(node, f"is assigned a {words[1]} but has the type {words[0]}", instead)
 
     # ---- branches and loops
