@@ -1,20 +1,24 @@
-"""Temporary directories with paths that every library can read.
+"""Temporary directories with paths that every library can read, and locks of folders that are in use.
 
-A directory is locked while its process lives. The first directory of a process removes those of killed processes.
+A lock ends with the process that holds it, so a temporary folder without one was left by a kill. The first temporary
+directory of a process removes those of killed processes. Locks exist on POSIX (fcntl), but not on all of its file
+systems.
 """
 
 import os
 import sys
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager, suppress
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager, nullcontext, suppress
 from functools import cache
 from pathlib import Path
 from shutil import rmtree
 from tempfile import gettempdir, mkdtemp
 
 from ..errors import HarnessError
-from .folder_lock import create_locked_folder, lock_path
 from .interrupt import defer_signals
+
+if sys.platform != "win32":
+    import fcntl
 
 PREFIX = "friction-fmus-"  # of the directories of this project
 FALLBACK_DIRECTORIES = (
@@ -75,3 +79,32 @@ def remove_abandoned_directories(root: Path) -> None:
                 ):
                     with lock_path(Path(entry)):  # raises OSError if its process lives
                         rmtree(entry, ignore_errors=True)
+
+
+def create_locked_folder(create: Callable[[], Path], resources: ExitStack) -> Path:
+    """Create a folder and lock it; `resources` holds the lock.
+
+    Another process may take a folder without a lock for a leftover and remove it: then another one is created.
+    """
+    while True:
+        folder = create()
+        with suppress(FileNotFoundError):
+            resources.enter_context(lock_path(folder, wait=True))
+        if folder.exists():
+            return folder
+        resources.close()
+
+
+@contextmanager
+def lock_path(path: Path, wait: bool = False) -> Iterator[None]:
+    """Lock a folder or a file, where locks exist; raise OSError if another process has it and `wait` is false."""
+    if sys.platform == "win32":
+        yield
+        return
+    lock = os.open(path, os.O_RDONLY)
+    try:
+        with suppress(OSError) if wait else nullcontext():  # file systems without locks
+            fcntl.flock(lock, fcntl.LOCK_EX if wait else fcntl.LOCK_EX | fcntl.LOCK_NB)
+        yield
+    finally:
+        os.close(lock)

@@ -21,8 +21,8 @@ from secrets import token_hex
 from shutil import rmtree
 
 from ..errors import HarnessError
-from ..process.folder_lock import create_locked_folder, lock_path
 from ..process.interrupt import defer_signals
+from ..process.temporary_directory import create_locked_folder, lock_path
 from .provenance import FILE, load_provenance, note_replaced_result
 from .summary import SUMMARY_FILE
 

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from ...errors import HarnessError
-from ...process.folder_lock import lock_path
+from ...process.temporary_directory import lock_path
 
 MISSING, FINISHED, FAILED = 0, 1, 2  # status; a failed run has FAILED plus the position of its error message in bytes
 BLOCK_SIZE = 1000  # runs read or written at a time
