@@ -10,14 +10,16 @@ import shlex
 import sys
 from collections.abc import Iterable, Mapping
 from contextvars import ContextVar
+from dataclasses import dataclass, field
 from datetime import datetime
 from functools import cache
 from hashlib import sha256
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 from ..errors import HarnessError, SceneError
+from ..scenes.schema import Constraint, field_names, parse_table
 from .files import to_json
 
 FILE = "provenance.json"
@@ -27,9 +29,55 @@ REPLACED = "replaced"
 # options of a result that follow from its parameters or input files
 IMPLIED_OPTIONS = {"values", "name", "fmu", "file", "source", "equal_steps"}
 PACKAGES = (HARNESS, "fmpy", "numpy", "scipy")
+MAX_DEPTH = 6  # of tables and lists within a scene
 
 Parameters = Mapping[str, tuple[object, str]]  # effective value and unit by name
 CALL: ContextVar[dict[str, Any] | None] = ContextVar("call", default=None)  # the command that is running, as data
+
+
+def is_shallow(value: object, depth: int = MAX_DEPTH) -> bool:
+    """Return whether tables and lists are nested in at most `depth` levels."""
+    items = value.values() if isinstance(value, dict) else value if isinstance(value, list) else None
+    return items is None or (depth > 0 and all(is_shallow(item, depth - 1) for item in items))
+
+
+STRING = Constraint(lambda value: isinstance(value, str), "a text")
+DIGEST = Constraint(lambda value: isinstance(value, str) and len(value) == 64, "a SHA-256 digest")
+VALUE = Constraint(lambda value: is_shallow(value, 3) and not isinstance(value, dict), "a value")
+SETTINGS = Constraint(lambda value: isinstance(value, dict | None) and is_shallow(value), "a table, or null")
+
+
+@dataclass(frozen=True)
+class StoredParameter:
+    """Effective value and unit of a parameter."""
+
+    value: Annotated[Any, VALUE]
+    unit: Annotated[str, STRING]
+
+
+@dataclass(frozen=True)
+class StoredCall:
+    """Name of the command that made a result, and the values of its arguments and options."""
+
+    name: Annotated[str, STRING]
+    options: dict[str, Annotated[Any, VALUE]]
+
+
+@dataclass(frozen=True)
+class ProvenanceKeys:
+    """Keys of a provenance file; those with a default are missing in files of earlier versions."""
+
+    command: Annotated[str, STRING]
+    date: Annotated[str, STRING]
+    files: dict[str, Annotated[str, DIGEST]]
+    parameters: dict[str, StoredParameter]
+    scene: Annotated[Any, SETTINGS]
+    source: Annotated[str, STRING] = ""
+    platform: Annotated[str, STRING] = ""
+    versions: dict[str, Annotated[str, STRING]] = field(default_factory=dict)
+    run: Annotated[Any, SETTINGS] = None
+    replaced: Annotated[str, STRING] = ""
+    call: StoredCall | None = None
 
 
 def write_provenance(
@@ -115,24 +163,29 @@ def load_provenance(folder: Path) -> dict[str, Any]:
 
 
 def read_provenance(file: Path) -> dict[str, Any]:
-    """Read and validate a provenance file.
+    """Read a provenance file, validate its keys and return those that are known.
 
     Raises
     ------
     OSError
         If the file cannot be read.
     SceneError
-        If its content is not valid.
+        If a value is not valid, or a required key is missing.
     """
+    content = {name: value for name, value in read_table(file).items() if name in field_names(ProvenanceKeys)}
+    parse_table(content, ProvenanceKeys)
+    return content
+
+
+def read_table(file: Path) -> dict[str, Any]:
+    """Return the table in a JSON file; raise OSError or SceneError if there is none."""
     try:
         content = json.loads(file.read_text(encoding="utf-8"))
     except (ValueError, RecursionError):
         raise SceneError("it is not JSON") from None
     if not isinstance(content, dict):
         raise SceneError("it is not a table")
-    from .provenance_schema import select_valid_keys  # only where a file is read: a new result needs no validation
-
-    return select_valid_keys(content)
+    return content
 
 
 def note_replaced_result(old_folder: Path, new_folder: Path, file: str) -> None:
@@ -173,8 +226,11 @@ def format_option(name: str, value: object) -> str:
 
 
 def replacement_note(folder: Path) -> str:
-    """Return the note about the replaced result; empty if there was none."""
-    return str(load_provenance(folder).get(REPLACED, ""))
+    """Return the note about the replaced result, for readers; empty if there was none."""
+    try:
+        return str(read_table(folder / FILE).get(REPLACED, ""))
+    except (OSError, SceneError):
+        return ""
 
 
 def load_verified_provenance(folder: Path) -> dict[str, Any]:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import HarnessError, SceneError
+from ..scenes.schema import parse_table
 from . import provenance
 from .files import to_json
 
@@ -161,8 +162,6 @@ def read_summary(folder: Path) -> Summary:
     HarnessError
         If it is missing, damaged, or of another program or version.
     """
-    from ..scenes.schema import parse_table  # only where a file is read: a new result needs no validation
-
     try:
         content: Any = json.loads((folder / SUMMARY_FILE).read_text(encoding="utf-8"))
         if not isinstance(content, dict) or "version" not in content:

@@ -1,28 +1,23 @@
 """Validation of TOML files: converts a table to a dataclass, or reports the first error in one sentence.
 
 The dataclass is the schema. Types carry constraints, as in `Annotated[float, POSITIVE]`. cattrs converts the table: its
-errors include the keys of nested tables, which those of msgspec do not, and pydantic is about forty times larger.
+errors include the keys of nested tables, which those of msgspec do not, and pydantic is about forty times larger. It is
+imported with the first table that is read, because many commands read none and its import takes 40 ms.
 """
 
 import tomllib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, fields, is_dataclass
+from functools import cache
 from math import isfinite
 from pathlib import Path
 from types import GenericAlias
-from typing import Any, TypeVar, get_args, get_origin
-
-from cattrs import Converter
-from cattrs.errors import (
-    BaseValidationError,
-    ClassValidationError,
-    ForbiddenExtraKeysError,
-    IterableValidationError,
-    IterableValidationNote,
-)
-from cattrs.gen import make_dict_structure_fn, make_mapping_structure_fn, override
+from typing import TYPE_CHECKING, Any, TypeVar, get_args, get_origin
 
 from ..errors import SceneError, format_value, unknown_name_message
+
+if TYPE_CHECKING:
+    from cattrs import Converter
 
 LIST_HINT = "`friction-fmus list` lists the available scenes"
 MAX_TITLE_LENGTH = 200  # letters
@@ -77,7 +72,23 @@ TABLE = Constraint(lambda value: isinstance(value, dict), "a table")
 LIST = Constraint(lambda value: isinstance(value, list), "a list")
 
 Hook = Callable[[Any, Any], Any]
-CONVERTER = Converter(forbid_extra_keys=True)
+
+
+@cache
+def converter() -> "Converter":
+    """Return what converts tables to dataclasses."""
+    from cattrs import Converter
+
+    hooks: tuple[tuple[Any, Any], ...] = (
+        (is_dataclass, make_table_hook),
+        (has_origin(dict), make_mapping_hook),
+        (has_origin(tuple), make_list_hook),
+        (find_constraint, make_value_hook),
+    )
+    new = Converter(forbid_extra_keys=True)
+    for concerns, make_hook in hooks:
+        new.register_structure_hook_factory(concerns, make_hook)
+    return new
 
 
 def find_constraint(annotation: Any) -> Constraint | None:
@@ -107,8 +118,10 @@ def make_value_hook(annotation: Any) -> Hook:
 
 def make_table_hook(annotation: Any) -> Hook:
     """Return a hook for a table whose keys are the fields of a dataclass; the field `from_` holds the key `from`."""
+    from cattrs.gen import make_dict_structure_fn, override
+
     renamed: Any = {name: override(rename=name.rstrip("_")) for name in field_names(annotation) if name.endswith("_")}
-    return make_checked_hook(TABLE, make_dict_structure_fn(annotation, CONVERTER, **renamed))
+    return make_checked_hook(TABLE, make_dict_structure_fn(annotation, converter(), **renamed))
 
 
 def field_names(schema: Any) -> list[str]:
@@ -118,13 +131,15 @@ def field_names(schema: Any) -> list[str]:
 
 def make_mapping_hook(annotation: Any) -> Hook:
     """Return a hook for a table with arbitrary keys and values of one type."""
-    return make_checked_hook(TABLE, make_mapping_structure_fn(annotation, CONVERTER))
+    from cattrs.gen import make_mapping_structure_fn
+
+    return make_checked_hook(TABLE, make_mapping_structure_fn(annotation, converter()))
 
 
 def make_list_hook(annotation: Any) -> Hook:
     """Return a hook for a list with items of one type."""
     list_type: Any = GenericAlias(list, get_args(annotation)[:1])
-    return make_checked_hook(LIST, lambda value, _: tuple(CONVERTER.structure(value, list_type)))
+    return make_checked_hook(LIST, lambda value, _: tuple(converter().structure(value, list_type)))
 
 
 def has_origin(container: Any) -> Callable[[Any], bool]:
@@ -132,25 +147,25 @@ def has_origin(container: Any) -> Callable[[Any], bool]:
     return lambda annotation: get_origin(annotation) is container
 
 
-for concerns, hooks in (
-    (is_dataclass, make_table_hook),
-    (has_origin(dict), make_mapping_hook),
-    (has_origin(tuple), make_list_hook),
-    (find_constraint, make_value_hook),
-):
-    CONVERTER.register_structure_hook_factory(concerns, hooks)  # type: ignore[arg-type]
-
-
 def parse_table(table: dict[str, Any], schema: type[Schema]) -> Schema:
     """Convert a table to its schema; raise SceneError with the most helpful error if it does not fit."""
+    from cattrs.errors import BaseValidationError
+
     try:
-        return CONVERTER.structure(table, schema)
+        return converter().structure(table, schema)
     except BaseValidationError as error:
         raise SceneError(min(find_faults(error))[1]) from None
 
 
 def find_faults(error: Exception, path: str = "") -> Iterator[tuple[int, str]]:
     """Yield (rank, message) for each error in a table; an unknown key explains most and has rank 0."""
+    from cattrs.errors import (
+        ClassValidationError,
+        ForbiddenExtraKeysError,
+        IterableValidationError,
+        IterableValidationNote,
+    )
+
     if isinstance(error, ClassValidationError | IterableValidationError):
         with_notes, without_notes = error.group_exceptions()
         for nested, note in with_notes:

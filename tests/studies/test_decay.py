@@ -120,7 +120,8 @@ from harness.studies.decay.study import write_results
 draws, draw = [], Figure.draw
 Figure.draw = lambda *arguments: draws.append(draw(*arguments))
 write_results(fit_decay(decay_record(0.02), KnownParameters()), Path.cwd())
-unnecessary = ("fmpy", "scipy.stats", "scipy.signal", "harness.running", "harness.scenes")
+unnecessary = ("fmpy", "cattrs", "scipy.stats", "scipy.signal")
+unnecessary += ("harness.running", "harness.scenes.run_spec", "harness.scenes.scene")
 print(len(draws), [name for name in unnecessary if name in sys.modules])
 """
     done = subprocess.run(
