@@ -3,8 +3,7 @@
 import numpy as np
 
 from ..errors import HarnessError
-from ..results.quantity import AnalysisResult
-from ..results.step_sizes import step_size_quantities
+from ..results.quantity import AnalysisResult, step_size_quantities
 from ..running.trajectory import Trajectory
 
 NEIGHBOUR_STEPS = 5  # steps on either side of a reversal that count as near it

@@ -11,8 +11,7 @@ import numpy as np
 
 from ..errors import HarnessError, check_names, optional
 from ..results.files import column_heading, write_csv, write_signals
-from ..results.quantity import Quantity, format_number
-from ..results.step_sizes import step_size_quantities
+from ..results.quantity import Quantity, format_number, step_size_quantities
 from ..results.summary import STEPS_TABLE, Summary, SummaryTable, make_table, write_summary
 from ..scenes.run_spec import RunSpec
 from .contacts import choose_outputs, contact_of_mode

@@ -5,7 +5,7 @@ import pytest
 
 from harness.analyses.slip import peak_value, slips_from_modes, upward_crossings
 from harness.analyses.steps import step_collapse
-from harness.results.step_sizes import published_mean_step
+from harness.results.quantity import published_mean_step
 
 
 def test_the_published_mean_counts_the_last_step_twice():

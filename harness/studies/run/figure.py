@@ -11,8 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ...results.quantity import PUBLISHED_UNITS, Quantity, display_unit
-from ...results.step_sizes import published_mean_step
+from ...results.quantity import PUBLISHED_UNITS, Quantity, display_unit, published_mean_step
 from ...results.style import (
     BLUE,
     GREEN,
