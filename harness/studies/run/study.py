@@ -90,7 +90,7 @@ def run_and_write(scene: Scene, folder: Path, report: Callable[[float], None]) -
     )
     summary = summarize_run(run, scene.name)
     if scene.about and not run.failure:
-        from .sketch import draw_sketches
+        from .figure import draw_sketches
 
         summary = replace(summary, sentences=(scene.about,), sketches=draw_sketches(run))
     if results:
