@@ -1,11 +1,15 @@
-"""Trajectory of a run: time, columns, steps, events, statistics and the specification."""
+"""Trajectory of a run: time, columns, steps, events, statistics and the specification.
 
-from collections.abc import Sequence
+A contact of an FMU of this project has a friction force and a mode, and the name of its force.
+"""
+
+import re
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from math import nan
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,7 +18,6 @@ from ..results.files import column_heading, write_csv, write_signals
 from ..results.quantity import Quantity, format_number, step_size_quantities
 from ..results.summary import STEPS_TABLE, Summary, SummaryTable, make_table, write_summary
 from ..scenes.run_spec import RunSpec
-from .contacts import choose_outputs, contact_of_mode
 
 if TYPE_CHECKING:
     import pandas
@@ -22,6 +25,7 @@ if TYPE_CHECKING:
 
 FILES = ("trajectory.csv", "steps.csv", "events.csv")
 MOST_PANELS = 8  # of a plot that names no outputs
+MODE_TEXT = re.compile(r"mode of (\w+): ")  # how the description of a mode begins; it names the force of the contact
 
 
 @dataclass(frozen=True)
@@ -366,3 +370,28 @@ def summarize_steps(run: Trajectory, title: str) -> tuple[SummaryTable, ...]:
     quantities = step_size_quantities(run.steps.h, int(run.steps.rejected.sum()))
     row = (title, *(" ".join(quantity.formatted()).strip() for quantity in quantities))
     return make_table(("case", *(quantity.text for quantity in quantities)), (row,), STEPS_TABLE)
+
+
+def contact_of_mode(description: str | None) -> str:
+    """Return the friction force that the description of a mode names; empty if it names none."""
+    named = MODE_TEXT.match(description or "")
+    return named[1] if named else ""
+
+
+def find_contacts(variables: Mapping[str, Any]) -> dict[str, str]:
+    """Return the contacts of an FMU of this project: the output that is the mode, by the name of the contact.
+
+    A contact has the name of its friction force, or that of its mode if the description of the mode names no force.
+    """
+    modes = [
+        variable for variable in variables.values() if (variable.causality, variable.type) == ("output", "Integer")
+    ]
+    named = {mode.name: contact_of_mode(mode.description) for mode in modes}
+    return {force if force in variables else mode: mode for mode, force in named.items()}
+
+
+def choose_outputs(outputs: Sequence[str], contacts: Collection[str], count: int) -> tuple[str, ...]:
+    """Return the first outputs, `count` in all, with the friction forces among them if there is space for these."""
+    forces = [name for name in outputs if name in contacts][:count]
+    others = [name for name in outputs if name not in contacts][: count - len(forces)]
+    return tuple(name for name in outputs if name in forces or name in others)

@@ -16,8 +16,7 @@ from ...results.provenance import describe_sources, write_provenance
 from ...results.quantity import Quantity
 from ...results.summary import write_summary
 from ...running import runner
-from ...running.contacts import choose_outputs
-from ...running.trajectory import Trajectory, summarize_run
+from ...running.trajectory import Trajectory, choose_outputs, summarize_run
 from ...scenes.fmu_files import check_built
 from ...scenes.run_spec import RunSpec
 from ...scenes.scene import MAX_DEFAULT_PLOTS, Scene, default_plots, is_panel, load_scene, shipped_scenes
