@@ -35,7 +35,7 @@ def with_options(
     timeout: float | None = None,
 ) -> "RunSpec":
     """Return a run with the options that are not None."""
-    from ..running.description import exposes_solver_steps, read_description
+    from ..running.fmu_archive import exposes_solver_steps, read_description
     from ..scenes.schema import is_number
 
     values = dict(spec.values)

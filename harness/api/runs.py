@@ -155,7 +155,7 @@ def fine_step(spec: "RunSpec", interval: float) -> float:
     """Return a communication step in s for input signals: a whole part of the interval, at most 1/4096 of the run."""
     from math import ceil
 
-    from ..running.description import read_description, resolve_time_span
+    from ..running.fmu_archive import read_description, resolve_time_span
     from ..scenes.run_spec import DEFAULT_EQUAL_STEPS
 
     start, stop = resolve_time_span(spec, read_description(spec.fmu, spec.lenient))

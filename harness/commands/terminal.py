@@ -165,7 +165,7 @@ def refuse_ignored_options(context: click.Context, fmus: Iterable[Path]) -> None
     fmus : iterable of pathlib.Path
         FMUs that are run with the options of the command line; scenes have their own.
     """
-    from ..running.description import exposes_solver_steps, read_description
+    from ..running.fmu_archive import exposes_solver_steps, read_description
 
     files = list(fmus)
     if not files:

@@ -14,7 +14,7 @@ import fmpy
 from ..errors import HarnessError
 from ..process.subprocess_runner import run_subprocess
 from ..process.temporary_directory import temporary_directory
-from .unpacking import PROCESS_RESOURCES, is_python_fmu, unpack
+from .fmu_archive import PROCESS_RESOURCES, is_python_fmu, unpack
 
 COMPILER = shutil.which("cc") or shutil.which("gcc")
 PYTHON_LIBRARY = Path(sysconfig.get_config_var("LIBDIR") or "", sysconfig.get_config_var("INSTSONAME") or "none")

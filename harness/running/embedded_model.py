@@ -13,10 +13,8 @@ import numpy as np
 
 from ..errors import HarnessError
 from ..scenes.fmu_files import check_built
-from .cached_by_mtime import cached_by_mtime
-from .description import REQUIRED_VARIABLES, read_description
+from .fmu_archive import REQUIRED_VARIABLES, SCRIPT_NAME_FILE, cached_by_mtime, read_description, unpack
 from .solution import Solution
-from .unpacking import SCRIPT_NAME_FILE, unpack
 
 OK = 0  # status of the solver
 

@@ -10,9 +10,7 @@ from ..process.subprocess_runner import SubprocessTimeoutError, run_module
 from ..process.temporary_directory import temporary_directory
 from ..scenes.fmu_files import FOLDERS
 from ..scenes.run_spec import RunSpec
-from .cached_by_mtime import cached_by_mtime
-from .description import read_description, resolve_stop
-from .unpacking import PROCESS_RESOURCES, is_python_fmu, unpack_once
+from .fmu_archive import PROCESS_RESOURCES, cached_by_mtime, is_python_fmu, read_description, resolve_stop, unpack_once
 from .whole_run import open_simulator, real_variables
 
 BUILD_TIMEOUT = 300.0  # s

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from ..results.files import column_heading
-from .description import read_description
+from .fmu_archive import read_description
 from .variable_values import variable_unit
 
 PANEL = (7.0, 1.7)  # inches, width and height

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..errors import HarnessError
 from ..scenes.run_spec import RunSpec
-from .description import exposes_solver_steps, read_description
+from .fmu_archive import exposes_solver_steps, read_description
 from .own_fmu import ProgressCallback, simulate
 from .recorder import C_TYPES, array_shape, element_names
 from .trajectory import Trajectory

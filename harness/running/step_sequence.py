@@ -15,11 +15,11 @@ from typing import Any
 from ..errors import HarnessError
 from ..scenes.roles import find_roles
 from ..scenes.run_spec import RunSpec
+from .fmu_archive import unpack_once
 from .fmu_session import CALL_FAILURES, FmuSession
 from .own_fmu import open_session, read_statistics
 from .recorder import Recorder, ShapedVariable, read_rows
 from .trajectory import Trajectory
-from .unpacking import unpack_once
 from .variable_values import REAL_TYPES, variable_unit
 
 CommunicationSteps = list[tuple[float, float]]  # communication steps as (start, size) in s

@@ -23,9 +23,8 @@ from ..process.subprocess_runner import run_subprocess
 from ..process.temporary_directory import temporary_directory
 from ..scenes.run_spec import RunSpec
 from .c_host import COMPILER
-from .description import exposes_solver_steps, read_description
+from .fmu_archive import PROCESS_RESOURCES, exposes_solver_steps, read_description, unpack_once
 from .fmu_session import CALL_FAILURES, FmuSession, capture_stderr
-from .unpacking import PROCESS_RESOURCES, unpack_once
 from .variable_values import REAL_TYPES, effective_value, find_bound, variable_unit
 
 SOURCE = Path(__file__).with_name("whole_run.c")

@@ -15,9 +15,9 @@ import pytest
 from fmpy.model_description import Dimension, ModelVariable
 
 from harness.errors import HarnessError, SceneError
-from harness.running.description import read_description
 from harness.running.external.simulation import read_longest_rows
 from harness.running.external.step_refinement import RefinementRun, refine
+from harness.running.fmu_archive import read_description
 from harness.running.recorder import Recorder, array_shape
 from harness.running.variable_values import convert_value
 from harness.scenes.assignments import NumberWithText

@@ -12,7 +12,7 @@ from commands import harness, run_process
 from harness.errors import HarnessError
 from harness.process import temporary_directory as rooms
 from harness.process.temporary_directory import has_plain_uri, temporary_directory
-from harness.running import unpacking
+from harness.running import fmu_archive
 
 ODD = "a#b'+(,&@[{;=!$^%20 é\u3042`~)"
 
@@ -50,10 +50,10 @@ def test_without_a_plain_folder_a_python_fmu_is_refused_and_others_run(odd_folde
     monkeypatch.setattr(rooms, "FALLBACK_DIRECTORIES", ())
     monkeypatch.setattr(tempfile, "tempdir", str(odd_folder))
     refused = pytest.raises(HarnessError, match=r"smd\.fmu is an FMU in Python, which cannot be run from .*TMPDIR")
-    with refused, unpacking.unpack(fmus / "smd.fmu"):
+    with refused, fmu_archive.unpack(fmus / "smd.fmu"):
         pass
     compiled = copy_without(fmus / "smd.fmu", odd_folder / "c.fmu", lambda name: name.startswith("binaries/"))
-    with unpacking.unpack(compiled) as folder:
+    with fmu_archive.unpack(compiled) as folder:
         assert folder.parent == odd_folder
     assert sorted(file.name for file in odd_folder.iterdir()) == ["c.fmu", "fmus"]
 

@@ -12,7 +12,7 @@ from models import MODELS
 from sweep_results import open_sweep, xarray
 
 from harness.errors import HarnessError
-from harness.running.description import read_description
+from harness.running.fmu_archive import read_description
 from harness.scenes.run_spec import RunSpec
 from harness.studies.sweep import figure
 from harness.studies.sweep import result_files as writing

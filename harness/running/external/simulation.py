@@ -16,11 +16,10 @@ from ...process.child_process import ChildDiedError, ChildProcess, ChildTimeoutE
 from ...process.temporary_directory import temporary_directory
 from ...results.files import replace_nonfinite
 from ...scenes.run_spec import RunSpec
-from ..description import resolve_time_span
+from ..fmu_archive import resolve_time_span, unpack
 from ..inputs import check_inputs
 from ..recorder import Columns, ShapedVariable, array_shape, element_names, read_rows, select_variables
 from ..trajectory import Trajectory
-from ..unpacking import unpack
 from ..variable_values import convert_value, effective_value, variable_unit
 from .step_refinement import (
     MAX_STEPS,

@@ -15,8 +15,8 @@ from ...references.models.smd import SmdProblem
 from ...references.models.stickslip import StickslipProblem
 from ...references.ode_problem import OdeProblem
 from ...running import stepping_loops
-from ...running.description import read_description
 from ...running.embedded_model import EmbeddedModel, create_run, load_model_class
+from ...running.fmu_archive import read_description
 from ...running.stepping_loops import COMMUNICATION_STEPS
 from ...running.timing import time_call, time_fastest_call
 from ...scenes.fmu_files import find_fmu

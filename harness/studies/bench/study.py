@@ -9,7 +9,7 @@ from ...results.files import write_csv_rows
 from ...results.folder import replace_folder
 from ...results.provenance import prefix_parameters, write_provenance
 from ...results.summary import write_summary
-from ...running.description import declared_parameters
+from ...running.fmu_archive import declared_parameters
 from ...scenes.fmu_files import find_fmu
 from .benchmark import Benchmark
 from .table import summarize_benchmarks

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from ...errors import HarnessError, SceneError
-from ...running.description import read_description, resolve_stop, resolve_time_span
 from ...running.external.step_refinement import communication_step, declared_step
+from ...running.fmu_archive import read_description, resolve_stop, resolve_time_span
 from ...running.own_fmu import ProgressCallback
 from ...running.resolve import FMU_SUFFIXES, resolve
 from ...running.runner import DEFAULT_COMMUNICATION_STEPS, run

@@ -12,7 +12,7 @@ from pyssp_standard.ssp import SSP
 from pyssp_standard.ssv import SSV
 
 from ...errors import HarnessError, SceneError, first_line
-from ...running.description import declared_parameters, read_description
+from ...running.fmu_archive import declared_parameters, read_description
 from ...running.variable_values import REAL_TYPES, parse_element, variable_unit
 from .convergence import Convergence
 

@@ -14,7 +14,7 @@ from ...errors import SceneError, check_names, format_value
 from ...records.columns import ColumnOptions
 from ...records.record import MIN_SAMPLES
 from ...records.signal_table import SignalSource, SignalTable
-from ...running.description import read_description
+from ...running.fmu_archive import read_description
 from ...running.variable_values import convert_value
 from ...running.whole_run import MAX_INPUTS, RealVariable, real_variables
 from ...scenes.run_spec import RunSpec

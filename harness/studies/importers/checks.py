@@ -15,7 +15,7 @@ from zipfile import ZipFile
 from ...errors import HarnessError
 from ...process.child_process import ChildError, ChildProcess
 from ...running.c_host import COMPILER, PYTHON_LIBRARY
-from ...running.description import read_description
+from ...running.fmu_archive import read_description
 from ...scenes.run_spec import RunSpec
 from . import c_adapter
 from .request import ImporterReply, ImporterRequest

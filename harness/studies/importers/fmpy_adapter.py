@@ -10,8 +10,7 @@ from fmpy import fmi2
 from fmpy.fmi1 import FMICallException
 from fmpy.logging import addLoggerProxy
 
-from ...running.description import read_description
-from ...running.unpacking import unpack_once
+from ...running.fmu_archive import read_description, unpack_once
 from .request import ImporterReply, ImporterRequest, serve
 
 

@@ -17,9 +17,7 @@ from typing import Any
 from fmu_manipulation_toolbox.cli.fmucontainer import fmucontainer
 
 from ...process.temporary_directory import temporary_directory
-from ...running.cached_by_mtime import cached_by_mtime
-from ...running.description import read_description
-from ...running.unpacking import PROCESS_RESOURCES
+from ...running.fmu_archive import PROCESS_RESOURCES, cached_by_mtime, read_description
 from . import fmpy_adapter
 from .request import ImporterReply, ImporterRequest, serve
 

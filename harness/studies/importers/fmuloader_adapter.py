@@ -10,9 +10,8 @@ from typing import Any
 
 from fmuloader.fmi2 import Fmi2Error, Fmi2Slave, Fmi2Status, Fmi2Type
 
-from ...running.description import read_description
+from ...running.fmu_archive import read_description, unpack_once
 from ...running.fmu_session import FMICallException
-from ...running.unpacking import unpack_once
 from .fmpy_adapter import run_instances
 from .request import ImporterReply, ImporterRequest, serve
 

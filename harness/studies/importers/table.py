@@ -14,7 +14,7 @@ from ...results.files import write_csv_rows
 from ...results.folder import replace_folder
 from ...results.provenance import describe_sources, prefix_parameters, write_provenance
 from ...results.summary import Summary, make_table, write_summary
-from ...running.description import declared_parameters
+from ...running.fmu_archive import declared_parameters
 from .checks import (
     CHECKS,
     IMPORTERS,

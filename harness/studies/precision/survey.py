@@ -14,8 +14,8 @@ from ...results.files import column_heading, write_csv_rows
 from ...results.folder import replace_folder
 from ...results.provenance import load_provenance, write_provenance
 from ...results.summary import MissingResult, Summary, SummaryTable, make_table, write_summary
-from ...running.description import declared_parameters
 from ...running.embedded_model import load_model_class
+from ...running.fmu_archive import declared_parameters
 from ...scenes.fmu_files import find_fmu
 from . import law_deviations, literature_problems
 from .advice import recommend

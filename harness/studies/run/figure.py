@@ -27,7 +27,7 @@ from ...results.style import (
     open_figure,
 )
 from ...results.summary import SKETCH_SIZE, Sketch
-from ...running.description import exposes_solver_steps, read_description
+from ...running.fmu_archive import exposes_solver_steps, read_description
 from ...running.own_fmu import simulate
 from ...running.plot import draw_sticking
 from ...running.trajectory import Trajectory

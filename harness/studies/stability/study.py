@@ -23,7 +23,7 @@ from ...results.files import write_csv_rows
 from ...results.folder import replace_folder
 from ...results.provenance import prefix_parameters, write_provenance
 from ...results.summary import write_summary
-from ...running.description import declared_parameters
+from ...running.fmu_archive import declared_parameters
 from ...running.fmu_info import FmuInfo, read_info
 from ...running.solution import Solution
 from ...running.step_sequence import CommunicationSteps, RefusalSummary, RefusedRun

@@ -28,7 +28,7 @@ from ...results.files import column_heading
 from ...results.folder import replace_folder
 from ...results.provenance import describe_sources, write_provenance
 from ...results.summary import Summary, write_summary
-from ...running.description import read_description
+from ...running.fmu_archive import read_description
 from ...running.variable_values import REAL_TYPES, variable_unit
 from ...scenes.fmu_files import check_built
 from .boundaries import Boundary, read_boundaries

@@ -12,7 +12,7 @@ from typing import Any
 
 from ...errors import HarnessError, check_names
 from ...running import runner
-from ...running.description import exposes_solver_steps, read_description
+from ...running.fmu_archive import exposes_solver_steps, read_description
 from ...running.fmu_session import CALL_FAILURES, FmuSession, PreparedRuns
 from ...running.own_fmu import build_trajectory, open_session, plan_run, read_parameters, record_run
 from ...running.variable_values import variable_unit
