@@ -14,8 +14,7 @@ from fmpy.sundials import CVodeSolver
 
 from ..errors import HarnessError
 from .fmu_session import FmuSession, TerminatedError
-from .inputs import InputSignals
-from .stepping import TimeGrid
+from .stepping import InputSignals, TimeGrid
 
 MAX_CVODE_STEPS = 100_000  # between two points
 MAX_EVENTS = 1000  # at one time

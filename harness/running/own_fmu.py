@@ -21,9 +21,8 @@ from ..scenes.run_spec import RunSpec
 from ..scenes.scene import SHORT_KEYS
 from .fmu_archive import REQUIRED_VARIABLES, read_description, resolve_time_span, unpack
 from .fmu_session import CALL_FAILURES, FmuSession, LogCapture, capture_stderr
-from .inputs import check_inputs, input_signals
 from .recorder import Columns, Recorder, ShapedVariable, read_rows
-from .stepping import CoSimulation, TimeGrid, step_to_stop
+from .stepping import CoSimulation, TimeGrid, check_inputs, input_signals, step_to_stop
 from .trajectory import ModeChanges, SolverSteps, Statistics, Trajectory, find_contacts
 from .variable_values import convert_value, effective_value, enumeration_labels, variable_unit
 

@@ -13,10 +13,9 @@ from ...errors import HarnessError, first_line
 from ...process.child_process import RequestServer
 from ...scenes.run_spec import RunSpec
 from ..fmu_session import STATUS_NAMES, FmuSession, LogCapture, StepError, StepRefusedError, TerminatedError
-from ..inputs import input_signals
 from ..model_exchange import ModelExchange
 from ..recorder import Recorder, StringTable, read_rows, select_variables
-from ..stepping import CoSimulation, Stepper, TimeGrid, step_to_stop
+from ..stepping import CoSimulation, Stepper, TimeGrid, input_signals, step_to_stop
 from .step_refinement import (
     ROWS_PREFIX,
     STRINGS_FILE,

@@ -17,8 +17,8 @@ from ...process.temporary_directory import temporary_directory
 from ...results.files import replace_nonfinite
 from ...scenes.run_spec import RunSpec
 from ..fmu_archive import resolve_time_span, unpack
-from ..inputs import check_inputs
 from ..recorder import Columns, ShapedVariable, array_shape, element_names, read_rows, select_variables
+from ..stepping import check_inputs
 from ..trajectory import Trajectory
 from ..variable_values import convert_value, effective_value, variable_unit
 from .step_refinement import (
