@@ -5,7 +5,7 @@ from typing import Any
 
 from ..scenes.fmu_files import find_fmu
 from ..scenes.run_spec import RunSpec
-from .own_fmu import read_own_description
+from .runner import read_own_description
 from .variable_values import enumeration_labels
 
 

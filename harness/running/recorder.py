@@ -55,6 +55,7 @@ FMI2_TYPES = {"Boolean": c_int, "Enumeration": c_int}  # other than those of FMI
 COLUMN_TYPES = {**dict.fromkeys(C_TYPES, np.int64), **dict.fromkeys(REAL_TYPES, np.float64), "UInt64": np.uint64}
 
 MAX_COLUMNS = 100_000  # recorded values at each point
+MAX_DEFAULT_OUTPUTS = 1000  # values recorded at each point of a run that names no outputs
 
 ShapedVariable = tuple[Any, tuple[int, ...]]  # variable and shape
 Columns = dict[str, np.ndarray]  # recorded values (n,) by name
@@ -90,6 +91,36 @@ def select_variables(spec: RunSpec, variables: Mapping[str, Any], values: Mappin
     check_names("output", [name for name in spec.outputs if name not in owner], shapes)
     names = dict.fromkeys(owner[name] for name in spec.outputs)
     return [(variables[name], shapes[name]) for name in names]
+
+
+def default_outputs(description: Any, values: Mapping[str, Any] | None = None) -> tuple[str, ...]:
+    """Return the outputs of an FMU, or its locals if it has none. Arrays are listed by element.
+
+    Parameters
+    ----------
+    description : ModelDescription
+    values : mapping, optional
+        Values that are set. Structural parameters among them determine the shapes of arrays.
+
+    Raises
+    ------
+    HarnessError
+        If there are too many to record all of them.
+    """
+    for causality in ("output", "local"):
+        shapes = {
+            variable.name: array_shape(variable, values or {})
+            for variable in description.modelVariables
+            if variable.causality == causality and variable.variability != "constant" and variable.type in C_TYPES
+        }
+        if (count := sum(map(prod, shapes.values()))) > MAX_DEFAULT_OUTPUTS:
+            raise HarnessError(
+                f"{description.modelName} has {count} {causality}s, more than the {MAX_DEFAULT_OUTPUTS} that are "
+                "recorded by default: run it as a scene that names those to record, as in outputs = ['x']"
+            )
+        if count:
+            return tuple(element for name, shape in shapes.items() for element in element_names(name, shape))
+    return ()
 
 
 def group_by_type(selection: Sequence[ShapedVariable]) -> Iterator[tuple[str, list[Any], list[str]]]:

@@ -17,8 +17,8 @@ from ..scenes.roles import find_roles
 from ..scenes.run_spec import RunSpec
 from .fmu_archive import unpack_once
 from .fmu_session import CALL_FAILURES, FmuSession
-from .own_fmu import open_session, read_statistics
 from .recorder import Recorder, ShapedVariable, read_rows
+from .runner import open_session, read_statistics
 from .trajectory import Trajectory
 from .variable_values import REAL_TYPES, variable_unit
 

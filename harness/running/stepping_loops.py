@@ -10,7 +10,7 @@ from pathlib import Path
 import fmpy
 
 from ..scenes.run_spec import RunSpec
-from .own_fmu import open_session, read_own_description, simulate
+from .runner import open_session, read_own_description, run_own_fmu
 from .timing import time_fastest_call
 
 COMMUNICATION_STEPS = 1600
@@ -40,7 +40,9 @@ def time_direct_loop(file: Path, steps: int) -> float:
     description = read_own_description(RunSpec(file))
     stop = float(description.defaultExperiment.stopTime)
     outputs = tuple(v.name for v in description.modelVariables if v.causality == "output")
-    statistics = simulate(RunSpec(file, outputs, stop=stop, grid=stop / steps, follow=False, repeat=REPEATS)).statistics
+    statistics = run_own_fmu(
+        RunSpec(file, outputs, stop=stop, grid=stop / steps, follow=False, repeat=REPEATS)
+    ).statistics
     assert statistics  # FMUs of this project provide them
     return statistics.seconds
 

@@ -6,7 +6,7 @@ import fmi3_fixtures
 import pytest
 
 from harness.running.fmu_session import CALL_FAILURES
-from harness.running.own_fmu import open_session
+from harness.running.runner import open_session
 from harness.scenes.run_spec import RunSpec
 
 

@@ -19,7 +19,7 @@ from harness.references import peer_solvers
 from harness.references.certified_reference import load_reference
 from harness.references.models import CASES
 from harness.running.embedded_model import load_model_class
-from harness.running.own_fmu import simulate
+from harness.running.runner import run_own_fmu
 from harness.scenes.run_spec import RunSpec
 from harness.studies.precision import advice, study
 from harness.studies.precision.study import (
@@ -117,8 +117,8 @@ def test_a_step_limit_of_cvode_gives_a_gap_with_the_reason_of_fmpy(points, capfd
 def test_each_run_of_an_instance_starts_from_scratch(both):
     sled = RunSpec(both / "fmus/native/fmi3/stickslip.fmu", ("x", "v", "mode"), {"mu_s": 0.8}, stop=16.0, grid=0.5)
     sled = replace(sled, follow=False, exchange=True)
-    first, again = (simulate(replace(sled, repeat=repeat)) for repeat in (1, 3))
-    other = simulate(replace(sled, values={}))
+    first, again = (run_own_fmu(replace(sled, repeat=repeat)) for repeat in (1, 3))
+    other = run_own_fmu(replace(sled, values={}))
     assert np.array_equal(first.time, again.time)
     assert all(np.array_equal(first[name], again[name]) for name in sled.outputs)
     assert first.statistics.evaluations == again.statistics.evaluations > 100
@@ -130,7 +130,7 @@ def test_a_failure_is_one_sentence(both, tmp_path, exchange, capfd):
     def refused(file, values=None, timeout=60.0):
         run = RunSpec(file, ("x",), values or {}, stop=16.0, grid=0.01, follow=False, exchange=exchange)
         with pytest.raises(HarnessError) as error:
-            simulate(run, study.limit_run_time(timeout, 16.0))
+            run_own_fmu(run, study.limit_run_time(timeout, 16.0))
         return str(error.value)
 
     sled, missing, broken = both / "fmus/native/fmi3/stickslip.fmu", tmp_path / "missing.fmu", tmp_path / "broken.fmu"

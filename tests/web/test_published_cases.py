@@ -6,7 +6,7 @@ import native_fmus
 import pytest
 import web_page
 
-from harness.running.own_fmu import simulate
+from harness.running.runner import run_own_fmu
 from harness.scenes.scene import load_scene, shipped_scenes
 from harness.studies.run.study import ANALYSES
 
@@ -22,7 +22,7 @@ def test_every_published_case_measures_the_same_as_the_terminal(page):
     for name, scene in scenes.items():
         page.choose("preset", name)
         native = native_fmus.build_native_fmus() / f"{scene.run.model}.fmu"  # runs while the page waits for more work
-        run = simulate(replace(scene.run, fmu=native, repeat=1))
+        run = run_own_fmu(replace(scene.run, fmu=native, repeat=1))
         page.wait(
             f"app.state().preset === {name!r} && document.querySelector('#tables caption')?.textContent === "
             "app.session.presets.get(app.state().preset).title"

@@ -18,7 +18,7 @@ from ...process.temporary_directory import temporary_directory
 from ...references.certified_reference import relative_errors
 from ...references.models import MODELS
 from ...running.c_host import Library, MissingToolError, compile_source, load_library
-from ...running.own_fmu import simulate
+from ...running.runner import run_own_fmu
 from ...running.trajectory import Trajectory
 from ...scenes.fmu_files import find_fmu, fmi3_path
 from .benchmark import SETTINGS, Baseline, Benchmark
@@ -125,7 +125,7 @@ def run_cvode(scene: Scenario, rtol: float) -> np.ndarray:
 
 def run_fmpy(scene: Scenario, rtol: float, exchange: bool = True) -> Trajectory:
     """Run the FMI 3.0 FMU with fmpy's CVode or with its own solver, and count its events."""
-    return simulate(scene.run_with(fmi3_fmu(scene.case.model), rtol, exchange))
+    return run_own_fmu(scene.run_with(fmi3_fmu(scene.case.model), rtol, exchange))
 
 
 def run_fmusim(scene: Scenario, rtol: float) -> Trajectory:

@@ -11,7 +11,7 @@ from ...results.files import to_json
 from ...results.folder import replace_folder
 from ...results.provenance import describe_sources, prefix_parameters, write_provenance
 from ...results.summary import Summary, make_terminal_table, read_cells, write_summary
-from ...running.own_fmu import ProgressCallback
+from ...running.runner import ProgressCallback
 from ...scenes.run_spec import RunSpec
 from . import trajectory_sources
 from .difference import Comparison, compare

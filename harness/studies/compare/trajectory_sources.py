@@ -10,9 +10,8 @@ import numpy as np
 from ...errors import HarnessError, SceneError
 from ...running.external.step_refinement import communication_step, declared_step
 from ...running.fmu_archive import read_description, resolve_stop, resolve_time_span
-from ...running.own_fmu import ProgressCallback
 from ...running.resolve import FMU_SUFFIXES, resolve
-from ...running.runner import DEFAULT_COMMUNICATION_STEPS, run
+from ...running.runner import DEFAULT_COMMUNICATION_STEPS, ProgressCallback, run
 from ...running.trajectory import Trajectory
 from ...scenes.run_spec import RunSpec
 from .trajectory_files import read_trajectory

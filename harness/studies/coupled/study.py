@@ -19,7 +19,7 @@ from ...results.folder import replace_folder
 from ...results.provenance import describe_sources, write_provenance
 from ...results.summary import Summary, make_table, write_summary
 from ...running.fmu_archive import read_description
-from ...running.own_fmu import ProgressCallback
+from ...running.runner import ProgressCallback
 from ...scenes.coupled.scene import CoupledScene, load_coupled_scene
 from ...scenes.fmu_files import find_fmu
 from .convergence import Convergence

@@ -23,7 +23,7 @@ from ...references.certified_reference import ReferenceCase, compute_errors, loa
 from ...references.models import CASES
 from ...references.ode_problem import UnspecifiedProblem
 from ...running.embedded_model import EmbeddedModel, load_model_class, method_numbers
-from ...running.own_fmu import simulate
+from ...running.runner import run_own_fmu
 from ...running.solution import Solution
 from ...running.timing import time_call
 from ...scenes.fmu_files import find_fmu, fmi3_path
@@ -206,7 +206,7 @@ class CaseRunner:
         outputs, tolerance = self.case.outputs, {"solver.rtol": rtol} if rtol else {}
         values: dict[str, float | str] = {**self.case.values, **tolerance, "solver.method": method}
         grid, repeat = float(self.times[1]), repeats(run_times[rtol], settings.budget)
-        run = simulate(RunSpec(self.file, outputs, values, grid=grid, follow=False, repeat=repeat))
+        run = run_own_fmu(RunSpec(self.file, outputs, values, grid=grid, follow=False, repeat=repeat))
         assert run.statistics  # FMUs of this project report it
         columns = np.column_stack([run.columns[name] for name in outputs])
         return Solution(self.times, columns, None, run.statistics.evaluations), run.statistics.seconds
@@ -223,10 +223,10 @@ class CaseRunner:
         spec = replace(spec, tolerance=rtol) if exchange else spec
         if not file.is_file():
             raise HarnessError(f"not built: {file} (friction-fmus build --fmi 3)")
-        recording = simulate(spec, limit_run_time(settings.timeout, stop))
+        recording = run_own_fmu(spec, limit_run_time(settings.timeout, stop))
         assert recording.statistics  # FMUs of this project report it
         repeat = repeats(recording.statistics.seconds, settings.budget)
-        timed = simulate(replace(spec, repeat=repeat)).statistics
+        timed = run_own_fmu(replace(spec, repeat=repeat)).statistics
         assert timed
         events = recording.find_changes(*modes) if modes else None
         states, evaluations = recording.sample_at(self.times, names), recording.statistics.evaluations

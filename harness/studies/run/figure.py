@@ -28,8 +28,8 @@ from ...results.style import (
 )
 from ...results.summary import SKETCH_SIZE, Sketch
 from ...running.fmu_archive import exposes_solver_steps, read_description
-from ...running.own_fmu import simulate
 from ...running.plot import draw_sticking
+from ...running.runner import run_own_fmu
 from ...running.trajectory import Trajectory
 from ...scenes.scene import MAX_DEFAULT_PLOTS, is_panel
 
@@ -134,7 +134,7 @@ def refine(run: Trajectory) -> Trajectory:
     is_fine = np.diff(run.time).max() <= 2 * (stop - start) / CURVE_POINTS
     if is_fine or run.failure or not exposes_solver_steps(read_description(run.spec.fmu)):
         return run
-    fine_run = simulate(
+    fine_run = run_own_fmu(
         replace(run.spec, start=start, stop=stop, grid=(stop - start) / CURVE_POINTS, follow=False, repeat=1)
     )
     time, order = np.unique(np.append(run.time, fine_run.time), return_index=True)

@@ -14,7 +14,8 @@ from ...errors import HarnessError, check_names
 from ...running import runner
 from ...running.fmu_archive import exposes_solver_steps, read_description
 from ...running.fmu_session import CALL_FAILURES, FmuSession, PreparedRuns
-from ...running.own_fmu import build_trajectory, open_session, plan_run, read_parameters, record_run
+from ...running.recorder import default_outputs
+from ...running.runner import build_trajectory, open_session, plan_run, read_parameters, record_run
 from ...running.variable_values import variable_unit
 from ...scenes.roles import find_roles
 from ...scenes.run_spec import RunSpec
@@ -51,9 +52,7 @@ class OwnFmuRunner:
         motion = find_roles(self.variables)
         outputs = tuple(motion[role] for role in ("position", "velocity") if role in motion)
         if len(outputs) < 2:
-            outputs = tuple(
-                name for name in runner.default_outputs(fmu_description) if self.variables[name].type == "Real"
-            )
+            outputs = tuple(name for name in default_outputs(fmu_description) if self.variables[name].type == "Real")
         plan = plan_run(replace(runs.run, outputs=outputs), fmu_description)
         self.stop = plan.grid.stop
         ends = [name for name in measures if name in FINAL_MEASURES]
@@ -116,7 +115,7 @@ class ExternalFmuRunner:
         self.variables = {variable.name: variable for variable in fmu_description.modelVariables}
         self.measures = select_measures(runs, self.variables, is_own_fmu=False)
         texts = {name for name, variable in self.variables.items() if variable.type == "String"}
-        outputs = tuple(name for name in runner.default_outputs(fmu_description) if name not in texts)
+        outputs = tuple(name for name in default_outputs(fmu_description) if name not in texts)
         self.shared = replace(runs.run, outputs=outputs, follow=True)
         self.columns = measure_columns(self.measures, self.variables, outputs)
         self.parameters_used: dict[str, tuple[object, str]] = {}

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ....running.own_fmu import simulate as run_fmu
+from ....running.runner import run_own_fmu as run_fmu
 from ....scenes.fmu_files import check_built, find_fmu
 from ....scenes.run_spec import RunSpec
 from ..scenes import Scene, Setting, Solution
