@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from harness.analyses.decay.intervals import confidence_interval
+from harness.analyses.decay.intervals import N_DRAWS, confidence_interval, nonnegative_interval, quasirandom_normal
 from harness.analyses.decay.law import OMEGA
-from harness.analyses.decay.nonnegative_intervals import N_DRAWS, nonnegative_interval, quasirandom_normal
 
 
 def test_nonnegative_intervals_cover_95_percent():

@@ -65,7 +65,7 @@ PARTLY_DEPARTED = 0.05  # fraction of departed samples in the half cycle before 
 MAX_REFITS = 2  # passes over all pairs of laws: each improves the fits of the one before
 EQUAL_DEVIANCE = 1.0  # of n ln(squares): no value of two such laws differs by more than a standard error
 
-# --- Intervals (intervals.py, nonnegative_intervals.py) ---
+# --- Intervals (intervals.py) ---
 BLOCKS_PER_HALF_CYCLE = (1.0, 0.3, 0.1, 0.03)  # lengths on which residuals may be correlated
 MIN_BLOCKS, MAX_BLOCKS = 24, 400  # fewer leave the variance uncertain; more are shorter than any correlation
 NEGLIGIBLE_BOUND = 4.0  # standard errors above zero: the bound at zero no longer matters
