@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from harness.analyses.decay.fit_problem import FitError, least_squares
 from harness.analyses.decay.law import AMPLITUDE, OMEGA, REST, T0, UNKNOWNS, ZETA, B, R
-from harness.analyses.decay.least_squares import FitError, least_squares
 
 T = np.linspace(0.0, 1.0, 21)
 START = np.zeros(len(UNKNOWNS))

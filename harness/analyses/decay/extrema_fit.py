@@ -17,10 +17,9 @@ from ..estimation.estimate import Estimate
 from .decrement import damping_ratio, friction_from_envelope
 from .estimates import KnownParameters, force_estimates, to_record_units
 from .extrema import Extrema
-from .fit_problem import FitProblem
+from .fit_problem import FitProblem, column_norms, least_squares
 from .intervals import confidence_interval, to_correlation
 from .law import AMPLITUDE, OMEGA, REST, TERMS, UNKNOWNS, ZETA, B, R
-from .least_squares import column_norms, least_squares
 from .model_selection import FittedLaw
 from .return_map import iterate_return_map
 from .signal_model import LAW

@@ -25,11 +25,10 @@ from . import thresholds
 from .estimates import KnownParameters, make_estimates
 from .extrema import Extrema, find_extrema
 from .extrema_fit import estimate_from_extrema, estimate_from_two_peaks
-from .fit_problem import FitProblem
+from .fit_problem import FitError, FitProblem
 from .free_motion import select_free_motion
 from .intervals import FitUncertainty, estimate_uncertainty
 from .law import DRIFT, REST, TERMS, Terms
-from .least_squares import FitError
 from .model_selection import FittedLaw, fit_all_laws, select_reported_law
 from .noise import remove_spikes
 from .remarks import check_fit, compare_halves, make_remarks

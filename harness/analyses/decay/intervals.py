@@ -29,9 +29,8 @@ from scipy import optimize, special
 from ..estimation.estimate import NORMAL_QUANTILE, student_quantile
 from ..estimation.noise import block_scores, residual_correlation
 from . import thresholds
-from .fit_problem import FitProblem
+from .fit_problem import FitProblem, column_norms
 from .law import OMEGA, ZETA, Terms
-from .least_squares import column_norms
 
 N_DRAWS = 1000
 

@@ -8,10 +8,9 @@ from ...records.record import Record
 from ..estimation.estimate import Estimate
 from . import thresholds
 from .estimates import unit_scales
-from .fit_problem import FitProblem
+from .fit_problem import FitError, FitProblem
 from .intervals import FitUncertainty, estimate_uncertainty
 from .law import AMPLITUDE, DRIFT, OMEGA, REST, UNKNOWNS, ZETA
-from .least_squares import FitError
 from .model_selection import FittedLaw, deviance_difference
 
 

@@ -33,7 +33,7 @@ PARTIAL_SWING = 0.25  # of a half cycle: a record that begins farther from a tur
 MIN_EXTRAPOLATED = 2.0  # rad: the start of a pendulum beyond it, near its upper rest, is not extrapolated
 GROWTH_ERRORS, GROWTH = 8.0, 1.001  # standard errors and ratio of the last amplitude to the first: it is driven
 
-# --- Fit of the signal (fit_problem.py, least_squares.py) ---
+# --- Fit of the signal (fit_problem.py) ---
 MODEL_ACCURACY = 1e-9  # relative to the motion: truncation error of the series, below which no fit is better
 UNREACHED = 30.0  # standard errors: residual of a turning point that the motion never reaches
 FIT_WINDOWS = (0.08, 0.2, 0.45, 1.0)  # fractions of a record: the fit of one window predicts the phase in the next
