@@ -22,9 +22,8 @@ from ...errors import HarnessError, check_names
 from ...records.record import Record
 from ..estimation.estimate import Estimate
 from . import thresholds
-from .estimates import KnownParameters, make_estimates
+from .estimates import KnownParameters, estimate_from_extrema, estimate_from_two_peaks, make_estimates
 from .extrema import Extrema, find_extrema
-from .extrema_fit import estimate_from_extrema, estimate_from_two_peaks
 from .fit_problem import FitError, FitProblem
 from .free_motion import select_free_motion
 from .intervals import FitUncertainty, estimate_uncertainty
