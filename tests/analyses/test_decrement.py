@@ -5,12 +5,8 @@ from math import cos, exp, pi, sin, sqrt
 import numpy as np
 import pytest
 
-from harness.analyses.decay.decrement import (
-    damping_ratio,
-    find_extrema_from_velocity,
-    friction_from_envelope,
-    select_cycles,
-)
+from harness.analyses.decay.decrement import find_extrema_from_velocity, select_cycles
+from harness.analyses.decay.law import damping_ratio, friction_from_envelope
 from harness.errors import HarnessError
 
 

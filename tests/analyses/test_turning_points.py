@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 from decays import decay_record, remarks_text, values
 
-from harness.analyses.decay.decrement import damping_ratio, friction_from_envelope
 from harness.analyses.decay.estimates import KnownParameters
 from harness.analyses.decay.identification import fit_decay
-from harness.analyses.decay.law import TERMS
+from harness.analyses.decay.law import TERMS, damping_ratio, friction_from_envelope
 from harness.analyses.decay.noise import find_reversals
 
 

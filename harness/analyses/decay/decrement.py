@@ -12,7 +12,7 @@ W. T. Thomson, Theory of Vibration, sections 2.6 and 2.7 (logarithmic decrement,
 """
 
 from dataclasses import dataclass
-from math import log, pi, prod, sqrt
+from math import prod
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,6 +20,7 @@ import numpy as np
 from ...errors import HarnessError
 from ...results.quantity import Quantity
 from .. import sample_density
+from .law import damping_ratio, friction_from_envelope
 
 if TYPE_CHECKING:
     from ...running.trajectory import Trajectory  # only for annotations: a record from a file needs no FMU
@@ -145,24 +146,3 @@ def select_cycles(
         have = f"the decay needs {least} turning points, and the run has {len(times)}"
         raise HarnessError(f"{have}: set a later stop, a finer grid or fewer cycles")
     return times[begin : end + 1], positions[begin : end + 1], (end - begin) / 2
-
-
-def damping_ratio(x_0: float, x_n: float, cycles: float) -> float:
-    """Return zeta from the logarithmic decrement of two turning points `cycles` apart."""
-    check_decrease(x_0, x_n)
-    delta = log(x_0 / x_n) / cycles
-    return delta / sqrt(4 * pi * pi + delta * delta)
-
-
-def friction_from_envelope(x_0: float, x_n: float, cycles: float, stiffness: float) -> float:
-    """Return friction from the linear envelope: a force for a stiffness in N/m, a torque for one in N.m/rad."""
-    check_decrease(x_0, x_n)
-    return stiffness * (x_0 - x_n) / (4 * cycles)
-
-
-def check_decrease(x_0: float, x_n: float) -> None:
-    """Raise HarnessError unless x_0 > x_n > 0."""
-    if not x_0 > x_n > 0:
-        raise HarnessError(
-            f"the turning points do not decay: from {x_0:.6g} to {x_n:.6g}; the motion is at rest, driven or undamped"
-        )

@@ -18,11 +18,22 @@ from scipy import optimize
 
 from ...records.record import Record
 from ..estimation.estimate import Estimate
-from .decrement import damping_ratio, friction_from_envelope
 from .extrema import Extrema
 from .fit_problem import FitProblem, column_norms, least_squares
 from .intervals import FitUncertainty, confidence_interval, to_correlation
-from .law import AMPLITUDE, DRIFT, OMEGA, REST, TERMS, UNKNOWNS, ZETA, B, R
+from .law import (
+    AMPLITUDE,
+    DRIFT,
+    OMEGA,
+    REST,
+    TERMS,
+    UNKNOWNS,
+    ZETA,
+    B,
+    R,
+    damping_ratio,
+    friction_from_envelope,
+)
 from .model_selection import FittedLaw
 from .return_map import iterate_return_map
 from .signal_model import LAW

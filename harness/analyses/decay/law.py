@@ -1,4 +1,4 @@
-"""The equation of motion of a free decay, its unknowns and the seven laws of damping.
+"""The equation of motion of a free decay, its unknowns, the seven laws of damping, and closed forms of two of them.
 
 In the time theta = omega (t - t0), with y the displacement from rest and s = sign y',
 
@@ -10,8 +10,11 @@ terms zeta, r and b are nonnegative.
 """
 
 from itertools import combinations
+from math import log, pi, sqrt
 
 import numpy as np
+
+from ...errors import HarnessError
 
 UNKNOWNS = ("t0", "amplitude", "rest", "drift", "omega", "zeta", "r", "b")
 T0, AMPLITUDE, REST, DRIFT, OMEGA, ZETA, R, B = range(8)
@@ -42,3 +45,24 @@ def describe_law(terms: Terms) -> str:
 def sticking_limit(r: np.ndarray, is_pendulum: bool) -> np.ndarray:
     """Return the largest displacement at which friction holds the body at rest (same shape as r)."""
     return np.arcsin(np.clip(r, 0.0, 1.0)) if is_pendulum else r
+
+
+def damping_ratio(x_0: float, x_n: float, cycles: float) -> float:
+    """Return zeta from the logarithmic decrement of two turning points `cycles` apart."""
+    check_decrease(x_0, x_n)
+    delta = log(x_0 / x_n) / cycles
+    return delta / sqrt(4 * pi * pi + delta * delta)
+
+
+def friction_from_envelope(x_0: float, x_n: float, cycles: float, stiffness: float) -> float:
+    """Return friction from the linear envelope: a force for a stiffness in N/m, a torque for one in N.m/rad."""
+    check_decrease(x_0, x_n)
+    return stiffness * (x_0 - x_n) / (4 * cycles)
+
+
+def check_decrease(x_0: float, x_n: float) -> None:
+    """Raise HarnessError unless x_0 > x_n > 0."""
+    if not x_0 > x_n > 0:
+        raise HarnessError(
+            f"the turning points do not decay: from {x_0:.6g} to {x_n:.6g}; the motion is at rest, driven or undamped"
+        )

@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from ...analyses.decay.decrement import stiffness
 from ...analyses.decay.energy_loss import EnergyLoss, measure_energy_loss
 from ...analyses.decay.estimates import KnownParameters
 from ...analyses.decay.identification import DecayIdentification, fit_decay
@@ -92,6 +91,7 @@ def record_of_scene(
     source: str, columns: ColumnOptions, parameters: KnownParameters, report: Callable[[float], None]
 ) -> LoadedRecord:
     """Run a scene and return its position as a record."""
+    from ...analyses.decay.decrement import stiffness
     from ...running.runner import run as run_fmu
     from ...scenes.fmu_files import check_built
     from ...scenes.scene import load_scene

@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from ...analyses.decay.decrement import damping_ratio, find_extrema_from_velocity, friction_from_envelope
+from ...analyses.decay.decrement import find_extrema_from_velocity
+from ...analyses.decay.law import damping_ratio, friction_from_envelope
 from ...analyses.slip import peak_value, slips_from_modes, upward_crossings
 from ...errors import HarnessError
 from ...running.trajectory import Trajectory
