@@ -15,7 +15,6 @@ from build_cache import ROOT
 from decays import decay_record
 from matplotlib.figure import Figure
 
-from harness.analyses.decay.energy_loss import measure_energy_loss
 from harness.analyses.decay.estimates import KnownParameters
 from harness.analyses.decay.identification import fit_decay
 from harness.analyses.decay.law import LAWS
@@ -47,7 +46,7 @@ def test_a_figure_shows_angles_in_degrees_and_marks_only_excluded_samples(tmp_pa
     t = np.linspace(0.0, 9.0, 3001)
     record = decay_record(0.02, sine=True, a=1.0, turn=0.0, rest=0.0, t=t, noise=1e-3)
     fit = fit_decay(replace(record, t=record.t + 1.7e9), KnownParameters(pendulum=True))
-    draw(fit, measure_energy_loss(fit), tmp_path / "figure.svg")
+    draw(fit, tmp_path / "figure.svg")
     signal, residuals, shares = figures[0].get_axes()
     assert [axes.get_ylabel() for axes in (signal, residuals)] == ["x [deg]", "record - fit [deg]"]
     assert shares.get_xlabel() == "amplitude [deg]"

@@ -16,7 +16,7 @@ from scipy import optimize
 from ...errors import HarnessError
 from ...records.record import MIN_SAMPLES, Record
 from . import thresholds
-from .energy_balance import estimate_losses
+from .energy_loss import estimate_losses
 from .extrema import Extrema
 from .law import AMPLITUDE, DRIFT, OMEGA, REST, T0, TERMS, UNKNOWNS, ZETA, R, Terms, unknown_indices
 from .return_map import MAX_HALF_CYCLES, iterate_return_map

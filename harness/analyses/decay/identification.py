@@ -1,7 +1,7 @@
 """Identification of damping, dry friction and drag from the record of a decay.
 
 1. Locate and number the turning points (extrema.py).
-2. Estimate the losses from the energy lost per half cycle (energy_balance.py), then fit the numbered turning points.
+2. Estimate the losses from the energy lost per half cycle (energy_loss.py), then fit the numbered turning points.
 3. Fit the law (law.py) to every sample of the free motion (signal_model.py, free_motion.py).
 4. Fit and rank the seven laws (model_selection.py); the full law gives the uncertainty (intervals.py).
 5. Remark on what is doubtful and refuse what is not a free decay (remarks.py).
@@ -15,6 +15,7 @@ Steps 2 and 4 follow J. W. Liang, B. F. Feeny, Nonlinear Dynamics 16 (1998), and
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -22,6 +23,7 @@ from ...errors import HarnessError, check_names
 from ...records.record import Record
 from ..estimation.estimate import Estimate
 from . import thresholds
+from .energy_loss import EnergyLoss, loss_fractions
 from .estimates import KnownParameters, estimate_from_extrema, estimate_from_two_peaks, make_estimates
 from .extrema import Extrema, find_extrema
 from .fit_problem import FitError, FitProblem
@@ -97,6 +99,27 @@ class DecayIdentification:
         problem = self.problem
         drift = law.p[DRIFT] * (t - problem.time_origin - problem.model.t_mid)
         return (law.p[REST] + drift) * problem.scale + problem.offset
+
+    @cached_property
+    def fit_values(self) -> np.ndarray:
+        """Values (n,) of the best law for the samples used, in the record's unit."""
+        return self.signal(self.best, self.t)
+
+    @cached_property
+    def energy_loss(self) -> EnergyLoss:
+        """Energy lost between the turning points of the record, and by each law fitted to it."""
+        problem = self.problem
+        points = np.zeros((2, 0))
+        if not self.record.order:
+            displacement = self.extrema.x - self.rest(self.best, self.extrema.t)
+            sign = np.sign(displacement[0]) * (-1.0) ** np.arange(len(displacement))
+            points = np.array(loss_fractions(sign * displacement, problem.model.is_pendulum))
+        curves = {}
+        for law in self.laws:
+            amplitudes, starts = problem.half_cycles(law.p)
+            during_record = amplitudes[starts <= problem.t[-1]] * problem.scale
+            curves[law.terms] = loss_fractions(during_record, problem.model.is_pendulum)
+        return EnergyLoss(points[0], points[1], curves)
 
     @property
     def rms(self) -> float:

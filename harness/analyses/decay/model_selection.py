@@ -12,7 +12,7 @@ from itertools import permutations
 import numpy as np
 
 from . import thresholds
-from .energy_balance import estimate_losses
+from .energy_loss import estimate_losses
 from .fit_problem import FitProblem, FitResult
 from .law import TERMS, ZETA, Terms, describe_law, sublaws
 

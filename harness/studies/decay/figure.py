@@ -5,7 +5,6 @@ from typing import Any
 
 import numpy as np
 
-from ...analyses.decay.energy_loss import EnergyLoss
 from ...analyses.decay.identification import DecayIdentification
 from ...analyses.decay.law import Terms
 from ...analyses.estimation.figure import MAX_POINTS, extremes, plot_legend, plot_record, plot_residuals, plot_samples
@@ -16,7 +15,7 @@ MARGINS = {"left": 0.105, "right": 0.985, "bottom": 0.055, "top": 0.97, "hspace"
 COLOURS: dict[Terms, str] = {("zeta",): GREEN, ("r",): BLUE, ("b",): "#CC79A7"}  # colours of the laws with one term
 
 
-def draw(identified: DecayIdentification, loss: EnergyLoss, path: Path) -> None:
+def draw(identified: DecayIdentification, path: Path) -> None:
     """Save the figure."""
     with open_figure(path, 1.8 * WIDTH, 3.4 * HEIGHT, layout=None) as figure:
         grid = figure.add_gridspec(3, 1, height_ratios=(3, 1.2, 2.2), **MARGINS)
@@ -24,11 +23,11 @@ def draw(identified: DecayIdentification, loss: EnergyLoss, path: Path) -> None:
         residual_axes = figure.add_subplot(grid[1], sharex=signal_axes)
         plot_signal(signal_axes, identified)
         unit, size = display_unit(identified.record.unit)
-        residuals = (identified.x - identified.signal(identified.best, identified.t)) / size
+        residuals = (identified.x - identified.fit_values) / size
         noise = identified.problem.noise * identified.problem.scale / size
         plot_residuals(residual_axes, identified.t, residuals, noise, "", unit)
         residual_axes.set_xlabel("t [s]")
-        plot_energy_loss(figure.add_subplot(grid[2]), identified, loss)
+        plot_energy_loss(figure.add_subplot(grid[2]), identified)
 
 
 def plot_signal(axes: Axes, identified: DecayIdentification) -> None:
@@ -55,9 +54,9 @@ def plot_signal(axes: Axes, identified: DecayIdentification) -> None:
     plot_legend(axes)
 
 
-def plot_energy_loss(axes: Axes, identified: DecayIdentification, loss: EnergyLoss) -> None:
+def plot_energy_loss(axes: Axes, identified: DecayIdentification) -> None:
     """Plot the relative energy loss per half cycle, with the curves of all laws."""
-    best, others = identified.best, identified.laws[1:]
+    best, others, loss = identified.best, identified.laws[1:], identified.energy_loss
     unit, size = display_unit(identified.record.base)
 
     def curve(loss: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:

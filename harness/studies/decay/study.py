@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from ...analyses.decay.energy_loss import EnergyLoss, measure_energy_loss
 from ...analyses.decay.estimates import KnownParameters
 from ...analyses.decay.identification import DecayIdentification, fit_decay
 from ...analyses.decay.law import AMPLITUDE, T0
@@ -128,24 +127,23 @@ def write_results(identified: DecayIdentification, folder: Path) -> None:
     from .figure import draw
 
     unit = identified.record.unit
-    loss = measure_energy_loss(identified)
-    (folder / "decay.json").write_text(to_json(identified_as_json(identified, loss)) + "\n", encoding="utf-8")
+    (folder / "decay.json").write_text(to_json(identified_as_json(identified)) + "\n", encoding="utf-8")
     write_csv(
         folder / "turning-points.csv",
         ["t [s]", column_heading("x", identified.record.base)],
         [identified.extrema.t, identified.extrema.x],
     )
-    fitted = identified.signal(identified.best, identified.t)
     name = identified.record.symbol
     heads = ["t [s]", column_heading(name, unit), column_heading("fit", unit), column_heading("residual", unit)]
-    write_csv(folder / "fit.csv", heads, [identified.t, identified.x, fitted, identified.x - fitted])
-    draw(identified, loss, folder / "figure.svg")
+    columns = [identified.t, identified.x, identified.fit_values, identified.x - identified.fit_values]
+    write_csv(folder / "fit.csv", heads, columns)
+    draw(identified, folder / "figure.svg")
 
 
-def identified_as_json(identified: DecayIdentification, loss: EnergyLoss | None = None) -> dict[str, Any]:
+def identified_as_json(identified: DecayIdentification) -> dict[str, Any]:
     """Return the identified decay for JSON output."""
     problem, record, best = identified.problem, identified.record, identified.best
-    loss = loss or measure_energy_loss(identified)
+    loss = identified.energy_loss
     samples = UsedSamples(record.name, identified.t, len(record.t))
     column = ColumnResiduals(
         record.name,
