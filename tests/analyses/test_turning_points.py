@@ -5,9 +5,9 @@ import pytest
 from decays import decay_record, remarks_text, values
 
 from harness.analyses.decay.estimates import KnownParameters
+from harness.analyses.decay.extrema import find_reversals
 from harness.analyses.decay.identification import fit_decay
 from harness.analyses.decay.law import TERMS, damping_ratio, friction_from_envelope
-from harness.analyses.decay.noise import find_reversals
 
 
 @pytest.mark.parametrize(("sine", "a"), [(False, 0.1), (True, 0.1), (True, 2.0)])

@@ -1,19 +1,19 @@
-"""Turning points of a record: noisy or clean, evenly sampled or not, about any rest position.
+"""Turning points of a record, noisy or clean, evenly sampled or not, about any rest position; and its noise.
 
 They are located in a smoothed copy of the record and only number and place the half cycles for the fits that follow.
 For a velocity the copy is its integral; for an acceleration it is -a/omega^2, which is the position except for the
-small contribution of the losses.
+small contribution of the losses.  A turning point is a reversal that exceeds the noise.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 
 from ...errors import HarnessError
-from ...records.record import Record
+from ...records.record import MIN_SAMPLES, Record
+from ..estimation.noise import interpolation_residuals, robust_std
 from . import thresholds
-from .noise import estimate_noise, find_reversals, savitzky_golay
 
 
 @dataclass(frozen=True)
@@ -195,3 +195,78 @@ def check_decay(record: Record, extrema: Extrema) -> None:
             f"{record.name} grows, from {sizes[0]:.4g} to {sizes[-1]:.4g} {record.base} peak to peak: it is driven or "
             "gains energy, and has no decay to measure"
         )
+
+
+def estimate_noise(t: np.ndarray, x: np.ndarray) -> tuple[float, float]:
+    """Return the standard deviation of the noise of x (n,), and the quantisation step if it exceeds the noise, or 0.
+
+    The noise is the median distance of a sample from the cubic through its four neighbours, so it includes curvature
+    that is too fast for the sampling.  A quantiser of step q adds at least q/sqrt(12).  Constant samples before the
+    first change and after the last one do not count.
+    """
+    changes = np.flatnonzero(np.diff(x))
+    if len(changes) and changes[-1] - changes[0] > 2 * MIN_SAMPLES:
+        moving = slice(changes[0], changes[-1] + 2)
+        t, x = t[moving], x[moving]
+    noise = robust_std(interpolation_residuals(t, x))
+    differences = np.diff(np.unique(x))
+    differences = differences[differences > 1e-9 * np.ptp(x)]  # smaller ones are rounding errors
+    step = float(differences.min()) if len(differences) else 0.0
+    is_coarse = step > thresholds.COARSE_STEP * noise or noise < thresholds.FINE_NOISE * step
+    return max(noise, step / np.sqrt(12)), step if is_coarse else 0.0
+
+
+def remove_spikes(record: Record) -> Record:
+    """Return the record without samples far from their neighbours; unchanged if there are many of them."""
+    t, x = record.t, record.x
+    for _ in range(thresholds.MAX_SPIKE_ROUNDS):
+        e = interpolation_residuals(t, x)
+        excess = np.pad(
+            np.where(e > max(thresholds.OUTLIER * robust_std(e), thresholds.MIN_SPIKE * np.ptp(x)), e, 0.0), 2
+        )
+        is_largest = excess[2:-2] >= np.max([excess[i : len(x) - 4 + i] for i in range(5)], axis=0)
+        spikes = 2 + np.flatnonzero(is_largest & (excess[2:-2] > 0))
+        t, x = np.delete(t, spikes), np.delete(x, spikes)
+        if not len(spikes) or len(x) < (1 - thresholds.MAX_SPIKES) * len(record.x):
+            break
+    removed = len(record.x) - len(x)
+    if not 0 < removed <= thresholds.MAX_SPIKES * len(record.x):
+        return record
+    note = f"{removed} of {len(record.x)} samples are outliers and are left out."
+    return replace(record, t=t, x=x, notes=(*record.notes, note))
+
+
+def savitzky_golay(x: np.ndarray, width: int, degree: int) -> np.ndarray:
+    """Smooth x (n,) by least-squares polynomials over `width` (odd) samples.
+
+    The polynomials at the ends are those of the first and the last `width` samples.
+
+    References
+    ----------
+    A. Savitzky, M. J. E. Golay, Analytical Chemistry 36 (1964)
+    """
+    half = width // 2
+    powers = np.vander(np.linspace(-1, 1, width), degree + 1, increasing=True)
+    project = powers @ np.linalg.pinv(powers)
+    inner = np.convolve(x, project[half][::-1], "valid")
+    return np.concatenate([project[:half] @ x[:width], inner, project[half + 1 :] @ x[-width:]])
+
+
+def find_reversals(x: np.ndarray, threshold: float) -> np.ndarray:
+    """Return the samples at which x (n,) reverses by `threshold` or more, including the first extremum."""
+    reversals: list[int] = []
+    low = high = 0
+    rising = None
+    values = x.tolist()
+    for i, value in enumerate(values):
+        if value > values[high]:
+            high = i
+        if value < values[low]:
+            low = i
+        if rising is not False and values[high] - value >= threshold:
+            reversals.append(high)
+            rising, low = False, i
+        elif rising is not True and value - values[low] >= threshold:
+            reversals.append(low)
+            rising, high = True, i
+    return np.array(reversals, int)

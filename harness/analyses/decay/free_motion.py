@@ -13,10 +13,9 @@ import numpy as np
 from ...records.record import MIN_SAMPLES, Record
 from ..estimation.noise import robust_std
 from . import thresholds
-from .extrema import Extrema
+from .extrema import Extrema, estimate_noise
 from .fit_problem import FitProblem, FitResult, prepare_problem
 from .law import OMEGA, T0, TERMS, UNKNOWNS, Terms
-from .noise import estimate_noise
 
 
 @dataclass(frozen=True)

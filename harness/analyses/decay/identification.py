@@ -25,13 +25,12 @@ from ..estimation.estimate import Estimate
 from . import thresholds
 from .energy_loss import EnergyLoss, loss_fractions
 from .estimates import KnownParameters, estimate_from_extrema, estimate_from_two_peaks, make_estimates
-from .extrema import Extrema, find_extrema
+from .extrema import Extrema, find_extrema, remove_spikes
 from .fit_problem import FitError, FitProblem
 from .free_motion import select_free_motion
 from .intervals import FitUncertainty, estimate_uncertainty
 from .law import DRIFT, REST, TERMS, Terms
 from .model_selection import FittedLaw, fit_all_laws, select_reported_law
-from .noise import remove_spikes
 from .remarks import check_fit, compare_halves, make_remarks
 
 

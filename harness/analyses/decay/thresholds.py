@@ -4,7 +4,7 @@ They are in the order of the steps of identification.py.  Numbers of the numeric
 interpolation) are with the code that they belong to, because they decide about accuracy only.
 """
 
-# --- Noise of the samples (noise.py) ---
+# --- Noise of the samples (extrema.py) ---
 OUTLIER = 8.0  # times the noise: white noise exceeds it in one of 1e15 samples
 MIN_SPIKE = 0.02  # of the range: a smaller spike hides no turning point
 MAX_SPIKE_ROUNDS = 40  # each round removes the outermost samples of a run of outliers
