@@ -15,10 +15,9 @@ import numpy as np
 from ..errors import SceneError, unknown_name_message
 from .headings import DATE_NAME, MAGNITUDE_NAME, TIME_NAME, order_from_name, split_heading
 from .record import QUANTITIES, Record, check_record
-from .sample_defects import leave_out_saturated, mark_dropouts, mark_sentinels
+from .samples import leave_out_saturated, mark_dropouts, mark_sentinels, parse_timestamps, undo_time_rounding
 from .table_files import Cells, Table, load_table
 from .text_table import GROUPED_NUMBER, MISSING, TIMESTAMP
-from .timestamps import parse_timestamps, undo_time_rounding
 from .units import COUNT_NAMES, TIMES, find_unit, parse_per_count, time_unit_size
 
 MAX_PLAUSIBLE_TIME = 1e11  # s: the year 5138

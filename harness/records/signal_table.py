@@ -20,9 +20,8 @@ from .columns import (
 )
 from .headings import split_heading
 from .record import MIN_SAMPLES, Record, check_record
-from .sample_defects import find_saturated, mark_dropouts, mark_sentinels
+from .samples import find_saturated, mark_dropouts, mark_sentinels, undo_time_rounding
 from .table_files import Table, load_table
-from .timestamps import undo_time_rounding
 from .units import conversion_factor
 
 MAX_MISSING_SHARE = 0.2  # of the rows

@@ -10,7 +10,7 @@ from harness.analyses.decay.estimates import KnownParameters
 from harness.analyses.decay.identification import fit_decay
 from harness.errors import SceneError
 from harness.records.columns import ColumnOptions, read_record
-from harness.records.sample_defects import find_saturated, leave_out_saturated, mark_dropouts, mark_sentinels
+from harness.records.samples import find_saturated, leave_out_saturated, mark_dropouts, mark_sentinels
 
 T = np.linspace(0.0, 12.0, 2401)
 ZETA = 0.0119
