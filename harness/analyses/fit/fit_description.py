@@ -5,8 +5,7 @@ from math import inf, isfinite, nan
 
 import numpy as np
 
-from ..estimation.answer import ColumnResiduals
-from ..estimation.estimate import Estimate
+from ..estimation.estimate import ColumnResiduals, Estimate
 from .combinations import determined_combinations
 from .fit_course import FitCourse
 from .fit_problem import FitProblem

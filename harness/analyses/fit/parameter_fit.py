@@ -5,8 +5,7 @@ from math import isfinite, log
 
 import numpy as np
 
-from ..estimation.answer import ColumnResiduals
-from ..estimation.estimate import Estimate
+from ..estimation.estimate import ColumnResiduals, Estimate
 from .measured_record import MeasuredRecord
 
 CLEAR_DIFFERENCE = 6.0  # of two BIC, which is strong evidence

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from ...errors import HarnessError
-from ..estimation.answer import ColumnResiduals
+from ..estimation.estimate import ColumnResiduals
 from .fit_course import FitCourse
 from .fit_description import column_residuals
 from .fit_problem import FitProblem

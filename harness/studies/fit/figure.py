@@ -8,8 +8,7 @@ from pathlib import Path
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
-from ...analyses.estimation.answer import ColumnResiduals
-from ...analyses.estimation.estimate import Estimate
+from ...analyses.estimation.estimate import ColumnResiduals, Estimate
 from ...analyses.estimation.figure import plot_legend, plot_record, plot_residuals
 from ...analyses.fit.measured_record import MeasuredRecord
 from ...analyses.fit.parameter_fit import ParameterFit, Profile

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ...analyses.estimation.answer import ColumnResiduals, UsedSamples, answer_as_json
+from ...analyses.estimation.estimate import ColumnResiduals, UsedSamples, answer_as_json
 from ...analyses.fit.fit_course import fit_records
 from ...analyses.fit.fit_description import describe_fit
 from ...analyses.fit.law_comparison import compare_laws

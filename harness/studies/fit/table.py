@@ -4,8 +4,7 @@ from math import isfinite
 
 from rich.table import Table
 
-from ...analyses.estimation.answer import ColumnResiduals
-from ...analyses.estimation.estimate import Estimate
+from ...analyses.estimation.estimate import ColumnResiduals, Estimate
 from ...analyses.fit.parameter_fit import ParameterFit
 from ...results.quantity import format_interval
 from ...results.summary import Summary, make_terminal_table, read_cells
