@@ -11,7 +11,6 @@ import numpy as np
 from ..errors import HarnessError
 from ..results.quantity import AnalysisResult, Quantity
 from ..running.trajectory import Trajectory
-from . import sample_density
 
 
 def analyse(run: Trajectory) -> AnalysisResult:
@@ -38,7 +37,7 @@ def analyse(run: Trajectory) -> AnalysisResult:
         ends = ends[np.searchsorted(ends, starts[:1]).sum() :]  # ignore a slip that began before the run
     if len(starts) < 2:
         raise HarnessError(f"the analysis 'slip' needs two slips, and the run has {len(starts)}: set a later stop")
-    sample_density.require_dense_sampling(run.time, starts[: len(ends)], ends, "slip")
+    run.check_sampling(starts[: len(ends)], ends, "slip")
     slipping = relative_speed >= 0
     quantities = [
         Quantity("slips", len(starts), "", "slips"),

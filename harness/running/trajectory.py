@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 FILES = ("trajectory.csv", "steps.csv", "events.csv")
 MOST_PANELS = 8  # of a plot that names no outputs
+MIN_SAMPLES = 8  # in a half cycle or a slip: a parabola through the top samples is then accurate to 1e-4
 MODE_TEXT = re.compile(r"mode of (\w+): ")  # how the description of a mode begins; it names the force of the contact
 
 
@@ -338,6 +339,21 @@ class Trajectory:
                 f"{purpose} needs the parameter '{name}', which {self.spec.model} does not have: remove it"
             )
         return value
+
+    def check_sampling(self, starts: np.ndarray, ends: np.ndarray, interval_name: str) -> None:
+        """Raise HarnessError if an interval between `starts` and `ends` (n,), in s, has fewer than MIN_SAMPLES samples.
+
+        `interval_name` says what an interval is.
+        """
+        counts = np.searchsorted(self.time, ends, "right") - np.searchsorted(self.time, starts, "left")
+        if len(counts) and counts.min() < MIN_SAMPLES:
+            i = int(np.argmin(counts))
+            # half the step that would do: with few samples the bounds of an interval are uncertain themselves
+            step = 0.5 * float((ends - starts).min()) / MIN_SAMPLES
+            raise HarnessError(
+                f"each {interval_name} needs at least {MIN_SAMPLES} samples, and the one from t = {starts[i]:.6g} s to "
+                f"{ends[i]:.6g} s has {counts[i]}: set grid to {step:.1g} s or less"
+            )
 
     def write_tables(self, directory: Path) -> None:
         """Write trajectory.csv, and steps.csv and events.csv if there are steps and events."""

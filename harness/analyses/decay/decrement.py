@@ -19,7 +19,6 @@ import numpy as np
 
 from ...errors import HarnessError
 from ...results.quantity import Quantity
-from .. import sample_density
 from .law import damping_ratio, friction_from_envelope
 
 if TYPE_CHECKING:
@@ -59,7 +58,7 @@ def analyse(run: "Trajectory", gives: str, first: int = 0, cycles: float | None 
         run.time, run.column_of_role("position"), run.column_of_role("velocity")
     )
     times, positions, cycles = select_cycles(times, positions, first, cycles)
-    sample_density.require_dense_sampling(run.time, times[:-1], times[1:], "half cycle")
+    run.check_sampling(times[:-1], times[1:], "half cycle")
     x_0, x_n = float(abs(positions[0])), float(abs(positions[-1]))
     if gives == "zeta":
         result = Quantity("zeta", damping_ratio(x_0, x_n, cycles), "1", f"damping ratio, {cycles:g} cycles")
