@@ -12,6 +12,7 @@ from harness.report.page import write_report
 from harness.report.typeset import typeset
 from harness.report.verdicts import build_verdicts
 from harness.results.provenance import write_provenance
+from harness.results.quantity import Quantity
 from harness.results.summary import Summary, write_summary
 from harness.studies.bench.benchmark import Baseline, Benchmark
 from harness.studies.bench.table import summarize_benchmarks
@@ -27,11 +28,11 @@ def summarize(study, title, outcome):
     return Summary(study, title, outcome=outcome)
 
 
-def published(title, *rows, **parameters):
-    """The summary of a published case with rows of quantities: name and difference."""
+def published(title, *deviations, **parameters):
+    """The summary of a published case with quantities: name and difference in percent from a published value."""
     run = SimpleNamespace(parameters=parameters)
-    cells = [(name, "1", "", "1", difference) for name, difference in rows]
-    return summarize("run", title, judge_deviations(cells, run))
+    quantities = [Quantity(name, 1 + percent / 100, "s", name.replace("_", " ")) for name, percent in deviations]
+    return summarize("run", title, judge_deviations(quantities, dict.fromkeys(dict(deviations), 1.0), run))
 
 
 def summarize_stability(*endings):
@@ -67,8 +68,8 @@ def report_on(tmp_path, summary):
 
 def test_the_verdicts_are_the_number_reproduced_the_fastest_methods_and_the_cases_passed():
     summaries = [
-        published("sled", ("period", "+0.5 %"), ("peak", "-2 %")),
-        published("sled-rough", ("steps", "-50 %"), ("run time", "other CPU")),
+        published("sled", ("period", 0.5), ("peak", -2.0)),
+        published("sled-rough", ("steps", -50.0), ("run_time", 80.0)),
         summarize("precision", "sled", tabulate_choices(make_study(*POINTS), 0.0)[1]),
         summarize_stability("finished", "refused", "wrong"),
     ]
@@ -83,7 +84,7 @@ def test_the_verdicts_are_the_number_reproduced_the_fastest_methods_and_the_case
 
 
 def test_a_law_that_chatters_is_the_reason_why_its_steps_differ_but_not_its_period():
-    outcomes = [published("sled", (name, "+40 %"), friction="sign").outcome for name in ("mean step", "period")]
+    outcomes = [published("sled", (name, 40.0), friction="sign").outcome for name in ("mean_step", "period")]
     assert outcomes[0].text == "mean step differs by +40 %; its friction chatters, so its steps depend on rounding"
     assert outcomes[1].text == "period differs by +40 %"
 

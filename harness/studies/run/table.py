@@ -71,9 +71,18 @@ def row(quantity: Quantity, figure: object) -> tuple[str, str, str, str, str]:
         return text, measured, unit, str(figure or ""), ""
     published = repr(figure)
     measured = format_number(value, max(5, len(published.replace(".", "").lstrip("0"))))
-    difference = f"{100 * (value / figure - 1):+.2g} %" if figure else ""
+    percent = deviation(quantity, (figure, unit))
+    difference = "" if percent is None else f"{percent:+.2g} %"
     difference = "other CPU" if quantity.name == "run_time" else difference
     return text, measured, "" if unit == "1" else unit, published, difference
+
+
+def deviation(quantity: Quantity, figure: object) -> float | None:
+    """Return the difference from a published value in percent, with two digits; None for texts, zeros and run times."""
+    value, unit = figure if isinstance(figure, tuple) else (figure, quantity.unit)
+    if not isinstance(value, int | float) or not value or quantity.name == "run_time":
+        return None
+    return float(f"{100 * (quantity.to_unit(unit) / value - 1):.2g}")
 
 
 def quantity_rows(quantities: Iterable[Quantity], published: dict[str, Any]) -> list[tuple[str, ...]]:
@@ -105,7 +114,7 @@ def summarize_quantities(
     others = [cells[:3] for cells in rows if cells not in compared]
     tables = make_table(headings, compared) + make_table(headings[:3], others, "Quantities without a published value")
     steps = tuple(table for table in summary.tables if table.title == STEPS_TABLE)
-    outcome = judge_deviations(rows, run) if published else None
+    outcome = judge_deviations(quantities, published, run)
     return replace(summary, tables=tables + steps, outcome=outcome)
 
 
@@ -115,9 +124,10 @@ def round_run_time(cells: tuple[str, ...]) -> tuple[str, ...]:
     return (name, f"{float(f'{float(value):.2g}'):g}", *others) if name == RUN_TIME else cells
 
 
-def judge_deviations(rows: Iterable[tuple[str, ...]], run: Trajectory) -> Outcome | None:
+def judge_deviations(quantities: Iterable[Quantity], published: dict[str, Any], run: Trajectory) -> Outcome | None:
     """Return the largest difference from a published value, and why the steps of a law that chatters differ."""
-    deviations = [(float(cells[-1][:-2]), cells[0]) for cells in rows if cells[-1].endswith(" %")]
+    differences = [(deviation(quantity, published.get(quantity.name)), quantity.text) for quantity in quantities]
+    deviations = [(percent, name) for percent, name in differences if percent is not None]
     if not deviations:
         return None
     percent, name = max(deviations, key=lambda deviation: abs(deviation[0]))
