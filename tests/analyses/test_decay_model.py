@@ -55,7 +55,7 @@ def test_the_jacobian_agrees_with_finite_differences(order, sine):
     unknowns, t = unknown_indices(TERMS, True), np.linspace(0.0, 4.0, 500)
     _, jacobian = model(p, unknowns, t)
     for column, parameter in zip(jacobian.T, unknowns, strict=True):
-        up, down = (p + way * 1e-5 * (np.arange(8) == parameter) for way in (1, -1))
+        up, down = (p + sign * 1e-5 * (np.arange(8) == parameter) for sign in (1, -1))
         slope = (model(up, unknowns, t)[0] - model(down, unknowns, t)[0]) / 2e-5
         assert np.mean(np.abs(slope - column) < 1e-5 * np.abs(column).max()) > 0.95
 

@@ -53,8 +53,8 @@ def test_a_profile_follows_a_curved_valley():
     problem = Residuals(valley)
     uncertainty = uncertainty_at(problem, MINIMUM)
     ends = {(i, side): profile_bound(problem, MINIMUM, uncertainty, i, side).end for i in (0, 1) for side in (-1, 1)}
-    reached = [2 * (np.exp(a - 1) - 1) for a in (ends[0, -1], ends[0, 1], np.sqrt(ends[1, 1]))]
-    assert reached == pytest.approx([-QUANTILE, QUANTILE, QUANTILE], rel=0.03)
+    expected = [2 * (np.exp(a - 1) - 1) for a in (ends[0, -1], ends[0, 1], np.sqrt(ends[1, 1]))]
+    assert expected == pytest.approx([-QUANTILE, QUANTILE, QUANTILE], rel=0.03)
 
 
 @pytest.mark.parametrize("height", [15.0, 3.3, 1.5, 1.0])

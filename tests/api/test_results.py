@@ -77,8 +77,8 @@ def test_compare_takes_runs_folders_and_fmus():
     for other in ("saved", run, "fmus/coulomb.fmu"):
         assert harness.compare(run, other).worst == 0.0
     other = harness.simulate("coulomb", {"f": 0.5001})
-    found = harness.compare(run, other)
-    (x,) = (each for each in found.differences if each.name == "x")
+    comparison = harness.compare(run, other)
+    (x,) = (each for each in comparison.differences if each.name == "x")
     assert x.largest == pytest.approx(np.abs(run["x"] - np.interp(run.time, other.time, other["x"])).max(), rel=1e-3)
     with pytest.raises(harness.HarnessError, match="no variable in common"):
         harness.compare(harness.simulate("smd", outputs=["F_damper"]), run)
@@ -99,12 +99,12 @@ def test_a_decay_is_identified_from_any_source(tmp_path):
         "millimetres": {"record": run.time, "x": 1000 * run["x"], "unit": "mm"},
     }
     for name, arguments in sources.items():
-        found = harness.identify_decay(**arguments, k=157.9)
-        assert found["f"].value == pytest.approx(0.5, rel=1e-6), name
-        assert found["zeta"].value == pytest.approx(0.0, abs=1e-9), name
-    assert len(repr(found)) < 300
+        identification = harness.identify_decay(**arguments, k=157.9)
+        assert identification["f"].value == pytest.approx(0.5, rel=1e-6), name
+        assert identification["zeta"].value == pytest.approx(0.0, abs=1e-9), name
+    assert len(repr(identification)) < 300
     with pytest.raises(harness.SceneError, match="unknown estimate 'mu'"):
-        _ = found["mu"]
+        _ = identification["mu"]
 
 
 def test_a_sweep_measures_what_single_runs_measure():
@@ -123,8 +123,8 @@ def test_a_sweep_measures_what_single_runs_measure():
 def test_samples_are_reproducible_and_stored():
     pytest.importorskip("xarray")
     first = harness.sweep("smd", {"k": (100.0, 200.0), "c": (0.0, 3.0)}, samples=8, seed=3, folder="kept")
-    again = harness.sweep("smd", {"k": (100.0, 200.0), "c": (0.0, 3.0)}, samples=8, seed=3)
-    assert first.equals(again)
+    repeated = harness.sweep("smd", {"k": (100.0, 200.0), "c": (0.0, 3.0)}, samples=8, seed=3)
+    assert first.equals(repeated)
     (folder,) = (path for path in Path("kept/sweep").iterdir() if not path.name.startswith("."))
     assert harness.load_result(folder).equals(first)
 

@@ -61,9 +61,9 @@ def test_the_directory_of_a_killed_build_is_removed_by_the_next_run_and_that_of_
     killed.communicate(timeout=60)
     program = "from harness.process.temporary_directory import temporary_directory as create\nwith create(): pass"
     subprocess.run([sys.executable, "-c", program], cwd=ROOT, env=environment, check=True, timeout=60)
-    left = list((tmp_path / "temporary").iterdir())
-    assert len(left) == 1
-    assert left[0] in directories
+    files = list((tmp_path / "temporary").iterdir())
+    assert len(files) == 1
+    assert files[0] in directories
     os.killpg(running.pid, signal.SIGCONT)
     os.killpg(running.pid, signal.SIGTERM)
     running.communicate(timeout=60)

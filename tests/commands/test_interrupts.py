@@ -130,19 +130,19 @@ def test_an_interrupt_swallowed_by_a_callee_still_ends_the_command(monkeypatch):
 def test_a_signal_during_a_protected_section_is_deferred_to_its_end(monkeypatch):
     monkeypatch.setattr(interrupt, "RECEIVED_SIGNALS", [])
     before = signal.signal(signal.SIGTERM, interrupt.handle_signal)
-    begun = []
+    starts = []
 
     def begin():
         with defer_signals():
             signal.raise_signal(signal.SIGTERM)
-            begun.append("whole")
+            starts.append("whole")
 
     try:
         with pytest.raises(KeyboardInterrupt):
             begin()
     finally:
         signal.signal(signal.SIGTERM, before)
-    assert begun == ["whole"]
+    assert starts == ["whole"]
 
 
 @pytest.fixture
@@ -264,21 +264,21 @@ def test_a_program_awaited_by_a_thread_ends_with_the_command(tmp_path, monkeypat
 
 
 def test_a_worker_killed_while_it_receives_data_is_replaced(tmp_path):
-    crew = WorkerPool(1, tmp_path, [])
+    pool = WorkerPool(1, tmp_path, [])
     try:
-        pid = result(crew, os.getpid)
+        pid = result(pool, os.getpid)
         os.kill(pid, signal.SIGSTOP)  # it stops reading
         threading.Timer(0.2, os.kill, [pid, signal.SIGKILL]).start()
         with pytest.raises(WorkerDiedError, match="exit code -9"):
-            result(crew, len, bytes(10_000_000))
-        assert result(crew, len, bytes(10_000_000)) == 10_000_000
+            result(pool, len, bytes(10_000_000))
+        assert result(pool, len, bytes(10_000_000)) == 10_000_000
     finally:
-        crew.kill()
+        pool.kill()
 
 
-def result(crew, function, *arguments):
-    future = crew.submit(function, *arguments)
-    while not crew.wait_for_any([future]):
+def result(pool, function, *arguments):
+    future = pool.submit(function, *arguments)
+    while not pool.wait_for_any([future]):
         pass
     return future.result()
 

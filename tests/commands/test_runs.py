@@ -295,11 +295,11 @@ def test_a_command_runs_alike_in_a_process_of_its_own(fmus, tmp_path, arguments)
     (tmp_path / "pair.toml").write_text(PAIR)
     rows = [f"{0.04 * i},{exp(-0.04 * i) * cos(0.48 * i)}" for i in range(50)]
     (tmp_path / "swing.csv").write_text("\n".join(["t [s],x [m]", *rows]))
-    here = harness(tmp_path, *arguments)
+    inside = harness(tmp_path, *arguments)
     shutil.rmtree(tmp_path / "results", ignore_errors=True)  # otherwise the second run reports that nothing changed
-    alone = commands.run_process(tmp_path, *arguments, PATH="", COLUMNS="100")
-    assert (here.returncode, here.stderr) == (alone.returncode, alone.stderr)
-    outputs = [re.sub(TIME, "", done.stdout) for done in (here, alone)]
+    separate = commands.run_process(tmp_path, *arguments, PATH="", COLUMNS="100")
+    assert (inside.returncode, inside.stderr) == (separate.returncode, separate.stderr)
+    outputs = [re.sub(TIME, "", done.stdout) for done in (inside, separate)]
     assert re.sub(NUMBER, "", outputs[0]) == re.sub(NUMBER, "", outputs[1])
     one, other = (list(map(float, re.findall(NUMBER, text))) for text in outputs)
     assert one == pytest.approx(other, rel=1e-6, abs=1e-9)  # sums of numpy depend on the memory alignment of an array

@@ -224,8 +224,8 @@ def test_a_missing_optional_package_is_named_before_any_run(workspace, package, 
 
 def test_an_fmu_given_as_a_scene_is_run(workspace, tmp_path):
     outputs = [
-        harness(workspace, "run", *way, "fmus/smd.fmu", "--set", "k=50", "--out", tmp_path / str(len(way)))
-        for way in ((), ("--fmu",))
+        harness(workspace, "run", *option, "fmus/smd.fmu", "--set", "k=50", "--out", tmp_path / str(len(option)))
+        for option in ((), ("--fmu",))
     ]
     assert [done.returncode for done in outputs] == [0, 0]
     assert outputs[0].stdout.splitlines()[:-1] == outputs[1].stdout.splitlines()[:-1] != []

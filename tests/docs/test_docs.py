@@ -80,11 +80,11 @@ def test_the_page_on_code_generation_quotes_the_numerics_as_they_are():
 
 
 def test_each_picture_is_used_and_small():
-    used = {name for page in DOCS.rglob("*.md") for name in re.findall(r"images/([\w.-]+)", page.read_text())}
-    used |= set(re.findall(r"docs/images/([\w.-]+)", (ROOT / "README.md").read_text()))
+    names_in_pages = {name for page in DOCS.rglob("*.md") for name in re.findall(r"images/([\w.-]+)", page.read_text())}
+    names_in_pages |= set(re.findall(r"docs/images/([\w.-]+)", (ROOT / "README.md").read_text()))
     for picture in sorted((DOCS / "images").iterdir()):
         assert picture.stat().st_size < 150_000, f"{picture.name} is too large"
-        assert picture.name in used or picture.name == "stick-dark.svg", f"no page shows {picture.name}"
+        assert picture.name in names_in_pages or picture.name == "stick-dark.svg", f"no page shows {picture.name}"
 
 
 @pytest.mark.slow

@@ -16,15 +16,15 @@ specification.loader.exec_module(make_records)
 @pytest.mark.parametrize("name", make_records.RECORDS)
 def test_a_shipped_record_is_the_drawn_one_and_says_so(name, tmp_path):
     """Other processors may round a few values to the next step of a sensor."""
-    drawn, shipped = tmp_path / name, DOCS / "records" / name
-    drawn.write_text(make_records.RECORDS[name]())
+    record, shipped = tmp_path / name, DOCS / "records" / name
+    record.write_text(make_records.RECORDS[name]())
     assert "Synthetic record, drawn by docs/make_records.py" in shipped.read_text().splitlines()[0]
     heads, values = read_numeric(shipped)
-    other_heads, others = read_numeric(drawn)
+    other_heads, others = read_numeric(record)
     assert heads == other_heads
     assert values.shape == others.shape
-    same = (values == others) | ((values != values) & (others != others))
-    assert same.mean() > 0.99
+    is_equal = (values == others) | ((values != values) & (others != others))
+    assert is_equal.mean() > 0.99
     assert (values != values).sum() == 1
 
 

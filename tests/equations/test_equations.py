@@ -83,7 +83,7 @@ def test_generated_code_has_the_bits_of_the_declared_equations(source):
     """Rates and outputs while sliding and while stuck, and the load for which the rates vanish."""
     analysis, model = find_model(source).analysis, find_model(source).model()
     modes = [m.name for m in analysis.modes]
-    tried = 0
+    n_tried = 0
     for values, t, at, mode in situations(analysis, model, 300):
         values |= at | driver_positions(analysis, model, t) | dict.fromkeys(modes, mode)
         equations = Evaluated(analysis, values, math)
@@ -102,8 +102,8 @@ def test_generated_code_has_the_bits_of_the_declared_equations(source):
             assert limit >= 0.0
             model.compute_outputs(t, *at.values(), 0)
             assert getattr(model, analysis.rate_outputs[c.slip].name) == 0.0
-        tried += 1
-    assert tried > 100
+        n_tried += 1
+    assert n_tried > 100
 
 
 @EVERY_SOURCE
@@ -161,17 +161,17 @@ def test_any_number_of_states_and_contacts_is_derived(source):
 def slopes(analysis, values):
     """Return the derivatives of each law by time and by each state, as differences in many digits."""
     by_time = {d.name: values[d.constant_rate.name] for d in analysis.drivers}
-    ways = [by_time, *({s.name: 1} for s in analysis.states)]
+    directions = [by_time, *({s.name: 1} for s in analysis.states)]
     with mpmath.workdps(DIGITS):
         h = mpmath.mpf(10) ** -20
 
-        def moved(way, step):
-            return values | {name: values[name] + step * mpmath.mpf(speed) for name, speed in way.items()}
+        def moved(direction, step):
+            return values | {name: values[name] + step * mpmath.mpf(speed) for name, speed in direction.items()}
 
         pairs = (
-            [converged_law(analysis, analysis.rate_outputs[s], moved(way, d)) for d in (h, -h)]
+            [converged_law(analysis, analysis.rate_outputs[s], moved(direction, d)) for d in (h, -h)]
             for s in analysis.dynamic_states
-            for way in ways
+            for direction in directions
         )
         return [(ahead - behind) / (2 * h) for ahead, behind in pairs]
 
@@ -235,12 +235,12 @@ def test_the_public_api_is_complete():
 def test_generated_source_is_deterministic(source):
     """Builds are compared by their bytes; reading a file again changes nothing."""
     first = find_model(source)
-    again = type(first)(first.path, first.source)
-    analysis = again.analysis
+    reread = type(first)(first.path, first.source)
+    analysis = reread.analysis
     for slope in ({e: 1.0} for e in analysis.states):  # earlier queries change nothing
         analysis.derivative_while_sliding(analysis.rate_outputs[analysis.dynamic_states[0]], slope)
     assert analysis.overflow_indicators
-    assert again.generated_source == first.generated_source
+    assert reread.generated_source == first.generated_source
     assert f"Generated from the equations in {first.path.name}" in first.generated_source
 
 

@@ -146,9 +146,9 @@ def test_methods_laws_and_folders_are_selected_for_a_file_as_for_a_name(tmp_path
     path = next(path for path in EXAMPLE_MODELS if path.stem == "rotor_brake")
     run = command(path, "--method", "rodas", "--law", "hybrid", "--platform", "linux64", "--out", "lean", cwd=tmp_path)
     assert (run.returncode, run.stderr) == (0, "")
-    chosen = {v.name: v for v in read_model_description(tmp_path / "lean" / "rotor_brake.fmu").modelVariables}
-    assert [item.name for item in chosen["solver.method"].declaredType.items] == ["rodas"]
-    assert [item.name for item in chosen["friction"].declaredType.items] == ["hybrid"]
+    variables = {v.name: v for v in read_model_description(tmp_path / "lean" / "rotor_brake.fmu").modelVariables}
+    assert [item.name for item in variables["solver.method"].declaredType.items] == ["rodas"]
+    assert [item.name for item in variables["friction"].declaredType.items] == ["hybrid"]
     refused = command(path, "--method", "exact", cwd=tmp_path)
     assert refused.stderr == "Error: rotor_brake has no method 'exact'; it has ode23, ode45, dop853, rodas, radau9.\n"
 
@@ -204,9 +204,9 @@ def test_a_result_is_certified_by_two_agreeing_methods_and_packed_by_the_next_bu
     assert command("pendulum.py", cwd=oil).returncode == 0
     process = harness("references", "pendulum.py", cwd=oil)
     assert (process.returncode, process.stderr) == (0, "")
-    how, heads, *rows = (oil / "pendulum.csv").read_text().splitlines()
-    assert how.startswith("# dop853 and rodas, relative difference ")
-    assert float(how.rsplit(" ", 1)[1]) < 1e-10
+    comment, heads, *rows = (oil / "pendulum.csv").read_text().splitlines()
+    assert comment.startswith("# dop853 and rodas, relative difference ")
+    assert float(comment.rsplit(" ", 1)[1]) < 1e-10
     assert heads == "t [s],phi [rad],omega [rad/s]"
     t, phi, omega = np.array([row.split(",") for row in rows], float).T
     true = solve_ivp(viscous_pendulum, (0.0, t[-1]), (0.3, 0.0), "DOP853", t_eval=t, rtol=1e-12, atol=1e-13).y

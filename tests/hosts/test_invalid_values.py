@@ -188,9 +188,9 @@ def test_a_wrong_read_fails_without_ending_the_instance(launch):
 
 def test_an_invalid_reference_reads_as_nan_among_valid_ones(launch):
     fmu = launch("stickslip")
-    a, nothing, b = fmu.read("Real", [0, 10**6, 1])
+    a, unknown, b = fmu.read("Real", [0, 10**6, 1])
     assert [a, b] == fmu.get(*list(declared("stickslip"))[:2])
-    assert isnan(nothing)
+    assert isnan(unknown)
 
 
 def test_percent_signs_in_an_instance_name_are_harmless(worker, fmus):

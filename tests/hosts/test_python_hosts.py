@@ -60,7 +60,7 @@ def test_two_versions_of_an_fmu_run_their_own_code_in_one_process(worker, fmus, 
 def test_concurrent_instances_do_not_interfere(launch, worker):
     """All models, laws and methods at once, stepped in turn."""
     times = [0.02 * i for i in range(50)]
-    alone = [launch(name, values, stop=stop).run(times, outputs(name)) for name, values, stop in CASES]
+    separate = [launch(name, values, stop=stop).run(times, outputs(name)) for name, values, stop in CASES]
     fleet = [(launch(name, values, stop=stop), outputs(name)) for name, values, stop in CASES]
     rows = [[fmu.get(*names)] for fmu, names in fleet]
     for t, ahead in pairwise(times):
@@ -68,7 +68,7 @@ def test_concurrent_instances_do_not_interfere(launch, worker):
         results = worker.call(None, "batch", [*chain(*turns)])
         for collected, row in zip(rows, results[1::2], strict=True):
             collected.append(row)
-    for (_, names), collected, expected in zip(fleet, rows, alone, strict=True):
+    for (_, names), collected, expected in zip(fleet, rows, separate, strict=True):
         assert_identical(collected, expected, names)
 
 

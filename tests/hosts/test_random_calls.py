@@ -231,12 +231,12 @@ class RandomCalls(RuleBasedStateMachine):
             return  # which has been reported
         self.fmu.free()
         self.neighbour.step(0.1, 0.1)
-        alone = self.worker.instantiate(self.path).begin()
-        alone.step(0.0, 0.1)
-        alone.step(0.1, 0.1)
-        assert self.neighbour.get(*self.outputs) == alone.get(*self.outputs)
+        separate = self.worker.instantiate(self.path).begin()
+        separate.step(0.0, 0.1)
+        separate.step(0.1, 0.1)
+        assert self.neighbour.get(*self.outputs) == separate.get(*self.outputs)
         self.neighbour.free()
-        alone.free()
+        separate.free()
 
 
 def test_no_call_sequence_crashes_or_fails_silently(fmus):

@@ -92,8 +92,8 @@ def find_member(state, path):
 
 def member(content, path):
     """Return the member of serialized bytes at the end of a path."""
-    thing, last = find_member(json.loads(content[8:]), path)
-    return thing[last]
+    owner, last = find_member(json.loads(content[8:]), path)
+    return owner[last]
 
 
 @EVERY_MODEL
@@ -139,12 +139,12 @@ def test_every_member_must_be_present_with_its_name_type_and_length(name, capsys
         value = find_member(state, path)[0][path[-1]]
 
         def drop(state, path=path):
-            thing, last = find_member(state, path)
-            del thing[last]
+            owner, last = find_member(state, path)
+            del owner[last]
 
         def rename(state, path=path):
-            thing, last = find_member(state, path)
-            thing["__class__"] = thing.pop(last)
+            owner, last = find_member(state, path)
+            owner["__class__"] = owner.pop(last)
 
         def add(state, path=path):
             find_member(state, path)[0]["compute_outputs"] = 1.0
@@ -154,8 +154,8 @@ def test_every_member_must_be_present_with_its_name_type_and_length(name, capsys
         for other in wrong if kind not in met else [draw.choice(wrong)]:
 
             def replace(state, path=path, other=other):
-                thing, last = find_member(state, path)
-                thing[last] = other
+                owner, last = find_member(state, path)
+                owner[last] = other
 
             changes.append(replace)
         met.add(kind)
@@ -219,13 +219,13 @@ def test_forged_bytes_change_neither_instance_nor_neighbour_nor_process(fmu):
     neighbour, one = worker.instantiate(path).begin(), worker.instantiate(path).begin()
     rows = [neighbour.get(*names)], [one.get(*names)]
     worker.read_stderr()
-    for (what, forge), t, ahead in zip(FORGERIES.items(), times[:-1], times[1:], strict=True):
+    for (title, forge), t, ahead in zip(FORGERIES.items(), times[:-1], times[1:], strict=True):
         content = bytes.fromhex(one.serialize(one.save()))
         foreign = forge(content)
-        assert foreign != content, what
+        assert foreign != content, title
         with pytest.raises(FmiError) as refusal:
             one.deserialize(foreign.hex())
-        assert refusal.value.status >= 3, what
+        assert refusal.value.status >= 3, title
         assert worker.read_stderr() == f"Stickslip: {REFUSAL}\n"
         assert REFUSAL in one.messages()[-1][2]
         for instance, row in zip((neighbour, one), rows, strict=True):
@@ -250,9 +250,9 @@ def test_forged_numbers_end_in_a_status_and_a_reset_restores_the_instance(fmu):
 
     def forge(state):
         for path in draw.sample(numbers, 4):
-            thing, last = find_member(state, path)
-            values = (0, 1, -1, 99, 2**40) if type(thing[last]) is int else (0.0, -1.0, 1e300, nan, inf, -inf)
-            thing[last] = draw.choice(values)
+            owner, last = find_member(state, path)
+            values = (0, 1, -1, 99, 2**40) if type(owner[last]) is int else (0.0, -1.0, 1e300, nan, inf, -inf)
+            owner[last] = draw.choice(values)
 
     for _ in range(60):
         try:

@@ -105,28 +105,28 @@ def test_a_complex_system_is_solved_alike_on_arrays_and_in_scalars(bodies, undam
     if undamped:  # no rate depends on its own state
         spec = ModelLayout(BODIES[bodies], {}, zeros=frozenset((i, i) for i in spec.dynamic_states))
     names, rates, n = list(spec.states), list(spec.states.values()), len(spec.states)
-    own = spec.dynamic_states
+    dynamic = spec.dynamic_states
     lines = [
         *complex_factorization_lines("s", "re", "im", spec),
         *complex_solution_lines("k", "m", "s", "r", "q", spec),
     ]
     for _ in range(300):
         h, J = 10.0 ** draw.uniform(-4.0, 0.0), draw.normal(0.0, 1.0, (n, n)) * 10.0 ** draw.uniform(-3.0, 3.0, (n, 1))
-        for i in set(range(n)) - {*own}:
+        for i in set(range(n)) - {*dynamic}:
             J[i] = np.eye(n)[names.index(rates[i])]
         for place in spec.zeros:
             J[place] = 0.0
         re, im, r, q = 3.7 / h, -6.5 / h, np.zeros(n), np.zeros(n)
-        r[own], q[own] = draw.normal(size=len(own)), draw.normal(size=len(own))
+        r[dynamic], q[dynamic] = draw.normal(size=len(dynamic)), draw.normal(size=len(dynamic))
         namespace = {"re": re, "im": im, "nan": nan}
         namespace |= {f"{a}_{name}": b[i] for a, b in (("r", r), ("q", q)) for i, name in enumerate(names)}
-        namespace |= {f"{rates[i]}_{name}": J[i, j] for i in own for j, name in enumerate(names)}
+        namespace |= {f"{rates[i]}_{name}": J[i, j] for i in dynamic for j, name in enumerate(names)}
         exec("\n".join(lines), namespace)
-        scalars = np.array([complex(namespace[f"k_{names[i]}"], namespace[f"m_{names[i]}"]) for i in own])
+        scalars = np.array([complex(namespace[f"k_{names[i]}"], namespace[f"m_{names[i]}"]) for i in dynamic])
         set_layout(spec)
         k, m = vectors.solve_complex(vectors.factorize_complex(re, im, J), r, q)
-        assert np.array_equal(scalars, k[own] + 1j * m[own])
-        truth = np.linalg.solve(complex(re, im) * np.eye(n) - J, r + 1j * q)[own]
+        assert np.array_equal(scalars, k[dynamic] + 1j * m[dynamic])
+        truth = np.linalg.solve(complex(re, im) * np.eye(n) - J, r + 1j * q)[dynamic]
         assert np.abs(scalars - truth).max() <= 1e-7 * np.abs(truth).max()
 
 

@@ -61,8 +61,8 @@ def master(unpacked, name, values=None, **options):
 def handle(fmu):
     """Handle an event, from step mode back to step mode."""
     fmu.enterEventMode()
-    again, terminate, *_ = fmu.updateDiscreteStates()
-    assert (again, terminate) == (False, False)
+    needs_update, terminate, *_ = fmu.updateDiscreteStates()
+    assert (needs_update, terminate) == (False, False)
     fmu.enterStepMode()
 
 

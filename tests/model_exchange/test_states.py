@@ -180,7 +180,7 @@ def test_a_restored_state_is_bitwise_identical(launch_moving, launch, name):
 @EVERY_MODEL
 def test_three_hundred_resets_end_alike(launch_moving, name):
     fmu, t, states = launch_moving(name)
-    begun = (
+    running = (
         ["reset"],
         ["setup", 0.0, None, None],
         ["init"],
@@ -188,8 +188,8 @@ def test_three_hundred_resets_end_alike(launch_moving, name):
         ["enter_continuous_time"],
         ["set_point", t, states],
     )
-    calls = [[fmu.number, call, rest] for call, *rest in (*begun, ["rates"], ["indicators"], ["get", outputs(name)])]
-    rows = {repr(fmu.worker.call(None, "batch", calls)[len(begun) :]) for _ in range(300)}
+    calls = [[fmu.number, call, rest] for call, *rest in (*running, ["rates"], ["indicators"], ["get", outputs(name)])]
+    rows = {repr(fmu.worker.call(None, "batch", calls)[len(running) :]) for _ in range(300)}
     assert len(rows) == 1
 
 

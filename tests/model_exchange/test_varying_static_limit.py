@@ -64,7 +64,7 @@ def test_no_contact_sticks_while_its_indicator_requires_breakaway(source):
     rest = {name: 0.0 for name, d in declared(source).items() if name in ("x0", "theta0")}
     model, exchange, run = externally_integrated(source, rest)
     entry = next(name for name, d in declared(source).items() if d.causality == "input" and d.unit in ("N", "N.m"))
-    many, tried = len(model.contacts), 0
+    n_contacts, n_tried = len(model.contacts), 0
     solver = run.solver
     start_states, start_modes = ([getattr(solver, n) for n in names] for names in (model.states, model.contacts))
 
@@ -75,10 +75,10 @@ def test_no_contact_sticks_while_its_indicator_requires_breakaway(source):
                 setattr(solver, name, number)
         setattr(model, entry, force)
         exchange.update_indicators(run, model)
-        before = min(run.model_exchange.indicators[many : 2 * many])
+        before = min(run.model_exchange.indicators[n_contacts : 2 * n_contacts])
         exchange.update_modes(run, model)
         exchange.update_indicators(run, model)
-        return before, min(run.model_exchange.indicators[many : 2 * many])
+        return before, min(run.model_exchange.indicators[n_contacts : 2 * n_contacts])
 
     low, high = getattr(model, entry), 1e4
     assert push(low)[0] > 0.0 >= push(high)[0]
@@ -86,9 +86,9 @@ def test_no_contact_sticks_while_its_indicator_requires_breakaway(source):
         low, high = (low, middle) if push(middle)[0] <= 0.0 else (middle, high)
     for places in range(300):
         before, after = push(high * (1.0 + places * ULP))
-        tried += before <= 0.0
+        n_tried += before <= 0.0
         assert after > 0.0, places
-    assert tried == 300
+    assert n_tried == 300
 
 
 @pytest.fixture

@@ -77,14 +77,14 @@ def test_every_reference_in_the_xml_resolves(description, name):
         assert re.fullmatch(r"[A-Za-z_]\w*(\.[A-Za-z_]\w*)*|der\(\w+\)", scalar.get("name"))
         assert scalar.get("description")
         if kind.tag == "Real":
-            shown = [unit.get("name") for unit in units[kind.get("unit")].findall("DisplayUnit")]
-            assert kind.get("displayUnit") in [None, *shown]
+            display_units = [unit.get("name") for unit in units[kind.get("unit")].findall("DisplayUnit")]
+            assert kind.get("displayUnit") in [None, *display_units]
             assert types[kind.get("declaredType")].get("unit") == kind.get("unit")
         if kind.tag in ("Real", "Enumeration"):
             assert types[kind.get("declaredType")].tag == kind.tag
-    used = {scalar[0].get("unit") for scalar in scalars}, {scalar[0].get("declaredType") for scalar in scalars}
-    assert set(units) == used[0] - {None}
-    assert set(types) == used[1] - {None}
+    references = {scalar[0].get("unit") for scalar in scalars}, {scalar[0].get("declaredType") for scalar in scalars}
+    assert set(units) == references[0] - {None}
+    assert set(types) == references[1] - {None}
 
 
 @EVERY_MODEL
@@ -368,8 +368,8 @@ def test_outputs_depend_on_the_input_as_declared(launch, description, name):
     entry, size = push(name)
     declared_dependencies = {}
     for unknown in root.findall("ModelStructure/Outputs/Unknown"):
-        known = [scalars[int(i) - 1] for i in unknown.get("dependencies").split()]
-        inputs = [scalar.get("name") for scalar in known if scalar.get("causality") == "input"]
+        knowns = [scalars[int(i) - 1] for i in unknown.get("dependencies").split()]
+        inputs = [scalar.get("name") for scalar in knowns if scalar.get("causality") == "input"]
         assert inputs in ([], [entry])
         declared_dependencies[names[int(unknown.get("index")) - 1]] = bool(inputs)
     followed = set()

@@ -94,9 +94,9 @@ def test_the_solver_has_its_settings_and_counters(name):
 
 def test_each_model_offers_its_friction_laws():
     laws = {name: declared(name)["friction"] for name in TUNABLE if "friction" in declared(name)}
-    offered = {name: [item[:2] for item in law.items] for name, law in laws.items()}
+    items = {name: [item[:2] for item in law.items] for name, law in laws.items()}
     both = [("hybrid", 1), ("sign", 2)]
-    assert offered == {"coulomb": both, "pendulum": both, "stickslip": [("hybrid", 1), ("threshold", 3)]}
+    assert items == {"coulomb": both, "pendulum": both, "stickslip": [("hybrid", 1), ("threshold", 3)]}
     assert all(law.start == 1 for law in laws.values())
     assert [item[:2] for item in declared("pendulum")["pin_load"].items] == [("weight", 1), ("reaction", 2)]
 
@@ -143,7 +143,7 @@ def test_a_declaration_states_its_allowed_range():
 @pytest.mark.parametrize("name", TUNABLE)
 def test_a_rate_names_its_state_so_that_motion_is_identified_by_role(fmus, name):
     variables = {v.name: v for v in read_model_description(fmus / f"{name}.fmu").modelVariables}
-    whose = {v.name: v.derivative.name for v in variables.values() if v.derivative is not None}
-    assert whose == ({"omega": "theta", "alpha": "omega"} if name == "pendulum" else {"v": "x", "a": "v"})
-    named = [*whose.values(), "alpha" if name == "pendulum" else "a"]
+    states = {v.name: v.derivative.name for v in variables.values() if v.derivative is not None}
+    assert states == ({"omega": "theta", "alpha": "omega"} if name == "pendulum" else {"v": "x", "a": "v"})
+    named = [*states.values(), "alpha" if name == "pendulum" else "a"]
     assert list(find_roles(variables).values()) == named

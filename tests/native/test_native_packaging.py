@@ -167,10 +167,10 @@ def test_every_binary_exports_only_fmi_and_needs_only_the_system(binary):
     assert len(libraries) == len(PLATFORMS[platform].targets)
     for index in range(len(libraries)):
         library = libraries[index] if platform != "darwin64" else libraries.at(index)
-        needed = {getattr(library_name, "name", library_name) for library_name in library.libraries}
+        libraries_needed = {getattr(library_name, "name", library_name) for library_name in library.libraries}
         if platform == "win64":
-            needed = {name.lower() for name in needed if not name.startswith("api-ms-win-crt-")}
-        assert needed == SYSTEM[platform]
+            libraries_needed = {name.lower() for name in libraries_needed if not name.startswith("api-ms-win-crt-")}
+        assert libraries_needed == SYSTEM[platform]
         exported = {function.name.lstrip("_") for function in library.exported_functions}
         assert exported - {"mh_dylib_header", "dso_handle"} == functions()
         imported = {function.name.lstrip("_") for function in library.imported_functions}

@@ -257,8 +257,8 @@ def test_the_source_date_changes_only_the_date(fmu, tmp_path):
 def test_an_unknown_name_is_refused_with_the_known_ones_before_any_build(arguments, tmp_path):
     run = command(*arguments, "--out", tmp_path)
     assert (run.returncode, run.stdout) == (2, "")
-    known = ", ".join(model_names() + more_model_names())
-    assert run.stderr == f"Error: There is no model 'bogus'; choose one of {known}, or give the path of a .py file.\n"
+    names = ", ".join(model_names() + more_model_names())
+    assert run.stderr == f"Error: There is no model 'bogus'; choose one of {names}, or give the path of a .py file.\n"
     assert list(tmp_path.iterdir()) == []
 
 
@@ -386,8 +386,8 @@ def test_the_guid_follows_the_content():
     def guid(text):
         return ElementTree.fromstring(text).get("guid")
 
-    first, again = sketch(m=Parameter(1.0, "kg", "Mass.")), sketch(m=Parameter(1.0, "kg", "Mass."))
-    assert first == again
+    first, second = sketch(m=Parameter(1.0, "kg", "Mass.")), sketch(m=Parameter(1.0, "kg", "Mass."))
+    assert first == second
     assert guid(first) != guid(sketch(m=Parameter(2.0, "kg", "Mass.")))
     date = datetime(2024, 1, 1, tzinfo=UTC)
     codes = [guid(describe(Sketch, "sketch", code, date)) for code in ("a", "b")]

@@ -105,9 +105,9 @@ def test_native_builds_differ_from_those_of_the_sources_only_in_the_date(run, tm
     as the stubs of the C libraries, are not rebuilt, which would take long."""
     expected = entries(build_for_all_platforms() / "smd.fmu")
     run("build_fmus --native smd --method exact", ZIG_LOCAL_CACHE_DIR=tmp_path / "own", SOURCE_DATE_EPOCH="1700000000")
-    again = entries(tmp_path / "fmus" / "native" / "smd.fmu")
-    assert {f"binaries/{platform}/smd{PLATFORMS[platform].suffix}" for platform in DEFAULT_PLATFORMS} <= set(again)
-    dated = again["modelDescription.xml"]
+    rebuilt = entries(tmp_path / "fmus" / "native" / "smd.fmu")
+    assert {f"binaries/{platform}/smd{PLATFORMS[platform].suffix}" for platform in DEFAULT_PLATFORMS} <= set(rebuilt)
+    dated = rebuilt["modelDescription.xml"]
     undated = dated.replace(b"2023-11-14T22:13:20Z", f"{__date__}T00:00:00Z".encode())
     assert dated != undated
-    assert again | {"modelDescription.xml": undated} == {name: expected[name] for name in again}
+    assert rebuilt | {"modelDescription.xml": undated} == {name: expected[name] for name in rebuilt}

@@ -91,9 +91,9 @@ def test_no_peer_finishes_with_the_plain_sign_law(rows):
     }.items(),
 )
 def test_every_method_of_the_runtime_reaches_the_certified_answer(rows, problem, bound):
-    found = rows(problem, literature_problems.RUNTIME)
-    assert {"ode23", "ode45", "dop853", "rodas"} <= {row.method for row in found}
-    assert all(row.error < bound * row.rtol for row in found)
+    runs = rows(problem, literature_problems.RUNTIME)
+    assert {"ode23", "ode45", "dop853", "rodas"} <= {row.method for row in runs}
+    assert all(row.error < bound * row.rtol for row in runs)
 
 
 def test_lugre_is_right_to_nine_digits(rows):

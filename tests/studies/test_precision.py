@@ -98,11 +98,11 @@ def test_a_missing_peer_is_listed_and_skipped(fmus, monkeypatch):
 
 
 def test_a_run_is_limited_in_steps_and_in_time():
-    ask = partial(peer_solvers.solve, "scipy", "RK23", CASE["smd"].problem, load_reference("smd").times, 1e-9, 1e-12)
+    solve = partial(peer_solvers.solve, "scipy", "RK23", CASE["smd"].problem, load_reference("smd").times, 1e-9, 1e-12)
     with pytest.raises(HarnessError, match=r"^at t = .* s after 500 right-hand sides$"):
-        ask(peer_solvers.limit_evaluations(500))
+        solve(peer_solvers.limit_evaluations(500))
     with pytest.raises(HarnessError, match=r"^at t = .* s after 0\.001 s of run time$"):
-        ask(peer_solvers.limit_run_time(1e-3))
+        solve(peer_solvers.limit_run_time(1e-3))
 
 
 def test_a_failed_run_is_a_gap_and_tighter_ones_after_a_slow_run_are_skipped():
@@ -157,8 +157,8 @@ def test_the_advice_is_derived_from_the_points():
         "stickslip: use ode45: error 1e-6 in 2 ms at rtol 1e-6 (hybrid; relative run time at error 1e-6: ode23 4, "
         "scipy RK45 140); the law 'threshold' does not get below an error of 0.005 against stick and slip."
     )
-    nothing = Study("stickslip", (CASE["stickslip"],), points[:1])
-    assert advice.recommend(nothing, []) == "stickslip: no method of the FMU reaches an error of 1e-6."
+    empty_study = Study("stickslip", (CASE["stickslip"],), points[:1])
+    assert advice.recommend(empty_study, []) == "stickslip: no method of the FMU reaches an error of 1e-6."
 
 
 def test_a_figure_labels_three_solvers_per_case_and_draws_the_others_in_grey(tmp_path, monkeypatch):
@@ -192,15 +192,15 @@ def test_a_figure_labels_three_solvers_per_case_and_draws_the_others_in_grey(tmp
 def test_no_advice_is_given_without_sufficient_evidence():
     """A quick run gives no advice if another solver comes close to the best method; a full run names a better peer."""
     own, slower = make_point("rodas", 2e-3, 1e-7), make_point("ode23", 4e-3, 1e-7)
-    untold = "stickslip: no recommendation from a quick run; use `friction-fmus precision stickslip`."
+    message = "stickslip: no recommendation from a quick run; use `friction-fmus precision stickslip`."
     for peer, carried in ((1.7e-3, False), (2.5e-3, False), (4e-3, True)):
         study = Study("stickslip", (CASE["stickslip"],), (own, slower, make_point("LSODA", peer, 1e-7, "scipy")))
         quick, complete = (advice.recommend(study, [], clear) for clear in (QUICK.min_ratio, FULL.min_ratio))
         assert (quick == complete) == carried
-        assert carried or quick == untold
+        assert carried or quick == message
         assert complete.startswith("stickslip: use rodas: ")
         assert ("scipy LSODA 0.85, not a method of the FMU" in complete) == (peer < own.seconds)
-    assert advice.recommend(Study("stickslip", (CASE["stickslip"],), ()), [], QUICK.min_ratio) == untold
+    assert advice.recommend(Study("stickslip", (CASE["stickslip"],), ()), [], QUICK.min_ratio) == message
 
 
 def test_a_quick_run_does_not_replace_a_full_one(user_folder, tmp_path, monkeypatch):

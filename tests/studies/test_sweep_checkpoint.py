@@ -46,12 +46,12 @@ def test_a_checkpoint_is_read_back(tmp_path):
     with checkpoint.open():
         checkpoint.add(RunBlock(0, np.ones((3, 2)), {1: "first"}))
         checkpoint.add(RunBlock(5, np.full((5, 2), 7.0), {4: "last"}))
-    again = Checkpoint(tmp_path / "a.checkpoint", 10, 2)
-    assert (again.n_done, again.missing_spans) == (10, [])
-    (block,) = again.blocks()
+    reopened = Checkpoint(tmp_path / "a.checkpoint", 10, 2)
+    assert (reopened.n_done, reopened.missing_spans) == (10, [])
+    (block,) = reopened.blocks()
     assert block.messages == {1: "first", 3: "failed \u00e9", 9: "last"}
     assert block.values[[0, 4, 5]].tolist() == [[1.0, 1.0], [1.0, 2.0], [7.0, 7.0]]
-    again.delete()
+    reopened.delete()
     assert list(tmp_path.iterdir()) == []
 
 
@@ -78,11 +78,11 @@ def test_a_block_cut_off_by_a_kill_is_repeated(tmp_path, part):
         checkpoint.array["values"][7] = 5.0
     else:
         checkpoint.array["status"][4] = 0
-    again = Checkpoint(tmp_path / "a.checkpoint", 10, 2)
-    assert (again.damaged, again.n_done) == (False, 1 if part == "status" else 2)
-    with again.open():
-        again.add(RunBlock(8, np.full((1, 2), np.nan), {0: "after the cut"}))
-    assert again.messages(again.array["status"])[8] == "after the cut"
+    reopened = Checkpoint(tmp_path / "a.checkpoint", 10, 2)
+    assert (reopened.damaged, reopened.n_done) == (False, 1 if part == "status" else 2)
+    with reopened.open():
+        reopened.add(RunBlock(8, np.full((1, 2), np.nan), {0: "after the cut"}))
+    assert reopened.messages(reopened.array["status"])[8] == "after the cut"
 
 
 def cut_values(checkpoint):
