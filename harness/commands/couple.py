@@ -13,7 +13,7 @@ from .terminal import POSITIVE, Terminal, result_options
 @result_options
 def couple(scene: str, stop: float | None, terminal: Terminal) -> None:
     """Couple the FMUs of a SCENE.  The scene is written as an SSP archive, run by Ecos, libcosim and fmpy, and compared
-    with a monolithic reference.
+    with one model of the whole system.
 
     SCENE is two-masses, driven, chain, the path of a TOML file (keys: see harness/scenes/coupled/scene.py), or the path
     of an SSP archive (.ssp).  An archive is compared with its own run at the smallest communication step.
@@ -28,15 +28,15 @@ def couple(scene: str, stop: float | None, terminal: Terminal) -> None:
 
     with terminal.progress(1) as report:
         study, folder = run_coupled(scene, terminal.out, stop, partial(report, scene))
-    engines = {name: {"largest error": error, "why not": why} for name, (_, error, why) in study.engines.items()}
+    engines = {name: {"largest error": error, "failure": reason} for name, (_, error, reason) in study.engines.items()}
     result = {"steps": study.steps, "errors": study.errors, "order": study.order, "engines": engines, "folder": folder}
     output = [
         f"communication step [s]   largest error{f' [{study.unit}]' if study.unit else ''}",
         *(f"{step:<24g} {error:.3e}" for step, error in zip(study.steps, study.errors, strict=False)),
         f"Order of convergence: {study.order:.2f}.",
         *(
-            f"{name:<24} {why or f'{error:.3e} at the smallest step'}"
-            for name, (_, error, why) in study.engines.items()
+            f"{name:<24} {reason or f'{error:.3e} at the smallest step'}"
+            for name, (_, error, reason) in study.engines.items()
         ),
     ]
     terminal.print_result(result, *output, folder=folder)

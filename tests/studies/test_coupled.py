@@ -151,7 +151,7 @@ def test_an_external_archive_is_compared_with_its_finest_run(run, user_folder):
     assert (done.returncode, done.stderr) == (0, "")
     result = json.loads(done.stdout)
     assert result["order"] > 0.8
-    assert {name: item["why not"] for name, item in result["engines"].items()} == dict.fromkeys(ENGINES, "")
+    assert {name: item["failure"] for name, item in result["engines"].items()} == dict.fromkeys(ENGINES, "")
     table = np.loadtxt(user_folder / "theirs/coupled/driven/trajectory.csv", delimiter=",", skiprows=1)
     ours = np.loadtxt(run("driven") / "trajectory.csv", delimiter=",", skiprows=1)
     heads = (user_folder / "theirs/coupled/driven/trajectory.csv").read_text().splitlines()[0].split(",")

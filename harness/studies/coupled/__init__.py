@@ -1,1 +1,1 @@
-"""Coupled FMUs: written as an SSP archive, run by existing engines, compared with a monolithic model."""
+"""Coupled FMUs: written as an SSP archive, run by existing engines, compared with one model of the whole system."""

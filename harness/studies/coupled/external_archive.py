@@ -22,7 +22,7 @@ COARSEST, HALVINGS = 100, 4  # steps of the first run, and number of halvings
 def read_archive(source: Path, file: Path, stop: float | None) -> Convergence:
     """Return the study to run, which records every Real output of every component; the archive is copied to `file`."""
     if not source.is_file():
-        raise SceneError(f"{source} does not exist: give an existing archive, or a scene of `python -m harness list`")
+        raise SceneError(f"{source} does not exist: give an existing archive, or a scene of `friction-fmus list`")
     copy(source, file)
     try:
         with SSP(file, mode="r") as archive, archive.system_structure as structure:

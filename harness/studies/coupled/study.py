@@ -100,9 +100,9 @@ def element_fmus(scene: CoupledScene, folder: Path) -> dict[str, Path]:
     """Return the FMU of each element; the FMU of the springs is built here."""
     fmus = {name: part.fmu for name, part in scene.parts.items()}
     if scene.springs:
-        done = run_module("build_fmus", str(SPRING), "--out", str(folder))
-        if done.returncode:
-            raise HarnessError(f"the spring could not be built: {done.stderr.strip()}")
+        build = run_module("build_fmus", str(SPRING), "--out", str(folder))
+        if build.returncode:
+            raise HarnessError(f"the spring could not be built: {build.stderr.strip()}")
     return fmus | {spring.name: folder / "spring.fmu" for spring in scene.springs}
 
 
@@ -110,7 +110,7 @@ def unsolved_study(scene: CoupledScene) -> Convergence:
     """Return the study to run, which records the positions of the parts."""
     read = tuple((name, "x", reference(part.fmu, "x")) for name, part in scene.parts.items())
     labels = tuple(f"{name} ({part.model})" for name, part in scene.parts.items())
-    return Convergence(scene.title, read, labels, ("m",) * len(read), scene.steps, scene.stop, "monolithic reference")
+    return Convergence(scene.title, read, labels, ("m",) * len(read), scene.steps, scene.stop, "single-model reference")
 
 
 def reference(fmu: Path, name: str) -> int:
@@ -179,10 +179,13 @@ def save(result: Convergence, folder: Path) -> None:
     )
     columns = [np.array(result.steps[: len(result.errors)]), np.array(result.errors)]
     write_csv(folder / "error.csv", ["communication step [s]", column_heading("largest error", result.unit)], columns)
-    table = [[engine, *(end or [None] * len(names)), off, why] for engine, (end, off, why) in result.engines.items()]
+    table = [
+        [engine, *(end or [None] * len(names)), error, reason]
+        for engine, (end, error, reason) in result.engines.items()
+    ]
     table.append([result.reference, *result.truth[-1].tolist(), 0.0, ""])
     write_csv_rows(
-        folder / "engines.csv", ["engine", *final_heads, column_heading("largest error", result.unit), "why not"], table
+        folder / "engines.csv", ["engine", *final_heads, column_heading("largest error", result.unit), "failure"], table
     )
 
 

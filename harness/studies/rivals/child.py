@@ -52,9 +52,9 @@ def run_request(request: RunRequest) -> RunReply:
         simulate = import_module(f"{__package__}.engines.{request.module}").simulate
         times: list[float] = []
         while len(times) < (REPEATS if not times or times[0] < SHORT else 1):
-            begun = process_time()
+            start = process_time()
             motion = simulate(scene, dict(request.setting))
-            times.append(process_time() - begun)
+            times.append(process_time() - start)
     except ImportError as error:
         return RunReply(f"it cannot be imported: {first_line(error)}")
     except (NotOfferedError, HarnessError) as error:

@@ -46,10 +46,10 @@ class Comparison:
 
     def time_ratio(self, result: Result) -> float:
         """Return the processor time relative to that of the FMU at its defaults in the same scene."""
-        for own in self.results:
-            is_baseline = (own.rival, own.setting, own.scene) == (OWN.title, "default", result.scene)
-            if is_baseline and own.measures and result.measures:
-                return result.measures.seconds / own.measures.seconds
+        for other in self.results:
+            is_baseline = (other.rival, other.setting, other.scene) == (OWN.title, "default", result.scene)
+            if is_baseline and other.measures and result.measures:
+                return result.measures.seconds / other.measures.seconds
         return nan
 
 

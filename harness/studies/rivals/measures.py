@@ -56,15 +56,15 @@ def match_events(changes: Events, expected: Events, stop: float) -> tuple[int, i
     """
     missed, spurious, differences = 0, 0, [] if expected and changes else [nan]
     for kind in {kind for _, kind in (*changes, *expected)}:
-        left = [t for t, other in changes if other == kind]
-        right = [t for t, other in expected if other == kind]
-        window = 0.5 * min(np.diff(right).min(initial=inf), stop)
-        for t in right:
-            nearest = min(left, key=lambda other: abs(other - t), default=inf)
+        unmatched = [t for t, other in changes if other == kind]
+        reference_times = [t for t, other in expected if other == kind]
+        window = 0.5 * min(np.diff(reference_times).min(initial=inf), stop)
+        for t in reference_times:
+            nearest = min(unmatched, key=lambda other: abs(other - t), default=inf)
             if abs(nearest - t) <= window:
-                left.remove(nearest)
+                unmatched.remove(nearest)
                 differences.append(abs(nearest - t))
             else:
                 missed += 1
-        spurious += len(left)
+        spurious += len(unmatched)
     return missed, spurious, max(differences, default=nan)

@@ -83,5 +83,5 @@ def gap_lines(comparison: Comparison) -> Iterator[str]:
             settings = gaps.setdefault((result.rival, result.gap), {})
             settings.setdefault(result.setting, []).append(SCENES[result.scene].name)
     for (rival, gap), settings in gaps.items():
-        where = "; ".join(f"{setting}: {', '.join(scenes)}" for setting, scenes in settings.items())
-        yield f"No result of {rival} ({where}): {gap}."
+        settings_text = "; ".join(f"{setting}: {', '.join(scenes)}" for setting, scenes in settings.items())
+        yield f"No result of {rival} ({settings_text}): {gap}."

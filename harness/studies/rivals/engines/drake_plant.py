@@ -22,10 +22,10 @@ def simulate(scene: Scene, setting: Setting) -> Solution:
         raise NotOfferedError("sliding friction is constant")
     if not scene.has_one_coefficient and setting.get("time_step") != 0.0:
         raise NotOfferedError("the discrete plant ignores the static coefficient")
-    own = {name: value for name, value in setting.items() if hasattr(multibody.MultibodyPlantConfig, name)}
-    options = analysis.SimulatorConfig(**{name: value for name, value in setting.items() if name not in own})
+    plant_options = {name: value for name, value in setting.items() if hasattr(multibody.MultibodyPlantConfig, name)}
+    options = analysis.SimulatorConfig(**{name: value for name, value in setting.items() if name not in plant_options})
     builder, down, still = framework.DiagramBuilder(), [0.0, 0.0, 1.0], math.RigidTransform()
-    plant, _ = multibody.AddMultibodyPlant(multibody.MultibodyPlantConfig(**own), builder)
+    plant, _ = multibody.AddMultibodyPlant(multibody.MultibodyPlantConfig(**plant_options), builder)
     solid = tree.UnitInertia.SolidSphere(RADIUS)
     ball = plant.AddRigidBody("ball", tree.SpatialInertia(scene.inertia, np.zeros(3), solid))
     carrier = plant.AddRigidBody("carrier", tree.SpatialInertia.Zero())

@@ -25,7 +25,7 @@ def simulate(scene: Scene, setting: Setting) -> Solution:
     # the ground and the belt are a node with a constant speed
     partner = mbs.AddNode(items.Node1D(referenceCoordinates=[0.0], initialVelocities=[w]))
     mbs.AddObject(items.Mass1D(physicsMass=min(scene.partner, 1e12), nodeNumber=partner))
-    markers = [mbs.AddMarker(items.MarkerNodeCoordinate(nodeNumber=one, coordinate=0)) for one in (partner, node)]
+    markers = [mbs.AddMarker(items.MarkerNodeCoordinate(nodeNumber=n, coordinate=0)) for n in (partner, node)]
     start = [float(np.sign(v - w)), x, 0.0]  # mode, last position at rest, limit stop
     history = mbs.AddNode(items.NodeGenericData(initialCoordinates=start, numberOfDataCoordinates=3))
     slide, hold = scene.slide(0.0, abs(v - w)), scene.hold(0.0)
@@ -48,8 +48,8 @@ def simulate(scene: Scene, setting: Setting) -> Solution:
     mbs.AddLoad(items.LoadCoordinate(markerNumber=markers[1], load=1.0, loadUserFunction=load))
     if not scene.has_constant_sliding:
         mbs.SetPreStepUserFunction(rewrite)
-    wanted = ((node, VALUES.Coordinates), (node, VALUES.Coordinates_t), (partner, VALUES.Coordinates_t))
-    outputs = [items.SensorNode(nodeNumber=one, outputVariableType=kind, storeInternal=True) for one, kind in wanted]
+    signals = ((node, VALUES.Coordinates), (node, VALUES.Coordinates_t), (partner, VALUES.Coordinates_t))
+    outputs = [items.SensorNode(nodeNumber=n, outputVariableType=kind, storeInternal=True) for n, kind in signals]
     sensors = [mbs.AddSensor(output) for output in outputs]
     mbs.Assemble()
     options, n = exudyn.SimulationSettings(), round(scene.stop / step)
