@@ -27,6 +27,7 @@ class Mine(Model):
     v = State("m/s", "speed", rate_of=x)
 '''
 RATE = '    a = Output("m/s2", "acceleration", (F - k * x) / m, rate_of=v)\n'
+USE = '    power = Output("W", "power of the belt", f * u)\n'  # uses what the equation of motion does not
 DRY = '    mode = Mode()\n    R = Contact("N", "friction", mode=mode, slip=v, slide=f)\n'
 STUCK = '    a = Output("m/s2", "acceleration", (F - k * x - R) / m, rate_of=v)\n'
 
@@ -429,6 +430,65 @@ WRONG = {
         17,
         "q has the unit 'mass': the unit comes before the description, so exchange them",
     ),
+    "a parameter without an effect": (RATE, 11, "no equation uses f: use it, or remove its declaration"),
+    "an input without an effect": (RATE.replace("F - ", "-") + USE, 13, "no equation uses F: use it, or remove its"),
+    "a choice without an effect": (RATE + USE + '    q = Choice("kind", a="x", b="y")\n', 18, "no equation uses q: "),
+    "a random number": (
+        "    import random\n" + RATE.replace("F -", "random.random() * F -"),
+        17,
+        "the file gives other values each time it is read: write fixed numbers instead of random ones or the time",
+    ),
+    "the time of the computer": (
+        '    import time as clock\n    q = Parameter(clock.perf_counter(), "s", "time")\n' + RATE,
+        17,
+        "the file gives other values each time it is read: write fixed numbers instead of random ones or the time",
+    ),
+    "a bare equation": (RATE + "    m * a == F - k * x\n", 17, "this line has no effect: an equation is written as"),
+    "a bare term": (RATE + "    k * x + F\n", 17, "this line has no effect: an equation is written as name = Output"),
+    "a name with a space": (
+        RATE + '    vars()["k 1"] = Parameter(1.0, "1", "q")\n',
+        17,
+        "the name 'k 1' is no identifier: use letters, digits and _, and no digit at the start",
+    ),
+    "a name with a point": (
+        RATE + '    vars()["k.1"] = Parameter(1.0, "1", "q")\n',
+        17,
+        "the name 'k.1' is no identifier",
+    ),
+    "a number for a name": (RATE + '    vars()[3] = Parameter(1.0, "1", "q")\n', 17, "the name 3 is no identifier"),
+    "a condition on a contact force": (
+        DRY + STUCK.replace("F -", "choose(R > 0.0, F, 0.0) -"),
+        18,
+        "a condition in a compares R, which follows from a: use a condition on states",
+    ),
+    "a nominal velocity of zero": (
+        RATE + '    q = State("m/s", "q", rate=f / m, nominal_velocity=0.0)\n',
+        17,
+        "the start values are invalid: nominal_velocity of q must be above 0, got 0.0",
+    ),
+    "a nominal velocity below zero": (
+        RATE + '    q = State("m/s", "q", rate=f / m, nominal_velocity=-u)\n',
+        17,
+        "the start values are invalid: nominal_velocity of q must be above 0, got u = 1.0",
+    ),
+    "liftoff in words": (
+        DRY.replace("slide=f", 'slide=f, lifts_off="no"') + STUCK,
+        17,
+        "lifts_off must be True, False or None, got 'no'",
+    ),
+    "a function without a value": (RATE.replace("F -", "sqrt(-1.0) * F -"), 16, "sqrt(-1.0) has no value"),
+    "degrees Celsius": (RATE + '    q = Parameter(1.0, "degC", "q")\n', 17, "q has the unit 'degC'; allowed units are"),
+    "friction with a direction": (
+        DRY.replace("slide=f", "slide=f * tanh(v / u)") + STUCK,
+        17,
+        "slide of R changes its sign with the slip: write the size of the force",
+    ),
+    "friction without a value at rest": (
+        DRY.replace("slide=f", "slide=f * v / fabs(v), hold=f") + STUCK,
+        17,
+        "R: f * v / fabs(v) cannot be calculated at the start values, where fabs(v) is 0.0",
+    ),
+    "a number for a docstring": (RATE + "    __doc__ = 3\n", 4, "Mine has no docstring"),
     "a name for the rate of a driver": (
         RATE + '    q = State("m", "one", start=1.0, rate=u)\n    q_rate = Parameter(1.0, "m/s", "another")\n',
         17,
@@ -468,6 +528,8 @@ WORKS = """
     body = vars()
     for n, name in enumerate(names):
         body[f"{name}_force"] = Output("N", f"force {n}", scale * math.pi * pull(x))
+    import random
+    body["random_force"] = Output("N", "force drawn from a seed", random.Random(1).random() * pull(x))
     alias = k
     unused = k * x
     stop_time: float = 8.0
@@ -477,8 +539,8 @@ WORKS = """
 def test_helper_values_of_the_class_body_are_allowed(tmp_path):
     """Values that the body reads, private names, modules, aliases and terms; real numbers of numpy."""
     path = tmp_path / "mine.py"
-    numbers = '    q = Parameter(np.int64(2), "kg", "q", low=np.float32(0.5))\n'
-    path.write_text(HEAD.replace("from", "import numpy as np\nfrom", 1) + RATE + WORKS + numbers)
+    numbers = '    q = Parameter(np.int64(2), "kg", "q", low=np.float32(0.5))\n    twice = Output("kg", "2 q", q + q)\n'
+    path.write_text(HEAD.replace("from", "import numpy as np\nfrom", 1) + RATE + WORKS + USE + numbers)
     model = find_model(path).model
     assert {"x_force", "y_force"} <= vars(model).keys()
     assert (model.stop_time, model.q.start, model.q.low) == (8.0, 2.0, 0.5)
@@ -499,7 +561,7 @@ def test_any_docstring_text_survives_unchanged(tmp_path):
     """LaTeX, quotes and format placeholders in a docstring; a byte order mark before the file."""
     words = r"""A \nu \x \N{k} {imports} spring of "three" \"\"\" quotes"""
     path = tmp_path / "mine.py"
-    text = (HEAD + RATE).replace('    """A mass on a spring.', f"    r'''{words}")
+    text = (HEAD + RATE + USE).replace('    """A mass on a spring.', f"    r'''{words}")
     path.write_text("\ufeff" + text.replace('- c v\n    """', "- c v\n    '''"), encoding="utf-8")
     assert find_model(path).model.__doc__.startswith(words)
 

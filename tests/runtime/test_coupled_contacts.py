@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from contact_balance import MASSES, balanced_modes
 from internal_steps import compute_step, prepared_run, start, state_values
+from model_text import remove_unused
 from models import DOP853, LARGER_MODELS, ODE23, ODE45, RODAS, SIGN, THRESHOLD
 from scipy.integrate import quad
 
@@ -34,7 +35,7 @@ def custom_model(tmp_path_factory):
     path = tmp_path_factory.mktemp("mine") / "mine.py"
 
     def make(*body, methods=()):
-        path.write_text(HEAD + "".join(f"    {line}\n" for line in body))
+        path.write_text(remove_unused(HEAD + "".join(f"    {line}\n" for line in body)))
         source = find_model(path)
         return lowered_model(source, select_features(source, methods))()
 

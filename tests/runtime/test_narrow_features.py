@@ -46,8 +46,11 @@ OTHER = """
     g = Parameter(1e-3, "m/s2", "acceleration of a driver")
     w = State("m/s", "speed of a driver", rate=g, nominal_velocity=v_s_1)
 """
+BELT = """
+    relative = Output("m/s", "speed relative to the belt", v - v_b)
+"""
 TEXTS = {
-    "floor": (HEAD + BLOCK.format("", WIDTH.format(""))).replace("slip = v - v_b", "slip = v"),
+    "floor": (HEAD + BLOCK.format("", WIDTH.format(""))).replace("slip = v - v_b", "slip = v") + BELT,
     "belt": HEAD + BLOCK.format("", WIDTH.format("")),
     "two_widths": HEAD + BLOCK.format("_1", WIDTH.format("_1")) + BLOCK.format("_2", WIDTH.format("_2")),
     "other_state": HEAD + BLOCK.format("_1", "") + BLOCK.format("_2", "") + OTHER,

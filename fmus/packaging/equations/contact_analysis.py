@@ -192,6 +192,12 @@ class ContactAnalysis(ModelRoles):
                     c.location,
                 )
             for law in self.rate_outputs.values():
+                if has_condition_on(law, (c,)):
+                    raise ModelError(
+                        f"a condition in {law.name} compares {c.name}, which follows from {law.name}: use a condition "
+                        "on states",
+                        law.location,
+                    )
                 if depends_on(self.derivative(law, {c: 1.0}), (*self.contacts, *self.modes)):
                     raise ModelError(f"{c.name} must enter {law.name} linearly", law.location)
         self._check_loads()

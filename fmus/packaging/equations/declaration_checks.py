@@ -2,6 +2,7 @@
 
 from math import inf
 from sys import float_info
+from typing import Any
 
 from ...runtime.active_method import EXACT_ITEM, METHOD_ITEMS
 from .algebra import depends_on, subexpressions, variables_in
@@ -16,7 +17,7 @@ from .expressions import (
     is_comparison,
     is_number,
 )
-from .model_declaration import Choice, Contact, SettableVariable, Variable
+from .model_declaration import Choice, Contact, Model, Rule, SettableVariable, Variable
 from .model_roles import ModelRoles
 from .reserved_names import RESERVED
 
@@ -76,12 +77,12 @@ def check_declarations(an: ModelRoles) -> None:
             raise ModelError(
                 f"{word} = {describe(value)} is invalid: it must be a number above 0 and below {limit:g}", location
             )
-    if not (an.model.__doc__ or "").strip():
+    if not isinstance(an.model.__doc__, str) or not an.model.__doc__.strip():
         raise ModelError(
             f"{an.name} has no docstring: its first line becomes the description of the FMU, the rest its page",
             location,
         )
-    _check_printable(an.name, location, (an.model.__doc__ or "").replace("\n", " "))
+    _check_printable(an.name, location, an.model.__doc__.replace("\n", " "))
 
 
 def _check_choices(e: Variable, part: Operand) -> None:
@@ -131,3 +132,44 @@ def _check_printable(name: str, location: tuple[str, int], *words: str) -> None:
     for text in words:
         if not isinstance(text, str) or not text.isprintable():
             raise ModelError(f"{name}: {text!r} must be printable text on one line", location)
+
+
+def check_use(an: ModelRoles) -> None:
+    """Raise ModelError for a parameter, choice or input that no equation and no rule reads."""
+    read: dict[int, Operand] = {}
+    for part in (
+        *(rule.broken for rule in an.rules),
+        *(one for e in an.declared for one in an.declared_expressions(e)),
+    ):
+        subexpressions(part, read)
+    for e in (*an.parameters, *an.choices, *an.inputs):
+        if id(e) not in read:
+            raise ModelError(f"no equation uses {e.name}: use it, or remove its declaration", e.location)
+
+
+def check_repetition(model: type[Model], repeated: type[Model]) -> None:
+    """Raise ModelError if a second execution of the file declares something else, as random numbers and clocks do."""
+    for (e, *content), (_, *other) in zip(declared_content(model), declared_content(repeated), strict=False):
+        if content != other:
+            raise ModelError(
+                "the file gives other values each time it is read: write fixed numbers instead of random ones or the "
+                "time, or draw them from a random generator with a fixed seed",
+                e.location,
+            )
+
+
+def declared_content(model: type[Model]) -> list[tuple[Any, ...]]:
+    """Return each variable and term of a model class, with its name or operation and its numbers."""
+    rules = (model.rules,) if isinstance(model.rules, Rule) else model.rules
+    roots = [rule.broken for rule in rules]
+    for e in vars(model).values():
+        if isinstance(e, Variable):
+            roots += [e, *ModelRoles.declared_expressions(e)]
+    found: dict[int, Operand] = {}
+    for e in roots:
+        subexpressions(e, found)
+    variables = [
+        (e, e.name, e.start, e.low, e.high, e.above, e.below) for e in found.values() if isinstance(e, Variable)
+    ]
+    terms = [e for e in found.values() if isinstance(e, Term)]
+    return [*variables, *((e, e.op, *(one for one in e.args if is_number(one))) for e in terms)]

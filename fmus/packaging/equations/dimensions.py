@@ -73,7 +73,7 @@ def unit_hint(unit: str, text: str) -> str:
     """Return what to write instead of an unknown unit, or an empty text."""
     if parse_unit(text):
         return "the unit comes before the description, so exchange them"
-    if "deg" in unit:
+    if re.search(r"\bdeg(ree)?s?\b", unit):
         return 'use rad instead of deg, and display="deg" to show degrees'
     if unit.strip() in ("", "-"):
         return 'a pure number has the unit "1"'

@@ -184,7 +184,12 @@ class Term(Expression):
 
 def _function(name: str) -> Callable[[Operand], Operand]:
     def function(u: Operand) -> Operand:
-        return Term(name, u) if isinstance(u, Expression) else getattr(math, name)(u)
+        if isinstance(u, Expression):
+            return Term(name, u)
+        try:
+            return getattr(math, name)(u)
+        except (ArithmeticError, ValueError) as error:
+            raise ModelError(f"{name}({describe(u)}) has no value") from error
 
     function.__name__ = function.__qualname__ = name
     function.__doc__ = f"Return {name} of an expression or a number."

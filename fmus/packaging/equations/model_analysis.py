@@ -12,6 +12,7 @@ from .algebra import (
     negate,
     subexpressions,
     unconditional_quotients,
+    variables_in,
 )
 from .conditions import Condition, find_conditions
 from .contact_analysis import ContactAnalysis
@@ -34,7 +35,7 @@ class ModelAnalysis(ContactAnalysis):
         check_declarations(self)
         self._find_contact_loads()
         self.ramps = {e: rate for e, rate in self.ramps.items() if self._keeps_closed_form(e)}
-        self.rules = (*self._division_rules(), *self.rules, *self._holding_rules())
+        self.rules = (*self._division_rules(), *self._nominal_velocity_rules(), *self.rules, *self._holding_rules())
         self.switches = find_conditions(self._dynamic_expressions(), (TIME, *self.states, *self.drivers, *self.ramps))
         self.limits = self._find_limits()
         for e in self.named if self.contacts and not self.waits else ():
@@ -54,6 +55,18 @@ class ModelAnalysis(ContactAnalysis):
                         result[e] = Rule(Term("==", e, 0.0), sentence)
                         result[e].broken.location = quotient.location
         return tuple(result.values())
+
+    def _nominal_velocity_rules(self) -> list[Rule]:
+        """Return a rule for each nominal_velocity that is not positive by its range: it bounds steps and errors."""
+        result = []
+        for s in (*self.states, *self.drivers):
+            e = s.nominal_velocity
+            if e is not None and not (isinstance(e, (Parameter, Fixed)) and e.above >= 0.0):
+                broken = Term("<=", e, 0.0)
+                broken.location = s.location
+                values = ", ".join(f"{one.name} = {{{one.name}!r}}" for one in variables_in(e)) or repr(e)
+                result.append(Rule(broken, f"nominal_velocity of {s.name} must be above 0, got {values}"))
+        return result
 
     @property
     def checks_event_steps(self) -> bool:

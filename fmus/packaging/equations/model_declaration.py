@@ -274,6 +274,8 @@ class Contact(Variable, variable_declarations.Output):
         self.mode, self.slide, self.laws, self.eps = mode, as_operand(slide), laws, eps
         self.slip: Operand = slip
         self.hold = None if hold is None else as_operand(hold)
+        if lifts_off not in (None, True, False):
+            raise ModelError(f"lifts_off must be True, False or None, got {describe(lifts_off)}")
         self.lifts_off = lifts_off
         if lifts_off:
             touches = Term(">", self.slide, 0.0)

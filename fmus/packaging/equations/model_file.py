@@ -6,9 +6,11 @@ Errors are reported in one sentence with file and line.
 import ast
 import linecache
 import sys
+from contextlib import redirect_stdout
 from dataclasses import dataclass
 from functools import cached_property
 from hashlib import sha256
+from io import StringIO
 from keyword import iskeyword
 from pathlib import Path
 from types import ModuleType
@@ -17,13 +19,14 @@ from typing import Any
 from ...runtime.codes import MODEL_RULE, OK
 from ...runtime.variable_declarations import VariableOwner
 from .. import BuildError
+from .declaration_checks import check_repetition, check_use
 from .dimensions import check_units
 from .expressions import ModelError
 from .model_analysis import ModelAnalysis
 from .model_declaration import Model
 from .model_source import model_source
 from .python_errors import check_statements, explain
-from .start_values import check_evaluation
+from .start_values import check_evaluation, check_friction_forces
 
 PACKAGE = __name__.split(".", 1)[0]
 RESERVED_FILE_NAMES = ("pythonfmu", "runtime")  # embedded in the same package
@@ -52,6 +55,9 @@ class ModelFile:
         try:
             analysis = ModelAnalysis(self._load_class(), self.ramps)
             check_units(analysis)
+            with redirect_stdout(StringIO()):
+                repeated = vars(self._execute())[analysis.name]
+            check_repetition(analysis.model, repeated)
             return analysis
         except ModelError as mistake:
             raise self._build_error(mistake) from mistake
@@ -100,7 +106,13 @@ class ModelFile:
             except ModelError as named:
                 mistake = named
             raise self._build_error(mistake) from error
-        if status != OK:
+        if status == OK:
+            try:
+                check_friction_forces(self.analysis)
+                check_use(self.analysis)
+            except ModelError as mistake:
+                raise self._build_error(mistake) from mistake
+        else:
             sentence = thing.rules[status].format_map(vars(thing))
             own_rules = dict(enumerate(self.analysis.rules, MODEL_RULE))
             location = own_rules[status].broken.location if status in own_rules else self.analysis.model.location
@@ -117,16 +129,7 @@ class ModelFile:
             raise BuildError(
                 f"{self.path}: the file name is the model name: use only ASCII letters, digits and _{exceptions}."
             )
-        module = ModuleType(f"{PACKAGE}.model_files.{self.name}")
-        module.__file__ = str(self.path)
-        try:
-            exec(compile(self.source, str(self.path), "exec", optimize=0), vars(module))
-        except ModelError:
-            raise
-        except SyntaxError as error:
-            raise ModelError(f"invalid Python: {error.msg}", (str(self.path), error.lineno or 1)) from error
-        except (Exception, SystemExit) as error:
-            raise explain(error, ast.parse(self.source), str(self.path)) from error
+        module = self._execute()
         models = [
             model
             for model in vars(module).values()
@@ -139,6 +142,20 @@ class ModelFile:
             )
         check_statements(ast.parse(self.source), models[0].__name__, str(self.path))
         return models[0]
+
+    def _execute(self) -> ModuleType:
+        """Execute the file."""
+        module = ModuleType(f"{PACKAGE}.model_files.{self.name}")
+        module.__file__ = str(self.path)
+        try:
+            exec(compile(self.source, str(self.path), "exec", optimize=0), vars(module))
+        except ModelError:
+            raise
+        except SyntaxError as error:
+            raise ModelError(f"invalid Python: {error.msg}", (str(self.path), error.lineno or 1)) from error
+        except (Exception, SystemExit) as error:
+            raise explain(error, ast.parse(self.source), str(self.path)) from error
+        return module
 
     def _build_error(self, mistake: ModelError) -> BuildError:
         """Return a BuildError with file and line in front of the message."""

@@ -105,13 +105,18 @@ def explain_arguments(name: str, function: Any, call: ast.Call) -> str:
 
 
 def check_statements(tree: ast.Module, model: str, file: str) -> None:
-    """Raise ModelError for declarations in the class body that are assigned to no name."""
+    """Raise ModelError for declarations and expressions in the class body that are assigned to no name."""
     for statement in class_statements(tree, model):
         match statement:
             case ast.Expr(value=ast.Call(func=ast.Name(id=name))) if name in DECLARATIONS:
                 target = "rules" if name == Rule.__name__ else "name"
                 raise ModelError(
                     f"this {name} belongs to no name, so the model does not have it: write {target} = {name}(...)",
+                    (file, statement.lineno),
+                )
+            case ast.Expr(value=ast.BinOp() | ast.Compare() | ast.UnaryOp() | ast.Name()):
+                raise ModelError(
+                    "this line has no effect: an equation is written as name = Output(unit, text, expression)",
                     (file, statement.lineno),
                 )
             case ast.AnnAssign(target=ast.Name(id=name), value=None):

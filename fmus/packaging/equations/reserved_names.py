@@ -75,6 +75,10 @@ def is_reserved_in_c(name: str) -> bool:
 
 def check_name(name: str, e: Expression, reserved: Collection[str] = RESERVED) -> None:
     """Raise ModelError for a name that a variable of a model cannot have."""
+    if not str(name).isidentifier():
+        raise ModelError(
+            f"the name {name!r} is no identifier: use letters, digits and _, and no digit at the start", e.location
+        )
     if name in reserved or is_reserved_in_c(name) or iskeyword(name) or name.startswith("_"):
         raise ModelError(f"the name {name} is reserved by the solver or by C: choose another name", e.location)
     if not name.isascii():

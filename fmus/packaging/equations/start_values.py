@@ -5,11 +5,11 @@ import operator
 from collections.abc import Callable
 from typing import Any
 
-from .algebra import ARITHMETIC
+from .algebra import ARITHMETIC, substitute
 from .dimensions import expression_text
 from .expressions import Expression, ModelError, Operand, Term
 from .model_analysis import ModelAnalysis
-from .model_declaration import Output
+from .model_declaration import Contact, Output
 
 MAX_TEXT_LENGTH = 80  # characters of an expression in a message
 OPERATIONS: dict[str, Callable[..., Any]] = {
@@ -21,13 +21,46 @@ OPERATIONS: dict[str, Callable[..., Any]] = {
 
 def check_evaluation(an: ModelAnalysis) -> None:
     """Raise ModelError for the first expression without a value at the start values; contact forces count as 0."""
+    values = start_values(an)
+    memo: dict[int, float] = {}
+    for e in an.outputs:
+        evaluate(e, values, memo)
+
+
+def check_friction_forces(an: ModelAnalysis) -> None:
+    """Raise ModelError for a sliding or holding force without a value at the start values, or with a direction."""
+    values = start_values(an)
+    for c in an.contacts:
+        for e in (c.slide, an.holding_limit[c]):
+            try:
+                evaluate(e, values, {})
+            except ModelError as error:
+                raise ModelError(f"{c.name}: {error}", c.location) from error
+        if has_direction(c, values):
+            raise ModelError(
+                f"slide of {c.name} changes its sign with the slip: write the size of the force, which the solver "
+                "directs against the slip",
+                c.location,
+            )
+
+
+def has_direction(c: Contact, values: dict[Expression, float]) -> bool:
+    """Return whether the sliding forces at a slip of 1 and of -1 are opposite; False if one has no value."""
+    try:
+        forward, backward = (evaluate(substitute(c.slide, {c.slip: slip}), values, {}) for slip in (1.0, -1.0))
+    except ModelError:
+        return False
+    return forward == -backward != 0.0
+
+
+def start_values(an: ModelAnalysis) -> dict[Expression, float]:
+    """Return the values of parameters, inputs and states at the start; what follows from them counts as 0."""
     values: dict[Expression, float] = dict.fromkeys(an.time_varying, 0.0)
     values |= {e: float(e.start) for e in (*an.parameters, *an.choices, *an.inputs)}
     memo: dict[int, float] = {}
     for s in an.states:
         values[s] = evaluate(s.start_expression, values, memo)
-    for e in an.outputs:
-        evaluate(e, values, memo)
+    return values
 
 
 def evaluate(e: Operand, values: dict[Expression, float], memo: dict[int, float]) -> float:

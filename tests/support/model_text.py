@@ -1,0 +1,15 @@
+"""Texts of model files that are put together from parts."""
+
+import re
+
+
+def remove_unused(text):
+    """Return the text of a model file without the parameters and inputs that no other line uses, which are refused."""
+    return "".join(line for line in text.splitlines(keepends=True) if not is_unused(line, text))
+
+
+def is_unused(line, text):
+    """Return whether a line declares a parameter or an input that no other line uses."""
+    declaration = re.match(r"    (\w+) = (Parameter|Input)\(", line)
+    code = re.sub('"[^"]*"', "", text)
+    return declaration is not None and len(re.findall(rf"\b{declaration[1]}\b", code)) == 1
