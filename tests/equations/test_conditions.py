@@ -434,6 +434,13 @@ def test_limits_exist_only_where_a_force_may_become_negative(tmp_path, slide):
 # ---- model exchange
 
 
+def test_the_indicator_of_a_dimensionless_condition_has_a_unit(tmp_path):
+    """Also in a model with a Mode, which has none."""
+    text = full_model_text("slidinginput").replace("F_ext)", "choose(x / gap > 1.0, F_ext, -F_ext))")
+    (tmp_path / "ratio.py").write_text(remove_unused(text))
+    assert find_model(tmp_path / "ratio.py").model.condition_units == ("1", "N")
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["native", "native/fmi3"])
 @pytest.mark.parametrize("name", ["relay", "backlash", "timed"])

@@ -201,7 +201,7 @@ def condition_unit(an: ModelAnalysis, condition: Condition) -> str:
     """Return the unit of the margin of a condition: that of a variable with the same dimensions, else 1."""
     memo: dict[int, Dimensions | None] = {}
     dimensions = next((d for e in condition.sides if (d := dimensions_of(e, memo)) is not None), None)
-    return next((e.unit for e in an.declared if declared_dimensions(e) == dimensions), "1")
+    return next((e.unit for e in an.declared if e.unit and declared_dimensions(e) == dimensions), "1")
 
 
 def string_lines(text: str) -> str:
