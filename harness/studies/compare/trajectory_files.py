@@ -77,11 +77,11 @@ def parse_heading(head: str) -> tuple[str, str]:
 
 def read_table(file: Path) -> Columns:
     """Read a table of an instrument, a spreadsheet or MATLAB; SceneError if there is none."""
-    heads, parse_numbers = read_numeric(file)
+    heads, values = read_numeric(file)
     duplicates = [head for i, head in enumerate(heads) if head in heads[:i]]
     if duplicates:
         raise SceneError(f"{file.name}: two columns are named {format_value(duplicates[0])}")
-    return dict(zip(heads, parse_numbers.T, strict=True))
+    return dict(zip(heads, values.T, strict=True))
 
 
 def read_csv(file: Path) -> Columns | None:
