@@ -390,22 +390,32 @@ def read_times(table: Table, time_column: Column, columns: ColumnOptions) -> np.
 
 
 def parse_numbers(table: Table, i: int, strict: bool = True) -> np.ndarray:
-    """Return the numbers (n,) of a column, NaN for missing cells.
+    """Return the numbers (n,) of a column, NaN for missing cells. They are parsed once for a table.
 
     Raises
     ------
     SceneError
         If `strict` and a cell is neither a number nor missing.
     """
-    cells: Cells = table.columns[i]
+    if i not in table.parsed_columns:
+        table.parsed_columns[i] = parse_cells(table.columns[i])
+    numbers, invalid = table.parsed_columns[i]
+    if strict and invalid is not None:
+        row = f"row {table.line + 1 + invalid}, column {table.column_headings[i]}"
+        raise SceneError(f"{table.name}: '{table.columns[i][invalid][:40]}' in {row}, is not a number")
+    return numbers
+
+
+def parse_cells(cells: Cells) -> tuple[np.ndarray, int | None]:
+    """Return the numbers (n,) in cells, NaN for others, and the index of the first that is neither one nor missing."""
     if isinstance(cells, np.ndarray):
-        return cells
+        return cells, None
     try:
         everywhere = all("," in cell for cell in cells)
-        return np.array([cell.replace(",", ".") for cell in cells] if everywhere else cells, dtype=float)
+        return np.array([cell.replace(",", ".") for cell in cells] if everywhere else cells, dtype=float), None
     except ValueError:
         pass
-    numbers = np.full(len(cells), np.nan)
+    numbers, invalid = np.full(len(cells), np.nan), None
     present = [cell for cell in cells if cell.lower() not in MISSING]
     with_comma = [cell for cell in present if "," in cell]
     comma_groups = len(with_comma) < len(present) and all(
@@ -415,12 +425,11 @@ def parse_numbers(table: Table, i: int, strict: bool = True) -> np.ndarray:
         if cell.lower() in MISSING:
             continue
         grouped = GROUPED_NUMBER.match(cell)
+        number = cell
         if grouped and (grouped[2] or grouped[3] or grouped[1] == "'" or (grouped[1] == "," and comma_groups)):
-            cell = cell.replace(grouped[1], "")
+            number = cell.replace(grouped[1], "")
         try:
-            numbers[index] = float(EXPONENT.sub("e", cell.replace(",", ".")))
+            numbers[index] = float(EXPONENT.sub("e", number.replace(",", ".")))
         except ValueError:
-            if strict:
-                row = f"row {table.line + 1 + index}, column {table.column_headings[i]}"
-                raise SceneError(f"{table.name}: '{cell[:40]}' in {row}, is not a number") from None
-    return numbers
+            invalid = index if invalid is None else invalid
+    return numbers, invalid

@@ -7,7 +7,7 @@ The format is detected from the first bytes, so standard input works for all of 
 import io
 import re
 import sys
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
@@ -39,6 +39,8 @@ class Table:
         Sampling interval in s, if the file has one and no times.
     notes : tuple of str
         What was chosen when reading.
+    parsed_columns : dict
+        Cache of the numbers of a column by its index, and the index of its first cell that is no number.
     """
 
     name: str
@@ -47,6 +49,9 @@ class Table:
     line: int = 0
     interval: float | None = None
     notes: tuple[str, ...] = ()
+    parsed_columns: dict[int, tuple[np.ndarray, int | None]] = field(
+        default_factory=dict, init=False, compare=False, repr=False
+    )
 
 
 def load_table(source: str, headings: str | None = None) -> Table:
