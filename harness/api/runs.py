@@ -9,6 +9,7 @@ from ..errors import HarnessError, SceneError
 from .options import QUIET, Progress, with_options
 
 if TYPE_CHECKING:
+    import numpy as np
     import pandas
     from numpy.typing import ArrayLike
 
@@ -23,6 +24,7 @@ def simulate(
     *,
     stop: float | None = None,
     interval: float | None = None,
+    times: "ArrayLike | None" = None,
     outputs: Sequence[str] | None = None,
     method: str | int | None = None,
     rtol: float | None = None,
@@ -45,6 +47,9 @@ def simulate(
     interval : float, optional
         Time between two recorded points in s. By default 4096 intervals and every step and event of the solver are
         recorded.
+    times : array_like, optional
+        Increasing times (n,) in s to record instead, as those of a measurement; the run stops at the last one unless
+        `stop` is given.
     outputs : sequence of str, optional
         Variables to record; by default all outputs of a model or FMU, and those that a scene names.
     method : str or int, optional
@@ -88,6 +93,8 @@ def simulate(
         spec = replace(spec, values={**spec.values, **values})
     if inputs is not None:
         spec = replace(spec, inputs={str(name): column for name, column in table_of(inputs).items()})
+    if times is not None:
+        spec = replace(spec, times=tuple(row_of_numbers("times", times).tolist()))
     spec = with_options(spec, stop, interval, outputs, method, rtol, interface, timeout)
     if interval is not None and spec.inputs:
         spec = replace(spec, grid=fine_step(spec, interval))
@@ -164,15 +171,23 @@ def fine_step(spec: "RunSpec", interval: float) -> float:
 
 def table_of(inputs: Any) -> dict[str, tuple[float, ...]]:
     """Return the columns of a mapping or a DataFrame; the index of a DataFrame may be its time."""
-    import numpy as np
-
     if not isinstance(inputs, Mapping) and not hasattr(inputs, "columns"):
         raise SceneError("inputs must be a mapping or a DataFrame with the column 'time' and one for each input")
     names = inputs.columns if hasattr(inputs, "columns") else inputs
-    columns = {str(name): np.atleast_1d(np.asarray(inputs[name])) for name in names}
+    columns = {str(name): inputs[name] for name in names}
     if "time" not in columns and getattr(getattr(inputs, "index", None), "name", None) == "time":
-        columns = {"time": np.asarray(inputs.index)} | columns
-    for name, column in columns.items():
-        if column.ndim != 1 or column.dtype.kind not in "fiub":
-            raise SceneError(f"inputs: {name} must be a row of numbers")
-    return {name: tuple(column.astype(float).tolist()) for name, column in columns.items()}
+        columns = {"time": inputs.index} | columns
+    return {name: tuple(row_of_numbers(f"inputs: {name}", column).tolist()) for name, column in columns.items()}
+
+
+def row_of_numbers(name: str, numbers: "ArrayLike") -> "np.ndarray":
+    """Return numbers as an array (n,) of floats; SceneError with their name if they are no row of finite numbers."""
+    import numpy as np
+
+    row = np.atleast_1d(np.asarray(numbers))
+    if row.ndim != 1 or row.dtype.kind not in "fiub":
+        raise SceneError(f"{name} must be a row of numbers")
+    row = row.astype(float)
+    if not np.isfinite(row).all():
+        raise SceneError(f"{name} holds a value that is not a finite number")
+    return row

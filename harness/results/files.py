@@ -37,7 +37,7 @@ def write_csv_rows(path: Path, heads: Sequence[str], rows: Iterable[Sequence[obj
 
 
 def to_json(result: Any) -> str:
-    """Return dataclasses, dicts, lists, texts and numbers as ASCII JSON; nonfinite numbers become null."""
+    """Return dataclasses, dicts, lists, arrays, texts and numbers as ASCII JSON; nonfinite numbers become null."""
     return json.dumps(replace_nonfinite(result), indent=1, allow_nan=False)
 
 
@@ -49,6 +49,8 @@ def replace_nonfinite(result: Any) -> Any:
         return {name: replace_nonfinite(value) for name, value in result.items()}
     if isinstance(result, list | tuple):
         return [replace_nonfinite(value) for value in result]
+    if isinstance(result, np.ndarray):
+        return replace_nonfinite(result.tolist())
     if isinstance(result, Path):
         return str(result)
     return None if isinstance(result, float) and not isfinite(result) else result

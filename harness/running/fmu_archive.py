@@ -131,6 +131,8 @@ def resolve_time_span(spec: RunSpec, description: Any) -> tuple[float, float]:
 
 def resolve_stop(spec: RunSpec, description: Any) -> float | None:
     """Return the stop time of a run in s, or None if neither the specification nor the FMU has one."""
+    if spec.stop is None and len(spec.times):
+        return float(spec.times[-1])
     default_stop = description.defaultExperiment.stopTime if description.defaultExperiment else None
     return spec.stop if spec.stop is not None else None if default_stop is None else float(default_stop)
 

@@ -23,7 +23,15 @@ from ..scenes.scene import SHORT_KEYS
 from .fmu_archive import REQUIRED_VARIABLES, exposes_solver_steps, read_description, resolve_time_span, unpack
 from .fmu_session import CALL_FAILURES, FmuSession, LogCapture, capture_stderr
 from .recorder import Columns, Recorder, ShapedVariable, default_outputs, read_rows
-from .stepping import CoSimulation, TimeGrid, check_inputs, input_signals, step_to_stop
+from .stepping import (
+    POINT_TOLERANCE,
+    CoSimulation,
+    TimeGrid,
+    check_inputs,
+    input_signals,
+    make_grid,
+    step_to_stop,
+)
 from .trajectory import ModeChanges, SolverSteps, Statistics, Trajectory, find_contacts
 from .variable_values import convert_value, effective_value, enumeration_labels, variable_unit
 
@@ -76,9 +84,13 @@ def run(spec: RunSpec, report: ProgressCallback) -> Trajectory:
 
     Raises
     ------
+    SceneError
+        If the specification is not valid.
     HarnessError
         If the run fails and there is nothing to show.
     """
+    if len(spec.times) and spec.interval is not None:
+        raise SceneError("times and interval exclude each other: remove one")
     description = read_description(spec.fmu, spec.lenient)
     spec = replace(spec, outputs=spec.outputs or default_outputs(description, spec.values))
     if not spec.outputs:
@@ -89,7 +101,18 @@ def run(spec: RunSpec, report: ProgressCallback) -> Trajectory:
         from .external import simulation as external
 
         trajectory = external.simulate(spec, description, report)
+    if len(spec.times):
+        return keep_times(trajectory, np.asarray(spec.times, dtype=float))
     return trajectory if spec.interval is None else keep_interval(trajectory, spec.interval)
+
+
+def keep_times(run: Trajectory, times: np.ndarray) -> Trajectory:
+    """Keep the points of a run nearest to times in s, after an event there; the last one if it ends before them all."""
+    reached = times[times <= run.time[-1] + POINT_TOLERANCE * (run.time[-1] - run.time[0])]
+    before = np.searchsorted(run.time, reached, "right") - 1
+    after = np.minimum(before + 1, len(run.time) - 1)
+    rows = np.where(run.time[after] - reached < reached - run.time[before], after, before)
+    return keep_rows(run, rows if len(rows) else np.array([len(run.time) - 1]))
 
 
 def keep_interval(run: Trajectory, interval: float) -> Trajectory:
@@ -98,7 +121,12 @@ def keep_interval(run: Trajectory, interval: float) -> Trajectory:
     near = 1e-9 * interval
     keep = np.abs(start + np.rint((run.time - start) / interval) * interval - run.time) <= near
     keep[-1] = True
-    return replace(run, time=run.time[keep], columns={name: column[keep] for name, column in run.columns.items()})
+    return keep_rows(run, keep)
+
+
+def keep_rows(run: Trajectory, rows: np.ndarray) -> Trajectory:
+    """Keep rows of a run, given by indices or by one Boolean for each."""
+    return replace(run, time=run.time[rows], columns={name: column[rows] for name, column in run.columns.items()})
 
 
 def run_own_fmu(spec: RunSpec, report: ProgressCallback = lambda share: None) -> Trajectory:
@@ -178,7 +206,7 @@ def plan_run(spec: RunSpec, description: Any) -> RunPlan:
             *find_contacts(variables).values(),
         )
         names += [name for name in extra if name in variables and name not in names]
-    return RunPlan(spec, variables, TimeGrid(start, stop, spec.grid or inf), names)
+    return RunPlan(spec, variables, make_grid(spec, start, stop), names)
 
 
 def check_fmu(run: RunSpec, variables: dict[str, Any]) -> None:

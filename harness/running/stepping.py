@@ -7,17 +7,19 @@ signals are a table over time, linear between its rows.
 
 from collections.abc import Callable, Mapping, Sequence
 from ctypes import c_double
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
 from math import inf
 from typing import Any, Protocol
 
 import numpy as np
 
 from ..errors import HarnessError, SceneError, check_names
+from ..scenes.run_spec import RunSpec
 from .fmu_session import FmuSession, TerminatedError
 from .variable_values import REAL_TYPES
 
-Inputs = Mapping[str, Sequence[float]]  # "time" in s, and the values of each input at these times
+Inputs = Mapping[str, Sequence[float] | np.ndarray]  # "time" in s, and the values of each input at these times
 
 TIME = "time"
 POINT_TOLERANCE = 1e-9  # relative to the communication step; times this close coincide
@@ -26,43 +28,107 @@ EVEN_TOLERANCE = 1e-6  # relative to the communication step; the last step may d
 
 @dataclass(frozen=True)
 class TimeGrid:
-    """Communication points from `start` to `stop` at intervals of `h`, in s; infinite for a single interval."""
+    """Communication points from `start` to `stop` at intervals of `h`, in s; infinite for a single interval.
+
+    There are further points at the increasing `times`, in place of points of the intervals that coincide with them.
+    """
 
     start: float
     stop: float
     h: float = inf
+    times: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
     @property
     def duration(self) -> float:
         """Return the time in s from start to stop."""
         return self.stop - self.start
 
-    @property
+    @cached_property
     def tolerance(self) -> float:
         """Return the time in s within which two points coincide."""
+        if len(self.times):
+            return POINT_TOLERANCE * min(self.h, shortest_interval(self.times, self.duration))
         return POINT_TOLERANCE * self.h if self.h < inf else 0.0
 
     @property
     def is_even(self) -> bool:
-        """Return whether the last interval is as long as the others."""
+        """Return whether all intervals are as long as `h`."""
+        return self.has_whole_intervals and not len(self.times)
+
+    @property
+    def has_whole_intervals(self) -> bool:
+        """Return whether the run is a multiple of `h`."""
         return abs(self.start + self.whole_count * self.h - self.stop) < EVEN_TOLERANCE * self.h < inf
 
     @property
     def whole_count(self) -> int:
-        """Return the number of intervals, rounded to the nearest integer."""
+        """Return the number of intervals `h`, rounded to the nearest integer."""
         return max(1, round(self.duration / self.h))
+
+    @property
+    def count(self) -> int:
+        """Return the number of intervals `h`, and of a shorter one at the end if there is one."""
+        has_remainder = self.start + self.whole_count * self.h < self.stop and not self.has_whole_intervals
+        return self.whole_count + has_remainder
+
+    @cached_property
+    def points(self) -> np.ndarray:
+        """Return all points (n,) in s."""
+        first, end = np.searchsorted(self.times, [self.start + self.tolerance, self.stop - self.tolerance])
+        points = np.concatenate([[self.start], self.times[first:end], [self.stop]])
+        return merge_points(points, self.start + self.h * np.arange(1, self.count), self.tolerance)
 
     @property
     def point_at(self) -> Callable[[int], float]:
         """Return a function that returns the i-th point after the start; `stop` for the last and all after it."""
-        start, stop, h = self.start, self.stop, self.h
-        has_remainder = start + self.whole_count * h < stop and not self.is_even
-        count = self.whole_count + has_remainder
+        start, stop, h, count = self.start, self.stop, self.h, self.count
+        if len(self.times):
+            points, last = self.points.tolist(), len(self.points) - 1
+            return lambda i: points[min(i, last)]
         return lambda i: stop if i >= count else start + i * h
 
     def progress(self, t: float) -> float:
         """Return the progress at a time, from 0 to 1."""
         return (t - self.start) / self.duration
+
+
+def shortest_interval(times: np.ndarray, single: float = inf) -> float:
+    """Return the shortest interval in s between increasing times (n,), or `single` without an interval."""
+    return float(np.diff(times).min(initial=single))
+
+
+def merge_points(points: np.ndarray, others: np.ndarray, tolerance: float) -> np.ndarray:
+    """Return increasing points in s and those of increasing others that are farther than a tolerance in s from them."""
+    if not len(others):
+        return points
+    neighbours = np.concatenate([[-inf], points, [inf]])
+    after = np.searchsorted(points, others)
+    gap = np.minimum(others - neighbours[after], neighbours[after + 1] - others)
+    return np.sort(np.concatenate([points, others[gap > tolerance]]))
+
+
+def make_grid(spec: RunSpec, start: float, stop: float) -> TimeGrid:
+    """Return the communication points of a run from start to stop in s, with those that its `times` add.
+
+    Raises
+    ------
+    SceneError
+        If the times do not increase or are outside the run.
+    """
+    h = spec.grid or ((stop - start) / spec.equal_steps if spec.equal_steps else inf)
+    times = np.asarray(spec.times, dtype=float)
+    if not len(times):
+        return TimeGrid(start, stop, h)
+    shortest = shortest_interval(times, stop - start)
+    if not shortest > 0.0:
+        raise SceneError("times must increase: sort them, and remove those that occur twice")
+    for t in times[[0, -1]].tolist():
+        if not start <= t <= stop:
+            raise SceneError(f"times has {t!r} s, outside the run from {start!r} s to {stop!r} s")
+    if TIME in spec.inputs:
+        rows = np.unique(np.asarray(spec.inputs[TIME], dtype=float))
+        times = merge_points(times, rows[(start < rows) & (rows < stop)], POINT_TOLERANCE * shortest)
+    return TimeGrid(start, stop, h, times)
 
 
 class Stepper(Protocol):

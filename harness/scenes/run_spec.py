@@ -5,15 +5,21 @@ from dataclasses import dataclass, field
 from inspect import get_annotations
 from math import inf
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from .roles import find_roles
-from .schema import FLAG, NAMES, NUMBER, POSITIVE, TABLE, TEXT, Constraint, is_whole, parse_table
+from .schema import FLAG, NAMES, NUMBER, POSITIVE, TABLE, TEXT, TIMES, Constraint, is_whole, parse_table
 
 DEFAULT_EQUAL_STEPS = 4096  # communication steps of a run that names neither a grid nor whether to follow the solver
 MAX_REPEATS = 1000
 NATURAL_NUMBER = Constraint(lambda value: is_whole(value, 0, inf), "a whole number of at least 0")
 REPEAT_COUNT = Constraint(lambda value: is_whole(value, 1, MAX_REPEATS), f"a whole number from 1 to {MAX_REPEATS}")
+if TYPE_CHECKING:
+    import numpy as np
+
+    Numbers = tuple[float, ...] | np.ndarray
+else:
+    Numbers = tuple[Annotated[float, NUMBER], ...]  # in files; an import of numpy would take time in every command
 
 
 @dataclass(frozen=True)
@@ -30,12 +36,15 @@ class RunSpec:
         Outputs to record.
     values : dict
         Values to set by variable name; enumerations by label or number.
-    inputs : dict
-        Table of input signals: the column "time" in s and one column for each input.
+    inputs : mapping
+        Table of input signals: the column "time" in s and one column for each input, tuples or arrays.
     start, stop : float or None
-        Start and stop in s; None for those of the FMU.
+        Start and stop in s; None for those of the FMU, or for a stop at the last of the `times`.
     grid : float or None
         Communication step in s.
+    times : tuple of float, or numpy.ndarray
+        Increasing times in s to keep; empty to keep every point. Communication steps end there and at the rows of the
+        inputs too.
     equal_steps : int
         Number of equal communication steps if there is no `grid`.
     interval : float or None
@@ -58,10 +67,11 @@ class RunSpec:
     fmu: Annotated[Path, TEXT]
     outputs: Annotated[tuple[str, ...], NAMES] = ()
     values: Annotated[dict[str, Any], TABLE] = field(default_factory=dict)
-    inputs: dict[str, tuple[Annotated[float, NUMBER], ...]] = field(default_factory=dict)
+    inputs: Mapping[str, Numbers] = field(default_factory=dict)
     start: Annotated[float | None, NUMBER] = None
     stop: Annotated[float | None, NUMBER] = None
     grid: Annotated[float | None, POSITIVE] = None
+    times: Annotated[Numbers, TIMES] = ()
     equal_steps: Annotated[int, NATURAL_NUMBER] = 0
     interval: Annotated[float | None, POSITIVE] = None
     follow: Annotated[bool, FLAG] = True
@@ -92,5 +102,5 @@ class RunSpec:
         return find_roles(self.outputs)
 
 
-# keys of a scene file that are those of its run; the FMU has other keys, and a scene keeps every point
+# keys of a scene file that are those of its run; the FMU has other keys, and a scene keeps every point or its `times`
 SCENE_KEYS = tuple(name for name in get_annotations(RunSpec) if name not in ("fmu", "equal_steps", "interval"))

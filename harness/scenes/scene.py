@@ -8,6 +8,7 @@
     rtol, atol, h_max         solver.rtol, solver.atol (m), solver.h_max (s); default: those of the FMU
     outputs = ["x", "v"]      columns to record
     grid                      communication step in s
+    times = [0.0, 0.1, 0.3]   times in s to record, and no others; the run stops at the last one without a stop
     follow = true             step to the ends of internal steps as well; without a grid: to these only
                               default without follow and grid: 4096 equal steps and the internal steps
     repeat = 3                run several times and report the shortest run time
@@ -250,8 +251,8 @@ def check_requirements(scene: Scene) -> None:
                     raise SceneError(f"the {category} '{name}' needs the {role}: add {candidates} to the outputs")
             if name == "steps" and not run.follow:
                 raise SceneError(f"the {category} 'steps' needs follow = true, or no grid")
-    if not run.follow and run.grid is None:
-        raise SceneError("follow = false needs a grid: set the communication step, as in grid = 0.01")
+    if not run.follow and run.grid is None and not len(run.times):
+        raise SceneError("follow = false needs a grid: set the communication step, as in grid = 0.01, or times")
     if ("decay" in scene.analyses) != (scene.decay.gives is not None):
         raise SceneError(
             "the analysis 'decay' needs the table [decay] with gives = 'zeta', 'f' or 'T_f', and vice versa"

@@ -6,9 +6,10 @@ imported with the first table that is read, because many commands read none and 
 """
 
 import tomllib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, fields, is_dataclass
 from functools import cache
+from itertools import pairwise
 from math import isfinite
 from pathlib import Path
 from types import GenericAlias
@@ -62,11 +63,17 @@ def is_names(value: object) -> bool:
     return isinstance(value, list) and all(map(is_text, value)) and len(set(value)) == len(value)
 
 
+def is_increasing(value: object) -> bool:
+    """Return whether a value is a list of increasing finite numbers."""
+    return isinstance(value, list) and all(map(is_number, value)) and all(a < b for a, b in pairwise(value))
+
+
 TITLE = Constraint(is_title, f"a text of one line and at most {MAX_TITLE_LENGTH} characters")
 TEXT = Constraint(is_text, "a text")
 NUMBER = Constraint(is_number, "a finite number")
 POSITIVE = Constraint(lambda value: is_number(value) and value > 0, "a finite number above 0")
 NAMES = Constraint(is_names, "a list of distinct names")
+TIMES = Constraint(is_increasing, "a list of increasing finite numbers")
 FLAG = Constraint(lambda value: isinstance(value, bool), "true or false")
 TABLE = Constraint(lambda value: isinstance(value, dict), "a table")
 LIST = Constraint(lambda value: isinstance(value, list), "a list")
@@ -82,6 +89,7 @@ def converter() -> "Converter":
     hooks: tuple[tuple[Any, Any], ...] = (
         (is_dataclass, make_table_hook),
         (has_origin(dict), make_mapping_hook),
+        (has_origin(Mapping), make_mapping_hook),
         (has_origin(tuple), make_list_hook),
         (find_constraint, make_value_hook),
     )
@@ -133,7 +141,8 @@ def make_mapping_hook(annotation: Any) -> Hook:
     """Return a hook for a table with arbitrary keys and values of one type."""
     from cattrs.gen import make_mapping_structure_fn
 
-    return make_checked_hook(TABLE, make_mapping_structure_fn(annotation, converter()))
+    table_type: Any = GenericAlias(dict, get_args(annotation))
+    return make_checked_hook(TABLE, make_mapping_structure_fn(table_type, converter()))
 
 
 def make_list_hook(annotation: Any) -> Hook:

@@ -37,6 +37,8 @@ WAYS = {  # arguments of harness.simulate
     "interval": {"source": "coulomb", "interval": 0.25, "stop": 2.0, "outputs": ["x"]},
     "inputs": {"source": "smd", "inputs": INPUTS, "stop": 2.0},
     "inputs at an interval": {"source": "smd", "inputs": INPUTS, "stop": 2.0, "interval": 0.1},
+    "times": {"source": "stickslip", "times": [0.3, 0.55, 0.9, 4.0], "inputs": INPUTS},
+    "external at times": {"source": "{external}/Midpoint.fmu", "times": [0.3, 0.55, 1.0], "rtol": 1e-3},
     "scene": {"source": "mine.toml"},
     "native": {"source": "{native}/pendulum.fmu", "values": {"pin_load": "reaction"}},
     "fmi3": {"source": "{fmi3}/smd.fmu", "stop": 1.0},

@@ -71,6 +71,8 @@ def test_a_scene_without_plots_shows_its_outputs(tmp_path, outputs, plots):
         ({"rtol": "0"}, "rtol = 0 is not a finite number above 0"),
         ({"repeat": "true"}, "repeat = True is not a whole number from 1 to 1000"),
         ({"follow": "false"}, "follow = false needs a grid"),
+        ({"times": "[0.0, 1.0, 1.0]"}, "times = [0.0, 1.0, 1.0] is not a list of increasing finite numbers"),
+        ({"times": "0.5"}, "times = 0.5 is not a list of increasing finite numbers"),
         ({"grid": "0.1", "analyses": '["steps"]'}, "the analysis 'steps' needs follow = true"),
         ({"outputs": '["x"]', "plots": '["phase"]'}, "the plot 'phase' needs the velocity: add v or omega"),
         ({"analyses": '["decay"]'}, "the table [decay] with gives"),

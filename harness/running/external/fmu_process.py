@@ -3,6 +3,7 @@
 import os
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,7 @@ from ...scenes.run_spec import RunSpec
 from ..fmu_session import STATUS_NAMES, FmuSession, LogCapture, StepError, StepRefusedError, TerminatedError
 from ..model_exchange import ModelExchange
 from ..recorder import Recorder, StringTable, read_rows, select_variables
-from ..stepping import CoSimulation, Stepper, TimeGrid, input_signals, step_to_stop
+from ..stepping import CoSimulation, Stepper, input_signals, make_grid, step_to_stop
 from .step_refinement import (
     ROWS_PREFIX,
     STRINGS_FILE,
@@ -97,7 +98,7 @@ class ExternalFmu:
     def record(self, path: Path, log: LogCapture, h: float, tolerance: float) -> None:
         """Run a new instance and record its rows; exceptions propagate."""
         span = coarsest_grid(self.spec)
-        grid = TimeGrid(span.start, span.stop, h)
+        grid = make_grid(replace(self.spec, grid=h), span.start, span.stop)
         session = FmuSession(self.description, self.folder, self.spec.exchange, log=log)
         session.initialize(self.settings, grid.start, grid.stop, tolerance)
         signals = input_signals(self.spec.inputs, session)

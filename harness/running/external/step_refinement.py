@@ -77,7 +77,8 @@ def refine(spec: RunSpec, description: Any, run: RunFunction) -> RefinementResul
     run : callable
         Runs the FMU with a communication step in s and a tolerance; returns a RefinementRun.
     """
-    duration, requested_step = coarsest_grid(spec).duration, None if spec.follow else spec.grid
+    duration = coarsest_grid(spec).duration
+    requested_step = None if spec.follow else spec.grid or (inf if len(spec.times) else None)
     if spec.exchange:
         return refine_tolerance(spec, requested_step or whole_fraction(spec, MIN_OUTPUT_STEPS), run)
     fixed_step = declared_step(description)
@@ -86,7 +87,8 @@ def refine(spec: RunSpec, description: Any, run: RunFunction) -> RefinementResul
         return accept_run(result, f"declared fixed internal step of {fixed_step:g} s, error unknown")
     if requested_step:
         result = run(requested_step, solver_tolerance(spec))
-        return accept_run(result, f"requested communication step of {requested_step:g} s, error unknown")
+        requested = f"step of {requested_step:g} s" if requested_step < inf else "times"
+        return accept_run(result, f"requested communication {requested}, error unknown")
     answer = refine_steps(spec, run)
     default_step = description.defaultExperiment.stepSize if description.defaultExperiment else None
     if answer.run_number is None and default_step:  # no run advanced by a step
