@@ -51,14 +51,13 @@ def is_same_model(fmu: Path, other: Path) -> bool:
     """
     if not declared_variables(fmu) <= declared_variables(other):
         return False
-    outputs = [
-        name for name, variable in real_variables(read_description(fmu)).items() if variable.causality == "output"
-    ]
-    t = np.linspace(0.0, resolve_stop(RunSpec(fmu), read_description(fmu)) or 1.0, COMPARED_POINTS)
+    variables = real_variables(read_description(fmu))
+    outputs = tuple(name for name, variable in variables.items() if variable.causality == "output")
+    times = np.linspace(0.0, resolve_stop(RunSpec(fmu), read_description(fmu)) or 1.0, COMPARED_POINTS)
     runs = []
     for path in (fmu, other):
-        with open_simulator(RunSpec(path)) as simulator:
-            runs.append(simulator.simulate({}, t, outputs, {}))
+        with open_simulator(RunSpec(path, outputs, times=times, follow=False)) as simulator:
+            runs.append(simulator.prepare(simulator.spec)({}))
     one, two = runs
     return one is not None and two is not None and np.allclose(one, two, rtol=AGREEMENT, atol=AGREEMENT)
 

@@ -10,7 +10,7 @@ from ctypes import c_double
 from dataclasses import dataclass, field
 from functools import cached_property
 from math import inf
-from typing import Any, Protocol
+from typing import Any, Literal, Protocol
 
 import numpy as np
 
@@ -229,6 +229,35 @@ def check_inputs(inputs: Inputs, variables: Mapping[str, Any]) -> None:
             raise SceneError(f"inputs: {name} holds a value that is not a finite number")
     if (np.diff(inputs[TIME]) < 0).any():
         raise SceneError("inputs: the time falls; sort the rows by time")
+
+
+def values_of_steps(inputs: Inputs, points: np.ndarray) -> np.ndarray:
+    """Return the inputs (n, inputs) of a run: those at the start, and the means of the two ends of each step.
+
+    Parameters
+    ----------
+    inputs : mapping
+        The table, as `check_inputs` describes it.
+    points : numpy.ndarray
+        Communication points (n,) in s; all times of the table in between are among them.
+    """
+    time = np.asarray(inputs.get(TIME, ()), dtype=float)
+    columns = [np.asarray(column, dtype=float) for name, column in inputs.items() if name != TIME]
+    values = np.empty((len(points), len(columns)))
+    for j, column in enumerate(columns):
+        begin, end = interpolate(time, column, points[:-1], "right"), interpolate(time, column, points[1:], "left")
+        values[0, j], values[1:, j] = begin[0], 0.5 * (begin + end)
+    return values
+
+
+def interpolate(time: np.ndarray, column: np.ndarray, points: np.ndarray, side: Literal["left", "right"]) -> np.ndarray:
+    """Return a column over time (n,) in s at points (m,) in s; at a jump the value on its left or right side."""
+    after = np.searchsorted(time, points, side)
+    before, after = np.maximum(after - 1, 0), np.minimum(after, len(time) - 1)
+    interval = time[after] - time[before]  # 0 before and after the table
+    share = np.divide(points - time[before], interval, out=np.zeros(len(points)), where=interval > 0)
+    interpolated: np.ndarray = (1.0 - share) * column[before] + share * column[after]
+    return interpolated
 
 
 def input_signals(inputs: Inputs, session: FmuSession) -> "InputSignals | None":

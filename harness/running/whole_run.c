@@ -1,8 +1,8 @@
 /* One co-simulation run in one call: sets values, initializes, steps over the given times and reads outputs.
  *
  * The instance is new or has been reset. The functions of the FMU are passed as pointers, so the library links nothing
- * but the C library. Of the inputs u (n, n_in), each step gets the mean of its two ends. The outputs y are read at
- * every `stride`-th time. The result is 0, REFUSED if the FMU does not initialize, FAILED if a later call fails or an
+ * but the C library. Of the inputs u (n, n_in), the first row is set at the start, and each other one before the step to
+ * its time. The outputs y are read at the times that are `kept`. The result is 0, REFUSED if the FMU does not initialize, FAILED if a later call fails or an
  * output is not finite, or TOO_SLOW after `limit` seconds of processor time.
  */
 #include <math.h>
@@ -12,7 +12,7 @@
 #include <time.h>
 
 enum { REFUSED = 1, FAILED, TOO_SLOW };
-enum { WARNING = 1, MAX_INPUTS = 64, STEPS_PER_CHECK = 128 };
+enum { WARNING = 1, STEPS_PER_CHECK = 128 };
 
 typedef void *Instance;
 typedef uint32_t Reference;
@@ -93,17 +93,21 @@ static bool step(const Fmu *fmu, double t, double h)
 }
 
 int run(const Fmu *fmu, const Variables *parameters, const Variables *inputs, const Variables *outputs,
-        const double *t, size_t n, size_t stride)
+        const double *t, const bool *kept, size_t n)
 {
-    double held[MAX_INPUTS], *y = outputs->values;
+    double *y = outputs->values;
     const double *u = inputs->values;
     clock_t begun = clock();
     if (!initialize(fmu, parameters, inputs, t[0], t[n - 1])) return REFUSED;
-    if (!get(fmu, outputs, y)) return FAILED;
-    for (size_t i = 0; i + 1 < n; i++, u += inputs->count) {
-        for (size_t j = 0; j < inputs->count; j++) held[j] = 0.5 * (u[j] + u[j + inputs->count]);
-        if (!set(fmu, inputs, held) || !step(fmu, t[i], t[i + 1] - t[i])) return FAILED;
-        if ((i + 1) % stride == 0 && !get(fmu, outputs, y += outputs->count)) return FAILED;
+    for (size_t i = 0; i < n; i++) {
+        if (i > 0) {
+            u += inputs->count;
+            if (!set(fmu, inputs, u) || !step(fmu, t[i - 1], t[i] - t[i - 1])) return FAILED;
+        }
+        if (kept[i]) {
+            if (!get(fmu, outputs, y)) return FAILED;
+            y += outputs->count;
+        }
         if (i % STEPS_PER_CHECK == 0 && (double)(clock() - begun) > fmu->limit * CLOCKS_PER_SEC) return TOO_SLOW;
     }
     return 0;

@@ -1,19 +1,21 @@
-"""Repeated co-simulation runs of one FMU at given times, each in one call of a compiled loop.
+"""Co-simulation runs of one FMU that differ in values only, each in one call of a compiled loop.
 
 The loop (whole_run.c) is compiled by the package ziglang or the system's compiler. Without either, the same calls are
 made from Python, which takes about thirty times as long. The FMU is instantiated once and reset before each run.
 """
 
+import json
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
-from ctypes import CDLL, Structure, addressof, byref, c_double, c_int, c_size_t, c_uint32, c_void_p, cast
+from ctypes import CDLL, Array, Structure, addressof, byref, c_double, c_int, c_size_t, c_uint32, c_void_p, cast
 from dataclasses import dataclass
 from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
 from time import process_time
 from typing import Any
+from weakref import finalize
 
 import numpy as np
 
@@ -21,10 +23,18 @@ from ..errors import HarnessError
 from ..process.child_process import ChildError, ChildProcess
 from ..process.subprocess_runner import run_subprocess
 from ..process.temporary_directory import temporary_directory
+from ..results.files import replace_nonfinite
 from ..scenes.run_spec import RunSpec
 from .c_host import COMPILER
-from .fmu_archive import PROCESS_RESOURCES, exposes_solver_steps, read_description, unpack_once
+from .fmu_archive import (
+    PROCESS_RESOURCES,
+    exposes_solver_steps,
+    read_description,
+    resolve_time_span,
+    unpack_once,
+)
 from .fmu_session import CALL_FAILURES, FmuSession, capture_stderr
+from .stepping import TIME, make_grid, values_of_steps
 from .variable_values import REAL_TYPES, effective_value, find_bound, variable_unit
 
 SOURCE = Path(__file__).with_name("whole_run.c")
@@ -34,9 +44,7 @@ FUNCTIONS = {  # in the order of the structs in whole_run.c
 }
 # without the runtime of the compiler, which would have to be built first
 OPTIONS = ("-std=c99", "-O2", "-shared", "-fPIC", "-nostdlib", "-lc")
-MAX_INPUTS = 64  # of whole_run.c
 STEPS_PER_CHECK = 16
-MAX_PREPARED = 64
 BUSY_TIME = 20.0  # s that a run in a child process may take beyond its processor time, on a busy machine
 
 
@@ -52,6 +60,9 @@ class VariablesStruct(Structure):
     _fields_ = (("references", c_void_p), ("count", c_size_t), ("values", c_void_p))
 
 
+Run = Callable[[Mapping[str, float]], np.ndarray | None]  # outputs of a run with values; None if the FMU refuses them
+
+
 @dataclass(frozen=True)
 class RealVariable:
     """A scalar Real of an FMU. Start value and bounds are None if the FMU declares none."""
@@ -63,168 +74,184 @@ class RealVariable:
     unit: str
 
 
-@dataclass(frozen=True)
-class RunRequest:
-    """A run: values to set, communication points (n,) in s, outputs to read at every `stride`-th point, inputs (n,).
-
-    The arrays of a request do not change: the structs of whole_run.c keep copies of them for runs with other values.
-    """
-
-    values: Mapping[str, float]
-    t: np.ndarray
-    outputs: Sequence[str]
-    inputs: Mapping[str, np.ndarray]
-    stride: int = 1
-
-
-class RepeatedRun:
-    """A session that is reset and run again and again.
+class RunSession:
+    """A session that is reset before each run.
 
     Parameters
     ----------
-    shared : RunSpec
-        The FMU, values of variables of any type, which all runs share, and the seconds of processor time that one run
-        may take.
+    fmu : pathlib.Path
+    limit : float
+        Processor time in s that one run may take.
     """
 
-    def __init__(self, shared: RunSpec) -> None:
+    def __init__(self, fmu: Path, limit: float) -> None:
         try:
-            session = self.session = FmuSession(read_description(shared.fmu), unpack_once(shared.fmu))
+            session = self.session = FmuSession(read_description(fmu), unpack_once(fmu))
         except HarnessError as error:
-            raise HarnessError(f"{shared.fmu.name} cannot be loaded: {error}") from None
-        self.limit, self.loop, self.is_new = shared.timeout, compile_loop(), True
-        self.settings = [(session.variables[name], value) for name, value in shared.values.items()]
-        self.prepared: dict[tuple[Any, ...], PreparedRun] = {}
+            raise HarnessError(f"{fmu.name} cannot be loaded: {error}") from None
+        self.limit, self.loop, self.is_new = limit, compile_loop(), True
         version = session.description.fmiVersion
         self.functions = (c_void_p * len(FUNCTIONS[version]))(
             *(cast(session.function(name), c_void_p) for name in FUNCTIONS[version])
         )
-        self.handle = FmuStruct(int(version[0]), cast(self.functions, c_void_p), session.instance, self.limit)
+        self.references: dict[tuple[str, ...], Array[c_uint32]] = {}
+        self.handle = FmuStruct(int(version[0]), cast(self.functions, c_void_p), session.instance, limit)
 
-    def run(self, request: RunRequest) -> np.ndarray | None:
-        """Return the outputs (1 + (n - 1)//stride, outputs), or None if the FMU refuses the values or is too slow."""
-        try:
-            if not self.is_new:
-                self.session.reset()
-            self.is_new = False
-            for variable, value in self.settings:
-                self.session.set(variable, value)
-            return self.run_compiled(self.loop, request) if self.loop else self.run_in_python(request)
-        except (*CALL_FAILURES, RunTimeError):
-            return None
+    def prepare(self, spec: RunSpec) -> Run:
+        """Prepare runs that differ in Reals only."""
+        return PreparedRun(spec, self).run
 
-    def run_compiled(self, loop: CDLL, request: RunRequest) -> np.ndarray:
-        """Run the compiled loop; raise RunTimeError if it does not end well."""
-        key = (tuple(request.values), id(request.t), tuple(map(id, request.inputs.values())), *request.outputs)
-        prepared = self.prepared.get(key)
-        if prepared is None or prepared.request.stride != request.stride:
-            if len(self.prepared) >= MAX_PREPARED:
-                self.prepared.clear()
-            prepared = self.prepared[key] = PreparedRun(request, self.handle, self.session)
-        prepared.x[:-1] = [*request.values.values()]
-        if loop.run(*prepared.arguments):
-            raise RunTimeError
-        return prepared.y.copy()
+    def reset(self) -> None:
+        """Reset the instance if it is not new."""
+        if not self.is_new:
+            self.session.reset()
+        self.is_new = False
 
-    def run_in_python(self, request: RunRequest) -> np.ndarray:
-        """Make the calls of whole_run.c from Python."""
-        y = np.empty(((len(request.t) - 1) // request.stride + 1, len(request.outputs)))
-        session, t, begun = self.session, request.t.tolist(), process_time()
-        inputs = [session.variables[name] for name in request.inputs]
-        u = np.stack([*request.inputs.values()], axis=1) if inputs else np.zeros((len(t), 0))
-        held = (0.5 * (u[:-1] + u[1:])).tolist()
-        values = [(session.variables[name], value) for name, value in request.values.items()]
-        session.initialize([*values, *zip(inputs, u[0].tolist(), strict=True)], t[0], t[-1])
-        y[0] = [session.get(name) for name in request.outputs]
-        for i in range(len(t) - 1):
-            for variable, value in zip(inputs, held[i], strict=True):
-                session.set(variable, value)
-            session.step(t[i], t[i + 1] - t[i])
-            if (i + 1) % request.stride == 0:
-                y[(i + 1) // request.stride] = [session.get(name) for name in request.outputs]
-            if i % STEPS_PER_CHECK == 0 and process_time() - begun > self.limit:
-                raise RunTimeError
-        if not np.isfinite(y).all():
-            raise RunTimeError
-        return y
+    def make_struct(self, names: tuple[str, ...], values: np.ndarray) -> VariablesStruct:
+        """Return the struct of variables, whose value references are kept, and of their values."""
+        if names not in self.references:
+            references = [self.session.variables[name].valueReference for name in names]
+            self.references[names] = (c_uint32 * len(names))(*references)
+        return VariablesStruct(addressof(self.references[names]), len(names), values.ctypes.data)
+
+    def close(self) -> None:
+        """Free the instance."""
+        self.session.close()
 
 
 class PreparedRun:
-    """A request as whole_run.c receives it: for runs that differ in values only, all but the values stays.
+    """A run as whole_run.c receives it: for runs that differ in Reals only, all but their values stays.
+
+    Parameters
+    ----------
+    spec : RunSpec
+        Its steps end at the communication points only: it does not follow the solver.
+    runs : RunSession
 
     Attributes
     ----------
-    x, y : numpy.ndarray
-        Values to set, and one more; outputs (1 + (n - 1)//stride, outputs).
-    arguments : tuple
-        Arguments of the function `run` of whole_run.c.
+    t : numpy.ndarray
+        Communication points (n,) in s.
+    kept : numpy.ndarray
+        Whether the outputs are read at each of them (n,).
+    u : numpy.ndarray
+        Inputs (n, inputs) at the start, and of each step.
+    y : numpy.ndarray
+        Outputs (kept points, outputs).
     """
 
-    def __init__(self, request: RunRequest, handle: FmuStruct, session: FmuSession) -> None:
-        self.request = request  # whose arrays must live on: their addresses identify this object
-        self.x, self.t = np.zeros(len(request.values) + 1), np.ascontiguousarray(request.t, dtype=float)
-        self.u = np.stack([*request.inputs.values()], axis=1).astype(float) if request.inputs else self.x
-        self.y = np.empty(((len(self.t) - 1) // request.stride + 1, len(request.outputs)))
+    def __init__(self, spec: RunSpec, runs: RunSession) -> None:
+        assert not spec.follow
+        self.runs, session = runs, runs.session
+        self.settings = [(session.variables[name], value) for name, value in spec.values.items()]
+        start, stop = resolve_time_span(spec, session.description)
+        grid = make_grid(spec, start, stop)
+        self.t = grid.points
+        self.kept = np.full(len(self.t), len(spec.times) in (0, len(self.t)))
+        if not self.kept[0]:
+            self.kept[np.searchsorted(self.t, np.asarray(spec.times, dtype=float) - grid.tolerance)] = True
+        self.u = values_of_steps(spec.inputs, self.t)
+        self.y = np.empty((np.count_nonzero(self.kept), len(spec.outputs)))
+        self.outputs, self.inputs = spec.outputs, tuple(name for name in spec.inputs if name != TIME)
+        self.names: tuple[str, ...] | None = None
+
+    def name_values(self, names: tuple[str, ...]) -> None:
+        """Prepare for values of the variables of these names."""
+        self.names, self.x = names, np.zeros(len(names))
         self.structs = [
-            make_struct([session.variables[name].valueReference for name in names], array)
-            for names, array in ((request.values, self.x), (request.inputs, self.u), (request.outputs, self.y))
+            self.runs.make_struct(*variables)
+            for variables in ((names, self.x), (self.inputs, self.u), (self.outputs, self.y))
         ]
-        pointers = [byref(handle), *(byref(struct) for struct, _ in self.structs), c_void_p(self.t.ctypes.data)]
-        self.arguments = (*pointers, c_size_t(len(self.t)), c_size_t(request.stride))
+        pointers = [byref(self.runs.handle), *map(byref, self.structs)]
+        arrays = [c_void_p(array.ctypes.data) for array in (self.t, self.kept)]
+        self.arguments = (*pointers, *arrays, c_size_t(len(self.t)))
 
+    def run(self, values: Mapping[str, float]) -> np.ndarray | None:
+        """Return the outputs (kept points, outputs); None if the FMU refuses the values or is too slow."""
+        if tuple(values) != self.names:
+            self.name_values(tuple(values))
+        self.x[:] = [*values.values()]
+        try:
+            self.runs.reset()
+            for variable, value in self.settings:
+                self.runs.session.set(variable, value)
+            if self.runs.loop is None:
+                self.run_in_python()
+            elif self.runs.loop.run(*self.arguments):
+                return None
+        except (*CALL_FAILURES, RunTimeError):
+            return None
+        return self.y.copy()
 
-def make_struct(references: Sequence[int], array: np.ndarray) -> tuple[VariablesStruct, Any]:
-    """Return the struct of variables and their values, and the references, which must live as long."""
-    array_of_references = (c_uint32 * max(len(references), 1))(*references)
-    return VariablesStruct(addressof(array_of_references), len(references), array.ctypes.data), array_of_references
+    def run_in_python(self) -> None:
+        """Make the calls of whole_run.c from Python; raise RunTimeError if the run does not end well."""
+        session, t, begun = self.runs.session, self.t.tolist(), process_time()
+        inputs = [session.variables[name] for name in self.inputs]
+        assert self.names is not None
+        start = [*zip(self.names, self.x.tolist(), strict=True), *zip(self.inputs, self.u[0].tolist(), strict=True)]
+        session.initialize([(session.variables[name], value) for name, value in start], t[0], t[-1])
+        rows = iter(self.y)
+        for i in range(len(t)):
+            if i:
+                for variable, value in zip(inputs, self.u[i].tolist(), strict=True):
+                    session.set(variable, value)
+                session.step(t[i - 1], t[i] - t[i - 1])
+            if self.kept[i]:
+                next(rows)[:] = [session.get(name) for name in self.outputs]
+            if i % STEPS_PER_CHECK == 0 and process_time() - begun > self.runs.limit:
+                raise RunTimeError
+        if not np.isfinite(self.y).all():
+            raise RunTimeError
 
 
 class RunTimeError(Exception):
     """A run does not reach its end in time, or outputs are not finite."""
 
 
-class IsolatedRun:
+class ChildSession:
     """Runs of an external FMU in a child process, which is replaced when it crashes or exceeds the time limit.
 
-    Arrays are exchanged by files in `folder`.
+    Parameters
+    ----------
+    spec : RunSpec
+        What all runs share.
+    folder : pathlib.Path
+        Folder for specifications and results.
     """
 
-    def __init__(self, shared: RunSpec, folder: Path) -> None:
-        self.process, self.shared, self.folder = ChildProcess(f"{__package__}.whole_run_process"), shared, folder
-        self.timeout = shared.timeout + BUSY_TIME
-        self.files: dict[int, tuple[np.ndarray, Path]] = {}
-        self.n_files = 0
+    def __init__(self, spec: RunSpec, folder: Path) -> None:
+        self.process, self.folder, self.n_files = ChildProcess(f"{__package__}.whole_run_process"), folder, 0
+        self.timeout = spec.timeout + BUSY_TIME
         try:
-            self.process.ask({"shared": shared, "run": None}, self.timeout)
+            self.process.ask({"fmu": spec.fmu, "limit": spec.timeout}, self.timeout)
         except ChildError:
-            raise HarnessError(f"{shared.fmu.name} cannot be loaded: it crashes or hangs") from None
+            raise HarnessError(f"{spec.fmu.name} cannot be loaded: it crashes or hangs") from None
 
-    def store(self, array: np.ndarray) -> Path:
-        """Return the file of an array of a request, which is written once."""
-        if id(array) not in self.files:
-            if len(self.files) >= MAX_PREPARED:
-                for _, path in self.files.values():
-                    path.unlink()
-                self.files.clear()
-            path = self.folder / f"{self.n_files}.npy"
-            np.save(path, array)
-            self.files[id(array)] = array, path
-            self.n_files += 1
-        return self.files[id(array)][1]
-
-    def run(self, request: RunRequest) -> np.ndarray | None:
-        """Return the outputs, or None if the FMU refuses the values, crashes or is too slow."""
-        inputs = {name: self.store(column) for name, column in request.inputs.items()}
-        run = {**vars(request), "t": self.store(request.t), "inputs": inputs}
-        try:
-            results = self.process.ask({"shared": self.shared, "run": run, "folder": self.folder}, self.timeout)
-        except ChildError:
-            return None
-        return np.load(results) if results else None
+    def prepare(self, spec: RunSpec) -> Run:
+        """Prepare runs that differ in Reals only."""
+        return ChildRun(spec, self).run
 
     def close(self) -> None:
         """End the child process."""
         self.process.kill()
+
+
+class ChildRun:
+    """A run in a child process, which reads its specification from a file."""
+
+    def __init__(self, spec: RunSpec, runs: ChildSession) -> None:
+        self.runs, self.path = runs, runs.folder / f"{runs.n_files}.json"
+        runs.n_files += 1
+        self.path.write_text(json.dumps(replace_nonfinite(spec)), encoding="utf-8")
+        finalize(self, self.path.unlink, missing_ok=True)
+
+    def run(self, values: Mapping[str, float]) -> np.ndarray | None:
+        """Return the outputs (kept points, outputs); None if the FMU refuses the values, crashes or is too slow."""
+        try:
+            results = self.runs.process.ask({"spec": self.path, "values": values}, self.runs.timeout)
+        except ChildError:
+            return None
+        return np.load(results) if results else None
 
 
 class Simulator:
@@ -232,74 +259,69 @@ class Simulator:
 
     Attributes
     ----------
-    name : str
+    spec : RunSpec
+        What all runs share.
     variables : dict of RealVariable
         The scalar Reals of the FMU by name.
     n_runs : int
         Number of runs so far.
     """
 
-    def __init__(self, name: str, variables: Mapping[str, RealVariable], runner: RepeatedRun | IsolatedRun) -> None:
-        self.name, self.variables, self.runner, self.n_runs = name, variables, runner, 0
+    def __init__(
+        self, spec: RunSpec, variables: Mapping[str, RealVariable], session: "RunSession | ChildSession"
+    ) -> None:
+        self.spec, self.variables, self.session, self.n_runs = spec, variables, session, 0
 
-    def simulate(
-        self,
-        values: Mapping[str, float],
-        t: np.ndarray,
-        outputs: Sequence[str],
-        inputs: Mapping[str, np.ndarray],
-        stride: int = 1,
-    ) -> np.ndarray | None:
-        """Run from t[0] to t[-1].
+    def prepare(self, spec: RunSpec) -> Run:
+        """Return a function that runs a specification with other values of Reals.
 
         Parameters
         ----------
-        values : mapping
-            Parameters and start values.
-        t : numpy.ndarray
-            Communication points (n,) in s.
-        outputs : sequence of str
-        inputs : mapping
-            Values (n,) of inputs at the communication points. Each step gets the mean of its two ends.
-        stride : int
-            Outputs are read at every `stride`-th point.
+        spec : RunSpec
+            That of the simulator with other outputs, inputs or times.
 
         Returns
         -------
-        numpy.ndarray or None
-            Outputs (1 + (n - 1)//stride, outputs); None if the FMU refuses the values, crashes or is too slow.
+        callable
+            Receives values by name. Returns the outputs (times, outputs), at all communication points if there are no
+            `times`; None if the FMU refuses the values, crashes or is too slow.
         """
-        self.n_runs += 1
-        return self.runner.run(RunRequest(values, t, outputs, inputs, stride))
+        run = self.session.prepare(spec)
+
+        def run_values(values: Mapping[str, float]) -> np.ndarray | None:
+            self.n_runs += 1
+            return run(values)
+
+        return run_values
 
 
 @contextmanager
-def open_simulator(shared: RunSpec) -> Iterator[Simulator]:
+def open_simulator(spec: RunSpec) -> Iterator[Simulator]:
     """Instantiate an FMU for many runs; one that is not of this project runs in a child process.
 
     Parameters
     ----------
-    shared : RunSpec
-        What all runs share: the FMU, values, and as `timeout` the seconds of processor time that one run may take.
+    spec : RunSpec
+        What all runs share: the FMU, values of variables of any type, and as `timeout` the seconds of processor time
+        that one run may take.
 
     Raises
     ------
     HarnessError
         If the FMU offers no co-simulation or cannot be loaded.
     """
-    fmu, description = shared.fmu, read_description(shared.fmu)
+    description = read_description(spec.fmu)
     if description.coSimulation is None:
-        raise HarnessError(f"{fmu.name} offers no co-simulation: export it for co-simulation")
-    runner: RepeatedRun | IsolatedRun
+        raise HarnessError(f"{spec.fmu.name} offers no co-simulation: export it for co-simulation")
+    session: RunSession | ChildSession
     with ExitStack() as stack:
         if exposes_solver_steps(description):
             stack.enter_context(capture_stderr())  # an FMU prints a sentence about each set that it refuses
-            runner = RepeatedRun(shared)
-            stack.callback(runner.session.close)
+            session = RunSession(spec.fmu, spec.timeout)
         else:
-            runner = IsolatedRun(shared, stack.enter_context(temporary_directory("fit-")))
-            stack.callback(runner.close)
-        yield Simulator(fmu.stem, real_variables(description), runner)
+            session = ChildSession(spec, stack.enter_context(temporary_directory("fit-")))
+        stack.callback(session.close)
+        yield Simulator(spec, real_variables(description), session)
 
 
 def real_variables(description: Any) -> dict[str, RealVariable]:

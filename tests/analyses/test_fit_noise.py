@@ -1,10 +1,16 @@
 """Noise of measured records: the scatter, and the step of a quantiser."""
 
+from pathlib import Path
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
-from harness.analyses.fit.measured_record import MeasuredRecord
+from harness.analyses.fit.measured_record import MeasuredRecord, RecordData
 from harness.analyses.fit.noise import correlation_length, estimate_noise, significant_correlation
+from harness.scenes.run_spec import RunSpec
+
+SIMULATOR = SimpleNamespace(spec=RunSpec(Path()), prepare=lambda spec: None)  # is not run
 
 
 @pytest.mark.parametrize("levels", [[0, 151, 860, 909, 935], [0, 7, 8, 30]])
@@ -43,7 +49,7 @@ def test_means_of_a_quantised_rest_keep_the_error_of_one_sample():
     t, step = np.linspace(0.0, 10.0, 20_001), 0.1
     moving = np.where(t > 5.0, 2.03 + 10.0 * (t - 5.0), 2.03)
     levels = np.round(moving / step) * step
-    record = MeasuredRecord("record", t, levels[:, None], {}, [None], binned=True)
+    record = MeasuredRecord(SIMULATOR, RecordData("record", t, levels[:, None], {}, (None,)), binned=True)
     errors = record.quantisation_errors(np.interp(record.t, t, moving)[:, None])[:, 0]
     assert record.width > 1
     assert errors[record.t < 4.9] == pytest.approx(-0.03)

@@ -1,5 +1,6 @@
 """Validation of a fit whose runs are a sine."""
 
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -9,27 +10,31 @@ from harness.analyses.fit.fit_problem import FitProblem
 from harness.analyses.fit.measured_record import MeasuredRecord, RecordData
 from harness.analyses.fit.unknowns import Unknown
 from harness.analyses.fit.validation import validate
+from harness.scenes.run_spec import RunSpec
 
 NOISE = 1e-4
 
 
-def simulate(values, t, outputs, inputs, stride=1):
-    """Return a sine of 1 Hz."""
-    return values["size"] * np.sin(2 * np.pi * t)[:, None]
+def prepare(spec):
+    """Return a function that returns a sine of 1 Hz with a given size."""
+    return lambda values: values["size"] * np.sin(2 * np.pi * spec.times)[:, None]
+
+
+SIMULATOR = SimpleNamespace(spec=RunSpec(Path("sine.fmu"), ("x",)), prepare=prepare)
 
 
 def make_record(stop):
     """Return a record of 6001 samples until the stop time in s, with noise."""
     t = np.linspace(0.0, stop, 6001)
-    y = simulate({"size": 1.0}, t, ["x"], {}) + NOISE * np.random.default_rng(1).normal(size=(len(t), 1))
+    y = prepare(RunSpec(Path(), times=t))({"size": 1.0}) + NOISE * np.random.default_rng(1).normal(size=(len(t), 1))
     return RecordData(f"{stop} s", t, y, {}, (None,))
 
 
 def test_a_validation_record_is_averaged_only_where_its_means_are_those_of_the_outputs():
     """Means of two samples hold the sine where they are 1 ms apart, and smooth it where they are 10 ms apart."""
     data = make_record(6.0)
-    fitted = MeasuredRecord(data.name, data.t, data.y, data.inputs, data.sigma, binned=True)
-    problem = FitProblem(simulate, [fitted], ["x"], [Unknown("size", "size", "m", 0.5, 2.0)], {})
+    fitted = MeasuredRecord(SIMULATOR, data, binned=True)
+    problem = FitProblem([fitted], ["x"], [Unknown("size", "size", "m", 0.5, 2.0)], {})
     z = np.zeros(1)
     course = SimpleNamespace(z=z, uncertainty=SimpleNamespace(residuals=problem.residuals(z, problem.all)))
     same, longer = validate(problem, course, [data, make_record(60.0)]).records

@@ -1,14 +1,16 @@
 """Whole runs in one call: the same numbers as step by step, refusals, time limits, and FMUs that crash."""
 
+from dataclasses import replace
+
 import build_cache
 import numpy as np
 import pytest
 from external_fmus import build_external_fmus
 from native_fmus import build_native_fmus, require_compiler
 
-from harness.api import simulate
+from harness.running import runner
 from harness.running.native_equivalent import native_equivalent
-from harness.running.whole_run import MAX_PREPARED, open_simulator
+from harness.running.whole_run import open_simulator
 from harness.scenes.run_spec import RunSpec
 
 T = np.linspace(0.0, 8.0, 401)
@@ -26,81 +28,112 @@ def sled(request, fmus):
     return build_cache.build_once("fmi3-stickslip", *chosen) / "stickslip.fmu"
 
 
-def test_a_whole_run_is_the_run_step_by_step(sled, fmus):
-    expected = simulate(fmus / "stickslip.fmu", {"mu_s": 0.8}, stop=8.0, interval=0.02, outputs=["x", "F_spring"])
-    with open_simulator(RunSpec(sled)) as simulator:
-        compiled = simulator.simulate({"mu_s": 0.8}, T, ["x", "F_spring"], {})
-        assert simulator.simulate({"mu_s": -0.8}, T, ["x"], {}) is None  # refused
-        simulator.runner.loop = None
-        stepped = simulator.simulate({"mu_s": 0.8}, T, ["x", "F_spring"], {})
-        assert simulator.simulate({"mu_s": -0.8}, T, ["x"], {}) is None
+@pytest.fixture
+def simulator(sled):
+    """Runs of the FMU with the output x, at 401 times."""
+    with open_simulator(RunSpec(sled, ("x",), times=T, follow=False)) as opened:
+        yield opened
+
+
+def run_each_way(simulator, spec, values):
+    """Return the outputs of a run by the compiled loop; the loop in Python must return the same.
+
+    In a child process, both are the compiled loop.
+    """
+    compiled = simulator.prepare(spec)(values)
+    loop = getattr(simulator.session, "loop", None)
+    simulator.session.loop = None
+    stepped = simulator.prepare(spec)(values)
+    simulator.session.loop = loop
+    assert (compiled is None and stepped is None) or np.array_equal(compiled, stepped)
+    return compiled
+
+
+UNEVEN = np.sort(np.random.default_rng(1).uniform(0.5, 7.5, 60))
+FORCE = {"time": np.linspace(-1.0, 9.0, 201), "F_ext": 60.0 * np.sin(2.0 * np.linspace(-1.0, 9.0, 201))}
+JUMPS = {"time": (1.0, 2.0, 2.0, 5.0, 5.0), "F_ext": (0.0, 30.0, 10.0, 40.0, -40.0)}
+RUNS = {
+    "even times": {"times": T},
+    "times apart from start and stop": {"times": UNEVEN, "stop": 8.0},
+    "a grid": {"grid": 0.03, "stop": 8.0},
+    "equal steps": {"equal_steps": 100, "stop": 8.0},
+    "times and a grid": {"grid": 0.03, "times": UNEVEN, "stop": 8.0},
+    "inputs": {"inputs": FORCE, "times": T},
+    "inputs at other times": {"inputs": FORCE, "times": UNEVEN, "stop": 8.0},
+    "inputs that jump": {"inputs": JUMPS, "times": UNEVEN, "stop": 8.0},
+}
+
+
+@pytest.mark.parametrize("described", RUNS.values(), ids=RUNS)
+def test_a_whole_run_is_that_of_simulate(sled, fmus, described):
+    spec = RunSpec(sled, ("x", "F_spring"), follow=False, **described)
+    expected = runner.run(replace(spec, fmu=fmus / "stickslip.fmu", values={"mu_s": 0.8}), lambda share: None)
+    with open_simulator(spec) as simulator:
+        y = run_each_way(simulator, spec, {"mu_s": 0.8})
+        assert run_each_way(simulator, spec, {"mu_s": -0.8}) is None  # refused
         assert simulator.n_runs == 4
-    assert np.array_equal(compiled, stepped)
-    for column, name in zip(compiled.T, ("x", "F_spring"), strict=True):
+    for column, name in zip(y.T, spec.outputs, strict=True):
+        assert np.ptp(column) > 0.0
         assert np.abs(column - expected[name]).max() < 1e-12 * np.abs(column).max()
 
 
-def test_inputs_are_means_over_steps_and_strides_skip_points(sled):
+def test_an_input_is_the_mean_over_a_step(simulator):
     force = 60.0 * np.sin(2.0 * T)
-    with open_simulator(RunSpec(sled)) as simulator:
-        every = simulator.simulate({}, T, ["x"], {"F_ext": force})
-        second = simulator.simulate({}, T, ["x"], {"F_ext": force}, 2)
-        constant = simulator.simulate({}, T, ["x"], {"F_ext": np.full(len(T), 20.0)})
-        parameter = simulator.simulate({"F_ext": 20.0}, T, ["x"], {})
-        simulator.runner.loop = None
-        stepped = simulator.simulate({}, T, ["x"], {"F_ext": force})
-    assert np.array_equal(every[::2], second)
-    assert np.array_equal(every, stepped)
-    assert np.abs(constant - parameter).max() < 1e-12
+    driven = simulator.prepare(replace(simulator.spec, inputs={"time": T, "F_ext": force}))({})
+    times, means = np.repeat(T, 2)[1:-1], np.repeat(0.5 * (force[1:] + force[:-1]), 2)
+    constant = simulator.prepare(replace(simulator.spec, inputs={"time": times, "F_ext": means}))({})
+    assert np.abs(driven - constant).max() < 1e-12 * np.abs(driven).max()
 
 
-def test_runs_of_many_requests_do_not_mix(sled):
-    """Of more requests than stay prepared, whose arrays live no longer than the run."""
-    forces = [5.0 * i for i in range(MAX_PREPARED + 6)] * 2
-    with open_simulator(RunSpec(sled)) as simulator:
-        driven = [simulator.simulate({"k": 60.0}, T[:41].copy(), ["x"], {"F_ext": np.full(41, f)}) for f in forces]
-        constant = [simulator.simulate({"k": 60.0, "F_ext": f}, T[:41], ["x"], {}) for f in forces]
-        other = simulator.simulate({"k": 900.0, "F_ext": forces[-1]}, T[:41], ["x"], {})
-    assert np.abs(np.array(driven) - constant).max() < 1e-12
-    assert np.ptp([each[-1] for each in driven]) > 0
-    assert not np.array_equal(other, constant[-1])
+def test_prepared_runs_do_not_mix(simulator):
+    """Of one FMU, in turn, and with values of other variables."""
+    forces = [40.0 * i for i in range(8)]
+    inputs = [{"time": (0.0, 8.0), "F_ext": (force, force)} for force in forces]
+    runs = [simulator.prepare(replace(simulator.spec, inputs=each)) for each in inputs]
+    other = simulator.prepare(simulator.spec)
+    for _ in range(2):
+        driven = [run({"k": 60.0}) for run in runs]
+        constant = [other({"k": 60.0, "F_ext": force}) for force in forces]
+        assert np.abs(np.array(driven) - constant).max() < 1e-12
+        assert np.ptp([each[-1] for each in driven]) > 0
+        assert not np.array_equal(other({"k": 900.0, "F_ext": forces[-1]}), constant[-1])
+        assert not np.array_equal(other({"F_ext": forces[-1]}), constant[-1])
 
 
-def test_settings_hold_in_every_run(sled):
-    with open_simulator(RunSpec(sled, values={"friction": 3})) as simulator:
-        first, second = (simulator.simulate({}, T, ["x"], {}) for _ in range(2))
-    with open_simulator(RunSpec(sled)) as simulator:
-        hybrid = simulator.simulate({}, T, ["x"], {})
+def test_values_of_the_specification_hold_in_every_run(simulator):
+    threshold = simulator.prepare(replace(simulator.spec, values={"friction": 3}))
+    first, second = threshold({}), threshold({})
     assert np.array_equal(first, second)
-    assert not np.array_equal(first, hybrid)
+    assert not np.array_equal(first, simulator.prepare(simulator.spec)({}))
 
 
 def test_a_run_over_its_time_limit_is_refused(sled):
-    with open_simulator(RunSpec(sled, timeout=1e-9)) as simulator:
-        assert simulator.simulate({}, T, ["x"], {}) is None
-        simulator.runner.loop = None
-        assert simulator.simulate({}, T, ["x"], {}) is None
+    spec = RunSpec(sled, ("x",), times=T, follow=False, timeout=1e-9)
+    with open_simulator(spec) as simulator:
+        assert run_each_way(simulator, spec, {}) is None
 
 
-@pytest.mark.parametrize("name", ["Midpoint", "Fmi3FixedStep"])
-def test_external_fmus_run_in_a_process_of_their_own(name):
-    t = np.linspace(0.0, 1.0, 101)
-    with open_simulator(RunSpec(build_external_fmus() / f"{name}.fmu")) as simulator:
-        output = next(each for each, variable in simulator.variables.items() if variable.causality == "output")
-        first, second = (simulator.simulate({"k": 0.9}, t, [output], {}) for _ in range(2))
+@pytest.mark.parametrize(("name", "output"), [("Midpoint", "x"), ("Fmi3FixedStep", "x")])
+def test_external_fmus_run_in_a_process_of_their_own(name, output):
+    spec = RunSpec(build_external_fmus() / f"{name}.fmu", (output,), times=np.linspace(0.0, 1.0, 101), follow=False)
+    with open_simulator(spec) as simulator:
+        run, other = simulator.prepare(spec), simulator.prepare(replace(spec, times=spec.times[::2], stop=1.0))
+        first, coarse, second = run({"k": 0.9}), other({"k": 0.9}), run({"k": 0.9})
     assert np.ptp(first) > 0
     assert np.array_equal(first, second)
+    assert coarse.shape == (51, 1)
 
 
 def test_an_external_fmu_that_crashes_is_replaced():
-    t = np.linspace(0.0, 1.0, 11)
-    with open_simulator(RunSpec(build_external_fmus() / "Faulty.fmu")) as simulator:
-        output = next(each for each, variable in simulator.variables.items() if variable.causality == "output")
-        good = simulator.simulate({}, t, [output], {})
-    with open_simulator(RunSpec(build_external_fmus() / "Faulty.fmu", values={"kind": 2})) as simulator:
-        assert simulator.simulate({}, t, [output], {}) is None
-        assert simulator.simulate({}, t, [output], {}) is None
-    assert good is not None
+    spec = RunSpec(build_external_fmus() / "Faulty.fmu", ("x",), times=np.linspace(0.0, 1.0, 11), follow=False)
+    with open_simulator(spec) as simulator:
+        good = simulator.prepare(spec)
+        crashing = simulator.prepare(replace(spec, values={"kind": 2}))
+        before = good({})
+        assert crashing({}) is None
+        assert crashing({}) is None
+        assert np.array_equal(good({}), before)
+    assert before is not None
 
 
 def test_the_native_fmu_of_the_same_model_is_taken(fmus, tmp_path):
@@ -122,6 +155,7 @@ def test_a_native_fmu_is_built_from_the_model_file(fmus, tmp_path):
     python.write_bytes((fmus / "smd.fmu").read_bytes())
     native = native_equivalent(python)
     assert native not in (python, fmus / "smd.fmu")
-    with open_simulator(RunSpec(python)) as one, open_simulator(RunSpec(native)) as other:
-        runs = [each.simulate({"m": 2.0}, T, ["x"], {}) for each in (one, other)]
+    run = RunSpec(python, ("x",), times=T, follow=False)
+    with open_simulator(run) as one, open_simulator(replace(run, fmu=native)) as other:
+        runs = [each.prepare(each.spec)({"m": 2.0}) for each in (one, other)]
     assert np.array_equal(*runs)

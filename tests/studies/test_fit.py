@@ -48,8 +48,8 @@ def native(model):
 def pull(outputs=("x",), values=TRUTH, t=T, noise=0.01, seed=1):
     """Return a DataFrame with a run of stickslip and white noise, a share of the range of each column."""
     pandas = pytest.importorskip("pandas")
-    with open_simulator(RunSpec(native("stickslip"))) as simulator:
-        y = simulator.simulate(values, t, outputs, {})
+    with open_simulator(RunSpec(native("stickslip"), tuple(outputs), times=t, follow=False)) as simulator:
+        y = simulator.prepare(simulator.spec)(values)
         units = {name: simulator.variables[name].unit for name in outputs}
     y = y + noise * np.ptp(y, axis=0) * np.random.default_rng(seed).normal(size=y.shape)
     frame = pandas.DataFrame({"t": t, **dict(zip(outputs, y.T, strict=True))})
@@ -173,9 +173,9 @@ def test_a_sensor_with_offset_and_gain_is_identified():
 def test_the_delay_of_a_sensor_is_identified(delay):
     """The delayed signal is interpolated from a run with 20 times as many samples."""
     fine = np.linspace(0.0, 8.0, 4001)
-    with open_simulator(RunSpec(native("coulomb"))) as simulator:
-        force = shaker(fine)
-        x = simulator.simulate({"x0": 0.0, "f": 2.0}, fine, ["x"], {"F_ext": force})[:, 0]
+    inputs = {"time": fine, "F_ext": shaker(fine)}
+    with open_simulator(RunSpec(native("coulomb"), ("x",), inputs=inputs, times=fine, follow=False)) as simulator:
+        x = simulator.prepare(simulator.spec)({"x0": 0.0, "f": 2.0})[:, 0]
     t = fine[:-200:20]
     y = np.interp(t - delay, fine, x) + 0.003 * np.ptp(x) * np.random.default_rng(3).normal(size=len(t))
     frame = pytest.importorskip("pandas").DataFrame({"t [s]": t, "x [m]": y, "F": shaker(t)})
@@ -318,8 +318,8 @@ def test_the_law_that_made_the_record_has_the_lowest_bic(record_of, v_s):
     frame = pull(noise=0.003)
     if v_s:
         values = {"f_s": 100.0, "f_d": 40.0, "k": 900.0, "v_driver": 0.04, "v_s": v_s}
-        with open_simulator(RunSpec(fmus[1])) as simulator:
-            x = simulator.simulate(values, T, ["x"], {})[:, 0]
+        with open_simulator(RunSpec(fmus[1], ("x",), times=T, follow=False)) as simulator:
+            x = simulator.prepare(simulator.spec)(values)[:, 0]
         frame["x"] = x + 0.003 * np.ptp(x) * np.random.default_rng(2).normal(size=len(T))
     found = harness.fit(fmus[0], frame, observe="x", against=fmus[1], **LAWS)
     assert found.comparison.laws[0].fmu == record_of

@@ -1,6 +1,6 @@
 """Records with known parameters, drawn at random: models, parameters, sampling and noise."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -67,7 +67,7 @@ def draw_record(group, simulator, random, max_samples=20_000):
     for static, sliding in LARGER.items():
         if sliding in truth:
             truth[sliding] = truth[static] * random.uniform(0.3, 0.95)
-    fixed, inputs = {}, {}
+    fixed, inputs, driven = {}, {}, {}
     if "x0" in names:
         reach = truth["mu_s"] * start["m"] * start["g"] / truth["k"]
         truth["x0"], free["x0"] = random.uniform(-1, 1) * reach, (-0.5, 0.5)
@@ -79,9 +79,9 @@ def draw_record(group, simulator, random, max_samples=20_000):
         inputs["F_ext"] = force(t)
         parts = -(-FINE_POINTS // len(t))
         fine = np.append((t[:-1, None] + np.diff(t)[:, None] * np.arange(parts) / parts).ravel(), t[-1])
-        clean = simulator.simulate(truth | fixed, fine, group.outputs, {"F_ext": force(fine)}, parts)
-    else:
-        clean = simulator.simulate(truth | fixed, t, group.outputs, {})
+        driven = {"time": fine, "F_ext": force(fine)}
+    run = replace(simulator.spec, outputs=group.outputs, times=t, inputs=driven, follow=False)
+    clean = simulator.prepare(run)(truth | fixed)
     y, noise = add_noise(clean, random)
     if group.record_of:
         truth = {"k": truth["k"], "mu_s": truth["f_s"] / (start["m"] * 9.81), "v_driver": start["v_driver"]}

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...errors import HarnessError
+from ...running.whole_run import Simulator
 from .fit_problem import FitProblem, Selection
-from .measured_record import MeasuredRecord, RecordData, Simulate
+from .measured_record import MeasuredRecord, RecordData
 from .profile_likelihood import profile_bound
 from .search import DISTINCT, Minimum, distinct, search
 from .uncertainty import Uncertainty, estimate_uncertainty
@@ -40,9 +41,8 @@ class FitCourse:
 
 
 def fit_records(
-    simulate: Simulate,
+    simulator: Simulator,
     data: Sequence[RecordData],
-    outputs: Sequence[str],
     unknowns: Sequence[Unknown],
     fixed: Mapping[str, float],
     robust: bool,
@@ -66,11 +66,11 @@ def fit_records(
             raise HarnessError(f"{each.name} shows no motion in a column: nothing can be determined from it")
     warm: np.ndarray | None = None
     for binned in (True, False) if averages else (False,):
-        records = [MeasuredRecord(each.name, each.t, each.y, each.inputs, each.sigma, binned) for each in data]
-        problem = FitProblem(simulate, records, outputs, unknowns, fixed, robust)
+        records = [MeasuredRecord(simulator, each, binned) for each in data]
+        problem = FitProblem(records, simulator.spec.outputs, unknowns, fixed, robust)
         course = find_course(problem, warm, any(any(each.sigma) for each in data), report)
         values = [problem.values(course.z, i) for i in range(len(records))]
-        if all(record.means_hold(simulate, each, outputs) for record, each in zip(records, values, strict=True)):
+        if all(record.means_hold(each) for record, each in zip(records, values, strict=True)):
             break
         warm = course.z
     return problem, course

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from .feasible_region import FeasibleRegion
-from .measured_record import MeasuredRecord, Simulate
+from .measured_record import MeasuredRecord
 from .unknowns import DELAY, GAIN, OFFSET, Unknown
 
 EXACT_STEPS, ROUGH_STEPS = (1e-6, 1e-6), (1e-5, 1e-4)  # of one-sided and central differences
@@ -26,8 +26,6 @@ class FitProblem:
 
     Parameters
     ----------
-    simulate : callable
-        Runs the FMU; see `Simulator.simulate`.
     records : sequence of MeasuredRecord
     outputs : sequence of str
         Observed variables, one for each column of the records.
@@ -40,14 +38,13 @@ class FitProblem:
 
     def __init__(
         self,
-        simulate: Simulate,
         records: Sequence[MeasuredRecord],
         outputs: Sequence[str],
         unknowns: Sequence[Unknown],
         fixed: Mapping[str, float],
         robust: bool = False,
     ) -> None:
-        self.simulate, self.records, self.outputs = simulate, tuple(records), list(outputs)
+        self.records, self.outputs = tuple(records), list(outputs)
         self.unknowns, self.fixed, self.robust = tuple(unknowns), dict(fixed), robust
         self.sensors = [(i, unknown) for i, unknown in enumerate(self.unknowns) if unknown.column is not None]
         self.region = FeasibleRegion(self.unknowns)
@@ -85,7 +82,7 @@ class FitProblem:
     def predict_record(self, z: np.ndarray, record: MeasuredRecord, i: int, index: np.ndarray) -> np.ndarray | None:
         """Return what the sensors show at samples of a record, with the values of record `i`; None if refused."""
         delays = self.sensor_values(z, i, DELAY)
-        y = record.simulate(self.simulate, self.values(z, i), self.outputs, index, delays)
+        y = record.simulate(self.values(z, i), index, delays)
         if y is None:
             return None
         for column, gain in self.sensor_values(z, i, GAIN).items():

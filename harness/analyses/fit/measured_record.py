@@ -1,35 +1,28 @@
 """A measured record as a fit uses it: samples, noise, inputs between samples, and the run at the same times."""
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.interpolate import CubicSpline
 
+from ...running.stepping import merge_points
+from ...running.whole_run import Run, Simulator
 from .noise import bin_means, estimate_noise
 
 MAX_SAMPLES = 2500  # twice as many are averaged to this number of means of neighbours
 INPUT_POINTS = 500  # of an input that suffice for a search
 MAX_PARTS = 32  # that are kept
 SHORTEST_STEP = 1e-6  # between communication points, in intervals between samples
-Simulate = Callable[..., np.ndarray | None]
 
 
 @dataclass(frozen=True)
 class RecordPart:
-    """The samples `index` of a record: their values y, and the times and inputs of a run that reads them.
-
-    Attributes
-    ----------
-    rows : numpy.ndarray or None
-        Those times of the run that are times of the samples; None if all are.
-    """
+    """The samples `index` of a record: their values y, and the run that returns the outputs there."""
 
     index: np.ndarray
     y: np.ndarray
-    t: np.ndarray
-    inputs: Mapping[str, np.ndarray]
-    rows: np.ndarray | None
+    run: Run
 
 
 @dataclass(frozen=True)
@@ -45,7 +38,15 @@ class RecordData:
 
 
 class MeasuredRecord:
-    """Samples y (n, columns) at the times t (n,), and the inputs that acted.
+    """Samples y (n, columns) at the times t (n,), the inputs that acted, and the runs at the same times.
+
+    Parameters
+    ----------
+    simulator : Simulator
+        Its specification has the observed outputs, one for each column.
+    data : RecordData
+    binned : bool
+        Whether a long record is averaged.
 
     Attributes
     ----------
@@ -57,16 +58,9 @@ class MeasuredRecord:
         Number of parts of each interval between samples, in each of which inputs are constant.
     """
 
-    def __init__(
-        self,
-        name: str,
-        t: np.ndarray,
-        y: np.ndarray,
-        inputs: Mapping[str, np.ndarray],
-        sigma: Sequence[float | None],
-        binned: bool,
-    ) -> None:
-        self.name, self.sampled_t, self.sampled_y, self.sampled_inputs = name, t, y, inputs
+    def __init__(self, simulator: Simulator, data: RecordData, binned: bool) -> None:
+        t, y, inputs = data.t, data.y, data.inputs
+        self.simulator, self.name, self.sampled_t, self.sampled_y = simulator, data.name, t, y
         estimates = [estimate_noise(t, column) for column in y.T]
         self.step = np.array([step for _, step in estimates])
         self.width = len(t) // MAX_SAMPLES if binned and len(t) > 2 * MAX_SAMPLES else 1
@@ -76,7 +70,7 @@ class MeasuredRecord:
             self.inputs = {name: bin_means(u, self.width) for name, u in inputs.items()}
         scatter = [estimate_noise(self.t, column)[0] for column in self.y.T]
         self.noise = np.maximum(scatter, self.step / 12**0.5)
-        known = np.array([each or 0.0 for each in sigma])
+        known = np.array([each or 0.0 for each in data.sigma])
         self.noise = np.where(known > 0, known / np.sqrt(self.width), self.noise)
         self.all = np.arange(len(self.t))
         self.parts: dict[int, RecordPart] = {}
@@ -89,17 +83,19 @@ class MeasuredRecord:
         self.fine_t = np.append((self.t[:-1, None] + np.diff(self.t)[:, None] * shares).ravel(), self.t[-1])
         if parts == every == 1:
             self.driven = self.inputs
-            return
-        knots = np.unique(np.append(self.all[::every], self.all[-1]))
-        self.driven = {name: CubicSpline(self.t[knots], u[knots])(self.fine_t) for name, u in self.inputs.items()}
+        else:
+            knots = np.unique(np.append(self.all[::every], self.all[-1]))
+            self.driven = {name: CubicSpline(self.t[knots], u[knots])(self.fine_t) for name, u in self.inputs.items()}
+        self.run = self.prepare(self.t, self.fine_t, self.driven)
+
+    def prepare(self, times: np.ndarray, knots: np.ndarray, inputs: Mapping[str, np.ndarray]) -> Run:
+        """Prepare runs that return the outputs at `times` in s, with inputs at `knots` (n,) in s, first to last."""
+        table = {"time": knots, **inputs} if inputs else {}
+        start, stop = knots[[0, -1]].tolist()
+        return self.simulator.prepare(replace(self.simulator.spec, inputs=table, start=start, stop=stop, times=times))
 
     def simulate(
-        self,
-        simulate: Simulate,
-        values: Mapping[str, float],
-        outputs: Sequence[str],
-        index: np.ndarray,
-        delays: Mapping[int, float] | None = None,
+        self, values: Mapping[str, float], index: np.ndarray, delays: Mapping[int, float] | None = None
     ) -> np.ndarray | None:
         """Return the outputs (len(index), outputs) at the samples `index`, which contain the first; None if refused.
 
@@ -109,14 +105,10 @@ class MeasuredRecord:
             Delay in s of the sensor of an output, by its position. An output has its start value before the run.
         """
         if delays:
-            return self.simulate_delayed(simulate, values, outputs, index, delays)
-        if len(index) == len(self.t):
-            return simulate(values, self.fine_t, outputs, self.driven, self.subdivision)
-        part = self.part(index)
-        y = simulate(values, part.t, outputs, part.inputs)
-        return y if y is None or part.rows is None else y[part.rows]
+            return self.simulate_delayed(values, index, delays)
+        return self.run(values) if len(index) == len(self.t) else self.part(index).run(values)
 
-    def part(self, index: np.ndarray) -> "RecordPart":
+    def part(self, index: np.ndarray) -> RecordPart:
         """Return what a run for the samples `index` needs. It is kept, for an index serves many runs."""
         if id(index) not in self.parts:
             if len(self.parts) >= MAX_PARTS:
@@ -124,18 +116,12 @@ class MeasuredRecord:
             grid = index
             if self.inputs:
                 grid = np.union1d(np.arange(0, index[-1] + 1, max(1, len(self.t) // INPUT_POINTS)), index)
-            inputs = {name: u[grid] for name, u in self.inputs.items()}
-            rows = np.searchsorted(grid, index) if self.inputs else None
-            self.parts[id(index)] = RecordPart(index, self.y[index], self.t[grid], inputs, rows)
+            run = self.prepare(self.t[index], self.t[grid], {name: u[grid] for name, u in self.inputs.items()})
+            self.parts[id(index)] = RecordPart(index, self.y[index], run)
         return self.parts[id(index)]
 
     def simulate_delayed(
-        self,
-        simulate: Simulate,
-        values: Mapping[str, float],
-        outputs: Sequence[str],
-        index: np.ndarray,
-        delays: Mapping[int, float],
+        self, values: Mapping[str, float], index: np.ndarray, delays: Mapping[int, float]
     ) -> np.ndarray | None:
         """Return the outputs at the samples, each earlier by its delay.
 
@@ -144,8 +130,8 @@ class MeasuredRecord:
         """
         t, begin = self.t[index], self.t[0]
         shortest = SHORTEST_STEP * (self.t[-1] - begin) / len(self.t)  # an FMU may refuse tiny steps
-        earlier = [t - delays.get(j, 0.0) for j in range(len(outputs))]
-        shown = [np.where(each > begin + shortest, each, begin) for each in earlier]
+        earlier = [t - delays.get(j, 0.0) for j in range(len(self.simulator.spec.outputs))]
+        shown = [np.where(each - begin > shortest, each, begin) for each in earlier]
         knots, inputs = self.t[[0, index[-1]]], {}
         if self.inputs and len(index) == len(self.t):
             knots, inputs = self.fine_t, self.driven
@@ -153,13 +139,11 @@ class MeasuredRecord:
             grid = np.arange(0, index[-1] + 1, max(1, len(self.t) // INPUT_POINTS))
             knots, inputs = self.t[grid], {name: u[grid] for name, u in self.inputs.items()}
         points = np.unique(np.concatenate(shown))
-        right = np.minimum(np.searchsorted(points, knots), len(points) - 1)
-        gap = np.minimum(np.abs(points[right] - knots), np.abs(points[np.maximum(right - 1, 0)] - knots))
-        times = np.unique(np.concatenate([self.t[:1], points, knots[gap > shortest]]))
-        y = simulate(values, times, outputs, {name: np.interp(times, knots, u) for name, u in inputs.items()})
+        times = merge_points(points, knots, shortest)
+        y = self.prepare(points, times, {name: np.interp(times, knots, u) for name, u in inputs.items()})(values)
         if y is None:
             return None
-        return np.stack([y[np.searchsorted(times, each), j] for j, each in enumerate(shown)], axis=1)
+        return np.stack([y[np.searchsorted(points, each), j] for j, each in enumerate(shown)], axis=1)
 
     def quantisation_errors(self, y: np.ndarray) -> np.ndarray:
         """Return the errors (n, columns) that the quantisers of a record of the signals y (n, columns) would make.
@@ -174,12 +158,11 @@ class MeasuredRecord:
             errors[:, j] = bin_means(each, self.width) if self.width > 1 else each
         return errors
 
-    def means_hold(self, simulate: Simulate, values: Mapping[str, float], outputs: Sequence[str]) -> bool:
+    def means_hold(self, values: Mapping[str, float]) -> bool:
         """Return whether the means of the outputs over the samples are the outputs at the mean times."""
         if self.width == 1 or self.inputs:
             return True
-        y = self.simulate(simulate, values, outputs, self.all)
-        whole = simulate(values, self.sampled_t, outputs, {})
+        y, whole = self.run(values), self.prepare(self.sampled_t, self.sampled_t, {})(values)
         if y is None or whole is None:
             return False
         return bool(np.abs((bin_means(whole, self.width) - y) / self.noise).max() < 0.3)

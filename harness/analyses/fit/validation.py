@@ -27,9 +27,9 @@ def validate(problem: FitProblem, course: FitCourse, data: Sequence[RecordData])
     records, predictions = [], []
     fitted = problem.records[0]
     for each in data:
-        record = MeasuredRecord(each.name, each.t, each.y, each.inputs, each.sigma, fitted.width > 1)
-        if not record.means_hold(problem.simulate, problem.values(course.z, 0), problem.outputs):
-            record = MeasuredRecord(each.name, each.t, each.y, each.inputs, each.sigma, binned=False)
+        record = MeasuredRecord(fitted.simulator, each, fitted.width > 1)
+        if not record.means_hold(problem.values(course.z, 0)):
+            record = MeasuredRecord(fitted.simulator, each, binned=False)
         record.noise = np.where(np.ptp(record.y, axis=0) > 0.0, record.noise, fitted.noise)  # of a body at rest
         record.subdivide(fitted.subdivision)
         prediction = problem.predict_record(course.z, record, 0, record.all)

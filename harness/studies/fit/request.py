@@ -16,7 +16,7 @@ from ...records.record import MIN_SAMPLES
 from ...records.signal_table import SignalSource, SignalTable
 from ...running.fmu_archive import read_description
 from ...running.variable_values import convert_value
-from ...running.whole_run import MAX_INPUTS, RealVariable, real_variables
+from ...running.whole_run import RealVariable, real_variables
 from ...scenes.run_spec import RunSpec
 
 SAMPLES_PER_UNKNOWN = 4
@@ -72,7 +72,19 @@ class FitRequest:
 
 @dataclass(frozen=True)
 class ResolvedRequest:
-    """A request that fits the FMU: sources of all signals, fixed Reals, and the run with values of other types only."""
+    """A request that fits the FMU.
+
+    Attributes
+    ----------
+    variables : mapping
+        The scalar Reals of the FMU.
+    sources : mapping
+        Columns of all signals, by variable.
+    fixed : mapping
+        Values of Reals that are not fitted.
+    shared : RunSpec
+        What all runs of the fit have in common: the observed outputs, and values that are no Reals.
+    """
 
     request: FitRequest
     variables: Mapping[str, RealVariable]
@@ -103,8 +115,6 @@ def resolve_request(request: FitRequest) -> ResolvedRequest:
         raise SceneError(f"nothing is free: name the parameters to fit, as in --free {','.join(parameters[:2])}")
     if not request.observe:
         raise SceneError(f"nothing is observed: name a variable and its column, as in --observe {readable[0]}=position")
-    if len(request.inputs) > MAX_INPUTS:
-        raise SceneError(f"{len(request.inputs)} inputs are too many; at most {MAX_INPUTS} are supported")
     check_names("output", request.observe, readable)
     check_names("input", request.inputs, inputs)
     check_names("parameter", request.free, parameters)
@@ -130,7 +140,12 @@ def resolve_request(request: FitRequest) -> ResolvedRequest:
         variables,
         {name: SignalSource(heading, variables[name].unit) for name, heading in signals.items()},
         {name: value for name, value in converted.items() if name in variables},
-        replace(request.run, values={name: value for name, value in converted.items() if name not in variables}),
+        replace(
+            request.run,
+            outputs=tuple(request.observe),
+            follow=False,
+            values={name: value for name, value in converted.items() if name not in variables},
+        ),
     )
 
 

@@ -181,11 +181,8 @@ def fit_tables(
         )
     data = [record_data(resolved, table) for table in tables]
     unknowns = make_unknowns(resolved, data)
-    outputs = [*request.observe]
     with open_simulator(replace(resolved.shared, fmu=native_equivalent(request.run.fmu))) as simulator:
-        problem, course = fit_records(
-            simulator.simulate, data, outputs, unknowns, resolved.fixed, request.robust, report, averages
-        )
+        problem, course = fit_records(simulator, data, unknowns, resolved.fixed, request.robust, report, averages)
         prediction = (
             validate(problem, course, [record_data(resolved, table) for table in validation]) if validation else None
         )
