@@ -11,18 +11,22 @@ from fmpy.ssp.ssd import read_ssv
 
 from ..process.child_process import RequestServer
 from ..process.temporary_directory import temporary_directory
+from ..scenes.run_spec import RunSpec
 
 
-def run(archive: str, step: float, count: int, read: list[tuple[str, str, int]], values: str) -> list[list[float]]:
+def run_archive(run: RunSpec) -> list[list[float]]:
     """Run the archive and return one row per step."""
-    with temporary_directory("ssv-") as directory, ZipFile(archive) as content:
+    assert run.stop is not None
+    assert run.grid is not None
+    stop = (round(run.stop / run.grid) - 0.5) * run.grid
+    with temporary_directory("ssv-") as directory, ZipFile(run.fmu) as content:
         name = "resources/parameters.ssv"
         parameters: Any = None
         if name in content.namelist():
             parameters = read_ssv(content.extract(name, directory))
-        rows = simulate_ssp(archive, stop_time=(count - 0.5) * step, step_size=step, parameter_set=parameters)
-    return [[float(row[f"{element}.{variable}"]) for element, variable, _ in read] for row in rows]
+        rows = simulate_ssp(str(run.fmu), stop_time=stop, step_size=run.grid, parameter_set=parameters)
+    return [[float(row[name]) for name in run.outputs] for row in rows]
 
 
 if __name__ == "__main__":
-    RequestServer().serve(lambda request: run(**request))
+    RequestServer().serve(lambda request: run_archive(RunSpec.from_json(request["run"])))

@@ -7,6 +7,7 @@ import re
 import zipfile
 from importlib.util import find_spec
 from math import cos, sqrt
+from pathlib import Path
 
 import commands
 import numpy as np
@@ -17,6 +18,7 @@ from fmpy.ssp.ssd import read_ssd
 from harness.errors import HarnessError, SceneError
 from harness.references.single_model_reference import CoupledBodies, solve_bodies
 from harness.scenes.coupled.scene import shipped_coupled_scenes
+from harness.scenes.run_spec import RunSpec
 from harness.studies.coupled import engine, study
 from harness.studies.coupled.engine import ENGINES
 
@@ -210,4 +212,4 @@ def test_an_engine_that_hangs_is_reported_by_name(monkeypatch, tmp_path):
     monkeypatch.setitem(ENGINES, "Sleeper", "sleeps")
     monkeypatch.setattr(engine, "ENGINE_TIMEOUT", 0.3)
     with pytest.raises(HarnessError, match=r"Sleeper could not run pair\.ssp: no answer after 0\.3 s"):
-        engine.run_engine("Sleeper", engine.EngineRequest("pair.ssp", 0.1, 1, []))
+        engine.run_engine("Sleeper", RunSpec(Path("pair.ssp"), stop=0.1, grid=0.1), [])

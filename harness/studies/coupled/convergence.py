@@ -52,6 +52,11 @@ class Convergence:
     engines: dict[str, tuple[tuple[float, ...], float, str]] = field(default_factory=dict)
 
     @property
+    def names(self) -> tuple[str, ...]:
+        """Return the names of the recorded variables."""
+        return tuple(f"{element}.{variable}" for element, variable, _ in self.read)
+
+    @property
     def unit(self) -> str:
         """Return the common unit of the variables, or an empty string."""
         return self.units[0] if len(set(self.units)) == 1 else ""

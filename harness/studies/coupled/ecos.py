@@ -5,25 +5,28 @@ import sys
 from pathlib import Path
 
 from ...process.child_process import RequestServer
-from .engine import EngineRequest
+from ...scenes.run_spec import RunSpec
+from .engine import ElementVariable
 
 
-def run(request: EngineRequest) -> list[list[float]]:
+def run_archive(run: RunSpec, variables: list[ElementVariable], parameter_set: str) -> list[list[float]]:
     """Return the rows of a run."""
+    assert run.stop is not None
+    assert run.grid is not None
     if sys.platform == "linux":
         ctypes.CDLL(str(Path(sys.prefix) / "lib" / "libtbb.so.12"), ctypes.RTLD_GLOBAL)
     from ecospy import EcosLib, EcosSimulation
 
     EcosLib.set_log_level("warn")
-    names = [f"{element}::{variable}" for element, variable, _ in request.read]
-    with EcosSimulation(step_size=request.step, ssp_path=request.archive) as simulation:
-        simulation.init(parameter_set=request.values or None)
+    names = [f"{element}::{variable}" for element, variable, _ in variables]
+    with EcosSimulation(step_size=run.grid, ssp_path=str(run.fmu)) as simulation:
+        simulation.init(parameter_set=parameter_set or None)
         rows = [[simulation.get_real(name) for name in names]]
-        for _ in range(request.count):
+        for _ in range(round(run.stop / run.grid)):
             simulation.step(1)
             rows.append([simulation.get_real(name) for name in names])
     return rows
 
 
 if __name__ == "__main__":
-    RequestServer().serve(lambda request: run(EngineRequest(**request)))
+    RequestServer().serve(lambda request: run_archive(**request | {"run": RunSpec.from_json(request["run"])}))

@@ -1,10 +1,10 @@
 """Engines that run an SSP archive, each in a separate process with JSON input and output."""
 
-from dataclasses import dataclass
-from pathlib import Path
+from collections.abc import Sequence
 
 from ...errors import HarnessError
 from ...process.child_process import ChildDiedError, ask_once
+from ...scenes.run_spec import RunSpec
 
 ENGINE_TIMEOUT = 300.0  # s, for one run
 EXTRA = "python -m pip install 'friction-fmus[coupled]'"
@@ -16,27 +16,31 @@ ENGINES = {  # modules
 }
 
 
-@dataclass(frozen=True)
-class EngineRequest:
-    """Run an archive with `count` communication steps of `step` s and the parameter set `values`, and read variables
-    (element, variable, value reference) after each step."""
-
-    archive: str
-    step: float
-    count: int
-    read: list[tuple[str, str, int]]
-    values: str = "initialValues"
+ElementVariable = tuple[str, str, int]  # element of an archive, variable, value reference
 
 
-def run_engine(engine: str, request: EngineRequest) -> list[list[float]]:
+def run_engine(
+    engine: str, run: RunSpec, variables: Sequence[ElementVariable], parameter_set: str = ""
+) -> list[list[float]]:
     """Run an archive and return one row per communication point, without the start if the engine does not record it.
+
+    Parameters
+    ----------
+    engine : str
+    run : RunSpec
+        The archive in place of the FMU, the communication step `grid`, the stop, and the names of the variables.
+    variables : sequence of ElementVariable
+        The same variables as the engines address them.
+    parameter_set : str
+        Name of the parameter set in the archive; empty for none.
 
     Raises
     ------
     HarnessError
         If the engine fails or times out; with its last line of output.
     """
-    failed = f"{engine} could not run {Path(request.archive).name}"
+    failed = f"{engine} could not run {run.fmu.name}"
+    request = {"run": run, "variables": variables, "parameter_set": parameter_set}
     try:
         rows: list[list[float]] = ask_once(ENGINES[engine], request, ENGINE_TIMEOUT)
     except ChildDiedError as died:

@@ -22,8 +22,9 @@ from ...running.fmu_archive import read_description
 from ...running.runner import ProgressCallback
 from ...scenes.coupled.scene import CoupledScene, load_coupled_scene
 from ...scenes.fmu_files import find_fmu
+from ...scenes.run_spec import RunSpec
 from .convergence import Convergence
-from .engine import ENGINES, EXTRA, MAIN_ENGINE, EngineRequest, run_engine
+from .engine import ENGINES, EXTRA, MAIN_ENGINE, run_engine
 
 FOLDER = "coupled"
 FILES = ("trajectory.csv", "error.csv", "engines.csv", "figure.svg")
@@ -135,7 +136,7 @@ def study(
     """Run the archive at each communication step, and at the smallest step in the other engines as well."""
     runs = []
     for i, step in enumerate(plan.steps):
-        runs.append(np.array(run_engine(MAIN_ENGINE, request(plan, archive, step))))
+        runs.append(run_step(MAIN_ENGINE, plan, archive, step))
         report((i + 1) / (len(plan.steps) + len(ENGINES)))
     finest = runs[-1]
     times = [np.arange(len(x)) * step for step, x in zip(plan.steps, runs, strict=True)]
@@ -151,11 +152,7 @@ def study(
     engines = {}
     for engine in ENGINES:
         try:
-            x = (
-                finest
-                if engine == MAIN_ENGINE
-                else np.array(run_engine(engine, request(plan, archive, plan.steps[-1])))
-            )
+            x = finest if engine == MAIN_ENGINE else run_step(engine, plan, archive, plan.steps[-1])
             n_missing = len(references[-1]) - len(x)
             engines[engine] = tuple(x[-1].tolist()), float(np.abs(x - references[-1][n_missing:]).max()), ""
         except HarnessError as error:
@@ -163,15 +160,16 @@ def study(
     return replace(plan, time=times[-1], x=finest, truth=references[-1], errors=tuple(errors), engines=engines)
 
 
-def request(plan: Convergence, archive: Path, step: float) -> EngineRequest:
-    return EngineRequest(str(archive), step, round(plan.stop / step), list(plan.read), plan.values)
+def run_step(engine: str, plan: Convergence, archive: Path, step: float) -> np.ndarray:
+    """Return the rows (m, n) of a run of an archive with a communication step in s."""
+    run = RunSpec(archive, plan.names, stop=plan.stop, grid=step, follow=False)
+    return np.array(run_engine(engine, run, plan.read, plan.values))
 
 
 def save(result: Convergence, folder: Path) -> None:
     """Write trajectory.csv, error.csv and engines.csv."""
-    names = [f"{element}.{variable}" for element, variable, _ in result.read]
     heads, reference_heads, final_heads = (
-        [column_heading(name + suffix, size) for name, size in zip(names, result.units, strict=True)]
+        [column_heading(name + suffix, size) for name, size in zip(result.names, result.units, strict=True)]
         for suffix in ("", " reference", " at the stop")
     )
     write_csv(
@@ -180,7 +178,7 @@ def save(result: Convergence, folder: Path) -> None:
     columns = [np.array(result.steps[: len(result.errors)]), np.array(result.errors)]
     write_csv(folder / "error.csv", ["communication step [s]", column_heading("largest error", result.unit)], columns)
     table = [
-        [engine, *(end or [None] * len(names)), error, reason]
+        [engine, *(end or [None] * len(result.names)), error, reason]
         for engine, (end, error, reason) in result.engines.items()
     ]
     table.append([result.reference, *result.truth[-1].tolist(), 0.0, ""])
