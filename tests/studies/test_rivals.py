@@ -15,7 +15,7 @@ from harness.process.child_process import ChildProcess
 from harness.references.certified_reference import FOLDER, load_reference
 from harness.studies.rivals import child, study
 from harness.studies.rivals.catalogue import ENGINES, MAX_LINES, OTHERS, OWN, RIVALS, count_lines
-from harness.studies.rivals.child import RunReply, RunRequest, run_request
+from harness.studies.rivals.child import RivalCase, RivalReply, run_case
 from harness.studies.rivals.comparison import Comparison, Result
 from harness.studies.rivals.measures import match_events, measure
 from harness.studies.rivals.reference_motions import FINE, compute_reference_motion
@@ -40,7 +40,7 @@ def engine(monkeypatch):
         module = ModuleType("engine")
         module.simulate = simulate
         monkeypatch.setitem(sys.modules, f"{child.__package__}.engines.engine", module)
-        return RunRequest("engine", "rest", {})
+        return RivalCase("engine", "rest", {})
 
     return install
 
@@ -64,7 +64,7 @@ def test_references_agree_with_the_certified_results(references, name):
 @pytest.mark.parametrize("name", SCENES)
 def test_scipy_with_programmed_events_agrees_with_the_references(references, name):
     rival = RIVALS["scipy"]
-    measures = measure(SCENES[name], references[name], run_request(RunRequest(rival.module, name, rival.best)))
+    measures = measure(SCENES[name], references[name], run_case(RivalCase(rival.module, name, rival.best)))
     assert measures.error < 1e-9
     assert (measures.creep, measures.missed, measures.spurious) == (0.0, 0, 0)
     assert isnan(measures.event_error) if name == "held" else measures.event_error < 1e-9
@@ -74,7 +74,7 @@ def test_scipy_with_programmed_events_agrees_with_the_references(references, nam
 def test_an_installed_rival_simulates_a_scene_that_it_offers(references, rival):
     if rival.installed_version is None:
         pytest.skip(f"{rival.package} is not installed")
-    (reply,) = run_in_child([RunRequest(rival.module, "rest", rival.default)], 120.0)
+    (reply,) = run_in_child([RivalCase(rival.module, "rest", rival.default)], 120.0)
     assert reply.gap == ""
     measures = measure(SCENES["rest"], references["rest"], reply)
     assert measures.error < 0.05
@@ -89,7 +89,7 @@ def test_our_fmus_are_exact_in_all_scenes(references, fmus, tmp_path, monkeypatc
     (tmp_path / "fmus" / "more").symlink_to(build_once("more-rivals", "belt", "clutch"))
     monkeypatch.chdir(tmp_path)
     for name, scene in SCENES.items():
-        measures = measure(scene, references[name], run_request(RunRequest(OWN.module, name, OWN.best)))
+        measures = measure(scene, references[name], run_case(RivalCase(OWN.module, name, OWN.best)))
         assert measures.error < 1e-9, name
         assert (measures.creep, measures.missed, measures.spurious) == (0.0, 0, 0), name
 
@@ -128,11 +128,11 @@ def test_what_an_engine_raises_is_a_gap(engine):
     def diverges(scene, setting):
         return Solution(scene.times, np.full((len(scene.times), 3), np.nan), steps=1)
 
-    assert run_request(engine(fails)).gap == "RuntimeError: the solver fell over"
-    assert run_request(engine(diverges)).gap == "the result is not finite"
-    assert run_request(RunRequest("no_such_engine", "rest", {})).gap.startswith("it cannot be imported: ")
+    assert run_case(engine(fails)).gap == "RuntimeError: the solver fell over"
+    assert run_case(engine(diverges)).gap == "the result is not finite"
+    assert run_case(RivalCase("no_such_engine", "rest", {})).gap.startswith("it cannot be imported: ")
     pytest.importorskip("mujoco", reason="extra rivals")
-    assert run_request(RunRequest("mujoco", "sled", {})).gap == "frictionloss is one constant force"
+    assert run_case(RivalCase("mujoco", "sled", {})).gap == "frictionloss is one constant force"
 
 
 BROKEN = """
@@ -161,7 +161,7 @@ def test_after_a_rival_that_dies_or_hangs_the_next_scene_runs(tmp_path, monkeypa
     (tmp_path / "broken.py").write_text(BROKEN)
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     monkeypatch.setattr(study, "ChildProcess", lambda module: ChildProcess("broken"))
-    replies = run_in_child([RunRequest("broken", name, {"how": how}) for name in ("rest", "sled", "held")], 8.0)
+    replies = run_in_child([RivalCase("broken", name, {"how": how}) for name in ("rest", "sled", "held")], 8.0)
     assert [reply.gap for reply in replies] == ["", reason, ""]
 
 
@@ -186,7 +186,7 @@ def test_a_slip_begins_and_ends_where_it_passes_the_level_even_within_one_step()
 
 def test_a_body_that_stays_where_it_should_move_has_its_error_and_no_events(references, engine):
     scene = SCENES["rest"]
-    measures = measure(scene, references["rest"], run_request(engine(lambda scene, setting: at_rest(scene))))
+    measures = measure(scene, references["rest"], run_case(engine(lambda scene, setting: at_rest(scene))))
     assert measures.error == pytest.approx(np.abs(references["rest"].states[::FINE, 0] - 0.1).max())
     assert (measures.missed, measures.spurious, measures.steps) == (32, 0, 7)
 
@@ -209,13 +209,13 @@ def test_the_command_writes_a_table_a_figure_and_the_gaps(user_folder, tmp_path,
 def reply_of_reference(request):
     """The reply of an exact engine; one setting gives no result."""
     if request.module == OWN.module and request.setting:
-        return RunReply("it fell over")
+        return RivalReply("it fell over")
     reference = compute_reference_motion(SCENES[request.scene])
-    return RunReply("", reference.states[::FINE].tolist(), True, reference.events, 5, 0.5)
+    return RivalReply("", reference.states[::FINE].tolist(), True, reference.events, 5, 0.5)
 
 
 def test_other_exact_rivals_are_named_before_ours():
-    measures = measure(SCENES["held"], compute_reference_motion(SCENES["held"]), RunReply("", [[0.0] * 3] * 51, True))
+    measures = measure(SCENES["held"], compute_reference_motion(SCENES["held"]), RivalReply("", [[0.0] * 3] * 51, True))
     results = [Result(title, "1", "best", {}, "held", 1, measures) for title in (OWN.title, "scipy", "MuJoCo")]
     results.append(replace(results[2], setting="default", measures=replace(measures, error=0.1)))
     comparison = Comparison((OWN,), tuple(results))

@@ -15,8 +15,8 @@ SHORT = 1.0  # s
 
 
 @dataclass(frozen=True)
-class RunRequest:
-    """The module of an engine, the name of a scene, and the setting."""
+class RivalCase:
+    """The module of an engine, the name of the scene that it solves, and its setting."""
 
     module: str
     scene: str
@@ -24,7 +24,7 @@ class RunRequest:
 
 
 @dataclass(frozen=True)
-class RunReply:
+class RivalReply:
     """What came of a run.
 
     Attributes
@@ -45,33 +45,33 @@ class RunReply:
     seconds: float = 0.0
 
 
-def run_request(request: RunRequest) -> RunReply:
+def run_case(case: RivalCase) -> RivalReply:
     """Run a rival; what it raises becomes a gap."""
-    scene = SCENES[request.scene]
+    scene = SCENES[case.scene]
     try:
-        simulate = import_module(f"{__package__}.engines.{request.module}").simulate
+        simulate = import_module(f"{__package__}.engines.{case.module}").simulate
         times: list[float] = []
         while len(times) < (REPEATS if not times or times[0] < SHORT else 1):
             start = process_time()
-            motion = simulate(scene, dict(request.setting))
+            motion = simulate(scene, dict(case.setting))
             times.append(process_time() - start)
     except ImportError as error:
-        return RunReply(f"it cannot be imported: {first_line(error)}")
+        return RivalReply(f"it cannot be imported: {first_line(error)}")
     except (NotOfferedError, HarnessError) as error:
-        return RunReply(first_line(error))
+        return RivalReply(first_line(error))
     except Exception as error:  # of an engine, which may raise anything
-        return RunReply(f"{type(error).__name__}: {first_line(error)}")
+        return RivalReply(f"{type(error).__name__}: {first_line(error)}")
     states = sample(motion, scene.times)
     if not np.isfinite(states).all():
-        return RunReply("the result is not finite")
+        return RivalReply("the result is not finite")
     has_modes = motion.events is not None
     changes = slip_changes(motion, scene.level) if motion.events is None else motion.events
-    return RunReply("", states.tolist(), has_modes, changes, int(motion.steps), min(times))
+    return RivalReply("", states.tolist(), has_modes, changes, int(motion.steps), min(times))
 
 
 def serve() -> None:
     """Answer the requests of the parent."""
-    RequestServer().serve(lambda request: run_request(RunRequest(**request)))
+    RequestServer().serve(lambda request: run_case(RivalCase(**request)))
 
 
 if __name__ == "__main__":

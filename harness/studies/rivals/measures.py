@@ -6,7 +6,7 @@ from math import inf, nan
 import numpy as np
 
 from ...running.solution import Events, Solution
-from .child import RunReply
+from .child import RivalReply
 from .reference_motions import FINE
 from .scenes import Scene, slip_changes
 
@@ -36,7 +36,7 @@ class Measures:
     seconds: float
 
 
-def measure(scene: Scene, reference: Solution, reply: RunReply) -> Measures:
+def measure(scene: Scene, reference: Solution, reply: RivalReply) -> Measures:
     """Compare a run with the reference of its scene."""
     states, true_states = np.array(reply.states), reference.states[::FINE]
     error = np.abs(states - true_states)[:, scene.compared_columns].max()

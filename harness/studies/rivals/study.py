@@ -13,7 +13,7 @@ from ...results.summary import Summary, read_cells, write_summary
 from ...running.solution import Solution
 from ...scenes.fmu_files import find_fmu
 from .catalogue import Rival, find_rivals
-from .child import RunReply, RunRequest
+from .child import RivalCase, RivalReply
 from .comparison import Comparison, Result, format_setting
 from .figure import draw
 from .measures import measure
@@ -60,24 +60,24 @@ def run_rival(rival: Rival, references: dict[str, Solution], timeout: float) -> 
     version = rival.installed_version
     for name, setting in rival.settings.items():
         if version:
-            replies = run_in_child([RunRequest(rival.module, scene, setting) for scene in SCENES], timeout)
+            replies = run_in_child([RivalCase(rival.module, scene, setting) for scene in SCENES], timeout)
         else:
             reason = f"{rival.package} is not installed: python -m pip install 'friction-fmus[rivals]'"
-            replies = [RunReply(reason)] * len(SCENES)
+            replies = [RivalReply(reason)] * len(SCENES)
         for (scene_name, scene), reply in zip(SCENES.items(), replies, strict=True):
             measures = None if reply.gap else measure(scene, references[scene_name], reply)
             yield Result(rival.title, version or "-", name, setting, scene_name, rival.lines, measures, reply.gap)
 
 
-def run_in_child(requests: list[RunRequest], timeout: float) -> list[RunReply]:
-    """Run requests in one process. A crash and a hang are gaps, after which another process goes on."""
-    replies: list[RunReply] = []
+def run_in_child(cases: list[RivalCase], timeout: float) -> list[RivalReply]:
+    """Run cases in one process. A crash and a hang are gaps, after which another process goes on."""
+    replies: list[RivalReply] = []
     with ChildProcess(f"{__package__}.child") as child:
-        for request in requests:
+        for case in cases:
             try:
-                replies.append(RunReply(**child.ask(request, timeout)))
+                replies.append(RivalReply(**child.ask(case, timeout)))
             except ChildError as error:
-                replies.append(RunReply(str(error)))
+                replies.append(RivalReply(str(error)))
     return replies
 
 
