@@ -201,19 +201,23 @@ static bool has_value(State *state, const Variable *variable, double value)
     return is_constant && value == variable_value(state, variable);
 }
 
+static COLD Status refuse_value(const Instance *self, int64_t reason, const Variable *variable, double value)
+{
+    TextBuffer text = {0};
+    append_value_message(&text, reason, variable, value);
+    report_error(self, &text);
+    return STATUS_ERROR;
+}
+
 /* Refuse a value that the variable cannot have now. */
 static Status check_value(Instance *self, uint32_t reference, double value)
 {
     const Variable *variable = &variables[reference];
-    TextBuffer text = {0};
     bool allowed = is_allowed_value(variable, value), fault = false;
     if (has_value(&self->state, variable, value)) return STATUS_OK;
     int64_t reason = call_sequence_rejection_reason(&self->state.run, variable->is_calculated, variable->is_fixed,
                                                     allowed, &fault);
-    if (reason == OK) return STATUS_OK;
-    append_value_message(&text, reason, variable, value);
-    report_error(self, &text);
-    return STATUS_ERROR;
+    return reason == OK ? STATUS_OK : refuse_value(self, reason, variable, value);
 }
 
 /* Set a variable to a valid value. */
@@ -313,21 +317,25 @@ static Status set_logging(Instance *self, bool logging, size_t n, const char *co
     return STATUS_OK;
 }
 
+/* Refuse the start or stop time that `run` has. */
+static COLD Status refuse_experiment(const Instance *self, int64_t reason, const Run *run)
+{
+    TextBuffer text = {0};
+    append_run_message(&text, reason, run, &self->state.model, NAN, NAN);
+    report_error(self, &text);
+    return STATUS_ERROR;
+}
+
 /* Set start time, stop time (infinite if unknown) and tolerance (0 if unknown) of the run. */
 static Status set_experiment(Instance *self, double start, double stop, double tolerance)
 {
     Run run = self->state.run;
-    TextBuffer text = {0};
     bool fault = false;
     call_sequence_set_experiment(&run, start, stop, tolerance, &fault);
     int64_t status = call_sequence_check_experiment(&run, &fault);
-    if (status == OK) {
-        self->state.run = run;
-        return STATUS_OK;
-    }
-    append_run_message(&text, status, &run, &self->state.model, NAN, NAN);
-    report_error(self, &text);
-    return STATUS_ERROR;
+    if (status != OK) return refuse_experiment(self, status, &run);
+    self->state.run = run;
+    return STATUS_OK;
 }
 
 /* Start the run. If the importer handles events, it starts in event mode. */
