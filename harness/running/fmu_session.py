@@ -45,6 +45,8 @@ class StepRefusedError(StepError):
 
 CALL_FAILURES = (FMICallException, StepError)
 
+PreparedCall = tuple[str, Any, tuple[Any, ...]]  # name, function and arguments
+
 
 class LogCapture:
     """Log messages of an FMU, and its standard error if that is captured."""
@@ -142,6 +144,19 @@ class FmuSession:
     def function(self, name: str) -> Any:
         """Return a function of the library, by its name without the prefix."""
         return getattr(self.fmu.dll, f"{self.prefix}{name}")
+
+    def prepare_call(self, name: str, *arguments: Any) -> PreparedCall:
+        """Return a call of a function of the library, by its name without the prefix, with constant arguments.
+
+        Numbers are converted once. The function has no declared types, because ctypes would check these in each call,
+        which takes as long as the call itself.
+        """
+        name, types = f"{self.prefix}{name}", self.function(name).argtypes
+        converted = (
+            kind(value) if isinstance(value, int | float) else value
+            for kind, value in zip(types, (self.instance, *arguments), strict=True)
+        )
+        return name, self.fmu.dll[name], tuple(converted)
 
     def initialize(
         self, values: Iterable[tuple[Any, Any]], start: float, stop: float | None, tolerance: float | None = None
@@ -251,22 +266,22 @@ class PreparedRuns:
         start: float,
         stop: float,
     ) -> None:
-        self.session, slots = session, {}
-        self.start_calls = [self.prepare("Reset"), self.prepare("SetupExperiment", 0, 0.0, start, 1, stop)]
+        self.session, call, slots = session, session.prepare_call, {}
+        self.start_calls = [call("Reset"), call("SetupExperiment", 0, 0.0, start, 1, stop)]
         for type_name, names in self.group([*values, *varied]).items():
             references, buffer = self.make_buffer(type_name, names)
             for i, name in enumerate(names):
                 buffer[i] = values.get(name, 0)
                 slots[name] = buffer, i, float if type_name == "Real" else int
-            self.start_calls.append(self.prepare(f"Set{type_name}", references, len(names), buffer))
+            self.start_calls.append(call(f"Set{type_name}", references, len(names), buffer))
         self.slots = [slots[name] for name in varied]
-        self.start_calls += [self.prepare("EnterInitializationMode"), self.prepare("ExitInitializationMode")]
-        self.step_call = self.prepare("DoStep", start, stop - start, 1)
+        self.start_calls += [call("EnterInitializationMode"), call("ExitInitializationMode")]
+        self.step_call = call("DoStep", start, stop - start, 1)
         self.read_calls, self.results = [], []
         for type_name, names in self.group(read).items():
             references, buffer = self.make_buffer(type_name, names)
             self.results.append(buffer)
-            self.read_calls.append(self.prepare(f"Get{type_name}", references, len(names), buffer))
+            self.read_calls.append(call(f"Get{type_name}", references, len(names), buffer))
 
     def group(self, names: Iterable[str]) -> dict[str, list[str]]:
         """Return the distinct names of variables by type."""
@@ -279,10 +294,6 @@ class PreparedRuns:
         """Return value references, and a buffer for the values."""
         references = (c_uint * len(names))(*(self.session.variables[name].valueReference for name in names))
         return references, ((c_double if type_name == "Real" else c_int) * len(names))()
-
-    def prepare(self, name: str, *arguments: Any) -> tuple[str, Any, tuple[Any, ...]]:
-        """Return name, function and arguments of a call."""
-        return f"{self.session.prefix}{name}", self.session.function(name), (self.session.instance, *arguments)
 
     def start(self, point: Sequence[float]) -> None:
         """Initialize a run with the varied values."""
@@ -300,7 +311,7 @@ class PreparedRuns:
         return [value for buffer in self.results for value in buffer]
 
 
-def call_all(calls: Iterable[tuple[str, Any, tuple[Any, ...]]]) -> None:
+def call_all(calls: Iterable[PreparedCall]) -> None:
     """Call functions of the library; raise FMICallException if one of them fails."""
     for name, function, arguments in calls:
         status = function(*arguments)

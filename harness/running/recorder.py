@@ -31,7 +31,7 @@ from fmpy.fmi1 import FMICallException
 
 from ..errors import HarnessError, SceneError, check_names
 from ..scenes.run_spec import RunSpec
-from .fmu_session import WARNING, FmuSession
+from .fmu_session import WARNING, FmuSession, PreparedCall
 from .variable_values import REAL_TYPES, convert_value
 
 C_TYPES: dict[str, Any] = {
@@ -164,7 +164,7 @@ class Recorder:
         layout = row_type(selection, session.is_fmi2)
         self.row, self.write, self.strings, self.only_finite = bytearray(layout.itemsize), write, strings, only_finite
         self.time = c_double.from_buffer(self.row)
-        self.calls: list[tuple[str, Any, tuple[Any, ...]]] = []
+        self.calls: list[PreparedCall] = []
         self.cells: dict[str, tuple[Any, int]] = {}  # of Reals: buffer and index
         self.texts: list[tuple[Any, Any]] = []  # of Strings: pointers and indices
         for type_name, variables, names in group_by_type(selection):
@@ -176,11 +176,10 @@ class Recorder:
             if type_name == "String":
                 values = (c_char_p * len(names))()
                 self.texts = [(values, buffer)]
-            name = f"Get{session.type_name(variables[0])}"
             references = (c_uint * len(variables))(*(variable.valueReference for variable in variables))
             count = () if session.is_fmi2 else (len(names),)
-            arguments = (session.instance, references, len(variables), values, *count)
-            self.calls.append((f"{session.prefix}{name}", session.function(name), arguments))
+            name = f"Get{session.type_name(variables[0])}"
+            self.calls.append(session.prepare_call(name, references, len(variables), values, *count))
 
     def cell(self, name: str) -> c_double:
         """Return what holds the last recorded value of a Float64."""

@@ -226,7 +226,9 @@ def test_the_longest_of_the_aborted_refinement_runs_is_kept(tmp_path):
 
     chosen = [(ModelVariable("x", type="Float64", valueReference=0), ())]
     session = SimpleNamespace(
-        is_fmi2=False, prefix="fmi3", instance=None, type_name=lambda variable: variable.type, function=lambda _: answer
+        is_fmi2=False,
+        type_name=lambda variable: variable.type,
+        prepare_call=lambda name, *arguments: (name, answer, (None, *arguments)),
     )
     for number, times in enumerate(([0.0, 0.5, 1.0], [0.0, 0.25, 0.5, 0.75], [])):
         with (tmp_path / f"rows-{number}").open("wb") as file:

@@ -87,7 +87,9 @@ def test_a_null_or_malformed_string_is_recorded(tmp_path, bytes_, text):
 
     variable = ModelVariable("said", valueReference=7, type="String")
     session = SimpleNamespace(
-        is_fmi2=False, prefix="fmi3", instance=None, type_name=lambda variable: "String", function=lambda name: answer
+        is_fmi2=False,
+        type_name=lambda variable: "String",
+        prepare_call=lambda name, *arguments: (name, answer, (None, *arguments)),
     )
     texts, rows = StringTable(tmp_path / "texts"), bytearray()
     Recorder(session, [(variable, ())], rows.extend, texts).record(0.0)
