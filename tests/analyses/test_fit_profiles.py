@@ -1,5 +1,7 @@
 """Least squares, differences and profiles of a fit, whose answers have a closed form."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -48,6 +50,18 @@ def test_a_curved_valley_is_followed_to_its_minimum():
     assert problem.n_runs < 200
 
 
+@pytest.mark.parametrize(("floor", "share"), [(100.0, 0.5), (0.9, 1.0)])
+def test_a_fit_ends_early_only_where_its_goal_is_out_of_reach(floor, share):
+    """The floor of the valley lies above the goal, a sum of squares of 1, or below."""
+    counts, ends = [], []
+    for goal in (np.inf, 1.0):
+        problem = Residuals(lambda a, b: (*valley(a, b)[:2], floor))
+        ends.append(problem.minimize(np.array([3.0, 9.0]), (), 40, 1e-9, central=True, goal=goal)[1])
+        counts.append(problem.n_runs)
+    assert counts[1] <= share * counts[0]
+    assert share < 1.0 or ends[1] == pytest.approx(MINIMUM, abs=1e-4)
+
+
 def test_a_profile_follows_a_curved_valley():
     """The profile of a is 2 (exp(a - 1) - 1), and that of b follows from b = a^2."""
     problem = Residuals(valley)
@@ -83,6 +97,24 @@ def test_a_profile_ends_where_the_squares_jump(slope):
 def test_a_profile_that_never_reaches_its_limit_has_no_end():
     problem = Residuals(lambda a, b: (0.5 * np.tanh(a - 1.0), b - 1.0, 1.0))
     assert profile_bound(problem, MINIMUM, uncertainty_at(problem, MINIMUM), 0, 1).end is None
+
+
+def test_a_profile_without_an_end_stops_at_the_limit_of_the_fit():
+    problem = Residuals(lambda a, b: (0.1 * (a - 1.0), b - 1.0, 1.0), reach=3.0)
+    bound = profile_bound(problem, MINIMUM, uncertainty_at(problem, MINIMUM), 0, 1)
+    assert bound.end is None
+    assert bound.profile[-1][0] == pytest.approx(problem.unknowns[0].limits[1], abs=1e-9)
+
+
+@pytest.mark.parametrize("excess", [0.0, 0.7])
+def test_a_profile_from_another_minimum_starts_at_its_height(excess):
+    """The limit is where the squares of that minimum and of the distance exceed those of the best one by 1.96^2."""
+    problem = Residuals(lambda a, b: (a - 1.0, b - 1.0, 1.0))
+    uncertainty = uncertainty_at(problem, MINIMUM)
+    excess *= uncertainty.limit(0)
+    best = replace(uncertainty, squares=uncertainty.squares - excess)
+    end = profile_bound(problem, MINIMUM, best, 0, 1, excess=excess).end
+    assert end - 1.0 == pytest.approx(np.sqrt(QUANTILE**2 - excess), rel=0.03)
 
 
 @pytest.mark.parametrize(("coupling", "has_end"), [(0.0, True), (1.0, False)])

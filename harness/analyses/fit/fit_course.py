@@ -121,9 +121,10 @@ def find_course(
             break
     else:
         doubts.append("The sum of squares has many shallow minima here: the values may lie anywhere in the intervals.")
-    others = [there for _, there in minima if np.abs(there - z).max() > DISTINCT]
+    others = [each for each in minima if np.abs(each[1] - z).max() > DISTINCT]
     extend_ends(problem, z, uncertainty, ends, others)
-    return FitCourse(z, uncertainty, ends, profiles, others, doubts, result.log, result.n_searches)
+    other_minima = [there for _, there in others]
+    return FitCourse(z, uncertainty, ends, profiles, other_minima, doubts, result.log, result.n_searches)
 
 
 def starting_points(problem: FitProblem, warm: np.ndarray | None) -> np.ndarray:
@@ -194,7 +195,7 @@ def find_other_minima(
     problem: FitProblem, z: np.ndarray, uncertainty: Uncertainty, minima: list[Minimum], squares: float
 ) -> list[Minimum]:
     """Return minima about as low as that at z (k,), found from those of the search and from draws around z."""
-    limit = uncertainty.variance * uncertainty.inflation.max() * uncertainty.quantile**2
+    limit = max(map(uncertainty.limit, range(len(z))))
     random = np.random.default_rng(0)
     starts = [there for value, there in distinct(minima, MAX_OTHER_MINIMA) if value < squares + 3 * limit]
     eigenvalues, axes = np.linalg.eigh(uncertainty.covariance * uncertainty.inflation.mean())
@@ -214,11 +215,13 @@ def extend_ends(
     z: np.ndarray,
     uncertainty: Uncertainty,
     ends: dict[tuple[int, int], float | None],
-    other_minima: list[np.ndarray],
+    other_minima: list[Minimum],
 ) -> None:
     """Follow the profile from the minimum that lies farthest out, if it lies where an interval ends or beyond."""
     for (i, side), end in ends.items():
-        farthest = max(other_minima, key=lambda there: side * float(there[i]), default=z)
+        below = [(max(squares - uncertainty.squares, 0.0), there) for squares, there in other_minima]
+        below = [each for each in below if each[0] < uncertainty.limit(i)]
+        excess, farthest = max(below, key=lambda each: side * float(each[1][i]), default=(0.0, z))
         if end is not None and side * (farthest[i] - z[i]) > 0.5 * abs(end - z[i]):
-            other = profile_bound(problem, farthest, uncertainty, i, side, ends_at_better=False).end
+            other = profile_bound(problem, farthest, uncertainty, i, side, ends_at_better=False, excess=excess).end
             ends[i, side] = None if other is None else side * max(side * other, side * end)

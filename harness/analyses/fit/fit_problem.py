@@ -174,6 +174,7 @@ class FitProblem:
         min_gain: float,
         free: np.ndarray | None = None,
         central: bool = False,
+        goal: float = np.inf,
     ) -> tuple[float, np.ndarray]:
         """Return the sum of squares and the coordinates after steps of Levenberg and Marquardt inside the region.
 
@@ -186,12 +187,15 @@ class FitProblem:
             Relative reduction of the sum of squares below which the steps end.
         free : numpy.ndarray, optional
             Indices of the coordinates to fit; by default all.
+        goal : float
+            Sum of squares that matters: the steps also end where `max_steps` like the last two would not reach it, and
+            the last one gains less than the one before. The first steps along a curved valley gain more and more.
         """
         free = np.arange(len(z)) if free is None else free
         e, damping = self.residuals(z, selection), 1e-2
         if e is None:
             return np.inf, z
-        squares, is_central = float(e @ e), central or self.central
+        squares, last_gain, is_central = float(e @ e), 0.0, central or self.central
         for _ in range(max_steps if len(free) else 0):
             jacobian = self.jacobian(z, e, selection, free, is_central)
             matrix, slope = jacobian.T @ jacobian, jacobian.T @ e
@@ -214,11 +218,12 @@ class FitProblem:
                 damping = max(damping * 2.0 ** (n + 1), 1e-8)
             else:
                 return squares, z
-            gain, z, e = 1 - float(new @ new) / squares, z + step, new
+            before, squares = squares, float(new @ new)
+            z, e, gain = z + step, new, before - squares
             damping = damping if n else max(damping * 0.1, MIN_DAMPING)
-            squares = float(e @ e)
-            if gain < min_gain:
+            if gain < min_gain * before or gain < last_gain < (squares - goal) / max_steps:
                 break
+            last_gain = gain
         return squares, z
 
     def curvature_correction(

@@ -73,6 +73,8 @@ class Bracket:
         Change (k,) of the coordinates with the distance, near the minimum.
     reach : float
         Distance of the limit if the squares are quadratic.
+    height : float
+        Height of the minimum; above 0 if another one is lower.
 
     Attributes
     ----------
@@ -82,16 +84,16 @@ class Bracket:
         The nearest trial outside.
     """
 
-    def __init__(self, z: np.ndarray, tangent: np.ndarray, reach: float) -> None:
+    def __init__(self, z: np.ndarray, tangent: np.ndarray, reach: float, height: float = 0.0) -> None:
         self.tangent, self.reach = tangent, reach
-        self.inner: list[Trial] = [Trial(0.0, 0.0, z, 0)]
+        self.inner: list[Trial] = [Trial(0.0, height, z, 0)]
         self.outer: Trial | None = None
 
     @property
     def slope(self) -> float:
         """Return the increase of the height with the distance at the last inner trials."""
         if len(self.inner) < 2:
-            return 1 / self.reach
+            return (1 - self.inner[0].height) / self.reach
         before, last = self.inner[-2:]
         return max((last.height - before.height) / (last.distance - before.distance), 1e-300)
 
@@ -123,7 +125,7 @@ class Bracket:
         last, outer = self.inner[-1], self.outer
         expected = self.expected_end
         if outer is None and len(self.inner) == 1:
-            return min(self.reach / 2, LONGEST_FIRST_STEP)
+            return min(expected / 2, LONGEST_FIRST_STEP)
         if outer is None:
             step = max(MAX_GROWTH * (last.distance - self.inner[-2].distance), MIN_GROWTH * last.distance)
             return float(np.clip(expected, (1 + MIN_GROWTH) * last.distance, last.distance + step))
@@ -167,7 +169,13 @@ class Bracket:
 
 
 def profile_bound(
-    problem: FitProblem, z: np.ndarray, uncertainty: Uncertainty, i: int, side: int, ends_at_better: bool = True
+    problem: FitProblem,
+    z: np.ndarray,
+    uncertainty: Uncertainty,
+    i: int,
+    side: int,
+    ends_at_better: bool = True,
+    excess: float = 0.0,
 ) -> Bound:
     """Return how far coordinate `i` moves from z (k,) to one side until the squares exceed the limit of 95 %.
 
@@ -177,20 +185,26 @@ def profile_bound(
     ----------
     ends_at_better : bool
         Whether there is no end where a better minimum is met; otherwise the profile is followed on.
+    excess : float
+        Squares at z above the minimum, less than those of the limit; above 0 where z is another minimum.
     """
     others = np.delete(np.arange(len(z)), i)
-    target = uncertainty.variance * uncertainty.inflation[i] * uncertainty.quantile**2
+    target = uncertainty.limit(i)
     variance = max(uncertainty.covariance[i, i], 1e-300)
-    reach = max(float(np.sqrt(target / uncertainty.variance * variance)), 1e-6)
-    bracket = Bracket(z, side * uncertainty.covariance[:, i] / variance, reach)
+    reach = max(float(np.sqrt((target - excess) / uncertainty.variance * variance)), 1e-6)
+    bracket = Bracket(z, side * uncertainty.covariance[:, i] / variance, reach, float(np.sqrt(excess / target)))
+    low, high = problem.unknowns[i].limits
+    farthest = high - z[i] if side > 0 else z[i] - low
     better: np.ndarray | None = None
     end: Trial | None = None
     for _ in range(MAX_TRIALS):
-        distance = bracket.next_distance()
+        distance = min(bracket.next_distance(), farthest)
         starts = [bracket.extrapolate(distance), bracket.inner[-1].z.copy()]
         for start in starts:
             start[i] = z[i] + side * distance
-        squares, there = fit_others(problem, z, starts, others, MIN_GAIN * target / uncertainty.squares)
+        squares, there = fit_others(
+            problem, z, starts, others, MIN_GAIN * target / uncertainty.squares, uncertainty.squares + target
+        )
         if squares < uncertainty.squares - BETTER * target:
             better = there
             if ends_at_better:
@@ -198,7 +212,7 @@ def profile_bound(
         height = float(np.sqrt(max(squares - uncertainty.squares, 0.0) / target))
         bracket.add(Trial(distance, height, there, len(bracket.inner)))
         end = bracket.end()
-        if end:
+        if end or bracket.inner[-1].distance >= farthest:
             break
     else:
         end = bracket.last_resort()
@@ -207,17 +221,17 @@ def profile_bound(
     there = next(trial.z for trial in (end, bracket.inner[-1]) if trial and np.isfinite(trial.height))
     if end is None or depends_on_limits(problem, there, i, target):
         return Bound(None, better, profile)
-    coordinate, (low, high) = float(z[i] + side * end.distance), problem.unknowns[i].limits
+    coordinate = float(z[i] + side * end.distance)
     return Bound(coordinate if low < coordinate < high else None, better, profile)
 
 
 def fit_others(
-    problem: FitProblem, z: np.ndarray, starts: list[np.ndarray], others: np.ndarray, min_gain: float
+    problem: FitProblem, z: np.ndarray, starts: list[np.ndarray], others: np.ndarray, min_gain: float, limit: float
 ) -> tuple[float, np.ndarray]:
     """Return the least squares and the coordinates from the best of the starts (k,) on, with only the `others` fitted.
 
-    The squares are infinite if the region holds no values of the others there. The way from z (k,) to a start shows
-    where the FMU refuses values.
+    The squares are infinite if the region holds no values of the others there, and need not be the least ones above the
+    limit. The way from z (k,) to a start shows where the FMU refuses values.
     """
     best, lowest = starts[0], np.inf
     for start in starts:
@@ -230,7 +244,7 @@ def fit_others(
             problem.region.learn(problem.is_refused, z, start - z)
         elif e @ e < lowest:
             best, lowest = start, e @ e
-    return problem.minimize(best, problem.all, MAX_STEPS, min_gain, others)
+    return problem.minimize(best, problem.all, MAX_STEPS, min_gain, others, goal=limit)
 
 
 def depends_on_limits(problem: FitProblem, z: np.ndarray, i: int, target: float) -> bool:

@@ -58,6 +58,10 @@ class Uncertainty:
         degrees = max(len(self.residuals) - len(self.inflation), 1)
         return student_quantile(min(degrees, CORRELATED_DEGREES_OF_FREEDOM) if self.correlation else degrees)
 
+    def limit(self, i: int) -> float:
+        """Return by how much the squares exceed the minimum where the 95 % interval of coordinate i ends."""
+        return float(self.variance * self.inflation[i] * self.quantile**2)
+
     @property
     def deviations(self) -> np.ndarray:
         """Return the standard errors (k,) of the coordinates."""
