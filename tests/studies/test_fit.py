@@ -276,6 +276,18 @@ def test_runs_have_a_tight_tolerance_unless_the_user_fixes_another(fixed, rtol):
     assert resolve_request(request).fixed["solver.rtol"] == rtol
 
 
+@pytest.mark.parametrize(("motion", "is_described"), [(0.0, True), (1e-3, False)])
+def test_a_column_at_rest_with_coloured_noise_is_described(motion, is_described):
+    """Before the sled breaks away, the force of the spring determines k; a drift of the sled contradicts the model."""
+    frame = pull(("x", "F_spring"), t=np.linspace(0.0, 2.0, 2000))
+    white = np.random.default_rng(2).normal(size=len(frame) + 19)
+    frame["x"] = 1e-4 * np.convolve(white, 0.8 ** np.arange(20), "valid") + motion * frame["t"]
+    observe = ["x", "F_spring"]
+    fit = harness.fit(native("stickslip"), frame, {"k": (500.0, 2000.0)}, observe=observe, fixed=DRIVEN)
+    assert fit.describes_record == is_described
+    assert not is_described or holds(fit["k"], TRUTH["k"])
+
+
 def test_a_record_without_such_a_motion_is_refused():
     frame = pull()
     frame["x"] = 0.0

@@ -16,6 +16,7 @@ from .search import ROUGH
 from .uncertainty import INDETERMINATE, Uncertainty, split_residuals
 
 UNFIT_SHARE, UNFIT_NOISE = 0.1, 2.0  # residuals as a share of the range, and in units of the noise
+REST_PARTS, AVERAGED = 20, 0.5  # means of noise over so many parts are smaller than this share of it
 SHIFTED = 0.25  # share of a variance that the error of the inputs adds before it is remarked
 
 
@@ -24,8 +25,14 @@ def describe_fit(
 ) -> ParameterFit:
     """Return the result of a fit: estimates with intervals, combinations, residuals and remarks."""
     z, uncertainty = course.z, course.uncertainty
-    columns = column_residuals(problem.records, split_residuals(problem, uncertainty.residuals), problem.outputs)
-    is_unfit = any(each.residual > max(UNFIT_SHARE * each.range, UNFIT_NOISE * each.noise) for each in columns)
+    residuals = split_residuals(problem, uncertainty.residuals)
+    columns = column_residuals(problem.records, residuals, problem.outputs)
+    predictions = problem.predict(z, problem.all)
+    assert predictions is not None
+    is_unfit = any(
+        each.residual > max(UNFIT_SHARE * each.range, UNFIT_NOISE * each.noise) and not is_rest
+        for each, is_rest in zip(columns, find_rests(problem.records, predictions, residuals), strict=True)
+    )
     estimates, several = make_estimates(problem, course, is_unfit)
     undetermined = [i for i, estimate in enumerate(estimates) if not isfinite(estimate.error)]
     values = np.array([estimate.value for estimate in estimates])
@@ -34,8 +41,6 @@ def describe_fit(
     remarks = (
         unfit_remark(columns) if is_unfit else fit_remarks(problem, course, columns, estimates, several, undetermined)
     )
-    predictions = problem.predict(z, problem.all)
-    assert predictions is not None
     return ParameterFit(
         fmu=fmu,
         estimates=estimates,
@@ -76,6 +81,22 @@ def column_residuals(
             size = float(np.ptp(record.y[:, j]))
             columns.append(ColumnResiduals(record.name, name, "", float(rms[j]), float(record.noise[j]), size))
     return tuple(columns)
+
+
+def find_rests(
+    records: Sequence[MeasuredRecord], predictions: Sequence[np.ndarray], residuals: Sequence[np.ndarray]
+) -> list[bool]:
+    """Return for every observed column of every record whether it is at rest, in the fit and in the record.
+
+    Its range is then that of its noise, which residuals cannot be small against. The record is at rest where residuals,
+    even of coloured noise, average out over parts of it; those of a drift or of a slip that the model lacks do not.
+    """
+    rests = []
+    for record, prediction, e in zip(records, predictions, residuals, strict=True):
+        means = np.array([part.mean(axis=0) for part in np.array_split(e, REST_PARTS)])
+        averages_out = np.sqrt((means**2).mean(axis=0)) < AVERAGED * np.sqrt((e**2).mean(axis=0))
+        rests += [*((np.ptp(prediction, axis=0) < record.noise) & averages_out)]
+    return rests
 
 
 def make_estimates(problem: FitProblem, course: FitCourse, is_unfit: bool) -> tuple[tuple[Estimate, ...], list[str]]:
