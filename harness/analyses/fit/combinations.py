@@ -29,7 +29,7 @@ def determined_combinations(
     """
     covariance = uncertainty.covariance * uncertainty.inflation.max()
     pairs = [(i, j) for i in indeterminate for j in indeterminate if i < j and unknowns[i].sign and unknowns[j].sign]
-    found: list[tuple[Estimate, np.ndarray]] = []
+    combinations: list[tuple[Estimate, np.ndarray]] = []
     for i, j in pairs:
         candidates = list_combinations(unknowns[i], unknowns[j], float(values[i]), float(values[j]))
         block = covariance[np.ix_([i, j], [i, j])]
@@ -41,9 +41,9 @@ def determined_combinations(
             estimate = Estimate(name, value, errors[best] * abs(value), value - margin, value + margin, unit, "")
             row = np.zeros(len(unknowns))
             row[[i, j]] = weights
-            found.append((estimate, row))
+            combinations.append((estimate, row))
     independent: list[tuple[Estimate, np.ndarray]] = []
-    for estimate, row in sorted(found, key=lambda each: each[0].error / abs(each[0].value)):
+    for estimate, row in sorted(combinations, key=lambda pair: pair[0].error / abs(pair[0].value)):
         if np.linalg.matrix_rank([*(other for _, other in independent), row], tol=1e-6) > len(independent):
             independent.append((estimate, row))
     return tuple(estimate for estimate, _ in independent)
@@ -57,13 +57,13 @@ def list_combinations(a: Unknown, b: Unknown, p: float, q: float) -> list[tuple[
         (f"{a.name}^2/{b.name}", combine_units(a.unit, 2, b.unit, -1), p * p / q, (2, -1)),
         (f"{a.name}/{b.name}^2", combine_units(a.unit, 1, b.unit, -2), p / q / q, (1, -2)),
     ]
-    found = [(name, unit, value, np.array(weights, dtype=float)) for name, unit, value, weights in quotients]
+    combinations = [(name, unit, value, np.array(weights, dtype=float)) for name, unit, value, weights in quotients]
     if a.unit == b.unit and 1 / COMPARABLE < p / q < COMPARABLE:
         for sign, symbol in ((1, "+"), (-1, "-")):
             value = p + sign * q
             if value:
-                found.append((f"{a.name} {symbol} {b.name}", a.unit, value, np.array([p, sign * q]) / value))
-    return found
+                combinations.append((f"{a.name} {symbol} {b.name}", a.unit, value, np.array([p, sign * q]) / value))
+    return combinations
 
 
 def combine_units(a: str, power_a: int, b: str, power_b: int) -> str:

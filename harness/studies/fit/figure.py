@@ -70,7 +70,7 @@ def fitted_columns(laws: Sequence[ParameterFit]) -> list[FittedColumn]:
     for columns, records, predictions, text in parts:
         for n, column in enumerate(columns):
             i, j = divmod(n, predictions[0][0].shape[1])
-            signals_of_laws = tuple(each[i][:, j] for each in predictions)
+            signals_of_laws = tuple(prediction[i][:, j] for prediction in predictions)
             fitted.append(FittedColumn(column, records[i], j, signals_of_laws, f"{column.record}{text}"))
     return fitted
 
@@ -79,12 +79,12 @@ def plot_column(panels: np.ndarray, laws: Sequence[ParameterFit], fitted: Fitted
     """Plot a column of a record with the fits, and below it the residuals of each law."""
     record, j = fitted.record, fitted.position
     unit, size = display_unit(fitted.column.unit)
-    measured = record.y[:, j] / size
-    plot_record(panels[0], record.t, measured, fitted.title, axis_label(fitted.column.name, unit))
+    samples = record.y[:, j] / size
+    plot_record(panels[0], record.t, samples, fitted.title, axis_label(fitted.column.name, unit))
     for n, (law, signal, axes) in enumerate(zip(laws, fitted.signals, panels[1:], strict=True)):
         label, name = f"fit: {law.fmu}", f" of {law.fmu}" if len(laws) > 1 else ""
         panels[0].plot(record.t, signal / size, color=COLOURS[n % len(COLOURS)], linewidth=0.9, label=label)
-        plot_residuals(axes, record.t, measured - signal / size, float(record.noise[j]) / size, name, unit)
+        plot_residuals(axes, record.t, samples - signal / size, float(record.noise[j]) / size, name, unit)
         axes.sharex(panels[0])
     limits = [axes.get_ylim() for axes in panels[1:]]
     for axes in panels[1:]:
@@ -101,8 +101,8 @@ def plot_profile(axes: Axes, profile: Profile, estimate: Estimate, colour: str) 
     value, excess = np.array(profile.value) / size, np.array(profile.excess)
     root = np.sqrt(excess) * np.sign(value - estimate.value / size)
     if len(value) > 1:
-        fine = np.linspace(value[0], value[-1], 200)
-        axes.plot(fine, PchipInterpolator(value, root)(fine) ** 2, color=colour, linewidth=0.9)
+        grid = np.linspace(value[0], value[-1], 200)
+        axes.plot(grid, PchipInterpolator(value, root)(grid) ** 2, color=colour, linewidth=0.9)
     axes.plot(value, excess, ".", markersize=4, color=colour)
     axes.axhline(1.0, color="black", linewidth=0.6)
     if isfinite(estimate.low) and isfinite(estimate.high):

@@ -48,32 +48,40 @@ def resolve_laws(request: FitRequest) -> ResolvedLaws:
     check_names("free parameter", request.each, [*request.free])
     check_starts(request)
     laws, notes = [], []
-    for fmu, name, description, own, fixable in zip(fmus, names, descriptions, free, settable, strict=True):
+    for fmu, name, description, available, fixable in zip(fmus, names, descriptions, free, settable, strict=True):
         law = replace(
             request,
             run=replace(
                 request.run,
                 fmu=fmu,
-                values={each: value for each, value in request.run.values.items() if each in fixable},
+                values={parameter: value for parameter, value in request.run.values.items() if parameter in fixable},
             ),
             name=name,
             against=(),
-            free={each: limits for each, limits in request.free.items() if each in own},
-            start={each: value for each, value in request.start.items() if is_unknown(each, own, own)},
-            each=tuple(each for each in request.each if each in own),
+            free={parameter: limits for parameter, limits in request.free.items() if parameter in available},
+            start={
+                parameter: value
+                for parameter, value in request.start.items()
+                if is_unknown(parameter, available, available)
+            },
+            each=tuple(parameter for parameter in request.each if parameter in available),
         )
-        for kind, causalities, given in (
+        for kind, causalities, requested in (
             ("output", READABLE, request.observe),
             ("input", ("input",), request.inputs),
         ):
-            check_names(f"{kind} of {name}", given, variable_names(description, causalities))
+            check_names(f"{kind} of {name}", requested, variable_names(description, causalities))
         if request.free and not law.free:
             raise SceneError(
                 f"{name} has none of the free parameters {', '.join(request.free)}: free some of its own as well, as "
-                f"in --free {','.join([*request.free, *own[:1]])}"
+                f"in --free {','.join([*request.free, *available[:1]])}"
             )
-        lacking = [each for each in (*request.free, *request.run.values) if each not in own and each not in fixable]
-        notes.append((f"{name} has no {', '.join(lacking)}: its fit leaves them out.",) if lacking else ())
+        missing = [
+            parameter
+            for parameter in (*request.free, *request.run.values)
+            if parameter not in available and parameter not in fixable
+        ]
+        notes.append((f"{name} has no {', '.join(missing)}: its fit leaves them out.",) if missing else ())
         try:
             laws.append(resolve_request(law))
         except SceneError as error:

@@ -94,14 +94,14 @@ export function linearScale(a, b, p, q) {
   return map;
 }
 
-// The value of a tickLabel, with as many decimals as the ticks need.
+// The label of a tick, with as many decimals as the ticks need.
 export function tickLabel(value, all) {
   if (Math.abs(value) < 1e-9 * Math.abs(all[1] - all[0])) return "0";
   const places = Math.max(0, -Math.floor(Math.log10(all[1] - all[0]) + 1e-9));
   return fixedDigits(value, places);
 }
 
-// A linearScale of time under a diagram.
+// A time axis under a diagram.
 export function timeAxis(chart, x, from, to, y, unit = "s") {
   const count = Math.max(2, Math.min(8, Math.floor((x(to) - x(from)) / 55)));
   const all = ticks(from, to, count);
