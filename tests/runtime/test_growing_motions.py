@@ -284,4 +284,4 @@ def test_references_and_stability_accept_an_unstable_model(tmp_path):
     cases = [[case for case in group if case.title == "as it comes"] for group in grouped_cases(models=[str(file)])]
     rows, _ = run_stability(tmp_path, lambda *_: None, [group for group in cases if group])
     assert rows
-    assert [row.text for row in rows if not row.passed] == []
+    assert [row.text for row in rows if not row.has_passed] == []

@@ -19,6 +19,8 @@ from harness.analyses.fit.law_comparison import compare_laws
 from harness.analyses.fit.measured_record import RecordData
 from harness.analyses.fit.parameter_fit import information_criterion
 from harness.errors import HarnessError, SceneError
+from harness.running.fmu_archive import read_description
+from harness.running.variable_values import enumeration_labels
 from harness.running.whole_run import open_simulator
 from harness.scenes.run_spec import RunSpec
 from harness.studies.fit import study
@@ -270,10 +272,28 @@ def test_the_command_writes_what_it_prints(tmp_path):
     assert harness.load_result(folder) == stored
 
 
-@pytest.mark.parametrize(("fixed", "rtol"), [({}, 1e-8), ({"solver.rtol": 1e-5}, 1e-5)])
-def test_runs_have_a_tight_tolerance_unless_the_user_fixes_another(fixed, rtol):
-    request = FitRequest(RunSpec(Path("fmus/stickslip.fmu"), values=fixed), {"k": None}, {"x": "x"})
-    assert resolve_request(request).fixed["solver.rtol"] == rtol
+@pytest.mark.parametrize(
+    ("fixed", "rtol", "method"),
+    [
+        ({}, 1e-8, "dop853"),
+        ({"solver.rtol": 1e-5}, 1e-5, "dop853"),
+        ({"solver.method": "ode45"}, 1e-8, "ode45"),
+    ],
+)
+def test_runs_are_accurate_and_fast_unless_the_user_fixes_other_settings(fixed, rtol, method):
+    request = FitRequest(RunSpec(native("stribeck_sled"), values=fixed), {"k": None}, {"x": "x"})
+    variables = {variable.name: variable for variable in read_description(request.run.fmu).modelVariables}
+    method_variable = variables["solver.method"]
+    labels, resolved = enumeration_labels(method_variable), resolve_request(request)
+    assert labels[int(method_variable.start)] == "ode45"
+    assert resolved.fixed["solver.rtol"] == rtol
+    assert labels[resolved.shared.values["solver.method"]] == method
+
+
+@pytest.mark.parametrize("model", ["stickslip", "pacejka"])
+def test_fast_and_stiff_methods_are_kept(model):
+    request = FitRequest(RunSpec(Path(f"fmus/{model}.fmu")), {"k": None}, {"x": "x"})
+    assert "solver.method" not in resolve_request(request).shared.values
 
 
 @pytest.mark.parametrize(("motion", "is_described"), [(0.0, True), (1e-3, False)])
