@@ -133,8 +133,8 @@ def test_fmi3_refuses_an_invalid_parameter_and_continues_with_the_valid_one():
 def failures(name):
     """Return a script that provokes every error, and recovers by reset or from a saved state."""
     ref = value_references(name)
-    stop, reference, count = model_class(name).stop_time, reals(name)[0], len(ref)
-    ints = [ref[v] for v, d in declared(name).items() if d.type == "Enumeration"]
+    stop, real, count = model_class(name).stop_time, reals(name)[0], len(ref)
+    enumerations = [ref[v] for v, d in declared(name).items() if d.type == "Enumeration"]
     script = ["0 other", "0 new"]
     script += [
         f"0 {line}" for line in ("step 0 1", "exit", "terminate", "enter", "setup nan 0 1", "enter", "exit", "exit")
@@ -146,47 +146,38 @@ def failures(name):
                 f"0 setr {ref[variable]} {value}",
                 f"0 setup nan 0 {stop}",
                 "0 enter",
-                f"0 getr {reference} {ref['solver.t_next']}",
-            ]
-            script += [
+                f"0 getr {real} {ref['solver.t_next']}",
                 "0 exit",
                 f"0 step 0 {stop / 8}",
                 f"0 step 0 {stop / 8}",
                 "0 status",
-                f"0 getr {reference}",
+                f"0 getr {real}",
                 "0 reset",
             ]
-    for reference in ints:
-        script += [f"0 seti {reference} 99", *begin(0)[1:], f"0 step 0 {stop / 8}", "0 reset"]
+    for enumeration in enumerations:
+        script += [f"0 seti {enumeration} 99", *begin(0)[1:], f"0 step 0 {stop / 8}", "0 reset"]
     for start, end in (("nan", "nan"), ("inf", "nan"), ("1", "1"), ("0", "-1")):
-        script += [
-            f"0 setup 1e-4 {start} {end}",
-            "0 enter",
-            f"0 getr {reference}",
-            "0 exit",
-            "0 step 0 1",
-            "0 reset",
-        ]
+        script += [f"0 setup 1e-4 {start} {end}", "0 enter", f"0 getr {real}", "0 exit", "0 step 0 1", "0 reset"]
     for t, h in (("0", "0"), ("0", "-1"), ("0", "nan"), ("0", "inf"), ("1", "1"), ("nan", "1"), ("0", "1e9")):
         script += [*begin(0, stop=stop)[1:], f"0 step {t} {h}", "0 reset"]
     for wrong in (count, count + 1, 4294967295):
         for letter in "ribs":
             script += [f"0 get{letter} {wrong}", f"0 set{letter} {wrong} 1", "0 reset"]
     script += [
-        f"0 geti {reference}",
-        f"0 getr {ints[0]}",
-        f"0 setr {ints[0]} 1.0",
-        f"0 getb {ints[0]}",
-        f"0 gets {reference}",
+        f"0 geti {real}",
+        f"0 getr {enumerations[0]}",
+        f"0 setr {enumerations[0]} 1.0",
+        f"0 getb {enumerations[0]}",
+        f"0 gets {real}",
         "0 reset",
     ]
     script += [*begin(0, stop=stop)[1:], f"0 step 0 {stop / 8}", "0 save 1", "0 serialize 1 2", "0 deserialize 3 2"]
     script += [
-        f"0 setr {reference} 1.0",
+        f"0 setr {real} 1.0",
         f"0 step {stop / 8} 0.01",
         "0 restore 3",
         f"0 step {stop / 8} 0.01",
-        f"0 getr {reference}",
+        f"0 getr {real}",
     ]
     script += [
         "0 serialize 9 4",
@@ -203,8 +194,8 @@ def failures(name):
         "0 drop 3",
         "0 drop 9",
         "0 terminate",
-        f"0 getr {reference}",
-        f"0 setr {reference} 1",
+        f"0 getr {real}",
+        f"0 setr {real} 1",
         "0 step 0 1",
         "0 free",
     ]
