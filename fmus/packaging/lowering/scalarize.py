@@ -439,7 +439,7 @@ class Scalarizer(ConstantFolder):
         """Record the states of rates that are copied together with them, as in y, f = step.y0, step.f0."""
         for rates, value in zip(left, right, strict=True):
             if isinstance(rates, ast.Name) and (states := self.states_of(value)):
-                copies = (target for target, value in zip(left, right, strict=True) if is_same_tree(value, states))
+                copies = (target for target, source in zip(left, right, strict=True) if is_same_tree(source, states))
                 if (copy := next(copies, None)) and isinstance(copy, ast.Name):
                     self.states_of_rates[rates.id] = copy
 

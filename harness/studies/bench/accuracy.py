@@ -63,46 +63,43 @@ def run_through_times(spec: RunSpec, times: list[float]) -> tuple[np.ndarray, np
     return x, v
 
 
-def max_error(model: str, read_info: FmuInfo, settings: dict[str, float | str]) -> float:
+def max_error(model: str, info: FmuInfo, settings: dict[str, float | str]) -> float:
     """Return the largest error of the default experiment, relative to the largest value."""
-    values = read_info.resolve_labels({**read_info.start_values, **settings})
-    answer = compute_reference(model, [(0.0, read_info.stop, values)], CommunicationGrid(0.0, read_info.stop, POINTS))
-    spec = RunSpec(find_fmu(model), values=values, stop=read_info.stop)
-    return motion_error(answer, *run_through_times(spec, answer.times.tolist()))
+    values = info.resolve_labels({**info.start_values, **settings})
+    reference = compute_reference(model, [(0.0, info.stop, values)], CommunicationGrid(0.0, info.stop, POINTS))
+    spec = RunSpec(find_fmu(model), values=values, stop=info.stop)
+    return motion_error(reference, *run_through_times(spec, reference.times.tolist()))
 
 
-def exact_run_error(model: str, read_info: FmuInfo) -> Benchmark:
-    return Benchmark(f"{model}, exact: whole run", max_error(model, read_info, {}), "1", 1e-13, (CLOSED,))
+def exact_run_error(model: str, info: FmuInfo) -> Benchmark:
+    return Benchmark(f"{model}, exact: whole run", max_error(model, info, {}), "1", 1e-13, (CLOSED,))
 
 
-def default_run_error(model: str, read_info: FmuInfo, name: str, value: float | str, target: float) -> Benchmark:
+def default_run_error(model: str, info: FmuInfo, name: str, value: float | str, target: float) -> Benchmark:
     """Measure the error with the default method and tolerance of the model."""
     baseline = Baseline("scipy Radau at 1e-11" if equations_of(model).is_stiff else "scipy DOP853 at 1e-13")
     return Benchmark(
-        f"{model}, default, {name} {value}", max_error(model, read_info, {name: value}), "1", target, (baseline,)
+        f"{model}, default, {name} {value}", max_error(model, info, {name: value}), "1", target, (baseline,)
     )
 
 
-def event_time_error(model: str, read_info: FmuInfo) -> Benchmark:
+def event_time_error(model: str, info: FmuInfo) -> Benchmark:
     """Measure the largest relative error of event times."""
-    reference = compute_reference(
-        model, [(0.0, read_info.stop, read_info.start_values)], CommunicationGrid(0.0, read_info.stop, 1)
-    )
-    events = reference.events or []
-    event_list = EmbeddedModel.create(load_model_class(find_fmu(model)), {}, "exact", 0.0).find_mode_changes(
-        read_info.stop
-    )
-    if [mode for _, mode in event_list] != [mode for _, mode in events]:
+    reference = compute_reference(model, [(0.0, info.stop, info.start_values)], CommunicationGrid(0.0, info.stop, 1))
+    expected = reference.events or []
+    embedded_model = EmbeddedModel.create(load_model_class(find_fmu(model)), {}, "exact", 0.0)
+    events = embedded_model.find_mode_changes(info.stop)
+    if [mode for _, mode in events] != [mode for _, mode in expected]:
         raise HarnessError(f"{model}: the modes after events are wrong")
-    largest_error = max(abs(t / t_reference - 1) for (t, _), (t_reference, _) in zip(event_list, events, strict=True))
-    return Benchmark(f"{model}, exact: times of {len(event_list)} events", largest_error, "1", 1e-14, (CLOSED,))
+    largest_error = max(abs(t / t_reference - 1) for (t, _), (t_reference, _) in zip(events, expected, strict=True))
+    return Benchmark(f"{model}, exact: times of {len(events)} events", largest_error, "1", 1e-14, (CLOSED,))
 
 
 def last_event_error(model: str, values: dict[str, float], number: int, law: Callable[[Any, int], Any]) -> Benchmark:
     """Measure the error of the time of the last of many events, in units in the last place."""
     embedded_model = EmbeddedModel.create(load_model_class(find_fmu(model)), values, "exact", 0.0)
-    t_reference, next_one = (law(embedded_model.model, n) for n in (number, number + 1))
-    stop = float((t_reference + next_one) / 2)
+    t_reference, next_time = (law(embedded_model.model, n) for n in (number, number + 1))
+    stop = float((t_reference + next_time) / 2)
     embedded_model.compute_states([stop * i / 10 for i in range(10)] + [stop])
     events = embedded_model.run.events
     embedded_model.run.solver.report(events)
@@ -130,12 +127,12 @@ def slip_event_time(model: Any, number: int) -> Any:
     return h / u + (number - 1) // 2 * (slip + stick) + (0 if number % 2 else slip)
 
 
-def between_grids(model: str, read_info: FmuInfo) -> Benchmark:
+def between_grids(model: str, info: FmuInfo) -> Benchmark:
     """Measure the largest relative difference at common times between runs on a uniform and on a random grid."""
-    uniform = [read_info.stop * i / 200 for i in range(201)]
+    uniform = [info.stop * i / 200 for i in range(201)]
     random = Random(model)
-    both = sorted({*uniform, *(random.uniform(0.0, read_info.stop) for _ in range(777))})
-    spec = RunSpec(find_fmu(model), values=read_info.start_values, stop=read_info.stop)
+    both = sorted({*uniform, *(random.uniform(0.0, info.stop) for _ in range(777))})
+    spec = RunSpec(find_fmu(model), values=info.start_values, stop=info.stop)
     one, other = run_through_times(spec, uniform), run_through_times(spec, both)
     shared = np.searchsorted(both, uniform)
     parts = zip(one, other, strict=True)
@@ -145,9 +142,9 @@ def between_grids(model: str, read_info: FmuInfo) -> Benchmark:
     )
 
 
-def stuck_drift(model: str, read_info: FmuInfo, settings: dict[str, float]) -> Benchmark:
+def stuck_drift(model: str, info: FmuInfo, settings: dict[str, float]) -> Benchmark:
     """Measure the displacement of a stuck body."""
-    spec = RunSpec(find_fmu(model), values={**read_info.start_values, **settings}, stop=1e6)
+    spec = RunSpec(find_fmu(model), values={**info.start_values, **settings}, stop=1e6)
     x, _ = run_through_times(spec, [1e4 * i for i in range(101)])
     displacement = float(np.abs(x - x[0]).max())
     return Benchmark(f"{model}, stuck for 1e6 s: displacement", displacement, equations_of(model).unit, 0.0, ())

@@ -85,12 +85,12 @@ def error_ratio_to_cvode(scene: Scenario, tolerances: tuple[float, ...] = TOLERA
             except MissingToolError as reason:
                 missing.add(Baseline(str(reason)))
             reference_error, *others = errors.values()
-            ratio = max(ratio, *(error_value / reference_error for error_value in others))
+            ratio = max(ratio, *(error / reference_error for error in others))
             if scene.is_default:
                 errors["CVODE with Adams or exact Jacobian"] = largest_error(
                     scene.case.name, time_cvode(scene.case.name, rtol)
                 )
-            text = ", ".join(f"{name} {error_value:.1e}" for name, error_value in errors.items())
+            text = ", ".join(f"{name} {error:.1e}" for name, error in errors.items())
             baselines.append(Baseline(f"errors at rtol {rtol:.0e}: {text}"))
         return ratio, 3.0, (*baselines, *missing)
 

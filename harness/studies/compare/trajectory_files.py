@@ -48,11 +48,11 @@ def read_trajectory(path: Path) -> Trajectory:
     if not ((np.abs(time) < MAX_TIME).all() and (np.diff(time) >= 0).all()):
         raise SceneError(f"{file.name}: the time in the first column must increase and stay below {MAX_TIME:g} s")
     columns, units = Columns(), dict[str, str]()
-    for head, parse_column in others:
+    for head, column in others:
         name, unit = parse_heading(head)
         if name in columns or name == parse_heading(clock)[0]:
             raise SceneError(f"{file.name}: two columns are named {format_value(name)}")
-        columns[name], units[name] = parse_column, unit
+        columns[name], units[name] = column, unit
     return Trajectory(RunSpec(file), time, columns, units, {}, {}, events=read_events(path), label=path.stem)
 
 

@@ -64,7 +64,7 @@ def outputs(part: Component, folder: Path) -> list[Any]:
 
 
 def components(system: Any) -> list[Component]:
-    return [parse_element for parse_element in system.elements if isinstance(parse_element, Component)]
+    return [element for element in system.elements if isinstance(element, Component)]
 
 
 def parameter_sets(part: Any, folder: Path) -> Iterator[tuple[str, dict[str, Any]]]:

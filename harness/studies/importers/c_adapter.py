@@ -76,5 +76,5 @@ def parse_output(lines: list[str], count: int) -> tuple[list[list[float]], list[
 @cache
 def version() -> str:
     """Return the version of the compiler."""
-    parse_output = subprocess.run([find_compiler(), "--version"], capture_output=True, text=True, check=True)
-    return (re.findall(r"\d+(?:\.\d+)+", parse_output.stdout.splitlines()[0]) or ["unknown version"])[-1]
+    process = subprocess.run([find_compiler(), "--version"], capture_output=True, text=True, check=True)
+    return (re.findall(r"\d+(?:\.\d+)+", process.stdout.splitlines()[0]) or ["unknown version"])[-1]

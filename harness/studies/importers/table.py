@@ -47,18 +47,18 @@ class CheckResult:
     fmus: tuple[str, ...] = ()
 
 
-def run_importer_checks(find_fmus: Path, out: Path, report: Callable[[str, float], None]) -> list[CheckResult]:
+def run_importer_checks(fmus: Path, out: Path, report: Callable[[str, float], None]) -> list[CheckResult]:
     """Check the FMUs in a folder, and write the results to out/importers/importers.csv."""
-    with replace_folder(out / FOLDER, FILES, describe_sources(str(find_fmus))) as folder:
-        results = run_checks(find_fmus, report)
+    with replace_folder(out / FOLDER, FILES, describe_sources(str(fmus))) as folder:
+        results = run_checks(fmus, report)
         headings, rows = result_rows(results)
         write_csv_rows(folder / FILES[0], headings, rows)
-        files = [find_fmus / f"{name}.fmu" for name in fmu_names(results)]
+        files = [fmus / f"{name}.fmu" for name in fmu_names(results)]
         write_provenance(
             folder,
             files,
             prefix_parameters({file.stem: declared_parameters(file) for file in files}),
-            source=describe_sources(str(find_fmus)),
+            source=describe_sources(str(fmus)),
         )
         write_summary(folder, Summary("importers", "Checks", tables=make_table(headings, rows)))
     return results
@@ -90,9 +90,7 @@ def run_checks(folder: Path, report: Callable[[str, float], None]) -> list[Check
             report(importer.name, 1.0)
             name = name_with_version(importer, subjects[0].base_request)
             for check, *cells in zip(CHECKS, *columns, strict=True):
-                failed = tuple(
-                    f"{m}: {check_cell}" for m, check_cell in zip(names, cells, strict=True) if "FAILED" in check_cell
-                )
+                failed = tuple(f"{m}: {cell}" for m, cell in zip(names, cells, strict=True) if "FAILED" in cell)
                 results.append(CheckResult(name, check, tuple(cells), failed, fmus=names))
     return results + [CheckResult(name, "", reason=reason) for name, reason in NOT_RUN.items()]
 

@@ -186,6 +186,6 @@ def csv_headings(kind: type) -> list[str]:
     return [column_heading(field.name, UNITS.get(field.name, "")) for field in fields(kind)]
 
 
-def write_table(path: Path, csv_headings: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
+def write_table(path: Path, headings: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
     """Write a CSV file; None and NaN are empty cells."""
-    write_csv_rows(path, csv_headings, ([None if value != value else value for value in row] for row in rows))
+    write_csv_rows(path, headings, ([None if value != value else value for value in row] for row in rows))

@@ -130,7 +130,7 @@ def judge_deviations(quantities: Iterable[Quantity], published: dict[str, Any], 
     deviations = [(percent, name) for percent, name in differences if percent is not None]
     if not deviations:
         return None
-    percent, name = max(deviations, key=lambda deviation: abs(deviation[0]))
+    percent, name = max(deviations, key=lambda pair: abs(pair[0]))
     chatters = run.parameters.get("friction") in CHATTERING_LAWS and name in STEP_QUANTITIES
     reason = "; its friction chatters, so its steps depend on rounding" * chatters
     is_good = abs(percent) <= MAX_DEVIATION
