@@ -50,10 +50,24 @@ def backend_fmus(request, fmus):
 
 @pytest.fixture(scope="module")
 def user_folder(fmus, tmp_path_factory):
-    """A folder that contains the built FMUs, like that of a user."""
-    folder = tmp_path_factory.mktemp("place")
+    """A folder with the built FMUs, which all tests of a module share."""
+    folder = tmp_path_factory.mktemp("user")
     (folder / "fmus").symlink_to(fmus)
     return folder
+
+
+@pytest.fixture
+def workspace(fmus, tmp_path):
+    """The folder of a test, with the built FMUs."""
+    (tmp_path / "fmus").symlink_to(fmus)
+    return tmp_path
+
+
+@pytest.fixture
+def in_workspace(workspace, monkeypatch):
+    """The same folder, as the current directory."""
+    monkeypatch.chdir(workspace)
+    return workspace
 
 
 @pytest.fixture(scope="session")

@@ -48,11 +48,9 @@ WAYS = {  # arguments of harness.simulate
 
 
 @pytest.fixture(autouse=True)
-def in_folder(user_folder, tmp_path, monkeypatch):
-    """Work in an empty folder with built FMUs and a scene."""
-    (tmp_path / "fmus").symlink_to(user_folder / "fmus")
-    (tmp_path / "mine.toml").write_text(SCENE)
-    monkeypatch.chdir(tmp_path)
+def scene(in_workspace):
+    """Work in a folder with the built FMUs and a scene."""
+    (in_workspace / "mine.toml").write_text(SCENE)
 
 
 def read_back(spec):

@@ -11,12 +11,7 @@ from commands import harness as harness_command
 
 import harness
 
-
-@pytest.fixture(autouse=True)
-def in_folder(user_folder, tmp_path, monkeypatch):
-    """Work in an empty folder with built FMUs."""
-    (tmp_path / "fmus").symlink_to(user_folder / "fmus")
-    monkeypatch.chdir(tmp_path)
+pytestmark = pytest.mark.usefixtures("in_workspace")
 
 
 def test_public_names_are_complete_and_documented():

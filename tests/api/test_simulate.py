@@ -11,14 +11,9 @@ from scipy.integrate import solve_ivp
 
 import harness
 
+pytestmark = pytest.mark.usefixtures("in_workspace")
+
 SMD = {"m": 1.0, "k": 157.9, "c": 2.0}
-
-
-@pytest.fixture(autouse=True)
-def in_folder(user_folder, tmp_path, monkeypatch):
-    """Work in an empty folder with built FMUs."""
-    (tmp_path / "fmus").symlink_to(user_folder / "fmus")
-    monkeypatch.chdir(tmp_path)
 
 
 def driven(t, force):

@@ -6,7 +6,6 @@ import re
 import subprocess
 import sys
 import threading
-from contextlib import chdir
 from itertools import zip_longest
 from math import cos, exp
 from pathlib import Path
@@ -18,6 +17,8 @@ from commands import blank_figures, harness
 from harness.errors import HarnessError
 from harness.scenes.scene import SceneKeys
 from harness.scenes.schema import field_names
+
+pytestmark = pytest.mark.usefixtures("in_workspace")
 
 SCENE = {"title": '"a title"', "model": '"smd"', "outputs": '["x", "v"]', "stop": "0.1", "plots": "[]"}
 TIMES = ("start", "stop", "follow", "h_max")
@@ -97,14 +98,6 @@ def run_command(*arguments):
     """Return exit status and error message of a command; any unexpected exception fails the test."""
     done = harness(Path.cwd(), *arguments)
     return done.returncode, done.stderr
-
-
-@pytest.fixture
-def workspace(user_folder, tmp_path):
-    """The current folder, with the built FMUs."""
-    (tmp_path / "fmus").symlink_to(user_folder / "fmus")
-    with chdir(tmp_path):
-        yield tmp_path
 
 
 def scene_text(scene):

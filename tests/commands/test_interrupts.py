@@ -46,17 +46,16 @@ def logging_goes_on():
 @pytest.mark.parametrize(
     ("command", "number"), [*product(COMMANDS, [signal.SIGINT]), ("run", signal.SIGTERM), ("sweep", signal.SIGTERM)]
 )
-def test_a_signal_ends_a_command_and_leaves_nothing_behind(user_folder, tmp_path, command, number):
+def test_a_signal_ends_a_command_and_leaves_nothing_behind(workspace, command, number):
     """To the whole process group, as a terminal sends it."""
-    (tmp_path / "temporary").mkdir()
-    (tmp_path / "fmus").symlink_to(user_folder / "fmus")
-    (tmp_path / "slow.toml").write_text(SLOW)
+    (workspace / "temporary").mkdir()
+    (workspace / "slow.toml").write_text(SLOW)
     arguments, sign = COMMANDS[command]
-    environment = os.environ | {"PYTHONPATH": str(ROOT), "TMPDIR": str(tmp_path / "temporary")}
+    environment = os.environ | {"PYTHONPATH": str(ROOT), "TMPDIR": str(workspace / "temporary")}
     reset_sigint = partial(signal.signal, signal.SIGINT, signal.SIG_DFL)  # a test run in the background ignores it
     process = subprocess.Popen(
         [sys.executable, "-m", "harness", *arguments, "--out", "out"],
-        cwd=tmp_path,
+        cwd=workspace,
         env=environment,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
@@ -64,21 +63,21 @@ def test_a_signal_ends_a_command_and_leaves_nothing_behind(user_folder, tmp_path
         start_new_session=True,
         preexec_fn=reset_sigint,
     )
-    while process.poll() is None and not list(tmp_path.glob(sign)):
+    while process.poll() is None and not list(workspace.glob(sign)):
         time.sleep(0.01)
     os.killpg(process.pid, number)
     stdout, stderr = process.communicate(timeout=60)
     assert (process.returncode, stdout, stderr.count("\n")) == (128 + number, "", 1), stderr
     assert stderr.startswith(("Error: interrupted", "Error: terminated"))
-    assert list((tmp_path / "temporary").iterdir()) == []
-    files = [path.name for path in (tmp_path / "out").rglob("*") if path.is_file() or path.name.startswith(".")]
+    assert list((workspace / "temporary").iterdir()) == []
+    files = [path.name for path in (workspace / "out").rglob("*") if path.is_file() or path.name.startswith(".")]
     if command == "sweep":
         assert [
             name for name in files if not name.endswith((".checkpoint", ".messages"))
         ] == []  # finished runs are kept
     elif command == "main":
         assert [name for name in files if name.startswith(".")] == []  # completed scenes are intact
-        assert len(list((tmp_path / "out").glob("*"))) < 8
+        assert len(list((workspace / "out").glob("*"))) < 8
     else:
         assert files == []
 

@@ -31,15 +31,14 @@ def assert_one_sentence(done, status, sentence):
 
 
 @pytest.mark.parametrize("command", COMMANDS, ids=" ".join)
-def test_a_source_that_does_not_exist_is_called_so(fmus, tmp_path, command):
-    (tmp_path / "fmus").symlink_to(fmus)
+def test_a_source_that_does_not_exist_is_called_so(workspace, command):
     for source in NO_SUCH:
-        done = commands.harness(tmp_path, *command, source)
+        done = commands.harness(workspace, *command, source)
         assert_one_sentence(done, done.returncode, "nosuch")
         assert done.returncode
         phrases = ("does not exist", "no file or folder", "there is no", "There is no", "No such file")
         assert any(phrase in done.stderr for phrase in phrases), (source, done.stderr)
-    assert not (tmp_path / "results").exists()
+    assert not (workspace / "results").exists()
 
 
 OWN = "fmus/smd.fmu"
@@ -90,12 +89,11 @@ COMMAND_LINES = [  # arguments, exit status, words of the sentence
 
 
 @pytest.mark.parametrize(("arguments", "status", "sentence"), COMMAND_LINES)
-def test_an_invalid_command_line_is_one_sentence_and_leaves_no_result(fmus, tmp_path, arguments, status, sentence):
-    (tmp_path / "fmus").symlink_to(fmus)
-    (tmp_path / "line.csv").write_text("t,x\n" + "".join(f"{i},{i}\n" for i in range(20)))
-    done = commands.harness(tmp_path, *arguments)
+def test_an_invalid_command_line_is_one_sentence_and_leaves_no_result(workspace, arguments, status, sentence):
+    (workspace / "line.csv").write_text("t,x\n" + "".join(f"{i},{i}\n" for i in range(20)))
+    done = commands.harness(workspace, *arguments)
     assert_one_sentence(done, status, sentence)
-    assert [file for file in tmp_path.glob("results/**/*") if file.is_file()] == []
+    assert [file for file in workspace.glob("results/**/*") if file.is_file()] == []
 
 
 SCENE = 'title = "a decay"\nfmu = "{fmu}"\noutputs = ["x"]\n{more}\n'
@@ -124,9 +122,8 @@ def test_the_decay_of_a_scene_of_an_external_fmu_is_identified(tmp_path):
 
 
 @pytest.mark.parametrize(("value", "hint"), [("0.3", "; write it without quotes"), ("low", "")])
-def test_a_text_in_place_of_a_number_is_called_a_text(fmus, tmp_path, value, hint):
+def test_a_text_in_place_of_a_number_is_called_a_text(workspace, value, hint):
     scene = f'title = "a text"\nmodel = "stickslip"\noutputs = ["x"]\n[values]\nmu_s = "{value}"\n'
-    (tmp_path / "mine.toml").write_text(scene)
-    (tmp_path / "fmus").symlink_to(fmus)
-    done = commands.harness(tmp_path, "run", "mine.toml")
+    (workspace / "mine.toml").write_text(scene)
+    done = commands.harness(workspace, "run", "mine.toml")
     assert_one_sentence(done, 2, f"mu_s = '{value}' is a text, not a number{hint}\n")

@@ -248,18 +248,17 @@ def test_an_invalid_scene_is_one_sentence_and_keeps_the_previous_result(scene, t
     assert [path.name for path in results.parent.iterdir()] == ["mine"]
 
 
-def test_a_failing_case_does_not_lose_the_others(fmus, tmp_path, monkeypatch):
-    (tmp_path / "fmus").symlink_to(fmus)
-    run_published_cases = "\n[published]\nsource = 'me'\nrun_time = 1\n"
+def test_a_failing_case_does_not_lose_the_others(workspace, monkeypatch):
+    published = "\n[published]\nsource = 'me'\nrun_time = 1\n"
     for name, extra in (("bad", "[values]\nmu_d = 0.95"), ("good", "stop = 1")):
-        (tmp_path / f"{name}.toml").write_text(BASE + extra + run_published_cases)
-    monkeypatch.setattr("harness.scenes.scene.SHIPPED", tmp_path)
-    done = harness(tmp_path, "--out", tmp_path / "out")
+        (workspace / f"{name}.toml").write_text(BASE + extra + published)
+    monkeypatch.setattr("harness.scenes.scene.SHIPPED", workspace)
+    done = harness(workspace, "--out", workspace / "out")
     assert done.returncode == 1
     assert done.stderr.startswith("Error: scene bad: mu_d is 0.95")
     assert done.stderr.count("\n") == 1
     assert "failed" in done.stdout.split("\nbad ")[1].split("\n")[0]
-    assert [path.name for path in (tmp_path / "out").iterdir()] == ["good"]
+    assert [path.name for path in (workspace / "out").iterdir()] == ["good"]
 
 
 def test_a_missing_fmu_error_explains_how_to_build_it(tmp_path):
@@ -288,16 +287,15 @@ PAIR = (
         ["report", "--help"],
     ],
 )
-def test_a_command_runs_alike_in_a_process_of_its_own(fmus, tmp_path, arguments):
+def test_a_command_runs_alike_in_a_process_of_its_own(workspace, arguments):
     """Most tests run commands in the process of pytest."""
-    (tmp_path / "fmus").symlink_to(fmus)
-    (tmp_path / "mine.toml").write_text(BASE + "analyses = ['slip']\nplots = []")
-    (tmp_path / "pair.toml").write_text(PAIR)
+    (workspace / "mine.toml").write_text(BASE + "analyses = ['slip']\nplots = []")
+    (workspace / "pair.toml").write_text(PAIR)
     rows = [f"{0.04 * i},{exp(-0.04 * i) * cos(0.48 * i)}" for i in range(50)]
-    (tmp_path / "swing.csv").write_text("\n".join(["t [s],x [m]", *rows]))
-    inside = harness(tmp_path, *arguments)
-    shutil.rmtree(tmp_path / "results", ignore_errors=True)  # otherwise the second run reports that nothing changed
-    separate = commands.run_process(tmp_path, *arguments, PATH="", COLUMNS="100")
+    (workspace / "swing.csv").write_text("\n".join(["t [s],x [m]", *rows]))
+    inside = harness(workspace, *arguments)
+    shutil.rmtree(workspace / "results", ignore_errors=True)  # otherwise the second run reports that nothing changed
+    separate = commands.run_process(workspace, *arguments, PATH="", COLUMNS="100")
     assert (inside.returncode, inside.stderr) == (separate.returncode, separate.stderr)
     outputs = [re.sub(TIME, "", done.stdout) for done in (inside, separate)]
     assert re.sub(NUMBER, "", outputs[0]) == re.sub(NUMBER, "", outputs[1])

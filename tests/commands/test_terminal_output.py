@@ -46,12 +46,6 @@ PLAIN = {"COLUMNS": str(WIDTH), "PATH": ""}
 harness = partial(processes.harness, blank=True)
 
 
-@pytest.fixture
-def workspace(fmus, tmp_path):
-    (tmp_path / "fmus").symlink_to(fmus)
-    return tmp_path
-
-
 def assert_fits(output, *headings):
     """Assert that lines are short enough, nothing is truncated, and the headings are present."""
     lines = output.splitlines()

@@ -39,10 +39,9 @@ scripts = load("run_blocks")
 
 @pytest.mark.slow
 @pytest.mark.parametrize("page", [page for page in PAGES if runnable(page)])
-def test_code_blocks_run(page, fmus, tmp_path):
-    (tmp_path / "fmus").symlink_to(fmus)
-    (tmp_path / "docs").symlink_to(DOCS)
-    command = [sys.executable, str(DOCS / "run_blocks.py"), str(tmp_path), str(DOCS / page)]
+def test_code_blocks_run(page, workspace):
+    (workspace / "docs").symlink_to(DOCS)
+    command = [sys.executable, str(DOCS / "run_blocks.py"), str(workspace), str(DOCS / page)]
     done = subprocess.run(command, capture_output=True, text=True, env=ENVIRONMENT, timeout=300)
     assert done.returncode == 0, done.stderr
 
@@ -88,12 +87,11 @@ def test_each_picture_is_used_and_small():
 
 
 @pytest.mark.slow
-def test_notebook_runs(fmus, tmp_path):
+def test_notebook_runs(workspace):
     nbclient = pytest.importorskip("nbclient", reason="extra docs")
     nbformat = pytest.importorskip("nbformat", reason="extra docs")
-    (tmp_path / "fmus").symlink_to(fmus)
     notebook = nbformat.read(DOCS / "tutorials" / "python_api.ipynb", as_version=4)
-    client = nbclient.NotebookClient(notebook, timeout=120, resources={"metadata": {"path": str(tmp_path)}})
+    client = nbclient.NotebookClient(notebook, timeout=120, resources={"metadata": {"path": str(workspace)}})
     client.execute(env=ENVIRONMENT)
 
 

@@ -16,10 +16,9 @@ def test_readme_is_short():
 
 
 @pytest.mark.slow
-def test_readme_code_blocks_run(fmus, tmp_path):
-    (tmp_path / "fmus").symlink_to(fmus)
-    (tmp_path / "docs").symlink_to(DOCS)
-    command = [sys.executable, str(DOCS / "run_blocks.py"), str(tmp_path), str(README)]
+def test_readme_code_blocks_run(workspace):
+    (workspace / "docs").symlink_to(DOCS)
+    command = [sys.executable, str(DOCS / "run_blocks.py"), str(workspace), str(README)]
     done = subprocess.run(command, capture_output=True, text=True, env=ENVIRONMENT, timeout=300)
     assert done.returncode == 0, done.stderr
 

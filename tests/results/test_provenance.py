@@ -34,13 +34,6 @@ DRAWN = "decay/coulomb"  # the others are not drawn; test_figures.py checks that
 harness = partial(commands.harness, blank=True)  # each of these is drawn by a test of its study
 
 
-@pytest.fixture
-def workspace(fmus, tmp_path):
-    """A folder with the built FMUs."""
-    (tmp_path / "fmus").symlink_to(fmus)
-    return tmp_path
-
-
 @pytest.fixture(scope="module", params=COMMANDS)
 def example_run(request, fmus, tmp_path_factory):
     """A folder in which one of the commands was run, its arguments, and its result."""

@@ -1,6 +1,7 @@
 """Comparisons of project FMUs, external FMUs, and results."""
 
 import json
+from functools import partial
 from itertools import combinations
 from math import cos, sqrt
 from pathlib import Path
@@ -29,13 +30,9 @@ def external_fmu_folder():
 
 
 @pytest.fixture
-def harness(fmus, tmp_path):
-    (tmp_path / "fmus").symlink_to(fmus)
-
-    def run(*arguments, blank=True):
-        return commands.harness(tmp_path, *arguments, blank=blank, COLUMNS="120")
-
-    return run
+def harness(workspace):
+    """Return harness(argument, ...): the finished process, in a folder with the built FMUs."""
+    return partial(commands.harness, workspace, blank=True, COLUMNS="120")
 
 
 def test_a_project_fmu_is_run_at_its_internal_steps(harness, tmp_path):

@@ -35,15 +35,14 @@ springs = [{ between = ["a", "b"], k = 40.0 }]
 
 
 @pytest.fixture
-def couple(fmus, tmp_path):
+def couple(workspace):
     """Return couple(scene, option, ...): the finished process, in a folder with the built FMUs."""
-    (tmp_path / "fmus").symlink_to(fmus)
 
     def run(scene, *options):
         if "\n" in scene:
-            (tmp_path / "mine.toml").write_text(scene)
+            (workspace / "mine.toml").write_text(scene)
             scene = "mine.toml"
-        return commands.harness(tmp_path, "couple", scene, *options, blank=True)
+        return commands.harness(workspace, "couple", scene, *options, blank=True)
 
     return run
 

@@ -83,12 +83,11 @@ def test_the_csv_of_another_program_gives_the_parameters_of_its_run(fmus, tmp_pa
     assert estimates["c"] == pytest.approx(0.3, rel=1e-9)
 
 
-def test_a_scene_writes_quantities_turning_points_fit_and_figure(fmus, tmp_path):
-    (tmp_path / "fmus").symlink_to(fmus)
-    done = harness(tmp_path, "decay", "coulomb")
+def test_a_scene_writes_quantities_turning_points_fit_and_figure(workspace):
+    done = harness(workspace, "decay", "coulomb")
     assert (done.returncode, done.stderr) == (0, "")
     assert "Best described by dry friction" in done.stdout
-    folder = tmp_path / "results/decay/coulomb"
+    folder = workspace / "results/decay/coulomb"
     files = {"decay.json", "turning-points.csv", "fit.csv", "figure.svg", "provenance.json", "summary.json"}
     assert {file.name for file in folder.iterdir()} == files
     estimates = {item["name"]: item for item in json.loads((folder / "decay.json").read_text())["fit"]}

@@ -27,15 +27,10 @@ from harness.studies.fit import study
 from harness.studies.fit.options import parse_starts
 from harness.studies.fit.request import FitRequest, make_unknowns, resolve_request
 
+pytestmark = pytest.mark.usefixtures("in_workspace")
+
 T = np.linspace(0.0, 16.0, 201)
 TRUTH = {"mu_s": 0.8, "mu_d": 0.5, "k": 900.0, "v_driver": 0.04}
-
-
-@pytest.fixture(autouse=True)
-def in_folder(user_folder, tmp_path, monkeypatch):
-    """Work in an empty folder with built FMUs."""
-    (tmp_path / "fmus").symlink_to(user_folder / "fmus")
-    monkeypatch.chdir(tmp_path)
 
 
 def native(model):

@@ -24,11 +24,9 @@ MAP = ("sweep", "stickslip", "--vary", "mu_d=0.5:0.8:4", "--vary", "v_driver=0.0
 
 
 @pytest.fixture
-def harness(fmus, tmp_path):
+def harness(workspace):
     """Return harness(argument, ...): the finished process, in a folder with the built FMUs."""
-    (tmp_path / "fmus").symlink_to(fmus)
-
-    return partial(commands.harness, tmp_path)
+    return partial(commands.harness, workspace)
 
 
 def test_a_grid_has_every_combination_and_a_sample_every_stratum():

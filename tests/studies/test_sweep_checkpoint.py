@@ -17,11 +17,9 @@ from harness.studies.sweep.study import Sweep
 
 
 @pytest.fixture
-def harness(fmus, tmp_path):
+def harness(workspace):
     """Return harness(argument, ...): the finished process, in a folder with the built FMUs."""
-    (tmp_path / "fmus").symlink_to(fmus)
-
-    return partial(commands.harness, tmp_path)
+    return partial(commands.harness, workspace)
 
 
 def test_the_fmu_is_part_of_the_identity_of_a_sweep():

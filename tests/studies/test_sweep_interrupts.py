@@ -39,11 +39,9 @@ sys.addaudithook(note)
 
 
 @pytest.fixture
-def harness(fmus, tmp_path):
+def harness(workspace):
     """Return harness(argument, ...): the finished process, in a folder with the built FMUs."""
-    (tmp_path / "fmus").symlink_to(fmus)
-
-    return partial(commands.harness, tmp_path, blank=True)
+    return partial(commands.harness, workspace, blank=True)
 
 
 @pytest.fixture
