@@ -185,16 +185,16 @@ def test_an_invalid_sweep_is_refused_before_a_worker_starts(workspace, option):
         status, output = run_command("sweep", "smd", *vary, option, text)
         check(status, output, text[:100])
         assert status, text[:100]
-    for more in (
+    for name, value in (
         ("--seed", "-1"),
         ("--random", "9" * 30),
         ("--workers", "0"),
         ("--workers", "9" * 9),
         ("--name", "../x"),
     ):
-        status, output = run_command("sweep", "smd", "--vary", "m=1:2", "--random", "2", more)
-        check(status, output, more)
-        assert status == 2, more
+        status, output = run_command("sweep", "smd", "--vary", "m=1:2", "--random", "2", name, value)
+        check(status, output, (name, value))
+        assert status == 2, (name, value)
     assert not list(workspace.glob("results/sweep/*"))
 
 

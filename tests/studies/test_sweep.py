@@ -18,7 +18,7 @@ from harness.running.trajectory import Trajectory  # noqa: E402
 from harness.scenes.run_spec import RunSpec  # noqa: E402
 from harness.studies.sweep.measures import TRAJECTORY_MEASURES  # noqa: E402
 from harness.studies.sweep.runner import SweepSpec, open_runner  # noqa: E402
-from harness.studies.sweep.sampling import SweepPoints, parse_axis  # noqa: E402
+from harness.studies.sweep.sampling import SweepAxis, SweepPoints, parse_axis  # noqa: E402
 
 MAP = ("sweep", "stickslip", "--vary", "mu_d=0.5:0.8:4", "--vary", "v_driver=0.02,0.05,0.1", "--measure", "final,slips")
 
@@ -60,6 +60,14 @@ def test_a_grid_has_every_combination_and_a_sample_every_stratum():
 def test_an_invalid_axis_is_refused(text, random):
     with pytest.raises(SceneError):
         parse_axis(text, random)
+
+
+@pytest.mark.parametrize(("n_axes", "random"), [(2, None), (4, None), (1, 10_000_001), (1, 10**30)])
+def test_too_many_runs_are_refused(n_axes, random):
+    """Also if no list could hold them."""
+    axes = tuple(SweepAxis(f"a{i}", tuple(range(100_000))) for i in range(n_axes))
+    with pytest.raises(SceneError, match="runs exceed the maximum of 10000000; reduce the number of values"):
+        SweepPoints(axes, random)
 
 
 def test_a_reset_instance_gives_the_same_results_as_a_fresh_one(fmus):

@@ -99,16 +99,21 @@ class SweepPoints:
     def __post_init__(self) -> None:
         if len({axis.name for axis in self.axes}) < len(self.axes):
             raise SceneError("--vary names a parameter twice")
-        if len(self) > MAX_RUNS:
-            raise SceneError(f"{len(self)} runs exceed the maximum of {MAX_RUNS}; reduce the number of values")
+        if self.n_runs > MAX_RUNS:
+            raise SceneError(f"{self.n_runs} runs exceed the maximum of {MAX_RUNS}; reduce the number of values")
 
     @property
     def names(self) -> tuple[str, ...]:
         """Return the names of the varied parameters."""
         return tuple(axis.name for axis in self.axes)
 
-    def __len__(self) -> int:
+    @property
+    def n_runs(self) -> int:
+        """Return the number of points, before the check also one that is too large for len()."""
         return prod(len(axis.values) for axis in self.axes) if self.random is None else self.random
+
+    def __len__(self) -> int:
+        return self.n_runs
 
     def coordinates(self, first: int, last: int) -> np.ndarray:
         """Return the points from number `first` to before `last`, (last - first, axes)."""
