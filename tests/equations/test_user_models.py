@@ -337,6 +337,33 @@ def test_sliding_friction_above_static_friction_is_refused_before_the_run(puck, 
     fmu.free()
 
 
+DRIVING = {
+    "f": "F: the sliding force is negative with f = -2.0: set values with which it is at least 0",
+    "grip": "F: the holding force is negative with grip = -2.0: set values with which it is at least 0",
+    "m": "F: the force accelerates its own slip with m = -2.0: set values with which it opposes the slip",
+}
+
+
+def run_with_a_change(fmu, before, during):
+    """Make two steps, with values that are set before the first and before the second."""
+    fmu.begin(before, stop=1.0).step(0.0, 0.1)
+    fmu.set(during)
+    fmu.step(0.1, 0.1)
+
+
+@pytest.mark.parametrize("kind", ["", "native"])
+def test_parameters_with_which_friction_drives_are_refused(puck, worker, kind):
+    """Where no range of the parameter excludes them: before the run, and during it."""
+    puck.write_text(PUCK.replace(", low=0.0", "").replace(", above=0.0", ""))
+    for name, sentence in DRIVING.items():
+        for before, during in ({name: -2.0}, {}), ({}, {name: -2.0}):
+            fmu = worker.instantiate(built(puck, kind))
+            with pytest.raises(FmiError):
+                run_with_a_change(fmu, before, during)
+            assert sentence in str(fmu.messages())
+            fmu.free()
+
+
 SPECIAL = r"""??= ??/ ??' ??( ??) ??! ??< ??> ??- ???/ " \ \n %s %n { </p> & ' ]]> --> */ /* // é ∂ 漢"""
 TEXTS = f"""
 from fmus import Contact, Mode, Model, Output, Parameter, Rule, State

@@ -90,8 +90,23 @@ def is_nonnegative(e: Operand) -> bool:
             return True
         case "+" | "*" | "/":
             return all(map(is_nonnegative, e.args))
+        case "-":
+            return is_nonnegative(e.args[0]) and is_nonpositive(e.args[1])
         case "choose":
             return all(is_nonnegative(case) or is_positive_part(e.args[0], case) for case in e.args[1:])
+    return False
+
+
+def is_nonpositive(e: Operand) -> bool:
+    """Return whether the form of an expression shows that it is never positive."""
+    if not isinstance(e, Term):
+        return not isinstance(e, Expression) and e <= 0.0
+    a, b = e.args[0], e.args[-1]
+    match e.op:
+        case "neg":
+            return is_nonnegative(a)
+        case "*" | "/":
+            return (is_nonpositive(a) and is_nonnegative(b)) or (is_nonnegative(a) and is_nonpositive(b))
     return False
 
 

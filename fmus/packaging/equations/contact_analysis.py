@@ -137,6 +137,27 @@ class ContactAnalysis(ModelRoles):
         forces = [e for c in self.contacts for e in (c.slip, c.slide, c.hold) if e is not None]
         return [*self.rate_outputs.values(), *forces]
 
+    def _sign_rules(self) -> tuple[Rule, ...]:
+        """Return rules that reject values with which friction drives a body instead of opposing its slip.
+
+        They apply where a force, or the inverse mass on which it acts, depends on parameters only and may be negative.
+        Forces that vary during the run are limits instead.
+        """
+        result = []
+        for c in self.contacts:
+            for e, op, meaning, allowed in (
+                (c.slide, "<", "the sliding force is negative", "it is at least 0"),
+                (c.hold, "<", "the holding force is negative", "it is at least 0"),
+                (self.A[c, c], "<=", "the force accelerates its own slip", "it opposes the slip"),
+            ):
+                is_constant = isinstance(e, Expression) and not depends_on(e, (*self.time_varying, *self.inputs))
+                if is_constant and not is_nonnegative(e):
+                    values = ", ".join(f"{one.name} = {{{one.name}!r}}" for one in variables_in(e))
+                    broken = Term(op, e, 0.0)
+                    broken.location = c.location
+                    result.append(Rule(broken, f"{c.name}: {meaning} with {values}: set values with which {allowed}"))
+        return tuple(result)
+
     def _holding_rules(self) -> tuple[Rule, ...]:
         """Return a rule for each contact that rejects sliding forces above the holding force.
 

@@ -35,7 +35,13 @@ class ModelAnalysis(ContactAnalysis):
         check_declarations(self)
         self._find_contact_loads()
         self.ramps = {e: rate for e, rate in self.ramps.items() if self._keeps_closed_form(e)}
-        self.rules = (*self._division_rules(), *self._nominal_velocity_rules(), *self.rules, *self._holding_rules())
+        self.rules = (
+            *self._division_rules(),
+            *self._nominal_velocity_rules(),
+            *self.rules,
+            *self._sign_rules(),
+            *self._holding_rules(),
+        )
         self.switches = find_conditions(self._dynamic_expressions(), (TIME, *self.states, *self.drivers, *self.ramps))
         self.limits = self._find_limits()
         for e in self.named if self.contacts and not self.waits else ():
