@@ -4,11 +4,10 @@ import commands
 import numpy as np
 import pytest
 from build_cache import build_user_model
-from contact_references import CONTACT_REFERENCES, reference_events
+from contact_references import CONTACT_REFERENCES, reference_events, solve_lugre
 from fmpy import read_model_description
 from models import LARGER_MODELS, write_growing_friction_model
 from row_comparison import assert_identical
-from scipy.integrate import solve_ivp
 from worker_client import FmiError
 
 STOP, DOP853 = 8.0, 4
@@ -20,24 +19,12 @@ def built(name, kind):
     return build_user_model(file, *(["--native", "--platform", "linux64"] if kind else [])) / kind / f"{name}.fmu"
 
 
-def lugre(t, y):
-    """The LuGre equations, written independently."""
-    x, v, z = y
-    u = v - 1e4 * abs(v) * z / (73.56 + (110.34 - 73.56) * np.exp(-((v / 0.01) ** 2)))
-    return [v, (742.5 * (0.034 * t - x) - (1e4 * z + 300.0 * u + 0.4 * v)) / 12.5, u]
-
-
-def reference_run(stop):
-    """Return final position, speed and bristle deflection, by a method that the project does not use."""
-    return solve_ivp(lugre, (0.0, stop), (0.0, 0.0, 0.0), "LSODA", rtol=1e-12, atol=1e-14).y[:, -1]
-
-
 def test_three_states_agree_with_an_independent_formulation(worker):
     """LuGre: position, speed and bristle deflection, within 1e-9 of their size."""
     fmu = worker.instantiate(built("lugre", "")).begin({"solver.rtol": 1e-11}, stop=STOP)
     (final,) = fmu.run([0.0, STOP], ["x", "v", "z"])[-1:]
     fmu.free()
-    assert np.abs(final - reference_run(STOP)).max() < 1e-9
+    assert np.abs(final - solve_lugre(STOP)).max() < 1e-9
 
 
 def test_a_certified_result_has_all_states_and_precision_accepts_it(tmp_path):
@@ -50,7 +37,7 @@ def test_a_certified_result_has_all_states_and_precision_accepts_it(tmp_path):
     _, heads, *rows = (tmp_path / "lugre.csv").read_text().splitlines()
     assert heads == "t [s],x [m],v [m/s],z [m]"
     table = np.array([row.split(",") for row in rows], float)
-    assert np.abs(table[-1, 1:] - reference_run(table[-1, 0])).max() < 1e-9
+    assert np.abs(table[-1, 1:] - solve_lugre(table[-1, 0])).max() < 1e-9
     done = commands.harness(tmp_path, "precision", "lugre.py", "--quick", blank=True)
     assert (done.returncode, done.stderr) == (0, "")
     assert [file.name for file in (tmp_path / "results/precision").iterdir()] == ["lugre"]

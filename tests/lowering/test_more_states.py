@@ -1,15 +1,12 @@
 """Three states, two contacts on separate bodies, and conditions, which the five models do not use."""
 
-from functools import cache
 from itertools import cycle, product
-from math import exp, fabs
 
 import numpy as np
 import pytest
-from contact_references import CONTACT_REFERENCES, reference_events
+from contact_references import CONTACT_REFERENCES, reference_events, solve_lugre
 from internal_steps import array_steps, bits, compute_step, prepared_run, scalar_steps, start, state_values
 from models import DOP853, LARGER_MODELS, ODE23, ODE45, RADAU9, RODAS, ROOT
-from scipy.integrate import solve_ivp
 
 from fmus.packaging.lowering import lowered_model, select_features
 from fmus.packaging.model_lookup import find_model
@@ -54,21 +51,9 @@ def integrate(name, method):
     return state_values(step, one.states), events
 
 
-@cache
-def bristles():
-    """Return the final state by a method that the project does not use."""
-
-    def rates(t, y):
-        x, v, z = y
-        u = v - 1e4 * fabs(v) * z / (122.6 * (0.6 + 0.3 * exp(-((v / 1e-2) ** 2))))
-        return v, (742.5 * (0.034 * t - x) - 1e4 * z - 300.0 * u - 0.4 * v) / 12.5, u
-
-    return solve_ivp(rates, (0.0, 4.0), [0.0] * 3, method="Radau", rtol=1e-12, atol=1e-15).y[:, -1]
-
-
 @EVERY_METHOD
 def test_bristles_agree_with_an_independent_solver(method):
-    truth = bristles()
+    truth = solve_lugre(STOPS["lugre"])
     final, _ = integrate("lugre", method)
     assert np.abs(np.array(final) - truth).max() < max(2e3 * RTOL[method] * np.abs(truth).max(), 1e-11)
 
