@@ -60,6 +60,10 @@ OPTIONS_WITHOUT_EFFECT = [
     (["decay", "coulomb", "--rate", 100], "--rate"),
 ]
 COMMAND_LINES = [  # arguments, exit status, words of the sentence
+    (["runn"], 2, "runn"),
+    (["--nosuch"], 2, "--nosuch"),
+    (["run"], 2, "give one SCENE, or --fmu PATH"),
+    (["run", "nosuch"], 2, "unknown scene 'nosuch'"),
     *((arguments, 2, f"{option} has no effect ") for arguments, option in OPTIONS_WITHOUT_EFFECT),
     (["compare", "fmus", OWN], 2, "trajectory.csv is missing"),
     (["decay", "stickslip"], 1, "not a free decay of one oscillator"),

@@ -261,15 +261,6 @@ def test_a_failing_case_does_not_lose_the_others(workspace, monkeypatch):
     assert [path.name for path in (workspace / "out").iterdir()] == ["good"]
 
 
-def test_a_missing_fmu_error_explains_how_to_build_it(tmp_path):
-    (tmp_path / "fmus").mkdir()
-    (tmp_path / "fmus/absent.py").write_text("")
-    (tmp_path / "mine.toml").write_text(BASE.replace("stickslip", "absent"))
-    done = harness(tmp_path, "run", "mine.toml")
-    assert done.returncode == 1
-    assert "there is no fmus/absent.fmu: build the FMUs with `friction-fmus build`" in done.stderr
-
-
 PAIR = (
     'title = "a title"\nstop = 0.1\nsteps = [0.01]\n[parts.one]\nmodel = "coulomb"\n[parts.two]\nmodel = "smd"\n'
     '[[connections]]\nfrom = "one.F_spring"\nto = "two"\n'
@@ -303,24 +294,10 @@ def test_a_command_runs_alike_in_a_process_of_its_own(workspace, arguments):
     assert one == pytest.approx(other, rel=1e-6, abs=1e-9)  # sums of numpy depend on the memory alignment of an array
 
 
-@pytest.mark.parametrize("arguments", [["runn"], ["run"], ["run", "nosuch"], ["--nosuch"]])
-def test_wrong_usage_has_exit_status_two(user_folder, arguments):
-    done = harness(user_folder, *arguments)
-    assert done.returncode == 2
-    assert "Error: " in done.stderr
-    assert "Traceback" not in done.stderr
-
-
 def test_quiet_prints_nothing(scene):
     done, results = scene(BASE + "grid = 1", "--quiet")
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
     assert results.exists()
-
-
-def test_list_shows_every_scene(user_folder):
-    done = harness(user_folder, "list")
-    for path in (ROOT / "harness/scenes").glob("*.toml"):
-        assert path.stem in done.stdout
 
 
 def test_a_scene_imports_only_the_modules_it_needs(user_folder, tmp_path):

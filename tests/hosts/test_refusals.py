@@ -204,9 +204,9 @@ def test_values_that_contradict_each_other_are_refused_until_one_is_corrected(in
 
 
 def test_a_refused_start_can_be_corrected(instance, backend):
-    """Times, start values and their combinations; the layer of a Python FMU can refuse none of them."""
+    """Times, start values and their combinations."""
     if backend == "python":
-        return
+        pytest.skip("the layer of a Python FMU refuses nothing before the first step")
     other, fmu = instance("stickslip"), instance("stickslip")  # fmpy logs to the latter
     refused(fmu, backend, "set", {"m": -1.0})
     for start, stop in ((nan, None), (1.0, 1.0), (0.0, -1.0)):

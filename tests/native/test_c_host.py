@@ -117,16 +117,6 @@ def ends_of_lives(fmu, exchange):
     return ends
 
 
-def test_fmi3_refuses_an_invalid_parameter_and_continues_with_the_valid_one():
-    mass, speed = (value_references("stickslip")[v] for v in ("m", "v"))
-    script = ["0 new", f"0 setr {mass} -1", "0 enter", "0 exit", "0 step 0 1", f"0 getr {mass} {speed}"]
-    (log, status, *answers), _ = run_host_script(fmi3_fixtures.build_fmi3_fmus() / "stickslip.fmu", script)
-    assert log.startswith(f"log {ERROR} logStatusError ")
-    assert "m = -1.0" in log
-    assert status == ERROR
-    assert read_values(answers) == [[model_class("stickslip").m.start, 0.0]]
-
-
 # ---- errors
 
 
