@@ -488,6 +488,51 @@ WRONG = {
         17,
         "R: f * v / fabs(v) cannot be calculated at the start values, where fabs(v) is 0.0",
     ),
+    "a start value after the declaration": (
+        RATE + "    x.start = 0.1\n",
+        17,
+        "x.start is set after the declaration of x: write start=... in that line",
+    ),
+    "a bound that grows": (RATE + "    k.low += 1.0\n", 17, "k.low is set after the declaration of k: write low=..."),
+    "a name of the class in a comprehension": (
+        RATE + "    y = sum([k * x for _i in range(2)])\n",
+        17,
+        "k is a name of the class body, which comprehensions, lambdas and functions do not see: write a for loop",
+    ),
+    "a floor": (RATE.replace("F -", "floor(x) -"), 16, "floor is no function of fmus, which has sin, cos"),
+    "a function of a text": (RATE.replace("F -", 'sin("x") -'), 16, "sin() needs an expression or a number, got 'x'"),
+    "a function of a library": (
+        RATE + "    import statistics\n    y = statistics.median([x, k])\n",
+        18,
+        "an expression has no value at build time, as if, and, or, not, max",
+    ),
+    "a value in a text": (
+        RATE.replace('"acceleration"', 'f"acceleration of {m:.1f} kg"'),
+        16,
+        "m has no value at build time, so a text can show its name only: write {m}",
+    ),
+    "a mistake in a try statement": (
+        RATE + "    try:\n        y = max(x, 0.0)\n    except ValueError:\n        y = x\n",
+        18,
+        "an expression has no value at build time, as if, and, or, not, max",
+    ),
+    "hertz as the rate of an angle": (
+        RATE + '    fr = Parameter(2.0, "Hz", "frequency")\n    q = State("rad", "angle", rate=fr)\n',
+        18,
+        "q is in rad, but fr counts revolutions, as it has the unit Hz: write 2.0 * pi * fr",
+    ),
+    "hertz as an angular velocity": (
+        RATE
+        + '    fr = Parameter(2.0, "Hz", "frequency")\n    w = Output("rad/s", "speed", choose(k > 2 * k, fr, -fr))\n',
+        18,
+        "w is in rad/s, but choose(k > 2 * k, fr, -fr) counts revolutions, as it has the unit Hz: write 2.0 * pi *",
+    ),
+    "hertz in a sine": (
+        RATE + '    fr = Parameter(2.0, "Hz", "frequency")\n    clock = State("s", "time", rate=1.0)\n'
+        '    p = Output("1", "signal", sin(fr * clock))\n',
+        19,
+        "the argument of sin is an angle in rad, but fr * clock counts revolutions, as it has the unit Hz: write 2.0",
+    ),
     "a number for a docstring": (RATE + "    __doc__ = 3\n", 4, "Mine has no docstring"),
     "a name for the rate of a driver": (
         RATE + '    q = State("m", "one", start=1.0, rate=u)\n    q_rate = Parameter(1.0, "m/s", "another")\n',
@@ -530,6 +575,13 @@ WORKS = """
         body[f"{name}_force"] = Output("N", f"force {n}", scale * math.pi * pull(x))
     import random
     body["random_force"] = Output("N", "force drawn from a seed", random.Random(1).random() * pull(x))
+    fr = Parameter(2.0, "Hz", "frequency")
+    angle = State("rad", "phase angle", rate=2.0 * math.pi * fr)
+    decay = Output("rad/s", "rate of decay", fr * angle)
+    forces = []
+    for n in range(2):
+        forces.append(pull(x))
+    total = Output("N", f"sum of {x} and {forces[0]}", sum(forces))
     alias = k
     unused = k * x
     stop_time: float = 8.0
@@ -543,6 +595,7 @@ def test_helper_values_of_the_class_body_are_allowed(tmp_path):
     path.write_text(HEAD.replace("from", "import numpy as np\nfrom", 1) + RATE + WORKS + USE + numbers)
     model = find_model(path).model
     assert {"x_force", "y_force"} <= vars(model).keys()
+    assert model.total.text == "sum of x and an expression"
     assert (model.stop_time, model.q.start, model.q.low) == (8.0, 2.0, 0.5)
     assert find_model(path).analysis.model.stop_time == 8.0
 

@@ -6,6 +6,7 @@ from typing import Any
 
 from .. import BuildError
 from ..units import SYMBOLS, parse_unit, unit_of
+from .algebra import operands, subexpressions
 from .expression_printer import COMPARISON_OPERATORS
 from .expressions import Expression, ModelError, Operand, Term
 from .model_analysis import ModelAnalysis
@@ -54,6 +55,58 @@ def check_dimensions(
     dimensions = dimensions_of(e, memo) if isinstance(e, Expression) else None
     if None not in (dimensions, expected) and dimensions != expected:
         raise ModelError(f"{prefix} {expression_text(e)} is in {dimensions_text(dimensions)}", owner.location)
+
+
+def check_frequencies(an: ModelAnalysis) -> None:
+    """Check that no frequency in Hz is used as an angular velocity; both have the dimension 1/s."""
+    for e in an.declared:
+        uses: list[tuple[Variable, Operand]] = [(e, e.expression)] if isinstance(e, Output) else []
+        if isinstance(e, (State, Output)) and e.integrates is not None:
+            uses.append((e.integrates, e))
+        if isinstance(e, State) and e.constant_rate is not None:
+            uses.append((e, e.constant_rate))
+        for variable, value in uses:
+            if angle_exponent(variable) > 0 and is_in_hertz(value):
+                raise frequency_error(value, f"{variable.name} is in {variable.unit}", e)
+        for part in an.declared_expressions(e):
+            for term in subexpressions(part).values():
+                if isinstance(term, Term) and term.op in ("sin", "cos", "tan") and is_in_hertz(term.args[0]):
+                    raise frequency_error(term.args[0], f"the argument of {term.op} is an angle in rad", term)
+
+
+def frequency_error(e: Operand, use: str, owner: Expression) -> ModelError:
+    """Return the error for a frequency that is used as an angular velocity."""
+    text = expression_text(e, PRECEDENCE["*"])
+    return ModelError(
+        f"{use}, but {text} counts revolutions, as it has the unit Hz: write 2.0 * pi * {text}", owner.location
+    )
+
+
+def is_in_hertz(e: Operand) -> bool:
+    """Return whether an expression counts revolutions: it has a factor in Hz, and none that may convert it."""
+    if isinstance(e, Variable):
+        return "Hz" in e.unit
+    if not isinstance(e, Term):
+        return False
+    match e.op:
+        case "+" | "-" | "neg" | "fabs" | "choose":
+            return any(map(is_in_hertz, e.args))
+        case "*" | "/":
+            others = [one for one in e.args if not is_in_hertz(one)]
+            return len(others) < len(e.args) and not any(map(may_convert_hertz, others))
+    return False
+
+
+def may_convert_hertz(e: Operand) -> bool:
+    """Return whether a factor of a frequency may turn revolutions into an angle: numbers, ratios and angles."""
+    if isinstance(e, Variable):
+        return declared_dimensions(e) == DIMENSIONLESS or angle_exponent(e) != 0
+    return not isinstance(e, Expression) or any(map(may_convert_hertz, operands(e)))
+
+
+def angle_exponent(e: Variable) -> int:
+    """Return the exponent of rad in the unit of a variable."""
+    return unit_of(e.name, e.unit, e.display).rad if e.unit else 0
 
 
 def declared_dimensions(e: Variable) -> Dimensions:

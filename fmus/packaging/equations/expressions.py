@@ -45,8 +45,11 @@ NO_EQUALITY = (
 )
 
 
-class ModelError(ValueError):
-    """Raised for a mistake in a model file: message, file and line."""
+class ModelError(Exception):
+    """Raised for a mistake in a model file: message, file and line.
+
+    It is no ValueError, because a model file may catch that of math.sqrt, and would hide the mistake.
+    """
 
     def __init__(self, sentence: str, location: "tuple[str, int] | None" = None) -> None:
         super().__init__(sentence)
@@ -100,6 +103,14 @@ class Expression:
     def __eq__(self, other: object) -> "Term":  # type: ignore[override]
         """Return a comparison; `is` and the keys of sets and dictionaries compare by identity."""
         return Term("==", self, other)
+
+    def __repr__(self) -> str:
+        return self.name or "an expression"
+
+    def __format__(self, format_spec: str) -> str:
+        if format_spec:
+            raise ModelError(f"{self} has no value at build time, so a text can show its name only: write {{{self}}}")
+        return str(self)
 
     __ne__ = _refusal(NO_EQUALITY)
     __hash__ = object.__hash__
@@ -186,6 +197,8 @@ def _function(name: str) -> Callable[[Operand], Operand]:
     def function(u: Operand) -> Operand:
         if isinstance(u, Expression):
             return Term(name, u)
+        if not is_number(u):
+            raise ModelError(f"{name}() needs an expression or a number, got {describe(u)}")
         try:
             return getattr(math, name)(u)
         except (ArithmeticError, ValueError) as error:

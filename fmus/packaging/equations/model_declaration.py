@@ -4,6 +4,7 @@ from collections.abc import Callable, MutableMapping
 from difflib import get_close_matches
 from functools import cached_property
 from inspect import signature
+from linecache import getline
 from math import inf
 from types import FunctionType, ModuleType
 from typing import Any
@@ -319,7 +320,9 @@ class _ClassBody(dict[str, Any]):
 
     def __setitem__(self, name: str, value: Any) -> None:
         if isinstance(self.get(name), Expression) or (name in SETTINGS and name in self.unread):
-            raise ModelError(f"{name} is assigned twice: give the second equation another name")
+            raise ModelError(
+                f"{name} is assigned twice: give the second equation another name, or add terms in a list by sum(terms)"
+            )
         if isinstance(value, Expression):
             value.name = value.name or name
             self.unread.pop(name, None)
@@ -332,7 +335,9 @@ class _ClassBody(dict[str, Any]):
         for name, location in self.unread.items():
             value = self.get(name)
             is_function = isinstance(value, FUNCTION_TYPES) and not name.startswith("__annotate")
-            is_harmless = isinstance(value, (ModuleType, type)) or (name.startswith("_") and not is_function)
+            is_loop_variable = getline(*location).lstrip().startswith("for ")
+            is_private = name.startswith("_") and not is_function
+            is_harmless = isinstance(value, (ModuleType, type)) or is_private or is_loop_variable
             if name not in self or name in SETTINGS or is_harmless:
                 continue
             if is_function:

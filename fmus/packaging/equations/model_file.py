@@ -13,6 +13,7 @@ from hashlib import sha256
 from io import StringIO
 from keyword import iskeyword
 from pathlib import Path
+from traceback import extract_tb
 from types import ModuleType
 from typing import Any
 
@@ -20,7 +21,7 @@ from ...runtime.codes import MODEL_RULE, OK
 from ...runtime.variable_declarations import VariableOwner
 from .. import BuildError
 from .declaration_checks import check_repetition, check_use
-from .dimensions import check_units
+from .dimensions import check_frequencies, check_units
 from .expressions import ModelError
 from .model_analysis import ModelAnalysis
 from .model_declaration import Model
@@ -55,6 +56,7 @@ class ModelFile:
         try:
             analysis = ModelAnalysis(self._load_class(), self.ramps)
             check_units(analysis)
+            check_frequencies(analysis)
             with redirect_stdout(StringIO()):
                 repeated = vars(self._execute())[analysis.name]
             check_repetition(analysis.model, repeated)
@@ -140,7 +142,7 @@ class ModelFile:
             raise BuildError(
                 f"{self.path}: a model file must define exactly one class derived from Model; this one {content}."
             )
-        check_statements(ast.parse(self.source), models[0].__name__, str(self.path))
+        check_statements(ast.parse(self.source), models[0], str(self.path))
         return models[0]
 
     def _execute(self) -> ModuleType:
@@ -149,7 +151,10 @@ class ModelFile:
         module.__file__ = str(self.path)
         try:
             exec(compile(self.source, str(self.path), "exec", optimize=0), vars(module))
-        except ModelError:
+        except ModelError as error:
+            lines = [frame.lineno for frame in extract_tb(error.__traceback__) if frame.filename == str(self.path)]
+            if error.location[0] != str(self.path) and lines:  # raised by a library that the file calls
+                error.location = (str(self.path), lines[-1] or 1)
             raise
         except SyntaxError as error:
             raise ModelError(f"invalid Python: {error.msg}", (str(self.path), error.lineno or 1)) from error

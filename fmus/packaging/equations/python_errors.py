@@ -11,7 +11,7 @@ from typing import Any
 from ... import __all__ as EXPORTED_NAMES
 from . import expressions, model_declaration
 from .expressions import FUNCTIONS, NO_VALUE, ModelError
-from .model_declaration import Rule, Variable, signature_text
+from .model_declaration import Model, Rule, Variable, signature_text
 
 OFFERED = {
     name: one
@@ -20,6 +20,7 @@ OFFERED = {
     if name in EXPORTED_NAMES
 }
 DECLARATIONS = [name for name, one in OFFERED.items() if isinstance(one, type) and issubclass(one, (Variable, Rule))]
+MISSING_FUNCTIONS = ("floor", "ceil", "trunc", "fmod", "atan2", "hypot", "log10", "log2", "pow", "cbrt")  # of math
 OTHER_NAMES = {  # arguments of other programs and of earlier versions -> the argument that has this meaning
     **dict.fromkeys(("min", "minimum", "lower"), "low"),
     **dict.fromkeys(("max", "maximum", "upper"), "high"),
@@ -59,6 +60,11 @@ def explain_name(name: str, tree: ast.Module, line: int) -> str:
             f"{name} is used before its declaration in line {assigned_lines[name]}: Python runs the file from top to "
             "bottom, so declare each name before the line that uses it"
         )
+    if name in assigned_lines:
+        return (
+            f"{name} is a name of the class body, which comprehensions, lambdas and functions do not see: write a for "
+            f"loop, or pass it as an argument"
+        )
     if name in ("t", "time"):
         return f'{name} is not defined: for the time, declare a state such as clock = State("s", "time", rate=1.0)'
     if name == "self":
@@ -67,6 +73,8 @@ def explain_name(name: str, tree: ast.Module, line: int) -> str:
         return f"{name} is not imported: write from fmus import {name}"
     if name == "sign":
         return "sign is not defined: declare dry friction as a Contact, and write other laws with choose or tanh"
+    if name in MISSING_FUNCTIONS:
+        return f"{name} is no function of fmus, which has {', '.join(FUNCTIONS)}, and choose(condition, this, that)"
     close = get_close_matches(name, [*assigned_lines, *DECLARATIONS, *FUNCTIONS], 1, 0.7)
     return f"{name} is not defined: " + (f"the nearest name is {close[0]}" if close else "declare it before this line")
 
@@ -104,10 +112,18 @@ def explain_arguments(name: str, function: Any, call: ast.Call) -> str:
     return ""
 
 
-def check_statements(tree: ast.Module, model: str, file: str) -> None:
-    """Raise ModelError for declarations and expressions in the class body that are assigned to no name."""
-    for statement in class_statements(tree, model):
+def check_statements(tree: ast.Module, model: type[Model], file: str) -> None:
+    """Raise ModelError for statements in the class body that have no effect on the model."""
+    for statement in class_statements(tree, model.__name__):
         match statement:
+            case (
+                ast.Assign(targets=[ast.Attribute(value=ast.Name(id=name), attr=argument)])
+                | ast.AugAssign(target=ast.Attribute(value=ast.Name(id=name), attr=argument))
+            ) if isinstance(vars(model).get(name), Variable):
+                raise ModelError(
+                    f"{name}.{argument} is set after the declaration of {name}: write {argument}=... in that line",
+                    (file, statement.lineno),
+                )
             case ast.Expr(value=ast.Call(func=ast.Name(id=name))) if name in DECLARATIONS:
                 target = "rules" if name == Rule.__name__ else "name"
                 raise ModelError(
