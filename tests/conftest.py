@@ -24,8 +24,8 @@ def pytest_configure(config):
         config.add_cleanup(folder.cleanup)
         build_cache.shared_folder = Path(folder.name)
         cache = getattr(config, "cache", None)  # absent with -p no:cacheprovider, as in a read-only checkout
-        kept = cache.mkdir("builds") if cache else build_cache.shared_folder
-        build_cache.kept_folder, lock = build_cache.open_kept_folder(kept)
+        parent = cache.mkdir("builds") if cache else build_cache.shared_folder
+        build_cache.kept_folder, lock = build_cache.open_kept_folder(parent)
         config.add_cleanup(lock.close)
 
 

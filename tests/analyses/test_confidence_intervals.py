@@ -37,8 +37,8 @@ def test_joint_nonnegative_intervals_cover_95_percent(means, rho):
     low, high = np.array([nonnegative_interval(item, correlation) for item in z]).T
     assert 0.9 < np.mean((low <= means[0]) & (means[0] <= high)) < (1.0 if means == (0.0, 0.0) else 0.985)
     if means == (0.0, 0.0) and rho < 0:
-        alone = np.array([nonnegative_interval(item[:1], np.eye(1)) for item in z])
-        assert np.mean(high) < 0.5 * np.mean(alone[:, 1])
+        single = np.array([nonnegative_interval(item[:1], np.eye(1)) for item in z])
+        assert np.mean(high) < 0.5 * np.mean(single[:, 1])
 
 
 @pytest.mark.parametrize("rho", [0.0, 0.5, -0.98])

@@ -36,9 +36,9 @@ def rubbed(loss, n=4001):
 @pytest.mark.parametrize("cycles", [0.5, 2, 2.5, 5])
 def test_the_damping_ratio_of_an_exact_signal_is_recovered(zeta, cycles):
     times, positions = find_extrema_from_velocity(*damped(zeta))
-    _, positions, used = select_cycles(times, positions, 0, cycles)
-    assert used == cycles
-    assert damping_ratio(abs(positions[0]), abs(positions[-1]), used) == pytest.approx(zeta, abs=1e-6)
+    _, positions, cycles_used = select_cycles(times, positions, 0, cycles)
+    assert cycles_used == cycles
+    assert damping_ratio(abs(positions[0]), abs(positions[-1]), cycles_used) == pytest.approx(zeta, abs=1e-6)
 
 
 @pytest.mark.parametrize("n", [100, 200, 400])

@@ -17,8 +17,8 @@ SIMULATOR = SimpleNamespace(spec=RunSpec(Path()), prepare=lambda spec: None)  # 
 def test_a_record_of_long_rests_reveals_the_step_of_its_quantiser(levels):
     step = 3.7e-4
     x = step * np.repeat(levels, 40).astype(float)
-    noise, found = estimate_noise(np.arange(len(x)) * 0.01, x)
-    assert found == pytest.approx(step, rel=1e-9)
+    noise, estimate = estimate_noise(np.arange(len(x)) * 0.01, x)
+    assert estimate == pytest.approx(step, rel=1e-9)
     assert noise == pytest.approx(step / 12**0.5, rel=1e-9)
 
 

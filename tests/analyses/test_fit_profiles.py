@@ -67,8 +67,8 @@ def test_a_profile_follows_a_curved_valley():
     problem = Residuals(valley)
     uncertainty = uncertainty_at(problem, MINIMUM)
     ends = {(i, side): profile_bound(problem, MINIMUM, uncertainty, i, side).end for i in (0, 1) for side in (-1, 1)}
-    expected = [2 * (np.exp(a - 1) - 1) for a in (ends[0, -1], ends[0, 1], np.sqrt(ends[1, 1]))]
-    assert expected == pytest.approx([-QUANTILE, QUANTILE, QUANTILE], rel=0.03)
+    residuals = [2 * (np.exp(a - 1) - 1) for a in (ends[0, -1], ends[0, 1], np.sqrt(ends[1, 1]))]
+    assert residuals == pytest.approx([-QUANTILE, QUANTILE, QUANTILE], rel=0.03)
 
 
 @pytest.mark.parametrize("height", [15.0, 3.3, 1.5, 1.0])
@@ -132,5 +132,5 @@ def test_differences_of_runs_that_scatter_show_how_weak_a_direction_is():
     matrix[:, 1] += 0.01 * np.random.default_rng(2).normal(size=2000)
     problem = Residuals(lambda a, b: matrix @ [a, b] + 1e-7 * random.normal(size=2000))
     jacobian = problem.choose_steps(MINIMUM, problem.residuals(MINIMUM, ()))
-    errors, expected = (np.sqrt(np.diag(np.linalg.inv(each.T @ each))) for each in (jacobian, matrix))
+    errors, expected = (np.sqrt(np.diag(np.linalg.inv(slopes.T @ slopes))) for slopes in (jacobian, matrix))
     assert errors == pytest.approx(expected, rel=0.1)

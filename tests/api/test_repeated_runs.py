@@ -31,7 +31,7 @@ time = [0, 1, 1, 2]
 F_ext = [0, 5, 0, 1]
 """
 INPUTS = {"time": [0.0, 1.0, 1.0, 2.0], "F_ext": [0.0, 5.0, 0.0, 1.0]}
-WAYS = {  # arguments of harness.simulate
+CALLS = {  # arguments of harness.simulate
     "model": {"source": "coulomb"},
     "enumerations": {"source": "stickslip", "values": {"friction": "threshold"}, "method": "ode45", "rtol": 1e-5},
     "interval": {"source": "coulomb", "interval": 0.25, "stop": 2.0, "outputs": ["x"]},
@@ -58,18 +58,18 @@ def read_back(spec):
     return pickle.loads(pickle.dumps(RunSpec.from_json(json.loads(to_json(spec)))))
 
 
-@pytest.mark.parametrize("way", WAYS)
-def test_a_stored_run_is_repeated_bit_for_bit(way):
+@pytest.mark.parametrize("call", CALLS)
+def test_a_stored_run_is_repeated_bit_for_bit(call):
     folders = {
         "native": native_fmus.build_native_fmus,
         "fmi3": fmi3_fixtures.build_fmi3_fmus,
         "external": external_fmus.build_external_fmus,
     }
-    source, *others = WAYS[way]["source"], WAYS[way]
+    arguments, source = CALLS[call], CALLS[call]["source"]
     for name, build in folders.items():
         if f"{{{name}}}" in source:
             source = source.format(**{name: build()})
-    run = harness.simulate(**others[0] | {"source": source})
+    run = harness.simulate(**arguments | {"source": source})
     run.save("saved")
     assert read_back(run.spec) == run.spec == harness.load_result("saved").spec
     for repeated in (harness.simulate("saved"), runner.run(read_back(run.spec), lambda share: None)):

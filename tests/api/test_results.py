@@ -73,7 +73,7 @@ def test_compare_takes_runs_folders_and_fmus():
         assert harness.compare(run, other).worst == 0.0
     other = harness.simulate("coulomb", {"f": 0.5001})
     comparison = harness.compare(run, other)
-    (x,) = (each for each in comparison.differences if each.name == "x")
+    (x,) = (difference for difference in comparison.differences if difference.name == "x")
     assert x.largest == pytest.approx(np.abs(run["x"] - np.interp(run.time, other.time, other["x"])).max(), rel=1e-3)
     with pytest.raises(harness.HarnessError, match="no variable in common"):
         harness.compare(harness.simulate("smd", outputs=["F_damper"]), run)

@@ -138,8 +138,8 @@ TABLES = {  # of slow commands, filled with long words
 
 @pytest.mark.parametrize("name", TABLES)
 def test_tables_of_long_commands_fit_into_80_columns(name):
-    shown, heading = TABLES[name]
-    for item in shown:
+    tables, heading = TABLES[name]
+    for item in tables:
         console = Console(width=WIDTH, markup=False, highlight=False)
         with console.capture() as output:
             console.print(item)

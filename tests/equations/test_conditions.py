@@ -425,8 +425,8 @@ def test_limits_exist_only_where_a_force_may_become_negative(tmp_path, slide):
         full_model_text("slidinginput").replace("mu * N_ext", slide).replace("import Contact", "import fabs, Contact")
     )
     lines = {"r": "    r = v / v_s\n", "load": "    load = F_ext - k * x\n"}
-    used = "".join(line for name, line in lines.items() if f"{name} " in slide)
-    text = text.replace("    F_f", f"{used}    F_f")
+    helper_lines = "".join(line for name, line in lines.items() if f"{name} " in slide)
+    text = text.replace("    F_f", f"{helper_lines}    F_f")
     (tmp_path / "limited.py").write_text(text)
     assert bool(find_model(tmp_path / "limited.py").analysis.limits) is SLIDING_FORCES[slide]
 

@@ -194,7 +194,7 @@ def converged_law(analysis, law, variables):
         h = mpmath.mpf(10) ** -15
         flow = {s.name: h * equations.of(analysis.rate[s]) for s in analysis.states}
         flow |= {d.name: h * values[d.constant_rate.name] for d in analysis.drivers}
-        later = Evaluated(analysis, values | {name: values[name] + way for name, way in flow.items()}, mpmath.mp)
+        later = Evaluated(analysis, values | {name: values[name] + rate for name, rate in flow.items()}, mpmath.mp)
         return [(later.of(c.slip) - equations.of(c.slip)) / h for c in stuck]
 
     if stuck:

@@ -50,7 +50,7 @@ def run(fmu, physics, changes):
     values."""
     t, events = 0.0, []
 
-    def look():
+    def record_event():
         count, *event = fmu.get("events.count", "events.t_last", *physics.modes)
         if count > len(events):
             events.append(event)
@@ -60,10 +60,10 @@ def run(fmu, physics, changes):
             ahead = min(fmu.get("solver.t_next"), end)
             fmu.step(t, ahead - t)
             t = ahead
-            look()
+            record_event()
         if name:
             fmu.set({name: value})
-            look()
+            record_event()
     return events, fmu.get(*physics.states)
 
 

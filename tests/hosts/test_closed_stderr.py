@@ -4,19 +4,16 @@ import pytest
 from closed_stderr import STDERR_FAILURES
 from worker_client import run_script
 
-*OBJECTS, _, _, _, _ = STDERR_FAILURES
-PROCESSES = [
-    OBJECTS,
-    *([way] for way in STDERR_FAILURES if way not in OBJECTS),
-]  # can be tested one after another in one process
+*OBJECTS, _, _, _, _ = STDERR_FAILURES  # these can be tested one after another in one process
+PROCESSES = [OBJECTS, *([failure] for failure in STDERR_FAILURES if failure not in OBJECTS)]
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("ways", PROCESSES, ids=lambda ways: ways[-1])
-def test_an_error_survives_the_loss_of_standard_error(fmus, ways):
+@pytest.mark.parametrize("failures", PROCESSES, ids=lambda failures: failures[-1])
+def test_an_error_survives_the_loss_of_standard_error(fmus, failures):
     """The process exits cleanly, too. The instance name is not ASCII."""
-    answers = run_script("closed_stderr.py", "run_all", fmus / "pendulum.fmu", ways)
-    assert len(answers) == len(ways)
+    answers = run_script("closed_stderr.py", "run_all", fmus / "pendulum.fmu", failures)
+    assert len(answers) == len(failures)
     for answer in answers:
         assert answer["status"] == 2  # discard is all that the native layer can return
         assert answer["silent"]

@@ -66,10 +66,10 @@ def test_concurrent_instances_do_not_interfere(launch, worker):
     for t, ahead in pairwise(times):
         turns = [[[fmu.number, "step", [t, ahead - t]], [fmu.number, "get", [names]]] for fmu, names in fleet]
         results = worker.call(None, "batch", [*chain(*turns)])
-        for collected, row in zip(rows, results[1::2], strict=True):
-            collected.append(row)
-    for (_, names), collected, expected in zip(fleet, rows, separate, strict=True):
-        assert_identical(collected, expected, names)
+        for instance_rows, row in zip(rows, results[1::2], strict=True):
+            instance_rows.append(row)
+    for (_, names), instance_rows, expected in zip(fleet, rows, separate, strict=True):
+        assert_identical(instance_rows, expected, names)
 
 
 def interpreter(version):

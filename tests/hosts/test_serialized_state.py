@@ -134,7 +134,7 @@ def test_every_member_must_be_present_with_its_name_type_and_length(name, capsys
     content, draw = own_bytes(slave_class, one), random.Random(name)
     assert is_accepted(slave_class, forge_bytes(content, lambda state: None))
     state = json.loads(content[8:])
-    others, met = [None, "1", [], {}, [0.0] * 3, True, 1, 1.5, 10**30], set()
+    others, seen_kinds = [None, "1", [], {}, [0.0] * 3, True, 1, 1.5, 10**30], set()
     for path in iterate_members(state):
         value = find_member(state, path)[0][path[-1]]
 
@@ -151,14 +151,14 @@ def test_every_member_must_be_present_with_its_name_type_and_length(name, capsys
 
         changes, kind = [drop, rename, add], (type(value), type(value) is list and len(value))
         wrong = [other for other in others if not is_alternative(other, value)]
-        for other in wrong if kind not in met else [draw.choice(wrong)]:
+        for other in wrong if kind not in seen_kinds else [draw.choice(wrong)]:
 
             def replace(state, path=path, other=other):
                 owner, last = find_member(state, path)
                 owner[last] = other
 
             changes.append(replace)
-        met.add(kind)
+        seen_kinds.add(kind)
         for change in changes:
             assert not is_accepted(slave_class, forge_bytes(content, change)), (path, change)
 

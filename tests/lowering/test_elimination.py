@@ -61,9 +61,9 @@ def test_a_system_is_solved_or_refused_but_never_half_solved(bodies):
         J = draw.normal(0.0, 1.0, (n, n)) * 10.0 ** draw.uniform(-3.0, 5.0, (n, 1))
         first = spec.dynamic_states[0]
         if turn % 3:  # the first pivot is rounding error, or little more
-            moved = [i for i in range(n) if i not in spec.dynamic_states]
+            kinematic = [i for i in range(n) if i not in spec.dynamic_states]
             J[first, first] = 1.0 / (g * h) * (1.0 - 10.0 ** draw.uniform(-17.0, -3.0))
-            J[first, moved] = 0.0
+            J[first, kinematic] = 0.0
         for i in range(n):
             if i not in spec.dynamic_states:
                 J[i] = M[list(spec.states).index(list(spec.states.values())[i])]
@@ -85,7 +85,7 @@ def test_entries_that_are_always_zero_are_left_out_and_change_no_number(order):
     dense, names, draw = ModelLayout(states, {}), list(states), np.random.default_rng(5)
     joined = np.array([[abs(int(one[1]) - int(other[1])) < 2 for other in names] for one in names])
     spec = ModelLayout(
-        states, {}, zeros=frozenset(zip(*(place.tolist() for place in np.nonzero(~joined)), strict=True))
+        states, {}, zeros=frozenset(zip(*(indices.tolist() for indices in np.nonzero(~joined)), strict=True))
     )
     assert len(factorization_lines("s", "g", "h", spec)) < 0.7 * len(factorization_lines("s", "g", "h", dense))
     for _ in range(100):
@@ -114,8 +114,8 @@ def test_a_complex_system_is_solved_alike_on_arrays_and_in_scalars(bodies, undam
         h, J = 10.0 ** draw.uniform(-4.0, 0.0), draw.normal(0.0, 1.0, (n, n)) * 10.0 ** draw.uniform(-3.0, 3.0, (n, 1))
         for i in set(range(n)) - {*dynamic}:
             J[i] = np.eye(n)[names.index(rates[i])]
-        for place in spec.zeros:
-            J[place] = 0.0
+        for entry in spec.zeros:
+            J[entry] = 0.0
         re, im, r, q = 3.7 / h, -6.5 / h, np.zeros(n), np.zeros(n)
         r[dynamic], q[dynamic] = draw.normal(size=len(dynamic)), draw.normal(size=len(dynamic))
         namespace = {"re": re, "im": im, "nan": nan}

@@ -87,8 +87,8 @@ def test_author_choices_named_like_an_unavailable_method_or_law_are_kept(tmp_pat
     source = find_model(path)
     lowered = lowered_model(source, select_features(source, ["ode45"], ["hybrid"]))
     items = {name: meaning.items for name, meaning in declared_variables(lowered) if meaning.items}
-    offered = {name: [label for label, _, _ in rows] for name, rows in items.items()}
-    assert offered == {"kind": labels, "friction": ["hybrid"], "solver.method": ["ode45"]}
+    labels_by_name = {name: [label for label, _, _ in rows] for name, rows in items.items()}
+    assert labels_by_name == {"kind": labels, "friction": ["hybrid"], "solver.method": ["ode45"]}
     model, rates = lowered(), set()
     for model.kind in range(1, 9):
         assert model.prepare() == 0

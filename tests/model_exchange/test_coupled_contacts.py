@@ -37,13 +37,13 @@ def integrate_with_indicators(name, stop):
         return list(run.model_exchange.states)
 
     def indicator(i):
-        def left(t, y):
+        def margin(t, y):
             at(t, y)
             exchange.update_indicators(run, model)
             return run.model_exchange.indicators[i]
 
-        left.terminal, left.direction = True, -1
-        return left
+        margin.terminal, margin.direction = True, -1
+        return margin
 
     t, y, events = 0.0, states(), []
     indicators = [indicator(i) for i in range(2 * len(model.contacts))]

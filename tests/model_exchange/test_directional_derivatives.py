@@ -76,7 +76,7 @@ def test_directional_derivatives_agree_with_central_differences(model):
     inputs = [v for v in description.modelVariables if v.causality == "input"]
     outputs = [v for v in description.modelVariables if v.causality == "output" and v.variability == "continuous"]
     rates = [unknown.variable for unknown in description.derivatives if unknown.variable.name.startswith("der(")]
-    knowns, unknowns = ([v.valueReference for v in some] for some in ((*states, *inputs), (*outputs, *rates)))
+    knowns, unknowns = ([v.valueReference for v in group] for group in ((*states, *inputs), (*outputs, *rates)))
     pushes, size, chance = [v.valueReference for v in inputs], len(states), Random(3)
 
     def at(point):

@@ -71,11 +71,11 @@ def through(fmu, stop, h, at_event):
     t, times = 0.0, []
     while t < stop:
         ahead = min(h * (int(t / h + 1e-9) + 1), stop)
-        event, terminate, early, reached = fmu.doStep(t, ahead - t)
+        event, terminate, early, t_end = fmu.doStep(t, ahead - t)
         assert not terminate
-        assert early == (reached < ahead)
+        assert early == (t_end < ahead)
         assert event or not early
-        t = reached
+        t = t_end
         times.append(t)
         if event:
             at_event(t)
@@ -94,11 +94,11 @@ def test_a_master_with_long_steps_sees_every_event_at_its_time(unpacked, name, m
         fmu.enterStepMode()
 
         def at_event(t):
-            before, counted = read("mode"), read("events.count")
+            before, n_before = read("mode"), read("events.count")
             handle(fmu)
             changes.append((t, read("mode")))
             assert read("mode") != before
-            assert read("events.count") == counted + 1 == len(changes)
+            assert read("events.count") == n_before + 1 == len(changes)
             assert read("events.t_last") == t == read("time")
 
         through(fmu, stop, 1.0, at_event)
@@ -111,9 +111,9 @@ def test_the_sled_breaks_away_at_the_closed_form_time(unpacked):
     with master(unpacked, "stickslip", eventModeUsed=True, earlyReturnAllowed=True) as (fmu, read, _):
         fmu.updateDiscreteStates()
         fmu.enterStepMode()
-        *_, early, reached = fmu.doStep(0.0, 16.0)
+        *_, early, t_end = fmu.doStep(0.0, 16.0)
         assert early
-        assert reached == pytest.approx(BREAKAWAY_TIME, abs=1e-14)
+        assert t_end == pytest.approx(BREAKAWAY_TIME, abs=1e-14)
         assert read("mode") == 0
         assert read("F_friction") == pytest.approx(0.9 * 12.5 * 9.81, rel=1e-14)
         handle(fmu)
@@ -153,10 +153,10 @@ def test_discrete_variables_change_in_event_mode_only_and_every_event_is_announc
     def read_all():
         return [read(variable) for variable in discrete]
 
-    def look(*_):
+    def update(*_):
         looks.append(read_all())
 
-    options = {"eventModeUsed": True, "earlyReturnAllowed": early, "intermediateUpdate": look}
+    options = {"eventModeUsed": True, "earlyReturnAllowed": early, "intermediateUpdate": update}
     with master(unpacked, name, **options) as (fmu, read, _):
         fmu.updateDiscreteStates()
         fmu.enterStepMode()
@@ -248,21 +248,21 @@ def test_a_value_set_at_an_event_acts_from_then_on(unpacked):
 def test_an_input_set_during_intermediate_update_acts_from_then_on(unpacked, name):
     """It acts as if it were set between two steps at the same time. Only inputs can be set there."""
     (force, size), stop = push(name), 0.5 * model_class(name).stop_time
-    places = [next(v.valueReference for v in unpacked(name)[1].modelVariables if v.name == one) for one in (force, "m")]
-    rows, turned = [], []
+    references = {v.name: v.valueReference for v in unpacked(name)[1].modelVariables}
+    rows, set_times = [], []
 
-    def look(_, time, setting, getting, finished, may_return, request, when):
-        if time > 0.3 * stop and not turned:
-            turned.append(time)
-            fmu.setFloat64(places[:1], [size])
+    def update(_, time, setting, getting, finished, may_return, request, when):
+        if time > 0.3 * stop and not set_times:
+            set_times.append(time)
+            fmu.setFloat64([references[force]], [size])
             with pytest.raises(FMICallException):
-                fmu.setFloat64(places[1:], [1.0])
+                fmu.setFloat64([references["m"]], [1.0])
 
-    for options in {"intermediateUpdate": look}, {}:
+    for options in {"intermediateUpdate": update}, {}:
         with master(unpacked, name, {"solver.method": 3}, **options) as (fmu, read, write):
             t = 0.0
-            if turned:
-                (t,) = turned
+            if set_times:
+                (t,) = set_times
                 fmu.doStep(0.0, t)
                 write(force, size)
             fmu.doStep(t, stop - t)

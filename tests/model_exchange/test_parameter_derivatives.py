@@ -161,8 +161,8 @@ def test_initial_unknowns_have_the_declared_derivatives_by_parameters_and_start_
         jacobian = check_derivatives(fmu, unknowns, declared, reals, at_rest, lambda: None)
         has_responded |= {(unknowns[i], list(reals)[j]) for i, j in zip(*np.nonzero(jacobian), strict=True)}
         assert not any(fmu.getDirectionalDerivative(unknowns, solver_values, [1.0] * len(solver_values)))
-    own = references(description, "x0", "theta0", "m", "m1")
-    assert has_responded >= {(u, known) for u in unknowns for known in own if known in declared[u]}
+    start_values = references(description, "x0", "theta0", "m", "m1")
+    assert has_responded >= {(u, known) for u in unknowns for known in start_values if known in declared[u]}
 
 
 def test_outputs_have_the_declared_derivatives_by_parameters_after_initialisation(instance):

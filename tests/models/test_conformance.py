@@ -126,12 +126,12 @@ def test_the_structure_lists_every_output_and_derivative_once_and_in_order(descr
     root = description(name)
     scalars = root.findall("ModelVariables/ScalarVariable")
     expected = [str(i) for i, scalar in enumerate(scalars, 1) if scalar.get("causality") == "output"]
-    listed = {
+    unknowns = {
         part: [unknown.get("index") for unknown in root.findall(f"ModelStructure/{part}/Unknown")]
         for part in ("Outputs", "Derivatives", "InitialUnknowns")
     }
-    assert listed["Outputs"] == expected
-    assert listed["InitialUnknowns"] == sorted({*expected, *listed["Derivatives"]}, key=int)
+    assert unknowns["Outputs"] == expected
+    assert unknowns["InitialUnknowns"] == sorted({*expected, *unknowns["Derivatives"]}, key=int)
 
 
 # ---- the units

@@ -95,8 +95,8 @@ def test_the_solver_has_its_settings_and_counters(name):
 def test_each_model_offers_its_friction_laws():
     laws = {name: declared(name)["friction"] for name in TUNABLE if "friction" in declared(name)}
     items = {name: [item[:2] for item in law.items] for name, law in laws.items()}
-    both = [("hybrid", 1), ("sign", 2)]
-    assert items == {"coulomb": both, "pendulum": both, "stickslip": [("hybrid", 1), ("threshold", 3)]}
+    two_laws = [("hybrid", 1), ("sign", 2)]
+    assert items == {"coulomb": two_laws, "pendulum": two_laws, "stickslip": [("hybrid", 1), ("threshold", 3)]}
     assert all(law.start == 1 for law in laws.values())
     assert [item[:2] for item in declared("pendulum")["pin_load"].items] == [("weight", 1), ("reaction", 2)]
 

@@ -151,8 +151,8 @@ def test_python_native_and_fmi3_agree_bit_for_bit(worker, name):
 @pytest.mark.slow
 def test_commands_know_the_models_by_name(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    listed = commands.harness(tmp_path, "list", "--json").stdout
-    assert all(f'"model": "{name}"' in listed for name in CERTIFIED)
+    listing = commands.harness(tmp_path, "list", "--json").stdout
+    assert all(f'"model": "{name}"' in listing for name in CERTIFIED)
     with pytest.raises(HarnessError, match=r"no fmus/more/belt.fmu: build it with `friction-fmus build belt`"):
         check_built(Path("fmus/more/belt.fmu"))
     (tmp_path / "fmus" / "more").mkdir(parents=True)

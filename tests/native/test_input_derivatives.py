@@ -323,20 +323,20 @@ def test_a_method_keeps_its_order_when_input_derivatives_are_set(launch, method)
     """Without input derivatives the order is 1, with the first derivative 2: one internal step per communication
     step, at a loose tolerance, under the force sin(3 t) N. The reference uses the exact method with all derivatives."""
 
-    def left_at(number, order, many):
-        h = 1.0 / many
+    def end_position(number, order, n_steps):
+        h = 1.0 / n_steps
         loose = {"solver.method": number, "solver.rtol": 0.9, "solver.atol": 1e3, "solver.h_max": h}
         fmu = launch("smd", loose | {"k": 4.0, "c": 1.0}, stop=None)
-        for n in range(many):
+        for n in range(n_steps):
             fmu.set({"F_ext": sin(3.0 * n * h)})
             for k in range(1, order):
                 fmu.ramp("F_ext", 3.0**k * sin(3.0 * n * h + 0.5 * pi * k), k)
             fmu.step(n * h, h)
         return fmu.get("x")
 
-    truth, many = left_at(EXACT, 9, 64), 32 if method == "ode23" else 8
+    truth, n_steps = end_position(EXACT, 9, 64), 32 if method == "ode23" else 8
     for order in sorted({1, 2, ORDERS[method]}):
-        coarse, fine = (abs(left_at(NUMBERS[method], order, n) - truth) for n in (many, 2 * many))
+        coarse, fine = (abs(end_position(NUMBERS[method], order, n) - truth) for n in (n_steps, 2 * n_steps))
         assert log2(coarse / fine) == pytest.approx(order, abs=0.25)
 
 
@@ -389,10 +389,10 @@ def test_a_ramp_is_saved_and_continues_bit_for_bit(ramped_instance):
     state = fmu.save()
     fmu.step(0.3, 0.7)
     row = fmu.get(force, *names)
-    for again in state, fmu.deserialize(fmu.serialize(state)):
+    for copy in state, fmu.deserialize(fmu.serialize(state)):
         fmu.ramp(force, -size, 2)
         fmu.step(1.0, 0.1)
-        fmu.restore(again)
+        fmu.restore(copy)
         fmu.step(0.3, 0.7)
         assert_identical([fmu.get(force, *names)], [row], [force, *names])
     fmu.reset()

@@ -267,7 +267,7 @@ def assert_same_results(fmu, platform, folder, make):
 
 def simulations(folder):
     """Return runs in co-simulation and in model exchange."""
-    return [simulate_fmu(str(folder), fmi_type=way).tobytes() for way in ("CoSimulation", "ModelExchange")]
+    return [simulate_fmu(str(folder), fmi_type=interface).tobytes() for interface in ("CoSimulation", "ModelExchange")]
 
 
 def test_the_build_description_names_the_existing_files(smd):

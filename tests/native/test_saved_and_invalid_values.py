@@ -74,8 +74,8 @@ def test_a_saved_state_with_a_boolean_of_2_is_refused_though_its_checksum_is_rig
     content = string_at(state.value, len(fmu.serializeFMUstate(state)))
     assert checksum(content[CHECKSUM_SIZE:]).to_bytes(8, "little") == content[:CHECKSUM_SIZE]
     assert printed
-    for place in map(int, printed.split()):
-        changed = content[CHECKSUM_SIZE:place] + b"\2" + content[place + 1 :]
+    for offset in map(int, printed.split()):
+        changed = content[CHECKSUM_SIZE:offset] + b"\2" + content[offset + 1 :]
         with pytest.raises(FMICallException):
             fmu.deSerializeFMUstate(pack("<Q", checksum(changed)) + changed)
     assert "a saved state is refused" in capfd.readouterr().err

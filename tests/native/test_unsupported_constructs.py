@@ -375,7 +375,7 @@ OTHER.extra = 1.0
 
 
 @pytest.mark.parametrize(
-    ("thing", "words"),
+    ("part", "words"),
     [
         (owner(a=None), "Owner.a is None"),
         (owner(a="text"), "Owner.a is 'text'"),
@@ -389,9 +389,9 @@ OTHER.extra = 1.0
     ],
     ids=lambda part: part if isinstance(part, str) else "",
 )
-def test_an_object_without_plain_data_is_refused_by_attribute_name(thing, words):
+def test_an_object_without_plain_data_is_refused_by_attribute_name(part, words):
     with pytest.raises(UnsupportedConstructError) as refusal:
-        CallGraph(thing)
+        CallGraph(part)
     assert words in str(refusal.value)
 
 

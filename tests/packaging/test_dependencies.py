@@ -20,16 +20,16 @@ def test_the_constraints_name_an_allowed_version_of_every_dependency_with_hashes
     entries = {}
     text = (ROOT / ".ci" / "constraints.txt").read_text(encoding="utf-8").replace("\\\n", "")
     for line in text.splitlines():
-        requirement, *hashes = re.split(r"\s+--hash=", line)
+        pinned, *hashes = re.split(r"\s+--hash=", line)
         assert hashes
         assert all(re.fullmatch(r"sha256:[0-9a-f]{64}", digest) for digest in hashes)
-        name, version = requirement.partition(";")[0].strip().split("==")
+        name, version = pinned.partition(";")[0].strip().split("==")
         entries.setdefault(normalized(name), []).append(version)
     for text in chain(PROJECT["dependencies"], *PROJECT["optional-dependencies"].values()):
-        needed = Requirement(text)
-        if needed.name != OWN_NAME:
-            versions = entries[normalized(needed.name)]
-            assert all(needed.specifier.contains(version, prereleases=True) for version in versions), text
+        requirement = Requirement(text)
+        if requirement.name != OWN_NAME:
+            versions = entries[normalized(requirement.name)]
+            assert all(requirement.specifier.contains(version, prereleases=True) for version in versions), text
 
 
 def test_the_job_of_the_lowest_versions_runs_tests_that_exist():

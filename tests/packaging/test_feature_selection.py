@@ -58,8 +58,8 @@ def test_a_reduced_fmu_carries_one_method_and_runs_alike(lean, launch, worker, c
         files = {entry.rsplit("/", 1)[1] for entry in archive.namelist() if "/runtime/" in entry}
         assert {entry.split("/")[1] for entry in archive.namelist() if entry.startswith("binaries")} == {"linux64"}
         page = archive.read("documentation/index.html").decode()
-    shown = {label for label in (*METHODS, *LAWS) if f"<b>{label}</b>" in page}
-    assert shown == set(options.values())
+    labels = {label for label in (*METHODS, *LAWS) if f"<b>{label}</b>" in page}
+    assert labels == set(options.values())
     methods = {"linear_closed_form.py", "ode23.py", "ode45.py", "dop853.py", "rodas.py", "radau9.py"}
     assert files & methods == {f"{options['--method']}.py".replace("exact", "linear_closed_form")}
     times = [stop * i / 40 for i in range(41)]

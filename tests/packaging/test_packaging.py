@@ -133,12 +133,12 @@ def test_the_xml_matches_the_declarations(fmu, name):
 @EVERY_MODEL
 def test_every_real_has_a_unit_and_every_angle_is_displayed_in_degrees(fmu, name):
     root = description_of(fmu(name))
-    shown = {unit.get("name"): unit.find("DisplayUnit") for unit in root.findall("UnitDefinitions/Unit")}
+    display_units = {unit.get("name"): unit.find("DisplayUnit") for unit in root.findall("UnitDefinitions/Unit")}
     for real in root.iterfind("ModelVariables/ScalarVariable/Real"):
-        assert real.get("unit") in shown
+        assert real.get("unit") in display_units
         if real.get("unit") == "rad":
-            assert real.get("displayUnit") == shown["rad"].get("name") == "deg"
-            assert float(shown["rad"].get("factor")) * pi == pytest.approx(180.0, rel=1e-15)
+            assert real.get("displayUnit") == display_units["rad"].get("name") == "deg"
+            assert float(display_units["rad"].get("factor")) * pi == pytest.approx(180.0, rel=1e-15)
 
 
 @EVERY_MODEL
@@ -230,9 +230,9 @@ def test_entry_script_and_package_carry_the_digest_of_their_content(fmu, name):
 
 @EVERY_MODEL
 def test_no_file_reveals_where_it_was_built(fmu, name):
-    places = [str(location).encode() for location in (ROOT, fmu(name).parents[1], installed_package("pythonfmu"))]
+    folders = [str(location).encode() for location in (ROOT, fmu(name).parents[1], installed_package("pythonfmu"))]
     for path, content in entries(fmu(name)).items():
-        assert not [location for location in places if location in content], path
+        assert not [location for location in folders if location in content], path
 
 
 @EVERY_MODEL

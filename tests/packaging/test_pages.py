@@ -82,16 +82,16 @@ def test_the_capabilities_listed_per_backend_are_true_on_every_page_and_in_the_g
             [re.sub("`(.*?)`", r"<code>\1</code>", cell.strip()) for cell in line.split("|")[1:-1]]
             for line in guide_table.splitlines()
         ]
-    for what, *offered in rows:
-        if what.startswith("terminal"):
-            assert [bool(cell) for cell in offered] == [any("flange" in name for name in files) for files in kinds]
+    for capability, *marks in rows:
+        if capability.startswith("terminal"):
+            assert [bool(cell) for cell in marks] == [any("flange" in name for name in files) for files in kinds]
             continue
-        element, start = CAPABILITIES[what]
+        element, start = CAPABILITIES[capability]
         elements = [ElementTree.fromstring(files["modelDescription.xml"]).find(element) for files in kinds]
         attributes = [
             {k: v for k, v in e.attrib.items() if k.startswith(start)} if e is not None else {} for e in elements
         ]
-        assert [bool(cell) for cell in offered] == [set(item.values()) not in (set(), {"false"}) for item in attributes]
+        assert [bool(cell) for cell in marks] == [set(item.values()) not in (set(), {"false"}) for item in attributes]
 
 
 class Reader(HTMLParser):

@@ -33,7 +33,8 @@ def fit(record):
     key = np.round(record.x, 8).tobytes(), record.base
     if key not in FITS:
         plain = Record("record", T, record.x, record.unit, record.order, record.base)
-        FITS[key] = {each.name: each.value for each in fit_decay(plain, KnownParameters(), drag=False).estimates}
+        estimates = fit_decay(plain, KnownParameters(), drag=False).estimates
+        FITS[key] = {estimate.name: estimate.value for estimate in estimates}
     return FITS[key]
 
 
@@ -91,7 +92,7 @@ def test_units_of_a_matlab_table_are_read():
     frame = pytest.importorskip("pandas", reason="extra sweep").DataFrame({"t": T, "x": X})
     for attribute in ("varUnits", "VariableUnits"):
         frame.attrs = {attribute: ["s", "mm"]}
-        assert [each.heading("") for each in list_columns(columns_of_frame(frame))] == ["t [s]", "x [mm]"]
+        assert [column.heading("") for column in list_columns(columns_of_frame(frame))] == ["t [s]", "x [mm]"]
 
 
 @pytest.mark.parametrize(
@@ -105,7 +106,7 @@ def test_units_of_a_matlab_table_are_read():
     ],
 )
 def test_units_beside_arrays_are_read(entry, headings):
-    assert [each.heading("") for each in list_columns({"t": T, "x": X} | entry)] == headings
+    assert [column.heading("") for column in list_columns({"t": T, "x": X} | entry)] == headings
 
 
 @pytest.mark.parametrize(

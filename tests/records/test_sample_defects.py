@@ -145,9 +145,9 @@ def test_a_rounded_or_held_motion_has_no_defects(order):
         noise, turn = step * rng.choice([0, 0.1, 0.5]), rng.choice([0.0, 1.0])
         damping, times = 10 ** rng.uniform(-4, -1.3), np.linspace(0, rng.uniform(2, 40), 1000)
         record = decay_record(damping, a=0.1, step=step, t=times, turn=turn, noise=noise, seed=seed, order=order)
-        for each in (record, random_record(seed, order=order)[0]):
-            assert leave_out_saturated(each) is each
-            assert mark_sentinels(each.x, "x") == mark_dropouts(each.x, "x") == []
+        for motion in (record, random_record(seed, order=order)[0]):
+            assert leave_out_saturated(motion) is motion
+            assert mark_sentinels(motion.x, "x") == mark_dropouts(motion.x, "x") == []
 
 
 @pytest.mark.parametrize(

@@ -38,8 +38,8 @@ WANTED = {"x": SignalSource("laser", "m"), "F": SignalSource("load", "N")}
     ],
 )
 def test_units_of_one_quantity_are_converted(unit, other, factor):
-    found = conversion_factor(unit, other)
-    assert found is factor is None or found == pytest.approx(factor, rel=1e-14)
+    conversion = conversion_factor(unit, other)
+    assert conversion is factor is None or conversion == pytest.approx(factor, rel=1e-14)
 
 
 def write(path, rows, heading="# a comment\nt [ms],laser [mm],load (kN),other\n"):
@@ -56,12 +56,12 @@ def test_columns_are_converted_and_incomplete_rows_skipped(tmp_path):
     table = rows()
     table[5] = (52, "NaN", 0.05, 7)
     table[9] = (90, 1.0, "", 7)
-    found = read_signals(write(tmp_path / "a.csv", table), WANTED, ColumnOptions(), "a")
-    kept = [row for i, row in enumerate(table) if i not in (5, 9)]
-    assert found.t == pytest.approx([1e-3 * row[0] for row in kept])
-    assert found.columns["x"] == pytest.approx([1e-3 * row[1] for row in kept])
-    assert found.columns["F"] == pytest.approx([1e3 * row[2] for row in kept])
-    assert any("2 of 40 rows" in note for note in found.notes)
+    signals = read_signals(write(tmp_path / "a.csv", table), WANTED, ColumnOptions(), "a")
+    complete_rows = [row for i, row in enumerate(table) if i not in (5, 9)]
+    assert signals.t == pytest.approx([1e-3 * row[0] for row in complete_rows])
+    assert signals.columns["x"] == pytest.approx([1e-3 * row[1] for row in complete_rows])
+    assert signals.columns["F"] == pytest.approx([1e3 * row[2] for row in complete_rows])
+    assert any("2 of 40 rows" in note for note in signals.notes)
 
 
 def test_a_second_run_beside_the_first_is_not_read(tmp_path):
@@ -69,9 +69,9 @@ def test_a_second_run_beside_the_first_is_not_read(tmp_path):
     heading = "t [s],laser [mm],load (kN),t [s],laser [mm],load (kN)\n"
     table = [(0.01 * i, i % 7, 0.1, 0.02 * i, -1, -1) for i in range(30)]
     table += [("", "", "", 0.02 * i, -1, -1) for i in range(30, 40)]
-    found = read_signals(write(tmp_path / "a.csv", table, heading), WANTED, ColumnOptions(), "a")
-    assert len(found.t) == 30
-    assert found.columns["F"] == pytest.approx(np.full(30, 100.0))
+    signals = read_signals(write(tmp_path / "a.csv", table, heading), WANTED, ColumnOptions(), "a")
+    assert len(signals.t) == 30
+    assert signals.columns["F"] == pytest.approx(np.full(30, 100.0))
 
 
 TEXTS = [form for form in FORMATS if not form.refusal and not any(part in form.file for part in LIBRARIES)]
@@ -107,28 +107,28 @@ def check_signal(path, decay_options, options, unit):
     column, _ = find_signal_column(table, candidates, options, find_time_column(table, candidates, options))
     unit_of_column = "mm" if decay_options != options else ""  # a unit that the file lacks is given with the column
     heading = f"{column.heading} [{unit_of_column}]" if unit_of_column else column.heading
-    found = parse_signals(table, {"x": SignalSource(heading, unit)}, options, "a")
-    assert found.t.tolist() == record.t.tolist()
-    assert found.columns["x"] == pytest.approx(record.x, rel=1e-14)
+    signals = parse_signals(table, {"x": SignalSource(heading, unit)}, options, "a")
+    assert signals.t.tolist() == record.t.tolist()
+    assert signals.columns["x"] == pytest.approx(record.x, rel=1e-14)
     for text in ("side by side", "missing cell"):
-        assert [note for note in found.notes if text in note] == [note for note in record.notes if text in note]
+        assert [note for note in signals.notes if text in note] == [note for note in record.notes if text in note]
     return record
 
 
 def test_a_range_of_times_and_a_rate_select_samples(tmp_path):
     file = write(tmp_path / "a.csv", rows())
-    found = read_signals(file, WANTED, ColumnOptions(begin=0.1, end=0.25), "a")
-    assert found.t[0] >= 0.1
-    assert found.t[-1] <= 0.25
+    signals = read_signals(file, WANTED, ColumnOptions(begin=0.1, end=0.25), "a")
+    assert signals.t[0] >= 0.1
+    assert signals.t[-1] <= 0.25
     assert read_signals(file, WANTED, ColumnOptions(rate=200.0), "a").t[1] == pytest.approx(0.005)
 
 
 def test_a_unit_in_the_request_replaces_that_of_the_file(tmp_path):
     file = write(tmp_path / "a.csv", rows(), "t [ms],laser,load,other\n")
-    wanted = {"x": SignalSource("laser [um]", "m"), "F": SignalSource("load", "N")}
-    found = read_signals(file, wanted, ColumnOptions(), "a")
-    assert found.columns["x"][1] == pytest.approx(1e-6 * rows()[1][1])
-    assert found.notes == ("load has no unit in a.csv: N is assumed, the unit of F in the FMU.",)
+    sources = {"x": SignalSource("laser [um]", "m"), "F": SignalSource("load", "N")}
+    signals = read_signals(file, sources, ColumnOptions(), "a")
+    assert signals.columns["x"][1] == pytest.approx(1e-6 * rows()[1][1])
+    assert signals.notes == ("load has no unit in a.csv: N is assumed, the unit of F in the FMU.",)
 
 
 @pytest.mark.parametrize(
@@ -150,8 +150,8 @@ def test_a_wrong_request_is_refused_in_one_sentence(tmp_path, wanted, options, m
 def table(tmp_path, text, encoding="utf-8"):
     """Return the position and the force in a file that has the text."""
     (tmp_path / "record.csv").write_text(text, encoding=encoding)
-    wanted = {"x": SignalSource("Weg", "m"), "F": SignalSource("Kraft", "N")}
-    return read_signals(str(tmp_path / "record.csv"), wanted, ColumnOptions(), "record")
+    sources = {"x": SignalSource("Weg", "m"), "F": SignalSource("Kraft", "N")}
+    return read_signals(str(tmp_path / "record.csv"), sources, ColumnOptions(), "record")
 
 
 @pytest.mark.parametrize(
@@ -185,7 +185,7 @@ def test_a_body_at_rest_has_no_missing_samples(tmp_path):
     v = np.zeros(3000)
     for start in range(50, 3000, 100):
         v[start : start + 6] = np.round(random.uniform(0.2, 0.4) * np.sin(np.pi * (np.arange(6) + 0.5) / 6), 4)
-    rows = "".join(f"{0.01 * i:.2f},{each},{np.sin(i):.6f}\n" for i, each in enumerate(v))
+    rows = "".join(f"{0.01 * i:.2f},{speed},{np.sin(i):.6f}\n" for i, speed in enumerate(v))
     signals = table(tmp_path, "t [s],Weg [m],Kraft [N]\n" + rows)
     assert np.array_equal(signals.columns["x"], v)
 

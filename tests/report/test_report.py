@@ -81,10 +81,10 @@ def test_every_picture_has_alternative_text_and_nothing_is_loaded_from_elsewhere
 def test_every_link_of_a_copied_report_leads_to_an_anchor_or_carries_its_file(report_run, page):
     """No link leads out of the page; small files are in it, large ones are named."""
     tags = Tags(page)
-    places = {attributes.get("id") for _, attributes in tags.elements}
+    anchors = {attributes.get("id") for _, attributes in tags.elements}
     links = tags.of("a")
     data = {link["download"]: link["href"].partition("base64,")[2] for link in links if "download" in link}
-    assert {link["href"][1:] for link in links if "download" not in link} <= places
+    assert {link["href"][1:] for link in links if "download" not in link} <= anchors
     assert {"coulomb-quantities.csv", "coulomb-events.csv", "decay-coulomb-turning-points.csv"} <= set(data)
     assert b64decode(data["coulomb-events.csv"]) == (report_run[0] / "results/coulomb/events.csv").read_bytes()
     assert "coulomb-trajectory.csv" not in data
@@ -169,8 +169,8 @@ def test_it_begins_with_a_plot_of_the_computed_motion_to_its_stop(page):
 
 def test_published_values_are_shown_and_other_quantities_folded(page):
     part = re.search(r'<h3>coulomb-sign</h3>.*?<div class="figure"', page, re.S)[0]
-    shown, folded = part.split("<summary>Quantities without a published value</summary>")
-    assert [cell in shown for cell in ("friction force, 3 cycles", "smallest step")] == [True, False]
+    compared, folded = part.split("<summary>Quantities without a published value</summary>")
+    assert [cell in compared for cell in ("friction force, 3 cycles", "smallest step")] == [True, False]
     assert [cell in folded for cell in ("friction force, 3 cycles", "smallest step")] == [False, True]
 
 

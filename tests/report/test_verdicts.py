@@ -173,8 +173,8 @@ def test_missed_benchmarks_are_shown_and_others_folded(tmp_path):
     ]
     page = report_on(tmp_path, summarize_benchmarks(benchmarks))
     parts = re.split("<summary>(?:Targets that are met|Not measured)</summary>", page[page.index("1 of 2 targets") :])
-    shown, met, skipped = (re.findall(r"<td[^>]*>([^<]*)<", part) for part in parts)
-    assert shown == ["slow", "0.0035", "0.00125", "s", "a peer 1.6; another 2.5"]
+    missed, met, skipped = (re.findall(r"<td[^>]*>([^<]*)<", part) for part in parts)
+    assert missed == ["slow", "0.0035", "0.00125", "s", "a peer 1.6; another 2.5"]
     assert met == ["fast", "0.0012", "0.00125", "s", "a peer 1.5"]
     assert skipped == ["skipped", "", "", "", "not found: a tool"]
 

@@ -40,11 +40,11 @@ def folder(tmp_path):
 
 def test_a_summary_reads_back_with_origin_and_files(folder):
     write_summary(folder, WHOLE)
-    found = read_summary(folder)
-    assert found.files == ("a.csv", "b.csv")
-    assert found.origin[0].endswith(": python -m harness run smd")
-    assert found.origin[1] == "Parameters: k = 2.0 N/m."
-    assert {name: value for name, value in vars(found).items() if name not in ("files", "origin")} == {
+    summary = read_summary(folder)
+    assert summary.files == ("a.csv", "b.csv")
+    assert summary.origin[0].endswith(": python -m harness run smd")
+    assert summary.origin[1] == "Parameters: k = 2.0 N/m."
+    assert {name: value for name, value in vars(summary).items() if name not in ("files", "origin")} == {
         name: value for name, value in vars(WHOLE).items() if name not in ("files", "origin")
     }
 

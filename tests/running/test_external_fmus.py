@@ -224,7 +224,7 @@ def test_the_longest_of_the_aborted_refinement_runs_is_kept(tmp_path):
         values[0] = 1.5
         return 0
 
-    chosen = [(ModelVariable("x", type="Float64", valueReference=0), ())]
+    selection = [(ModelVariable("x", type="Float64", valueReference=0), ())]
     session = SimpleNamespace(
         is_fmi2=False,
         type_name=lambda variable: variable.type,
@@ -232,13 +232,13 @@ def test_the_longest_of_the_aborted_refinement_runs_is_kept(tmp_path):
     )
     for number, times in enumerate(([0.0, 0.5, 1.0], [0.0, 0.25, 0.5, 0.75], [])):
         with (tmp_path / f"rows-{number}").open("wb") as file:
-            recorder = Recorder(session, chosen, file.write)
+            recorder = Recorder(session, selection, file.write)
             for t in times:
                 recorder.record(t)
     with (tmp_path / "rows-0").open("ab") as file:
         file.write(b"cut off")
-    assert read_longest_rows(tmp_path, None, chosen, False)[0].tolist() == [0.0, 0.5, 1.0]
-    assert read_longest_rows(tmp_path, 1, chosen, False)[1]["x"].tolist() == [1.5] * 4
+    assert read_longest_rows(tmp_path, None, selection, False)[0].tolist() == [0.0, 0.5, 1.0]
+    assert read_longest_rows(tmp_path, 1, selection, False)[1]["x"].tolist() == [1.5] * 4
 
 
 def test_the_output_of_an_fmu_is_reported_and_harmless(run):
@@ -364,8 +364,8 @@ def repeat_variable(count, causality):
 @pytest.mark.parametrize(("causality", "count"), [("output", 30_000), ("local", 10_000)])
 def test_an_fmu_with_many_variables_runs_or_is_refused(run, external_fmu_folder, tmp_path, causality, count):
     """By default all outputs are recorded, but not the local variables of an FMU that has outputs."""
-    many = edited_description(repeat_variable(count, causality))
-    external_fmus.edited_copy(external_fmu_folder / "FixedStep.fmu", tmp_path / "many.fmu", many)
+    changes = edited_description(repeat_variable(count, causality))
+    external_fmus.edited_copy(external_fmu_folder / "FixedStep.fmu", tmp_path / "many.fmu", changes)
     done, rows = run("many.fmu", "--lenient")
     if causality == "output":
         assert_refused(done, 1, f"has {count + 1} outputs, more than the 1000 that are recorded by default")

@@ -10,7 +10,6 @@ from build_cache import ROOT
 from commands import harness, run_process
 
 from harness.errors import HarnessError
-from harness.process import temporary_directory as rooms
 from harness.process.temporary_directory import has_plain_uri, temporary_directory
 from harness.running import fmu_archive
 
@@ -47,7 +46,7 @@ def test_paths_of_temporary_files_fmus_and_results_may_contain_any_character(odd
 
 
 def test_without_a_plain_folder_a_python_fmu_is_refused_and_others_run(odd_folder, fmus, monkeypatch):
-    monkeypatch.setattr(rooms, "FALLBACK_DIRECTORIES", ())
+    monkeypatch.setattr("harness.process.temporary_directory.FALLBACK_DIRECTORIES", ())
     monkeypatch.setattr(tempfile, "tempdir", str(odd_folder))
     refused = pytest.raises(HarnessError, match=r"smd\.fmu is an FMU in Python, which cannot be run from .*TMPDIR")
     with refused, fmu_archive.unpack(fmus / "smd.fmu"):

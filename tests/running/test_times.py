@@ -18,14 +18,14 @@ UNEVEN = np.sort(np.random.default_rng(2).uniform(0.01, 7.99, 40))
 def test_times_keep_the_points_of_another_grid(backend_fmus):
     """Internal steps do not depend on communication points, and all events are known."""
     sled = backend_fmus / "stickslip.fmu"
-    every = harness.simulate(sled, {"mu_s": 0.8}, interval=0.125, stop=8.0)
-    chosen = np.sort(np.random.default_rng(1).choice(len(every.time), 20, replace=False))
-    run = harness.simulate(sled, {"mu_s": 0.8}, times=every.time[chosen], stop=8.0)
-    assert np.array_equal(run.time, every.time[chosen])
+    full = harness.simulate(sled, {"mu_s": 0.8}, interval=0.125, stop=8.0)
+    indices = np.sort(np.random.default_rng(1).choice(len(full.time), 20, replace=False))
+    run = harness.simulate(sled, {"mu_s": 0.8}, times=full.time[indices], stop=8.0)
+    assert np.array_equal(run.time, full.time[indices])
     for name, column in run.columns.items():
-        assert np.array_equal(column, every[name][chosen]), name
-    assert np.array_equal(run.events.t, every.events.t)
-    assert np.array_equal(run.steps.t, every.steps.t)
+        assert np.array_equal(column, full[name][indices]), name
+    assert np.array_equal(run.events.t, full.events.t)
+    assert np.array_equal(run.steps.t, full.steps.t)
 
 
 @pytest.mark.parametrize("follow", [True, False])
@@ -72,16 +72,16 @@ def test_a_ramp_of_an_input_follows_its_rows(fmus):
     """Without a grid, steps end at the times and at the rows of the table: an input is the mean of a step."""
     rows = np.linspace(0.0, 2.0, 2001)
     spec = RunSpec(fmus / "smd.fmu", ("x",), stop=2.0, follow=False, times=(0.5, 2.0))
-    fine = runner.run(replace(spec, inputs={"time": rows, "F_ext": np.sin(rows)}), lambda share: None)
+    driven = runner.run(replace(spec, inputs={"time": rows, "F_ext": np.sin(rows)}), lambda share: None)
     grid = runner.run(
         replace(spec, grid=0.001, inputs={"time": rows[::200], "F_ext": np.sin(rows[::200])}), lambda share: None
     )
-    assert len(fine.time) == len(grid.time) == 2
-    assert np.abs(fine["x"] - grid["x"]).max() < 2e-3 * np.abs(fine["x"]).max()
-    every = runner.run(
+    assert len(driven.time) == len(grid.time) == 2
+    assert np.abs(driven["x"] - grid["x"]).max() < 2e-3 * np.abs(driven["x"]).max()
+    full = runner.run(
         replace(spec, times=(), grid=0.001, inputs={"time": rows, "F_ext": np.sin(rows)}), lambda share: None
     )
-    assert np.abs(fine["x"] - every["x"][[500, -1]]).max() < 1e-12
+    assert np.abs(driven["x"] - full["x"][[500, -1]]).max() < 1e-12
 
 
 def test_an_aborted_run_keeps_the_times_that_it_reached():
@@ -89,8 +89,8 @@ def test_an_aborted_run_keeps_the_times_that_it_reached():
     run = runner.run(replace(crashing, times=(0.1, 0.2, 0.9)), lambda share: None)
     assert run.time.tolist() == [0.1, 0.2]
     assert "crashed" in run.failure
-    nothing = runner.run(replace(crashing, times=(0.8, 0.9)), lambda share: None)
-    assert 0.4 < nothing.time.item() < 0.8
+    late = runner.run(replace(crashing, times=(0.8, 0.9)), lambda share: None)
+    assert 0.4 < late.time.item() < 0.8
 
 
 def test_a_scene_is_recorded_at_times(workspace):

@@ -24,8 +24,8 @@ def sled(request, fmus):
     if request.param == "native":
         return build_native_fmus() / "stickslip.fmu"
     require_compiler()
-    chosen = ("stickslip", "--fmi", "3", "--platform", "linux64")
-    return build_cache.build_once("fmi3-stickslip", *chosen) / "stickslip.fmu"
+    options = ("stickslip", "--fmi", "3", "--platform", "linux64")
+    return build_cache.build_once("fmi3-stickslip", *options) / "stickslip.fmu"
 
 
 @pytest.fixture
@@ -89,13 +89,13 @@ def test_prepared_runs_do_not_mix(simulator):
     """Of one FMU, in turn, and with values of other variables."""
     forces = [40.0 * i for i in range(8)]
     inputs = [{"time": (0.0, 8.0), "F_ext": (force, force)} for force in forces]
-    runs = [simulator.prepare(replace(simulator.spec, inputs=each)) for each in inputs]
+    runs = [simulator.prepare(replace(simulator.spec, inputs=table)) for table in inputs]
     other = simulator.prepare(simulator.spec)
     for _ in range(2):
         driven = [run({"k": 60.0}) for run in runs]
         constant = [other({"k": 60.0, "F_ext": force}) for force in forces]
         assert np.abs(np.array(driven) - constant).max() < 1e-12
-        assert np.ptp([each[-1] for each in driven]) > 0
+        assert np.ptp([x[-1] for x in driven]) > 0
         assert not np.array_equal(other({"k": 900.0, "F_ext": forces[-1]}), constant[-1])
         assert not np.array_equal(other({"F_ext": forces[-1]}), constant[-1])
 
@@ -113,9 +113,9 @@ def test_a_run_over_its_time_limit_is_refused(sled):
         assert run_each_way(simulator, spec, {}) is None
 
 
-@pytest.mark.parametrize(("name", "output"), [("Midpoint", "x"), ("Fmi3FixedStep", "x")])
-def test_external_fmus_run_in_a_process_of_their_own(name, output):
-    spec = RunSpec(build_external_fmus() / f"{name}.fmu", (output,), times=np.linspace(0.0, 1.0, 101), follow=False)
+@pytest.mark.parametrize("name", ["Midpoint", "Fmi3FixedStep"])
+def test_external_fmus_run_in_a_process_of_their_own(name):
+    spec = RunSpec(build_external_fmus() / f"{name}.fmu", ("x",), times=np.linspace(0.0, 1.0, 101), follow=False)
     with open_simulator(spec) as simulator:
         run, other = simulator.prepare(spec), simulator.prepare(replace(spec, times=spec.times[::2], stop=1.0))
         first, coarse, second = run({"k": 0.9}), other({"k": 0.9}), run({"k": 0.9})
@@ -157,5 +157,5 @@ def test_a_native_fmu_is_built_from_the_model_file(fmus, tmp_path):
     assert native not in (python, fmus / "smd.fmu")
     run = RunSpec(python, ("x",), times=T, follow=False)
     with open_simulator(run) as one, open_simulator(replace(run, fmu=native)) as other:
-        runs = [each.prepare(each.spec)({"m": 2.0}) for each in (one, other)]
+        runs = [opened.prepare(opened.spec)({"m": 2.0}) for opened in (one, other)]
     assert np.array_equal(*runs)

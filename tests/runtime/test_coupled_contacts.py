@@ -76,8 +76,8 @@ def events(model, method, rtol, stop):
 def test_simultaneous_equal_events_are_one_event(custom_model):
     """Two equal sleds on two equal springs, pulled alike, have the same bits."""
     (one, a), (two, b) = body("1", "k * (p - x1) - F1", 12.5), body("2", "k * (p - x2) - F2", 12.5)
-    both = contact("1", "v1", 20.0, 30.0) + contact("2", "v2", 20.0, 30.0)
-    changes, rows = events(custom_model(*one, *two, DRIVER, *both, a, b, methods=["dop853"]), DOP853, 1e-10, 8.0)
+    lines = contact("1", "v1", 20.0, 30.0) + contact("2", "v2", 20.0, 30.0)
+    changes, rows = events(custom_model(*one, *two, DRIVER, *lines, a, b, methods=["dop853"]), DOP853, 1e-10, 8.0)
     assert len(changes) > 5
     assert all(first == second for _, first, second in changes)
     assert all(x1 == x2 and v1 == v2 for _, (x1, v1, x2, v2), _ in rows)
@@ -86,9 +86,9 @@ def test_simultaneous_equal_events_are_one_event(custom_model):
 def test_two_riders_on_one_carrier_break_away_and_stop_together(custom_model):
     (carrier, a), (one, b) = body("0", "F1 + F2 - 3.0 * k * x0", 3.0), body("1", "k * (p - x1) - F1", 1.3)
     two, c = body("2", "k * (p - x2) - F2", 1.3)
-    both = contact("1", "v1 - v0", 7.0, 10.0) + contact("2", "v2 - v0", 7.0, 10.0)
+    lines = contact("1", "v1 - v0", 7.0, 10.0) + contact("2", "v2 - v0", 7.0, 10.0)
     changes, rows = events(
-        custom_model(*carrier, *one, *two, DRIVER, *both, a, b, c, methods=["dop853"]), DOP853, 1e-10, 8.0
+        custom_model(*carrier, *one, *two, DRIVER, *lines, a, b, c, methods=["dop853"]), DOP853, 1e-10, 8.0
     )
     assert len(changes) > 5
     assert all(first == second for _, first, second in changes)
@@ -448,16 +448,16 @@ def test_the_jacobian_of_the_threshold_law_includes_the_load_limit(custom_model,
     declared = ['f = Parameter(6.0, "N", "friction")', 'w = Parameter(40.0, "N/m", "how it grows")', DRIVER, *one]
     lines = [line.replace("hold=", f"{LAWS[THRESHOLD][0]}, hold=") for line in both]
     lines = [*declared, *two, *lines, a, b] if bodies == 2 else [*declared, *lines[:2], a]
-    model, draw, many = custom_model(*lines, methods=["rodas"]), np.random.default_rng(3), 2 * bodies
+    model, draw, n_states = custom_model(*lines, methods=["rodas"]), np.random.default_rng(3), 2 * bodies
     assert model.prepare() == 0
     model.friction, limited = THRESHOLD, 0
     for _ in range(200):
-        y = draw.uniform(-0.1, 0.1, many) * np.tile([1.0, 0.05], bodies)
+        y = draw.uniform(-0.1, 0.1, n_states) * np.tile([1.0, 0.05], bodies)
         slopes = []
-        for moved in 1e-7 * np.eye(many):
-            ahead, behind = (np.ravel(model.rates(0.1, *(y + way), *[0] * bodies)) for way in (moved, -moved))
+        for shift in 1e-7 * np.eye(n_states):
+            ahead, behind = (np.ravel(model.rates(0.1, *(y + sign * shift), *[0] * bodies)) for sign in (1, -1))
             slopes.append((ahead - behind) / 2e-7)
-        actual = np.reshape(model.jacobian(0.1, *y, *[0] * bodies), (bodies, many + 1))
+        actual = np.reshape(model.jacobian(0.1, *y, *[0] * bodies), (bodies, n_states + 1))
         assert np.abs(actual[:, 1:].T - slopes).max() < 1e-5
         limited += bool(abs(slopes[0][0]) < 300.0)
     assert 20 < limited < 180

@@ -17,5 +17,5 @@ def test_a_sharp_friction_curve_costs_no_digits(launch, x_m):
         [x for (x,) in launch("pacejka", {"x_m": x_m, **values}, stop=STOP).run(times, outputs("pacejka")[:1])]
         for values in (tight, {}, TOLERANT)
     )
-    for places, error in ((default, 1e-6), (tolerant, 0.3 * TOLERANT["solver.rtol"])):
-        assert max(abs(a - b) for a, b in zip(places, truth, strict=True)) < error * max(map(abs, truth))
+    for positions, error in ((default, 1e-6), (tolerant, 0.3 * TOLERANT["solver.rtol"])):
+        assert max(abs(a - b) for a, b in zip(positions, truth, strict=True)) < error * max(map(abs, truth))

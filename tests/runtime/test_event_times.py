@@ -42,9 +42,9 @@ def test_half_cycles_of_a_mass_with_little_friction_end_on_time(worker, backend_
         fmu.free()
         assert count == number
         assert assert_close_times(t, number * half)
-        turned = (-1) ** number * (mpf(0.1) - number * loss)
-        rest = sign(turned) * loss / 2
-        assert abs(x - (rest + (turned - rest) * cos((mpf(stop) - number * half) * pi / half))) < 1e-9 * 0.1
+        turning_point = (-1) ** number * (mpf(0.1) - number * loss)
+        rest = sign(turning_point) * loss / 2
+        assert abs(x - (rest + (turning_point - rest) * cos((mpf(stop) - number * half) * pi / half))) < 1e-9 * 0.1
 
 
 SLEDS = {"default": {}, "to the other limit": {"mu_d": 0.0}, "backward": {"mu_s": 0.7, "mu_d": 0.3, "v_driver": -0.5}}
@@ -79,6 +79,6 @@ def test_slips_of_the_sled_end_on_time(worker, backend_fmus, sled, start):
         fmu.free()
         assert count == 2 * number
         assert assert_close_times(t, last + slip)
-        way = number * (slip + stick) * v
-        assert abs(x - way) < 1e-9 * 0.1
-        assert assert_close_times(x, way)
+        path = number * (slip + stick) * v
+        assert abs(x - path) < 1e-9 * 0.1
+        assert assert_close_times(x, path)

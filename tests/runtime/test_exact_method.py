@@ -25,10 +25,10 @@ def compare(launch, name, values, x0=0.0, v0=0.0, start=0.0, run=4.0, points=100
     times = [start + run * i / points for i in range(points + 1)]
     rows = fmu.run(times, ["x", "v"])
     truth = [motion.at(t) for t in times]
-    for i, what in enumerate("xv"):
+    for i, variable in enumerate("xv"):
         scale = max(abs(row[i]) for row in truth) or 1
         worst = max(abs(row[i] - true[i]) for row, true in zip(rows, truth, strict=True)) / scale
-        assert worst < PLACES, f"{what} is off by {float(worst):.1e} of its largest value"
+        assert worst < PLACES, f"{variable} is off by {float(worst):.1e} of its largest value"
     if name != "smd":
         fmu = launch(name, {"solver.method": EXACT, **values, "x0": x0, "v0": v0}, start=start, stop=stop)
         same_events(fmu, motion.events, start, stop)

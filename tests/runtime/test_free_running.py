@@ -106,10 +106,10 @@ def test_a_change_at_the_end_of_an_internal_step_discards_the_lookahead(launch, 
     internal, _ = following(case)
     t, (force, size) = internal[len(internal) // 3], push(name)
     runs = []
-    for look in (False, True):
+    for reads_ahead in (False, True):
         fmu = launch(name, values, stop=stop)
         fmu.run([0.0, t][: 1 + (t > 0.0)], [])
-        if look:
+        if reads_ahead:
             fmu.get("solver.t_next")
         fmu.set({force: size})
         runs.append(fmu.run([t, t + 0.001, t + 0.05 * (stop - t)], names))

@@ -133,7 +133,7 @@ def test_the_closed_form_is_right_to_rounding(draw_motion, seed):
 def test_the_next_standstill_is_right_to_rounding(draw_motion, seed):
     """There is one exactly where the independent solution has one, before the horizon."""
     draw = random.Random(seed)
-    found = 0
+    n_found = 0
     for _ in range(60):
         start, rate = draw_motion(draw)
         closed_form, segment = begin(start)
@@ -150,11 +150,11 @@ def test_the_next_standstill_is_right_to_rounding(draw_motion, seed):
         true = segment.turning_point(mode, mpf(horizon), catches=False)
         assert (got < horizon) == (true is not None), (start, got, true)
         if true is not None:
-            found += 1
+            n_found += 1
             step = true * mpf(10) ** -20
             slope = abs(segment.at(true + step)[1] / step)
             assert abs(got - true) <= ROUNDING * (true + largest_terms(start, true)[1] / slope), (start, got, true)
-    assert found > 5
+    assert n_found > 5
 
 
 def test_a_force_that_turns_stops_a_body_that_has_hardly_started():

@@ -73,14 +73,14 @@ def assert_resolved(worker, folder, model, blocks):
         for suffix, block in zip(suffixes, blocks, strict=True)
         for name, value in zip(("v_b", "v_s", "x0"), block, strict=True)
     }
-    places, events = zip(*(reference(*block) for block in blocks), strict=True)
+    positions, events = zip(*(reference(*block) for block in blocks), strict=True)
     for method, tolerances in TOLERANCES.items():
         for rtol in tolerances:
             fmu.reset()
             fmu.begin({**values, "solver.method": method, "solver.rtol": rtol}, stop=TIMES[-1])
             rows = np.array(fmu.run(TIMES, ["events.count", *(f"x{suffix}" for suffix in suffixes)]))
             assert rows[:, 0].tolist() == np.sum(events, axis=0).tolist(), (method, rtol)
-            assert np.max(np.abs(rows[:, 1:] - np.transpose(places))) < ERROR * rtol, (method, rtol)
+            assert np.max(np.abs(rows[:, 1:] - np.transpose(positions))) < ERROR * rtol, (method, rtol)
     fmu.free()
 
 

@@ -48,17 +48,17 @@ def assert_agrees_with_reference(launch, name, values, changes, solvers):
     motion = ClosedFormMotion(spans(getattr(independent_solution, name), values, changes), x0, 0.0, stop)
     times = sorted({stop * i / 80 for i in range(81)} | set(changes))
     truth = [motion.at(t) for t in times]
-    for settings, places in solvers:
+    for settings, bound in solvers:
         fmu = launch(name, {**values, **settings}, stop=stop)
         rows = fmu.run_with_changes(times, ["x", "v"], changes)
-        for i, what in enumerate("xv"):
+        for i, variable in enumerate("xv"):
             scale = max(abs(row[i]) for row in truth)
             worst = max(abs(row[i] - true[i]) for row, true in zip(rows, truth, strict=True)) / scale
-            assert worst < places, f"{what} is off by {float(worst):.1e} of its largest value"
+            assert worst < bound, f"{variable} is off by {float(worst):.1e} of its largest value"
         if motion.events:
             count, last = fmu.get("events.count", "events.t_last")
             assert count == len(motion.events)
-            assert last == pytest.approx(float(motion.events[-1][0]), rel=max(places / 10, 1e-14))
+            assert last == pytest.approx(float(motion.events[-1][0]), rel=max(bound / 10, 1e-14))
 
 
 @pytest.mark.parametrize("scene", SCENES.values(), ids=SCENES)

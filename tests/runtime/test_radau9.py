@@ -124,18 +124,18 @@ def test_a_first_error_estimate_above_the_tolerance_is_filtered(rate):
 def test_a_step_elsewhere_is_that_of_a_new_run():
     """As after an event: neither the polynomial nor the error of the steps before count."""
     model = Damped(spring=-4.0, damper=-0.6)
-    step, used, new = begin_step(model, 1e-10), *(runtime("pacejka", "radau9").Radau9() for _ in range(2))
+    step, used_method, new = begin_step(model, 1e-10), *(runtime("pacejka", "radau9").Radau9() for _ in range(2))
     control = step.active_method
 
     def propose_elsewhere(method):
         result = method.propose(model, step, 0.7, 0.5, 0.7, model.rates(0.7, 0.5, 0.7), 0.2)
         return *result, control.stages, control.safety, control.grow, control.shrink_after_rejection
 
-    x, v, a, *_ = used.propose(model, step, 0.0, 1.0, -0.3, model.rates(0.0, 1.0, -0.3), 0.1)
+    x, v, a, *_ = used_method.propose(model, step, 0.0, 1.0, -0.3, model.rates(0.0, 1.0, -0.3), 0.1)
     step.n_accepted = 1
-    used.propose(model, step, 0.1, x, v, a, 0.1)
-    assert used.h_last == 0.1
-    assert propose_elsewhere(used) == propose_elsewhere(new)
+    used_method.propose(model, step, 0.1, x, v, a, 0.1)
+    assert used_method.h_last == 0.1
+    assert propose_elsewhere(used_method) == propose_elsewhere(new)
 
 
 class Growing(Damped):
@@ -182,15 +182,15 @@ def relative_error(rows, truth):
 @pytest.fixture(scope="module")
 def truth():
     """Return the motion of the sled for a width of the friction curve, by scipy's Radau (order 5) at 1e-11."""
-    found = {}
+    solutions = {}
 
     def solve(x_m):
-        if x_m not in found:
+        if x_m not in solutions:
             model = model_class("pacejka")()
             model.x_m = x_m
             assert model.prepare() == 0
             model.initial_state(0.0)
-            found[x_m] = solve_ivp(
+            solutions[x_m] = solve_ivp(
                 lambda t, y: (y[1], model.rates(t, *y)),
                 (0.0, 6.0),
                 (0.0, 0.0),
@@ -200,7 +200,7 @@ def truth():
                 atol=(1e-14, 1e-11 * x_m),
                 jac=lambda t, y: ((0.0, 1.0), model.jacobian(t, *y)[1:]),
             ).y.T
-        return found[x_m]
+        return solutions[x_m]
 
     return solve
 

@@ -109,12 +109,12 @@ def read(instance, *names):
     ]
 
 
-def number_paths(thing, path, seen):
+def number_paths(owner, path, seen):
     """Return path and type of every number in an object, which must own all its objects alone."""
-    assert id(thing) not in seen, f"{path} is owned twice"
-    seen.add(id(thing))
+    assert id(owner) not in seen, f"{path} is owned twice"
+    seen.add(id(owner))
     numbers = {}
-    for name, value in vars(thing).items():
+    for name, value in vars(owner).items():
         member_path = f"{path}.{name}"
         if hasattr(value, "__dict__"):
             numbers |= number_paths(value, member_path, seen)

@@ -27,17 +27,17 @@ def test_a_restored_state_continues_bit_for_bit(launch, worker, fmus, case):
     draw = random.Random(label(case))
     times = [0.0, *sorted(draw.uniform(0.0, stop) for _ in range(59)), stop]
     expected = launch(name, values, stop=stop).run(times, names)
-    places = {0, *draw.sample(range(1, 56), 4)}
+    indices = {0, *draw.sample(range(1, 56), 4)}
     if "mode" in names:
         modes = [row[names.index("mode")] for row in expected]
-        places |= {draw.choice([i for i, m in enumerate(modes[:56]) if m == mode]) for mode in set(modes[:56])}
+        indices |= {draw.choice([i for i, m in enumerate(modes[:56]) if m == mode]) for mode in set(modes[:56])}
 
     force, size = push(name)
     other = launch(name, {force: size / 2, outputs(name)[0] + "0": 0.02}, start=-1.0, stop=99.0)
     raw = worker.instantiate(fmus / f"{name}.fmu")
-    fmu, t, look, others = launch(name, values, stop=stop), 0, False, cycle((other, raw))
-    for i in sorted(places):
-        rows = fmu.run(times[t : i + 1], names if look else names[:-1])
+    fmu, t, reads_ahead, others = launch(name, values, stop=stop), 0, False, cycle((other, raw))
+    for i in sorted(indices):
+        rows = fmu.run(times[t : i + 1], names if reads_ahead else names[:-1])
         state = fmu.save()
         wander(fmu, name, times[i], stop)
         fmu.restore(state)
@@ -48,7 +48,7 @@ def test_a_restored_state_continues_bit_for_bit(launch, worker, fmus, case):
         assert_identical(other.run(times[i:], names), expected[i:], names)
         fmu.restore(state)
         assert_identical([row[: len(names) - 1] for row in rows], [row[:-1] for row in expected[t : i + 1]], names[:-1])
-        t, look = i, not look
+        t, reads_ahead = i, not reads_ahead
     raw.free()
 
 

@@ -32,8 +32,8 @@ def cases(model):
     if model == "stack":
         return short_sticks.stacks(1.02, 3) + short_sticks.stacks(1.005, 5)
     randoms = short_sticks.belts if model == "belt" else short_sticks.sleds
-    both = [case for ratio in (1.02, 1.01, 1.005) for case in randoms(ratio, 10)]
-    return both + short_sticks.chosen(model, 40, depths=(1e-9, 1e-2))
+    random_cases = [case for ratio in (1.02, 1.01, 1.005) for case in randoms(ratio, 10)]
+    return random_cases + short_sticks.chosen(model, 40, depths=(1e-9, 1e-2))
 
 
 def wrong_sets(worker, path, model, method, rtol):
@@ -45,9 +45,9 @@ def wrong_sets(worker, path, model, method, rtol):
         fmu.reset()
         fmu.begin({**parameters.values(), "solver.method": method, "solver.rtol": rtol}, stop=motion.stop)
         rows = fmu.run([0.0, *(t for t, _, _ in points)], ["events.count", *MODES[model]])[1:]
-        for (t, n_events, modes), (found, *present) in zip(points, rows, strict=True):
-            if found != n_events or (modes and tuple(present) != modes):
-                wrong.append((t, n_events, found, parameters))
+        for (t, n_events, modes), (n_found, *present) in zip(points, rows, strict=True):
+            if n_found != n_events or (modes and tuple(present) != modes):
+                wrong.append((t, n_events, n_found, parameters))
                 break
     fmu.free()
     return wrong

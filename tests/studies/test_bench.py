@@ -73,13 +73,13 @@ def of(all_measures, function):
 
 
 def test_exact_events_and_the_pendulum_meet_their_targets_and_a_stuck_body_stays(all_measures):
-    chosen = [
+    calls = [
         call
         for function in (exact_run_error, event_time_error, last_event_error, stuck_drift)
         for call in of(all_measures, function)
     ]
-    chosen += [call for call in of(all_measures, default_run_error) if call.args[0] == "pendulum"]
-    measures = [call() for call in chosen]
+    calls += [call for call in of(all_measures, default_run_error) if call.args[0] == "pendulum"]
+    measures = [call() for call in calls]
     assert len(measures) == 3 + 2 + 2 + 3 + 2
     assert [measure.name for measure in measures if not measure.is_met] == []
 

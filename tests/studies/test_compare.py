@@ -174,11 +174,11 @@ def test_a_jump_is_compared_as_a_jump(late):
 
 def test_a_repeated_time_holds_both_sides_of_a_jump(tmp_path):
     (tmp_path / "twice.csv").write_text("t [s],x [m]\n0,1\n1,1\n1,5\n2,5\n")
-    for value, apart in ((1, 4.0), (3, 2.0), (5, 4.0), (6, 5.0)):
+    for value, difference in ((1, 4.0), (3, 2.0), (5, 4.0), (6, 5.0)):
         (tmp_path / "other.csv").write_text(f"t [s],x [m]\n0,{value}\n1,{value}\n2,{value}\n")
         one, two = (read_trajectory(tmp_path / name) for name in ("twice.csv", "other.csv"))
         (x,) = compare(one, two).differences
-        assert x.largest == apart
+        assert x.largest == difference
         assert abs(x.left[1] - x.right[1]) == (0 if 1 <= value <= 5 else 1)
 
 

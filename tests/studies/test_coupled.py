@@ -22,8 +22,8 @@ from harness.scenes.run_spec import RunSpec
 from harness.studies.coupled import engine, study
 from harness.studies.coupled.engine import ENGINES
 
-here = all(map(find_spec, ("pyssp_standard", "ecospy", "libcosimpy")))
-pytestmark = pytest.mark.skipif(not here, reason="the extras 'coupled' and 'importers' are not installed")
+HAS_ENGINES = all(map(find_spec, ("pyssp_standard", "ecospy", "libcosimpy")))
+pytestmark = pytest.mark.skipif(not HAS_ENGINES, reason="the extras 'coupled' and 'importers' are not installed")
 PAIR = """
 title = "a title"
 stop = 1.0
@@ -154,10 +154,10 @@ def test_an_external_archive_is_compared_with_its_finest_run(run, user_folder):
     assert result["order"] > 0.8
     assert {name: item["failure"] for name, item in result["engines"].items()} == dict.fromkeys(ENGINES, "")
     table = np.loadtxt(user_folder / "theirs/coupled/driven/trajectory.csv", delimiter=",", skiprows=1)
-    ours = np.loadtxt(run("driven") / "trajectory.csv", delimiter=",", skiprows=1)
+    expected = np.loadtxt(run("driven") / "trajectory.csv", delimiter=",", skiprows=1)
     heads = (user_folder / "theirs/coupled/driven/trajectory.csv").read_text().splitlines()[0].split(",")
     column = heads.index("shaken.x [m]")
-    assert table[-1, column] == pytest.approx(np.interp(0.5, ours[:, 0], ours[:, 4]), abs=1e-3)
+    assert table[-1, column] == pytest.approx(np.interp(0.5, expected[:, 0], expected[:, 4]), abs=1e-3)
 
 
 def test_an_invalid_archive_is_reported(couple, tmp_path):

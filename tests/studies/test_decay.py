@@ -10,10 +10,10 @@ from dataclasses import replace
 import commands
 import numpy as np
 import pytest
-from answers import check_shared_keys
 from build_cache import ROOT
 from decays import decay_record
 from matplotlib.figure import Figure
+from shared_keys import check_shared_keys
 
 from harness.analyses.decay.estimates import KnownParameters
 from harness.analyses.decay.identification import fit_decay
@@ -50,19 +50,19 @@ def test_a_figure_shows_angles_in_degrees_and_marks_only_excluded_samples(tmp_pa
     signal, residuals, shares = figures[0].get_axes()
     assert [axes.get_ylabel() for axes in (signal, residuals)] == ["x [deg]", "record - fit [deg]"]
     assert shares.get_xlabel() == "amplitude [deg]"
-    drawn = {line.get_label(): line.get_data() for line in signal.lines}
-    assert np.degrees(1.0) == pytest.approx(np.max(drawn["record"][1]), rel=5e-3)
-    assert len(drawn.get("excluded", [[]])[0]) == len(record.t) - len(fit.t)
+    curves = {line.get_label(): line.get_data() for line in signal.lines}
+    assert np.degrees(1.0) == pytest.approx(np.max(curves["record"][1]), rel=5e-3)
+    assert len(curves.get("excluded", [[]])[0]) == len(record.t) - len(fit.t)
     assert fit.record.format_time(1.7e9 + 0.0125) == "1700000000.0125"
 
 
 @pytest.mark.parametrize("count", [3000, 120_000])
 def test_downsampling_keeps_the_extremes(count):
     x = np.sin(np.arange(count)) + np.random.default_rng(1).standard_normal(count)
-    some, wide = extremes(x), -(-2 * count // MAX_POINTS)
-    assert len(some) <= min(count, 3 * MAX_POINTS // 2)
+    selection, wide = extremes(x), -(-2 * count // MAX_POINTS)
+    assert len(selection) <= min(count, 3 * MAX_POINTS // 2)
     for begin in range(0, count, 100 * wide):
-        those = x[some[(some >= begin) & (some < begin + 10 * wide)]]
+        those = x[selection[(selection >= begin) & (selection < begin + 10 * wide)]]
         assert (those.min(), those.max()) == (x[begin : begin + 10 * wide].min(), x[begin : begin + 10 * wide].max())
 
 

@@ -9,10 +9,10 @@ import build_cache
 import commands
 import numpy as np
 import pytest
-from answers import check_shared_keys
 from drawn_records import GROUPS, draw_record
 from fit_campaign import SOURCES
 from native_fmus import build_native_fmus, require_compiler
+from shared_keys import check_shared_keys
 
 import harness
 from harness.analyses.fit.law_comparison import compare_laws
@@ -65,7 +65,7 @@ def fit_drawn(name, seed, max_samples):
     with open_simulator(RunSpec(native(group.model))) as simulator:
         record = draw_record(group, simulator, np.random.default_rng(seed), max_samples=max_samples)
     columns = dict(zip(group.outputs, record.y.T, strict=True)) | record.inputs
-    found = harness.fit(
+    fit = harness.fit(
         native(group.model),
         pandas.DataFrame({"t [s]": record.t, **columns}),
         record.free,
@@ -73,7 +73,7 @@ def fit_drawn(name, seed, max_samples):
         inputs=[*record.inputs],
         fixed=record.fixed,
     )
-    return record, found
+    return record, fit
 
 
 LONG_FITS = ("forced", "position, 4 free", "Stribeck", "belt")
@@ -84,10 +84,10 @@ LONG_FITS = ("forced", "position, 4 free", "Stribeck", "belt")
 )
 def test_the_parameters_of_a_drawn_record_are_found(name):
     """The seed was drawn once; tests/support/fit_campaign.py fits hundreds of others."""
-    record, found = fit_drawn(name, [20261123, len(name)], max_samples=250)
-    assert found.describes_record
+    record, fit = fit_drawn(name, [20261123, len(name)], max_samples=250)
+    assert fit.describes_record
     for parameter, truth in record.truth.items():
-        estimate = found[parameter]
+        estimate = fit[parameter]
         assert not isfinite(estimate.error) or abs(estimate.value - truth) < 5 * estimate.error
         assert estimate.low <= estimate.value <= estimate.high
 
@@ -95,19 +95,19 @@ def test_the_parameters_of_a_drawn_record_are_found(name):
 @pytest.mark.slow
 def test_a_long_curved_valley_does_not_hide_the_best_values():
     """Runs with the default tolerance scattered so much that fits of this record ended halfway along the valley."""
-    record, found = fit_drawn("Stribeck", [8101, 6, 65], max_samples=20_000)
+    record, fit = fit_drawn("Stribeck", [8101, 6, 65], max_samples=20_000)
     for parameter, truth in record.truth.items():
-        assert isfinite(found[parameter].error)
-        assert abs(found[parameter].value - truth) < 5 * found[parameter].error
-    assert found.columns[0].residual < 1.01 * found.columns[0].noise
+        assert isfinite(fit[parameter].error)
+        assert abs(fit[parameter].value - truth) < 5 * fit[parameter].error
+    assert fit.columns[0].residual < 1.01 * fit.columns[0].noise
 
 
 def test_a_position_determines_the_ratio_of_stiffness_and_mass():
-    found = harness.fit(native("stickslip"), pull(), ["k", "m"], observe="x", fixed={"mu_s": 0.8} | DRIVEN)
-    assert {*found.undetermined} == {"k", "m"}
-    assert [each.name for each in found.combinations] == ["k/m"]
-    assert holds(found["k/m"], 900.0 / 12.5)
-    assert any("does not determine k, m" in remark for remark in found.remarks)
+    fit = harness.fit(native("stickslip"), pull(), ["k", "m"], observe="x", fixed={"mu_s": 0.8} | DRIVEN)
+    assert {*fit.undetermined} == {"k", "m"}
+    assert [combination.name for combination in fit.combinations] == ["k/m"]
+    assert holds(fit["k/m"], 900.0 / 12.5)
+    assert any("does not determine k, m" in remark for remark in fit.remarks)
 
 
 DRIVEN = {"mu_d": 0.5, "v_driver": 0.04}
@@ -116,7 +116,7 @@ DRIVEN = {"mu_d": 0.5, "v_driver": 0.04}
 def test_several_records_share_parameters_and_have_some_of_their_own():
     speeds = (0.03, 0.05)
     frames = [pull(values=TRUTH | {"v_driver": speed}, seed=i) for i, speed in enumerate(speeds)]
-    found = harness.fit(
+    fit = harness.fit(
         native("stickslip"),
         frames,
         ["mu_s", "v_driver"],
@@ -124,9 +124,9 @@ def test_several_records_share_parameters_and_have_some_of_their_own():
         each=["v_driver"],
         fixed={"k": 900.0, "mu_d": 0.5},
     )
-    assert [each.name for each in found.estimates] == ["mu_s", "v_driver[1]", "v_driver[2]"]
+    assert [estimate.name for estimate in fit.estimates] == ["mu_s", "v_driver[1]", "v_driver[2]"]
     for number, speed in enumerate(speeds, 1):
-        assert holds(found[f"v_driver[{number}]"], speed)
+        assert holds(fit[f"v_driver[{number}]"], speed)
 
 
 @pytest.mark.parametrize(
@@ -161,9 +161,9 @@ def test_a_sensor_with_offset_and_gain_is_identified():
     frame = pull()
     frame["x"] = 1.1 * frame["x"] + 0.02
     free = ["mu_s", "offset(x)", "gain(x)"]
-    found = harness.fit(native("stickslip"), frame, free, observe="x", fixed=DRIVEN | {"k": 900.0})
+    fit = harness.fit(native("stickslip"), frame, free, observe="x", fixed=DRIVEN | {"k": 900.0})
     for name, truth in {"mu_s": 0.8, "offset(x)": 0.02, "gain(x)": 1.1}.items():
-        assert holds(found[name], truth)
+        assert holds(fit[name], truth)
 
 
 @pytest.mark.parametrize("delay", [0.084, pytest.param(-0.1, marks=pytest.mark.slow)])
@@ -177,10 +177,10 @@ def test_the_delay_of_a_sensor_is_identified(delay):
     y = np.interp(t - delay, fine, x) + 0.003 * np.ptp(x) * np.random.default_rng(3).normal(size=len(t))
     frame = pytest.importorskip("pandas").DataFrame({"t [s]": t, "x [m]": y, "F": shaker(t)})
     free = {"f": None, "delay(x)": (-0.3, 0.3)}
-    found = harness.fit(native("coulomb"), frame, free, observe="x", inputs={"F_ext": "F"}, fixed={"x0": 0.0})
-    assert holds(found["delay(x)"], delay)
-    assert holds(found["f"], 2.0)
-    assert found["delay(x)"].high - found["delay(x)"].low < 0.005
+    fit = harness.fit(native("coulomb"), frame, free, observe="x", inputs={"F_ext": "F"}, fixed={"x0": 0.0})
+    assert holds(fit["delay(x)"], delay)
+    assert holds(fit["f"], 2.0)
+    assert fit["delay(x)"].high - fit["delay(x)"].low < 0.005
 
 
 def shaker(t):
@@ -191,17 +191,17 @@ def shaker(t):
 def test_the_values_predict_a_record_that_was_not_fitted():
     arguments = {"free": ["mu_s"], "observe": "x", "fixed": DRIVEN | {"k": 900.0}}
     same, other = pull(seed=2, t=T[:150]), pull(values=TRUTH | {"mu_d": 0.7}, seed=3)
-    found = harness.fit(native("stickslip"), pull(), validate=[same, other], **arguments)
-    good, bad = found.validation.columns
+    fit = harness.fit(native("stickslip"), pull(), validate=[same, other], **arguments)
+    good, bad = fit.validation.columns
     assert good.residual < 1.3 * good.noise
     assert bad.residual > 5.0 * bad.noise
-    assert [len(record.t) for record in found.validation.records] == [150, len(T)]
-    (remark,) = (remark for remark in found.remarks if "do not predict" in remark)
+    assert [len(record.t) for record in fit.validation.records] == [150, len(T)]
+    (remark,) = (remark for remark in fit.remarks if "do not predict" in remark)
     assert "do not predict x in the validation record 2" in remark
     rest = harness.fit(native("stickslip"), pull(), validate=same.assign(x=0.05), **arguments)
     (column,) = rest.validation.columns
     assert column.residual == pytest.approx(np.sqrt(np.mean((0.05 - rest.validation.predictions[0]) ** 2)))
-    assert column.noise == found.columns[0].noise  # a record at rest has none of its own
+    assert column.noise == fit.columns[0].noise  # a record at rest has none of its own
     spikes = np.where(np.arange(150) % 50 == 25, 20.0 * good.noise, 0.0)
     spiked = harness.fit(
         native("stickslip"), pull(), validate=same.assign(x=same["x"] + spikes), robust=True, **arguments
@@ -215,10 +215,8 @@ def test_the_values_predict_a_record_that_was_not_fitted():
 
 def test_a_profile_crosses_its_limit_where_the_interval_ends():
     """Between the points, the root of the squares is nearly linear."""
-    found = harness.fit(
-        native("stickslip"), pull(), ["mu_s", "mu_d"], observe="x", fixed={"k": 900.0, "v_driver": 0.04}
-    )
-    for profile, estimate in zip(found.profiles, found.estimates, strict=True):
+    fit = harness.fit(native("stickslip"), pull(), ["mu_s", "mu_d"], observe="x", fixed={"k": 900.0, "v_driver": 0.04})
+    for profile, estimate in zip(fit.profiles, fit.estimates, strict=True):
         value, excess = np.array(profile.value), np.array(profile.excess)
         assert excess[value == estimate.value] == 0.0
         root = np.sqrt(excess) * np.sign(value - estimate.value)
@@ -228,18 +226,18 @@ def test_a_profile_crosses_its_limit_where_the_interval_ends():
 def test_outliers_count_little_in_a_robust_fit():
     frame = pull()
     frame.loc[::25, "x"] += 0.3
-    found = harness.fit(native("stickslip"), frame, ["mu_s"], observe="x", fixed=DRIVEN | {"k": 900.0}, robust=True)
-    assert holds(found["mu_s"], 0.8)  # without `robust`, the interval is four times as wide
-    assert found["mu_s"].high - found["mu_s"].low < 0.004
+    fit = harness.fit(native("stickslip"), frame, ["mu_s"], observe="x", fixed=DRIVEN | {"k": 900.0}, robust=True)
+    assert holds(fit["mu_s"], 0.8)  # without `robust`, the interval is four times as wide
+    assert fit["mu_s"].high - fit["mu_s"].low < 0.004
 
 
 def test_a_record_of_another_motion_is_remarked():
     frame = pull()
     frame["x"] += 0.2 * np.sin(T)
-    found = harness.fit(native("stickslip"), frame, ["mu_s"], observe="x", fixed=DRIVEN | {"k": 900.0})
-    assert not found.describes_record
-    assert "do not rely on these values" in found.remarks[0]
-    assert not any(isfinite(each.error) for each in found.estimates)
+    fit = harness.fit(native("stickslip"), frame, ["mu_s"], observe="x", fixed=DRIVEN | {"k": 900.0})
+    assert not fit.describes_record
+    assert "do not rely on these values" in fit.remarks[0]
+    assert not any(isfinite(estimate.error) for estimate in fit.estimates)
 
 
 def test_the_command_writes_what_it_prints(tmp_path):
@@ -260,7 +258,7 @@ def test_the_command_writes_what_it_prints(tmp_path):
         "provenance.json",
         "summary.json",
     }
-    estimates = {each["name"]: each for each in stored["fit"]}
+    estimates = {estimate["name"]: estimate for estimate in stored["fit"]}
     check_shared_keys(stored)
     assert estimates["k"]["low"] < 900.0 < estimates["k"]["high"]
     assert estimates["mu_s"]["low"] < 0.8 < estimates["mu_s"]["high"]
@@ -348,14 +346,14 @@ def test_the_law_that_made_the_record_has_the_lowest_bic(record_of, v_s):
         with open_simulator(RunSpec(fmus[1], ("x",), times=T, follow=False)) as simulator:
             x = simulator.prepare(simulator.spec)(values)[:, 0]
         frame["x"] = x + 0.003 * np.ptp(x) * np.random.default_rng(2).normal(size=len(T))
-    found = harness.fit(fmus[0], frame, observe="x", against=fmus[1], **LAWS)
-    assert found.comparison.laws[0].fmu == record_of
-    assert found.comparison.is_clear
-    assert (found.comparison.verdict in found.remarks) == (record_of != "stickslip")
-    assert [each.name for each in found.estimates] == ["k", "mu_s", "mu_d"]
-    assert [each.name for each in found.against[0].estimates] == ["k", "f_s", "f_d"]
-    assert "stickslip has no f_s, f_d, v_s: its fit leaves them out." in found.notes
-    assert "stribeck_sled has no mu_s, mu_d: its fit leaves them out." in found.against[0].notes
+    fit = harness.fit(fmus[0], frame, observe="x", against=fmus[1], **LAWS)
+    assert fit.comparison.laws[0].fmu == record_of
+    assert fit.comparison.is_clear
+    assert (fit.comparison.verdict in fit.remarks) == (record_of != "stickslip")
+    assert [estimate.name for estimate in fit.estimates] == ["k", "mu_s", "mu_d"]
+    assert [estimate.name for estimate in fit.against[0].estimates] == ["k", "f_s", "f_d"]
+    assert "stickslip has no f_s, f_d, v_s: its fit leaves them out." in fit.notes
+    assert "stribeck_sled has no mu_s, mu_d: its fit leaves them out." in fit.against[0].notes
 
 
 def test_the_bic_of_white_residuals_is_that_of_a_linear_model():
@@ -413,7 +411,7 @@ def test_a_peer_that_fails_has_its_reason_in_the_table(capsys):
 
     peers = {"broken": fit_peers.Peer("numpy", fail, (), True), "exact": fit_peers.Peer("numpy", know, ())}
     attempts = fit_peers.fit_record(0, build_native_fmus(), peers)
-    assert {tool: (each.is_found, each.failure) for tool, each in attempts.items()} == {
+    assert {tool: (attempt.is_found, attempt.failure) for tool, attempt in attempts.items()} == {
         "harness.fit": (True, ""),
         "broken": (False, "AttributeError: no such thing"),
         "exact": (True, ""),

@@ -117,11 +117,11 @@ def test_a_step_limit_of_cvode_gives_a_gap_with_the_reason_of_fmpy(points, capfd
 def test_each_run_of_an_instance_starts_from_scratch(both):
     sled = RunSpec(both / "fmus/native/fmi3/stickslip.fmu", ("x", "v", "mode"), {"mu_s": 0.8}, stop=16.0, grid=0.5)
     sled = replace(sled, follow=False, exchange=True)
-    first, again = (run_own_fmu(replace(sled, repeat=repeat)) for repeat in (1, 3))
+    first, repeated = (run_own_fmu(replace(sled, repeat=repeat)) for repeat in (1, 3))
     other = run_own_fmu(replace(sled, values={}))
-    assert np.array_equal(first.time, again.time)
-    assert all(np.array_equal(first[name], again[name]) for name in sled.outputs)
-    assert first.statistics.evaluations == again.statistics.evaluations > 100
+    assert np.array_equal(first.time, repeated.time)
+    assert all(np.array_equal(first[name], repeated[name]) for name in sled.outputs)
+    assert first.statistics.evaluations == repeated.statistics.evaluations > 100
     assert other["x"][-1] != first["x"][-1]
 
 

@@ -53,9 +53,9 @@ def at_rest(scene):
 @pytest.mark.parametrize("name", CERTIFIED)
 def test_references_agree_with_the_certified_results(references, name):
     certified, scene = load_reference(CERTIFIED[name], FOLDER), SCENES[name]
-    common, at, there = np.intersect1d(scene.times.round(9), certified.times.round(9), return_indices=True)
+    common, at_scene, at_certified = np.intersect1d(scene.times.round(9), certified.times.round(9), return_indices=True)
     assert len(common) > 50
-    assert references[name].states[::FINE][at, :2] == pytest.approx(certified.states[there, :2], abs=1e-9)
+    assert references[name].states[::FINE][at_scene, :2] == pytest.approx(certified.states[at_certified, :2], abs=1e-9)
     assert [mode for _, mode in references[name].events] == [mode for _, mode in certified.events]
     times = [t for t, _ in certified.events]
     assert [t for t, _ in references[name].events] == pytest.approx(times, abs=1e-9)

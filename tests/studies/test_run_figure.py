@@ -260,7 +260,7 @@ def test_an_output_takes_precedence_over_the_panel_of_its_name(tmp_path):
         done = commands.harness(tmp_path, "run", *words)
         assert done.returncode == 0, done.stderr
         figure = (tmp_path / "results/named/figure.svg").read_text(encoding="utf-8")
-        shown = {*re.findall(r">([^<>]+)</text>", figure)}
-        assert titles <= shown
-        assert not {"phase plane", "step size of the solver"} & shown
+        labels = {*re.findall(r">([^<>]+)</text>", figure)}
+        assert titles <= labels
+        assert not {"phase plane", "step size of the solver"} & labels
         shutil.rmtree(tmp_path / "results")

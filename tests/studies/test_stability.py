@@ -56,19 +56,18 @@ def no_progress(name, share):
 
 
 def is_sampled():
-    """Return whether a scene is in QUICK, or at the soft end of the region, and the first with its model or its
-    value."""
-    met = set()
+    """Return a predicate for scenes in QUICK or at the soft end of the region: the first with each model and value."""
+    seen = set()
 
-    def wanted(scene):
+    def is_new(scene):
         if not (scene["pattern"] in QUICK or ("region" in scene and scene["varied"] in (0.1, 0.03))):
             return False
         marks = {(scene["pattern"], key, repr(scene.get(key))) for key in ("model", "varied")}
-        new = not marks <= met
-        met.update(marks)
-        return new
+        has_new_mark = not marks <= seen
+        seen.update(marks)
+        return has_new_mark
 
-    return wanted
+    return is_new
 
 
 def defaults(name):

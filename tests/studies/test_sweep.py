@@ -31,9 +31,9 @@ def harness(workspace):
 
 def test_a_grid_has_every_combination_and_a_sample_every_stratum():
     grid = SweepPoints((parse_axis("a=1:3:3", False), parse_axis("b=1:100:3:log", False)))
-    every = np.array([[a, b] for a in (1, 2, 3) for b in (1, 10, 100)])
-    assert grid.coordinates(0, len(grid)) == pytest.approx(every)
-    assert grid.coordinates(2, 7) == pytest.approx(every[2:7])
+    expected = np.array([[a, b] for a in (1, 2, 3) for b in (1, 10, 100)])
+    assert grid.coordinates(0, len(grid)) == pytest.approx(expected)
+    assert grid.coordinates(2, 7) == pytest.approx(expected[2:7])
     spread = (parse_axis("a=1:2", True), parse_axis("b=1:100:log", True))
     sample = SweepPoints(spread, 20, 1).coordinates(0, 20)
     assert sorted(np.floor(20 * (sample[:, 0] - 1))) == list(range(20))
@@ -103,7 +103,7 @@ def test_a_sled_pulled_backward_has_the_measures_of_one_pulled_forward(driver):
     v = 1.5 * driver * (1.0 - np.cos(2.0 * pi * time))
     spec = RunSpec(Path("sled.fmu"), outputs=("x", "v"))
     run = Trajectory(spec, time, {"x": 0.0 * v, "v": v}, {"x": "m", "v": "m/s"}, {}, {"v_driver": driver})
-    measured = {name: each.measure(run) for name, each in TRAJECTORY_MEASURES.items() if not each.decay}
+    measured = {name: measure.measure(run) for name, measure in TRAJECTORY_MEASURES.items() if not measure.decay}
     expected = {"slips": 3, "period": 1.0, "unsteady": 1.5, "peak_speed": 0.06, "stuck": nan, "rest": nan}
     assert measured == pytest.approx(expected, rel=1e-6, nan_ok=True)
 

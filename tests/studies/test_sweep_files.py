@@ -28,12 +28,12 @@ def test_memory_use_does_not_grow_with_the_number_of_runs(monkeypatch, tmp_path)
     monkeypatch.setattr(figure, "draw", lambda *arguments: None)
     monkeypatch.setattr(writing, "CHUNK_SIZE", "40 KiB")
     peaks = []
-    for many in (20, 200):
-        axes = parse_axis(f"a=0:1:{many}", False), parse_axis("b=0:1:100", False)
+    for n_points in (20, 200):
+        axes = parse_axis(f"a=0:1:{n_points}", False), parse_axis("b=0:1:100", False)
         sweep = Sweep(SweepSpec(RunSpec(Path("many.fmu")), ("a", "b")), SweepPoints(axes), b"", 1)
         labels = dict.fromkeys(("a", "b"), ("m", ""))
         about = writing.SweepDescription(labels, (writing.MeasureColumn("c", "s", "some"),), {}, 1.0, ())
-        folder = tmp_path / str(many)
+        folder = tmp_path / str(n_points)
         folder.mkdir()
         tracemalloc.start()
         checkpoint = sweep.checkpoint(folder)

@@ -55,47 +55,47 @@ def undisturbed(fmus):
     return files(build_cache.cached_folder("swept", make))
 
 
-def files(place):
-    return {file.name: file.read_bytes() for file in sweep_folder(place / "results", "stickslip-mu_d").glob("sweep.*")}
+def files(folder):
+    return {file.name: file.read_bytes() for file in sweep_folder(folder / "results", "stickslip-mu_d").glob("sweep.*")}
 
 
-def checkpoint_file(place):
+def checkpoint_file(folder):
     """Return the checkpoint of a sweep that has begun; None before."""
-    return next((place / "results/sweep").glob(".*.checkpoint"), None)
+    return next((folder / "results/sweep").glob(".*.checkpoint"), None)
 
 
-def finished_runs(place):
+def finished_runs(folder):
     """Return the number of finished runs."""
-    path = checkpoint_file(place)
+    path = checkpoint_file(folder)
     return Checkpoint(path, 100, 1).n_done if path and path.stat().st_size else 0
 
 
-def start_sweep(place):
+def start_sweep(folder):
     """Start the long sweep in a child process and wait for two more finished runs.
 
     Its environment marks its processes, and the file `bound` lists the addresses at which they listen.
     """
-    reset_sigint, before = partial(signal.signal, signal.SIGINT, signal.SIG_DFL), finished_runs(place)
-    (place / "sitecustomize.py").write_text(NOTE)
+    reset_sigint, before = partial(signal.signal, signal.SIGINT, signal.SIG_DFL), finished_runs(folder)
+    (folder / "sitecustomize.py").write_text(NOTE)
     process = subprocess.Popen(
         [sys.executable, "-m", "harness", *LONG],
-        cwd=place,
-        env=os.environ | {"PYTHONPATH": f"{place}{os.pathsep}{build_cache.ROOT}"},
+        cwd=folder,
+        env=os.environ | {"PYTHONPATH": f"{folder}{os.pathsep}{build_cache.ROOT}"},
         stderr=subprocess.PIPE,
         text=True,
         start_new_session=True,
         preexec_fn=reset_sigint,  # a test run in the background ignores it
     )
     while process.poll() is None:
-        if finished_runs(place) > before + 1:
+        if finished_runs(folder) > before + 1:
             return process
         time.sleep(0.02)
     raise AssertionError(process.communicate()[1])
 
 
-def sweep_processes(place):
+def sweep_processes(folder):
     """Return the processes of the sweeps started there."""
-    processes, mark = [], f"PYTHONPATH={place}{os.pathsep}".encode()
+    processes, mark = [], f"PYTHONPATH={folder}{os.pathsep}".encode()
     for file in Path("/proc").glob("[0-9]*/environ"):
         try:
             processes += [file.parent.name] if mark in file.read_bytes() else []

@@ -58,9 +58,9 @@ def takes_vectors(types):
     return any(kind in VECTOR_TYPES for name, kind in types.items() if name != "return")
 
 
-def store_vectors_as_arrays(thing):
+def store_vectors_as_arrays(owner):
     """Store the vector attributes of an object, and of all objects that it owns, as arrays."""
-    types = {name: kind for one in type(thing).__mro__ for name, kind in vars(one).get("__annotations__", {}).items()}
+    types = {name: kind for one in type(owner).__mro__ for name, kind in vars(one).get("__annotations__", {}).items()}
 
     def assign(self, name, value):
         if types.get(name) in VECTOR_TYPES:
@@ -68,9 +68,9 @@ def store_vectors_as_arrays(thing):
             value = np.full(long, value) if np.ndim(value) == 0 else np.array(value)
         object.__setattr__(self, name, value)
 
-    type(thing).__setattr__ = assign
-    for name, value in list(vars(thing).items()):
-        setattr(thing, name, 0.0 if isinstance(value, np.ndarray) else value)  # left over from another model
+    type(owner).__setattr__ = assign
+    for name, value in list(vars(owner).items()):
+        setattr(owner, name, 0.0 if isinstance(value, np.ndarray) else value)  # left over from another model
         if hasattr(value, "__dict__"):
             store_vectors_as_arrays(value)
 

@@ -102,8 +102,8 @@ class Browser:
 
     def run(self, script):
         """Evaluate an expression in the page, awaiting a promise."""
-        how = {"awaitPromise": True, "returnByValue": True, "userGesture": True}
-        result = self.call("Runtime.evaluate", expression=script, **how)
+        options = {"awaitPromise": True, "returnByValue": True, "userGesture": True}
+        result = self.call("Runtime.evaluate", expression=script, **options)
         assert "exceptionDetails" not in result, result["exceptionDetails"]
         return result["result"].get("value")
 

@@ -1,6 +1,6 @@
-"""Run an FMU that reports an error while standard error is unusable: python closed_stderr.py run_all '[FMU, WAYS]'.
+"""Run an FMU that reports an error while standard error is unusable: python closed_stderr.py run_all '[FMU, FAILURES]'.
 
-Prints for each way the log, the values read after the error, and the result of the run after a reset.
+Prints for each failure the log, the values read after the error, and the result of the run after a reset.
 """
 
 import io
@@ -55,14 +55,14 @@ STDERR_FAILURES = {
 }
 
 
-def run_all(path, ways):
+def run_all(path, failures):
     process = worker.Worker(tempfile.mkdtemp())
-    return [run_without_stderr(way, process, path) for way in ways]
+    return [run_without_stderr(failure, process, path) for failure in failures]
 
 
-def run_without_stderr(way, process, path):
+def run_without_stderr(failure, process, path):
     fmu = process.instances[process.instantiate(path, "Prüfstand")]
-    STDERR_FAILURES[way]()
+    STDERR_FAILURES[failure]()
 
     def begin():
         fmu.setup(0.0, None, None)

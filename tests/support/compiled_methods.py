@@ -22,9 +22,9 @@ VALUES += [random.Random(1).uniform(-4.0, 4.0) for _ in range(6)]
 PAIRS = [*product(VALUES, VALUES)]
 
 
-def flat_values(thing):
+def flat_values(owner):
     """Yield all numbers of an object, in order."""
-    for value in vars(thing).values():
+    for value in vars(owner).values():
         if hasattr(value, "__dict__"):
             yield from flat_values(value)
         elif isinstance(value, list):
@@ -52,9 +52,9 @@ def bits(values):
 class CompiledMethods:
     """Methods of an object compiled to C; each call starts from a fresh copy of the object."""
 
-    def __init__(self, thing, methods, folder, warnings=STRICT):
-        call_graph = CallGraph(thing)
-        cls = type(thing)
+    def __init__(self, owner, methods, folder, warnings=STRICT):
+        call_graph = CallGraph(owner)
+        cls = type(owner)
         state = list(c_member_paths(call_graph.layout, cls, "it."))
         calls, self.widths = [], {}
         for name in methods:
@@ -68,7 +68,7 @@ class CompiledMethods:
                 + "".join(f"    *out++ = (double){part};\n" for part in parts + state)
                 + "    return fault;\n}\n"
             )
-        image = f"static const struct {cls.__name__} image = {call_graph.layout.initializer(thing)};\n"
+        image = f"static const struct {cls.__name__} image = {call_graph.layout.initializer(owner)};\n"
         text = '#include "python_arithmetic.h"\n' + call_graph.text() + image + "".join(calls)
         (folder / "frozen.c").write_text(text)
         header = Path(native.__file__).parent
@@ -83,17 +83,17 @@ class CompiledMethods:
         return bool(fault), list(out)
 
 
-def assert_same_as_python(frozen, thing, name, pairs):
+def assert_same_as_python(frozen, owner, name, pairs):
     """Compare results, final object states and exceptions (faults in C) of a method in C and CPython."""
     for x, y in pairs:
-        it = copy.deepcopy(thing)
+        python_owner = copy.deepcopy(owner)
         try:
-            result = getattr(it, name)(x, y)
+            result = getattr(python_owner, name)(x, y)
         except FAULT_EXCEPTIONS as error:
             result = error
         fault, out = frozen.call(name, x, y)
         assert fault == isinstance(result, Exception), f"{name}({x!r}, {y!r}): {result!r}"
-        remaining = list(flat_values(it))
+        remaining = list(flat_values(python_owner))
         values = [] if fault else [*result] if isinstance(result, tuple) else [result]
         if fault:  # a fault returns no value, but earlier side effects remain
             out = out[frozen.widths[name] :]

@@ -37,8 +37,8 @@ class Clutch:
         a, b = y
         first, second = self.T_in - 0.05 * a, 5.0 + 0.2 * b
         force = modes[0] * 0.03 * self.F_n if modes[0] else (1.5 * first + 0.5 * second) / 2.0
-        both = [(first - second) / 2.0] * 2
-        rates = [(first - force) / 0.5, (force - second) / 1.5] if modes[0] else both
+        common = [(first - second) / 2.0] * 2
+        rates = [(first - force) / 0.5, (force - second) / 1.5] if modes[0] else common
         return rates, [a - b], [force], [0.04 * self.F_n]
 
     def rest(self, y, modes):
@@ -193,12 +193,12 @@ def integrate_events(physics, changes=()):
 def event_function(physics, modes, i, side):
     """Return an event function that falls to zero where contact i stops slipping (side 0) or breaks away to a side."""
 
-    def left(t, y, modes=tuple(modes)):
+    def margin(t, y, modes=tuple(modes)):
         _, slips, forces, most = physics(t, y, modes)
         return most[i] - side * forces[i] if side else modes[i] * slips[i]
 
-    left.terminal, left.direction, left.contact, left.after = True, -1, i, side
-    return left
+    margin.terminal, margin.direction, margin.contact, margin.after = True, -1, i, side
+    return margin
 
 
 def apply_breakaways(physics, t, y, modes):

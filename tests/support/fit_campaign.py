@@ -82,26 +82,28 @@ def summarize(record, fit, seconds):
         "runs": fit.n_runs,
         "searches": fit.n_searches,
         "remarks": list(fit.remarks),
-        "values": {name: each.value for name, each in estimates.items()},
-        "errors": {name: each.error for name, each in estimates.items()},
+        "values": {name: estimate.value for name, estimate in estimates.items()},
+        "errors": {name: estimate.error for name, estimate in estimates.items()},
         "deviation": {
-            name: abs(each.value - record.truth[name]) / each.error if each.error else np.inf
-            for name, each in estimates.items()
+            name: abs(estimate.value - record.truth[name]) / estimate.error if estimate.error else np.inf
+            for name, estimate in estimates.items()
         },
         "covered": {
-            name: each.low <= record.truth[name] <= each.high
-            for name, each in estimates.items()
-            if isfinite(each.low) and isfinite(each.high)
+            name: estimate.low <= record.truth[name] <= estimate.high
+            for name, estimate in estimates.items()
+            if isfinite(estimate.low) and isfinite(estimate.high)
         },
-        "half_width": {name: (each.high - each.low) / 2 / abs(record.truth[name]) for name, each in estimates.items()},
-        "combinations": [each.name for each in fit.combinations],
+        "half_width": {
+            name: (estimate.high - estimate.low) / 2 / abs(record.truth[name]) for name, estimate in estimates.items()
+        },
+        "combinations": [combination.name for combination in fit.combinations],
         "describes_record": fit.describes_record,
     }
 
 
 def is_found(row):
     """Return whether all determined values are within five standard errors."""
-    return all(not each > 5 for each in row["deviation"].values()) and row["describes_record"]
+    return all(not deviation > 5 for deviation in row["deviation"].values()) and row["describes_record"]
 
 
 def print_summary(rows):
@@ -151,29 +153,29 @@ def main():
     options.add_argument("--log", type=Path, help="file for the results; a campaign continues from there")
     options.add_argument("--fmus", type=Path, help="folder of native FMUs that exist already")
     options.add_argument("--summary", action="store_true", help="only print the summary of the log")
-    given = options.parse_args()
-    rows = json.loads(given.log.read_text()) if given.log and given.log.exists() else []
-    if given.summary:
+    arguments = options.parse_args()
+    rows = json.loads(arguments.log.read_text()) if arguments.log and arguments.log.exists() else []
+    if arguments.summary:
         print_summary(rows)
         return
-    groups = given.group or [*GROUPS]
+    groups = arguments.group or [*GROUPS]
     with temporary_directory("campaign-") as folder:
-        fmus = given.fmus or build_fmus(folder)
+        fmus = arguments.fmus or build_fmus(folder)
         done = {(row["group"], row["seed"]) for row in rows}
-        for n in range(given.records):
+        for n in range(arguments.records):
             name, number = groups[n % len(groups)], n // len(groups)
-            seed = [given.seed, [*GROUPS].index(name), number]
+            seed = [arguments.seed, [*GROUPS].index(name), number]
             if (name, str(seed)) in done:
                 continue
-            begun = cpu_seconds()
+            start = cpu_seconds()
             record, fit = fit_drawn_record(GROUPS[name], seed, fmus)
-            row = summarize(record, fit, cpu_seconds() - begun)
+            row = summarize(record, fit, cpu_seconds() - start)
             rows.append({"group": name, "seed": str(seed)} | row)
             bad = "" if "refused" in row or is_found(row) else "NOT FOUND"
-            missed = [each for each, held in row.get("covered", {}).items() if not held]
+            missed = [parameter for parameter, held in row.get("covered", {}).items() if not held]
             print(name, number, row["noise"], f"{row['seconds']:.1f} s", bad, missed or "", flush=True)
-            if given.log:
-                given.log.write_text(json.dumps(rows))
+            if arguments.log:
+                arguments.log.write_text(json.dumps(rows))
     print_summary(rows)
 
 

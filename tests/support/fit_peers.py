@@ -87,8 +87,8 @@ def fit_with_lmfit(t, x, free, known, force):
     parameters = lmfit.Parameters()
     for name, (start, low, high) in free.items():
         parameters.add(name, value=start, min=low, max=high)
-    found = lmfit.minimize(lambda p: smoothed_run(t, p.valuesdict(), known, force) - x, parameters)
-    return found.params.valuesdict()
+    result = lmfit.minimize(lambda p: smoothed_run(t, p.valuesdict(), known, force) - x, parameters)
+    return result.params.valuesdict()
 
 
 def fit_with_scipy(t, x, free, known, force):
@@ -98,8 +98,8 @@ def fit_with_scipy(t, x, free, known, force):
         return np.sum((smoothed_run(t, dict(zip(free, values, strict=True)), known, force) - x) ** 2)
 
     bounds = [(low, high) for _, low, high in free.values()]
-    found = differential_evolution(squares, bounds, seed=1)
-    return dict(zip(free, found.x, strict=True))
+    result = differential_evolution(squares, bounds, seed=1)
+    return dict(zip(free, result.x, strict=True))
 
 
 def fit_with_harness(t, x, free, known, force, fmu):
@@ -183,14 +183,14 @@ def draw_even_record(name, number, fmus):
             random = np.random.default_rng([SEED, KINDS.index(name), number, attempt])
             record = draw_record(group, simulator, random, max_samples=MAX_SAMPLES)
             if np.ptp(np.diff(record.t)) < 1e-9:
-                return record, {key: each.start for key, each in simulator.variables.items()}
+                return record, {key: variable.start for key, variable in simulator.variables.items()}
     raise RuntimeError("no record has even times")
 
 
 def run_peer(function, arguments, budget, connection):
     """Send the values or a failure, and the processor time, of a peer; a signal ends it when its time is used."""
-    begun = cpu_seconds()
-    limit = int(begun + budget)
+    start = cpu_seconds()
+    limit = int(start + budget)
     resource.setrlimit(resource.RLIMIT_CPU, (limit, limit + 1))
     values, failure = {}, ""
     with contextlib.redirect_stdout(io.StringIO()):
@@ -200,7 +200,7 @@ def run_peer(function, arguments, budget, connection):
             return
         except Exception as error:  # a package may fail in any way
             failure = f"{type(error).__name__}: {error}"
-    connection.send(Attempt(values, failure, cpu_seconds() - begun))
+    connection.send(Attempt(values, failure, cpu_seconds() - start))
 
 
 def call_peer(function, arguments, budget):
@@ -234,9 +234,9 @@ def fit_record(number, fmus, peers, least_budget=LEAST_BUDGET):
     free = {key: (start[key], start[key] / 4, 4 * start[key]) for key in record.truth if start[key]}
     free |= {key: (sum(ends) / 2, *ends) for key, ends in record.free.items() if ends and key not in free}
     force, x = record.inputs.get("F_ext"), record.y[:, 0]
-    begun = cpu_seconds()
+    begin = cpu_seconds()
     fit = fit_with_harness(record.t, x, free, record.fixed, force, fmu)
-    seconds = cpu_seconds() - begun
+    seconds = cpu_seconds() - begin
     attempts = {"harness.fit": Attempt(fit.values, "", seconds, is_found(fit.values, fit, record.truth))}
     for tool, peer in peers.items():
         known = dict(record.fixed)
@@ -245,26 +245,26 @@ def fit_record(number, fmus, peers, least_budget=LEAST_BUDGET):
             known |= {key: start[key] for key in names if key not in free}
         arguments = (record.t, x, free, known, force, *((fmu,) if peer.runs_fmu else ()))
         attempt = call_peer(peer.fit, arguments, max(least_budget, BUDGET * seconds))
-        found = not attempt.failure and is_found(attempt.values, fit, record.truth)
-        attempts[tool] = Attempt(attempt.values, attempt.failure, attempt.seconds, found)
+        is_right = not attempt.failure and is_found(attempt.values, fit, record.truth)
+        attempts[tool] = Attempt(attempt.values, attempt.failure, attempt.seconds, is_right)
     return attempts
 
 
 def print_table(attempts, lines, versions):
     """Print a line for each tool: successes, processor time, and lines of code."""
-    own = float(np.median([each["harness.fit"].seconds for each in attempts]))
+    own_seconds = float(np.median([record_attempts["harness.fit"].seconds for record_attempts in attempts]))
     print(f"{'':14}{'version':10}{'found':>8}{'stopped':>9}{'failed':>8}{'median s':>10}{'ratio':>8}{'lines':>7}")
     for tool in attempts[0]:
-        tries = [each[tool] for each in attempts]
-        failures = [each.failure for each in tries if each.failure not in ("", "stopped")]
+        tries = [record_attempts[tool] for record_attempts in attempts]
+        failures = [attempt.failure for attempt in tries if attempt.failure not in ("", "stopped")]
         stopped, median = (
-            sum(each.failure == "stopped" for each in tries),
-            float(np.median([each.seconds for each in tries])),
+            sum(attempt.failure == "stopped" for attempt in tries),
+            float(np.median([attempt.seconds for attempt in tries])),
         )
-        found = f"{sum(each.is_found for each in tries)}/{len(tries)}"
+        n_found = f"{sum(attempt.is_found for attempt in tries)}/{len(tries)}"
         print(
-            f"{tool:14}{versions[tool]:10}{found:>8}{stopped:9}{len(failures):8}{median:10.1f}{median / own:8.1f}"
-            f"{lines[tool]:7}"
+            f"{tool:14}{versions[tool]:10}{n_found:>8}{stopped:9}{len(failures):8}{median:10.1f}"
+            f"{median / own_seconds:8.1f}{lines[tool]:7}"
         )
         for failure in dict.fromkeys(failures):
             print(f"{'':14}failed: {failure}")
@@ -279,11 +279,11 @@ def main():
     options.add_argument("--modestpy", metavar="PYTHON", default=sys.executable, help="interpreter that has ModestPy")
     options.add_argument("--budget", type=float, default=LEAST_BUDGET, help="least processor time in s of a peer")
     options.add_argument("--processes", type=int, default=1, help="number of records that are fitted at the same time")
-    given = options.parse_args()
-    peers = {tool: PEERS[tool] for tool in given.peer or PEERS}
+    arguments = options.parse_args()
+    peers = {tool: PEERS[tool] for tool in arguments.peer or PEERS}
     versions = {"harness.fit": version("friction-fmus")}
     for tool, peer in [*peers.items()]:
-        python = given.modestpy if tool == "ModestPy" else sys.executable
+        python = arguments.modestpy if tool == "ModestPy" else sys.executable
         versions[tool] = version_of(peer.package, python)
         if versions[tool] is None:
             print(f"{tool} is skipped: {peer.package} is not installed")
@@ -291,14 +291,17 @@ def main():
         elif tool == "ModestPy":
             peers[tool] = Peer(peer.package, partial(run_modestpy, python), peer.functions, peer.runs_fmu)
     attempts = []
-    with temporary_directory("peers-") as folder, ProcessPoolExecutor(given.processes) as pool:
-        fmus = given.fmus or build_fmus(folder)
-        compare = partial(fit_record, fmus=fmus, peers=peers, least_budget=given.budget)
-        for each in pool.map(compare, range(given.records)):
-            attempts.append(each)
+    with temporary_directory("peers-") as folder, ProcessPoolExecutor(arguments.processes) as pool:
+        fmus = arguments.fmus or build_fmus(folder)
+        compare = partial(fit_record, fmus=fmus, peers=peers, least_budget=arguments.budget)
+        for record_attempts in pool.map(compare, range(arguments.records)):
+            attempts.append(record_attempts)
             print(
                 len(attempts),
-                {tool: (try_.is_found, round(try_.seconds, 1), try_.failure) for tool, try_ in each.items()},
+                {
+                    tool: (attempt.is_found, round(attempt.seconds, 1), attempt.failure)
+                    for tool, attempt in record_attempts.items()
+                },
             )
             sys.stdout.flush()
     print(f"Python {platform.python_version()}, {platform.machine()}, scipy {version('scipy')}")

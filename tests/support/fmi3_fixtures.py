@@ -28,8 +28,8 @@ def build_reduced_fmu(name):
 
     def make(folder):
         method, law = REDUCED[name]
-        chosen = ("--method", method, "--law", law, "--platform", "linux64")
-        done = commands.build("--fmi", "3", name, *chosen, "--out", folder)
+        options = ("--method", method, "--law", law, "--platform", "linux64")
+        done = commands.build("--fmi", "3", name, *options, "--out", folder)
         assert done.returncode == 0, done.stderr
 
     return build_cache.keep_build(f"lean fmi3 {name}", make) / f"{name}.fmu"

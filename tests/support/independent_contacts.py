@@ -443,18 +443,18 @@ class _Run:
                 modes[i] = mode
             verdicts = self.judge(modes, rest)
             held = sum(mode == 0 for mode in trial)
-            kept = sum(modes[i] == 0 for i in below_limit)
-            trials.append((held, kept, modes, verdicts))
+            n_below_limit = sum(modes[i] == 0 for i in below_limit)
+            trials.append((held, n_below_limit, modes, verdicts))
         good = [one for one in trials if all(ok for ok, _ in one[3])]
         if not good:
             raise UnsolvableError(f"no consistent modes at {self.t}")
-        held, kept, modes, verdicts = max(good, key=lambda one: one[:2])
-        best = [one for one in good if one[0] == held and (one[1] == kept or arriving)]
+        held, n_below_limit, modes, verdicts = max(good, key=lambda one: one[:2])
+        best = [one for one in good if one[0] == held and (one[1] == n_below_limit or arriving)]
         if len(best) > 1:
             self.solution.decisions.append(Decision(self.t, "choice", -1, 0.0))
         margin = min((size for _, size in verdicts), default=inf)
         for other_held, other_kept, _, others in trials:
-            if other_held >= held and (other_kept >= kept or arriving) and not all(ok for ok, _ in others):
+            if other_held >= held and (other_kept >= n_below_limit or arriving) and not all(ok for ok, _ in others):
                 margin = min(margin, max(size for ok, size in others if not ok))
         if margin < 0.05:
             self.solution.decisions.append(Decision(self.t, "modes", -1, float(margin)))

@@ -56,8 +56,8 @@ def interrupt_long_step(path, handler):
     try:
         fmu.step(0.0, 1e7)
     except BaseException as error:
-        reached = type(error).__name__, error.args
-    answer = {"reached": reached, "log": fmu.messages(), "x": isnan(fmu.get(["x"])[0])}
+        exception = type(error).__name__, error.args
+    answer = {"reached": exception, "log": fmu.messages(), "x": isnan(fmu.get(["x"])[0])}
     fmu.reset()
     begin(fmu)
     fmu.step(0.0, 0.1)
@@ -69,7 +69,7 @@ def interrupt_long_step(path, handler):
 def interrupt_short_steps(path, times):
     """Interrupt short steps repeatedly, mostly at entry or exit of a call; return the exceptions that reach the
     host."""
-    fmu, reached = start_fmu(path), []
+    fmu, exceptions = start_fmu(path), []
 
     def ring(*_):
         raise KeyboardInterrupt
@@ -84,11 +84,11 @@ def interrupt_short_steps(path, times):
                 t += 1e-5
                 fmu.get(["x", "v"])
         except BaseException as error:
-            reached.append(type(error).__name__)
+            exceptions.append(type(error).__name__)
         fmu.reset()
         begin(fmu)
     fmu.free()
-    return sorted(set(reached)), len(reached)
+    return sorted(set(exceptions)), len(exceptions)
 
 
 if __name__ == "__main__":

@@ -242,8 +242,8 @@ def run_beside_sources(root, built):
     loaded_before = set(sys.modules)
     rows = run_each(built)
     new = {getattr(sys.modules[name], "__file__", None) for name in set(sys.modules) - loaded_before}
-    places = (os.path.join(root, "fmus", ""), os.path.join(os.path.dirname(pythonfmu.__file__), ""))
-    return {"rows": rows, "foreign": [file for file in new if file and file.startswith(places)]}
+    folders = (os.path.join(root, "fmus", ""), os.path.join(os.path.dirname(pythonfmu.__file__), ""))
+    return {"rows": rows, "foreign": [file for file in new if file and file.startswith(folders)]}
 
 
 def run_in_folder(fmu, folder):

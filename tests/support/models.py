@@ -92,18 +92,18 @@ def experiment(name, values):
 
 
 def cover(groups):
-    """Return a few of these pairs of a thing and its properties, which have every property: the things."""
+    """Return a few of these cases, given with their properties, that have every property."""
     selected, missing = [], set().union(*(properties for _, properties in groups))
     while missing:
-        thing, met = max(groups, key=lambda group: len(group[1] & missing))
-        selected.append(thing)
-        missing -= met
+        case, properties = max(groups, key=lambda group: len(group[1] & missing))
+        selected.append(case)
+        missing -= properties
     return selected
 
 
-def pairwise_cases(name, many=2):
-    """Return a few combinations that contain every pair (`many` = 2) of choices."""
-    return cover([(values, {*choose(values.items(), min(many, len(values)))}) for values in combinations(name)])
+def pairwise_cases(name, size=2):
+    """Return a few combinations that contain every pair (`size` = 2) of choices."""
+    return cover([(values, {*choose(values.items(), min(size, len(values)))}) for values in combinations(name)])
 
 
 def traits(case):

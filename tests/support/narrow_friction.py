@@ -37,20 +37,20 @@ def motion(block, times):
     mode = int(np.sign(slip))
     if mode == 0:
         mode = 0 if block.k * abs(x) <= block.f_s else -int(np.sign(x))
-    places, events, n_events = [], [], 0
+    positions, events, n_events = [], [], 0
     while t < stop:
         if mode == 0:
             places_until, t, x, mode = rest(block, t, x, stop)
             slip = 0.0
         else:
             places_until, t, x, slip, mode = phase(block, mode, t, x, slip, stop)
-        for time in times[len(places) :]:
+        for time in times[len(positions) :]:
             if time > t or (time == t and t < stop):
                 break
-            places.append(places_until(time))
+            positions.append(places_until(time))
             events.append(n_events)
         n_events += 1
-    return places, events
+    return positions, events
 
 
 def rest(block, t, x, stop):
@@ -81,21 +81,21 @@ def phase(block, mode, t, x, slip, stop):
     near = mode * slip < limit
     while True:
         largest = (abs(block.k * x) + block.f_s) / block.m + block.v_s
-        how = {"max_step": 0.1 * block.v_s / largest} if near else {}
+        options = {"max_step": 0.1 * block.v_s / largest} if near else {}
         ends = [passes(0.0, -1), passes(limit * 1.01, 1)] if near else [passes(limit, -1)]
         done = solve_ivp(
-            rates, (t, stop), (x, slip), "DOP853", events=ends, rtol=3e-14, atol=1e-16, dense_output=True, **how
+            rates, (t, stop), (x, slip), "DOP853", events=ends, rtol=3e-14, atol=1e-16, dense_output=True, **options
         )
         assert done.status >= 0
         pieces.append(done)
         t, (x, slip) = done.t[-1], done.y[:, -1]
 
-        def places(time):
+        def position_at(time):
             return float(next(one for one in pieces if time <= one.t[-1]).sol(time)[0])
 
         if done.status == 0:
-            return places, stop, x, slip, mode
+            return position_at, stop, x, slip, mode
         if near and done.t_events[0].size:
             held = block.k * abs(x) <= block.f_s
-            return places, t, x, 0.0, 0 if held else -int(np.sign(x))
+            return position_at, t, x, 0.0, 0 if held else -int(np.sign(x))
         near = not near

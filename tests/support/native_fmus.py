@@ -25,5 +25,7 @@ def build_for_all_platforms():
     """Return the folder with a native FMU of smd for every platform, with one method, because only the platforms
     matter here."""
     require_compiler()
-    chosen = ("smd", "--native", "--method", "exact")
-    return build_cache.build_once("everywhere", *chosen, *(word for item in PLATFORMS for word in ("--platform", item)))
+    options = ("smd", "--native", "--method", "exact")
+    return build_cache.build_once(
+        "everywhere", *options, *(word for item in PLATFORMS for word in ("--platform", item))
+    )

@@ -50,12 +50,12 @@ def host_program(sanitizers="", version="2"):
     return compile_cached(f"host {version}", *words, sanitizers=sanitizers)
 
 
-def compile_sanitized(source, fmu, *how, sanitizers=SANITIZERS):
+def compile_sanitized(source, fmu, *options, sanitizers=SANITIZERS):
     """Compile the program `source` of tests/support together with the sources in an FMU, which it includes."""
     name, sources = f"{source} {fmu.stem}", unpack_cached(fmu) / "sources"
     words = ["-c", "-fPIC", "-fvisibility=hidden", f"-I{sources}", HOST_SOURCE.with_name(source)]
     program = compile_cached(name, *words, sanitizers=sanitizers)
-    return compile_cached(" ".join([name, "linked", *how]), *how, program, sanitizers=sanitizers)
+    return compile_cached(" ".join([name, "linked", *options]), *options, program, sanitizers=sanitizers)
 
 
 @cache

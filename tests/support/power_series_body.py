@@ -24,13 +24,13 @@ class Body:
     def push(self, *force):
         """Set the force and its leading derivatives at the current time; higher derivatives continue."""
         self.force, self.pushed = [*map(Decimal, force), *self.course()[len(force) :]], self.t
-        before, self.mode = self.mode, self.settled()
+        before, self.mode = self.mode, self.next_mode()
         self.events += [self.t] * bool(self.hold and self.t and self.mode != before)
 
     def course(self):
         """Return the current force and its derivatives."""
-        s, many = self.t - self.pushed, len(self.force)
-        return [value([self.force[j] / factorial(j - n) for j in range(n, many)][::-1], s) for n in range(many)]
+        s, n_terms = self.t - self.pushed, len(self.force)
+        return [value([self.force[j] / factorial(j - n) for j in range(n, n_terms)][::-1], s) for n in range(n_terms)]
 
     def forces(self):
         """Return the load and its derivatives while the body does not move."""
@@ -39,7 +39,7 @@ class Body:
         derivatives[1] += self.k * self.u
         return derivatives
 
-    def settled(self):
+    def next_mode(self):
         """Return the mode from the current time on; without dry friction any mode is right."""
         load, *rates = self.forces()
         if self.v or not self.hold:
@@ -55,7 +55,7 @@ class Body:
         for n in range(TERMS):
             force = forces[n] / factorial(n) if n < len(forces) else 0
             x.append((force - self.k * x[n] - self.c * (n + 1) * x[n + 1]) / (self.m * (n + 1) * (n + 2)))
-        return x[::-1], [n * one for n, one in enumerate(x)][:0:-1]
+        return x[::-1], [n * coefficient for n, coefficient in enumerate(x)][:0:-1]
 
     def release(self):
         """Return the time until breakaway and its direction."""
@@ -95,7 +95,7 @@ class Body:
                     low, h = (middle, h) if self.mode * value(v, middle) > 0 else (low, middle)
             self.t, self.x, self.v = self.t + h, value(x, h), value(v, h) * (not ends)
             if ends:
-                self.mode = self.settled()
+                self.mode = self.next_mode()
                 self.events.append(self.t)
         return self.x, self.v
 

@@ -276,7 +276,7 @@ def compare(rows, message, times, expected, structure):
         if t not in by_time:
             return "error", t, message
         row = by_time[t]
-        many = max(1.0, row[-2] / MANY_STEPS)
+        factor = max(1.0, row[-2] / MANY_STEPS)
         count, t_last, states = row[n], row[n + 1], np.array(row[n + 2 : n + 2 + len(state)])
         if not least <= count <= most:
             return (
@@ -286,10 +286,10 @@ def compare(rows, message, times, expected, structure):
             )
         if any(b is not None and a != b for a, b in zip(row, modes, strict=False)):
             return "modes", t, f"modes {tuple(row[:n])}, expected {modes}"
-        if least and abs(t_last - last) > many * time_error:
+        if least and abs(t_last - last) > factor * time_error:
             return "time", t, f"event at {t_last!r}, expected {last!r} +- {time_error:.1e}"
         worst = int(np.argmax(np.abs(states - state) / error))
-        if not abs(states[worst] - state[worst]) <= many * error[worst]:
+        if not abs(states[worst] - state[worst]) <= factor * error[worst]:
             return "state", t, f"state {worst} {states[worst]!r}, expected {state[worst]!r} +- {error[worst]:.1e}"
     return None
 
@@ -304,10 +304,10 @@ def describe(reference, structure, values, t):
     last = reference.first_modes
     for s, modes in reference.events:
         if start <= s <= t:
-            moved = [n for n in range(len(modes)) if modes[n] != last[n]]
-            if len(moved) > 1:
+            changed = [n for n in range(len(modes)) if modes[n] != last[n]]
+            if len(changed) > 1:
                 words.append("several")
-            for n in moved:
+            for n in changed:
                 hold = values.get(f"mu{n}_s", values.get(f"mu{n}_p", values[f"mu{n}_d"]))
                 words += ["no hold"] * (hold == 0.0)
                 words += ["limited"] * structure.contacts[n].limited

@@ -14,9 +14,9 @@ def run(resources, reals, integers, times, outputs):
     sys.path.insert(0, resources)
     entry = import_module(Path(resources, "slavemodule.txt").read_text().strip())
     slave_class = next(
-        thing
-        for thing in vars(entry).values()
-        if isinstance(thing, type) and "Fmi2Slave" in [base.__name__ for base in thing.__mro__[1:]]
+        value
+        for value in vars(entry).values()
+        if isinstance(value, type) and "Fmi2Slave" in [base.__name__ for base in value.__mro__[1:]]
     )
     slave = slave_class(instance_name="embedded", resources=resources)
     slave.set_real([int(reference) for reference in reals], list(reals.values()))

@@ -342,7 +342,7 @@ class StackPhase:
             if modes[i]:
                 self.guards.append((i, 0, modes[i] * self.slips[i], None))
             else:
-                self.guards += [(i, way, holds[i] * one - way * self.forces[i], holds[i]) for way in (-1, 1)]
+                self.guards += [(i, side, holds[i] * one - side * self.forces[i], holds[i]) for side in (-1, 1)]
 
     def follow(self, row, y):
         """Return the value of a row as a function of the time since the state y."""
@@ -365,7 +365,7 @@ class StackPhase:
             (time, value, contact, scale).
         """
         ends, minima = [], []
-        for i, way, row, scale in self.guards:
+        for i, side, row, scale in self.guards:
             values, slopes = path @ row, path @ (row @ self.rates)
             for n in np.flatnonzero(
                 ((slopes[:-1] < 0.0) & (slopes[1:] > 0.0)) | ((values[:-1] > 0.0) & (values[1:] < 0.0))
@@ -378,7 +378,7 @@ class StackPhase:
                         minima.append((n * dt + high, least, i, scale))
                         continue
                 if values[n] > 0.0:
-                    ends.append((n * dt + brentq(self.follow(row, path[n]), 0.0, high, xtol=1e-16), i, way))
+                    ends.append((n * dt + brentq(self.follow(row, path[n]), 0.0, high, xtol=1e-16), i, side))
                     break
         return min(ends, default=None), minima
 
@@ -409,23 +409,23 @@ def stack_motion(p, n_events=31, n_periods=30):
         end = None
         while end is None and t < horizon:
             path = powers @ y
-            end, found = phase.search(path, dt)
+            end, minima = phase.search(path, dt)
             last = len(path) - 1 if end is None else int(end[0] / dt)
             for i in range(2):
                 largest[i] = max(largest[i], modes[i] * (path[: last + 1] @ phase.slips[i]).max())
-            for s, value, i, scale in found:
+            for s, value, i, scale in minima:
                 if (end is None or s < end[0]) and (scale is None or value < 0.05 * scale):
                     dips.append(Dip(t + s, value / (scale or largest[i]), len(events)))
             if end is None:
                 t, y = t + last * dt, path[last]
         if end is None:
             break
-        duration, i, way = end
-        if way == 0:
+        duration, i, side = end
+        if side == 0:
             s, least = phase.next_minimum(modes[i] * phase.slips[i], y, duration, dt)
             dips.append(Dip(t + s, least / largest[i], len(events)))
         before, t, y = modes, t + duration, expm(phase.rates * duration) @ y
-        y, modes = modes_after(p, y, modes, i, way, t, dips, len(events))
+        y, modes = modes_after(p, y, modes, i, side, t, dips, len(events))
         for j in range(2):
             if not (before[j] and modes[j] == before[j]):
                 largest[j] = 0.0
@@ -439,16 +439,16 @@ def stack_motion(p, n_events=31, n_periods=30):
     return motion_to_a_calm_time(events, dips, horizon, p.period)
 
 
-def modes_after(p, y, modes, i, way, t, dips, n_events):
-    """Return state and modes after contact i changes to the mode `way`: loads above their limits break away."""
-    modes = tuple(way if j == i else mode for j, mode in enumerate(modes))
+def modes_after(p, y, modes, i, side, t, dips, n_events):
+    """Return state and modes after contact i changes to the mode `side`: loads above their limits break away."""
+    modes = tuple(side if j == i else mode for j, mode in enumerate(modes))
     y = y.copy()
     if modes[0] == 0:
         y[1] = 0.0
     if modes[1] == 0:
         y[3] = y[1] = 0.0 if modes[0] == 0 else (p.m1 * y[1] + p.m2 * y[3]) / (p.m1 + p.m2)
     holds = (p.ratio * p.f1, p.ratio * p.f2)
-    released = {i} if way else set()
+    released = {i} if side else set()
     while True:
         phase = StackPhase(p, modes)
         loads = phase.forces @ y
@@ -473,11 +473,11 @@ def random_stack(draw, ratio):
         m1, m2, k, c, f1, u = (start * 2.0 ** draw.uniform(-1.0, 1.0) for start in (4.0, 2.0, 400.0, 150.0, 9.0, 0.2))
         stack = Stack(m1, m2, k, c, f1, f1 * draw.uniform(1.02, 2.0), ratio, u)
         try:
-            found = stack_motion(stack)
+            motion_of_stack = stack_motion(stack)
         except AmbiguousError:
             continue
-        if len(found.events) > 5 and any(mode for _, mode, _ in found.events):
-            return stack, found
+        if len(motion_of_stack.events) > 5 and any(mode for _, mode, _ in motion_of_stack.events):
+            return stack, motion_of_stack
 
 
 def stacks(ratio, number=20, seed=1):
@@ -513,12 +513,12 @@ def shaken(number=200, seed=1, excesses=(1e-8, 1e-1)):
     shares."""
     draw = Random(f"shaken {seed}")
     low, high = (float(mp.log10(excess)) for excess in excesses)
-    found = []
+    blocks = []
     for _ in range(number):
         f_d, ratio, excess = draw.uniform(1.0, 5.0), draw.uniform(1.0, 1.5), 10.0 ** draw.uniform(low, high)
         excess *= -0.5 if draw.random() < 0.5 else 1.0
-        found.append(Shaken(1.0, f_d, ratio, ratio * f_d * (1.0 + excess), draw.uniform(2.0, 40.0), excess))
-    return found
+        blocks.append(Shaken(1.0, f_d, ratio, ratio * f_d * (1.0 + excess), draw.uniform(2.0, 40.0), excess))
+    return blocks
 
 
 def random_belt(draw, ratio):
@@ -527,9 +527,9 @@ def random_belt(draw, ratio):
         m, k, v_b, f_d = (start * 3.0 ** draw.uniform(-1.0, 1.0) for start in (1.0, 100.0, 0.1, 5.0))
         c = draw.choice([0.0, draw.uniform(0.0, 0.2), draw.uniform(0.0, 0.02)])
         belt = Belt(m, k, c, v_b, f_d, ratio, draw.uniform(-1.0, 1.0) * f_d / k, draw.uniform(-1.0, 2.0) * v_b)
-        found = motion(belt)
-        if len(found.events) > 1:
-            return belt, found
+        block_motion = motion(belt)
+        if len(block_motion.events) > 1:
+            return belt, block_motion
 
 
 def random_touch(draw):
@@ -604,18 +604,18 @@ def chosen_sled(draw, depth):
     return sled, 15
 
 
-def chosen(what, number, seed=1, depths=(1e-10, 1e-2)):
+def chosen(kind, number, seed=1, depths=(1e-10, 1e-2)):
     """Return blocks on a belt ("belt") or sleds whose dips have random relative depths, and their motions."""
-    draw = Random(f"chosen {what} {seed}")
+    draw = Random(f"chosen {kind} {seed}")
     low, high = (float(mp.log10(depth)) for depth in depths)
-    found = []
-    while len(found) < number:
+    pairs = []
+    while len(pairs) < number:
         depth = draw.choice([-1, 1]) * 10.0 ** draw.uniform(low, high)
-        parameters, n_periods = (chosen_belt(draw, depth), 15) if what == "belt" else chosen_sled(draw, depth)
-        found.append((parameters, motion(parameters, n_periods=n_periods)))
-        dips = found[-1][1].dips
+        parameters, n_periods = (chosen_belt(draw, depth), 15) if kind == "belt" else chosen_sled(draw, depth)
+        pairs.append((parameters, motion(parameters, n_periods=n_periods)))
+        dips = pairs[-1][1].dips
         assert abs(dips[0].depth / depth - 1.0) < 1e-4, (parameters, depth, dips[:3])
-    return found
+    return pairs
 
 
 def belts(ratio, number=60, seed=1):

@@ -145,10 +145,10 @@ class Instance:
 
     def follow(self, t, stop, names):
         """Step from t to stop along solver.t_next; return the times and a row of values for each."""
-        read, look = self._reader(names), self._reader(["solver.t_next"])
+        read, read_next = self._reader(names), self._reader(["solver.t_next"])
         times, rows = [t], [read()]
         while t < stop:
-            ahead = look()[0]
+            ahead = read_next()[0]
             ahead = ahead if ahead < stop else stop  # NaN (a run that will fail) leads to the stop time
             if ahead <= t:
                 raise AssertionError(f"solver.t_next is {ahead!r} at {t!r}: it does not lead on")
@@ -269,17 +269,17 @@ class ModelExchange(CoSimulation):
 
         read, t, rows, evaluations = self._reader(names), times[0], [], 0
 
-        def place(t, y):
+        def set_point_and_inputs(t, y):
             self.set({name: value + rate * t for name, (value, rate) in ramp.items()})
             self.set_point(t, list(y))
 
         def rates(t, y):
-            place(t, y)
+            set_point_and_inputs(t, y)
             return self.rates()
 
         def indicator(i):
             def root(t, y):
-                place(t, y)
+                set_point_and_inputs(t, y)
                 return self.indicators()[i]
 
             root.terminal, root.direction = True, -1
@@ -296,12 +296,12 @@ class ModelExchange(CoSimulation):
                 near = (ahead + i * np.spacing(ahead) for i in range(1000))
                 ahead = next(t for t in near if min(root(t, run.sol(t)) for root in roots) <= 0.0)
             while len(rows) < len(times) and (times[len(rows)] < ahead or run.status == 0):
-                place(times[len(rows)], run.sol(times[len(rows)]))
+                set_point_and_inputs(times[len(rows)], run.sol(times[len(rows)]))
                 rows.append(read())
             if run.status != 1:
                 return rows, evaluations
             t = ahead
-            place(t, run.sol(t))
+            set_point_and_inputs(t, run.sol(t))
             self.enter_event_mode()
             self.update_discrete_states()
             self.enter_continuous_time()
@@ -337,12 +337,12 @@ class Worker:
         (folder, options["model_description"]), count = self.unpacked(path), [0]
         plain = FMU3Model.getContinuousStateDerivatives
 
-        def counted(*arguments):
+        def count_and_call(*arguments):
             count[0] += 1
             return plain(*arguments)
 
         try:
-            with patch.object(FMU3Model, "getContinuousStateDerivatives", counted):
+            with patch.object(FMU3Model, "getContinuousStateDerivatives", count_and_call):
                 table = fmpy.simulate_fmu(folder, **options)
         except Exception as error:
             return {"error": str(error)}

@@ -14,10 +14,10 @@ import build_cache
 TIMEOUT = 120.0  # s, per request
 
 
-def run_script(script, function, *arguments, **how):
+def run_script(script, function, *arguments, **options):
     """Return the result of a function of a support script, run in a process that must exit cleanly and print no
     errors."""
-    answer, stderr = run_script_with_stderr(script, function, *arguments, **how)
+    answer, stderr = run_script_with_stderr(script, function, *arguments, **options)
     assert stderr == ""
     return answer
 
