@@ -30,7 +30,7 @@ SCENE_TEXTS = {
     "atol": "Value of `solver.atol`, in SI units.",
     "h_max": "Value of `solver.h_max`, in s.",
     "grid": "Communication step in s.",
-    "times": "Times in s to record, and no others, as those of a measurement.",
+    "times": "Times in s, such as those of a measurement; only these are recorded.",
     "follow": "Also visit the end of every internal step of the solver. Without `grid`, visit these only. "
     "Default: `true` without `grid`, `false` with it.",
     "repeat": "Time the run this many times and report the fastest.",
@@ -132,16 +132,18 @@ def enumerations(fmus: Path) -> str:
     """The items of all enumerations, with the FMUs that have them."""
     from fmpy import read_model_description
 
-    labels: dict[tuple[str, str, str, str], list[str]] = {}
+    models_by_item: dict[tuple[str, str, str, str], list[str]] = {}
     for model in MODELS:
         for variable in read_model_description(str(fmus / f"{model}.fmu")).modelVariables:
             for item in variable.declaredType.items if variable.type == "Enumeration" else ():
                 default = int(float(variable.start)) == int(item.value)
                 name = f"`{model}`" + (" (default)" if default else "")
-                labels.setdefault((variable.name, str(item.value), item.name, item.description), []).append(name)
+                models_by_item.setdefault((variable.name, str(item.value), item.name, item.description), []).append(
+                    name
+                )
     rows = [
         (f"`{name}`", value, item, text, ", ".join(models))
-        for (name, value, item, text), models in sorted(labels.items())
+        for (name, value, item, text), models in sorted(models_by_item.items())
     ]
     return table(("variable", "value", "name", "meaning", "FMUs"), rows)
 

@@ -8,7 +8,7 @@
     rtol, atol, h_max         solver.rtol, solver.atol (m), solver.h_max (s); default: those of the FMU
     outputs = ["x", "v"]      columns to record
     grid                      communication step in s
-    times = [0.0, 0.1, 0.3]   times in s to record, and no others; the run stops at the last one without a stop
+    times = [0.0, 0.1, 0.3]   times in s; only these are recorded, and the last one is the default stop
     follow = true             step to the ends of internal steps as well; without a grid: to these only
                               default without follow and grid: 4096 equal steps and the internal steps
     repeat = 3                run several times and report the shortest run time
