@@ -142,20 +142,20 @@ def draw_stick(runs: dict[str, dict[str, np.ndarray]], colours: dict[str, str], 
         whole = figure.add_subplot(grid[0, :])
         creep, speed, count = (figure.add_subplot(grid[1, i]) for i in range(3))
         for law in ("sign", "hybrid"):
-            run, style = runs[law], {"color": colours[law], "zorder": 3 if law == "hybrid" else 2}
+            run, line_style = runs[law], {"color": colours[law], "zorder": 3 if law == "hybrid" else 2}
             t, x, v = run["t"], run["x"], run["v"]
             even = np.unique(np.searchsorted(t, np.arange(0.0, 6.0, 0.01)))
-            whole.plot(t[even], 100 * x[even], lw=1.8 if law == "hybrid" else 3.4, label=labels[law], **style)
+            whole.plot(t[even], 100 * x[even], lw=1.8 if law == "hybrid" else 3.4, label=labels[law], **line_style)
             late = even[t[even] >= begin]
-            creep.plot(t[late], 1e6 * (x[late] - x[late[0]]), lw=1.8, **style)
+            creep.plot(t[late], 1e6 * (x[late] - x[late[0]]), lw=1.8, **line_style)
             near = (t >= begin) & (t <= begin + span)
             if law == "sign":
-                speed.plot(1e3 * (t[near] - begin), 1e6 * v[near], lw=1.4, **style)
+                speed.plot(1e3 * (t[near] - begin), 1e6 * v[near], lw=1.4, **line_style)
             else:  # one internal step covers the standstill
-                speed.plot([0.0, 1e3 * span], [0.0, 0.0], lw=1.8, **style)
+                speed.plot([0.0, 1e3 * span], [0.0, 0.0], lw=1.8, **line_style)
             steps = run["steps"]
             indices = np.unique(np.searchsorted(steps, np.linspace(0.0, 6.0, 301)[1:]).clip(0, len(steps) - 1))
-            count.plot(steps[indices], indices + 1, lw=1.8, **style)
+            count.plot(steps[indices], indices + 1, lw=1.8, **line_style)
             count.annotate(
                 f"{len(steps):,}".replace(",", " "), (5.95, 1.3 * len(steps)), ha="right", color=colours[law]
             )
@@ -221,11 +221,11 @@ def friction_laws(folder: Path) -> None:
             fmu = FMUS / ("more" if "sigma_2" in values else "") / f"{name}.fmu"
             run = api.simulate(fmu, values | {"m": 1.0, "k": 2.0, "v_driver": 0.1}, stop=10.0, rtol=1e-6)
             near = run.time > 7.2
-            style = {"color": colours[name], "label": label}
-            slip.plot(run.time[near], run.columns["v"][near], **style)
+            line_style = {"color": colours[name], "label": label}
+            slip.plot(run.time[near], run.columns["v"][near], **line_style)
             free = values | {"m": 1.0, "k": 0.0, "v_driver": 0.0}
             run = api.simulate(fmu, free, stop=40.0, interval=0.1, inputs=load, rtol=1e-8)
-            held.plot(run.time, 1e6 * np.asarray(run.columns["x"]), **style)
+            held.plot(run.time, 1e6 * np.asarray(run.columns["x"]), **line_style)
         slip.set(title="The first slip", xlabel="time, s", ylabel="speed, m/s")
         slip.legend(fontsize=8)
         held.set(title="Under 0.5 N, on and off", xlabel="time, s", ylabel="displacement, µm", ylim=(-0.5, 12.0))
