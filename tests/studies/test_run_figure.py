@@ -1,128 +1,107 @@
 """The figure of a run, for the published scenes that differ in it and do not take seconds."""
 
-import json
-import os
 import re
 import shutil
-import subprocess
-import sys
 import tomllib
+from contextlib import chdir
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from unittest.mock import patch
 
 import commands
 import numpy as np
 import pytest
-from build_cache import ROOT, build_user_model, cached_folder
+from build_cache import ROOT, build_user_model
+from matplotlib.figure import Figure
+from matplotlib.text import Text
 
 import harness
+from harness.running import runner
+from harness.scenes.scene import load_scene
+from harness.studies.run.study import run_scene
 
 SCENES = {path.stem: tomllib.loads(path.read_text()) for path in sorted((ROOT / "harness/scenes").glob("*.toml"))}
 for name in "coulomb-stop", "pacejka-0.001":  # its figure is that of coulomb; it takes seconds
     SCENES.pop(name)
 MODAL = [name for name, scene in SCENES.items() if scene.get("law") == "hybrid"]
-PROGRAM = """
-import json, sys
-from dataclasses import replace
-from pathlib import Path
-from matplotlib.figure import Figure
-from matplotlib.text import Text
-from harness.scenes.scene import load_scene
-from harness.studies.run import study
-
-summaries, run = {}, study.runner.run
-def record(spec, report):
-    runs.append(run(spec, report))
-    return runs[-1]
-study.runner.run = record
-def covered(axes):
-    (title,) = (each for each in axes.findobj(Text) if each.get_text() == axes.get_title(loc="left"))
-    legend = axes.get_legend()
-    return bool(legend and legend.get_window_extent().overlaps(title.get_window_extent()))
-for name in sys.argv[1:]:
-    figures, runs = [], []
-    Figure.savefig = lambda figure, file, **how: figures.append(figure)
-    scene = load_scene(name)
-    study.run_scene(replace(scene, run=replace(scene.run, repeat=1)), Path("results"), lambda share: None)
-    figures[0].draw_without_rendering()
-    events = runs[0].events
-    summaries[name] = {
-        "samples": len(runs[0].time),
-        "sticks": [] if events is None else events.t[events.mode == 0].tolist(),
-        "panels": {
-            axes.get_title(loc="left"): {
-                "axis": axes.get_ylabel(),
-                "covered": covered(axes),
-                "lines": [[line.get_label(), *(list(map(float, d)) for d in line.get_data())] for line in axes.lines],
-                "stuck": [patch.get_x() for patch in axes.patches if patch.get_label() == "stuck"],
-            }
-            for axes in figures[0].get_axes()
-        },
-    }
-print(json.dumps(summaries))
-"""
 
 
 @pytest.fixture(scope="module")
-def drawn_figures(fmus):
-    def make(folder):
-        (folder / "fmus").symlink_to(fmus)
-        done = subprocess.run(
-            [sys.executable, "-c", PROGRAM, *SCENES],
-            cwd=folder,
-            env=os.environ | {"PYTHONPATH": str(ROOT)},
-            capture_output=True,
-            text=True,
-            timeout=120,
-        )
-        assert done.returncode == 0, done.stderr
-        (folder / "summaries.json").write_text(done.stdout)
+def draw(fmus, tmp_path_factory):
+    """Return draw(scene): its run, and the axes of its figure by their titles; each scene is run once."""
+    folder = tmp_path_factory.mktemp("drawn")
+    (folder / "fmus").symlink_to(fmus)
 
-    return json.loads((cached_folder("drawn", make) / "summaries.json").read_text())
+    @cache
+    def draw(name):
+        figures, runs, run = [], [], runner.run
+
+        def save(figure, file, **options):
+            figures.append(figure)
+
+        def record(spec, report):
+            runs.append(run(spec, report))
+            return runs[-1]
+
+        scene = load_scene(name)
+        with chdir(folder), patch.object(Figure, "savefig", save), patch.object(runner, "run", record):
+            run_scene(replace(scene, run=replace(scene.run, repeat=1)), Path("results"), lambda share: None)
+        figures[0].draw_without_rendering()
+        return runs[0], {axes.get_title(loc="left"): axes for axes in figures[0].get_axes()}
+
+    return draw
 
 
-def curves(scene):
-    """Return the panels over time, each with its longest line, the curve."""
-    over_time = {title: panel for title, panel in scene["panels"].items() if title[:4] not in ("phas", "step")}
-    return {title: max(panel["lines"], key=lambda line: len(line[1])) for title, panel in over_time.items()}
+def curves(panels):
+    """Return the times and values of the curve in each panel over time: its longest line."""
+    over_time = {title: axes for title, axes in panels.items() if title[:4] not in ("phas", "step")}
+    lines = {title: max(axes.lines, key=lambda line: len(line.get_xdata())) for title, axes in over_time.items()}
+    return {title: line.get_data() for title, line in lines.items()}
+
+
+def is_title_covered(axes):
+    """Return whether the legend overlaps the title."""
+    (title,) = (text for text in axes.findobj(Text) if text.get_text() == axes.get_title(loc="left"))
+    legend = axes.get_legend()
+    return bool(legend and legend.get_window_extent().overlaps(title.get_window_extent()))
 
 
 @pytest.mark.parametrize("name", SCENES)
-def test_a_curve_is_smooth_despite_large_steps(drawn_figures, name):
-    for _, t, _ in curves(drawn_figures[name]).values():
+def test_a_curve_is_smooth_despite_large_steps(draw, name):
+    _, panels = draw(name)
+    for t, _ in curves(panels).values():
         assert np.diff(t).max() < 2.01 * (t[-1] - t[0]) / 1000
 
 
-def test_the_plotted_steps_are_those_of_the_solver(drawn_figures):
+def test_the_plotted_steps_are_those_of_the_solver(draw):
     """The steps are those of the measured run, and the curve has more points."""
-    _, t, _ = drawn_figures["smd"]["panels"]["step size of the solver"]["lines"][0]
-    assert (
-        len(t) + 1
-        == drawn_figures["smd"]["samples"]
-        < 300
-        < len(curves(drawn_figures["smd"])["position of the mass"][1])
-    )
+    run, panels = draw("smd")
+    t = panels["step size of the solver"].lines[0].get_xdata()
+    assert len(t) + 1 == len(run.time) < 300 < len(curves(panels)["position of the mass"][0])
 
 
 @pytest.mark.parametrize("name", MODAL)
-def test_every_stick_phase_is_shaded_from_its_start(drawn_figures, name):
-    for title in curves(drawn_figures[name]):
-        stuck = drawn_figures[name]["panels"][title]["stuck"]
-        assert stuck == pytest.approx(drawn_figures[name]["sticks"][: len(stuck)])
-        assert len(drawn_figures[name]["sticks"]) - len(stuck) <= (
-            name == "coulomb"
-        )  # whose last one begins after the end
+def test_every_stick_phase_is_shaded_from_its_start(draw, name):
+    run, panels = draw(name)
+    sticks = [] if run.events is None else run.events.t[run.events.mode == 0]
+    for title in curves(panels):
+        stuck = [patch.get_x() for patch in panels[title].patches if patch.get_label() == "stuck"]
+        assert stuck == pytest.approx(sticks[: len(stuck)])
+        assert len(sticks) - len(stuck) <= (name == "coulomb")  # whose last one begins after the end
 
 
 @pytest.mark.parametrize("name", SCENES)
-def test_no_legend_covers_a_title(drawn_figures, name):
-    assert [title for title, panel in drawn_figures[name]["panels"].items() if panel["covered"]] == []
+def test_no_legend_covers_a_title(draw, name):
+    _, panels = draw(name)
+    assert [title for title, axes in panels.items() if is_title_covered(axes)] == []
 
 
-def test_angles_are_in_degrees(drawn_figures):
-    angle, speed = (
-        drawn_figures["pendulum"]["panels"][title] for title in ("angle, zero when hanging down", "angular speed")
-    )
-    assert (angle["axis"], speed["axis"]) == ("theta [deg]", "omega [deg/s]")
-    assert curves(drawn_figures["pendulum"])["angle, zero when hanging down"][2][0] == pytest.approx(10.02)
+def test_angles_are_in_degrees(draw):
+    _, panels = draw("pendulum")
+    assert panels["angle, zero when hanging down"].get_ylabel() == "theta [deg]"
+    assert panels["angular speed"].get_ylabel() == "omega [deg/s]"
+    assert curves(panels)["angle, zero when hanging down"][1][0] == pytest.approx(10.02)
 
 
 @pytest.mark.parametrize(
@@ -136,27 +115,30 @@ def test_angles_are_in_degrees(drawn_figures):
         ("stickslip-threshold", "speed of the sled", ["peak_speed"]),
     ],
 )
-def test_a_published_figure_is_shown_for_comparison(drawn_figures, name, title, figures):
+def test_a_published_figure_is_shown_for_comparison(draw, name, title, figures):
     published = [SCENES[name]["published"][figure] for figure in figures]
-    lines = drawn_figures[name]["panels"][title]["lines"]
-    levels = [y[0] for text, _, y in lines if text.startswith("published") and len(set(y)) == 1]
+    _, panels = draw(name)
+    lines = [line.get_ydata() for line in panels[title].lines if line.get_label().startswith("published")]
+    levels = [y[0] for y in lines if len(set(y)) == 1]
     assert levels == pytest.approx([value[0] if isinstance(value, list) else value for value in published])
 
 
 @pytest.mark.parametrize("name", ["smd", "stickslip-threshold", "pacejka-0.01"])
-def test_the_published_mean_step_is_shown_for_comparison(drawn_figures, name):
+def test_the_published_mean_step_is_shown_for_comparison(draw, name):
     value, unit = SCENES[name]["published"]["mean_step"]
-    levels = {text: y[0] for text, _, y in drawn_figures[name]["panels"]["step size of the solver"]["lines"]}
+    _, panels = draw(name)
+    levels = {line.get_label(): line.get_ydata()[0] for line in panels["step size of the solver"].lines}
     assert levels[f"published {value:.5g} {unit}"] == pytest.approx(1e-3 * value)
 
 
 @pytest.mark.parametrize("name", ["smd", "coulomb", "pendulum"])
-def test_the_envelope_of_the_published_loss_passes_through_the_turning_points(drawn_figures, name):
+def test_the_envelope_of_the_published_loss_passes_through_the_turning_points(draw, name):
     """Within the difference between the published value and ours."""
-    lines = next(iter(drawn_figures[name]["panels"].values()))["lines"]
-    turning = next(np.abs(y) for text, _, y in lines if text == "turning points")
-    upper = next(np.array(y) for text, _, y in lines if text == "published" and len(y) > 1)
-    assert upper == pytest.approx(turning, abs=0.02 * turning[0])
+    _, panels = draw(name)
+    lines = [(line.get_label(), np.asarray(line.get_ydata())) for line in next(iter(panels.values())).lines]
+    turning_points = next(np.abs(y) for text, y in lines if text == "turning points")
+    upper = next(y for text, y in lines if text == "published" and len(y) > 1)
+    assert upper == pytest.approx(turning_points, abs=0.02 * turning_points[0])
 
 
 CONTACTS = ROOT / "tests/example_models/larger"
