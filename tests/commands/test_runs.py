@@ -4,8 +4,6 @@ import csv
 import json
 import re
 import shutil
-import subprocess
-import sys
 from functools import partial
 from math import cos, exp
 from types import SimpleNamespace
@@ -19,16 +17,9 @@ from models import MODELS, outputs
 BASE = 'title = "a title"\nmodel = "stickslip"\noutputs = ["x", "v"]\n'
 
 
-ENVIRONMENT = {"PYTHONPATH": str(ROOT), "PATH": "", "COLUMNS": "100"}
 TIME = r'"name": "run_time",\s+"value": [^,]+'
 NUMBER = r"-?\b\d+\.?\d*(?:e[-+]\d+)?"
 harness = partial(commands.harness, blank=True, PATH="", COLUMNS="100")  # published cases are drawn elsewhere
-
-
-def python(folder, *arguments):
-    """Run Python with these arguments in `folder`, with the harness on its path; return the finished process."""
-    command = [sys.executable, *map(str, arguments)]
-    return subprocess.run(command, cwd=folder, env=ENVIRONMENT, capture_output=True, text=True, timeout=300)
 
 
 @pytest.fixture
@@ -315,7 +306,7 @@ def test_a_scene_imports_only_the_modules_it_needs(user_folder, tmp_path):
             f"run_scene(load_scene({file!r}), Path({str(tmp_path)!r}), lambda share: None)\n"
             f"print([name for name in {optional} if name in sys.modules])\n"
         )
-    done = python(user_folder, "-c", code)
+    done = commands.run_python(user_folder, "-c", code)
     assert done.stderr == ""
     assert done.stdout == f"[]\n{optional[:1]}\n{[optional[0], optional[3]]}\n"
 

@@ -1,9 +1,8 @@
 """Imports of the package `fmus` load no more than they need."""
 
-import subprocess
-import sys
-
+import commands
 import pytest
+from build_cache import ROOT
 
 SCRIPT = "import sys; {}; print(*sorted(name for name in sys.modules if name.split('.')[0] in ('fmus', 'numpy')))"
 DECLARATIONS = "fmus.packaging.equations.expressions fmus.packaging.equations.model_declaration"
@@ -16,6 +15,5 @@ LOADED = {
 
 @pytest.mark.parametrize("statement", LOADED)
 def test_an_import_loads_no_other_modules(statement):
-    command = [sys.executable, "-c", SCRIPT.format(statement)]
-    loaded = subprocess.run(command, capture_output=True, text=True, check=True).stdout
-    assert loaded.split() == LOADED[statement].split()
+    done = commands.run_python(ROOT, "-c", SCRIPT.format(statement))
+    assert (done.stdout.split(), done.stderr) == (LOADED[statement].split(), "")

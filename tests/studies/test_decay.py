@@ -2,15 +2,11 @@
 
 import csv
 import json
-import os
-import subprocess
-import sys
 from dataclasses import replace
 
 import commands
 import numpy as np
 import pytest
-from build_cache import ROOT
 from decays import decay_record
 from matplotlib.figure import Figure
 from shared_keys import check_shared_keys
@@ -122,12 +118,5 @@ unnecessary = ("fmpy", "cattrs", "scipy.stats", "scipy.signal")
 unnecessary += ("harness.running", "harness.scenes.run_spec", "harness.scenes.scene")
 print(len(draws), [name for name in unnecessary if name in sys.modules])
 """
-    done = subprocess.run(
-        [sys.executable, "-c", program],
-        cwd=tmp_path,
-        env=os.environ | {"PYTHONPATH": os.pathsep.join([str(ROOT), str(ROOT / "tests/support")])},
-        capture_output=True,
-        text=True,
-        timeout=120,
-    )
+    done = commands.run_python(tmp_path, "-c", program)
     assert (done.stdout.split(maxsplit=1), done.stderr) == (["1", "[]\n"], "")

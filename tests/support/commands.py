@@ -63,11 +63,17 @@ def _run_here(program, folder, arguments, text, environment):
 
 def run_process(folder, *arguments, module="harness", text="", **environment):
     """Run `python -m harness`, or another module, in a process of its own and return the finished process."""
+    return run_python(folder, "-m", module, *arguments, text=text, **{"PYTHONPATH": str(ROOT), **environment})
+
+
+def run_python(folder, *arguments, text="", **environment):
+    """Run Python with these arguments in a process of its own, which finds the project and the folder of this file, and
+    return the finished process."""
     return subprocess.run(
-        [sys.executable, "-m", module, *map(str, arguments)],
+        [sys.executable, *map(str, arguments)],
         input=text,
         cwd=folder,
-        env={**os.environ, "PYTHONPATH": str(ROOT), **environment},
+        env={**os.environ, "PYTHONPATH": os.pathsep.join([str(ROOT), str(SUPPORT)]), **environment},
         capture_output=True,
         text=True,
         timeout=TIMEOUT,
