@@ -3,8 +3,8 @@
 import csv
 import html
 import json
+import os
 import re
-import sys
 from functools import partial
 from importlib.metadata import version
 from pathlib import Path
@@ -12,6 +12,7 @@ from pathlib import Path
 import commands as processes
 import numpy as np
 import pytest
+from build_cache import ROOT
 from rich.console import Console
 
 from fmus.packaging.model_lookup import more_model_names
@@ -197,10 +198,10 @@ def test_an_fmu_failure_of_either_backend_is_reported_once(backend_fmus, tmp_pat
         ("pyssp_standard", "coupled", ("couple", "two-masses")),
     ],
 )
-def test_a_missing_optional_package_is_named_before_any_run(workspace, monkeypatch, package, extra, arguments):
-    """Those of `decay` are named by a test of the formats of records."""
-    monkeypatch.setitem(sys.modules, package, None)
-    done = harness(workspace, *arguments)
+def test_a_missing_optional_package_is_named_before_any_run(workspace, package, extra, arguments):
+    """In a process of its own, which has not imported them; those of `decay` are named by a test of record formats."""
+    (workspace / "sitecustomize.py").write_text(f"import sys; sys.modules[{package!r}] = None")
+    done = processes.run_process(workspace, *arguments, PYTHONPATH=f"{workspace}{os.pathsep}{ROOT}")
     assert (done.returncode, done.stdout, done.stderr.count("\n")) == (1, "", 1), done.stderr
     assert package in done.stderr
     assert f"pip install 'friction-fmus[{extra}]'" in done.stderr
