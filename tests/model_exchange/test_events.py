@@ -2,12 +2,9 @@
 
 from math import isfinite
 
-import model_exchange_client
 import pytest
 from model_exchange_client import BREAKAWAY_TIME, DRIVER, HOLD, SLIDE, G, K, M, handle_event_at, single_error
 from models import EXACT, MODELS, SIGN, THRESHOLD, declared
-
-fmus, launch, _ = model_exchange_client.FIXTURES
 
 
 def test_the_sled_breaks_away_slides_and_sticks_again(launch):

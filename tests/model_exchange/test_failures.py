@@ -2,7 +2,6 @@
 
 from math import inf, isnan, nan
 
-import model_exchange_client
 import pytest
 from model_exchange_client import DRIVEN, handle_event_at, single_error
 from models import MODELS, PUSHED, declared, model_class, outputs, push, runtime
@@ -11,7 +10,6 @@ from worker_client import FmiError
 from fmus.packaging.lowering import model_exchange_run
 from fmus.runtime.codes import DIVERGED, OK
 
-fmus, launch, launch_moving = model_exchange_client.FIXTURES
 EVERY_MODEL = pytest.mark.parametrize("name", MODELS)
 
 

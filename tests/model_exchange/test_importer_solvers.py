@@ -13,7 +13,6 @@ follows: the error of the speed is the acceleration times the delay, which GROWT
 from itertools import pairwise
 from math import isclose, sqrt
 
-import fmi3_fixtures
 import independent_solution
 import numpy as np
 import pytest
@@ -28,7 +27,6 @@ from harness.references.certified_reference import POINTS, event_time_error, loa
 from harness.references.models import CASES
 from tests.runtime.test_parameter_changes import spans
 
-fmus = fmi3_fixtures.fmus
 TOLERANCES = (1e-4, 1e-6, 1e-8, 1e-10)
 CERTIFIED = [name for name in MODELS if (ROOT / "fmus" / f"{name}.csv").is_file()]
 TRUTHS = {name: load_reference(name) for name in CERTIFIED}

@@ -1,14 +1,12 @@
 """Model exchange call by call: states, rates and indicators in every phase, after restoring a state, and after a
 reset."""
 
-import model_exchange_client
 import pytest
 from model_exchange_client import DRIVEN, DRIVER, DRY, K, handle_event_at, single_error
 from models import FEW_CASES, MODELS, counts, declared, label, model_class, outputs, push
 from row_comparison import assert_identical
 from worker_client import FmiError
 
-fmus, launch, launch_moving = model_exchange_client.FIXTURES
 EVERY_MODEL = pytest.mark.parametrize("name", MODELS)
 
 

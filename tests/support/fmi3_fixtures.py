@@ -1,6 +1,6 @@
 """The FMI 3.0 FMUs, built once per test run.
 
-A test module runs them instead of the Python FMUs by `fmus = fmi3_fixtures.fmus`; `launch` then uses them.
+A module, or a conftest.py, runs them instead of the Python FMUs by `fmus = fmi3_fixtures.fmus`, which `launch` then uses.
 """
 
 from functools import cache
