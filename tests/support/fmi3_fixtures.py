@@ -1,6 +1,6 @@
 """The FMI 3.0 FMUs, built once per test run.
 
-A module, or a conftest.py, runs them instead of the Python FMUs by `fmus = fmi3_fixtures.fmus`, which `launch` then uses.
+A module, or a conftest.py, runs them instead of the Python FMUs by `fmus = fmi3_fixtures.fmus`.
 """
 
 from functools import cache
