@@ -32,16 +32,16 @@ def set_values(values):
 def answers_of(fmu, script, **environment):
     """Return the answers without log messages, and the lines of standard error; a Python FMU gets its interpreter."""
     library = c_host.load_library(fmu)
-    answers, noise = run_host_script(fmu, script, environment=os.environ | dict(library.environment) | environment)
-    return [answer for answer in answers if not answer.startswith("log ")], noise.splitlines()
+    answers, stderr = run_host_script(fmu, script, environment=os.environ | dict(library.environment) | environment)
+    return [answer for answer in answers if not answer.startswith("log ")], stderr.splitlines()
 
 
 FAILURES = {
     "bad parameter": ({"m": -1.0}, {}),
-    "contradicting values": ({"mu_d": 1.0}, {}),
+    "contradicting start values": ({"mu_d": 1.0}, {}),
     "bad input": ({}, {"F_ext": nan}),
     "output set": ({}, {"x": 1.0}),
-    "values that contradict each other": ({}, {"mu_s": 0.1}),
+    "contradicting values": ({}, {"mu_s": 0.1}),
     "diverging run": ({}, {"F_ext": 1e308, "m": 1e-308}),
 }
 

@@ -17,7 +17,7 @@ import independent_solution
 import numpy as np
 import pytest
 from build_cache import ROOT
-from independent_solution import ClosedFormMotion
+from independent_solution import ClosedFormMotion, spans
 from models import MODELS, SIGN, declared, model_class, outputs
 from worker_client import FmpyError
 
@@ -25,7 +25,6 @@ from fmus.runtime.codes import OUT_OF_RANGE
 from fmus.runtime.messages import value_message
 from harness.references.certified_reference import POINTS, event_time_error, load_reference, relative_errors
 from harness.references.models import CASES
-from tests.runtime.test_parameter_changes import spans
 
 TOLERANCES = (1e-4, 1e-6, 1e-8, 1e-10)
 CERTIFIED = [name for name in MODELS if (ROOT / "fmus" / f"{name}.csv").is_file()]

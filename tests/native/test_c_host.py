@@ -106,8 +106,8 @@ def test_a_hundred_life_cycles_of_fmi3_agree_with_fmpy(worker, name):
 
 def ends_of_lives(fmu, exchange):
     """Return the distinct final values of many life cycles."""
-    answers, noise = run_host_script(fmu, LIVES * life_cycle(fmu.stem, STEPS, exchange))
-    assert noise == ""
+    answers, stderr = run_host_script(fmu, LIVES * life_cycle(fmu.stem, STEPS, exchange))
+    assert stderr == ""
     rows = read_values(answers)
     ends = []
     for i, row in enumerate(rows):
@@ -204,15 +204,15 @@ def run_failures(fmu, sanitizers, n_instances):
     """Run every error, and the life cycles of many instances, in threads."""
     script = failures(fmu.stem) + [line for i in range(1, n_instances) for line in life(i, fmu.stem)]
     script += [f"{i} free" for i in range(1, n_instances)]
-    answers, noise = run_host_script(fmu, script, threads=8, sanitizers=sanitizers)
-    assert "Sanitizer" not in noise
+    answers, stderr = run_host_script(fmu, script, threads=8, sanitizers=sanitizers)
+    assert "Sanitizer" not in stderr
     assert {OK, DISCARD, ERROR} <= {line.split()[0] for line in answers}
 
 
 def test_every_failure_is_one_sentence_in_the_log_and_on_standard_error(fmu):
-    answers, noise = run_host_script(fmu, failures(fmu.stem))
+    answers, stderr = run_host_script(fmu, failures(fmu.stem))
     messages = [line.split(" ", 4)[4] for line in answers if line.startswith("log ")]
-    printed = re.findall(rf"^{fmu.stem.capitalize()} \((?:0|x)\): (.*)", noise, re.MULTILINE)
+    printed = re.findall(rf"^{fmu.stem.capitalize()} \((?:0|x)\): (.*)", stderr, re.MULTILINE)
     assert len(messages) > 50
     unheard = list((Counter(printed) - Counter(messages)).elements())
     assert len(unheard) == 2, unheard  # one instance has no logger; one error has a disabled category
@@ -247,11 +247,11 @@ CALLS = {
 @pytest.mark.parametrize("call", CALLS)
 def test_a_call_out_of_sequence_is_refused_and_changes_nothing(stickslip, phase, call):
     script = [f"0 {line}" for line in ("new", *PHASES[phase], call, "getr 0", "drop 0", "free")]
-    answers, noise = run_host_script(stickslip, script)
+    answers, stderr = run_host_script(stickslip, script)
     answers = answers[len(PHASES[phase]) :]
     if phase in CALLS[call]:
         assert answers[0].split()[0] == OK
-        assert "refused" not in noise
+        assert "refused" not in stderr
     else:
         assert answers[1] == ERROR
         allowed = " or ".join(CALLS[call])

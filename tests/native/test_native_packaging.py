@@ -12,6 +12,7 @@ from struct import unpack_from
 
 import fmi3_fixtures
 import pytest
+from archives import read_archive
 from commands import build
 from fmpy import read_model_description, simulate_fmu
 from fmpy.build import build_platform_binary
@@ -31,7 +32,6 @@ from fmus.packaging.native.compiler import (
     compile_libraries,
 )
 from fmus.packaging.native.sources import FMI_HEADERS, MAIN_SOURCE, OWN_HEADERS
-from tests.packaging.test_packaging import entries
 
 pytestmark = pytest.mark.slow
 
@@ -56,7 +56,7 @@ def test_the_sources_compile_without_warnings(name, fmi, tmp_path):
     """With the compiler of the system. A build stops at any warning of its own compiler, too, as STRICT
     leaves none out but one of the headers of FMI 3.0. Users' models are built by other tests."""
     folder = build_native_fmus() if fmi == "2" else fmi3_fixtures.build_fmi3_fmus()
-    for file, content in entries(folder / f"{name}.fmu").items():
+    for file, content in read_archive(folder / f"{name}.fmu").items():
         if file.startswith("sources/"):
             (tmp_path / file.split("/")[-1]).write_bytes(content)
     assert [option for option in STRICT if option.startswith("-Wno-")] == ["-Wno-strict-prototypes"]
@@ -74,7 +74,8 @@ def test_fmpy_reports_no_problems(name):
 def test_the_description_is_that_of_the_python_fmu_except_sources_guid_and_model_exchange(fmus, name):
     """Differences: states and derivatives, dependencies on states, and the variables after the declared ones."""
     roots = [
-        ET.fromstring(entries(folder / f"{name}.fmu")["modelDescription.xml"]) for folder in (fmus, build_native_fmus())
+        ET.fromstring(read_archive(folder / f"{name}.fmu")["modelDescription.xml"])
+        for folder in (fmus, build_native_fmus())
     ]
     guids = [root.attrib.pop("guid") for root in roots]
     python, native = roots
@@ -109,10 +110,10 @@ def test_fmpy_simulates_it_to_the_same_digits(fmus, name):
 def test_the_archive_contents_are_complete(smd):
     fmu, printed = smd
     binaries = {f"binaries/{name}/smd{platform.suffix}" for name, platform in PLATFORMS.items()}
-    assert {name for name in entries(fmu) if name.startswith("binaries/")} == binaries
+    assert {name for name in read_archive(fmu) if name.startswith("binaries/")} == binaries
     sources = {f"sources/{file}" for file in (*OWN_HEADERS, *FMI_HEADERS["2"], "fmi2.c", "model.h", "guid.h")}
     sources.add("sources/buildDescription.xml")
-    files = entries(fmu)
+    files = read_archive(fmu)
     documentation = {path for path in files if path.split("/")[0] in ("documentation", "extra", "model.png")}
     assert set(files) - documentation == binaries | sources | {"modelDescription.xml"}
     assert "documentation/licenses/license.txt" in documentation
@@ -121,10 +122,10 @@ def test_the_archive_contents_are_complete(smd):
 
 
 def test_only_required_code_is_compiled():
-    text = entries(build_native_fmus() / "smd.fmu")["sources/model.h"].decode()
+    text = read_archive(build_native_fmus() / "smd.fmu")["sources/model.h"].decode()
     assert "LinearClosedForm_overdamped" in text
     assert "DryFriction" not in text
-    text = entries(build_native_fmus() / "pacejka.fmu")["sources/model.h"].decode()
+    text = read_archive(build_native_fmus() / "pacejka.fmu")["sources/model.h"].decode()
     assert "LinearClosedForm" not in text
 
 
@@ -134,9 +135,9 @@ def test_methods_and_laws_can_be_selected_as_for_the_python_fmu(tmp_path):
     for folder, kind in (("python", ()), ("native", ("--native",))):
         done = build(*chosen, *kind, "--out", tmp_path / folder)
         assert done.returncode == 0, done.stderr
-    lean = entries(tmp_path / "native" / "stickslip.fmu")
+    lean = read_archive(tmp_path / "native" / "stickslip.fmu")
     text = lean["sources/model.h"].decode()
-    complete = entries(build_native_fmus() / "stickslip.fmu")["sources/model.h"].decode()
+    complete = read_archive(build_native_fmus() / "stickslip.fmu")["sources/model.h"].decode()
     others = ("Ode23_", "Ode45_", "Dop853_", "Rodas_")
     assert [name for name in others if name not in complete or name in text] == []
     assert b'name="ode45"' not in lean["modelDescription.xml"]
@@ -157,7 +158,7 @@ def lief():
 def binary(request, smd, lief):
     """A platform, the bytes of its binary, and every library in it, parsed."""
     fmu, _ = smd
-    content = entries(fmu)[f"binaries/{request.param}/smd{PLATFORMS[request.param].suffix}"]
+    content = read_archive(fmu)[f"binaries/{request.param}/smd{PLATFORMS[request.param].suffix}"]
     parsed = lief.MachO.parse(content) if request.param == "darwin64" else [lief.parse(content)]
     return request.param, content, parsed
 
@@ -190,7 +191,7 @@ def test_no_binary_reveals_where_it_was_built(binary):
 
 
 def test_macos_libraries_cover_both_processors_and_are_validly_signed(smd, lief):
-    content = entries(smd[0])["binaries/darwin64/smd.dylib"]
+    content = read_archive(smd[0])["binaries/darwin64/smd.dylib"]
     magic, count = unpack_from(">II", content)
     assert (magic, count) == (0xCAFEBABE, 2)
     intel, arm = (

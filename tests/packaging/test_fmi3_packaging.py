@@ -12,6 +12,7 @@ import fmpy
 import numpy as np
 import pytest
 import worker_client
+from archives import read_archive
 from fmpy import read_model_description, simulate_fmu
 from fmpy.validation import validate_fmu
 from lxml import etree
@@ -27,7 +28,6 @@ from tests.packaging.test_packaging import (  # noqa: F401
     EVERY_MODEL,
     command,
     description_of,
-    entries,
     test_validation_reports_no_problems,
 )
 
@@ -235,7 +235,7 @@ def test_an_instance_starts_with_the_values_of_the_xml_and_accepts_others(fmu, l
 
 @EVERY_MODEL
 def test_the_files_are_those_of_fmi3(fmu, name):
-    content = entries(fmu(name))
+    content = read_archive(fmu(name))
     assert content["documentation/licenses/license.txt"].decode() == (ROOT / "LICENSE").read_text(encoding="utf-8")
     certified = {"fmi-ls-manifest.xml", f"{name}_out.csv"}
     headers = [file for files in (OWN_HEADERS, FMI_HEADERS["3"], ("fmi3.c", "guid.h", "model.h")) for file in files]
@@ -258,7 +258,7 @@ def test_the_files_are_those_of_fmi3(fmu, name):
 
 @EVERY_MODEL
 def test_the_terminal_describes_the_body_and_is_valid_and_drawn(fmu, name):
-    files = entries(fmu(name))
+    files = read_archive(fmu(name))
     content = files["terminalsAndIcons/terminalsAndIcons.xml"]
     schema = etree.XMLSchema(etree.parse(str(SCHEMA / "fmi3TerminalsAndIcons.xsd")))
     schema.assertValid(etree.fromstring(content))
@@ -275,7 +275,7 @@ def test_the_terminal_describes_the_body_and_is_valid_and_drawn(fmu, name):
 
 @EVERY_MODEL
 def test_the_page_shows_the_icon_and_describes_model_exchange(fmu, name):
-    content, icons = entries(fmu(name)), []
+    content, icons = read_archive(fmu(name)), []
 
     class Reader(HTMLParser):
         def handle_starttag(self, tag, attributes):
@@ -310,7 +310,7 @@ def test_a_reduced_fmu_carries_only_its_selection_and_runs_both_ways(name, gone)
     """In model exchange, fmpy records a second row at an event, here a change of mode."""
     path = fmi3_fixtures.build_reduced_fmu(name)
     assert validate_fmu(str(path)) == []
-    text = entries(path)["sources/model.h"].decode()
+    text = read_archive(path)["sources/model.h"].decode()
     assert not [word for word in gone if f"struct {word}" in text]
     runs = [
         simulate_fmu(str(path), fmi_type=kind, stop_time=0.1, output_interval=0.01, relative_tolerance=1e-9)

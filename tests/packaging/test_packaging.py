@@ -15,6 +15,7 @@ from xml.etree import ElementTree
 from zipfile import ZipFile
 
 import pytest
+from archives import read_archive
 from build_cache import ROOT
 from commands import build as command
 from fmpy.validation import validate_fmu
@@ -67,20 +68,14 @@ def probe(*fmus, folder):
     return json.loads(run.stdout)
 
 
-def entries(fmu):
-    """Return the content of every file in an FMU."""
-    with ZipFile(fmu) as archive:
-        return {path: archive.read(path) for path in archive.namelist()}
-
-
 def description_of(fmu):
     """Return the root of the model description."""
-    return ElementTree.fromstring(entries(fmu)["modelDescription.xml"])
+    return ElementTree.fromstring(read_archive(fmu)["modelDescription.xml"])
 
 
 def modules_of(fmu):
     """Return the paths of the packed sources, without the package name."""
-    paths = [PurePosixPath(path).parts for path in entries(fmu) if path.endswith(".py")]
+    paths = [PurePosixPath(path).parts for path in read_archive(fmu) if path.endswith(".py")]
     return {"/".join(parts[2:]) for parts in paths if len(parts) > 2}
 
 
@@ -197,13 +192,13 @@ def test_an_instance_starts_with_the_values_of_the_xml_and_imports_every_packed_
         s.get("name"): s[0].get("start") for s in scalars if s[0].get("start") is not None
     }
     # The list is obtained twice: from the imports in the sources, and from the modules that Python loads.
-    assert set(self_description["inside"]) == {path for path in entries(fmu(name)) if path.endswith(".py")}
+    assert set(self_description["inside"]) == {path for path in read_archive(fmu(name)) if path.endswith(".py")}
     assert not [module for module in self_description["modules"] if module.startswith(("fmus", "pythonfmu."))]
 
 
 @EVERY_MODEL
 def test_packed_code_needs_the_standard_library_only(fmu, name):
-    for path, content in entries(fmu(name)).items():
+    for path, content in read_archive(fmu(name)).items():
         if path.count("/") > 1 and path.endswith(".py"):
             for node in ast.walk(ast.parse(content)):
                 modules = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
@@ -220,7 +215,7 @@ def test_a_model_carries_no_unavailable_method_or_mode(fmu):
 
 @EVERY_MODEL
 def test_entry_script_and_package_carry_the_digest_of_their_content(fmu, name):
-    content = entries(fmu(name))
+    content = read_archive(fmu(name))
     entry = content["resources/slavemodule.txt"].decode()
     assert re.fullmatch(rf"{name}_[0-9a-f]{{12}}_fmu", entry)
     assert content[f"resources/{entry}.py"].decode().startswith(f"from {entry.removesuffix('_fmu')} import ")
@@ -231,13 +226,13 @@ def test_entry_script_and_package_carry_the_digest_of_their_content(fmu, name):
 @EVERY_MODEL
 def test_no_file_reveals_where_it_was_built(fmu, name):
     folders = [str(location).encode() for location in (ROOT, fmu(name).parents[1], installed_package("pythonfmu"))]
-    for path, content in entries(fmu(name)).items():
+    for path, content in read_archive(fmu(name)).items():
         assert not [location for location in folders if location in content], path
 
 
 @EVERY_MODEL
 def test_both_licences_are_packed(fmu, name):
-    content = entries(fmu(name))
+    content = read_archive(fmu(name))
     assert content["documentation/licenses/license.txt"].decode() == (ROOT / "LICENSE").read_text(encoding="utf-8")
     assert b"NTNU" in content["documentation/licenses/pythonfmu.txt"]
 
@@ -249,8 +244,8 @@ def test_the_source_date_changes_only_the_date(fmu, tmp_path):
     with ZipFile(dated) as archive:
         assert {info.date_time for info in archive.infolist()} == {(2024, 2, 29, 12, 30, 14)}
     stamp = description_of(original).get("generationDateAndTime")
-    replaced = entries(original)["modelDescription.xml"].replace(stamp.encode(), b"2024-02-29T12:30:14Z")
-    assert entries(dated) == entries(original) | {"modelDescription.xml": replaced}
+    replaced = read_archive(original)["modelDescription.xml"].replace(stamp.encode(), b"2024-02-29T12:30:14Z")
+    assert read_archive(dated) == read_archive(original) | {"modelDescription.xml": replaced}
 
 
 @pytest.mark.parametrize("arguments", [("bogus",), ("smd", "bogus")])

@@ -10,6 +10,7 @@ from xml.etree import ElementTree
 import fmi3_fixtures
 import native_fmus
 import pytest
+from archives import read_archive
 from build_cache import ROOT
 from models import MODELS, declared, model_class, outputs
 
@@ -18,7 +19,6 @@ from fmus.packaging.documentation_page import documentation_page, typeset
 from fmus.packaging.fmi_variables import declared_variables
 from fmus.packaging.native import fmu
 from fmus.packaging.svg_chart import tick_values
-from tests.packaging.test_packaging import entries
 
 EVERY_MODEL = pytest.mark.parametrize("name", MODELS)
 WITH = {  # an ending -> the models that have such a file
@@ -32,13 +32,13 @@ NAMESPACE = "{http://fmi-standard.org/fmi-ls-manifest}"
 @pytest.fixture
 def content(fmus):
     """Return content(name): the files of an FMU."""
-    return lambda name: entries(fmus / f"{name}.fmu")
+    return lambda name: read_archive(fmus / f"{name}.fmu")
 
 
 @EVERY_MODEL
 def test_a_native_fmu_has_the_same_page_and_each_states_which_hosts_run_it(content, name):
     files = {path: data for path, data in content(name).items() if path in (PAGE, ICON) or path.startswith(EXTRA)}
-    others = entries(native_fmus.build_native_fmus() / f"{name}.fmu")
+    others = read_archive(native_fmus.build_native_fmus() / f"{name}.fmu")
     assert len(files) == 1 + (name in WITH["png"]) + 2 * (name in WITH["csv"])
     python_note, native_note = archive.USAGE_NOTE.encode(), fmu.USAGE_NOTE.encode()
     assert python_note in files[PAGE]
@@ -69,7 +69,7 @@ def test_the_capabilities_listed_per_backend_are_true_on_every_page_and_in_the_g
     kinds = [
         content("stickslip"),
         *(
-            entries(built() / "stickslip.fmu")
+            read_archive(built() / "stickslip.fmu")
             for built in (native_fmus.build_native_fmus, fmi3_fixtures.build_fmi3_fmus)
         ),
     ]

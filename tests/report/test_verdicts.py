@@ -6,6 +6,7 @@ from math import nan
 from types import SimpleNamespace
 
 import pytest
+from precision_points import make_point
 
 from harness.references.models import CASES
 from harness.report.page import write_report
@@ -17,7 +18,7 @@ from harness.results.summary import Summary, write_summary
 from harness.studies.bench.benchmark import Baseline, Benchmark
 from harness.studies.bench.table import summarize_benchmarks
 from harness.studies.precision.method_choice import choose_method, tabulate_choices
-from harness.studies.precision.study import FMPY, FMU, QUICK, Point, Study
+from harness.studies.precision.study import FMPY, QUICK, Study
 from harness.studies.run.table import judge_deviations
 from harness.studies.stability.table import summarize_outcomes
 
@@ -47,10 +48,6 @@ def summarize_stability(*endings):
             for i, ending in enumerate(endings)
         ]
     )
-
-
-def make_point(method, seconds, error, tool=FMU, case="stickslip", **others):
-    return Point(case, tool, method, 1e-6, 1e-9, seconds=seconds, evaluations=1, largest=error, **others)
 
 
 def make_study(*points, cases=("stickslip",)):

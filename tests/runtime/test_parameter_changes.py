@@ -5,7 +5,7 @@ import random
 import independent_pendulum
 import independent_solution
 import pytest
-from independent_solution import ClosedFormMotion
+from independent_solution import ClosedFormMotion, spans
 from models import EXACT, ODE23
 
 SCENES = {
@@ -30,15 +30,6 @@ SCENES = {
     ),
     "sled, lighter, then on the moon": ("stickslip", {}, {3.9: {"m": 10.0}, 7.0: {"g": 1.62}, 11.0: {"k": 2000.0}}),
 }
-
-
-def spans(make, values, changes):
-    """Return (time, parameters) of every span between changes."""
-    result = [(0.0, make(**values))]
-    for t in sorted(changes):
-        values = {**values, **changes[t]}
-        result.append((t, make(**values)))
-    return result
 
 
 def assert_agrees_with_reference(launch, name, values, changes, solvers):

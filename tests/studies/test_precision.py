@@ -13,6 +13,7 @@ import pytest
 from build_cache import build_user_model
 from matplotlib.figure import Figure
 from models import EXAMPLE_MODELS
+from precision_points import make_point
 
 from harness.errors import HarnessError
 from harness.references import event_located, peer_solvers
@@ -29,7 +30,6 @@ from harness.studies.precision.study import (
     FMU,
     FULL,
     QUICK,
-    Point,
     SolverJob,
     Study,
     SweepSettings,
@@ -131,15 +131,11 @@ def test_a_failed_run_is_a_gap_and_tighter_ones_after_a_slow_run_are_skipped():
         sweep_tolerances(CASE["smd"], SolverJob("tool", "method", 1e-3, run), SweepSettings(tolerances, 0.1, 0.1))
     )
     assert rtols == [1e-2, 1e-3, 1e-4, 1e-5]
-    assert [make_point.rtol for make_point in points] == list(tolerances)
-    assert [make_point.seconds for make_point in points] == pytest.approx([0.25, nan, 0.25, nan, nan], nan_ok=True)
-    assert [make_point.largest for make_point in points] == pytest.approx([0.0, nan, 0.0, nan, nan], nan_ok=True)
+    assert [point.rtol for point in points] == list(tolerances)
+    assert [point.seconds for point in points] == pytest.approx([0.25, nan, 0.25, nan, nan], nan_ok=True)
+    assert [point.largest for point in points] == pytest.approx([0.0, nan, 0.0, nan, nan], nan_ok=True)
     failures = ["", "it fell over", "", "it took too long", "skipped: at rtol 1e-05 the run stopped it took too long"]
-    assert [make_point.failure for make_point in points] == failures
-
-
-def make_point(method, seconds, largest, tool=FMU, case="stickslip", **more):
-    return Point(case, tool, method, 1e-6, 1e-9, seconds=seconds, evaluations=1, largest=largest, **more)
+    assert [point.failure for point in points] == failures
 
 
 def test_the_advice_is_derived_from_the_points():

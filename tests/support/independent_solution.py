@@ -199,7 +199,16 @@ def direction(load, rate, limit):
 
     A load equal to the limit is held, unless it is about to exceed it.
     """
-    for way in (-1, 1):
-        if way * load > limit + TOUCH_TOLERANCE or (way * rate > 0 and way * load > limit - TOUCH_TOLERANCE):
-            return way
+    for side in (-1, 1):
+        if side * load > limit + TOUCH_TOLERANCE or (side * rate > 0 and side * load > limit - TOUCH_TOLERANCE):
+            return side
     return 0
+
+
+def spans(make, values, changes):
+    """Return the start of each span between changes of values, and what `make` returns for its values."""
+    result = [(0.0, make(**values))]
+    for t in sorted(changes):
+        values = {**values, **changes[t]}
+        result.append((t, make(**values)))
+    return result
