@@ -137,6 +137,7 @@ def test_nothing_is_printed(capfd):
     shares = []
     harness.simulate("coulomb", method="ode23", rtol=1e-9, progress=shares.append)
     assert capfd.readouterr() == ("", "")
+    assert shares
     assert all(0.0 <= share <= 1.0 for share in shares)
 
 

@@ -86,8 +86,8 @@ def test_the_description_is_that_of_the_python_fmu_except_sources_guid_and_model
     for ability in ("providesDirectionalDerivative", "canInterpolateInputs"):
         assert interface.attrib.pop(ability) == "true"
     assert interface.attrib.pop("maxOutputDerivativeOrder") == "1"
-    scalars, declared_ones = native.find("ModelVariables"), python.find("ModelVariables")
-    for scalar in list(scalars)[len(declared_ones) :]:
+    scalars, declared_scalars = native.find("ModelVariables"), python.find("ModelVariables")
+    for scalar in list(scalars)[len(declared_scalars) :]:
         assert scalar.get("causality") in ("independent", "local")
         scalars.remove(scalar)
     for real in scalars.iterfind("ScalarVariable/Real"):

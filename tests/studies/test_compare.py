@@ -272,7 +272,7 @@ def test_a_distant_event_match_hides_no_difference():
 
 
 @pytest.mark.parametrize(
-    ("remaining", "right", "factor"),
+    ("left", "right", "factor"),
     [
         *(("m/s2", other, 1.0) for other in ("m/s^2", "m.s-2", "m s^-2", "m·s⁻²", "m/s²", "m/s/s", "m*s**-2")),
         ("N.m", "Nm", 1.0),
@@ -288,17 +288,15 @@ def test_a_distant_event_match_hides_no_difference():
         ("m/s", "m", None),
     ],
 )
-def test_units_have_one_spelling_and_are_converted_or_refused(remaining, right, factor):
+def test_units_have_one_spelling_and_are_converted_or_refused(left, right, factor):
     t = np.arange(20.0)
-    pair = (
-        signals(name, t, {"y": t, "x": t}, {"y": unit, "x": "m"}) for name, unit in (("one", remaining), ("two", right))
-    )
+    pair = (signals(name, t, {"y": t, "x": t}, {"y": unit, "x": "m"}) for name, unit in (("one", left), ("two", right)))
     comparison = compare(*pair)
     if factor is None:
-        assert comparison.left_out == (f"y is in {remaining} in one and in {right} in two; skipped",)
+        assert comparison.left_out == (f"y is in {left} in one and in {right} in two; skipped",)
         return
     (y, _) = comparison.differences
-    assert y.unit == remaining
+    assert y.unit == left
     assert y.largest == pytest.approx(19 * abs(1 - factor))
     assert bool(comparison.left_out) == (factor != 1.0)
 
@@ -438,10 +436,10 @@ def test_a_nonfinite_value_on_either_side_is_an_infinite_difference(lost, where,
     """Also beside a variable that agrees, before and after it, and where times are interpolated."""
     t = np.linspace(0, 1, 20)
     good, bad = np.sin(t), np.where(np.arange(20) == at, lost, np.cos(t))
-    remaining = {"a": good, "x": bad if where != "right" else np.cos(t), "z": good}
+    left = {"a": good, "x": bad if where != "right" else np.cos(t), "z": good}
     right = {"a": good, "x": bad if where != "left" else np.cos(t), "z": good}
-    units = dict.fromkeys(remaining, "m")
-    comparison = compare(signals("one", t, remaining, units), signals("two", t + shift, right, units))
+    units = dict.fromkeys(left, "m")
+    comparison = compare(signals("one", t, left, units), signals("two", t + shift, right, units))
     assert np.isnan(comparison.worst)
     assert not comparison.worst <= 1e300
 

@@ -58,8 +58,8 @@ def test_downsampling_keeps_the_extremes(count):
     selection, wide = extremes(x), -(-2 * count // MAX_POINTS)
     assert len(selection) <= min(count, 3 * MAX_POINTS // 2)
     for begin in range(0, count, 100 * wide):
-        those = x[selection[(selection >= begin) & (selection < begin + 10 * wide)]]
-        assert (those.min(), those.max()) == (x[begin : begin + 10 * wide].min(), x[begin : begin + 10 * wide].max())
+        block = x[selection[(selection >= begin) & (selection < begin + 10 * wide)]]
+        assert (block.min(), block.max()) == (x[begin : begin + 10 * wide].min(), x[begin : begin + 10 * wide].max())
 
 
 def harness(folder, *arguments, text=""):

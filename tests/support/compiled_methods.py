@@ -93,8 +93,8 @@ def assert_same_as_python(frozen, owner, name, pairs):
             result = error
         fault, out = frozen.call(name, x, y)
         assert fault == isinstance(result, Exception), f"{name}({x!r}, {y!r}): {result!r}"
-        remaining = list(flat_values(python_owner))
+        members = list(flat_values(python_owner))
         values = [] if fault else [*result] if isinstance(result, tuple) else [result]
         if fault:  # a fault returns no value, but earlier side effects remain
             out = out[frozen.widths[name] :]
-        assert bits(out[: len(values) + len(remaining)]) == bits(values + remaining), f"{name}({x!r}, {y!r})"
+        assert bits(out[: len(values) + len(members)]) == bits(values + members), f"{name}({x!r}, {y!r})"

@@ -88,11 +88,11 @@ def factors(path, parameters):
                 point = (c_double * len(states))()
                 fmu.getContinuousStates(point, len(states))
                 point = [*point, force]
-                values_here = answers(fmu, smooth, push, point)
+                values_at_point = answers(fmu, smooth, push, point)
                 for index, known in enumerate(knowns):
                     shifted = [value + NUDGE * (number == index) for number, value in enumerate(point)]
                     nudged = answers(fmu, smooth, push, shifted)
-                    for unknown, a, b in zip(smooth, values_here, nudged, strict=True):
+                    for unknown, a, b in zip(smooth, values_at_point, nudged, strict=True):
                         if a != b:
                             row = responses.setdefault(unknown.valueReference, {})
                             row.setdefault(known.valueReference, []).append((b - a) / NUDGE)
