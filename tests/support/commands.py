@@ -55,10 +55,16 @@ def blank_figures():
 
 def _run_here(program, folder, arguments, text, environment):
     runner = CliRunner(env=environment, catch_exceptions=False, capture="fd")
-    words = [*map(str, arguments)]
+    words = to_words(arguments)
     with chdir(folder), patch("sys.argv", [program.name, *words]):
         result = runner.invoke(program, words, text, prog_name=program.name)
     return subprocess.CompletedProcess(arguments, result.exit_code, result.stdout, result.stderr)
+
+
+def to_words(arguments):
+    """Return the words of a command line; a tuple or list among them is a test that forgot to unpack it."""
+    assert not any(isinstance(argument, (tuple, list)) for argument in arguments), arguments
+    return [*map(str, arguments)]
 
 
 def run_process(folder, *arguments, module="harness", text="", **environment):
@@ -70,7 +76,7 @@ def run_python(folder, *arguments, text="", **environment):
     """Run Python with these arguments in a process of its own, which finds the project and the folder of this file, and
     return the finished process."""
     return subprocess.run(
-        [sys.executable, *map(str, arguments)],
+        [sys.executable, *to_words(arguments)],
         input=text,
         cwd=folder,
         env={**os.environ, "PYTHONPATH": os.pathsep.join([str(ROOT), str(SUPPORT)]), **environment},
