@@ -32,7 +32,7 @@ def precision(models: tuple[str, ...], terminal: Terminal, quick: bool) -> None:
     data = {
         "points": {study.model: study.points for study in result.studies},
         "laws": result.deviations,
-        "anchors": result.literature,
+        "literature": result.literature,
         "advice": result.advice,
         "missing": result.missing,
     }

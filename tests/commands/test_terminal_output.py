@@ -91,7 +91,7 @@ TABLES = {  # of slow commands, filled with long words
         ],
         "creep [m/s]",
     ),
-    "anchors": (
+    "literature": (
         [
             table.literature_table(
                 [LiteratureRun("block on a belt", "scipy, arctan(1e6 v)", "DOP853", 1e-10, 123456, 1.2e-5)]

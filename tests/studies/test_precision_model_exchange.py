@@ -191,6 +191,7 @@ def test_the_command_shows_both_interfaces_and_error_against_tolerance(two_studi
 
 def test_json_holds_all_results(two_studies):
     data = json.loads(two_studies[0][1])
+    assert set(data) == {"points", "laws", "literature", "advice", "missing"}
     assert {point["method"] for point in data["points"]["smd"]} >= {"exact", "dop853", "fmpy's CVode"}
     assert data["advice"][0].startswith("smd: use exact")
 

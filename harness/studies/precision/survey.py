@@ -84,7 +84,7 @@ def run_studies(models: Iterable[str], extent: SweepSettings, report: Callable[[
             law_deviations.compare_bristles(name, law, literature_problems.load_more_model(name))
             for name, law in law_deviations.BRISTLES.items()
         ]
-    report("anchors", 0.0)
+    report("literature", 0.0)
     literature = (
         tuple(literature_problems.solve_all()) if deviations or any(case.model in models for case in CASES) else ()
     )
