@@ -220,10 +220,10 @@ class RandomCalls(RuleBasedStateMachine):
         flipped = bytes(
             [*content[:position], content[position] ^ 1 << data.draw(st.integers(0, 7)), *content[position + 1 :]]
         )
-        foreign = data.draw(
+        damaged = data.draw(
             st.sampled_from([flipped, content[:position], content + content[:position] + b" ", b"[" * position])
         )
-        assert self.call("deserialize", foreign.hex()) is worker_client.FmiError
+        assert self.call("deserialize", damaged.hex()) is worker_client.FmiError
         assert str(self.call("get", *self.outputs)) == str(before)
 
     def teardown(self):

@@ -119,8 +119,8 @@ def test_flipped_truncated_or_extended_bytes_are_refused(name, capsys):
     for i in range(TIMES):
         position, bit = draw.randrange(len(content)), 1 << draw.randrange(8)
         flipped = bytes([*content[:position], content[position] ^ bit, *content[position + 1 :]]) if i % 4 == 0 else b""
-        foreign = [flipped, content[:position], content + draw.randbytes(1 + i % 9), draw.randbytes(position)][i % 4]
-        assert not is_accepted(slave_class, foreign)
+        damaged = [flipped, content[:position], content + draw.randbytes(1 + i % 9), draw.randbytes(position)][i % 4]
+        assert not is_accepted(slave_class, damaged)
     stderr = capsys.readouterr().err.splitlines()
     assert set(stderr) == {f"{slave_class.__name__}: {REFUSAL}"}
     assert len(stderr) == TIMES
@@ -221,10 +221,10 @@ def test_forged_bytes_change_neither_instance_nor_neighbour_nor_process(fmu):
     worker.read_stderr()
     for (title, forge), t, ahead in zip(FORGERIES.items(), times[:-1], times[1:], strict=True):
         content = bytes.fromhex(one.serialize(one.save()))
-        foreign = forge(content)
-        assert foreign != content, title
+        forged = forge(content)
+        assert forged != content, title
         with pytest.raises(FmiError) as refusal:
-            one.deserialize(foreign.hex())
+            one.deserialize(forged.hex())
         assert refusal.value.status >= 3, title
         assert worker.read_stderr() == f"Stickslip: {REFUSAL}\n"
         assert REFUSAL in one.messages()[-1][2]

@@ -44,7 +44,7 @@ def test_start_values_become_the_states(launch, name):
 
 
 @pytest.mark.parametrize("case", FEW_CASES, ids=label)
-def test_it_starts_like_co_simulation(launch, worker, fmus, case):
+def test_model_exchange_starts_like_co_simulation(launch, worker, fmus, case):
     name, values, _ = case
     solver = worker.instantiate(fmus / f"{name}.fmu").begin(values)
     fmu = launch(name, values)

@@ -102,7 +102,7 @@ def test_the_description_is_that_of_the_python_fmu_except_sources_guid_and_model
 
 
 @pytest.mark.parametrize("name", MODELS)
-def test_fmpy_simulates_it_to_the_same_digits(fmus, name):
+def test_fmpy_simulates_a_native_fmu_to_the_same_digits(fmus, name):
     results = [simulate_fmu(str(folder / f"{name}.fmu")) for folder in (fmus, build_native_fmus())]
     assert results[0].tobytes() == results[1].tobytes()
 

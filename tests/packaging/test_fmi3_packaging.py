@@ -46,15 +46,15 @@ def fmu():
 
 
 @pytest.fixture(scope="module")
-def look(fmu, tmp_path_factory):
-    """Return look(function, name, ...), which inspects the FMU alone in a clean process; one process serves all
+def inspect(fmu, tmp_path_factory):
+    """Return inspect(function, name, ...), which inspects the FMU alone in a clean process; one process serves all
     tests."""
     requests = [("variables", name) for name in model_names()]
     requests += [("factors", name, PARAMETERS.get(name, {})) for name in model_names()] + [
         ("nominals", "pacejka", "x_m", 1e-5)
     ]
     calls = [(function, fmu(name), *more) for function, name, *more in requests]
-    answers = worker_client.run_script("fmi3_inspection.py", "call_each", calls, folder=tmp_path_factory.mktemp("look"))
+    answers = worker_client.run_script("fmi3_inspection.py", "call_each", calls, folder=tmp_path_factory.mktemp("fmi3"))
     return lambda *call: answers[requests.index(call)]
 
 
@@ -172,14 +172,14 @@ def test_nominal_values_are_the_error_scales_of_the_own_solver(fmu, name):
     assert nominals == sizes == [float(rate.derivative.nominal) for rate in rates]
 
 
-def test_a_finer_creep_lowers_the_nominal_speed_and_the_event_reports_it(look):
+def test_a_finer_creep_lowers_the_nominal_speed_and_the_event_reports_it(inspect):
     default, fine = [1e-3, 1e-3, 1e-3], [1e-3, 1e-5, 1e-3]
-    nominals = look("nominals", "pacejka", "x_m", 1e-5)
+    nominals = inspect("nominals", "pacejka", "x_m", 1e-5)
     assert nominals == [[False, default], [True, fine], [False, fine]]
 
 
 @EVERY_MODEL
-def test_declared_dependencies_are_true(fmu, look, name):
+def test_declared_dependencies_are_true(fmu, inspect, name):
     """A small change of a state or input affects only declared dependents; all dependents of rates and indicators
     respond. tests/model_exchange/test_parameter_derivatives.py changes parameters."""
     root = description_of(fmu(name))
@@ -188,7 +188,7 @@ def test_declared_dependencies_are_true(fmu, look, name):
         kind: [(reference, {*knowns} - parameters, kinds) for reference, knowns, kinds in structure(root, kind)]
         for kind in ("Output", "ContinuousStateDerivative", "EventIndicator")
     }
-    responses = look("factors", name, PARAMETERS.get(name, {}))
+    responses = inspect("factors", name, PARAMETERS.get(name, {}))
     responses = {int(unknown): {int(known): f for known, f in row.items()} for unknown, row in responses.items()}
     for reference, knowns, _ in [row for rows in declared_structure.values() for row in rows]:
         assert set(responses.get(reference, {})) <= set(knowns)
@@ -201,12 +201,12 @@ def test_declared_dependencies_are_true(fmu, look, name):
 
 
 @EVERY_MODEL
-def test_constant_factors_are_declared_and_are_constant(fmu, look, name):
+def test_constant_factors_are_declared_and_are_constant(fmu, inspect, name):
     rates = structure(description_of(fmu(name)), "ContinuousStateDerivative")
     smd = ["constant", "dependent dependent dependent tunable tunable tunable"]  # parameters come first
     expected = {"smd": smd, "pacejka": ["constant", None, None]}
     assert [kinds for _, _, kinds in rates] == expected.get(name, [None] * len(rates))
-    responses = look("factors", name, {}) if name in expected else {}
+    responses = inspect("factors", name, {}) if name in expected else {}
     for reference, knowns, kinds in rates:
         for known, kind in zip(knowns, (kinds or "").split(), strict=bool(kinds)):
             if kind == "dependent":
@@ -216,8 +216,8 @@ def test_constant_factors_are_declared_and_are_constant(fmu, look, name):
 
 
 @EVERY_MODEL
-def test_an_instance_starts_with_the_values_of_the_xml_and_accepts_others(fmu, look, name):
-    values = look("variables", name)
+def test_an_instance_starts_with_the_values_of_the_xml_and_accepts_others(fmu, inspect, name):
+    values = inspect("variables", name)
     elements = description_of(fmu(name)).find("ModelVariables")
     starts = {e.get("name"): e.get("start") for e in elements if e.get("start") is not None}
     assert set(values["starts"]) == {e.get("name") for e in elements}

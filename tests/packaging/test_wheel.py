@@ -89,7 +89,7 @@ def test_the_licence_is_in_the_wheel(wheel):
         assert archive.read(carried) == (ROOT / "LICENSE").read_bytes()
 
 
-def test_it_builds_the_same_bytes_as_the_sources_and_runs_them_in_an_empty_folder(run, fmus, tmp_path):
+def test_the_wheel_builds_the_same_bytes_as_the_sources_and_runs_them_in_an_empty_folder(run, fmus, tmp_path):
     """From files with another location and time; one model without a contact and one with a contact."""
     printed = run("build_fmus pacejka stickslip", PYTHONHASHSEED="7", TZ="Pacific/Auckland")
     assert [line.split()[0] for line in printed.splitlines()] == ["pacejka.fmu", "stickslip.fmu"]

@@ -121,7 +121,7 @@ def test_without_results_there_is_no_report(tmp_path):
 
 
 @pytest.mark.parametrize("dark", [False, True])
-def test_a_browser_shows_it_without_errors_or_horizontal_scrolling(report_run, browser, dark):
+def test_a_browser_shows_the_report_without_errors_or_horizontal_scrolling(report_run, browser, dark):
     """On a phone, figures keep a readable width and scroll on their own."""
     browser.dark(dark)
     browser.open((report_run[0] / "results/report.html").as_uri())
@@ -146,7 +146,7 @@ def test_the_navigation_stays_beside_the_text_on_a_wide_screen_only(report_run, 
     assert browser.run(f"{navigation}.bottom < 0 && {text}.width > 300")
 
 
-def test_it_begins_with_a_plot_of_the_computed_motion_to_its_stop(page):
+def test_the_report_begins_with_a_plot_of_the_computed_motion_to_its_stop(page):
     """The first drawing is the position over time, with the same number of turning points; then the mass is stuck."""
     width, lines = re.search(r'<svg viewBox="0 0 (\d+) \d+"(.*?)</svg>', page, re.S).groups()
     (motion, rest) = (

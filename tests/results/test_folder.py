@@ -169,10 +169,10 @@ def test_leftovers_of_a_killed_run_are_removed_but_no_other_files(older):
     leftovers = [
         older.with_name(name) for name in (".case-abcdefgh.new", ".case-abcdefgi.old", ".case-sign-abcdefgh.new")
     ]
-    foreign = older.with_name(".case-abcdefgk.new")
-    for folder in (*leftovers, foreign):
+    users_folder = older.with_name(".case-abcdefgk.new")
+    for folder in (*leftovers, users_folder):
         folder.mkdir()
-    (foreign / "notes.txt").write_text("mine")
+    (users_folder / "notes.txt").write_text("mine")
     with replace_folder(older, OURS) as other:
         (other / "b.csv").write_text("of a run that goes on")
         with replace_folder(older, OURS) as fresh:
@@ -181,7 +181,7 @@ def test_leftovers_of_a_killed_run_are_removed_but_no_other_files(older):
         assert not leftovers[0].exists()
         assert not leftovers[1].exists()
     assert contents(older) == {"b.csv": "of a run that goes on"}
-    assert sorted(older.parent.iterdir()) == sorted([older, foreign, leftovers[2]])
+    assert sorted(older.parent.iterdir()) == sorted([older, users_folder, leftovers[2]])
 
 
 def test_a_new_folder_that_another_command_takes_for_a_leftover_is_created_again(older, monkeypatch):

@@ -142,12 +142,12 @@ def test_a_result_is_reproduced_from_its_folder_bit_for_bit(example_run, tmp_pat
     original, (command, *_), folder = example_run
     workspace = shutil.copytree(original, tmp_path / "copy", symlinks=True)  # a repetition replaces the result
     folder = workspace / folder.relative_to(original)
-    before, account = files(folder), read_provenance(folder)
+    before, provenance = files(folder), read_provenance(folder)
     done = commands.harness(workspace, "run", folder.relative_to(workspace), blank=not folder.match(DRAWN))
     assert (done.returncode, done.stderr) == (0, "")
     assert files(folder) == before
     for key in ("files", "parameters", "run", "scene", "source"):
-        assert read_provenance(folder)[key] == account[key]
+        assert read_provenance(folder)[key] == provenance[key]
     if command == "run":
         assert "the same, bit for bit" in done.stdout
         assert harness(workspace, "run", folder.relative_to(workspace), "--quiet").returncode == 0  # and again
@@ -259,13 +259,13 @@ def test_a_result_with_other_options_is_not_replaced_silently(workspace, argumen
 
 
 def test_a_folder_without_provenance_is_not_run_again(workspace, first_run):
-    account = workspace / "results/smd/provenance.json"
+    file = workspace / "results/smd/provenance.json"
     shutil.copytree(first_run / "results/smd", workspace / "results/smd")
     for content in ("[]", "{}", '{"command": 1}', "", None):
         if content is None:
-            account.unlink()
+            file.unlink()
         else:
-            account.write_text(content)
+            file.write_text(content)
         done = harness(workspace, "run", "results/smd")
         assert (done.returncode, done.stderr.count("\n")) == (1, 1)
         assert "results/smd contains no result with a complete provenance.json" in done.stderr

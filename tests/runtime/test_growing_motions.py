@@ -208,7 +208,7 @@ def test_every_method_solves_every_sign_of_stiffness_and_damping(worker, method)
 
 
 @pytest.mark.parametrize(("k", "c"), [(-40.0, -0.2), (40.0, -0.2)])
-def test_an_importer_solves_it_in_model_exchange(k, c):
+def test_an_importer_solves_a_growing_motion_in_model_exchange(k, c):
     result = simulate_fmu(
         fmu("native"), fmi_type="ModelExchange", stop_time=2.0, relative_tolerance=1e-9, start_values={"k": k, "c": c}
     )

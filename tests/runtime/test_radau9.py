@@ -101,7 +101,7 @@ def begin_step(model, tolerance):
     return step
 
 
-def test_it_reports_all_evaluations():
+def test_radau9_reports_all_evaluations():
     model = Damped(spring=-4.0, damper=-0.6)
     _, reported = propose(model, 1.0, -0.3, 0.1)
     assert reported == model.evaluations > 0
@@ -222,7 +222,7 @@ def test_no_step_passes_a_stop_because_a_steep_jacobian_hides_the_error(x_m):
 
 
 @pytest.mark.parametrize("rtol", [1e-6, *(pytest.param(rtol, marks=pytest.mark.slow) for rtol in (1e-3, 1e-9))])
-def test_it_takes_fewer_steps_than_rodas_for_a_smaller_error(truth, rtol):
+def test_radau9_takes_fewer_steps_than_rodas_for_a_smaller_error(truth, rtol):
     (rows, steps), (others, more) = (
         (rows, solver.steps + solver.rejected)
         for rows, solver in (
