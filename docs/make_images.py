@@ -28,7 +28,7 @@ IMAGES = DOCS / "images"
 FMUS = DOCS.parent / "fmus"
 
 # The figures of results: the page whose code blocks make them, and where they are.
-OF_PAGES = {
+FIGURES_OF_PAGES = {
     "stickslip": ("tutorials/first_run.md", "results/stickslip/figure.svg"),
     "compare-laws": ("tutorials/first_run.md", "results/compare/*/figure.svg"),
     "cart": ("tutorials/own_model.md", "results/cart/figure.svg"),
@@ -41,7 +41,7 @@ OF_PAGES = {
     "my_scene": ("reference/scene_files.md", "results/my_scene/figure.svg"),
 }
 # Those of commands that pages show but do not run.
-OF_COMMANDS = {
+FIGURES_OF_COMMANDS = {
     "coulomb": ("run coulomb", "results/coulomb/figure.svg"),
     "pendulum": ("run pendulum", "results/pendulum/figure.svg"),
     "coupled": ("couple two-masses", "results/coupled/two-masses/figure.svg"),
@@ -58,7 +58,7 @@ def harness(folder: Path, command: str) -> None:
     subprocess.run(words, cwd=folder, check=True, env=os.environ | {"PYTHONPATH": str(DOCS.parent)})
 
 
-def of_page(page: str, folder: Path) -> None:
+def run_blocks_of_page(page: str, folder: Path) -> None:
     """Run the code blocks of a page in a folder."""
     (folder / "fmus").symlink_to(FMUS.resolve())
     (folder / "docs").symlink_to(DOCS)
@@ -72,7 +72,7 @@ def of_page(page: str, folder: Path) -> None:
         sys.exit("\n".join(faults))
 
 
-def copy(figure: Path, picture: Path) -> None:
+def copy_figure(figure: Path, picture: Path) -> None:
     """Copy a figure with coordinates of a tenth of a point, which halves long curves."""
     text = figure.read_text(encoding="utf-8")
     text = re.sub(r' d="[^"]*"', lambda line: re.sub(r"(\.\d)\d+", r"\1", line[0]), text)
@@ -282,7 +282,7 @@ def notebook(folder: Path) -> None:
 
 
 INLINE = "module://matplotlib_inline.backend_inline"
-DRAWN: dict[str, Callable[[Path], None]] = {
+DRAWINGS: dict[str, Callable[[Path], None]] = {
     "stick": stick,
     "laws": laws,
     "friction-laws": friction_laws,
@@ -296,21 +296,21 @@ def main() -> None:
     """Make the pictures."""
     bin = str(Path(sys.executable).parent)
     os.environ.update(PATH=f"{bin}{os.pathsep}{os.environ['PATH']}", MPLBACKEND="agg", COLUMNS="80")
-    names = sys.argv[1:] or [*OF_PAGES, *OF_COMMANDS, *DRAWN]
+    names = sys.argv[1:] or [*FIGURES_OF_PAGES, *FIGURES_OF_COMMANDS, *DRAWINGS]
     IMAGES.mkdir(exist_ok=True)
-    for page in dict.fromkeys(page for name, (page, _) in OF_PAGES.items() if name in names):
+    for page in dict.fromkeys(page for name, (page, _) in FIGURES_OF_PAGES.items() if name in names):
         with TemporaryDirectory() as folder:
-            of_page(page, Path(folder))
-            for name, (source, file) in OF_PAGES.items():
+            run_blocks_of_page(page, Path(folder))
+            for name, (source, file) in FIGURES_OF_PAGES.items():
                 if source == page and name in names:
                     (figure,) = Path(folder).glob(file)
-                    copy(figure, IMAGES / f"{name}.svg")
-    for name, (command, file) in OF_COMMANDS.items():
+                    copy_figure(figure, IMAGES / f"{name}.svg")
+    for name, (command, file) in FIGURES_OF_COMMANDS.items():
         if name in names:
             with TemporaryDirectory() as folder:
                 harness(Path(folder), command)
-                copy(Path(folder, file), IMAGES / f"{name}.svg")
-    for name, draw in DRAWN.items():
+                copy_figure(Path(folder, file), IMAGES / f"{name}.svg")
+    for name, draw in DRAWINGS.items():
         if name in names:
             with TemporaryDirectory() as folder:
                 draw(Path(folder))
