@@ -67,6 +67,8 @@ FORCES = {
     "pressing": "F_ext - choose(x > 0.0, f * x / (10.0 * gap), 0.0)",
     "jumping": "choose(F_ext > 0.2 * f, f, F_ext)",
     "ramped": "choose(F_ext > 0.2 * f, f, F_ext) - k * x * x * x / (gap * gap)",
+    "notch": "choose(fabs(x - gap) < 0.01 * gap, -40.0 * f, 0.0)",
+    "pulsing": "choose(sin(angle) > 1.0 - mu, f, 0.0)",
     "chattering": "choose(v > 0.0, -f, f)",
     "domain": "choose(x > 0.0, -f * sqrt(x / gap) - f * log(x / gap + 1.0) - f * x / (x + gap), 0.0)",
 }
@@ -77,6 +79,7 @@ CONTACTS = {  # slide and hold
     "holdingtime": "f, hold=f * (2.0 - clock / t_on)",
     "holdingspeed": "f, hold=f * (0.5 + fabs(v) / v_s)",
     "lifting": "mu * f * (1.0 + 2.0 * sin(angle)), hold=2.0 * mu * f * (1.0 + 2.0 * sin(angle)), lifts_off=True",
+    "guided": "mu * f * fabs(sin(angle)), hold=2.0 * mu * f * fabs(sin(angle))",
     "switched": "mu * choose(x > 0.0, 2.0 * f, f), hold=f * choose(clock > t_on, 2.0, 1.0)",
 }
 
@@ -142,6 +145,10 @@ PIECES = {  # event functions of the conditions; the force, given the conditions
         lambda x, s: K * x + (K * (GAP - x) if s[0] else K * (-GAP - x) if s[1] else 0.0),
     ),
     "nested": ([X_ABOVE_GAP, lambda t, x, v: v], lambda x, s: (-2.0 * F if s[1] else -F) if s[0] else 0.0),
+    "notch": (
+        [lambda t, x, v: x - 0.99 * GAP, lambda t, x, v: 1.01 * GAP - x],
+        lambda x, s: -40.0 * F if s[0] and s[1] else 0.0,
+    ),
     "timed": ([lambda t, x, v: t - T_ON], lambda x, s: F if s[0] else 0.0),
     "domain": (
         [X_ABOVE_0],
@@ -172,7 +179,10 @@ def piecewise_solution(name):
 
 @pytest.mark.parametrize(
     "name",
-    [pytest.param(name, marks=() if name in ("relay", "nested", "domain") else pytest.mark.slow) for name in PIECES],
+    [
+        pytest.param(name, marks=() if name in ("relay", "nested", "notch", "domain") else pytest.mark.slow)
+        for name in PIECES
+    ],
 )
 def test_the_error_is_proportional_to_the_tolerance(launch, name):
     """Each method, with jumps and kinks of the force, nested conditions, and operations with a limited domain."""
@@ -202,6 +212,17 @@ def test_changes_are_located_to_rounding(launch):
         fmu = launch("both", **loose, x0=-T_ON, v0=1.0)
         fmu.step(0.0, STOP)
         assert abs(fmu.get("x") - (STOP - T_ON + F * (STOP - T_ON) ** 2)) < 1e-13
+
+
+def test_short_pulses_of_a_force_are_found(launch):
+    """Pulses of 0.01 to 1e-5 of their period, while nothing else limits the steps; closed form."""
+    for method in METHODS:
+        for depth in (1e-3, 1e-6, 1e-9):
+            for Omega in (7.0, 20.0, 45.0):
+                fmu = launch("pulsing", method=method, rtol=1e-6, k=0.0, mu=depth, Omega=Omega)
+                fmu.step(0.0, STOP)
+                pulses, width = int((Omega * STOP / pi + 1.5) / 2.0), 2.0 * np.arccos(1.0 - depth) / Omega
+                assert fmu.get("v") == pytest.approx(pulses * F * width, rel=1e-6)
 
 
 def test_a_jump_of_the_force_costs_few_steps(launch):
@@ -407,9 +428,22 @@ def test_a_contact_that_lifts_off_agrees_with_an_independent_formulation(launch)
     assert abs(fmu.get("v") - v) < 1e-8
 
 
+def test_a_limit_that_falls_to_zero_for_a_short_time_lets_go(launch):
+    """Friction of a guide, mu |N|: while it sticks, the spring never exceeds what it holds."""
+    times = np.linspace(0.0, STOP, 1001)
+    for method in METHODS:
+        for Omega in (5.0, 9.0):
+            fmu = launch("guided", method=method, x0=0.005, Omega=Omega)
+            x, mode = np.array(fmu.run(times.tolist(), ["x", "mode"])).T
+            stuck = mode == 0
+            assert np.count_nonzero(stuck) > 500
+            assert np.all(K * np.abs(x[stuck]) <= 2.0 * MU * F * np.abs(np.sin(Omega * times[stuck])) + 1e-9)
+
+
 SLIDING_FORCES = {  # whether a limit is needed
     "f": False,
     "mu * fabs(F_ext)": False,
+    "mu * fabs(F_ext - k * x)": False,
     "f + (f_s - f) * exp(-r * r)": False,
     "f * (1.0 + r * r)": False,
     "mu * choose(load > 0.0, load, 0.0)": False,

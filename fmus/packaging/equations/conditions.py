@@ -7,9 +7,9 @@ equations are smooth in every step.  Limits must hold during the whole run.
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from .algebra import depends_on, is_constant, is_same_expression, operands, subexpressions
+from .algebra import depends_on, is_constant, is_same_expression, operands, subexpressions, substitute, variables_in
 from .expressions import COMPARISONS, Expression, Operand, Term
-from .model_declaration import SettableVariable
+from .model_declaration import Contact, Model, SettableVariable
 
 LIMITED_DOMAIN = ("sqrt", "log", "asin", "acos", "/")  # operations that fail for some operands
 HOLD_TOLERANCE = 1e-9  # the sliding force may exceed the holding force by rounding errors
@@ -39,11 +39,73 @@ def find_conditions(targets: Iterable[Operand], varying: Iterable[Expression]) -
                 groups.append([e])
             else:
                 group.append(e)
+    for group in groups:  # grows: a kink may lie within another one
+        for e in kinks(comparison_margin(group[0])):
+            side = Term(">", e.args[0], 0.0)
+            side.location = e.location
+            if depends_on(e, varying) and not any(is_same_expression(other[0], side) for other in groups):
+                groups.append([side])
     protecting = {id(comparison) for e in terms for comparison in protected_comparisons(e, varying)}
     return [
-        Condition(comparison_margin(group[0]), group[0].args, tuple(group), not any(id(e) in protecting for e in group))
+        Condition(
+            without_kinks(comparison_margin(group[0]), groups),
+            group[0].args,
+            tuple(group),
+            not any(id(e) in protecting for e in group),
+        )
         for group in groups
     ]
+
+
+def kinks(e: Operand) -> list[Term]:
+    """Return the absolute values in an expression, those of terms that contain others last."""
+    return [term for term in reversed(subexpressions(e).values()) if isinstance(term, Term) and term.op == "fabs"]
+
+
+def without_kinks(e: Operand, groups: list[list[Term]]) -> Operand:
+    """Return an expression with its absolute values as cases of the comparisons u > 0 among the groups.
+
+    A search on a polynomial would pass the narrow dip of fabs(u) - b without a zero; u itself has none.
+    """
+    values: dict[Expression, Operand] = {}
+    for kink in kinks(e):
+        (u,) = kink.args
+        for comparison, *_ in groups:
+            if comparison.op == ">" and is_same_expression(comparison, Term(">", u, 0.0)):
+                smooth = substitute(u, values)
+                values[kink] = Term("choose", comparison, smooth, Term("neg", smooth))
+    return substitute(e, values)
+
+
+def locate_kinks_of_friction(model: type[Model]) -> None:
+    """Write the absolute values in friction forces of a model by choose(), so that their kinks are events.
+
+    A limit mu |N| falls to zero and rises again where N changes its sign; a search would not find the dip.  The kink of
+    |slip| needs no event of its own.
+    """
+    for c in vars(model).values():
+        if isinstance(c, Contact):
+            speeds = variables_in(c.slip)
+            c.slide = without_absolute_values(c.slide, speeds)
+            c.hold = None if c.hold is None else without_absolute_values(c.hold, speeds)
+
+
+def without_absolute_values(e: Operand, speeds: list[Expression]) -> Operand:
+    """Return an expression with choose() in place of the absolute values that do not depend on the speeds."""
+    values: dict[Expression, Operand] = {}
+    for kink in kinks(e):
+        if variables_in(kink) and not depends_on(kink, speeds):
+            u = substitute(kink.args[0], values)
+            comparison = Term(">", u, 0.0)
+            values[kink] = Term("choose", comparison, u, Term("neg", u))
+            comparison.location = values[kink].location = kink.location
+    return substitute(e, values)
+
+
+def is_absolute_value(e: Term) -> bool:
+    """Return whether a term is choose(u > 0, u, -u)."""
+    condition, this, that = e.args
+    return is_positive_part(condition, this) and is_same_expression(that, Term("neg", this))
 
 
 def comparison_margin(e: Term) -> Operand:
@@ -93,7 +155,9 @@ def is_nonnegative(e: Operand) -> bool:
         case "-":
             return is_nonnegative(e.args[0]) and is_nonpositive(e.args[1])
         case "choose":
-            return all(is_nonnegative(case) or is_positive_part(e.args[0], case) for case in e.args[1:])
+            return is_absolute_value(e) or all(
+                is_nonnegative(case) or is_positive_part(e.args[0], case) for case in e.args[1:]
+            )
     return False
 
 
