@@ -23,6 +23,9 @@ DEGREE = 8  # of the polynomial through an event function; interpolants have deg
 INTERPOLANT_SHARE = 1.0 / 12.0
 NEAR_ZERO_SHARE = 0.002  # of the largest value since the last event; larger event functions are in no doubt
 MAX_SEARCH_STEPS, MAX_SECANTS, MAX_BISECTIONS = 1000, 200, 200
+# The polynomial differs by less than this share of its two highest coefficients; search of a minimum closer to zero
+POLYNOMIAL_ERROR = 1.0 / 32768.0
+MINIMUM_RANGE, MAX_SECTIONS, GOLDEN_SECTION = 0.0625, 40, 0.6180339887498949
 MAX_DOUBLINGS = 9  # of the share of a step where a search begins
 START_OF_SLIP = 1e-3  # share of a step after which a slip that starts at zero is larger than its rounding error
 ERROR_FACTOR = 100.0  # bound on the error of an event function, in multiples of the tolerance and of its scale
@@ -194,10 +197,13 @@ def search_polynomial(model, step, j):
 
     The polynomial of degree 8 through the function is searched from the start.  It stays above the parabola of its
     largest curvature, so that steps to the zero of that parabola cannot pass a zero.  Where the function is still
-    positive at a zero of the polynomial, the polynomial is raised to the function and the search goes on.
+    positive at a zero of the polynomial, the polynomial is raised to the function and the search goes on.  Where the
+    polynomial stays above zero by less than its error, the minimum of the function decides.
     """
     location = step.event_location
     fit_polynomial(model, step, j)
+    polynomial_error = POLYNOMIAL_ERROR * (fabs(location.samples[DEGREE]) + fabs(location.samples[DEGREE - 1]))
+    lowest, u_lowest = inf, 0.0
     largest_curvature = 0.0
     for k in range(DEGREE - 1):
         largest_curvature += (k + 2.0) * (k + 1.0) * fabs(location.polynomial[k + 2])
@@ -224,13 +230,47 @@ def search_polynomial(model, step, j):
                 return t  # the function only touches zero
             location.polynomial[0] += g - value
         else:
+            if value < lowest and slope <= 0.0:
+                lowest, u_lowest = value, u
             descent = sqrt(slope * slope + 2.0 * largest_curvature * value) - slope
             if not 2.0 * value < (1.0 - u) * descent:
                 break
             u += 2.0 * value / descent
     if location.end[j] > 0.0:
+        if lowest < polynomial_error < location.start[j]:
+            return search_minimum(model, step, u_lowest, j)
         return inf
     return find_root(model, step, step.t0, step.t1, location.start[j], location.end[j], j)
+
+
+def search_minimum(model, step, u, j):
+    """Return the first zero of one event function near a minimum, by golden sections; inf if the minimum is positive.
+
+    `u` is the place of the minimum, as a share of the step.
+    """
+    location = step.event_location
+    h = step.t1 - step.t0
+    low = u - MINIMUM_RANGE if u > MINIMUM_RANGE else 0.0
+    high = u + MINIMUM_RANGE if u < 1.0 - MINIMUM_RANGE else 1.0
+    left, right = high - GOLDEN_SECTION * (high - low), low + GOLDEN_SECTION * (high - low)
+    g_left = event_function(model, step, step.t0 + left * h, j)
+    g_right = event_function(model, step, step.t0 + right * h, j)
+    step.interpolant.n_event_evals += 2
+    for _ in range(MAX_SECTIONS):
+        if g_left <= 0.0:
+            return find_root(model, step, step.t0, step.t0 + left * h, location.start[j], g_left, j)
+        if g_right <= 0.0:
+            return find_root(model, step, step.t0, step.t0 + right * h, location.start[j], g_right, j)
+        step.interpolant.n_event_evals += 1
+        if g_left < g_right:
+            high, right, g_right = right, left, g_left
+            left = high - GOLDEN_SECTION * (high - low)
+            g_left = event_function(model, step, step.t0 + left * h, j)
+        else:
+            low, left, g_left = left, right, g_right
+            right = low + GOLDEN_SECTION * (high - low)
+            g_right = event_function(model, step, step.t0 + right * h, j)
+    return inf
 
 
 def end_of_interpolation_error(location, least, error):
