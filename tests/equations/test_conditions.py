@@ -68,6 +68,7 @@ FORCES = {
     "jumping": "choose(F_ext > 0.2 * f, f, F_ext)",
     "ramped": "choose(F_ext > 0.2 * f, f, F_ext) - k * x * x * x / (gap * gap)",
     "notch": "choose(fabs(x - gap) < 0.01 * gap, -40.0 * f, 0.0)",
+    "cusped": "2.0 * f * (1.0 - fabs(sin(angle) - mu))",
     "pulsing": "choose(sin(angle) > 1.0 - mu, f, 0.0)",
     "chattering": "choose(v > 0.0, -f, f)",
     "domain": "choose(x > 0.0, -f * sqrt(x / gap) - f * log(x / gap + 1.0) - f * x / (x + gap), 0.0)",
@@ -80,6 +81,7 @@ CONTACTS = {  # slide and hold
     "holdingspeed": "f, hold=f * (0.5 + fabs(v) / v_s)",
     "lifting": "mu * f * (1.0 + 2.0 * sin(angle)), hold=2.0 * mu * f * (1.0 + 2.0 * sin(angle)), lifts_off=True",
     "guided": "mu * f * fabs(sin(angle)), hold=2.0 * mu * f * fabs(sin(angle))",
+    "cusped": "0.5 * f, hold=1.999 * f",
     "switched": "mu * choose(x > 0.0, 2.0 * f, f), hold=f * choose(clock > t_on, 2.0, 1.0)",
 }
 
@@ -438,6 +440,19 @@ def test_a_limit_that_falls_to_zero_for_a_short_time_lets_go(launch):
             stuck = mode == 0
             assert np.count_nonzero(stuck) > 500
             assert np.all(K * np.abs(x[stuck]) <= 2.0 * MU * F * np.abs(np.sin(Omega * times[stuck])) + 1e-9)
+
+
+def test_a_cusp_of_the_load_breaks_a_contact_away(launch):
+    """The load exceeds the holding force for a short time; closed form of the break-away."""
+    for method in METHODS:
+        for Omega in (0.4, 0.9, 1.7):
+            fmu = launch("cusped", method=method, x0=0.0, k=0.0, Omega=Omega)
+            fmu.step(0.0, STOP)
+            assert fmu.get("events.count") > 0
+            fmu = launch("cusped", method=method, x0=0.0, k=0.0, Omega=Omega)
+            t = np.arcsin(0.5 - 0.0005) / Omega
+            modes = fmu.run([0.0, t - 1e-9, t + 1e-6], ["mode"])[1:]
+            assert [mode for (mode,) in modes] == [0, 1]
 
 
 SLIDING_FORCES = {  # whether a limit is needed

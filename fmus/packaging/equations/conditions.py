@@ -4,12 +4,12 @@ A condition of choose() that depends on states or time keeps its value during a 
 equations are smooth in every step.  Limits must hold during the whole run.
 """
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 
 from .algebra import depends_on, is_constant, is_same_expression, operands, subexpressions, substitute, variables_in
-from .expressions import COMPARISONS, Expression, Operand, Term
-from .model_declaration import Contact, Model, SettableVariable
+from .expressions import COMPARISONS, Expression, Operand, Term, is_among
+from .model_declaration import Contact, Model, Output, SettableVariable, State
 
 LIMITED_DOMAIN = ("sqrt", "log", "asin", "acos", "/")  # operations that fail for some operands
 HOLD_TOLERANCE = 1e-9  # the sliding force may exceed the holding force by rounding errors
@@ -77,20 +77,30 @@ def without_kinks(e: Operand, groups: list[list[Term]]) -> Operand:
     return substitute(e, values)
 
 
-def locate_kinks_of_friction(model: type[Model]) -> None:
-    """Write the absolute values in friction forces of a model by choose(), so that their kinks are events.
+def locate_kinks(model: type[Model]) -> None:
+    """Write the absolute values in the friction and the loads of contacts by choose(), so that their kinks are events.
 
-    A limit mu |N| falls to zero and rises again where N changes its sign; a search would not find the dip.  The kink of
-    |slip| needs no event of its own.
+    A limit mu |N| falls to zero and rises again where N changes its sign, and a load may have a cusp; a search would
+    not find the dip.  The kinks of |slip| and of drag |v| v need no events of their own.
     """
-    for c in vars(model).values():
-        if isinstance(c, Contact):
-            speeds = variables_in(c.slip)
-            c.slide = without_absolute_values(c.slide, speeds)
-            c.hold = None if c.hold is None else without_absolute_values(c.hold, speeds)
+    declared = list(vars(model).values())
+    contacts = [e for e in declared if isinstance(e, Contact)]
+    positions = [e.integrates for e in declared if isinstance(e, State) and e.integrates is not None]
+    speeds = [
+        s
+        for c in contacts
+        for s in variables_in(c.slip)
+        if isinstance(s, State) and s.constant_rate is None and not is_among(s, positions)
+    ]
+    for e in declared if contacts else ():  # an output before the outputs that use it
+        if isinstance(e, Output):
+            e.expression = without_absolute_values(e.expression, speeds)
+        elif isinstance(e, Contact):
+            e.slide = without_absolute_values(e.slide, speeds)
+            e.hold = None if e.hold is None else without_absolute_values(e.hold, speeds)
 
 
-def without_absolute_values(e: Operand, speeds: list[Expression]) -> Operand:
+def without_absolute_values(e: Operand, speeds: Collection[Expression]) -> Operand:
     """Return an expression with choose() in place of the absolute values that do not depend on the speeds."""
     values: dict[Expression, Operand] = {}
     for kink in kinks(e):
