@@ -254,7 +254,7 @@ class Terminal:
         ----------
         result
             Data for JSON output.
-        *shown
+        *blocks
             Tables and sentences to print otherwise.
         folder
             Folder of the result; printed last, with a note if an earlier result was replaced.

@@ -199,11 +199,13 @@ def note_replaced_result(old_folder: Path, new_folder: Path, file: str) -> None:
     if not after:
         return
     differences = [
-        format_parameter(name, **each)
-        for name, each in before["parameters"].items()
-        if each != after["parameters"].get(name)
+        format_parameter(name, **parameter)
+        for name, parameter in before["parameters"].items()
+        if parameter != after["parameters"].get(name)
     ]
-    options, new_options = ((each.get("run") or {}) | (each["scene"] or {}) for each in (before, after))
+    options, new_options = (
+        (provenance.get("run") or {}) | (provenance["scene"] or {}) for provenance in (before, after)
+    )
     unchanged = [name for name in options if name in IMPLIED_OPTIONS or options[name] == new_options.get(name)]
     differences += [format_option(name, value) for name, value in options.items() if name not in unchanged]
     differences += [f"another {name}" for name, value in before["files"].items() if value != after["files"].get(name)]

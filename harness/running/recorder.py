@@ -144,7 +144,7 @@ class Recorder:
     Parameters
     ----------
     session : FmuSession
-    chosen : sequence of (variable, shape)
+    selection : sequence of (variable, shape)
     write : callable
         Receives the bytes of each row.
     strings : StringTable, optional

@@ -90,8 +90,8 @@ def answer_as_json(
 ) -> dict[str, Any]:
     """Return the keys that the answers of `decay` and of `fit` share."""
     return {
-        "record": ", ".join(each.record for each in samples),
-        "records": [each.as_json() for each in samples],
+        "record": ", ".join(used.record for used in samples),
+        "records": [used.as_json() for used in samples],
         "columns": [asdict(column) for column in columns],
         "fit": [asdict(estimate) for estimate in estimates],
         "remarks": [*remarks],

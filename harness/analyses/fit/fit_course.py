@@ -61,16 +61,16 @@ def fit_records(
     HarnessError
         If a record shows no motion or the FMU refuses all values.
     """
-    for each in data:
-        if not np.ptp(each.y, axis=0).all():
-            raise HarnessError(f"{each.name} shows no motion in a column: nothing can be determined from it")
+    for record_data in data:
+        if not np.ptp(record_data.y, axis=0).all():
+            raise HarnessError(f"{record_data.name} shows no motion in a column: nothing can be determined from it")
     warm: np.ndarray | None = None
     for binned in (True, False) if averages else (False,):
-        records = [MeasuredRecord(simulator, each, binned) for each in data]
+        records = [MeasuredRecord(simulator, record_data, binned) for record_data in data]
         problem = FitProblem(records, simulator.spec.outputs, unknowns, fixed, robust)
-        course = find_course(problem, warm, any(any(each.sigma) for each in data), report)
+        course = find_course(problem, warm, any(any(record_data.sigma) for record_data in data), report)
         values = [problem.values(course.z, i) for i in range(len(records))]
-        if all(record.means_hold(each) for record, each in zip(records, values, strict=True)):
+        if all(record.means_hold(record_values) for record, record_values in zip(records, values, strict=True)):
             break
         warm = course.z
     return problem, course
@@ -121,9 +121,9 @@ def find_course(
             break
     else:
         doubts.append("The sum of squares has many shallow minima here: the values may lie anywhere in the intervals.")
-    others = [each for each in minima if np.abs(each[1] - z).max() > DISTINCT]
+    others = [minimum for minimum in minima if np.abs(minimum[1] - z).max() > DISTINCT]
     extend_ends(problem, z, uncertainty, ends, others)
-    other_minima = [there for _, there in others]
+    other_minima = [position for _, position in others]
     return FitCourse(z, uncertainty, ends, profiles, other_minima, doubts, result.log, result.n_searches)
 
 
@@ -197,7 +197,7 @@ def find_other_minima(
     """Return minima about as low as that at z (k,), found from those of the search and from draws around z."""
     limit = max(map(uncertainty.limit, range(len(z))))
     random = np.random.default_rng(0)
-    starts = [there for value, there in distinct(minima, MAX_OTHER_MINIMA) if value < squares + 3 * limit]
+    starts = [position for value, position in distinct(minima, MAX_OTHER_MINIMA) if value < squares + 3 * limit]
     eigenvalues, axes = np.linalg.eigh(uncertainty.covariance * uncertainty.inflation.mean())
     reach = 2 * np.minimum(np.sqrt(np.maximum(eigenvalues, 0.0)), DRAW_SIZE)
     starts += [z + axes @ (reach * random.normal(size=len(z))) for _ in range(DRAWS)]
@@ -205,7 +205,7 @@ def find_other_minima(
     if problem.n_samples > 2 * COARSE_SAMPLES * len(problem.records):
         few = tuple(np.unique(np.linspace(0, index[-1], COARSE_SAMPLES).astype(int)) for index in problem.all)
         coarse = distinct([problem.minimize(start, few, steps, 1e-4) for start in starts], len(starts))
-        starts = [there for value, there in coarse if value < coarse[0][0] + 3 * limit]
+        starts = [position for value, position in coarse if value < coarse[0][0] + 3 * limit]
     ends = [problem.minimize(start, problem.all, steps, 1e-6) for start in starts]
     return distinct([end for end in ends if end[0] < squares + limit], len(ends))
 
@@ -219,9 +219,9 @@ def extend_ends(
 ) -> None:
     """Follow the profile from the minimum that lies farthest out, if it lies where an interval ends or beyond."""
     for (i, side), end in ends.items():
-        below = [(max(squares - uncertainty.squares, 0.0), there) for squares, there in other_minima]
-        below = [each for each in below if each[0] < uncertainty.limit(i)]
-        excess, farthest = max(below, key=lambda each: side * float(each[1][i]), default=(0.0, z))
+        below = [(max(squares - uncertainty.squares, 0.0), position) for squares, position in other_minima]
+        below = [minimum for minimum in below if minimum[0] < uncertainty.limit(i)]
+        excess, farthest = max(below, key=lambda minimum: side * float(minimum[1][i]), default=(0.0, z))
         if end is not None and side * (farthest[i] - z[i]) > 0.5 * abs(end - z[i]):
             other = profile_bound(problem, farthest, uncertainty, i, side, ends_at_better=False, excess=excess).end
             ends[i, side] = None if other is None else side * max(side * other, side * end)

@@ -30,8 +30,8 @@ def describe_fit(
     predictions = problem.predict(z, problem.all)
     assert predictions is not None
     is_unfit = any(
-        each.residual > max(UNFIT_SHARE * each.range, UNFIT_NOISE * each.noise) and not is_rest
-        for each, is_rest in zip(columns, find_rests(problem.records, predictions, residuals), strict=True)
+        column.residual > max(UNFIT_SHARE * column.range, UNFIT_NOISE * column.noise) and not is_rest
+        for column, is_rest in zip(columns, find_rests(problem.records, predictions, residuals), strict=True)
     )
     estimates, several = make_estimates(problem, course, is_unfit)
     undetermined = [i for i, estimate in enumerate(estimates) if not isfinite(estimate.error)]
@@ -143,7 +143,7 @@ def make_profiles(problem: FitProblem, course: FitCourse) -> tuple[Profile, ...]
 
 def unfit_remark(columns: Sequence[ColumnResiduals]) -> list[str]:
     """Return the remark on a fit that does not describe the record."""
-    worst = max(columns, key=lambda each: each.residual / each.range)
+    worst = max(columns, key=lambda column: column.residual / column.range)
     return [
         f"The model does not describe {worst.record}: the best values leave residuals of "
         f"{100 * worst.residual / worst.range:.2g} % of the range of {worst.name}; do not rely on these values."
@@ -160,7 +160,7 @@ def fit_remarks(
 ) -> list[str]:
     """Return the remarks on a fit."""
     uncertainty, remarks = course.uncertainty, []
-    largest = max(columns, key=lambda each: each.residual / each.noise)
+    largest = max(columns, key=lambda column: column.residual / column.noise)
     if uncertainty.correlation or largest.residual > ROUGH * largest.noise:
         remarks.append(
             f"The residuals are not white noise (rms {largest.residual / largest.noise:.2g} times the scatter of "

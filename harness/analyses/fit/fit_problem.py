@@ -61,8 +61,8 @@ class FitProblem:
     def values(self, z: np.ndarray, record: int) -> dict[str, float]:
         """Return the values to set for a record."""
         fitted = {
-            unknown.variable: unknown.to_value(each)
-            for unknown, each in zip(self.unknowns, z.tolist(), strict=True)
+            unknown.variable: unknown.to_value(coordinate)
+            for unknown, coordinate in zip(self.unknowns, z.tolist(), strict=True)
             if unknown.column is None and unknown.record in (None, record)
         }
         return self.fixed | fitted
@@ -127,10 +127,10 @@ class FitProblem:
         They are longer where runs with nearly equal values scatter, as those of solvers with step control do. The
         scatter is that of third differences.
         """
-        index = tuple(each[:: max(1, len(each) // 200)] for each in self.all)
+        index = tuple(samples[:: max(1, len(samples) // 200)] for samples in self.all)
         for share in (0.5, 0.4, 0.6, 0.3, 0.7):
             z = self.low + (self.high - self.low) * share
-            e = [each for i in range(4) if (each := self.residuals(z + 1e-7 * i, index)) is not None]
+            e = [residuals for i in range(4) if (residuals := self.residuals(z + 1e-7 * i, index)) is not None]
             if len(e) == 4:
                 scatter = np.quantile(np.abs(e[0] - 3 * e[1] + 3 * e[2] - e[3]), 0.9) / 20**0.5
                 return EXACT_STEPS if scatter < 1e-9 * np.ptp(e[0]) else ROUGH_STEPS
@@ -145,7 +145,7 @@ class FitProblem:
             d = h * np.eye(len(z))[i]
             up = self.residuals(z + d, selection)
             down = self.residuals(z - d, selection) if central or up is None else None
-            ends = [(each, side) for each, side in ((up, 1), (down, -1), (e, 0)) if each is not None][:2]
+            ends = [(shifted, side) for shifted, side in ((up, 1), (down, -1), (e, 0)) if shifted is not None][:2]
             if len(ends) == 2:
                 columns[:, j] = (ends[0][0] - ends[1][0]) / (h * (ends[0][1] - ends[1][1]))
         return columns

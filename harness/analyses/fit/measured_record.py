@@ -70,7 +70,7 @@ class MeasuredRecord:
             self.inputs = {name: bin_means(u, self.width) for name, u in inputs.items()}
         scatter = [estimate_noise(self.t, column)[0] for column in self.y.T]
         self.noise = np.maximum(scatter, self.step / 12**0.5)
-        known = np.array([each or 0.0 for each in data.sigma])
+        known = np.array([deviation or 0.0 for deviation in data.sigma])
         self.noise = np.where(known > 0, known / np.sqrt(self.width), self.noise)
         self.all = np.arange(len(self.t))
         self.parts: dict[int, RecordPart] = {}
@@ -131,7 +131,7 @@ class MeasuredRecord:
         t, begin = self.t[index], self.t[0]
         shortest = SHORTEST_STEP * (self.t[-1] - begin) / len(self.t)  # an FMU may refuse tiny steps
         earlier = [t - delays.get(j, 0.0) for j in range(len(self.simulator.spec.outputs))]
-        shown = [np.where(each - begin > shortest, each, begin) for each in earlier]
+        shown = [np.where(shifted_t - begin > shortest, shifted_t, begin) for shifted_t in earlier]
         knots, inputs = self.t[[0, index[-1]]], {}
         if self.inputs and len(index) == len(self.t):
             knots, inputs = self.fine_t, self.driven
@@ -143,7 +143,7 @@ class MeasuredRecord:
         y = self.prepare(points, times, {name: np.interp(times, knots, u) for name, u in inputs.items()})(values)
         if y is None:
             return None
-        return np.stack([y[np.searchsorted(points, each), j] for j, each in enumerate(shown)], axis=1)
+        return np.stack([y[np.searchsorted(points, shifted_t), j] for j, shifted_t in enumerate(shown)], axis=1)
 
     def quantisation_errors(self, y: np.ndarray) -> np.ndarray:
         """Return the errors (n, columns) that the quantisers of a record of the signals y (n, columns) would make.
@@ -154,8 +154,8 @@ class MeasuredRecord:
         for j in np.flatnonzero(self.step):
             signal = np.interp(self.sampled_t, self.t, y[:, j]) if self.width > 1 else y[:, j]
             origin, step = self.sampled_y[0, j], self.step[j]
-            each = np.round((signal - origin) / step) * step + origin - signal
-            errors[:, j] = bin_means(each, self.width) if self.width > 1 else each
+            column_errors = np.round((signal - origin) / step) * step + origin - signal
+            errors[:, j] = bin_means(column_errors, self.width) if self.width > 1 else column_errors
         return errors
 
     def means_hold(self, values: Mapping[str, float]) -> bool:

@@ -172,7 +172,7 @@ class ParameterFit:
 
     def __getitem__(self, name: str) -> Estimate:
         """Return the estimate of an unknown or of a combination."""
-        return next(each for each in (*self.estimates, *self.combinations) if each.name == name)
+        return next(estimate for estimate in (*self.estimates, *self.combinations) if estimate.name == name)
 
     @property
     def undetermined(self) -> tuple[str, ...]:

@@ -75,7 +75,7 @@ def search(
         minima = [problem.minimize(z, selection, 20, 1e-6) for _, z in candidates[:REFINED]]
         result.minima += minima
         result.n_searches = number
-        new = min(minima, key=lambda each: each[0], default=(np.inf, np.zeros(0)))
+        new = min(minima, key=lambda minimum: minimum[0], default=(np.inf, np.zeros(0)))
         kind = "differential evolution" if is_evolution else "continuation in time"
         result.log.append(f"search {number}, {kind}: sum of squares {new[0]:.6g}")
         if not np.isfinite(new[0]):
@@ -173,7 +173,7 @@ def absolute_cost(problem: FitProblem, z: np.ndarray, selection: Selection) -> f
 def distinct(minima: list[Minimum], most: int) -> list[Minimum]:
     """Return the lowest minima that differ from each other."""
     kept: list[Minimum] = []
-    for squares, z in sorted(minima, key=lambda each: each[0]):
+    for squares, z in sorted(minima, key=lambda minimum: minimum[0]):
         is_new = all(np.abs(z - other).max() > DISTINCT for _, other in kept)
         if np.isfinite(squares) and len(kept) < most and is_new:
             kept.append((squares, z))

@@ -90,7 +90,7 @@ def estimate_uncertainty(
     problem.central = bool(eigenvalues.max() > STIFF**2 * eigenvalues.min())
     white = np.diag(inverse) * variance + 1e-300
     by_record = split_residuals(problem, e)
-    correlation = max((significant_correlation(each) for each in by_record), key=abs)
+    correlation = max((significant_correlation(residuals) for residuals in by_record), key=abs)
     inflation = np.ones(len(z))
     if correlation:
         inflation *= max(map(correlation_length, by_record))

@@ -96,4 +96,4 @@ class Unknown:
 
 def to_values(unknowns: tuple[Unknown, ...], z: np.ndarray) -> dict[str, float]:
     """Return the value of each unknown, by name, at the coordinates z (k,)."""
-    return {unknown.name: unknown.to_value(float(each)) for unknown, each in zip(unknowns, z, strict=True)}
+    return {unknown.name: unknown.to_value(float(coordinate)) for unknown, coordinate in zip(unknowns, z, strict=True)}

@@ -26,15 +26,17 @@ def validate(problem: FitProblem, course: FitCourse, data: Sequence[RecordData])
     """
     records, predictions = [], []
     fitted = problem.records[0]
-    for each in data:
-        record = MeasuredRecord(fitted.simulator, each, fitted.width > 1)
+    for record_data in data:
+        record = MeasuredRecord(fitted.simulator, record_data, fitted.width > 1)
         if not record.means_hold(problem.values(course.z, 0)):
-            record = MeasuredRecord(fitted.simulator, each, binned=False)
+            record = MeasuredRecord(fitted.simulator, record_data, binned=False)
         record.noise = np.where(np.ptp(record.y, axis=0) > 0.0, record.noise, fitted.noise)  # of a body at rest
         record.subdivide(fitted.subdivision)
         prediction = problem.predict_record(course.z, record, 0, record.all)
         if prediction is None:
-            raise HarnessError(f"the FMU refuses the fitted values in the run of the validation record {each.name}")
+            raise HarnessError(
+                f"the FMU refuses the fitted values in the run of the validation record {record_data.name}"
+            )
         records.append(record)
         predictions.append(prediction)
     residuals = [

@@ -57,10 +57,10 @@ def load_both(
 
 def display_names(sources: tuple[str, str]) -> list[str]:
     """Return short names of two sources; equal names are extended by the folders or suffixes in which they differ."""
-    paths = [Path(abspath(each)) if Path(each).exists() else Path("scene", each) for each in sources]
-    stems = [each if each.is_dir() or each.parts[0] == "scene" else each.with_suffix("") for each in paths]
+    paths = [Path(abspath(source)) if Path(source).exists() else Path("scene", source) for source in sources]
+    stems = [path if path.is_dir() or path.parts[0] == "scene" else path.with_suffix("") for path in paths]
     has_same_stem = stems[0] == stems[1] and paths[0] != paths[1]
-    one, two = (each.parts for each in (paths if has_same_stem else stems))
+    one, two = (path.parts for path in (paths if has_same_stem else stems))
     n_parts = next((k for k, ends in enumerate(zip(one[::-1], two[::-1], strict=False), 1) if ends[0] != ends[1]), 1)
     return ["/".join(parts[-n_parts:]) for parts in (one, two)]
 

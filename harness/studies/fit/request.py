@@ -190,7 +190,7 @@ def parameter_names(description: Any, observe: Iterable[str]) -> list[str]:
 
 def settable_names(description: Any) -> list[str]:
     """Return the names of the parameters and inputs of an FMU."""
-    return [each.name for each in description.modelVariables if each.causality in ("parameter", "input")]
+    return [variable.name for variable in description.modelVariables if variable.causality in ("parameter", "input")]
 
 
 def make_unknowns(resolved: ResolvedRequest, records: Sequence[RecordData]) -> tuple[Unknown, ...]:

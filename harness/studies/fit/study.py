@@ -48,7 +48,7 @@ def fit_files(
         Record files that are predicted, but not fitted.
     """
     laws = resolve_laws(request)
-    records, others = ([load_record(file, request) for file in each] for each in (files, validation))
+    records, others = ([load_record(file, request) for file in group] for group in (files, validation))
     folder = out / FOLDER / records[0].name
     source = provenance.describe_sources(*files)
     with replace_folder(folder, FILES, source) as new_folder:
@@ -94,7 +94,7 @@ def fit_laws(
     def fit_law(i: int, averages: bool) -> ParameterFit:
         law = laws.requests[i]
         tables, others = (
-            [parse_signals(each.table, law.sources, law.request.columns, each.name) for each in group]
+            [parse_signals(record.table, law.sources, law.request.columns, record.name) for record in group]
             for group in (records, validation)
         )
         try:
@@ -198,13 +198,13 @@ def fit_tables(
 
 def with_units(columns: Sequence[ColumnResiduals], units: Mapping[str, str]) -> tuple[ColumnResiduals, ...]:
     """Return columns with the units of their variables."""
-    return tuple(replace(each, unit=units[each.name]) for each in columns)
+    return tuple(replace(column, unit=units[column.name]) for column in columns)
 
 
 def fit_as_json(fit: ParameterFit) -> dict[str, Any]:
     """Return a fit for JSON output."""
-    comparison = {"against": [fit_as_json(each) for each in fit.against], "comparison": fit.comparison}
-    used = [UsedSamples(each.name, each.sampled_t, len(each.sampled_t), each.width) for each in fit.records]
+    comparison = {"against": [fit_as_json(law) for law in fit.against], "comparison": fit.comparison}
+    used = [UsedSamples(record.name, record.sampled_t, len(record.sampled_t), record.width) for record in fit.records]
     return {
         "fmu": fit.fmu,
         **answer_as_json(used, fit.columns, fit.estimates, fit.remarks),

@@ -67,7 +67,8 @@ class OwnFmuRunner:
         self.runs = PreparedRuns(session, shared, runs.varied, to_read, plan.grid.start, plan.grid.stop)
         self.columns = measure_columns(measures, self.variables, outputs)
         read = [
-            each.name for each in measure_columns(["final", *ends, "run_time", *self.along], self.variables, outputs)
+            column.name
+            for column in measure_columns(["final", *ends, "run_time", *self.along], self.variables, outputs)
         ]
         self.order = [read.index(column.name) for column in self.columns]
 
