@@ -1,11 +1,13 @@
 """Least squares, differences and profiles of a fit, whose answers have a closed form."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from harness.analyses.fit.feasible_region import FeasibleRegion
+from harness.analyses.fit.fit_course import extend_ends, starting_points
 from harness.analyses.fit.fit_problem import EXACT_STEPS, FitProblem
 from harness.analyses.fit.profile_likelihood import profile_bound
 from harness.analyses.fit.uncertainty import Uncertainty
@@ -99,11 +101,12 @@ def test_a_profile_that_never_reaches_its_limit_has_no_end():
     assert profile_bound(problem, MINIMUM, uncertainty_at(problem, MINIMUM), 0, 1).end is None
 
 
-def test_a_profile_without_an_end_stops_at_the_limit_of_the_fit():
+@pytest.mark.parametrize("side", [-1, 1])
+def test_a_profile_without_an_end_stops_at_the_limit_of_the_fit(side):
     problem = Residuals(lambda a, b: (0.1 * (a - 1.0), b - 1.0, 1.0), reach=3.0)
-    bound = profile_bound(problem, MINIMUM, uncertainty_at(problem, MINIMUM), 0, 1)
+    bound = profile_bound(problem, MINIMUM, uncertainty_at(problem, MINIMUM), 0, side)
     assert bound.end is None
-    assert bound.profile[-1][0] == pytest.approx(problem.unknowns[0].limits[1], abs=1e-9)
+    assert bound.profile[-1][0] == pytest.approx(problem.unknowns[0].limits[side > 0], abs=1e-9)
 
 
 @pytest.mark.parametrize("excess", [0.0, 0.7])
@@ -115,6 +118,23 @@ def test_a_profile_from_another_minimum_starts_at_its_height(excess):
     best = replace(uncertainty, squares=uncertainty.squares - excess)
     end = profile_bound(problem, MINIMUM, best, 0, 1, excess=excess).end
     assert end - 1.0 == pytest.approx(np.sqrt(QUANTILE**2 - excess), rel=0.03)
+
+
+def test_an_interval_extends_to_the_end_of_the_profile_of_another_minimum():
+    """The squares rise to both sides of a = 1, and of a = 2 from 0.8 of the limit on."""
+    excess, width = 0.8 * QUANTILE**2, 0.2
+    problem = Residuals(
+        lambda a, b: ((a - 1.0) / width if a < 1.5 else np.hypot(np.sqrt(excess), (a - 2.0) / width), b - 1.0, 1.0)
+    )
+    ends = {(0, 1): 1.0 + QUANTILE * width}
+    extend_ends(problem, MINIMUM, uncertainty_at(problem, MINIMUM), ends, [(1.0 + excess, np.array([2.0, 1.0]))])
+    assert ends[0, 1] - 2.0 == pytest.approx(width * np.sqrt(QUANTILE**2 - excess), rel=0.03)
+
+
+def test_a_start_value_of_one_unknown_leaves_the_others_in_the_middle_of_their_ranges():
+    a, b = Unknown("a", "a", "", 1.0, 16.0, start=2.0), Unknown("b", "b", "", 1.0, 16.0)
+    problem = SimpleNamespace(unknowns=(a, b), low=np.log([1.0, 1.0]), high=np.log([16.0, 16.0]))
+    assert np.exp(starting_points(problem, None)) == pytest.approx(np.array([[2.0, 4.0]]))
 
 
 @pytest.mark.parametrize(("coupling", "has_end"), [(0.0, True), (1.0, False)])

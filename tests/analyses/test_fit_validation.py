@@ -42,3 +42,15 @@ def test_a_validation_record_is_averaged_only_where_its_means_are_those_of_the_o
     validation = validate(problem, course, [make_record(60.0)])
     assert validation.columns[0].residual == pytest.approx(NOISE, rel=0.1)
     assert validation.remarks == ()
+
+
+def test_the_inputs_of_a_validation_record_are_as_fine_as_those_of_the_fit():
+    data = make_record(6.0)
+    driven = RecordData(data.name, data.t, data.y, {"F": np.cos(data.t)}, data.sigma)
+    fitted = MeasuredRecord(SIMULATOR, driven, binned=False)
+    fitted.subdivide(4)
+    problem = FitProblem([fitted], ["x"], [Unknown("size", "size", "m", 0.5, 2.0)], {})
+    z = np.zeros(1)
+    course = SimpleNamespace(z=z, uncertainty=SimpleNamespace(residuals=problem.residuals(z, problem.all)))
+    (record,) = validate(problem, course, [driven]).records
+    assert len(record.fine_t) == len(record.driven["F"]) == 4 * (len(data.t) - 1) + 1

@@ -78,6 +78,17 @@ def test_a_stored_run_is_repeated_bit_for_bit(call):
             assert np.array_equal(repeated[name], run[name]), name
 
 
+def test_a_stored_specification_names_enumerations_by_their_labels():
+    run = harness.simulate("stickslip", {"friction": 3, "k": 700}, stop=0.1)
+    assert run.spec.values == {"friction": "threshold", "k": 700.0}
+
+
+def test_a_run_at_an_interval_knows_its_internal_steps():
+    """Also where the scene does not follow them."""
+    assert harness.simulate("mine.toml").steps is None
+    assert harness.simulate("mine.toml", interval=0.5).steps is not None
+
+
 @pytest.mark.parametrize("name", [file.stem for file in shipped_scenes()])
 def test_every_shipped_scene_is_a_specification_that_reads_back(name):
     spec = resolve(name, scenes_first=True)

@@ -102,13 +102,16 @@ def test_a_decay_is_identified_from_any_source(tmp_path):
         _ = identification["mu"]
 
 
-def test_a_sweep_measures_what_single_runs_measure():
+@pytest.mark.parametrize("values", [{}, {"solver.method": "dop853", "solver.rtol": 0.1}], ids=["exact", "long steps"])
+def test_a_sweep_measures_what_single_runs_measure(values):
+    """Also where steps are as long as the run allows."""
     pytest.importorskip("xarray")
-    data = harness.sweep("coulomb", {"f": [0.3, 0.6], "k": [100.0, 200.0, 300.0]}, measures=["final", "events"])
+    grid = {"f": [0.3, 0.6], "k": [100.0, 200.0, 300.0]}
+    data = harness.sweep("coulomb", grid, values=values, measures=["final", "events"])
     assert data.sizes == {"f": 2, "k": 3}
     for f in data["f"].values:
         for k in data["k"].values:
-            run = harness.simulate("coulomb", {"f": f, "k": k})
+            run = harness.simulate("coulomb", values | {"f": f, "k": k})
             point = data.sel(f=f, k=k)
             assert float(point["final_x"]) == run["x"][-1]
             assert int(point["events"]) == len(run.events.t) - 1

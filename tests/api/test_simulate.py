@@ -54,6 +54,12 @@ def test_method_and_tolerance_are_those_of_the_solver():
     assert {*exact.columns} == {"x"}
 
 
+def test_an_interval_ends_with_the_stop():
+    run = harness.simulate("smd", stop=1.05, interval=0.25)
+    assert run.time == pytest.approx([0.0, 0.25, 0.5, 0.75, 1.0, 1.05])
+    assert run["x"][-1] == harness.simulate("smd", stop=1.05)["x"][-1]
+
+
 def test_a_scene_and_a_stored_result_run():
     run = harness.simulate("pacejka-0.01", stop=1.0)
     run.save("saved")
@@ -85,8 +91,12 @@ def test_an_input_that_jumps_jumps_at_its_time():
 def test_outputs_at_a_jump_have_the_input_after_it(interface, at_jump):
     """Model exchange shows both sides, because a jump is an event there."""
     table = {"time": [0.0, 0.0, 1.0, 1.0, 4.0], "F_ext": [9.0, 0.0, 0.0, 5.0, 5.0]}
-    run = harness.simulate(native_fmus.build_native_fmus() / "smd.fmu", inputs=table, interface=interface)
-    force = SMD["m"] * run["a"] + SMD["c"] * run["v"] + SMD["k"] * run["x"]
+    options = {"source": native_fmus.build_native_fmus() / "smd.fmu", "inputs": table, "interface": interface}
+    run, sampled = harness.simulate(**options), harness.simulate(**options, times=[0.5, 1.0, 1.5])
+    force, sampled_force = (
+        SMD["m"] * result["a"] + SMD["c"] * result["v"] + SMD["k"] * result["x"] for result in (run, sampled)
+    )
+    assert sampled_force == pytest.approx([0.0, 5.0, 5.0], abs=1e-12)
     assert force[run.time == 1.0] == pytest.approx(at_jump, abs=1e-12)
     assert force[run.time != 1.0] == pytest.approx(np.where(run.time[run.time != 1.0] > 1.0, 5.0, 0.0), abs=1e-12)
 

@@ -445,6 +445,8 @@ WRONG = {
     ),
     "a bare equation": (RATE + "    m * a == F - k * x\n", 17, "this line has no effect: an equation is written as"),
     "a bare term": (RATE + "    k * x + F\n", 17, "this line has no effect: an equation is written as name = Output"),
+    "a bare sign": (RATE + "    -F\n", 17, "this line has no effect: an equation is written as name = Output"),
+    "a bare name": (RATE + "    F\n", 17, "this line has no effect: an equation is written as name = Output"),
     "a name with a space": (
         RATE + '    vars()["k 1"] = Parameter(1.0, "1", "q")\n',
         17,
@@ -463,6 +465,11 @@ WRONG = {
     ),
     "a nominal velocity of zero": (
         RATE + '    q = State("m/s", "q", rate=f / m, nominal_velocity=0.0)\n',
+        17,
+        "the start values are invalid: nominal_velocity of q must be above 0, got 0.0",
+    ),
+    "a nominal velocity of zero for a driver": (
+        RATE + '    q = State("m", "q", rate=u, nominal_velocity=0.0)\n',
         17,
         "the start values are invalid: nominal_velocity of q must be above 0, got 0.0",
     ),
@@ -533,6 +540,11 @@ WRONG = {
         19,
         "the argument of sin is an angle in rad, but fr * clock counts revolutions, as it has the unit Hz: write 2.0",
     ),
+    "a holding force without a value at the start": (
+        DRY.replace("slide=f", "slide=f, hold=f * x / fabs(x)") + STUCK,
+        17,
+        "R: f * x / fabs(x) cannot be calculated at the start values, where fabs(x) is 0.0",
+    ),
     "a number for a docstring": (RATE + "    __doc__ = 3\n", 4, "Mine has no docstring"),
     "a name for the rate of a driver": (
         RATE + '    q = State("m", "one", start=1.0, rate=u)\n    q_rate = Parameter(1.0, "m/s", "another")\n',
@@ -598,6 +610,12 @@ def test_helper_values_of_the_class_body_are_allowed(tmp_path):
     assert model.total.text == "sum of x and an expression"
     assert (model.stop_time, model.q.start, model.q.low) == (8.0, 2.0, 0.5)
     assert find_model(path).analysis.model.stop_time == 8.0
+
+
+def test_friction_may_be_zero_at_the_start(tmp_path):
+    path = tmp_path / "mine.py"
+    path.write_text(HEAD.replace("f = Parameter(1.0", "f = Parameter(0.0") + DRY + STUCK + USE)
+    assert find_model(path).model.f.start == 0.0
 
 
 @pytest.mark.parametrize("kind", [fmus.Parameter, fmus.Fixed, fmus.Input, fmus.State, fmus.Output, fmus.Contact])

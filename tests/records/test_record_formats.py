@@ -280,6 +280,7 @@ def test_numbers_and_times_are_read_in_any_notation(tmp_path, name):
 
 
 ROWS = "\n".join(f"{i},{i}" for i in range(20))
+CLOCK = "\n".join(f"10:00:{i:02},{i % 5}" for i in range(20))
 
 
 @pytest.mark.parametrize(
@@ -293,6 +294,7 @@ ROWS = "\n".join(f"{i},{i}" for i in range(20))
         (f"t [s],x [m]\n{ROWS}\n20,abc", ColumnOptions(), "'abc' in row 22, column x [m], is not a number"),
         (f"t [s],x [m]\n{ROWS}\n20,1,2", ColumnOptions(), "row 22 has 3 cells where the heading has 2"),
         (f"t [s],x [m]\n{ROWS}\n5,5", ColumnOptions(), "time does not rise after t = 19.0 s"),
+        (f"time,x [m]\n{CLOCK}\n10:00:05,5", ColumnOptions(), "time does not rise after t = 19.0 s"),
         (f"t [s],x [m]\n{ROWS}\n20,1e200", ColumnOptions(), "which is not plausible"),
         (f"t [s],x [m]\n{ROWS}", ColumnOptions(begin=15), "has 5 samples"),
         (

@@ -7,6 +7,7 @@ import shutil
 from contextlib import suppress
 from functools import partial
 from hashlib import sha256
+from zipfile import ZipFile
 
 import commands
 import numpy as np
@@ -256,6 +257,15 @@ def test_a_result_with_other_options_is_not_replaced_silently(workspace, argumen
     done = harness(workspace, *arguments, *newer, COLUMNS="200")
     assert (done.returncode, done.stderr) == (0, "")
     assert re.search(rf"It replaces the result of [-\dT:+]+, which had {had}\b", done.stdout)
+
+
+def test_a_result_of_another_build_of_its_fmu_is_not_replaced_silently(workspace, fmus):
+    shutil.copy(fmus / "smd.fmu", workspace / "mine.fmu")
+    assert harness(workspace, "run", "--fmu", "mine.fmu", "--stop", "0.5").returncode == 0
+    with ZipFile(workspace / "mine.fmu", "a") as archive:
+        archive.comment = b"built again"
+    done = harness(workspace, "run", "--fmu", "mine.fmu", "--stop", "0.5", COLUMNS="200")
+    assert re.search(r"It replaces the result of [-\dT:+]+, which had another mine\.fmu\.", done.stdout)
 
 
 def test_a_folder_without_provenance_is_not_run_again(workspace, first_run):

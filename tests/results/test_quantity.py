@@ -2,9 +2,10 @@
 
 from math import inf, nan
 
+import numpy as np
 import pytest
 
-from harness.results.quantity import Quantity, format_interval
+from harness.results.quantity import Quantity, format_interval, step_size_quantities
 
 
 def test_quantities_change_their_unit_but_not_their_dimension():
@@ -21,6 +22,7 @@ def test_quantities_change_their_unit_but_not_their_dimension():
         (-2.0, -2.5, -1.5, "-2 ± 0.5"),
         (1.0, 0.93, 1.2, "1 (0.93 to 1.2)"),
         (1.0, 0.91, 1.1, "1 ± 0.1"),  # hardly asymmetric: the larger margin
+        (1.0, 0.9, 1.09, "1 ± 0.1"),
         (3.0, 0.0, 40.0, "3 (0 to 40)"),  # two digits at least
         (0.0, 0.0, 0.00123, "< 0.0012"),
         (2.0 / 3.0, 2.0 / 3.0, 2.0 / 3.0, "0.66666667 ± 0"),
@@ -30,3 +32,8 @@ def test_quantities_change_their_unit_but_not_their_dimension():
 )
 def test_the_digits_of_a_value_follow_from_its_interval(value, low, high, text):
     assert format_interval(value, low, high) == text
+
+
+def test_the_share_of_refused_steps_counts_all_attempts():
+    quantities = {quantity.name: quantity.value for quantity in step_size_quantities(np.array([1.0, 2.0, 6.0]), 1)}
+    assert quantities["refused"] == 0.25

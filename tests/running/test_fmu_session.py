@@ -5,7 +5,7 @@ from contextlib import suppress
 import fmi3_fixtures
 import pytest
 
-from harness.running.fmu_session import CALL_FAILURES
+from harness.running.fmu_session import CALL_FAILURES, STATUS_NAMES, LogCapture
 from harness.running.runner import open_session
 from harness.scenes.run_spec import RunSpec
 
@@ -24,6 +24,13 @@ def check_logs(folder):
 
 def test_a_message_is_in_the_log_of_its_session(backend_fmus):
     check_logs(backend_fmus)
+
+
+def test_a_later_warning_does_not_hide_an_error():
+    log = LogCapture()
+    log.add(STATUS_NAMES.index("Error"), b"m is refused")
+    log.add(STATUS_NAMES.index("Warning"), b"the step is long")
+    assert log.error_message == "m is refused"
 
 
 @pytest.mark.slow

@@ -50,6 +50,17 @@ def test_an_external_fmu_is_recorded_at_times(name, interface):
     assert np.abs(position - np.cos(np.sqrt(50.0) * times)).max() < 2e-3
 
 
+def test_equal_steps_divide_the_time_from_start_to_stop(fmus):
+    spec = RunSpec(fmus / "smd.fmu", ("x",), start=2.0, stop=4.0, equal_steps=4, follow=False)
+    assert runner.run(spec, lambda share: None).time.tolist() == [2.0, 2.5, 3.0, 3.5, 4.0]
+
+
+@pytest.mark.parametrize(("next_step", "ends"), [(2.0, [0, 1, 2]), (2.0 + 1e-12, [0, 1, 2]), (2.5, [0, 1])])
+def test_the_last_internal_step_may_end_a_rounding_after_the_stop(next_step, ends):
+    rows = runner.find_step_ends(np.array([0.0, 1.0, 2.0]), np.array([1.0, next_step, 3.0]), 1e-9)
+    assert rows.tolist() == ends
+
+
 def test_model_exchange_is_recorded_at_times(fmus):
     """At times of events as well, where the solver has two points."""
     sled = RunSpec(build_fmi3_fmus() / "stickslip.fmu", ("x", "mode"), exchange=True, tolerance=1e-8, stop=8.0)

@@ -1,6 +1,7 @@
 """Whole runs in one call: the same numbers as step by step, refusals, time limits, and FMUs that crash."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import build_cache
 import numpy as np
@@ -10,7 +11,7 @@ from native_fmus import build_native_fmus, require_compiler
 
 from harness.running import runner
 from harness.running.native_equivalent import native_equivalent
-from harness.running.whole_run import open_simulator
+from harness.running.whole_run import RunSession, open_simulator
 from harness.scenes.run_spec import RunSpec
 
 T = np.linspace(0.0, 8.0, 401)
@@ -122,6 +123,23 @@ def test_external_fmus_run_in_a_process_of_their_own(name):
     assert np.ptp(first) > 0
     assert np.array_equal(first, second)
     assert coarse.shape == (51, 1)
+
+
+@pytest.mark.parametrize(("name", "value"), [("Faulty", {"kind": 5}), ("Fmi3Midpoint", {"limit": 0.5})])
+def test_a_run_that_is_lost_or_terminates_is_refused(name, value):
+    spec = RunSpec(build_external_fmus() / f"{name}.fmu", ("x",), times=np.linspace(0.0, 1.0, 11), follow=False)
+    with open_simulator(spec) as simulator:
+        assert simulator.prepare(spec)({}) is not None
+        assert simulator.prepare(replace(spec, values=value))({}) is None
+
+
+def test_the_loop_in_python_refuses_outputs_that_are_not_finite():
+    session = RunSession(build_external_fmus() / "Faulty.fmu", 60.0)
+    session.loop = None
+    spec = RunSpec(Path("Faulty.fmu"), ("x",), times=np.linspace(0.0, 1.0, 11), follow=False)
+    assert session.prepare(spec)({}) is not None
+    assert session.prepare(replace(spec, values={"kind": 5}))({}) is None
+    session.close()
 
 
 def test_an_external_fmu_that_crashes_is_replaced():

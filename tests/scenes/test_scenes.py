@@ -1,10 +1,13 @@
 """Scene files: valid contents, and errors of invalid ones."""
 
+from pathlib import Path
+
 import pytest
 
 from harness.errors import SceneError
 from harness.scenes.coupled.scene import CoupledKeys
-from harness.scenes.scene import load_scene, shipped_scenes
+from harness.scenes.run_spec import RunSpec
+from harness.scenes.scene import load_scene, scene_from_provenance, shipped_scenes
 from harness.scenes.schema import parse_table
 
 GOOD = {"title": '"a title"', "model": '"stickslip"', "outputs": '["x", "v", "a"]'}
@@ -34,6 +37,7 @@ def test_omitted_keys_are_left_to_the_fmu(tmp_path):
 def test_a_grid_follows_the_solver_only_on_request(tmp_path):
     assert not load_scene(write(tmp_path, grid="0.1")).run.follow
     assert load_scene(write(tmp_path, grid="0.1", follow="true")).run.follow
+    assert not load_scene(write(tmp_path, times="[0.0, 1.0]", follow="false")).run.follow
 
 
 @pytest.mark.parametrize(
@@ -91,6 +95,15 @@ def test_an_invalid_scene_is_reported_in_one_sentence(tmp_path, keys, sentence):
     assert str(caught.value).startswith("scene mine: ")
     assert sentence in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_a_scene_of_an_earlier_version_holds_the_keys_of_its_run():
+    keys = {"name": "mine", "source": "mine.toml", "title": "a title", "decay": {"gives": None}, "stop": 2.0}
+    keys |= {"file": "fmus/smd.fmu", "outputs": ["x"], "values": {"c": 3.0}, "grid": 0.01, "patience": 7.0}
+    expected = RunSpec(
+        Path("fmus/smd.fmu"), ("x",), {"c": 3.0}, stop=2.0, grid=0.01, follow=False, timeout=7.0, equal_steps=4096
+    )
+    assert scene_from_provenance({"scene": keys}).run == expected
 
 
 PAIR = {

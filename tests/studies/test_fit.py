@@ -24,6 +24,7 @@ from harness.running.variable_values import enumeration_labels
 from harness.running.whole_run import open_simulator
 from harness.scenes.run_spec import RunSpec
 from harness.studies.fit import study
+from harness.studies.fit.laws import resolve_laws
 from harness.studies.fit.options import parse_starts
 from harness.studies.fit.request import FitRequest, make_unknowns, resolve_request
 
@@ -155,6 +156,23 @@ def test_a_fit_starts_from_an_earlier_one(tmp_path, monkeypatch, free, each, sta
     for paths in ([str(tmp_path)], [str(tmp_path / "fit.json")]):
         assert parse_starts(paths, free, each) == requests[0].request.start
     assert parse_starts([str(tmp_path), "mu_s=0.6"], free, each)["mu_s"] == 0.6
+
+
+def test_a_range_that_is_not_given_lies_around_the_start_value():
+    """Otherwise around that of the FMU, which is 742.5."""
+    t = np.linspace(0.0, 1.0, 50)
+    record = RecordData("record", t, np.sin(t)[:, None], {}, (None,))
+    for start, middle in (({"k": 5000.0}, 5000.0), ({}, 742.5)):
+        request = FitRequest(RunSpec(Path("fmus/stickslip.fmu")), free={"k": None}, observe={"x": "x"}, start=start)
+        (unknown,) = make_unknowns(resolve_request(request), [record])
+        assert (unknown.low, unknown.high) == (middle / 4.0, middle * 4.0)
+
+
+def test_a_law_starts_from_the_values_of_its_own_parameters():
+    fmus = [Path(f"fmus/{name}.fmu") for name in ("stickslip", "coulomb")]
+    start = {"mu_s": 0.8, "k": 700.0}
+    request = FitRequest(RunSpec(fmus[0]), dict.fromkeys(start), {"x": "x"}, start=start, against=(fmus[1],))
+    assert [law.request.start for law in resolve_laws(request).requests] == [start, {"k": 700.0}]
 
 
 def test_a_sensor_with_offset_and_gain_is_identified():

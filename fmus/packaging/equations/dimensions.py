@@ -7,6 +7,7 @@ from typing import Any
 from .. import BuildError
 from ..units import SYMBOLS, parse_unit, unit_of
 from .algebra import operands, subexpressions
+from .conditions import is_absolute_value
 from .expression_printer import COMPARISON_OPERATORS
 from .expressions import Expression, ModelError, Operand, Term
 from .model_analysis import ModelAnalysis
@@ -202,7 +203,9 @@ def expression_text(e: Operand, level: int = 0) -> str:
         return e.name
     assert isinstance(e, Term)
     own = PRECEDENCE.get(e.op, 4)
-    if e.op == "neg":
+    if e.op == "choose" and is_absolute_value(e):
+        text = f"fabs({expression_text(e.args[1])})"
+    elif e.op == "neg":
         text = f"-{expression_text(e.args[0], 3)}"
     elif e.op in PRECEDENCE:
         text = f"{expression_text(e.args[0], own)} {e.op} {expression_text(e.args[1], own + (e.op in '-/'))}"

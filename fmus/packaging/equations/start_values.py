@@ -89,7 +89,7 @@ def _evaluate_term(e: Term, values: dict[Expression, float], memo: dict[int, flo
     except (ArithmeticError, ValueError) as error:
         raise ModelError(
             f"{_short_text(e)} cannot be calculated at the start values, "
-            f"where {_short_text(e.args[-1])} is {args[-1]!r}",
+            f"where {_short_text(e.args[-1])} is {args[-1] + 0.0!r}",  # 0.0 instead of -0.0
             e.location,
         ) from error
 
