@@ -79,12 +79,12 @@ def test_a_stored_run_is_repeated_bit_for_bit(call):
 
 
 def test_a_stored_specification_names_enumerations_by_their_labels():
-    run = harness.simulate("stickslip", {"friction": 3, "k": 700}, stop=0.1)
-    assert run.spec.values == {"friction": "threshold", "k": 700.0}
+    run = harness.simulate("stickslip", {"friction": 3, "solver.method": 2, "k": 700}, stop=0.1)
+    assert run.spec.values == {"friction": "threshold", "solver.method": "ode23", "k": 700.0}
 
 
 def test_a_run_at_an_interval_knows_its_internal_steps():
-    """Also where the scene does not follow them."""
+    """The scene alone does not follow them."""
     assert harness.simulate("mine.toml").steps is None
     assert harness.simulate("mine.toml", interval=0.5).steps is not None
 
