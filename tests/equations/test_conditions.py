@@ -483,11 +483,15 @@ def test_limits_exist_only_where_a_force_may_become_negative(tmp_path, slide):
 # ---- model exchange
 
 
-def test_the_indicator_of_a_dimensionless_condition_has_a_unit(tmp_path):
-    """Also in a model with a Mode, which has none."""
-    text = full_model_text("slidinginput").replace("F_ext)", "choose(x / gap > 1.0, F_ext, -F_ext))")
-    (tmp_path / "ratio.py").write_text(remove_unused(text))
-    assert find_model(tmp_path / "ratio.py").model.condition_units == ("1", "N")
+@pytest.mark.parametrize(
+    ("condition", "unit"),
+    [("x / gap > 1.0", "1"), ("angle > 1.0", "rad"), ("2.0 * angle / mu > 1.0", "1"), ("2.0 * v * clock > gap", "m")],
+)
+def test_the_indicator_of_a_condition_has_its_unit(tmp_path, condition, unit):
+    """Not that of another dimensionless variable."""
+    text = full_model_text("slidinginput").replace("F_ext)", f"choose({condition}, F_ext, -F_ext))")
+    (tmp_path / "unit.py").write_text(remove_unused(text))
+    assert find_model(tmp_path / "unit.py").model.condition_units == (unit, "N")
 
 
 @pytest.mark.slow

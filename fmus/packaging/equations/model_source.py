@@ -11,7 +11,7 @@ from ..text_output import string_literal
 from .codegen_context import CodegenContext, rule_status
 from .conditions import Condition
 from .coupled_contact_methods import coupled_contact_methods
-from .dimensions import Dimensions, declared_dimensions, dimensions_of, expression_text
+from .dimensions import DIMENSIONLESS, Dimensions, declared_dimensions, dimensions_of, expression_text
 from .expression_printer import INDENT
 from .expressions import is_among
 from .model_analysis import ModelAnalysis
@@ -198,10 +198,16 @@ def condition_texts(an: ModelAnalysis) -> list[str]:
 
 
 def condition_unit(an: ModelAnalysis, condition: Condition) -> str:
-    """Return the unit of the margin of a condition: that of a variable with the same dimensions, else 1."""
+    """Return the unit of the margin of a condition: that of one side, or of any variable with the same dimensions.
+
+    A dimensionless margin has the unit 1 unless one side is a variable, as it can be an angle or a ratio.
+    """
     memo: dict[int, Dimensions | None] = {}
-    dimensions = next((d for e in condition.sides if (d := dimensions_of(e, memo)) is not None), None)
-    return next((e.unit for e in an.declared if e.unit and declared_dimensions(e) == dimensions), "1")
+    dimensions = next((d for e in condition.sides if (d := dimensions_of(e, memo)) is not None), DIMENSIONLESS)
+    variables = [e for e in condition.sides if isinstance(e, Variable)]
+    if dimensions != DIMENSIONLESS:
+        variables += an.declared
+    return next((e.unit for e in variables if declared_dimensions(e) == dimensions), "1")
 
 
 def string_lines(text: str) -> str:
