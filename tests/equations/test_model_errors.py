@@ -618,6 +618,27 @@ def test_friction_may_be_zero_at_the_start(tmp_path):
     assert find_model(path).model.f.start == 0.0
 
 
+def test_friction_may_have_no_value_at_high_speeds(tmp_path):
+    path = tmp_path / "mine.py"
+    path.write_text(HEAD + DRY.replace("slide=f", "slide=f * sqrt(1.0 - 4.0 * v * v / (u * u))") + STUCK)
+    assert find_model(path).model.f.start == 1.0
+
+
+def test_friction_may_be_divided_by_an_input_that_starts_above_zero(tmp_path):
+    path = tmp_path / "mine.py"
+    tank = '    tank = Input(2.0, "kg", "mass of a tank")\n'
+    path.write_text(HEAD + tank + DRY.replace("slide=f", "slide=f * m / tank") + STUCK + USE)
+    assert find_model(path).model.tank.start == 2.0
+
+
+def test_a_model_file_may_print(tmp_path, capsys):
+    """Once, though it is run twice to find values that differ."""
+    path = tmp_path / "mine.py"
+    path.write_text(HEAD + RATE + USE + '    print("stiffness", k.start)\n')
+    assert find_model(path).analysis.name == "Mine"
+    assert capsys.readouterr().out == "stiffness 100.0\n"
+
+
 @pytest.mark.parametrize("kind", [fmus.Parameter, fmus.Fixed, fmus.Input, fmus.State, fmus.Output, fmus.Contact])
 def test_the_signature_of_a_declaration_names_all_arguments(kind):
     """And its documentation describes each of them."""

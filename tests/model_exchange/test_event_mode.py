@@ -120,6 +120,28 @@ def test_the_sled_breaks_away_at_the_closed_form_time(unpacked):
         assert read("F_friction") == pytest.approx(0.6 * 12.5 * 9.81, rel=1e-14)
 
 
+def test_a_refused_end_of_initialisation_can_be_repeated(unpacked, capfd):
+    """Then the run begins in event mode, as without the refused call."""
+    folder, description = unpacked("stickslip")
+    (sliding,) = (v.valueReference for v in description.modelVariables if v.name == "mu_d")
+    fmu = FMU3Slave(guid=description.instantiationToken, unzipDirectory=folder, modelIdentifier="stickslip")
+    fmu.instantiate(eventModeUsed=True, earlyReturnAllowed=True)
+    fmu.enterInitializationMode(startTime=0.0)
+    fmu.setFloat64([sliding], [1.0])  # more than mu_s
+    with pytest.raises(FMICallException):
+        fmu.exitInitializationMode()
+    assert "mu_d" in capfd.readouterr().err
+    with pytest.raises(FMICallException):
+        fmu.updateDiscreteStates()
+    assert "fmi3UpdateDiscreteStates" in capfd.readouterr().err
+    fmu.setFloat64([sliding], [0.6])
+    fmu.exitInitializationMode()
+    fmu.updateDiscreteStates()
+    fmu.enterStepMode()
+    assert fmu.doStep(0.0, 16.0)[-1] == pytest.approx(BREAKAWAY_TIME, abs=1e-14)
+    fmu.freeInstance()
+
+
 @pytest.mark.parametrize("options", [{}, {"eventModeUsed": True}, {"earlyReturnAllowed": True}], ids=str)
 @pytest.mark.parametrize("name", MODELS)
 def test_the_motion_does_not_depend_on_the_steps_of_the_master(unpacked, name, options):

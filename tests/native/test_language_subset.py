@@ -216,6 +216,9 @@ class Allowed(Base):
         self.b = 7.0
         return self.left.take(y)
 
+    def effects_after_a_fault(self, x, y):
+        return self.left.take(x / y)
+
     def from_within(self, x, y):
         if self.left.take(x) > 0.0:
             return self.effects_then_fault(x, y)

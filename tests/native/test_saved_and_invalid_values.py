@@ -1,6 +1,7 @@
 """Native instances: digits and categories of messages, and saved states byte by byte."""
 
 import subprocess
+from contextlib import closing
 from ctypes import string_at
 from struct import pack
 from zipfile import ZipFile
@@ -9,8 +10,10 @@ import fmpy
 import pytest
 from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import FMU2Slave
+from models import MODELS, declared, model_class
 from native_fmus import build_native_fmus
 from native_host import compiler
+from worker_client import Worker
 
 CHECKSUM_SIZE = 8
 PLACES = """
@@ -63,6 +66,32 @@ def test_a_power_of_two_has_as_few_digits_as_in_python(unpacked, fmu, capfd, exp
     assert f"m = {-(2.0**exponent)!r} kg is refused" in capfd.readouterr().err
 
 
+@pytest.mark.parametrize("name", MODELS)
+def test_values_do_not_depend_on_the_order_in_which_a_call_reads_them(name):
+    """Some are calculated only when they are read."""
+    names = [v for v, declaration in declared(name).items() if declaration.type == "Real"]
+    rows = []
+    with closing(Worker()) as worker:
+        for order in names, names[::-1]:
+            fmu = worker.instantiate(build_native_fmus() / f"{name}.fmu").begin()
+            fmu.step(0.0, 0.8 * model_class(name).stop_time)
+            rows.append(dict(zip(order, fmu.get(*order), strict=True)))
+            fmu.free()
+    assert rows[0] == rows[1]
+
+
+def test_no_value_of_a_refused_call_is_set(unpacked, fmu, capfd):
+    references = [v.valueReference for v in unpacked[0].modelVariables if v.name in ("k", "c", "m")]
+    before = fmu.getReal(references)
+    for i in range(3):
+        values = [7.0, 7.0, 7.0]
+        values[i] = -1.0
+        with pytest.raises(FMICallException):
+            fmu.setReal(references, values)
+        assert fmu.getReal(references) == before
+    assert capfd.readouterr().err.count("is refused") == 3
+
+
 def test_a_saved_state_with_a_boolean_of_2_is_refused_though_its_checksum_is_right(fmu, tmp_path, capfd):
     """A C program that includes the sources prints the places of all Booleans."""
     with ZipFile(build_native_fmus() / "smd.fmu") as archive:
@@ -83,10 +112,13 @@ def test_a_saved_state_with_a_boolean_of_2_is_refused_though_its_checksum_is_rig
 
 
 @pytest.mark.parametrize(
-    ("categories", "is_logged"),
-    [([], True), (["logAll"], True), (["logStatusError"], True), (["logStatusFatal"], False)],
+    ("logging_on", "categories", "is_logged"),
+    [
+        *((True, [], True), (True, ["logAll"], True), (True, ["logStatusError"], True)),
+        *((True, ["logStatusFatal"], False), (False, [], False), (False, ["logStatusError"], False)),
+    ],
 )
-def test_errors_are_logged_in_their_categories_only(unpacked, capfd, categories, is_logged):
+def test_errors_are_logged_in_their_categories_only(unpacked, capfd, logging_on, categories, is_logged):
     description, folder = unpacked
     lines = []
     fmu = FMU2Slave(guid=description.guid, unzipDirectory=folder, modelIdentifier="smd", instanceName="smd")
@@ -95,7 +127,7 @@ def test_errors_are_logged_in_their_categories_only(unpacked, capfd, categories,
     callbacks.allocateMemory = fmpy.fmi2.fmi2CallbackAllocateMemoryTYPE(fmpy.calloc)
     callbacks.freeMemory = fmpy.fmi2.fmi2CallbackFreeMemoryTYPE(fmpy.free)
     fmu.instantiate(callbacks=callbacks)
-    fmu.setDebugLogging(True, categories)
+    fmu.setDebugLogging(logging_on, categories)
     with pytest.raises(FMICallException):
         fmu.doStep(0.0, 0.1)
     assert bool(lines) == is_logged

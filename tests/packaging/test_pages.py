@@ -140,6 +140,13 @@ def test_the_page_lists_every_variable_law_and_method(content, name):
     assert expected <= set(reader.headings)
 
 
+def test_an_angle_is_drawn_in_the_unit_that_its_label_names(content):
+    """The pendulum starts at 10 degrees."""
+    chart = re.search(r'<svg.*?aria-label="theta in deg over time".*?</svg>', content("pendulum")[PAGE].decode(), re.S)
+    ticks = [float(tick) for tick in re.findall(r'text-anchor="end">(-?[\d.]+)<', chart[0])]
+    assert max(ticks) == 10.0
+
+
 @EVERY_MODEL
 def test_the_page_is_self_contained(content, name):
     carried = content(name)
