@@ -546,6 +546,16 @@ WRONG = {
         "R: f * x / fabs(x) cannot be calculated at the start values, where fabs(x) is 0.0",
     ),
     "a number for a docstring": (RATE + "    __doc__ = 3\n", 4, "Mine has no docstring"),
+    "a start out of the range of a state": (
+        RATE + USE + '    q = State("m", "gap", start=-2.0, rate=u, low=0.0)\n',
+        18,
+        "q starts at -2.0 m, but its declaration says that it is at least 0.0 m",
+    ),
+    "a step longer than the run": (
+        RATE + "    stop_time = 0.002\n",
+        4,
+        "step_size = 0.004 s is longer than the default run: set it to at most stop_time = 0.002 s",
+    ),
     "a name for the rate of a driver": (
         RATE + '    q = State("m", "one", start=1.0, rate=u)\n    q_rate = Parameter(1.0, "m/s", "another")\n',
         17,

@@ -77,6 +77,12 @@ def check_declarations(an: ModelRoles) -> None:
             raise ModelError(
                 f"{word} = {describe(value)} is invalid: it must be a number above 0 and below {limit:g}", location
             )
+    if an.model.step_size > an.model.stop_time:
+        raise ModelError(
+            f"step_size = {an.model.step_size!r} s is longer than the default run: set it to at most "
+            f"stop_time = {an.model.stop_time!r} s",
+            location,
+        )
     if not isinstance(an.model.__doc__, str) or not an.model.__doc__.strip():
         raise ModelError(
             f"{an.name} has no docstring: its first line becomes the description of the FMU, the rest its page",

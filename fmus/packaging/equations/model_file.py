@@ -28,7 +28,7 @@ from .model_analysis import ModelAnalysis
 from .model_declaration import Model
 from .model_source import model_source
 from .python_errors import check_statements, explain
-from .start_values import check_evaluation, check_friction_forces
+from .start_values import check_evaluation, check_friction_forces, check_state_ranges
 
 PACKAGE = __name__.split(".", 1)[0]
 RESERVED_FILE_NAMES = ("pythonfmu", "runtime")  # embedded in the same package
@@ -112,6 +112,7 @@ class ModelFile:
         if status == OK:
             try:
                 check_friction_forces(self.analysis)
+                check_state_ranges(self.analysis)
                 check_use(self.analysis)
             except ModelError as mistake:
                 raise self._build_error(mistake) from mistake

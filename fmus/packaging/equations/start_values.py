@@ -44,6 +44,17 @@ def check_friction_forces(an: ModelAnalysis) -> None:
             )
 
 
+def check_state_ranges(an: ModelAnalysis) -> None:
+    """Raise ModelError for a state that starts outside its declared range."""
+    values = start_values(an)
+    for s in an.states:
+        if not s.accepts(values[s]):
+            raise ModelError(
+                f"{s.name} starts at {values[s]!r}{s.unit_suffix}, but its declaration says that it is {s.allowed}",
+                s.location,
+            )
+
+
 def has_direction(c: Contact, values: dict[Expression, float]) -> bool:
     """Return whether the sliding forces at a slip of 1 and of -1 are opposite; False if one has no value."""
     try:
