@@ -56,13 +56,8 @@ class VariableDeclaration:
         """Return the range in words."""
         if self.items:
             return "one of " + ", ".join(f"{value} ({label})" for label, value, _ in self.items)
-        coefficient_bounds = (
-            ("at least", self.low),
-            ("above", self.above),
-            ("at most", self.high),
-            ("below", self.below),
-        )
-        words = [f"{word} {bound!r}{self.unit_suffix}" for word, bound in coefficient_bounds if isfinite(bound)]
+        bounds = ("at least", self.low), ("above", self.above), ("at most", self.high), ("below", self.below)
+        words = [f"{word} {bound!r}{self.unit_suffix}" for word, bound in bounds if isfinite(bound)]
         return " and ".join(words) or "a finite number"
 
     def accepts(self, value: float) -> bool:
