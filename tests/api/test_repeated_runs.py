@@ -10,11 +10,11 @@ import fmi3_fixtures
 import native_fmus
 import numpy as np
 import pytest
+from spec_runs import run_spec
 
 import harness
 from harness.errors import SceneError
 from harness.results.files import to_json
-from harness.running import runner
 from harness.running.resolve import resolve
 from harness.scenes.run_spec import RunSpec
 from harness.scenes.scene import shipped_scenes
@@ -72,7 +72,7 @@ def test_a_stored_run_is_repeated_bit_for_bit(call):
     run = harness.simulate(**arguments | {"source": source})
     run.save("saved")
     assert read_back(run.spec) == run.spec == harness.load_result("saved").spec
-    for repeated in (harness.simulate("saved"), runner.run(read_back(run.spec), lambda share: None)):
+    for repeated in (harness.simulate("saved"), run_spec(read_back(run.spec))):
         assert np.array_equal(repeated.time, run.time)
         for name in run.columns:
             assert np.array_equal(repeated[name], run[name]), name
@@ -100,9 +100,7 @@ def test_input_signals_of_a_scene_are_those_of_python():
     spec = replace(
         resolve("smd"), outputs=("x", "v"), values={"c": 3.0}, stop=2.0, grid=0.01, follow=False, equal_steps=0
     )
-    python = runner.run(
-        replace(spec, inputs={name: tuple(column) for name, column in INPUTS.items()}), lambda share: None
-    )
+    python = run_spec(replace(spec, inputs={name: tuple(column) for name, column in INPUTS.items()}))
     assert np.array_equal(scene["x"], python["x"])
     assert np.abs(scene["x"]).max() > 0.01
 

@@ -8,6 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from fmpy.model_description import ModelVariable
+from spec_runs import ignore_progress
 
 from harness.errors import HarnessError
 from harness.running.external.step_refinement import RefinementRun, refine
@@ -34,7 +35,7 @@ def run_with_step(answer):
     session.step_arguments = tuple(map(byref, session.step_results))
     times, grid = [], TimeGrid(0.0, 1.0, 0.25)
     with pytest.raises((TerminatedError, HarnessError)) as caught:
-        step_to_stop(CoSimulation(session, grid, only_grid=True), grid, times.append, lambda share: None)
+        step_to_stop(CoSimulation(session, grid, only_grid=True), grid, times.append, ignore_progress)
     return times, str(caught.value)
 
 

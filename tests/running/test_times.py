@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from external_fmus import build_external_fmus
 from fmi3_fixtures import build_fmi3_fmus
+from spec_runs import run_spec
 
 import harness
 from harness.running import runner
@@ -30,7 +31,7 @@ def test_times_keep_the_points_of_another_grid(backend_fmus):
 
 @pytest.mark.parametrize("follow", [True, False])
 def test_a_run_stops_at_the_last_time(fmus, follow):
-    run = runner.run(RunSpec(fmus / "smd.fmu", times=UNEVEN, follow=follow), lambda share: None)
+    run = run_spec(RunSpec(fmus / "smd.fmu", times=UNEVEN, follow=follow))
     assert np.array_equal(run.time, UNEVEN)
     assert run.statistics.steps > 0
     later = harness.simulate(fmus / "smd.fmu", times=UNEVEN, stop=20.0)
@@ -52,7 +53,7 @@ def test_an_external_fmu_is_recorded_at_times(name, interface):
 
 def test_equal_steps_divide_the_time_from_start_to_stop(fmus):
     spec = RunSpec(fmus / "smd.fmu", ("x",), start=2.0, stop=4.0, equal_steps=4, follow=False)
-    assert runner.run(spec, lambda share: None).time.tolist() == [2.0, 2.5, 3.0, 3.5, 4.0]
+    assert run_spec(spec).time.tolist() == [2.0, 2.5, 3.0, 3.5, 4.0]
 
 
 @pytest.mark.parametrize(("next_step", "ends"), [(2.0, [0, 1, 2]), (2.0 + 1e-12, [0, 1, 2]), (2.5, [0, 1])])
@@ -66,7 +67,7 @@ def test_model_exchange_is_recorded_at_times(fmus):
     sled = RunSpec(build_fmi3_fmus() / "stickslip.fmu", ("x", "mode"), exchange=True, tolerance=1e-8, stop=8.0)
     reference = harness.simulate(fmus / "stickslip.fmu", stop=8.0)
     times = np.sort(np.append(UNEVEN, reference.events.t[1:]))
-    run = runner.run(replace(sled, times=times), lambda share: None)
+    run = run_spec(replace(sled, times=times))
     expected = harness.simulate(fmus / "stickslip.fmu", times=times, stop=8.0)
     assert len(run.time) == len(times)
     assert np.abs(run["x"] - expected["x"]).max() < 1e-6
@@ -74,7 +75,7 @@ def test_model_exchange_is_recorded_at_times(fmus):
 
 def test_steps_without_refinement_end_at_the_times_and_at_rows_of_inputs():
     spec = RunSpec(build_external_fmus() / "Midpoint.fmu", times=UNEVEN / 8.0, follow=False)
-    run = runner.run(spec, lambda share: None)
+    run = run_spec(spec)
     assert np.array_equal(run.time, UNEVEN / 8.0)
     assert run.note == "requested communication times, error unknown"
 
@@ -83,24 +84,20 @@ def test_a_ramp_of_an_input_follows_its_rows(fmus):
     """Without a grid, steps end at the times and at the rows of the table: an input is the mean of a step."""
     rows = np.linspace(0.0, 2.0, 2001)
     spec = RunSpec(fmus / "smd.fmu", ("x",), stop=2.0, follow=False, times=(0.5, 2.0))
-    driven = runner.run(replace(spec, inputs={"time": rows, "F_ext": np.sin(rows)}), lambda share: None)
-    grid = runner.run(
-        replace(spec, grid=0.001, inputs={"time": rows[::200], "F_ext": np.sin(rows[::200])}), lambda share: None
-    )
+    driven = run_spec(replace(spec, inputs={"time": rows, "F_ext": np.sin(rows)}))
+    grid = run_spec(replace(spec, grid=0.001, inputs={"time": rows[::200], "F_ext": np.sin(rows[::200])}))
     assert len(driven.time) == len(grid.time) == 2
     assert np.abs(driven["x"] - grid["x"]).max() < 2e-3 * np.abs(driven["x"]).max()
-    full = runner.run(
-        replace(spec, times=(), grid=0.001, inputs={"time": rows, "F_ext": np.sin(rows)}), lambda share: None
-    )
+    full = run_spec(replace(spec, times=(), grid=0.001, inputs={"time": rows, "F_ext": np.sin(rows)}))
     assert np.abs(driven["x"] - full["x"][[500, -1]]).max() < 1e-12
 
 
 def test_an_aborted_run_keeps_the_times_that_it_reached():
     crashing = RunSpec(build_external_fmus() / "Faulty.fmu", values={"kind": 2}, stop=1.0)  # after half of the run
-    run = runner.run(replace(crashing, times=(0.1, 0.2, 0.9)), lambda share: None)
+    run = run_spec(replace(crashing, times=(0.1, 0.2, 0.9)))
     assert run.time.tolist() == [0.1, 0.2]
     assert "crashed" in run.failure
-    late = runner.run(replace(crashing, times=(0.8, 0.9)), lambda share: None)
+    late = run_spec(replace(crashing, times=(0.8, 0.9)))
     assert 0.4 < late.time.item() < 0.8
 
 

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from build_cache import cached_folder
 from fmpy.ssp.ssd import read_ssd
+from spec_runs import ignore_progress
 
 from harness.errors import HarnessError, SceneError
 from harness.references.single_model_reference import CoupledBodies, solve_bodies
@@ -201,7 +202,7 @@ def test_a_scene_is_checked_before_any_fmu(monkeypatch, tmp_path):
     """A typing error is reported even if no FMU is built."""
     monkeypatch.setattr(study, "start_values", lambda fmu: pytest.fail("an FMU was read"))
     with pytest.raises(SceneError, match="unknown coupled scene 'two-mases'"):
-        study.run_coupled("two-mases", tmp_path, None, lambda share: None)
+        study.run_coupled("two-mases", tmp_path, None, ignore_progress)
 
 
 def test_an_engine_that_hangs_is_reported_by_name(monkeypatch, tmp_path):

@@ -14,6 +14,7 @@ from build_cache import build_user_model
 from matplotlib.figure import Figure
 from models import EXAMPLE_MODELS
 from precision_points import make_point
+from spec_runs import ignore_progress
 
 from harness.errors import HarnessError
 from harness.references import event_located, peer_solvers
@@ -260,7 +261,7 @@ def test_stuck_points_lie_between_a_stop_and_the_next_breakaway():
 def test_a_user_model_is_studied_by_its_path_or_that_of_its_fmu(path, ending):
     """Every check that needs only the equations of the file; the reference is where two of its methods agree."""
     name = (build_user_model(path) / path.name).with_suffix(ending)
-    points = study_model(str(name), SweepSettings((1e-6,), 5.0, 0.0), lambda share: None)
+    points = study_model(str(name), SweepSettings((1e-6,), 5.0, 0.0), ignore_progress)
     assert points.model == path.stem
     assert {tool for tool, _ in points.solvers(points.cases[0])} == {FMU, FMPY, *FMI3_TOOLS}
     best = {p.tool: p.largest for p in points.points if p.method == "dop853"}

@@ -15,6 +15,7 @@ import pytest
 from build_cache import ROOT, build_user_model
 from matplotlib.figure import Figure
 from matplotlib.text import Text
+from spec_runs import ignore_progress
 
 import harness
 from harness.running import runner
@@ -46,7 +47,7 @@ def draw(fmus, tmp_path_factory):
 
         scene = load_scene(name)
         with chdir(folder), patch.object(Figure, "savefig", save), patch.object(runner, "run", record):
-            run_scene(replace(scene, run=replace(scene.run, repeat=1)), Path("results"), lambda share: None)
+            run_scene(replace(scene, run=replace(scene.run, repeat=1)), Path("results"), ignore_progress)
         figures[0].draw_without_rendering()
         return runs[0], {axes.get_title(loc="left"): axes for axes in figures[0].get_axes()}
 

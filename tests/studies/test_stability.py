@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from build_cache import build_user_model
 from models import EXAMPLE_MODELS, LARGER_MODELS, MODELS, declared
+from spec_runs import ignore_progress
 
 from harness.process.child_process import ChildProcess, ChildTimeoutError
 from harness.references.models.pacejka import MagicFormula
@@ -49,10 +50,6 @@ QUICK = (
     "stop at {} s",
     "NaN, inf, -inf in every Real, before and in mid-run",
 )
-
-
-def no_progress(name, share):
-    """Progress reporting that does nothing."""
 
 
 def is_sampled():
@@ -234,7 +231,7 @@ def test_a_scene_is_expanded_over_models_and_values():
 
 def test_a_part_of_the_table_ends_as_expected(user_folder, tmp_path, monkeypatch):
     monkeypatch.chdir(user_folder)
-    rows, regions = run_stability(tmp_path, no_progress, grouped_cases(is_sampled()))
+    rows, regions = run_stability(tmp_path, ignore_progress, grouped_cases(is_sampled()))
     assert [f"{row.case.label}: {row.text}" for row in rows if not row.has_passed] == []
     assert {row.case.method for row in rows} == {"exact", "ode23", "ode45", "dop853", "rodas", "radau9"}
     assert {row.case.model for row in rows} == set(MODELS)
@@ -261,7 +258,7 @@ def test_a_user_model_passes_the_standard_scenes(tmp_path, name):
     file = build_user_model(path) / f"{name}.fmu"
     titles = ("as it comes", "rtol = 1e-09", "NaN", "T_d = 3", "J = 0.002", "m1 = 125")
     groups = [[case for case in group if case.title.startswith(titles)] for group in grouped_cases(models=[str(file)])]
-    rows, _ = run_stability(tmp_path, no_progress, [group for group in groups if group])
+    rows, _ = run_stability(tmp_path, ignore_progress, [group for group in groups if group])
     assert {row.case.name for row in rows} == {name}
     assert {row.case.title for row in rows} >= {"as it comes", "rtol = 1e-09"}
     assert [f"{row.case.label}: {row.text}" for row in rows if not row.has_passed] == []

@@ -18,6 +18,7 @@ sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "support")]
 
 import numpy as np  # noqa: E402
 from drawn_records import GROUPS, draw_record  # noqa: E402
+from spec_runs import ignore_progress  # noqa: E402
 
 from harness.errors import HarnessError  # noqa: E402
 from harness.process.subprocess_runner import run_module  # noqa: E402
@@ -67,7 +68,7 @@ def fit_drawn_record(group, seed, fmus):
     resolved = resolve_request(request)
     try:
         signals = parse_signals(table, resolved.sources, request.columns, "record")
-        return record, fit_tables(resolved, [signals], lambda share: None)
+        return record, fit_tables(resolved, [signals], ignore_progress)
     except HarnessError as error:
         return record, str(error)
 
