@@ -1,17 +1,17 @@
 """Whole runs in one call: the same numbers as step by step, refusals, time limits, and FMUs that crash."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import build_cache
+import commands
 import numpy as np
 import pytest
 from external_fmus import build_external_fmus
 from native_fmus import build_native_fmus, require_compiler
+from spec_runs import run_spec
 
-from harness.running import runner
 from harness.running.native_equivalent import native_equivalent
-from harness.running.whole_run import RunSession, open_simulator
+from harness.running.whole_run import open_simulator
 from harness.scenes.run_spec import RunSpec
 
 T = np.linspace(0.0, 8.0, 401)
@@ -68,7 +68,7 @@ RUNS = {
 @pytest.mark.parametrize("described", RUNS.values(), ids=RUNS)
 def test_a_whole_run_is_that_of_simulate(sled, fmus, described):
     spec = RunSpec(sled, ("x", "F_spring"), follow=False, **described)
-    expected = runner.run(replace(spec, fmu=fmus / "stickslip.fmu", values={"mu_s": 0.8}), lambda share: None)
+    expected = run_spec(replace(spec, fmu=fmus / "stickslip.fmu", values={"mu_s": 0.8}))
     with open_simulator(spec) as simulator:
         y = run_each_way(simulator, spec, {"mu_s": 0.8})
         assert run_each_way(simulator, spec, {"mu_s": -0.8}) is None  # refused
@@ -133,13 +133,26 @@ def test_a_run_that_is_lost_or_terminates_is_refused(name, value):
         assert simulator.prepare(replace(spec, values=value))({}) is None
 
 
-def test_the_loop_in_python_refuses_outputs_that_are_not_finite():
-    session = RunSession(build_external_fmus() / "Faulty.fmu", 60.0)
-    session.loop = None
-    spec = RunSpec(Path("Faulty.fmu"), ("x",), times=np.linspace(0.0, 1.0, 11), follow=False)
-    assert session.prepare(spec)({}) is not None
-    assert session.prepare(replace(spec, values={"kind": 5}))({}) is None
-    session.close()
+PYTHON_LOOP = """
+import sys
+from dataclasses import replace
+from pathlib import Path
+import numpy as np
+from harness.running.whole_run import RunSession
+from harness.scenes.run_spec import RunSpec
+
+session = RunSession(Path(sys.argv[1]), 60.0)
+session.loop = None
+spec = RunSpec(Path("Faulty.fmu"), ("x",), times=np.linspace(0.0, 1.0, 11), follow=False)
+print(session.prepare(spec)({}) is None, session.prepare(replace(spec, values={"kind": 5}))({}) is None)
+session.close()
+"""
+
+
+def test_the_loop_in_python_refuses_outputs_that_are_not_finite(tmp_path):
+    """A process of its own loads the FMU, whose pythonfmu would replace the installed one for later tests."""
+    done = commands.run_python(tmp_path, "-c", PYTHON_LOOP, build_external_fmus() / "Faulty.fmu")
+    assert (done.stdout, done.stderr) == ("False True\n", "")
 
 
 def test_an_external_fmu_that_crashes_is_replaced():
