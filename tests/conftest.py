@@ -7,10 +7,10 @@ from tempfile import TemporaryDirectory
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as in a command; must be set before numpy is imported
 
 import build_cache
-import native_fmus
 import pytest
 from browser import CHROMIUM, Browser
 from firefox import FIREFOX, Firefox
+from native_fmus import backend_fmus  # noqa: F401 - a fixture of all tests
 from worker_client import Worker
 
 
@@ -40,12 +40,6 @@ def pytest_configure_node(node):
 def fmus():
     """The folder of the built FMUs."""
     return build_cache.build_once("fmi2")
-
-
-@pytest.fixture(params=["python", "native"])
-def backend_fmus(request, fmus):
-    """The folder of the FMUs of one backend."""
-    return fmus if request.param == "python" else native_fmus.build_native_fmus()
 
 
 @pytest.fixture(scope="module")

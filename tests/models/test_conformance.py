@@ -31,13 +31,8 @@ from worker_client import FmiError
 from fmus.runtime.variable_declarations import Choice
 
 EVERY_MODEL = pytest.mark.parametrize("name", MODELS)
+fmus = native_fmus.backend_fmus
 FOLDERS = ("binaries", "documentation", "extra", "resources", "sources")  # FMI 2.0.4, section 2.3
-
-
-@pytest.fixture(scope="module", params=["python", "native"])
-def fmus(request, fmus):
-    """The folder of the FMUs of one backend."""
-    return fmus if request.param == "python" else native_fmus.build_native_fmus()
 
 
 @pytest.fixture

@@ -1,4 +1,7 @@
-"""The native FMUs, built once per test run."""
+"""The native FMUs, built once per test run.
+
+A module runs the Python and the native FMUs in turn by `fmus = native_fmus.backend_fmus`.
+"""
 
 from functools import cache
 
@@ -29,3 +32,9 @@ def build_for_all_platforms():
     return build_cache.build_once(
         "everywhere", *options, *(word for item in PLATFORMS for word in ("--platform", item))
     )
+
+
+@pytest.fixture(params=["python", "native"])
+def backend_fmus(request, fmus):
+    """The folder of the FMUs of one backend."""
+    return fmus if request.param == "python" else build_native_fmus()
