@@ -22,12 +22,12 @@ def output_dependencies(model: type[VariableOwner], declared: Variables, at_star
     outputs = [name for name, meaning in declared if meaning.causality == "output"]
     if not outputs:
         return {}
-    an: ModelAnalysis = model.analysis  # type: ignore[attr-defined]
+    analysis: ModelAnalysis = model.analysis  # type: ignore[attr-defined]
     laws = [label for name, meaning in declared if name == "friction" for label, _, _ in meaning.items] or [HYBRID]
     start: dict[Expression, Operand] = {
         TIME: 0.0,
-        **dict.fromkeys(an.drivers, 0.0),
-        **{s: s.start_expression for s in an.states},
+        **dict.fromkeys(analysis.drivers, 0.0),
+        **{s: s.start_expression for s in analysis.states},
     }
     values = start if at_start else {}
 
@@ -35,24 +35,26 @@ def output_dependencies(model: type[VariableOwner], declared: Variables, at_star
         return {leaf for e in terms for leaf in variables_in(substitute(e, values))}
 
     def of_mode(c: Contact) -> set[Expression]:
-        contacts = [c] if c in an.load else an.contacts
-        held = [*an.load_expressions(c), *(an.holding_limit[d] for d in contacts)] if HYBRID in laws else []
-        rates = [differentiate(e, an.coasting_derivatives) for e in held]
+        contacts = [c] if c in analysis.load else analysis.contacts
+        held = [*analysis.load_expressions(c), *(analysis.holding_limit[d] for d in contacts)] if HYBRID in laws else []
+        rates = [differentiate(e, analysis.coasting_derivatives) for e in held]
         others = [e for d in contacts if d is not c for e in (d.slip, d.slide)]
         return among(c.slip, *held, *rates, *others, *([c.eps] if THRESHOLD in laws else []))
 
     def of_force(c: Contact) -> set[Expression]:
-        return of_mode(c) | among(c.slide, *([] if laws == [SIGN] else [*an.load_expressions(c), an.holding_limit[c]]))
+        return of_mode(c) | among(
+            c.slide, *([] if laws == [SIGN] else [*analysis.load_expressions(c), analysis.holding_limit[c]])
+        )
 
     def follows(e: Expression) -> set[str]:
         variables = among(e)
         contact_variables = [
-            of_force(c) if c in variables else of_mode(c) for c in an.contacts if {c, c.mode} & variables
+            of_force(c) if c in variables else of_mode(c) for c in analysis.contacts if {c, c.mode} & variables
         ]
         names = {variable.name for part in (variables, *contact_variables) for variable in part}
         return names | {"friction"} if contact_variables and laws[1:] else names
 
-    equations = {e.name: follows(e) for e in an.declared if e.name in outputs}
+    equations = {e.name: follows(e) for e in analysis.declared if e.name in outputs}
     knowns = {name for name, meaning in declared if meaning.causality in SETTABLE_CAUSALITIES}
     knowns |= set() if at_start else {name for name, meaning in declared if meaning.role == "state"}
     return {output: [name for name, _ in declared if name in knowns & equations[output]] for output in outputs}

@@ -50,11 +50,11 @@ def write_stages(source: ModelFile, folder: Path, methods: Sequence[str] = (), l
     return folder / source.name
 
 
-def expression_lines(an: ModelAnalysis) -> Iterator[str]:
+def expression_lines(analysis: ModelAnalysis) -> Iterator[str]:
     """Yield the expressions of outputs and friction forces, with operators in front of their operands."""
-    for e in an.outputs:
+    for e in analysis.outputs:
         yield f"{e.name} = {prefix_form(e.expression)}"
-    for c in an.contacts:
+    for c in analysis.contacts:
         parts = {"slip": c.slip, "slide": c.slide, "hold": c.hold}
         for label, part in parts.items():
             if part is not None:
@@ -68,25 +68,25 @@ def prefix_form(e: Operand) -> str:
     return e.name if isinstance(e, Variable) else repr(e)
 
 
-def analysis_lines(an: ModelAnalysis) -> Iterator[str]:
+def analysis_lines(analysis: ModelAnalysis) -> Iterator[str]:
     """Yield the roles of the variables and the derived expressions."""
-    names = {e: e.name for e in (TIME, *an.declared) if not isinstance(e, Output)}
+    names = {e: e.name for e in (TIME, *analysis.declared) if not isinstance(e, Output)}
     text = ExpressionPrinter(names, (), (), 0).text
-    yield f"states: {', '.join(e.name for e in an.states)}"
-    for state, rate in an.rate.items():
+    yield f"states: {', '.join(e.name for e in analysis.states)}"
+    for state, rate in analysis.rate.items():
         yield f"d{state.name}/dt = {text(rate)}"
-    for contact in an.contacts:
+    for contact in analysis.contacts:
         yield f"{contact.name}: slip velocity {text(contact.slip)}, sliding force {text(contact.slide)}"
-        if contact in an.load:
-            yield f"{contact.name}: load while stuck {text(an.load[contact])}"
-        yield f"{contact.name}: holding limit {text(an.holding_limit[contact])}"
-    for e in an.rate_outputs.values():
-        for by in (TIME, *an.states):
+        if contact in analysis.load:
+            yield f"{contact.name}: load while stuck {text(analysis.load[contact])}"
+        yield f"{contact.name}: holding limit {text(analysis.holding_limit[contact])}"
+    for e in analysis.rate_outputs.values():
+        for by in (TIME, *analysis.states):
             derivative = differentiate(e.expression, {by: 1.0})
             yield f"d{e.name}/d{by.name} at constant friction force = {text(derivative)}"
-    if an.closed_form:
-        mass, damping, stiffness, speed = map(text, an.closed_form)
+    if analysis.closed_form:
+        mass, damping, stiffness, speed = map(text, analysis.closed_form)
         yield f"closed form: mass {mass}, damping {damping}, stiffness {stiffness}, speed of the resting point {speed}"
     else:
         yield "closed form: none"
-    yield f"methods: {', '.join(an.methods)}; friction laws: {', '.join(an.laws)}"
+    yield f"methods: {', '.join(analysis.methods)}; friction laws: {', '.join(analysis.laws)}"

@@ -288,7 +288,7 @@ class Jump(Model):
     (tmp_path / "jump.py").write_text(text)
     analysis = find_model(tmp_path / "jump.py").analysis
     assert analysis.closed_form is None
-    assert analysis.waits == (moved == "x")
+    assert analysis.rests_when_stuck == (moved == "x")
     (tmp_path / "jump.py").write_text(text.replace(f"choose({moved} > edge, f, -f)", "f"))
     assert find_model(tmp_path / "jump.py").analysis.closed_form is not None
 

@@ -155,7 +155,11 @@ def run_lowered(model, values, pieces, h):
 @pytest.mark.parametrize("damping_ratio", [0.0, 0.08, 1.0, 3.0])
 def test_random_input_derivatives_never_stall_the_closed_form(worker, fmus, damping_ratio, order):
     """At a breakaway load and holding force differ by rounding errors, which may not start a slip the wrong way."""
-    model, h, path = lowered_model(replace(find_model("coulomb"), ramps=True)), 0.03, fmus / "coulomb.fmu"
+    model, h, path = (
+        lowered_model(replace(find_model("coulomb"), has_input_derivatives=True)),
+        0.03,
+        fmus / "coulomb.fmu",
+    )
     events = 0
     for seed in range(3):
         source = Random(seed)
@@ -176,7 +180,7 @@ def test_random_input_derivatives_never_stall_the_closed_form(worker, fmus, damp
 @pytest.mark.parametrize("damping_ratio", [0.08, 1.0, 3.0])
 def test_a_step_with_an_input_rate_evaluates_the_closed_form_a_few_times(monkeypatch, damping_ratio):
     """Most steps need no search for a standstill, and a search converges fast."""
-    model, h, calls = lowered_model(replace(find_model("coulomb"), ramps=True)), 0.03, []
+    model, h, calls = lowered_model(replace(find_model("coulomb"), has_input_derivatives=True)), 0.03, []
     closed_form = sibling_module(model, "runtime.linear_closed_form").LinearClosedForm
     evaluate = closed_form.evaluate
     monkeypatch.setattr(closed_form, "evaluate", lambda self, t: (calls.append(t), evaluate(self, t))[1])
@@ -512,5 +516,5 @@ class Block(Model):
         .replace("Block(", "Bar(")
     )
     for name, ramps in (("block", ["F_ext"]), ("bar", ["F_ext"])):
-        analysis = replace(find_model(tmp_path / f"{name}.py"), ramps=True).analysis
-        assert [e.name for e in analysis.ramps] == ramps
+        analysis = replace(find_model(tmp_path / f"{name}.py"), has_input_derivatives=True).analysis
+        assert [e.name for e in analysis.input_rates] == ramps

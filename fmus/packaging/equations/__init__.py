@@ -17,5 +17,8 @@
                                 generate the methods of a model class
     model_source.py             generates the module
 
+In these modules e is an expression, s a state, and c and d are contacts; `by` gives the derivatives of the variables
+along which an expression is differentiated.
+
 Terms are not regrouped: (F_ext + F_spring - F_friction) / m is evaluated in the order in which it is written.
 """

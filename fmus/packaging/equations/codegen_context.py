@@ -17,27 +17,27 @@ OVERFLOWING = ("exp", "sinh", "cosh")  # functions that raise an error for large
 class CodegenContext:
     """Model analysis together with the names, constants and argument lists of generated code."""
 
-    def __init__(self, an: ModelAnalysis) -> None:
-        self.an = an
-        self.rate_expressions = [an.rate_outputs[s] for s in an.dynamic_states]  # outputs that are rates of states
-        self.driver = an.drivers[0] if an.drivers else None
-        declared_names = {e.name for e in an.declared}
-        self.names = an.names  # of terms that the model does not name
-        for c in an.contacts:
-            for name, e in ("load", an.load.get(c)), ("slide", c.slide), ("limit", an.holding_limit[c]):
-                name += "" if an.waits else f"_{c.name}"
+    def __init__(self, analysis: ModelAnalysis) -> None:
+        self.analysis = analysis
+        self.rate_outputs = [analysis.rate_outputs[s] for s in analysis.dynamic_states]  # rates of states
+        self.driver = analysis.drivers[0] if analysis.drivers else None
+        declared_names = {e.name for e in analysis.declared}
+        self.names = analysis.names  # of terms that the model does not name
+        for c in analysis.contacts:
+            for name, e in ("load", analysis.load.get(c)), ("slide", c.slide), ("limit", analysis.holding_limit[c]):
+                name += "" if analysis.rests_when_stuck else f"_{c.name}"
                 if isinstance(e, Term) and not self.name_of(e) and name not in declared_names:
                     self.names[e] = name
-        for (c, d), e in an.A.items():
+        for (c, d), e in analysis.A.items():
             if (
                 isinstance(e, Term)
                 and not self.name_of(e)
-                and not depends_on(e, an.inputs)
+                and not depends_on(e, analysis.inputs)
                 and f"A_{c.name}_{d.name}" not in declared_names
             ):
                 self.names[e] = f"A_{c.name}_{d.name}"
-        self.states = [s.name for s in an.states]
-        self.modes = [c.mode.name for c in an.contacts]
+        self.states = [s.name for s in analysis.states]
+        self.modes = [c.mode.name for c in analysis.contacts]
         self.arguments = ["t", *self.states, *self.modes]
         self.used_names = declared_names | {"self", *self.arguments}
         self.constants = self._constants()
@@ -51,12 +51,16 @@ class CodegenContext:
 
         Those in cases of choose() may be undefined where the case is not used; they are computed if they cannot fail.
         """
-        an, result = self.an, {}
+        analysis, result = self.analysis, {}
         case_roots: list[Operand] = []
         safe_divisors: set[int] = set()  # other equations divide by them
 
         def walk(e: Operand, in_case: bool) -> None:
-            is_constant = isinstance(e, Term) and self.name_of(e) and not depends_on(e, (*an.time_varying, *an.inputs))
+            is_constant = (
+                isinstance(e, Term)
+                and self.name_of(e)
+                and not depends_on(e, (*analysis.time_varying, *analysis.inputs))
+            )
             if is_constant and not (in_case and can_fail(e, safe_divisors)):
                 result[id(e)] = e
                 return
@@ -69,10 +73,15 @@ class CodegenContext:
             for operand in operands(e):
                 walk(operand, in_case)
 
-        for c in an.contacts:
-            for e in (c.slide, an.holding_limit[c], c.eps, *(an.A[c, d] for d in an.contacts if not an.waits)):
+        for c in analysis.contacts:
+            for e in (
+                c.slide,
+                analysis.holding_limit[c],
+                c.eps,
+                *(analysis.A[c, d] for d in analysis.contacts if not analysis.rests_when_stuck),
+            ):
                 walk(e, in_case=False)
-        for e in an.outputs:
+        for e in analysis.outputs:
             walk(e, in_case=False)
         for e in case_roots:
             walk(e, in_case=True)
@@ -80,90 +89,100 @@ class CodegenContext:
 
     def printer(self, depth: int = 2) -> ExpressionPrinter:
         """Create a printer for a method, or for a block in it."""
-        an = self.an
-        names: dict[Expression, str] = {s: s.name for s in an.states} | {m: m.name for m in an.modes} | {TIME: "t"}
-        for n, condition in enumerate(an.switches):
+        analysis = self.analysis
+        names: dict[Expression, str] = (
+            {s: s.name for s in analysis.states} | {m: m.name for m in analysis.modes} | {TIME: "t"}
+        )
+        for n, condition in enumerate(analysis.switches):
             if condition.is_frozen:
                 names |= dict.fromkeys(condition.comparisons, f"self.condition_sides[{n}] > 0.0")
         return ExpressionPrinter(names, self.constants, self.used_names, depth, self.names)
 
-    def emit_driver(self, s: ExpressionPrinter, targets: Sequence[Operand]) -> None:
+    def emit_driver(self, printer: ExpressionPrinter, targets: Sequence[Operand]) -> None:
         """Emit the position of the driver and time-dependent inputs, if the targets need them."""
-        for e, rate in self.an.ramps.items():
-            course = f"self.{e.name}_polynomial"
-            if e not in s.bound_names and any(depends_on(target, (e,)) for target in targets):
-                s.bound_names[e] = e.name
-                s.emit(f"{e.name} = {course}.value_at(t - self.t_base)")
-            if rate not in s.bound_names and any(depends_on(target, (rate,)) for target in targets):
-                s.bound_names[rate] = rate.name
-                s.emit(f"{rate.name} = {course}.rate_at(t - self.t_base)")
+        for e, rate in self.analysis.input_rates.items():
+            polynomial = f"self.{e.name}_polynomial"
+            if e not in printer.bound_names and any(depends_on(target, (e,)) for target in targets):
+                printer.bound_names[e] = e.name
+                printer.emit(f"{e.name} = {polynomial}.value_at(t - self.t_base)")
+            if rate not in printer.bound_names and any(depends_on(target, (rate,)) for target in targets):
+                printer.bound_names[rate] = rate.name
+                printer.emit(f"{rate.name} = {polynomial}.rate_at(t - self.t_base)")
         if self.driver is not None and any(depends_on(e, (self.driver,)) for e in targets):
-            s.bound_names[self.driver] = self.driver.name
-            s.emit(f"{self.driver.name} = self.x_base + self.{self.driver.constant_rate.name} * (t - self.t_base)")
+            printer.bound_names[self.driver] = self.driver.name
+            printer.emit(
+                f"{self.driver.name} = self.x_base + self.{self.driver.constant_rate.name} * (t - self.t_base)"
+            )
 
     def nth_derivative_method(self, name: str, arguments: Sequence[str], targets: Sequence[Operand]) -> str:
         """Generate a method that returns targets with the n-th derivatives of inputs in place of their rates."""
-        s = self.printer()
-        n = s.fresh_name("n")
-        for e, rate in self.an.ramps.items():
-            s.bound_names[rate] = rate.name
-            s.emit(f"{rate.name} = self.{e.name}_polynomial.derivative_at(t - self.t_base, {n})")
-        return method_source(name, [*arguments, n], self.return_lines(s, targets))
+        printer = self.printer()
+        n = printer.fresh_name("n")
+        for e, rate in self.analysis.input_rates.items():
+            printer.bound_names[rate] = rate.name
+            printer.emit(f"{rate.name} = self.{e.name}_polynomial.derivative_at(t - self.t_base, {n})")
+        return method_source(name, [*arguments, n], self.return_lines(printer, targets))
 
     @property
     def single_contact(self) -> Contact | None:
         """The contact of a single-body model, which rests while stuck, or None."""
-        return self.an.contacts[0] if self.an.waits else None
+        return self.analysis.contacts[0] if self.analysis.rests_when_stuck else None
 
-    def emit_sign_mode(self, s: ExpressionPrinter, c: Contact, targets: Sequence[Operand]) -> None:
+    def emit_sign_mode(self, printer: ExpressionPrinter, c: Contact, targets: Sequence[Operand]) -> None:
         """Emit the sign of the slip as mode where the law uses it and mode is 0."""
         if len(c.laws) > 1 and any(depends_on(e, (c.mode,)) for e in targets):
-            with s.block(f"if {c.mode.name} == 0:"):
-                s.emit(f"{c.mode.name} = sign({s.text(c.slip)})")
+            with printer.block(f"if {c.mode.name} == 0:"):
+                printer.emit(f"{c.mode.name} = sign({printer.text(c.slip)})")
 
-    def return_lines(self, s: ExpressionPrinter, targets: Sequence[Operand]) -> list[str]:
+    def return_lines(self, printer: ExpressionPrinter, targets: Sequence[Operand]) -> list[str]:
         """Return the lines that return the targets, with one block for each item of a choice that they use."""
         test = next((result for e in targets if (result := find_choice_test(e)) is not None), None)
         if test is None:
-            self.emit_driver(s, targets)
-            s.count_uses(*targets)
-            return emit_return(s, targets)
-        with s.block(f"if {s.text(test)}:"):
-            s.lines += self.return_lines(self.printer(s.depth), [substitute(e, {test: True}) for e in targets])
-        return s.lines + self.return_lines(self.printer(s.depth), [substitute(e, {test: False}) for e in targets])
+            self.emit_driver(printer, targets)
+            printer.count_uses(*targets)
+            return emit_return(printer, targets)
+        with printer.block(f"if {printer.text(test)}:"):
+            printer.lines += self.return_lines(
+                self.printer(printer.depth), [substitute(e, {test: True}) for e in targets]
+            )
+        return printer.lines + self.return_lines(
+            self.printer(printer.depth), [substitute(e, {test: False}) for e in targets]
+        )
 
 
-def emit_return(s: ExpressionPrinter, targets: Sequence[Operand]) -> list[str]:
+def emit_return(printer: ExpressionPrinter, targets: Sequence[Operand]) -> list[str]:
     """Emit a return statement for the targets and return all lines."""
-    texts = list(map(s.text, targets))
+    texts = list(map(printer.text, targets))
     if sum(map(len, texts)) <= MAX_RETURN_LENGTH:
-        s.emit("return " + ", ".join(texts))
+        printer.emit("return " + ", ".join(texts))
     else:
-        with s.block("return ("):
+        with printer.block("return ("):
             for text in texts:
-                s.emit(f"{text},")
-        s.emit(")")
-    return s.lines
+                printer.emit(f"{text},")
+        printer.emit(")")
+    return printer.lines
 
 
-def emit_scales(f: CodegenContext, s: ExpressionPrinter, sizes: list[Operand]) -> list[Operand]:
+def emit_scales(context: CodegenContext, printer: ExpressionPrinter, sizes: list[Operand]) -> list[Operand]:
     """Return the rounding scales with the scale of the driver position inserted."""
-    drive = f.driver
-    if drive is None or not any(depends_on(e, (drive,)) for e in sizes):
+    driver = context.driver
+    if driver is None or not any(depends_on(e, (driver,)) for e in sizes):
         return sizes
     scale = Expression()
-    scale.name = drive.name if drive not in s.bound_names else s.fresh_name(f"scale_of_{drive.name}")
-    s.emit(f"{scale.name} = fabs(self.x_base) + fabs(self.{drive.constant_rate.name}) * (fabs(t) + fabs(self.t_base))")
-    s.bound_names[scale] = scale.name
+    scale.name = driver.name if driver not in printer.bound_names else printer.fresh_name(f"scale_of_{driver.name}")
+    printer.emit(
+        f"{scale.name} = fabs(self.x_base) + fabs(self.{driver.constant_rate.name}) * (fabs(t) + fabs(self.t_base))"
+    )
+    printer.bound_names[scale] = scale.name
     return [
-        substitute(e, {term: scale for term in subexpressions(e).values() if is_magnitude_of(term, drive)})
+        substitute(e, {term: scale for term in subexpressions(e).values() if is_magnitude_of(term, driver)})
         for e in sizes
     ]
 
 
-def is_magnitude_of(e: Operand, drive: Expression) -> bool:
+def is_magnitude_of(e: Operand, driver: Expression) -> bool:
     """Return whether this is the magnitude of the driver position."""
-    return isinstance(e, Term) and e.op == "fabs" and e.args[0] is drive
+    return isinstance(e, Term) and e.op == "fabs" and e.args[0] is driver
 
 
 def method_source(name: str, arguments: Sequence[str], lines: list[str]) -> str:

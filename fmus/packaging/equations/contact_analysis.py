@@ -97,7 +97,7 @@ class ContactAnalysis(ModelRoles):
         )
 
     @cached_property
-    def waits(self) -> bool:
+    def rests_when_stuck(self) -> bool:
         """Whether the model rests while its only contact sticks, with a load linear in time and a constant limit."""
         if any(len(group) != 1 for group in (self.contacts, self.positions, self.dynamic_states)):
             return False

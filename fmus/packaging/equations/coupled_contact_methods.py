@@ -30,46 +30,61 @@ class ContactUnknown:
         return [*self.sliding_values.values(), *self.stuck_values.values()]
 
 
-def coupled_contact_methods(f: CodegenContext) -> list[str]:
+def coupled_contact_methods(context: CodegenContext) -> list[str]:
     """Return the source of all methods for coupled contacts."""
-    if f.single_contact is not None or not f.an.contacts:
+    if context.single_contact is not None or not context.analysis.contacts:
         return []
-    slips = [c.slip for c in f.an.contacts]
+    slips = [c.slip for c in context.analysis.contacts]
     return [
-        method_source("slip_velocities", ["t", *f.states], f.return_lines(f.printer(), slips)),
-        slip_scale_method(f),
-        forces_method(f),
-        force_rates_method(f),
-        impulse_method(f),
+        method_source("slip_velocities", ["t", *context.states], context.return_lines(context.printer(), slips)),
+        slip_scale_method(context),
+        forces_method(context),
+        force_rates_method(context),
+        impulse_method(context),
     ]
 
 
 # ---- unknowns
 
 
-def force_unknown(f: CodegenContext) -> ContactUnknown:
+def force_unknown(context: CodegenContext) -> ContactUnknown:
     """Return the contact forces as unknowns."""
-    an = f.an
-    none = dict.fromkeys(an.contacts, 0.0)
-    held = {c: an.load[c] if c in an.load else substitute(an.slip_rate[c], none) for c in an.contacts}
-    return ContactUnknown({c: c for c in an.contacts}, {c: Term("*", c.mode, c.slide) for c in an.contacts}, held)
-
-
-def derivative_unknown(f: CodegenContext, name: str, by: dict[Expression, Operand]) -> ContactUnknown:
-    """Return the derivatives of the forces along `by` as unknowns."""
-    an, fixed = f.an, by | dict.fromkeys(f.an.contacts, 0.0)
-    slides = {c: build_term("*", c.mode, an.derivative(c.slide, by)) for c in an.contacts}
-    held = {
-        c: an.derivative(an.load[c], by) if c in an.load else an.derivative(an.slip_rate[c], fixed) for c in an.contacts
+    analysis = context.analysis
+    no_force = dict.fromkeys(analysis.contacts, 0.0)
+    stuck_values = {
+        c: analysis.load[c] if c in analysis.load else substitute(analysis.slip_rate[c], no_force)
+        for c in analysis.contacts
     }
-    zero = {
-        c: [slides[c], held[c], *([an.derivative(an.holding_limit[c], by)] if THRESHOLD in c.laws else [])]
-        for c in an.contacts
-    }
-    none = {c for c in an.contacts if all(is_same_expression(e, 0.0) for e in zero[c])}
-    none = none if none.issuperset(an.interacting_contacts) else none & {*an.independent_contacts}
     return ContactUnknown(
-        {c: 0.0 if c in none else local_symbol(f"{name}_{c.name}") for c in an.contacts}, slides, held
+        {c: c for c in analysis.contacts}, {c: Term("*", c.mode, c.slide) for c in analysis.contacts}, stuck_values
+    )
+
+
+def derivative_unknown(context: CodegenContext, name: str, by: dict[Expression, Operand]) -> ContactUnknown:
+    """Return the derivatives of the forces along `by` as unknowns."""
+    analysis, fixed = context.analysis, by | dict.fromkeys(context.analysis.contacts, 0.0)
+    sliding_values = {c: build_term("*", c.mode, analysis.derivative(c.slide, by)) for c in analysis.contacts}
+    stuck_values = {
+        c: analysis.derivative(analysis.load[c], by)
+        if c in analysis.load
+        else analysis.derivative(analysis.slip_rate[c], fixed)
+        for c in analysis.contacts
+    }
+    terms = {
+        c: [
+            sliding_values[c],
+            stuck_values[c],
+            *([analysis.derivative(analysis.holding_limit[c], by)] if THRESHOLD in c.laws else []),
+        ]
+        for c in analysis.contacts
+    }
+    zeros = {c for c in analysis.contacts if all(is_same_expression(e, 0.0) for e in terms[c])}
+    if not zeros.issuperset(analysis.interacting_contacts):  # their system has a solution other than zero
+        zeros &= {*analysis.independent_contacts}
+    return ContactUnknown(
+        {c: 0.0 if c in zeros else local_symbol(f"{name}_{c.name}") for c in analysis.contacts},
+        sliding_values,
+        stuck_values,
     )
 
 
@@ -81,40 +96,49 @@ def local_symbol(name: str) -> Expression:
 
 
 def emit_solution(
-    f: CodegenContext, s: ExpressionPrinter, unknowns: Sequence[ContactUnknown], law: bool = False
+    context: CodegenContext, printer: ExpressionPrinter, unknowns: Sequence[ContactUnknown], by_law: bool = False
 ) -> None:
-    """Emit the lines that solve for the unknowns; with `law`, the selected law decides which contacts are stuck."""
-    shared = f.an.interacting_contacts
-    matrix = {(c, d): s.fresh_name(f"row_{c.name}_{d.name}") for c in shared for d in shared}
+    """Emit the lines that solve for the unknowns; with `by_law`, the selected law decides which contacts are stuck."""
+    analysis, interacting = context.analysis, context.analysis.interacting_contacts
+    matrix = {(c, d): printer.fresh_name(f"row_{c.name}_{d.name}") for c in interacting for d in interacting}
     names = {
-        (n, c): c.name if e is c else s.fresh_name(e.name)
-        for n, u in enumerate(unknowns)
-        for c, e in u.symbols.items()
+        (n, c): c.name if e is c else printer.fresh_name(e.name)
+        for n, unknown in enumerate(unknowns)
+        for c, e in unknown.symbols.items()
         if isinstance(e, Expression)
     }
     for n, c in names:
-        if s.is_shared(unknowns[n].stuck_values[c]):
-            s.local_variable(unknowns[n].stuck_values[c])
-    for c in f.an.contacts:
+        if printer.is_shared(unknowns[n].stuck_values[c]):
+            printer.local_variable(unknowns[n].stuck_values[c])
+    for c in analysis.contacts:
         indices = [n for n in range(len(unknowns)) if (n, c) in names]
-        test = f"{c.mode.name} == 0" + (" and self.friction == HYBRID" if law and SIGN in c.laws else "")
-        for head, attribute in ((f"if {test}:", "stuck_values"), ("else:", "sliding_values")) if indices else ():
-            with s.block(head):
+        row = interacting if is_among(c, interacting) else []
+        test = f"{c.mode.name} == 0" + (" and self.friction == HYBRID" if by_law and SIGN in c.laws else "")
+        if indices:
+            with printer.block(f"if {test}:"):
                 for n in indices:
-                    s.emit(f"{names[n, c]} = {s.text(getattr(unknowns[n], attribute)[c])}")
-                for d in shared if is_among(c, shared) else []:
-                    s.emit(f"{matrix[c, d]} = {s.text(f.an.A[c, d] if attribute == 'stuck_values' else float(c is d))}")
-    sides = [{c: names[n, c] for c in shared} for n in range(len(unknowns)) if all((n, c) in names for c in shared)]
-    emit_elimination(s, shared, matrix, sides, any(is_among(c, f.an.variable_lever_contacts) for c in shared))
+                    printer.emit(f"{names[n, c]} = {printer.text(unknowns[n].stuck_values[c])}")
+                for d in row:
+                    printer.emit(f"{matrix[c, d]} = {printer.text(analysis.A[c, d])}")
+            with printer.block("else:"):
+                for n in indices:
+                    printer.emit(f"{names[n, c]} = {printer.text(unknowns[n].sliding_values[c])}")
+                for d in row:
+                    printer.emit(f"{matrix[c, d]} = {printer.text(float(c is d))}")
+    right_sides = [
+        {c: names[n, c] for c in interacting} for n in range(len(unknowns)) if all((n, c) in names for c in interacting)
+    ]
+    has_variable_levers = any(is_among(c, analysis.variable_lever_contacts) for c in interacting)
+    emit_elimination(printer, interacting, matrix, right_sides, has_variable_levers)
     for (n, c), name in names.items():
-        s.bound_names[unknowns[n].symbols[c]] = name
+        printer.bound_names[unknowns[n].symbols[c]] = name
 
 
 def emit_elimination(
-    s: ExpressionPrinter,
+    printer: ExpressionPrinter,
     rows: list[Contact],
     A: dict[tuple[Contact, Contact], str],
-    sides: list[dict[Contact, str]],
+    right_sides: list[dict[Contact, str]],
     has_variable_levers: bool,
 ) -> None:
     """Emit a Gaussian elimination that overwrites the right-hand sides with the solutions.
@@ -124,101 +148,122 @@ def emit_elimination(
     """
     for n, k in enumerate(rows):
         if has_variable_levers:
-            with s.block(f"if not fabs({A[k, k]}) > {SMALLEST_DIVISOR!r}:"):
-                s.emit(f"{A[k, k]} = {SMALLEST_DIVISOR!r}")
+            with printer.block(f"if not fabs({A[k, k]}) > {SMALLEST_DIVISOR!r}:"):
+                printer.emit(f"{A[k, k]} = {SMALLEST_DIVISOR!r}")
         for i in rows[n + 1 :]:
-            s.emit(f"{A[i, k]} = {A[i, k]} / {A[k, k]}")
+            printer.emit(f"{A[i, k]} = {A[i, k]} / {A[k, k]}")
             for j in rows[n + 1 :]:
-                s.emit(f"{A[i, j]} = {A[i, j]} - {A[i, k]} * {A[k, j]}")
-            for b in sides:
-                s.emit(f"{b[i]} = {b[i]} - {A[i, k]} * {b[k]}")
+                printer.emit(f"{A[i, j]} = {A[i, j]} - {A[i, k]} * {A[k, j]}")
+            for b in right_sides:
+                printer.emit(f"{b[i]} = {b[i]} - {A[i, k]} * {b[k]}")
     for n, k in reversed(list(enumerate(rows))):
-        for b in sides:
+        for b in right_sides:
             terms = "".join(f" - {A[k, j]} * {b[j]}" for j in rows[n + 1 :])
-            s.emit(f"{b[k]} = {f'({b[k]}{terms})' if terms else b[k]} / {A[k, k]}")
+            printer.emit(f"{b[k]} = {f'({b[k]}{terms})' if terms else b[k]} / {A[k, k]}")
 
 
 # ---- the methods
 
 
-def emit_friction_forces(f: CodegenContext, s: ExpressionPrinter) -> None:
+def law_mode(printer: ExpressionPrinter, c: Contact) -> str:
+    """Return the mode under a law without stick and slip: the sign of the slip, or 0 where the threshold law holds."""
+    slip = printer.text(c.slip)
+    return f"sign({slip}) if fabs({slip}) >= {printer.text(c.eps)} else 0" if THRESHOLD in c.laws else f"sign({slip})"
+
+
+def emit_friction_forces(context: CodegenContext, printer: ExpressionPrinter) -> None:
     """Emit the forces and modes under the selected law."""
-    contacts = [c for c in f.an.contacts if len(c.laws) > 1]
+    contacts = [c for c in context.analysis.contacts if len(c.laws) > 1]
     if contacts:
-        with s.block("if self.friction != HYBRID:"):
+        with printer.block("if self.friction != HYBRID:"):
             for c in contacts:
-                slip, near = s.text(c.slip), f" if fabs({s.text(c.slip)}) >= {s.text(c.eps)} else 0"
-                s.emit(f"{c.mode.name} = sign({slip}){near if THRESHOLD in c.laws else ''}")
-    emit_solution(f, s, [force_unknown(f)], law=True)
+                printer.emit(f"{c.mode.name} = {law_mode(printer, c)}")
+    emit_solution(context, printer, [force_unknown(context)], by_law=True)
     for c in contacts:
         if THRESHOLD in c.laws:
-            with s.block(f"if {c.mode.name} == 0 and self.friction != HYBRID:"):
-                s.emit(f"{c.name} = threshold(0.0, 1.0, {c.name}, 0.0, {s.text(f.an.holding_limit[c])})")
+            with printer.block(f"if {c.mode.name} == 0 and self.friction != HYBRID:"):
+                limit = printer.text(context.analysis.holding_limit[c])
+                printer.emit(f"{c.name} = threshold(0.0, 1.0, {c.name}, 0.0, {limit})")
 
 
-def slip_scale_method(f: CodegenContext) -> str:
+def slip_scale_method(context: CodegenContext) -> str:
     """Rounding scales of the slips."""
-    s = f.printer()
-    sizes = emit_scales(f, s, [rounding_scale(c.slip) for c in f.an.contacts])
-    f.emit_driver(s, sizes)
-    return method_source("slip_magnitudes", ["t", *f.states], emit_return(s, sizes))
+    printer = context.printer()
+    sizes = emit_scales(context, printer, [rounding_scale(c.slip) for c in context.analysis.contacts])
+    context.emit_driver(printer, sizes)
+    return method_source("slip_magnitudes", ["t", *context.states], emit_return(printer, sizes))
 
 
-def forces_method(f: CodegenContext) -> str:
+def forces_method(context: CodegenContext) -> str:
     """Forces, limits and rounding scales of the forces."""
-    an, s, u = f.an, f.printer(), force_unknown(f)
+    analysis, printer, forces = context.analysis, context.printer(), force_unknown(context)
     sizes = [
-        rounding_scale(an.load[c]) if c in an.load else build_term("/", rounding_scale(an.slip_rate[c]), an.divisor(c))
-        for c in an.contacts
+        rounding_scale(analysis.load[c])
+        if c in analysis.load
+        else build_term("/", rounding_scale(analysis.slip_rate[c]), analysis.divisor(c))
+        for c in analysis.contacts
     ]
-    limits = [an.holding_limit[c] for c in an.contacts]
-    f.emit_driver(s, [*u.terms, *limits])
-    s.count_uses(*u.terms, *limits, *sizes)
-    emit_solution(f, s, [u])
-    sizes = emit_scales(f, s, sizes)
-    return method_source("contact_forces", f.arguments, emit_return(s, [*an.contacts, *limits, *sizes]))
+    limits = [analysis.holding_limit[c] for c in analysis.contacts]
+    context.emit_driver(printer, [*forces.terms, *limits])
+    printer.count_uses(*forces.terms, *limits, *sizes)
+    emit_solution(context, printer, [forces])
+    sizes = emit_scales(context, printer, sizes)
+    return method_source(
+        "contact_forces", context.arguments, emit_return(printer, [*analysis.contacts, *limits, *sizes])
+    )
 
 
-def force_rates_method(f: CodegenContext) -> str:
+def force_rates_method(context: CodegenContext) -> str:
     """Rates of forces and limits, residual forces that would hold the contacts, and their rates."""
-    an, s, u, rate = f.an, f.printer(), force_unknown(f), derivative_unknown(f, "rate", f.an.time_derivatives)
-    flow = an.time_derivatives | {c: rate.symbols[c] for c in an.contacts}
-    pulls, pull_rates = [], []
-    for c in an.contacts:
-        if c in an.load:
-            pulls.append(build_term("-", an.load[c], c))
-            pull_rates.append(build_term("-", an.derivative(an.load[c], an.time_derivatives), rate.symbols[c]))
+    analysis, printer, forces = context.analysis, context.printer(), force_unknown(context)
+    by_time = analysis.time_derivatives
+    force_rates = derivative_unknown(context, "rate", by_time)
+    by_time_with_forces = by_time | {c: force_rates.symbols[c] for c in analysis.contacts}
+    residual_forces, residual_force_rates = [], []
+    for c in analysis.contacts:
+        if c in analysis.load:
+            residual_forces.append(build_term("-", analysis.load[c], c))
+            load_rate = analysis.derivative(analysis.load[c], by_time)
+            residual_force_rates.append(build_term("-", load_rate, force_rates.symbols[c]))
         else:
-            pulls.append(build_term("/", an.slip_rate[c], an.divisor(c)))
-            pull_rates.append(build_term("/", an.derivative(an.slip_rate[c], flow), an.divisor(c)))
-    rates = [*rate.symbols.values(), *(an.derivative(an.holding_limit[c], an.time_derivatives) for c in an.contacts)]
-    targets = [*rates, *pulls, *pull_rates]
-    f.emit_driver(s, [*u.terms, *rate.terms, *targets])
-    s.count_uses(*u.terms, *rate.terms, *targets)
-    emit_solution(f, s, [u])
-    emit_solution(f, s, [rate])
-    return method_source("contact_rates", f.arguments, emit_return(s, targets))
+            residual_forces.append(build_term("/", analysis.slip_rate[c], analysis.divisor(c)))
+            slip_jerk = analysis.derivative(analysis.slip_rate[c], by_time_with_forces)
+            residual_force_rates.append(build_term("/", slip_jerk, analysis.divisor(c)))
+    rates = [
+        *force_rates.symbols.values(),
+        *(analysis.derivative(analysis.holding_limit[c], by_time) for c in analysis.contacts),
+    ]
+    targets = [*rates, *residual_forces, *residual_force_rates]
+    context.emit_driver(printer, [*forces.terms, *force_rates.terms, *targets])
+    printer.count_uses(*forces.terms, *force_rates.terms, *targets)
+    emit_solution(context, printer, [forces])
+    emit_solution(context, printer, [force_rates])
+    return method_source("contact_rates", context.arguments, emit_return(printer, targets))
 
 
-def impulse_method(f: CodegenContext) -> str:
+def impulse_method(context: CodegenContext) -> str:
     """States after impulses that stop the slips of stuck contacts, exactly where slips are sums of speeds."""
-    an, s = f.an, f.printer()
-    ends = {c: c.slip if c not in an.load else build_term("/", c.slip, an.divisor(c)) for c in an.contacts}
+    analysis, printer = context.analysis, context.printer()
+    stuck_values = {
+        c: c.slip if c not in analysis.load else build_term("/", c.slip, analysis.divisor(c)) for c in analysis.contacts
+    }
     impulse = ContactUnknown(
-        {c: local_symbol(f"impulse_{c.name}") for c in an.contacts}, dict.fromkeys(an.contacts, 0.0), ends
+        {c: local_symbol(f"impulse_{c.name}") for c in analysis.contacts},
+        dict.fromkeys(analysis.contacts, 0.0),
+        stuck_values,
     )
     after: dict[State, Operand] = {}
-    for state in an.dynamic_states:
-        for c in an.contacts:
-            effect = an.derivative(an.rate_outputs[state], {c: 1.0})
+    for state in analysis.dynamic_states:
+        for c in analysis.contacts:
+            effect = analysis.derivative(analysis.rate_outputs[state], {c: 1.0})
             if not is_same_expression(effect, 0.0):
                 after[state] = build_term("+", after.get(state, state), build_term("*", effect, impulse.symbols[c]))
-    f.emit_driver(s, [*impulse.terms, *after.values()])
-    s.count_uses(*impulse.terms, *after.values())
-    emit_solution(f, s, [impulse])
-    s.emit(", ".join(e.name for e in after) + " = " + ", ".join(s.text(e) for e in after.values()))
-    for c, state, value in an.stick_assignments:
-        with s.block(f"if {c.mode.name} == 0:"):
-            s.emit(f"{state.name} = {s.text(value)}")
-    s.emit(f"return {', '.join(f.states)}")
-    return method_source("apply_impulses", f.arguments, s.lines)
+    context.emit_driver(printer, [*impulse.terms, *after.values()])
+    printer.count_uses(*impulse.terms, *after.values())
+    emit_solution(context, printer, [impulse])
+    printer.emit(", ".join(e.name for e in after) + " = " + ", ".join(printer.text(e) for e in after.values()))
+    for c, state, value in analysis.stick_assignments:
+        with printer.block(f"if {c.mode.name} == 0:"):
+            printer.emit(f"{state.name} = {printer.text(value)}")
+    printer.emit(f"return {', '.join(context.states)}")
+    return method_source("apply_impulses", context.arguments, printer.lines)

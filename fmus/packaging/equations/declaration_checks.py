@@ -25,70 +25,72 @@ LARGEST_FLOAT = float_info.max
 METHODS = [label for label, _, _ in (EXACT_ITEM, *METHOD_ITEMS)]
 
 
-def check_declarations(an: ModelRoles) -> None:
+def check_declarations(analysis: ModelRoles) -> None:
     """Check that all variables are declared in this class, and that modes, starts and rules are valid."""
-    known, location = set(an.declared), an.model.location
-    for e in an.declared:
-        for part in an.declared_expressions(e):
+    known, location = set(analysis.declared), analysis.model.location
+    for e in analysis.declared:
+        for part in analysis.declared_expressions(e):
             for leaf in variables_in(part):
                 if not leaf.name:
                     raise ModelError(
                         f"{e.name} uses a variable without a name: assign the variable to a name first", e.location
                     )
                 if leaf not in known:
-                    raise ModelError(f"{e.name} uses {leaf.name}, which is not declared in {an.name}", e.location)
+                    raise ModelError(f"{e.name} uses {leaf.name}, which is not declared in {analysis.name}", e.location)
             _check_choices(e, part)
-        _check_variable(an, e)
-        _check_alias(an, e)
-    for mode in an.modes:
-        owners = [c for c in an.contacts if c.mode is mode]
+        _check_variable(analysis, e)
+        _check_alias(analysis, e)
+    for mode in analysis.modes:
+        owners = [c for c in analysis.contacts if c.mode is mode]
         if len(owners) != 1:
             raise ModelError(
                 f"{mode.name} is the mode of {len(owners)} contacts: each Mode needs exactly one Contact",
                 mode.location,
             )
-    for s in (*an.states, *an.drivers):
+    for s in (*analysis.states, *analysis.drivers):
         for word, e in (
             ("start", s.start_expression),
             ("rate", s.constant_rate),
             ("nominal_velocity", s.nominal_velocity),
         ):
-            if depends_on(e, an.time_varying):
+            if depends_on(e, analysis.time_varying):
                 raise ModelError(f"{word} of {s.name} varies with time: it must depend on parameters only", s.location)
-    for rule in an.rules:
+    for rule in analysis.rules:
         if isinstance(rule.broken, Term) and rule.broken.op == "==":
             raise ModelError(NO_EQUALITY, rule.broken.location)
         if not is_comparison(rule.broken):
             raise ModelError(f"a Rule needs a comparison of parameters first, got {describe(rule.broken)}", location)
-        if depends_on(rule.broken, (*an.time_varying, *an.inputs)):
+        if depends_on(rule.broken, (*analysis.time_varying, *analysis.inputs)):
             raise ModelError("a Rule must depend on parameters only", rule.broken.location)
         _check_printable("the sentence of a Rule", rule.broken.location, rule.sentence)
         try:
-            rule.sentence.format_map({e.name: 1.0 for e in (*an.parameters, *an.choices)})
+            rule.sentence.format_map({e.name: 1.0 for e in (*analysis.parameters, *analysis.choices)})
         except (LookupError, ValueError) as error:
             raise ModelError(
                 f"the sentence of a Rule refers to {error}, which is not a parameter", rule.broken.location
             ) from None
-    if an.model.method not in ("", *METHODS):
-        raise ModelError(f"method = {an.model.method!r} is unknown; available methods: {', '.join(METHODS)}", location)
+    if analysis.model.method not in ("", *METHODS):
+        raise ModelError(
+            f"method = {analysis.model.method!r} is unknown; available methods: {', '.join(METHODS)}", location
+        )
     for word, limit in ("stop_time", inf), ("step_size", inf), ("tolerance", 1.0):
-        value = getattr(an.model, word)
+        value = getattr(analysis.model, word)
         if not is_number(value) or not 0.0 < value < limit:
             raise ModelError(
                 f"{word} = {describe(value)} is invalid: it must be a number above 0 and below {limit:g}", location
             )
-    if an.model.step_size > an.model.stop_time:
+    if analysis.model.step_size > analysis.model.stop_time:
         raise ModelError(
-            f"step_size = {an.model.step_size!r} s is longer than the default run: set it to at most "
-            f"stop_time = {an.model.stop_time!r} s",
+            f"step_size = {analysis.model.step_size!r} s is longer than the default run: set it to at most "
+            f"stop_time = {analysis.model.stop_time!r} s",
             location,
         )
-    if not isinstance(an.model.__doc__, str) or not an.model.__doc__.strip():
+    if not isinstance(analysis.model.__doc__, str) or not analysis.model.__doc__.strip():
         raise ModelError(
-            f"{an.name} has no docstring: its first line becomes the description of the FMU, the rest its page",
+            f"{analysis.name} has no docstring: its first line becomes the description of the FMU, the rest its page",
             location,
         )
-    _check_printable(an.name, location, an.model.__doc__.replace("\n", " "))
+    _check_printable(analysis.name, location, analysis.model.__doc__.replace("\n", " "))
 
 
 def _check_choices(e: Variable, part: Operand) -> None:
@@ -104,7 +106,7 @@ def _check_choices(e: Variable, part: Operand) -> None:
                 )
 
 
-def _check_variable(an: ModelRoles, e: Variable) -> None:
+def _check_variable(analysis: ModelRoles, e: Variable) -> None:
     """Check types of texts and numbers, and the range of the start value."""
     if not e.text:
         raise ModelError(f"{e.name} has an empty description: write a text", e.location)
@@ -115,18 +117,18 @@ def _check_variable(an: ModelRoles, e: Variable) -> None:
             raise ModelError(f"{e.name}: start value and bounds must be numbers, got {got}", e.location)
     if not max(e.low, e.above) <= min(e.high, e.below):
         raise ModelError(f"{e.name} has an empty range: no number is {e.allowed}", e.location)
-    if isinstance(e, Contact) and is_among(e.slip, an.positions):
+    if isinstance(e, Contact) and is_among(e.slip, analysis.positions):
         raise ModelError(
-            f"slip of {e.name} is {e.slip.name}, but a slip is a speed: write slip={an.rate[e.slip].name}",
+            f"slip of {e.name} is {e.slip.name}, but a slip is a speed: write slip={analysis.rate[e.slip].name}",
             e.location,
         )
     if isinstance(e, SettableVariable) and not e.accepts(e.start):
         raise ModelError(f"{e.name} has the start value {e.start!r}; it must be {e.allowed}", e.location)
 
 
-def _check_alias(an: ModelRoles, e: Variable) -> None:
+def _check_alias(analysis: ModelRoles, e: Variable) -> None:
     """Check that the alias is an identifier that nothing else uses."""
-    names = [word for variable in an.declared for word in (variable.name, variable.alias)]
+    names = [word for variable in analysis.declared for word in (variable.name, variable.alias)]
     if e.alias and (not e.alias.isidentifier() or names.count(e.alias) > 1 or e.alias in RESERVED):
         raise ModelError(
             f"{e.name} has the alias {e.alias!r}: it must be an identifier that nothing else uses", e.location
@@ -140,15 +142,15 @@ def _check_printable(name: str, location: tuple[str, int], *words: str) -> None:
             raise ModelError(f"{name}: {text!r} must be printable text on one line", location)
 
 
-def check_use(an: ModelRoles) -> None:
+def check_use(analysis: ModelRoles) -> None:
     """Raise ModelError for a parameter, choice or input that no equation and no rule reads."""
     read: dict[int, Operand] = {}
     for part in (
-        *(rule.broken for rule in an.rules),
-        *(one for e in an.declared for one in an.declared_expressions(e)),
+        *(rule.broken for rule in analysis.rules),
+        *(one for e in analysis.declared for one in analysis.declared_expressions(e)),
     ):
         subexpressions(part, read)
-    for e in (*an.parameters, *an.choices, *an.inputs):
+    for e in (*analysis.parameters, *analysis.choices, *analysis.inputs):
         if id(e) not in read:
             raise ModelError(f"no equation uses {e.name}: use it, or remove its declaration", e.location)
 

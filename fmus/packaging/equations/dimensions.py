@@ -21,10 +21,10 @@ UNIT_SPELLINGS = {symbol.lower(): symbol for symbol in SYMBOLS} | {"sec": "s", "
 PRECEDENCE = {"+": 1, "-": 1, "*": 2, "/": 2, "neg": 3} | dict.fromkeys(COMPARISON_OPERATORS, 0)
 
 
-def check_units(an: ModelAnalysis) -> None:
+def check_units(analysis: ModelAnalysis) -> None:
     """Check the units of all outputs, rates, start values, slips and forces."""
     memo: dict[int, Dimensions | None] = {}
-    for e in an.declared:
+    for e in analysis.declared:
         own, prefix = declared_dimensions(e), f"{e.name} is declared in {e.unit}, but"
         if isinstance(e, Output):
             check_dimensions(e, e.expression, own, prefix, memo)
@@ -45,7 +45,7 @@ def check_units(an: ModelAnalysis) -> None:
             for word, force in ("slide", e.slide), ("hold", e.hold):
                 check_dimensions(e, force, own, f"{prefix} {word}", memo)
             check_dimensions(e, e.eps, slip, f"the slip of {e.name} is in {dimensions_text(slip)}, but eps", memo)
-    for rule in an.rules:
+    for rule in analysis.rules:
         dimensions_of(rule.broken, memo)
 
 
@@ -58,9 +58,9 @@ def check_dimensions(
         raise ModelError(f"{prefix} {expression_text(e)} is in {dimensions_text(dimensions)}", owner.location)
 
 
-def check_frequencies(an: ModelAnalysis) -> None:
+def check_frequencies(analysis: ModelAnalysis) -> None:
     """Check that no frequency in Hz is used as an angular velocity; both have the dimension 1/s."""
-    for e in an.declared:
+    for e in analysis.declared:
         uses: list[tuple[Variable, Operand]] = [(e, e.expression)] if isinstance(e, Output) else []
         if isinstance(e, (State, Output)) and e.integrates is not None:
             uses.append((e.integrates, e))
@@ -69,7 +69,7 @@ def check_frequencies(an: ModelAnalysis) -> None:
         for variable, value in uses:
             if angle_exponent(variable) > 0 and is_in_hertz(value):
                 raise frequency_error(value, f"{variable.name} is in {variable.unit}", e)
-        for part in an.declared_expressions(e):
+        for part in analysis.declared_expressions(e):
             for term in subexpressions(part).values():
                 if isinstance(term, Term) and term.op in ("sin", "cos", "tan") and is_in_hertz(term.args[0]):
                     raise frequency_error(term.args[0], f"the argument of {term.op} is an angle in rad", term)

@@ -30,11 +30,11 @@ OFFERED_WITH = {label: file.OFFERED_WITH for label, file, _ in methods if hasatt
 class ModelAnalysis(ContactAnalysis):
     """The analysed model, from which numerics, model description, page and C code are generated."""
 
-    def __init__(self, model: type[Model], ramps: bool = False) -> None:
-        super().__init__(model, ramps)
+    def __init__(self, model: type[Model], has_input_derivatives: bool = False) -> None:
+        super().__init__(model, has_input_derivatives)
         check_declarations(self)
         self._find_contact_loads()
-        self.ramps = {e: rate for e, rate in self.ramps.items() if self._keeps_closed_form(e)}
+        self.input_rates = {e: rate for e, rate in self.input_rates.items() if self._keeps_closed_form(e)}
         self.rules = (
             *self._division_rules(),
             *self._nominal_velocity_rules(),
@@ -42,9 +42,11 @@ class ModelAnalysis(ContactAnalysis):
             *self._sign_rules(),
             *self._holding_rules(),
         )
-        self.switches = find_conditions(self._dynamic_expressions(), (TIME, *self.states, *self.drivers, *self.ramps))
+        self.switches = find_conditions(
+            self._dynamic_expressions(), (TIME, *self.states, *self.drivers, *self.input_rates)
+        )
         self.limits = self._find_limits()
-        for e in self.named if self.contacts and not self.waits else ():
+        for e in self.named if self.contacts and not self.rests_when_stuck else ():
             check_name(e.name, e, RESERVED_WHERE_COUPLED)
 
     def _division_rules(self) -> tuple[Rule, ...]:
@@ -92,7 +94,7 @@ class ModelAnalysis(ContactAnalysis):
     def _keeps_closed_form(self, e: Input) -> bool:
         """Return whether breakaway and motion keep their closed form while the input changes."""
         others = (TIME, *self.drivers, *self.inputs)
-        if self.waits:
+        if self.rests_when_stuck:
             (c,) = self.contacts
             if depends_on(self.holding_limit[c], (e,)) or depends_on(self.derivative(self.load[c], {e: 1.0}), others):
                 return False
@@ -113,7 +115,7 @@ class ModelAnalysis(ContactAnalysis):
             or any(depends_on(c.slide, self.time_varying) for c in self.contacts)
         ):
             return None
-        if self.contacts and not self.waits:
+        if self.contacts and not self.rests_when_stuck:
             return None
         if len(self.positions) != 1:
             return None

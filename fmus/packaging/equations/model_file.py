@@ -40,7 +40,7 @@ class ModelFile:
 
     path: Path
     source: str
-    ramps: bool = False  # whether inputs may have time derivatives
+    has_input_derivatives: bool = False  # whether inputs may have time derivatives
 
     @property
     def name(self) -> str:
@@ -55,7 +55,7 @@ class ModelFile:
     def analysis(self) -> ModelAnalysis:
         """The analysed and checked model."""
         try:
-            analysis = ModelAnalysis(self._load_class(), self.ramps)
+            analysis = ModelAnalysis(self._load_class(), self.has_input_derivatives)
             check_units(analysis)
             check_frequencies(analysis)
             with redirect_stdout(StringIO()):

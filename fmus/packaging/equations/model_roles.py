@@ -19,7 +19,7 @@ TIME.name = "t"
 class ModelRoles:
     """The variables of a model by role, and the derivatives of those that vary."""
 
-    def __init__(self, model: type[Model], ramps: bool = False) -> None:
+    def __init__(self, model: type[Model], has_input_derivatives: bool = False) -> None:
         self.model, self.name = model, model.__name__
         self.names: dict[Expression, str] = {}  # of derived terms
         if self.name in RESERVED or is_reserved_in_c(self.name) or not self.name.isascii():
@@ -47,8 +47,12 @@ class ModelRoles:
             raise ModelError("rules must be a Rule or a tuple of Rules", model.location)
         self._find_rates()
         self.time_varying = (TIME, *self.states, *self.drivers, *self.contacts, *self.modes)
-        self.ramps = {e: rate for e in self.inputs if (rate := self._input_rate(e)) is not None} if ramps else {}
-        self.time_derivatives = {s: self.rate[s] for s in self.states} | self.explicit_time_derivatives | self.ramps
+        self.input_rates = (
+            {e: rate for e in self.inputs if (rate := self._input_rate(e)) is not None} if has_input_derivatives else {}
+        )
+        self.time_derivatives = (
+            {s: self.rate[s] for s in self.states} | self.explicit_time_derivatives | self.input_rates
+        )
 
     def derivative(self, e: Operand, by: Mapping[Expression, Operand]) -> Operand:
         """Return the derivative of e, where `by` gives the derivatives of the variables, and name its terms."""
@@ -129,7 +133,7 @@ class ModelRoles:
     @property
     def coasting_derivatives(self) -> dict[Expression, Operand]:
         """Time derivatives without acceleration: also inputs at their rates and positions at their speeds."""
-        return self.explicit_time_derivatives | self.ramps | {x: self.rate[x] for x in self.positions}
+        return self.explicit_time_derivatives | self.input_rates | {x: self.rate[x] for x in self.positions}
 
     @property
     def ordered_outputs(self) -> list[Variable]:

@@ -53,40 +53,40 @@ DECLARATION_OPTIONS = {
 RUN_SETTINGS = ("stop_time", "step_size", "tolerance")
 
 
-def model_source(an: ModelAnalysis, file: str) -> str:
+def model_source(analysis: ModelAnalysis, file: str) -> str:
     """Return the source of the module."""
-    f = CodegenContext(an)
-    first, _, rest = escape_docstring(cleandoc(an.model.__doc__ or "")).partition("\n")
-    about = indent(f"{first}\n{rest}" + ("\n" if rest else ""), INDENT).strip(" ")
+    context = CodegenContext(analysis)
+    first, _, remainder = escape_docstring(cleandoc(analysis.model.__doc__ or "")).partition("\n")
+    about = indent(f"{first}\n{remainder}" + ("\n" if remainder else ""), INDENT).strip(" ")
     text = MODULE_TEMPLATE.format(
         first=first,
         file=file,
         import_lines=IMPORTS_MARK,
-        method="EXACT" if an.method == EXACT_ITEM[0] else f"{an.method}.NUMBER",
-        items="(EXACT_ITEM, *METHOD_ITEMS)" if an.closed_form else "METHOD_ITEMS",
-        name=an.name,
-        base_class=base_class(an),
-        about=about.rstrip(" ") + (INDENT if rest else ""),
-        declaration_lines=indent("\n".join(declaration_lines(an)), INDENT),
-        class_attribute_lines=indent("\n".join(class_attribute_lines(an)), INDENT),
+        method="EXACT" if analysis.method == EXACT_ITEM[0] else f"{analysis.method}.NUMBER",
+        items="(EXACT_ITEM, *METHOD_ITEMS)" if analysis.closed_form else "METHOD_ITEMS",
+        name=analysis.name,
+        base_class=base_class(analysis),
+        about=about.rstrip(" ") + (INDENT if remainder else ""),
+        declaration_lines=indent("\n".join(declaration_lines(analysis)), INDENT),
+        class_attribute_lines=indent("\n".join(class_attribute_lines(analysis)), INDENT),
         methods="\n\n".join(
             [
-                *setup_methods(f),
-                *rate_methods(f),
-                *single_contact_methods(f),
-                *coupled_contact_methods(f),
-                *condition_methods(f),
-                *law_modes_method(f),
-                observe_method(f),
+                *setup_methods(context),
+                *rate_methods(context),
+                *single_contact_methods(context),
+                *coupled_contact_methods(context),
+                *condition_methods(context),
+                *law_modes_method(context),
+                observe_method(context),
             ]
         ),
     )
     return text.replace(IMPORTS_MARK, import_lines(text.replace(IMPORTS_MARK, "")))
 
 
-def base_class(an: ModelAnalysis) -> str:
+def base_class(analysis: ModelAnalysis) -> str:
     """Return the runtime base class of the model."""
-    return "DryFriction" if an.waits else "CoupledFriction" if an.contacts else "Oscillator"
+    return "DryFriction" if analysis.rests_when_stuck else "CoupledFriction" if analysis.contacts else "Oscillator"
 
 
 def import_lines(text: str) -> str:
@@ -99,39 +99,39 @@ def import_lines(text: str) -> str:
     return "\n".join(lines)
 
 
-def declaration_lines(an: ModelAnalysis) -> list[str]:
+def declaration_lines(analysis: ModelAnalysis) -> list[str]:
     """Declare the variables in the order of the model description."""
     lines = [
         f"{e.name} = {'Fixed' if isinstance(e, Fixed) else 'Parameter'}({float(e.start)!r}, {declaration_arguments(e)})"
-        for e in an.parameters
+        for e in analysis.parameters
     ]
-    if an.laws:
-        items = ", ".join(f"{law.upper()}_LAW" for law in an.laws)
-        lines.append(f'friction = Choice(HYBRID, "friction law", ({items}{"," if len(an.laws) == 1 else ""}))')
-    for e in an.choices:
+    if analysis.laws:
+        items = ", ".join(f"{law.upper()}_LAW" for law in analysis.laws)
+        lines.append(f'friction = Choice(HYBRID, "friction law", ({items}{"," if len(analysis.laws) == 1 else ""}))')
+    for e in analysis.choices:
         items = ", ".join(
             f"({string_literal(label)}, {value}, {string_literal(sentence)})" for label, value, sentence in e.items
         )
         lines.append(f"{e.name} = Choice({e.start}, {string_literal(e.text)}, ({items},))")
-    lines += [f"{e.name} = Input({float(e.start)!r}, {declaration_arguments(e)})" for e in an.inputs]
-    return lines + [f"{e.name} = {output_declaration(an, e)}" for e in an.ordered_outputs]
+    lines += [f"{e.name} = Input({float(e.start)!r}, {declaration_arguments(e)})" for e in analysis.inputs]
+    return lines + [f"{e.name} = {output_declaration(analysis, e)}" for e in analysis.ordered_outputs]
 
 
-def output_declaration(an: ModelAnalysis, e: Variable) -> str:
+def output_declaration(analysis: ModelAnalysis, e: Variable) -> str:
     """Return the declaration of a calculated variable."""
     if isinstance(e, Mode):
         return f"Mode({string_literal(e.text)})"
-    more = (
+    options = (
         f", rate_of={string_literal(e.integrates.name)}"
         if isinstance(e, (State, Output)) and e.integrates is not None
         else ""
     )
     if isinstance(e, State):
-        more += f", rate={string_literal(e.constant_rate.name)}" if is_among(e, an.drivers) else ""
-        return f"State({declaration_arguments(e)}{more})"
+        options += f", rate={string_literal(e.constant_rate.name)}" if is_among(e, analysis.drivers) else ""
+        return f"State({declaration_arguments(e)}{options})"
     if isinstance(e, Contact):
         return f"Contact({declaration_arguments(e)})"
-    return f"Output({declaration_arguments(e)}{more}{', direct=True' if an.has_direct_feedthrough(e) else ''})"
+    return f"Output({declaration_arguments(e)}{options}{', direct=True' if analysis.has_direct_feedthrough(e) else ''})"
 
 
 def declaration_arguments(e: Variable) -> str:
@@ -143,61 +143,64 @@ def declaration_arguments(e: Variable) -> str:
     return ", ".join(texts)
 
 
-def class_attribute_lines(an: ModelAnalysis) -> list[str]:
+def class_attribute_lines(analysis: ModelAnalysis) -> list[str]:
     """Return the class attributes that the runtime reads."""
-    states = ", ".join(f"{string_literal(s.name)}: {string_literal(an.rate[s].name)}" for s in an.states)
+    states = ", ".join(f"{string_literal(s.name)}: {string_literal(analysis.rate[s].name)}" for s in analysis.states)
     lines = ["solver_class = Solver", f"states = {{{states}}}"]
-    if an.contacts:
+    if analysis.contacts:
         slips = ", ".join(
-            f"{string_literal(c.mode.name)}: {string_literal(c.slip.name if an.waits else '')}" for c in an.contacts
+            f"{string_literal(c.mode.name)}: {string_literal(c.slip.name if analysis.rests_when_stuck else '')}"
+            for c in analysis.contacts
         )
         lines.append(f"contacts = {{{slips}}}")
+    states_and_drivers = (*analysis.states, *analysis.drivers)
+    nominal_velocities = [s.nominal_velocity for s in states_and_drivers if s.nominal_velocity is not None]
     lines += [
-        f"{word} = True"
-        for word, holds in (
-            ("is_linear", an.closed_form),
-            ("has_other_laws", an.laws[1:]),
-            ("has_driver", an.drivers),
-            ("has_input_derivatives", an.ramps),
-            ("has_conditions", an.conditions),
-            ("checks_event_steps", an.checks_event_steps),
-            ("has_nominal_velocity", any(s.nominal_velocity is not None for s in (*an.states, *an.drivers))),
-            ("has_variable_levers", not an.waits and an.variable_lever_contacts),
+        f"{attribute} = True"
+        for attribute, is_set in (
+            ("is_linear", analysis.closed_form),
+            ("has_other_laws", analysis.laws[1:]),
+            ("has_driver", analysis.drivers),
+            ("has_input_derivatives", analysis.input_rates),
+            ("has_conditions", analysis.conditions),
+            ("checks_event_steps", analysis.checks_event_steps),
+            ("has_nominal_velocity", nominal_velocities),
+            ("has_variable_levers", not analysis.rests_when_stuck and analysis.variable_lever_contacts),
         )
-        if holds
+        if is_set
     ]
-    if n := n_event_functions(an):
-        lines.append(
-            f"n_event_functions, first_condition, n_switches = {n}, {2 * len(an.contacts)}, {len(an.switches)}"
-        )
-    if an.conditions:
-        lines.append(f"condition_texts = ({', '.join(map(string_literal, condition_texts(an)))},)")
-        lines.append(f"condition_units = ({', '.join(string_literal(condition_unit(an, e)) for e in an.conditions)},)")
-    if an.limits:
-        lines.append(f"first_limit_rule = {rule_status(len(an.rules))}")
-    for word in RUN_SETTINGS:
-        if (value := float(getattr(an.model, word))) != getattr(Oscillator, word):
-            lines.append(f"{word} = {value!r}")
-    if an.rules or an.limits:
-        inherited = [f"{INDENT}**{base_class(an)}.rules,"] if an.contacts else []
-        messages = [rule.sentence for rule in an.rules] + [limit.sentence for limit in an.limits]
+    if n := n_event_functions(analysis):
+        numbers = f"{n}, {2 * len(analysis.contacts)}, {len(analysis.switches)}"
+        lines.append(f"n_event_functions, first_condition, n_switches = {numbers}")
+    if analysis.conditions:
+        units = [condition_unit(analysis, condition) for condition in analysis.conditions]
+        lines.append(f"condition_texts = ({', '.join(map(string_literal, condition_texts(analysis)))},)")
+        lines.append(f"condition_units = ({', '.join(map(string_literal, units))},)")
+    if analysis.limits:
+        lines.append(f"first_limit_rule = {rule_status(len(analysis.rules))}")
+    for attribute in RUN_SETTINGS:
+        if (value := float(getattr(analysis.model, attribute))) != getattr(Oscillator, attribute):
+            lines.append(f"{attribute} = {value!r}")
+    if analysis.rules or analysis.limits:
+        inherited = [f"{INDENT}**{base_class(analysis)}.rules,"] if analysis.contacts else []
+        messages = [rule.sentence for rule in analysis.rules] + [limit.sentence for limit in analysis.limits]
         sentences = [f"{INDENT}{rule_status(n)}: {string_lines(message)}," for n, message in enumerate(messages)]
         lines += ["rules = {", *inherited, *sentences, "}"]
     return lines
 
 
-def n_event_functions(an: ModelAnalysis) -> int:
+def n_event_functions(analysis: ModelAnalysis) -> int:
     """Return the number of event functions: two for each contact, and one for each condition."""
-    return 2 * len(an.contacts) + len(an.conditions)
+    return 2 * len(analysis.contacts) + len(analysis.conditions)
 
 
-def condition_texts(an: ModelAnalysis) -> list[str]:
+def condition_texts(analysis: ModelAnalysis) -> list[str]:
     """Return what changes where the event function of a condition falls to zero."""
-    switches = [f"{expression_text(condition.comparisons[0])} changes" for condition in an.switches]
-    return switches + [condition.sentence.partition(" at t =")[0] for condition in an.limits]
+    switches = [f"{expression_text(condition.comparisons[0])} changes" for condition in analysis.switches]
+    return switches + [condition.sentence.partition(" at t =")[0] for condition in analysis.limits]
 
 
-def condition_unit(an: ModelAnalysis, condition: Condition) -> str:
+def condition_unit(analysis: ModelAnalysis, condition: Condition) -> str:
     """Return the unit of the margin of a condition: that of one side, or of any variable with the same dimensions.
 
     A dimensionless margin has the unit 1 unless one side is a variable, as it can be an angle or a ratio.
@@ -206,7 +209,7 @@ def condition_unit(an: ModelAnalysis, condition: Condition) -> str:
     dimensions = next((d for e in condition.sides if (d := dimensions_of(e, memo)) is not None), DIMENSIONLESS)
     variables = [e for e in condition.sides if isinstance(e, Variable)]
     if dimensions != DIMENSIONLESS:
-        variables += an.declared
+        variables += analysis.declared
     return next((e.unit for e in variables if declared_dimensions(e) == dimensions), "1")
 
 

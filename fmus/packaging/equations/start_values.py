@@ -19,19 +19,19 @@ OPERATIONS: dict[str, Callable[..., Any]] = {
 }
 
 
-def check_evaluation(an: ModelAnalysis) -> None:
+def check_evaluation(analysis: ModelAnalysis) -> None:
     """Raise ModelError for the first expression without a value at the start values; contact forces count as 0."""
-    values = start_values(an)
+    values = start_values(analysis)
     memo: dict[int, float] = {}
-    for e in an.outputs:
+    for e in analysis.outputs:
         evaluate(e, values, memo)
 
 
-def check_friction_forces(an: ModelAnalysis) -> None:
+def check_friction_forces(analysis: ModelAnalysis) -> None:
     """Raise ModelError for a sliding or holding force without a value at the start values, or with a direction."""
-    values = start_values(an)
-    for c in an.contacts:
-        for e in (c.slide, an.holding_limit[c]):
+    values = start_values(analysis)
+    for c in analysis.contacts:
+        for e in (c.slide, analysis.holding_limit[c]):
             try:
                 evaluate(e, values, {})
             except ModelError as error:
@@ -44,10 +44,10 @@ def check_friction_forces(an: ModelAnalysis) -> None:
             )
 
 
-def check_state_ranges(an: ModelAnalysis) -> None:
+def check_state_ranges(analysis: ModelAnalysis) -> None:
     """Raise ModelError for a state that starts outside its declared range."""
-    values = start_values(an)
-    for s in an.states:
+    values = start_values(analysis)
+    for s in analysis.states:
         if not s.accepts(values[s]):
             raise ModelError(
                 f"{s.name} starts at {values[s]!r}{s.unit_suffix}, but its declaration says that it is {s.allowed}",
@@ -64,12 +64,12 @@ def has_direction(c: Contact, values: dict[Expression, float]) -> bool:
     return forward == -backward != 0.0
 
 
-def start_values(an: ModelAnalysis) -> dict[Expression, float]:
+def start_values(analysis: ModelAnalysis) -> dict[Expression, float]:
     """Return the values of parameters, inputs and states at the start; what follows from them counts as 0."""
-    values: dict[Expression, float] = dict.fromkeys(an.time_varying, 0.0)
-    values |= {e: float(e.start) for e in (*an.parameters, *an.choices, *an.inputs)}
+    values: dict[Expression, float] = dict.fromkeys(analysis.time_varying, 0.0)
+    values |= {e: float(e.start) for e in (*analysis.parameters, *analysis.choices, *analysis.inputs)}
     memo: dict[int, float] = {}
-    for s in an.states:
+    for s in analysis.states:
         values[s] = evaluate(s.start_expression, values, memo)
     return values
 

@@ -44,10 +44,10 @@ class FeatureSelection:
 
 def select_features(source: ModelFile, methods: Sequence[str] = (), laws: Sequence[str] = ()) -> FeatureSelection:
     """Select methods and laws, by default all that the model offers; raise BuildError for those that it cannot have."""
-    an, selections = source.analysis, []
+    analysis, selections = source.analysis, []
     for word, default, has, requested in (
-        ("method", an.methods, an.available_methods, methods),
-        ("friction law", an.laws, an.laws, laws),
+        ("method", analysis.methods, analysis.available_methods, methods),
+        ("friction law", analysis.laws, analysis.laws, laws),
     ):
         for label in requested:
             if label not in has:

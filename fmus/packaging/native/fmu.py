@@ -68,7 +68,7 @@ def build(
         if platform not in PLATFORMS:
             raise BuildError(f"There is no platform {platform!r}; choose from {', '.join(PLATFORMS)}.")
     date = build_date()
-    source = replace(find_model(model), ramps=fmi == "2")  # FMI 3.0 cannot set derivatives of inputs
+    source = replace(find_model(model), has_input_derivatives=fmi == "2")  # FMI 3.0 cannot set derivatives of inputs
     name, cls = source.name, lowered_model(source, select_features(source, methods, laws))
     files, description = generate_c_sources(cls, name, date, fmi)
     declared = declared_variables(cls)
