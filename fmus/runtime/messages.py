@@ -24,8 +24,8 @@ from .run_state import RunState
 from .variable_declarations import VariableDeclaration
 
 RUN_MESSAGES = {
-    codes.DIVERGED: "the solution diverges after t = {t0!r} s, or the equations have no finite value there, as the "
-    "root of a negative number; reduce the excitation or check the parameters",
+    codes.DIVERGED: "the solution diverges after t = {t0!r} s, or an equation has no finite value there, such as the "
+    "square root of a negative number; reduce the excitation or check the parameters",
     codes.STALLED: "the solver stalls after t = {t0!r} s: its step has shrunk to the resolution of the time; raise "
     "solver.rtol or choose another solver.method",
     codes.TOO_MANY_STEPS: f"more than {MAX_STEPS} internal steps or {MAX_EVALUATIONS} right-hand sides within one "
