@@ -5,7 +5,7 @@ methods, and stickslip-events.csv; those of other laws and values under longer n
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cache
 from math import nan
 from pathlib import Path
@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from ..running.solution import Solution
+from ..scenes.run_spec import RunSpec
 from .ode_problem import OdeProblem
 
 FOLDER = Path(__file__).parents[2] / "fmus"
@@ -22,32 +23,39 @@ POINTS = 401  # common output points of every run, including start and stop
 
 @dataclass(frozen=True)
 class ReferenceCase:
-    """A model under one law.
+    """A run of a model under one law whose result is certified.
 
     Attributes
     ----------
-    model : name of the model, or path of its file
-    law : for people to read
-    reference_source : the reference of this law, or its name
-    problem : the equations for peer solvers
-    values : parameter values to set in the FMU
-    dry_friction_reference : name of the reference with dry friction, if the law only approximates it
-    outputs : names of the states among the outputs
+    name : str
+    run : RunSpec
+        The FMU, the values to set, and the states among its outputs.
+    law : str
+        Description of the friction law.
+    reference_source : str or Solution
+        The reference of this law, or its name.
+    problem : OdeProblem
+        The equations for peer solvers.
+    dry_friction_reference : str or None
+        Name of the reference with dry friction, if the law only approximates it.
     """
 
     name: str
-    model: str
+    run: RunSpec
     law: str
     reference_source: str | Solution
     problem: OdeProblem
-    values: dict[str, float] = field(default_factory=dict)
     dry_friction_reference: str | None = None
-    outputs: tuple[str, ...] = ("x", "v")
+
+    @property
+    def model(self) -> str:
+        """Return the name of the model."""
+        return self.run.model
 
     @property
     def is_chattering(self) -> bool:
         """Whether friction jumps within a step without an event; peer solvers are not made for that."""
-        return "friction" in self.values
+        return "friction" in self.run.values
 
     @property
     def reference(self) -> Solution:
@@ -63,9 +71,12 @@ class SolutionErrors:
 
     Attributes
     ----------
-    final : at the end
-    rms, largest : over the common points
-    events : largest error of the event times in s; None without events, NaN if their number or modes are wrong
+    final : float
+        Error at the end.
+    rms, largest : float
+        Root mean square and largest error over the common points.
+    events : float or None
+        Largest error of the event times in s; None without events, NaN if their number or modes are wrong.
     """
 
     final: float

@@ -259,19 +259,19 @@ def test_a_force_step_acts_from_then_on(worker, fmus):
 # ---- the other laws; solver.method stays at exact, which does not support them but is not used here
 
 
-@pytest.mark.parametrize("case", [case for case in CASES if case.values], ids=lambda case: case.name)
+@pytest.mark.parametrize("case", [case for case in CASES if case.run.values], ids=lambda case: case.name)
 def test_every_other_law_agrees_with_its_reference(worker, fmus, case):
     """The solver crosses the jumps of these laws with small steps, and a step that has passed one ends with an event.
     Nothing sticks before the end under the sign law, so the result is that of the hybrid law; only the start, at
     rest, is another event."""
     columns, evaluations = exchange(
-        worker, fmus / f"{case.model}.fmu", case.model, start_values=case.values, relative_tolerance=1e-7
+        worker, fmus / f"{case.model}.fmu", case.model, start_values=case.run.values, relative_tolerance=1e-7
     )
     truth = load_reference(case.reference_source)
     assert columns["time"] == truth.times.tolist()
     assert relative_errors(motion(case.model, columns), truth.states).max() <= bound(case.model, evaluations, 1e-7)
     if "events.count" in columns:
-        starts_to_slide = case.values.get("friction") == SIGN
+        starts_to_slide = case.run.values.get("friction") == SIGN
         assert columns["events.count"][-1] == len(truth.events) + starts_to_slide
 
 

@@ -106,7 +106,11 @@ def test_the_pendulum_references_agree_with_a_third_method(reaction):
 def test_the_built_fmu_agrees_with_the_reference(launch, case):
     truth = load_reference(case.reference_source)
     smooth = case.model == "pacejka"
-    values = {"solver.method": RODAS if smooth else DOP853, "solver.rtol": 1e-10 if smooth else 1e-12, **case.values}
+    values = {
+        "solver.method": RODAS if smooth else DOP853,
+        "solver.rtol": 1e-10 if smooth else 1e-12,
+        **case.run.values,
+    }
     fmu = launch(case.model, values, stop=case.problem.stop)
     motion = np.array(fmu.run(truth.times.tolist(), ["x", "v"] if smooth else ["theta", "omega"]))
     assert compute_errors(Solution(truth.times, motion), truth).largest < (1e-8 if smooth else 1e-11)

@@ -69,7 +69,7 @@ def test_every_method_of_the_fmu_approaches_the_reference_of_its_law(fmus, case)
             case.is_chattering and method == "exact"
         ):
             continue  # seconds of explicit steps; refused
-        answer = EmbeddedModel.create(model, case.values, method, 1e-6).solve(truth.times.tolist())
+        answer = EmbeddedModel.create(model, case.run.values, method, 1e-6).solve(truth.times.tolist())
         assert compute_errors(answer, truth).largest < within
         assert answer.evaluations > 0
 

@@ -1,9 +1,12 @@
 """Spring and mass with Coulomb friction."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import partial
+from pathlib import Path
 from typing import Any
 
+from ...scenes.run_spec import RunSpec
 from ..certified_reference import ReferenceCase
 from ..ode_problem import LinearOscillator, RhsFunction, closed_form_segments
 
@@ -28,8 +31,10 @@ def friction(value: Mapping[str, Any]) -> tuple[Any, Any]:
 
 
 solve_segments = partial(closed_form_segments, friction)
+RUN = RunSpec(Path("coulomb.fmu"), ("x", "v"))
+SIGN_RUN = replace(RUN, values={"friction": 2})
 CASES = (
-    ReferenceCase("coulomb", "coulomb", "hybrid", "coulomb", CoulombProblem()),
-    ReferenceCase("coulomb-sign", "coulomb", "sign", "coulomb", CoulombProblem(), {"friction": 2}, "coulomb"),
+    ReferenceCase("coulomb", RUN, "hybrid", "coulomb", CoulombProblem()),
+    ReferenceCase("coulomb-sign", SIGN_RUN, "sign", "coulomb", CoulombProblem(), "coulomb"),
 )
 CLOSED_FORMS = {"coulomb": lambda stop: solve_segments([(0.0, stop, CoulombProblem().fmu_values("m", "k", "f"))])}

@@ -2,9 +2,11 @@
 
 from collections.abc import Iterator
 from math import asin, atan, cos, pi, sin, tan
+from pathlib import Path
 
 import numpy as np
 
+from ...scenes.run_spec import RunSpec
 from ..certified_reference import ReferenceCase
 from ..ode_problem import JacobianFunction, OdeProblem, RhsFunction, StateVector
 from ..segments import ParameterSpan, ParameterValues, Segment, shift_time
@@ -82,8 +84,9 @@ def solve_segments(spans: list[ParameterSpan]) -> Iterator[Segment]:
 
 def make_case(x_m: str, reference: str) -> ReferenceCase:
     """Return the case of a curve with its peak at the velocity x_m (m/s)."""
+    run = RunSpec(Path("pacejka.fmu"), ("x", "v"), {"x_m": float(x_m)})
     law, problem = f"magic formula, x_m = {x_m} m/s", PacejkaProblem(float(x_m))
-    return ReferenceCase(f"pacejka-{x_m}", "pacejka", law, reference, problem, {"x_m": float(x_m)}, "stickslip")
+    return ReferenceCase(f"pacejka-{x_m}", run, law, reference, problem, "stickslip")
 
 
 CASES = (

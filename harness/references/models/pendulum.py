@@ -1,10 +1,13 @@
 """Compound pendulum with friction in its pin, by scipy's DOP853, restarted at every change of mode or value."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 from math import copysign, cos, hypot, inf, pi, radians, sin, sqrt
+from pathlib import Path
 
 import numpy as np
 
+from ...scenes.run_spec import RunSpec
 from ..certified_reference import ReferenceCase
 from ..ode_problem import JacobianFunction, OdeProblem, RhsFunction, StateVector
 from ..segments import MotionFunction, ParameterSpan, ParameterValues, Segment, constant_velocity, shift_time
@@ -149,16 +152,10 @@ def integrate_to_standstill(
     return float(run.t[-1]), float(run.y[0, -1]), 0.0 if run.status == 1 else float(run.y[1, -1]), run.sol
 
 
-NAME, OUTPUTS = "pendulum-reaction", ("theta", "omega")
+NAME = "pendulum-reaction"
+RUN = RunSpec(Path("pendulum.fmu"), ("theta", "omega"))
+REACTION_RUN = replace(RUN, values={"pin_load": REACTION})
 CASES = (
-    ReferenceCase("pendulum", "pendulum", "hybrid, pin load weight", "pendulum", PendulumProblem(), outputs=OUTPUTS),
-    ReferenceCase(
-        NAME,
-        "pendulum",
-        "hybrid, pin load reaction",
-        NAME,
-        PendulumReactionProblem(),
-        {"pin_load": REACTION},
-        outputs=OUTPUTS,
-    ),
+    ReferenceCase("pendulum", RUN, "hybrid, pin load weight", "pendulum", PendulumProblem()),
+    ReferenceCase(NAME, REACTION_RUN, "hybrid, pin load reaction", NAME, PendulumReactionProblem()),
 )

@@ -1,7 +1,9 @@
 """Spring, mass and viscous damper."""
 
 from functools import partial
+from pathlib import Path
 
+from ...scenes.run_spec import RunSpec
 from ..certified_reference import ReferenceCase
 from ..ode_problem import LinearOscillator, RhsFunction, closed_form_segments
 
@@ -19,5 +21,5 @@ class SmdProblem(LinearOscillator):
 
 friction = None
 solve_segments = partial(closed_form_segments, friction)
-CASES = (ReferenceCase("smd", "smd", "linear damping", "smd", SmdProblem()),)
+CASES = (ReferenceCase("smd", RunSpec(Path("smd.fmu"), ("x", "v")), "linear damping", "smd", SmdProblem()),)
 CLOSED_FORMS = {"smd": lambda stop: solve_segments([(0.0, stop, SmdProblem().fmu_values("m", "k", "c"))])}

@@ -1,9 +1,12 @@
 """Drag sled pulled through a spring."""
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from functools import partial
+from pathlib import Path
 from typing import Any
 
+from ...scenes.run_spec import RunSpec
 from ..certified_reference import ReferenceCase
 from ..ode_problem import LinearOscillator, RhsFunction, closed_form_segments
 from ..segments import Segment
@@ -42,9 +45,11 @@ def threshold_motion(eps: float, stop: float) -> Iterator[Segment]:
 
 
 solve_segments = partial(closed_form_segments, friction)
+RUN = RunSpec(Path("stickslip.fmu"), ("x", "v"))
+THRESHOLD_RUN = replace(RUN, values={"friction": 3})
 CASES = (
-    ReferenceCase("stickslip", "stickslip", "hybrid", "stickslip", StickslipProblem()),
-    ReferenceCase(THRESHOLD, "stickslip", "threshold", THRESHOLD, StickslipProblem(), {"friction": 3}, "stickslip"),
+    ReferenceCase("stickslip", RUN, "hybrid", "stickslip", StickslipProblem()),
+    ReferenceCase(THRESHOLD, THRESHOLD_RUN, "threshold", THRESHOLD, StickslipProblem(), "stickslip"),
 )
 CLOSED_FORMS = {
     "stickslip": lambda stop: solve_segments([(0.0, stop, VALUES)]),

@@ -99,7 +99,7 @@ def error_ratio_to_cvode(scene: Scenario, tolerances: tuple[float, ...] = TOLERA
 
 def largest_error_of(scene: Scenario, result: Trajectory | np.ndarray) -> float:
     """Return the largest error of a recording, or of position and speed (n, 2), at the common times."""
-    motion = result.sample_at(scene.times, scene.case.outputs) if isinstance(result, Trajectory) else result
+    motion = result.sample_at(scene.times, scene.case.run.outputs) if isinstance(result, Trajectory) else result
     return float(relative_errors(motion, scene.reference_motion).max())
 
 
@@ -113,7 +113,7 @@ def run_cvode(scene: Scenario, rtol: float) -> np.ndarray:
     read = "0 getr {} {}".format(*map(library.references.__getitem__, ("x", "v")))
     input_calls = {t: set_values(force=value, rate=rate) for t, _, value, rate in scene.segments}
     common_times = {*scene.times.tolist()}
-    calls = ["0 new cvode quiet", *set_values(**case.values, rtol=rtol, atol=rtol * case.problem.atol_factor)]
+    calls = ["0 new cvode quiet", *set_values(**case.run.values, rtol=rtol, atol=rtol * case.problem.atol_factor)]
     calls += [*input_calls.pop(scene.start), f"0 begin {scene.start!r}", read]
     for t, ahead in pairwise(sorted(common_times | input_calls.keys())):
         calls += [*input_calls.get(t, []), f"0 step {t!r} {ahead - t!r}", *[read] * (ahead in common_times)]
@@ -154,7 +154,7 @@ def run_fmusim(scene: Scenario, rtol: float) -> Trajectory:
             )
         rows = np.genfromtxt(file, delimiter=",", names=True)
         spec = scene.run_with(fmi3_fmu(case.model), rtol, exchange=True)
-        return Trajectory(spec, rows["time"], {name: rows[name] for name in case.outputs}, {}, {}, {})
+        return Trajectory(spec, rows["time"], {name: rows[name] for name in case.run.outputs}, {}, {}, {})
 
 
 def difference_from_cosimulation(scene: Scenario) -> Benchmark:
@@ -168,9 +168,8 @@ def difference_from_cosimulation(scene: Scenario) -> Benchmark:
             for recording in (exchange_run, cosimulation_run)
         ]
         baseline = Baseline("{} events in model exchange, {} in co-simulation".format(*counts))
-        difference = relative_errors(
-            *(recording.sample_at(scene.times, scene.case.outputs) for recording in (exchange_run, cosimulation_run))
-        ).max()
+        states = (run.sample_at(scene.times, scene.case.run.outputs) for run in (exchange_run, cosimulation_run))
+        difference = relative_errors(*states).max()
         return float(difference) if counts[0] == counts[1] else inf, 1e-6, (baseline,)
 
     return measure_or_skip(f"{scene}: model exchange at rtol 1e-10, difference from co-simulation", "1", figures)

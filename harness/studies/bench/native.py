@@ -3,7 +3,7 @@
 
 import os
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, partial
 from math import nan
 from pathlib import Path
@@ -187,7 +187,7 @@ def time_fmu(case: str, backend: str, steps: int = COMMUNICATION_STEPS) -> Timin
     """Time a built FMU with default method and tolerance in the C host."""
     data = CASES_BY_NAME[case]
     fmu, repeat = built_fmu(data.model, backend), REPEAT if backend == "native" else REPEAT_PYTHON
-    run = RunSpec(fmu, data.outputs, data.values, stop=data.problem.stop, equal_steps=steps, repeat=repeat)
+    run = replace(data.run, fmu=fmu, stop=data.problem.stop, equal_steps=steps, repeat=repeat)
     return time_runs(load_library(fmu), run)
 
 
@@ -196,7 +196,7 @@ def time_cvode(case: str, rtol: float) -> Timing:
     """Time the CVODE FMU in the C host."""
     data = CASES_BY_NAME[case]
     library = build_cvode_fmu(data.model)
-    values = {**data.values, "rtol": rtol, "atol": rtol * data.problem.atol_factor}
+    values = {**data.run.values, "rtol": rtol, "atol": rtol * data.problem.atol_factor}
     stop = data.problem.stop
     run = RunSpec(library.file, ("x", "v"), values, stop=stop, equal_steps=COMMUNICATION_STEPS, repeat=REPEAT)
     return time_runs(library, run)

@@ -96,10 +96,10 @@ def make_scenario(
             inputs = {"time": tuple(start + t for t in times), variable: column}
         else:
             values[variable] = value
-    run = RunSpec(
-        Path(f"{case.model}.fmu"),
-        outputs=(*case.outputs, *["events.count"] * case.problem.has_dry_friction),
-        values={**case.values, **values},
+    run = replace(
+        case.run,
+        outputs=(*case.run.outputs, *["events.count"] * case.problem.has_dry_friction),
+        values={**case.run.values, **values},
         inputs=inputs,
         start=start,
         stop=start + case.problem.stop,

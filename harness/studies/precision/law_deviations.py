@@ -67,7 +67,7 @@ def compare_with_dry_friction(case: ReferenceCase, model: type) -> LawDeviation:
     law_reference, dry_reference = load_reference(case.reference_source), load_reference(case.dry_friction_reference)
     deviation = compute_errors(replace(law_reference, events=None), dry_reference)
     method = CHATTERING_METHOD if case.is_chattering else None
-    own_run = EmbeddedModel.create(model, case.values, method, 0.0).solve(law_reference.times.tolist())
+    own_run = EmbeddedModel.create(model, case.run.values, method, 0.0).solve(law_reference.times.tolist())
     make_result = partial(
         LawDeviation,
         case.model,
@@ -85,7 +85,7 @@ def compare_with_dry_friction(case: ReferenceCase, model: type) -> LawDeviation:
     if case.problem.has_dry_friction:
         return make_result(creep, float(np.mean(np.diff([t for t, mode in law_reference.modes if mode]))), None)
     times = np.linspace(0.0, case.problem.stop, FINE)
-    run = EmbeddedModel.create(model, case.values, None, TOLERANCE)
+    run = EmbeddedModel.create(model, case.run.values, None, TOLERANCE)
     motion = run.compute_states(times.tolist())
     rates = case.problem.rates(1)
     a = [rates(t, y)[1] for t, y in zip(times.tolist(), motion, strict=True)]

@@ -173,7 +173,7 @@ def default_case(model: str, file: Path, model_class: Any) -> ReferenceCase:
     has_reference = file.with_suffix(".csv").is_file()
     truth = load_reference(file.stem, file.parent) if has_reference else certify_default_run(model_class, file)
     law, outputs = "default run", tuple(model_class.states)
-    return ReferenceCase(file.stem, model, law, truth, UnspecifiedProblem(float(truth.times[-1])), outputs=outputs)
+    return ReferenceCase(file.stem, RunSpec(file, outputs), law, truth, UnspecifiedProblem(float(truth.times[-1])))
 
 
 @dataclass(frozen=True)
@@ -192,7 +192,7 @@ class CaseRunner:
         self, method: str, run_times: dict[float, float], rtol: float, settings: SweepSettings
     ) -> tuple[Solution, float]:
         """Run the code of the FMU in this process."""
-        run, times = EmbeddedModel.create(self.model_class, self.case.values, method, rtol), self.times.tolist()
+        run, times = EmbeddedModel.create(self.model_class, self.case.run.values, method, rtol), self.times.tolist()
         answer = run.solve(times, settings.timeout)
         run_times[rtol] = best_time(partial(run.compute_states, times), settings.budget)
         return answer, run_times[rtol]
@@ -203,12 +203,12 @@ class CaseRunner:
         """Run the FMU through fmpy, if the run in this process succeeded."""
         if rtol not in run_times:
             return None
-        outputs, tolerance = self.case.outputs, {"solver.rtol": rtol} if rtol else {}
-        values: dict[str, float | str] = {**self.case.values, **tolerance, "solver.method": method}
+        case_run, tolerance = self.case.run, {"solver.rtol": rtol} if rtol else {}
+        values = {**case_run.values, **tolerance, "solver.method": method}
         grid, repeat = float(self.times[1]), repeats(run_times[rtol], settings.budget)
-        run = run_own_fmu(RunSpec(self.file, outputs, values, grid=grid, follow=False, repeat=repeat))
+        run = run_own_fmu(replace(case_run, fmu=self.file, values=values, grid=grid, follow=False, repeat=repeat))
         assert run.statistics  # FMUs of this project report it
-        columns = np.column_stack([run.columns[name] for name in outputs])
+        columns = np.column_stack([run.columns[name] for name in case_run.outputs])
         return Solution(self.times, columns, None, run.statistics.evaluations), run.statistics.seconds
 
     def run_fmi3(self, tool: str, rtol: float, settings: SweepSettings) -> tuple[Solution, float]:
@@ -216,11 +216,11 @@ class CaseRunner:
 
         In model exchange, changes of mode are recorded.
         """
-        names, stop, exchange = self.case.outputs, float(self.times[-1]), tool == ME
+        file, grid, stop, exchange = fmi3_path(self.file), float(self.times[1]), float(self.times[-1]), tool == ME
+        states = self.case.run.outputs
         modes = tuple(self.model_class.contacts) if exchange and self.case.reference.modes else ()
-        file, grid, values = fmi3_path(self.file), float(self.times[1]), self.case.values
-        spec = RunSpec(file, names + modes, values, stop=stop, grid=grid, follow=False, exchange=exchange)
-        spec = replace(spec, tolerance=rtol) if exchange else spec
+        spec = replace(self.case.run, fmu=file, outputs=states + modes, stop=stop, grid=grid, follow=False)
+        spec = replace(spec, exchange=True, tolerance=rtol) if exchange else spec
         if not file.is_file():
             raise HarnessError(f"not built: {file} (friction-fmus build --fmi 3)")
         recording = run_own_fmu(spec, limit_run_time(settings.timeout, stop))
@@ -229,8 +229,8 @@ class CaseRunner:
         timed = run_own_fmu(replace(spec, repeat=repeat)).statistics
         assert timed
         events = recording.find_changes(*modes) if modes else None
-        states, evaluations = recording.sample_at(self.times, names), recording.statistics.evaluations
-        solution = Solution(self.times, states, events, evaluations)
+        motion, evaluations = recording.sample_at(self.times, states), recording.statistics.evaluations
+        solution = Solution(self.times, motion, events, evaluations)
         return solution, min(timed.seconds, recording.statistics.seconds)
 
     def run_peer(self, peer: str, method: str, rtol: float, settings: SweepSettings) -> tuple[Solution, float]:

@@ -136,7 +136,7 @@ def write_study(
         headings = csv_headings(law_deviations.LawDeviation)
         write_table(folder / "laws.csv", headings, map(astuple, model_deviations))
     draw(study, model_deviations, folder / "figure.svg")
-    values = {case.name: case.values for case in study.cases}
+    values = {case.name: case.run.values for case in study.cases}
     source = QUICK_RUN if extent == QUICK else ""
     write_provenance(folder, [file], declared_parameters(file), values, source=source)
     choices, outcome = tabulate_choices(study, extent.min_ratio)
