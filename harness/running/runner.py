@@ -191,10 +191,9 @@ def plan_run(spec: RunSpec, description: Any) -> RunPlan:
         spec = replace(spec, follow=False)  # the solver of the FMU takes no steps
     start, stop = resolve_time_span(spec, description)
     check_inputs(spec.inputs, variables)
-    if spec.grid is None and spec.equal_steps:
-        spec = replace(spec, grid=(stop - start) / spec.equal_steps or None)
-    if spec.grid is not None and (points := (stop - start) / spec.grid) > MAX_POINTS:
-        sentence = f"grid = {spec.grid!r} s makes {points:.6g} points from {start!r} s to {stop!r} s"
+    grid = make_grid(spec, start, stop)
+    if (points := grid.duration / grid.h) > MAX_POINTS:
+        sentence = f"grid = {grid.h!r} s makes {points:.6g} points from {start!r} s to {stop!r} s"
         raise SceneError(f"{sentence}; the limit is {MAX_POINTS}: choose a larger grid")
     names = list(spec.outputs)
     if spec.follow:
@@ -206,7 +205,7 @@ def plan_run(spec: RunSpec, description: Any) -> RunPlan:
             *find_contacts(variables).values(),
         )
         names += [name for name in extra if name in variables and name not in names]
-    return RunPlan(spec, variables, make_grid(spec, start, stop), names)
+    return RunPlan(spec, variables, grid, names)
 
 
 def check_fmu(run: RunSpec, variables: dict[str, Any]) -> None:

@@ -115,7 +115,8 @@ def make_grid(spec: RunSpec, start: float, stop: float) -> TimeGrid:
     SceneError
         If the times do not increase or are outside the run.
     """
-    h = spec.grid or ((stop - start) / spec.equal_steps if spec.equal_steps else inf)
+    equal_step = (stop - start) / spec.equal_steps if spec.equal_steps else inf
+    h = spec.grid or equal_step or inf  # equal steps of the shortest times underflow to zero
     times = np.asarray(spec.times, dtype=float)
     if not len(times):
         return TimeGrid(start, stop, h)
