@@ -10,6 +10,7 @@ pytestmark = pytest.mark.slow
 STORIES = ("stops", "chatters", "squeaks", "creeps", "swings")
 DRAGGED = ("opening", "stops", "squeaks", "creeps", "swings")
 TOLERANCE = 3  # CSS pixels
+OPENING_IS_DONE = "document.getElementById('opening-verdict').textContent.startsWith('The same')"
 
 
 @pytest.fixture
@@ -34,7 +35,7 @@ def show(page, story):
 
 def test_the_opening_claims_that_real_things_stop_and_counts_the_steps_of_both_masses(still):
     assert text(still, "h1") == "Real things stop. Most solvers can\N{RIGHT SINGLE QUOTATION MARK}t."
-    still.wait("document.getElementById('opening-verdict').textContent.startsWith('The same')")
+    still.wait(OPENING_IS_DONE)
     assert text(still, "#opening-true-count") == "17"
     assert text(still, "#opening-sign-count") == "31999"
     assert text(still, "#opening-true-clock").endswith("at rest")
@@ -54,7 +55,7 @@ def test_the_opening_plays_once_at_load_and_not_under_reduced_motion(page):
         "globalThis.counts = new Set(); new MutationObserver(() => counts.add("
         f"{count})).observe(document.getElementById('opening-sign-count'), {{ childList: true }})"
     )
-    page.wait("document.getElementById('opening-verdict').textContent.startsWith('The same')")
+    page.wait(OPENING_IS_DONE)
     assert set(page.run("[...counts]")) <= {0, 31999}  # only the end
 
 
@@ -93,6 +94,7 @@ def test_bodies_of_the_opening_and_the_stories_stay_under_the_pointer(still, wid
             show(still, section)
         else:
             still.run("scrollTo(0, 0)")
+            still.wait(OPENING_IS_DONE)
             still.run(web_page.DRAWN)
         body = f"#{section} .grip :is(rect, circle).body"
         x, y = still.middle(body)
