@@ -9,7 +9,7 @@ import pytest
 from harness.analyses.fit.feasible_region import FeasibleRegion
 from harness.analyses.fit.fit_course import extend_ends, starting_points
 from harness.analyses.fit.fit_problem import EXACT_STEPS, FitProblem
-from harness.analyses.fit.profile_likelihood import profile_bound
+from harness.analyses.fit.profile_likelihood import profile_bound, search_bound
 from harness.analyses.fit.uncertainty import Uncertainty
 from harness.analyses.fit.unknowns import Unknown
 
@@ -94,6 +94,40 @@ def test_a_profile_ends_where_the_squares_jump(slope):
     problem = Residuals(lambda a, b: (slope * (a - 1.0) + 5.0 * (a > 1.3), b - 1.0, 1.0))
     uncertainty = uncertainty_at(problem, MINIMUM)
     assert profile_bound(problem, MINIMUM, uncertainty, 0, 1).end == pytest.approx(1.3, abs=0.003)
+
+
+@pytest.mark.parametrize(("residual", "is_flat"), [(2.7, True), (3.8, True), (4.2, False), (1e3, False)])
+def test_a_profile_that_rises_little_beyond_its_end_has_a_flat_tail(residual, is_flat):
+    """The squares rise to residual^2 above the minimum, and are flat up to four times those at the end."""
+    problem = Residuals(lambda a, b: (residual * np.tanh((a - 1.0) / 0.01 / residual), b - 1.0, 1.0))
+    bound = search_bound(problem, MINIMUM, uncertainty_at(problem, MINIMUM), 0, 1)
+    assert bound.end - 1.0 == pytest.approx(0.01 * residual * np.arctanh(QUANTILE / residual), rel=0.03)
+    assert bound.has_flat_tail == is_flat
+
+
+def test_a_better_minimum_beyond_the_end_of_a_profile_is_found():
+    """A ridge at a = 1.07 separates the minimum at 1 from lower squares farther out."""
+
+    def residuals(a, b):
+        u = (a - 1.0) / 0.1
+        return 6.0 * u * np.exp(-u * u), b - 1.0, 1.0 - 0.5 * np.tanh(u**4)
+
+    problem = Residuals(residuals)
+    bound = search_bound(problem, MINIMUM, uncertainty_at(problem, MINIMUM), 0, 1)
+    assert bound.end is None
+    assert bound.better[0] > 1.1
+
+
+def test_a_profile_goes_on_behind_a_ridge():
+    """The ridge at a = 1.07 rises above the limit, which the valley behind it reaches at a = 4.26."""
+
+    def residuals(a, b):
+        u = (a - 1.0) / 0.1
+        return 6.0 * u * np.exp(-u * u) + 0.7 * np.tanh(u**4) + max(a - 3.0, 0.0), b - 1.0, 1.0
+
+    problem = Residuals(residuals)
+    bound = search_bound(problem, MINIMUM, uncertainty_at(problem, MINIMUM), 0, 1)
+    assert bound.end == pytest.approx(3.0 + QUANTILE - 0.7, rel=0.01)
 
 
 def test_a_profile_that_never_reaches_its_limit_has_no_end():

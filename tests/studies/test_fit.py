@@ -114,6 +114,21 @@ def test_a_position_determines_the_ratio_of_stiffness_and_mass():
 DRIVEN = {"mu_d": 0.5, "v_driver": 0.04}
 
 
+@pytest.mark.parametrize(
+    ("displacement", "undetermined", "is_remarked"),
+    [(0.0, {"mu_s", "mu_d", "v_driver"}, False), (1e-4, {"mu_s", "mu_d", "v_driver"}, False), (2e-4, set(), True)],
+)
+def test_values_that_the_last_samples_alone_exclude_are_remarked(displacement, undetermined, is_remarked):
+    """The block slips once. Whether it begins to slip a second time decides about all values but k."""
+    values, t = {"mu_s": 0.37, "mu_d": 0.14, "k": 400.0, "v_driver": 0.0157}, np.linspace(0.0, 15.9, 2000)
+    record = pull(values=values, t=t, noise=0.004)
+    record.loc[len(t) - 5 :, "x"] += displacement * np.arange(1, 6)
+    fit = harness.fit(native("stickslip"), record, ["mu_s", "mu_d", "k", "v_driver"], observe=["x"])
+    remarks = [remark for remark in fit.remarks if "a small part of the record" in remark]
+    assert {*fit.undetermined} == undetermined
+    assert bool(remarks) == is_remarked
+
+
 def test_several_records_share_parameters_and_have_some_of_their_own():
     speeds = (0.03, 0.05)
     frames = [pull(values=TRUTH | {"v_driver": speed}, seed=i) for i, speed in enumerate(speeds)]

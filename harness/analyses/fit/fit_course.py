@@ -9,7 +9,7 @@ from ...errors import HarnessError
 from ...running.whole_run import Simulator
 from .fit_problem import FitProblem, Selection
 from .measured_record import MeasuredRecord, RecordData
-from .profile_likelihood import profile_bound
+from .profile_likelihood import profile_bound, search_bound
 from .search import DISTINCT, Minimum, distinct, search
 from .uncertainty import Uncertainty, estimate_uncertainty
 from .unknowns import Unknown
@@ -28,12 +28,16 @@ SHALLOW = 0.1  # variances of the residuals by which a minimum must be lower to 
 
 @dataclass
 class FitCourse:
-    """Intermediate results of a fit; ends and profiles by index of the unknown and side."""
+    """Intermediate results of a fit; ends and profiles by index of the unknown and side.
+
+    `flat_tails` are the indices of the unknowns of which values far outside of the interval fit nearly as well.
+    """
 
     z: np.ndarray
     uncertainty: Uncertainty
     ends: dict[tuple[int, int], float | None]
     profiles: dict[tuple[int, int], tuple[tuple[float, float], ...]]
+    flat_tails: list[int]
     other_minima: list[np.ndarray]
     doubts: list[str]
     log: list[str]
@@ -108,11 +112,12 @@ def find_course(
             if remaining and minima and minima[0][0] < squares - SHALLOW * uncertainty.variance:
                 z = minima[0][1]
                 continue
-        better = None
+        better, flat_tails = None, []
         for n, (i, side) in enumerate(sides):
             report(0.7 + 0.3 * n / len(sides))
-            bound = profile_bound(problem, z, uncertainty, i, side, ends_at_better=remaining > 0)
+            bound = search_bound(problem, z, uncertainty, i, side, ends_at_better=remaining > 0)
             ends[i, side], profiles[i, side] = bound.end, bound.profile
+            flat_tails += [i] * bound.has_flat_tail
             better = bound.better if better is None else better
             if remaining and better is not None:
                 z = better
@@ -124,7 +129,7 @@ def find_course(
     others = [minimum for minimum in minima if np.abs(minimum[1] - z).max() > DISTINCT]
     extend_ends(problem, z, uncertainty, ends, others)
     other_minima = [position for _, position in others]
-    return FitCourse(z, uncertainty, ends, profiles, other_minima, doubts, result.log, result.n_searches)
+    return FitCourse(z, uncertainty, ends, profiles, flat_tails, other_minima, doubts, result.log, result.n_searches)
 
 
 def starting_points(problem: FitProblem, warm: np.ndarray | None) -> np.ndarray:

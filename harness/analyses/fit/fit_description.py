@@ -179,6 +179,12 @@ def fit_remarks(
         )
     if several:
         remarks.append(f"Other values fit as well; the intervals of {', '.join(several)} include them.")
+    tails = [estimates[i].name for i in dict.fromkeys(course.flat_tails) if isfinite(estimates[i].error)]
+    if tails:
+        remarks.append(
+            f"Values of {', '.join(tails)} far outside of their intervals fit nearly as well, because a small part of "
+            "the record excludes them: do not rely on these intervals, or take a longer record."
+        )
     if undetermined:
         names = ", ".join(estimates[i].name for i in undetermined)
         remarks.append(f"The record does not determine {names}.")

@@ -5,7 +5,7 @@ References
 D. M. Bates, D. G. Watts, Nonlinear Regression Analysis and Its Applications (1988), section 6.1
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -24,18 +24,30 @@ NARROW = 0.01  # relative width of a bracket that needs no more trials, where th
 BETTER = 0.02  # of the limit, by which the squares of a better minimum are lower
 NEAR_LIMIT = 0.05  # distance of a coordinate from the limits of the fit at which it has no bound
 WIDER, NEGLIGIBLE = 0.7, 0.1  # limits of other coordinates, moved by this, lower a profile by less than this share
+FAR, FLAT = 5.0, 4.0  # distance of a tail in units of that of the end; excess below which it is flat, in limits
 
 
 @dataclass(frozen=True)
 class Bound:
-    """End of an interval: the coordinate, None if there is none; a better minimum, if the profile met one.
+    """One side of the interval of a coordinate.
 
-    `profile` holds coordinates of the profile, with the squares above the minimum in units of the limit.
+    Attributes
+    ----------
+    end : float or None
+        The coordinate at the end of the interval; None if there is no end.
+    better : numpy.ndarray or None
+        Coordinates (k,) of a better minimum, if the profile met one.
+    profile : tuple of (float, float)
+        Coordinates of the profile, with the squares above the minimum in units of the limit.
+    has_flat_tail : bool
+        Whether values far beyond the end fit nearly as well as those at the end. A small part of the record excludes
+        them, such as the last samples, in which a slip begins or does not.
     """
 
     end: float | None
     better: np.ndarray | None = None
     profile: tuple[tuple[float, float], ...] = ()
+    has_flat_tail: bool = False
 
 
 @dataclass(frozen=True)
@@ -223,6 +235,37 @@ def profile_bound(
         return Bound(None, better, profile)
     coordinate = float(z[i] + side * end.distance)
     return Bound(coordinate if low < coordinate < high else None, better, profile)
+
+
+def search_bound(
+    problem: FitProblem, z: np.ndarray, uncertainty: Uncertainty, i: int, side: int, ends_at_better: bool = True
+) -> Bound:
+    """Return the bound of coordinate `i` on one side of the minimum at z (k,), and what lies far behind it.
+
+    Where the squares there are below the limit, the bound of `profile_bound` is a ridge, and the profile is followed on
+    from behind it.
+    """
+    bound = profile_bound(problem, z, uncertainty, i, side, ends_at_better)
+    if bound.end is None:
+        return bound
+    target, distance = uncertainty.limit(i), FAR * abs(bound.end - z[i])
+    low, high = problem.unknowns[i].limits
+    distance = min(distance, high - z[i] if side > 0 else z[i] - low)
+    if distance**2 < 2 * FLAT * (bound.end - z[i]) ** 2:  # where squares that are quadratic are not much above FLAT
+        return bound
+    tangent = side * uncertainty.covariance[:, i] / max(uncertainty.covariance[i, i], 1e-300)
+    starts = [z + distance * tangent, z.copy()]
+    for start in starts:
+        start[i] = z[i] + side * distance
+    min_gain, others = MIN_GAIN * target / uncertainty.squares, np.delete(np.arange(len(z)), i)
+    squares, there = fit_others(problem, z, starts, others, min_gain, uncertainty.squares + FLAT * target)
+    excess = (squares - uncertainty.squares) / target
+    if excess < -BETTER and ends_at_better:
+        return Bound(None, there)
+    if excess < 1:
+        behind = profile_bound(problem, there, uncertainty, i, side, ends_at_better, max(excess, 0.0) * target)
+        return replace(behind, profile=bound.profile + behind.profile)
+    return replace(bound, has_flat_tail=excess < FLAT)
 
 
 def fit_others(
