@@ -480,6 +480,23 @@ def test_limits_exist_only_where_a_force_may_become_negative(tmp_path, slide):
     assert bool(find_model(tmp_path / "limited.py").analysis.limits) is SLIDING_FORCES[slide]
 
 
+@pytest.mark.parametrize(
+    ("force", "keeps_domain"),
+    [
+        ("choose(x > 0.0, f * sqrt(x / gap), 0.0)", True),
+        ("choose(x > 0.0, choose(clock > t_on, f * gap / x, f), 0.0)", True),
+        ("choose(clock > t_on, f * v_s / (v_s + fabs(v)), 0.0)", False),
+        ("choose(x > gap, f * sqrt(1.0 + v / v_s), 0.0)", False),
+    ],
+)
+def test_only_a_condition_on_the_operand_of_an_operation_keeps_it_in_its_domain(tmp_path, force, keeps_domain):
+    """Such a condition is evaluated at the present state, so that a jump at its change takes many steps."""
+    text = full_model_text("slidinginput").replace("F_ext)", f"{force})")
+    (tmp_path / "domain.py").write_text(remove_unused(text))
+    outermost = find_model(tmp_path / "domain.py").analysis.switches[0]
+    assert outermost.is_frozen is not keeps_domain
+
+
 # ---- model exchange
 
 

@@ -130,17 +130,20 @@ def comparison_margin(e: Term) -> Operand:
 def protected_comparisons(e: Term, varying: tuple[Expression, ...]) -> list[Term]:
     """Return the comparisons that keep an operation inside its domain; they must be evaluated where it is.
 
-    These are the conditions around the operation and those inside its operand.
+    These are the conditions around the operation and those inside its operand, if they depend on what the operand
+    depends on.
     """
     if e.op == "choose":
-        inside = [term for case in e.args[1:] for term in subexpressions(case).values()]
-        return [e.args[0]] if any(has_limited_domain(term, varying) for term in inside) else []
+        condition, *cases = e.args
+        inside = [term for case in cases for term in subexpressions(case).values()]
+        related = [one for one in variables_in(condition) if is_among(one, varying)]
+        return [condition] if any(has_limited_domain(term, related) for term in inside) else []
     if has_limited_domain(e, varying):
         return [term for term in subexpressions(e).values() if isinstance(term, Term) and term.op in COMPARISONS]
     return []
 
 
-def has_limited_domain(e: Operand, varying: tuple[Expression, ...]) -> bool:
+def has_limited_domain(e: Operand, varying: Collection[Expression]) -> bool:
     """Return whether an operation fails for some values of the variables."""
     return isinstance(e, Term) and e.op in LIMITED_DOMAIN and depends_on(e.args[-1], varying)
 
