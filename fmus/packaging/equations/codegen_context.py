@@ -87,8 +87,8 @@ class CodegenContext:
             walk(e, in_case=True)
         return list(result.values())
 
-    def printer(self, depth: int = 2) -> ExpressionPrinter:
-        """Create a printer for a method, or for a block in it."""
+    def printer(self, depth: int = 2, on_trial: Collection[Expression] = ()) -> ExpressionPrinter:
+        """Create a printer for a method, or for a block in it; see `ExpressionPrinter` for `on_trial`."""
         analysis = self.analysis
         names: dict[Expression, str] = (
             {s: s.name for s in analysis.states} | {m: m.name for m in analysis.modes} | {TIME: "t"}
@@ -96,7 +96,7 @@ class CodegenContext:
         for n, condition in enumerate(analysis.switches):
             if condition.is_frozen:
                 names |= dict.fromkeys(condition.comparisons, f"self.condition_sides[{n}] > 0.0")
-        return ExpressionPrinter(names, self.constants, self.used_names, depth, self.names)
+        return ExpressionPrinter(names, self.constants, self.used_names, depth, self.names, on_trial)
 
     def emit_driver(self, printer: ExpressionPrinter, targets: Sequence[Operand]) -> None:
         """Emit the position of the driver and time-dependent inputs, if the targets need them."""
@@ -143,10 +143,10 @@ class CodegenContext:
             return emit_return(printer, targets)
         with printer.block(f"if {printer.text(test)}:"):
             printer.lines += self.return_lines(
-                self.printer(printer.depth), [substitute(e, {test: True}) for e in targets]
+                self.printer(printer.depth, printer.on_trial), [substitute(e, {test: True}) for e in targets]
             )
         return printer.lines + self.return_lines(
-            self.printer(printer.depth), [substitute(e, {test: False}) for e in targets]
+            self.printer(printer.depth, printer.on_trial), [substitute(e, {test: False}) for e in targets]
         )
 
 

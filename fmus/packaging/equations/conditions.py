@@ -148,6 +148,12 @@ def has_limited_domain(e: Operand, varying: Collection[Expression]) -> bool:
     return isinstance(e, Term) and e.op in LIMITED_DOMAIN and depends_on(e.args[-1], varying)
 
 
+def is_in_domain(e: Term) -> bool:
+    """Return whether the form of the operand of a function shows that the function has a finite value there."""
+    (u,) = e.args
+    return (e.op == "sqrt" and is_nonnegative(u)) or (e.op == "exp" and (is_nonpositive(u) or is_decay(e)))
+
+
 def is_nonnegative(e: Operand) -> bool:
     """Return whether the form of an expression shows that it is never negative."""
     if not isinstance(e, Expression):

@@ -8,7 +8,8 @@ from math import pi
 from typing import Any
 
 from ...runtime.variable_declarations import VariableDeclaration
-from .algebra import operands
+from .algebra import depends_on, operands
+from .conditions import is_in_domain
 from .expressions import Expression, ModelError, Operand, Term
 from .model_declaration import Choice, Output, SettableVariable
 
@@ -22,13 +23,21 @@ COMPARISON_OPERATORS: dict[str, ast.cmpop] = {
     ">=": ast.GtE(),
     "==": ast.Eq(),
 }
+DOMAINS = {  # functions that raise an error for some arguments -> test of an argument for which they do not
+    "sqrt": "{0} >= 0.0",
+    "log": "{0} > 0.0",
+    **dict.fromkeys(("asin", "acos"), "fabs({0}) <= 1.0"),
+    "exp": "{0} < 709.0",
+    **dict.fromkeys(("sinh", "cosh"), "fabs({0}) < 709.0"),
+}
 
 
 class ExpressionPrinter:
     """Prints the lines of one block.
 
     `given` maps variables to their names in the block; `kept` are constants stored as attributes of the model; `names`
-    are those of terms that the model does not name.
+    are those of terms that the model does not name.  Functions of the variables `on_trial` are NaN outside their
+    domain, where they would raise an error.
     """
 
     def __init__(
@@ -38,11 +47,13 @@ class ExpressionPrinter:
         taken: Collection[str],
         depth: int,
         names: Mapping[Expression, str] | None = None,
+        on_trial: Collection[Expression] = (),
     ) -> None:
         self.bound_names, self.constants, self.used_names = dict(given), kept, set(taken)
         self.lines: list[str] = []
         self.depth = depth
         self.names = {} if names is None else names
+        self.on_trial = on_trial
         self.local_names: dict[int, str] = {}  # value number -> local variable
         self.author_names: dict[int, str] = {}
         self._use_counts: Counter[int] = Counter()
@@ -192,7 +203,16 @@ class ExpressionPrinter:
             return ast.Compare(args[0], [COMPARISON_OPERATORS[e.op]], [args[1]])
         if e.op == "choose":
             return ast.IfExp(*args)
+        if e.op in DOMAINS and depends_on(e, self.on_trial) and not is_in_domain(e):
+            return self._build_guarded_call(e, args[0])
         return ast.Call(ast.Name(e.op), args, [])
+
+    def _build_guarded_call(self, e: Term, argument: ast.expr) -> ast.expr:
+        """Return the function value, or NaN outside its domain."""
+        if not isinstance(argument, (ast.Name, ast.Attribute)):
+            argument = self._store_in_local(self.value_number(e.args[0]), argument)
+        test = ast.parse(DOMAINS[e.op].format(ast.unparse(argument)), mode="eval").body
+        return ast.IfExp(test, ast.Call(ast.Name(e.op), [argument], []), ast.Name("nan"))
 
 
 def binary_node(op: str, a: ast.expr, b: ast.expr) -> ast.expr:

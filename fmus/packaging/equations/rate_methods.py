@@ -10,13 +10,18 @@ from .single_contact_methods import threshold_call
 
 
 def rate_methods(context: CodegenContext) -> list[str]:
-    """Return the source of all methods for integrators."""
+    """Return the source of all methods for integrators.
+
+    A stage of a trial step may leave the domain of the equations.  NaN then rejects the step, where an error would end
+    the run.
+    """
     return [rates_method(context), jacobian_method(context), *closed_form_methods(context)]
 
 
 def rates_method(context: CodegenContext) -> str:
     """Rates that are not states, in the order of the states."""
-    analysis, printer, c = context.analysis, context.printer(), context.single_contact
+    analysis, c = context.analysis, context.single_contact
+    printer = context.printer(on_trial=analysis.time_varying)
     targets = [rate.expression for rate in context.rate_outputs]
     if c is not None and THRESHOLD not in c.laws:
         targets = with_sliding_force(c, targets)
@@ -39,7 +44,8 @@ def rates_method(context: CodegenContext) -> str:
 
 def jacobian_method(context: CodegenContext) -> str:
     """Derivatives of each of these rates with respect to time and each state."""
-    analysis, printer, c = context.analysis, context.printer(), context.single_contact
+    analysis, c = context.analysis, context.single_contact
+    printer = context.printer(on_trial=analysis.time_varying)
     directions: list[dict[Expression, Operand]] = [
         analysis.explicit_time_derivatives | analysis.input_rates,
         *({state: 1.0} for state in analysis.states),
@@ -57,7 +63,7 @@ def jacobian_method(context: CodegenContext) -> str:
     targets = [analysis.derivative_while_sliding(rate, by) for rate in context.rate_outputs for by in directions]
     if THRESHOLD in c.laws:
         with printer.block(f"if {c.mode.name} == 0 and fabs({printer.text(c.slip)}) < {printer.text(c.eps)}:"):
-            inner = context.printer(printer.depth)
+            inner = context.printer(printer.depth, printer.on_trial)
             stuck = [analysis.derivative_while_stuck(rate, by) for rate in context.rate_outputs for by in directions]
             context.emit_driver(inner, [analysis.load[c], *stuck])
             with inner.block(f"if fabs({inner.text(analysis.load[c])}) <= {inner.text(analysis.holding_limit[c])}:"):
@@ -68,7 +74,7 @@ def jacobian_method(context: CodegenContext) -> str:
             ):
                 limits = [by | {c: clipped_force_derivative(context, c, by)} for by in directions]
                 printer.lines += context.return_lines(
-                    context.printer(printer.depth),
+                    context.printer(printer.depth, printer.on_trial),
                     [context.analysis.derivative(rate, by) for rate in context.rate_outputs for by in limits],
                 )
     context.emit_sign_mode(printer, c, targets)

@@ -9,7 +9,7 @@ from ...runtime.stick_slip import DryFriction
 from .expressions import FUNCTIONS, Expression, ModelError
 from .model_declaration import KINDS
 
-MATH = ("copysign", "inf", "pi", *FUNCTIONS)
+MATH = ("copysign", "inf", "nan", "pi", *FUNCTIONS)
 IMPORTS = {  # module -> names that generated code may import
     "": tuple(label for label, _, _ in methods),
     "stick_slip": ("HYBRID_LAW", "SIGN_LAW", "THRESHOLD_LAW", "DryFriction", "sign", "threshold"),
