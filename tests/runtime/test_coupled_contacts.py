@@ -1,7 +1,7 @@
 """Contacts that share bodies: simultaneous events, order of declaration, loads that peak inside a step, conservation
 laws."""
 
-from itertools import pairwise
+from itertools import groupby, pairwise
 from math import asin, cos, pi, sin
 
 import numpy as np
@@ -93,6 +93,28 @@ def test_two_riders_on_one_carrier_break_away_and_stop_together(custom_model):
     assert len(changes) > 5
     assert all(first == second for _, first, second in changes)
     assert max(abs(y[2] - y[4]) for _, y, _ in rows) < 1e-12
+
+
+def test_contacts_whose_effects_on_each_other_cancel_move_as_single_ones(custom_model):
+    """Between two equal blocks, and on their mean speed: the difference and the mean of their positions are those of
+    two blocks that each slide on their own."""
+    (one, a), (two, b) = body("1", "k * (p - x1) - F1 - 0.5 * F2", 1.0), body("2", "F1 - k * x2 - 0.5 * F2", 1.0)
+    (three, c), (four, d) = body("3", "k * (p - x3) - 2.0 * F3", 1.0), body("4", "0.5 * (k * (p - 2.0 * x4) - F4)", 1.0)
+    lines = [
+        *contact("1", "v1 - v2", 5.0, 8.0),
+        *contact("2", "0.5 * (v1 + v2)", 9.0, 11.0),
+        *contact("3", "v3", 5.0, 8.0),
+        *contact("4", "v4", 9.0, 11.0),
+    ]
+    model = custom_model(*one, *two, *three, *four, DRIVER, *lines, a, b, c, d, methods=["dop853"])
+    _changes, rows = events(model, DOP853, 1e-10, 8.0)
+    histories = [[mode for mode, _ in groupby(modes)] for modes in zip(*(modes for *_, modes in rows), strict=True)]
+    assert histories[:2] == histories[2:]
+    assert len(histories[0]) > 5
+    assert len(histories[1]) > 5
+    for _, (x1, _, x2, _, x3, _, x4, _), _modes in rows:
+        assert x1 - x2 == pytest.approx(x3, abs=1e-10)
+        assert 0.5 * (x1 + x2) == pytest.approx(x4, abs=1e-10)
 
 
 @pytest.mark.slow

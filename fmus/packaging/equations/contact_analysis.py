@@ -67,7 +67,8 @@ class ContactAnalysis(ModelRoles):
             if depends_on(self.holding_limit[c], forces):
                 raise ModelError(f"the holding force of {c.name} depends on its direction: pass hold=", c.location)
             if is_among(c, self.independent_contacts):
-                e = self.slip_rate[c]
+                # other forces that occur in the rate cancel
+                e = substitute(self.slip_rate[c], {d: 0.0 for d in self.contacts if d is not c})
                 load = (
                     solve_for(e, c)
                     if count_occurrences(e, c) == 1 and not is_among(c, self.variable_lever_contacts)
