@@ -164,6 +164,16 @@ def raise_slip(model, t, y: StateVector, modes: ContactVector, amount, i: Contac
     return y
 
 
+def have_jumped(model, t, y: StateVector, slips_before: ContactVector):
+    """Return whether a slip velocity differs from its value before conditions changed, by more than rounding errors."""
+    slips = model.slip_velocities(t, y)
+    terms = model.slip_magnitudes(t, y)
+    jumped = False
+    for i in contact_indices:
+        jumped = jumped or fabs(slips[i] - slips_before[i]) > REVERSED_SHARE * (terms[i] + SLIP_SCALE)
+    return jumped
+
+
 def resolve_at_start(
     model, t, y: StateVector, modes: ContactVector, h_max, tie_tolerance, reach
 ) -> tuple[StateVector, ContactVector, bool]:

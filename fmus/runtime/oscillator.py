@@ -32,6 +32,7 @@ class Oscillator(VariableOwner):
     rests_when_stuck = False  # a single body: nothing moves while its contact sticks
     is_coupled = False  # a contact may stick while something moves (contact_lcp.py)
     has_variable_levers = False  # the lever of a contact force changes with the motion, and may vanish
+    has_slip_conditions = False  # a slip velocity depends on conditions, with which it may jump
     has_nominal_velocity = False  # nominal_velocity() is defined
     checks_event_steps = False  # steps to events are checked: see InternalStep.is_accurate_at
     has_driver = False  # the driver is at x_base at time t_base and moves at driver_velocity()

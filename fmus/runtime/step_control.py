@@ -441,6 +441,10 @@ class InternalStep:
         """End the step at an event."""
         self.y1 = self.state_at(model, end)
         self.t1 = end
+        if model.has_slip_conditions:
+            if self.is_hybrid:
+                self.y1 = contact_lcp.stop_slips(model, end, self.y1, self.modes0)
+            slips = model.slip_velocities(end, self.y1)
         if model.has_conditions:
             status = conditions.update_at_event(model, self.event_location, end, self.y1, self.modes0, self.h_max)
             if status != OK:
@@ -451,7 +455,11 @@ class InternalStep:
             for i in contact_indices:
                 other = location.times[len(self.modes0) + i]
                 ends[i] = location.times[i] if location.times[i] < other else other
-            if model.is_coupled:
+            if model.has_slip_conditions and contact_lcp.have_jumped(model, end, self.y1, slips):
+                self.y1, self.modes1, self.has_consistent_modes = contact_lcp.resolve_at_start(
+                    model, end, self.y1, self.modes0, self.h_max, ROUNDOFF_MARGIN, self.tie_tolerance(model)
+                )
+            elif model.is_coupled:
                 self.y1, self.modes1, self.has_consistent_modes = contact_lcp.resolve_after_event(
                     model, self, ends, self.tie_tolerance(model)
                 )

@@ -117,6 +117,35 @@ def test_contacts_whose_effects_on_each_other_cancel_move_as_single_ones(custom_
         assert 0.5 * (x1 + x2) == pytest.approx(x4, abs=1e-10)
 
 
+@pytest.mark.parametrize("method", [ODE23, ODE45, DOP853, RODAS])
+@pytest.mark.parametrize(
+    ("belt", "second_speed"),
+    [
+        ("choose(clock < second, u, 3.0 * u)", 0.6),
+        ("choose(clock < second, u, -u)", -0.2),
+        ("choose(x1 < 0.19 * metre, u, 3.0 * u)", 0.6),
+    ],
+)
+def test_a_block_slides_where_the_speed_of_its_belt_jumps(custom_model, belt, second_speed, method):
+    """The block follows the belt after 0.1 s, and is at 0.19 m after 1 s, where the speed jumps; closed form."""
+    (one, a), speed = body("1", "-F1", 1.0), 0.2
+    units = [
+        'second = Parameter(1.0, "s", "time")',
+        'metre = Parameter(1.0, "m", "length")',
+        'clock = State("s", "time", rate=1.0)',
+    ]
+    lines = contact("1", f"v1 - {belt}", 2.0, 3.0)
+    changes, rows = events(custom_model(*units, *one, *lines, a), method, 1e-6, 2.0)
+    end = 1.0 + abs(second_speed - speed) / 2.0
+    direction = 1 if second_speed < speed else -1
+    assert [mode for _, mode in changes] == [0, direction, 0]
+    assert [t for t, _ in changes] == pytest.approx([0.1, 1.0, end], abs=1e-12)
+    for t, y, _ in rows:
+        sliding = speed - 2.0 * direction * (t - 1.0)
+        v = 2.0 * t if t < 0.1 else speed if t < 1.0 else sliding if t < end else second_speed
+        assert y[-1] == pytest.approx(v, abs=1e-12)
+
+
 @pytest.mark.slow
 def test_the_order_of_declaration_does_not_matter(custom_model):
     """Three stacked blocks, driven from both sides: at first all contacts carry the same load and have the same

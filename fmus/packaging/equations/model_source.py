@@ -8,6 +8,7 @@ from ...runtime.active_method import EXACT_ITEM
 from ...runtime.oscillator import Oscillator
 from ...runtime.variable_declarations import VariableDeclaration
 from ..text_output import string_literal
+from .algebra import has_condition_on
 from .codegen_context import CodegenContext, rule_status
 from .conditions import Condition
 from .coupled_contact_methods import coupled_contact_methods
@@ -154,6 +155,7 @@ def class_attribute_lines(analysis: ModelAnalysis) -> list[str]:
         )
         lines.append(f"contacts = {{{slips}}}")
     states_and_drivers = (*analysis.states, *analysis.drivers)
+    moving = (*analysis.time_varying, *analysis.input_rates)
     nominal_velocities = [s.nominal_velocity for s in states_and_drivers if s.nominal_velocity is not None]
     lines += [
         f"{attribute} = True"
@@ -166,6 +168,7 @@ def class_attribute_lines(analysis: ModelAnalysis) -> list[str]:
             ("checks_event_steps", analysis.checks_event_steps),
             ("has_nominal_velocity", nominal_velocities),
             ("has_variable_levers", not analysis.rests_when_stuck and analysis.variable_lever_contacts),
+            ("has_slip_conditions", any(has_condition_on(c.slip, moving) for c in analysis.contacts)),
         )
         if is_set
     ]
