@@ -281,6 +281,26 @@ WRONG = {
         17,
         "slide or hold of R is negative at the start values",
     ),
+    "friction that grows with the slip, not its size": (
+        DRY.replace("slide=f", "slide=f + f * v / u") + STUCK,
+        17,
+        "slide of R is 2 N at a slip of 1, but 0 N at -1: write the size of the slip by fabs()",
+    ),
+    "friction that grows with the slip on a belt": (
+        DRY.replace("slip=v, slide=f", "slip=v - u, slide=f * (3.0 + (v - u) / u), lifts_off=True") + STUCK,
+        17,
+        "slide of R is 4 N at a slip of 1, but 2 N at -1: write the size of the slip by fabs()",
+    ),
+    "friction that decays with the slip, not its size": (
+        DRY.replace("slide=f", "slide=f * (1.0 + exp(-v / u))") + STUCK,
+        17,
+        "slide of R is 1.36788 N at a slip of 1, but 3.71828 N at -1: write the size of the slip by fabs()",
+    ),
+    "other friction backward without a holding force": (
+        DRY.replace("slide=f", "slide=choose(v > 0.0, f, 2.0 * f)") + STUCK,
+        17,
+        "slide of R is 1 N for small positive slips, but 2 N for negative ones: declare as hold what the contact holds",
+    ),
     "a huge unit": (RATE + '    q = Parameter(1.0, "m999", "q")\n', 17, "q has the unit 'm999'; allowed units are"),
     "a method": (RATE + "    def rates(self):\n        pass\n", 17, "nothing calls the function rates"),
     "a constructor": (RATE + "    def __init__(self):\n        pass\n", 17, "nothing calls the function __init__"),

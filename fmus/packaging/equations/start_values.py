@@ -5,12 +5,14 @@ import operator
 from collections.abc import Callable
 from typing import Any
 
-from .algebra import ARITHMETIC, substitute
+from .algebra import ARITHMETIC, has_condition_on, is_same_expression, subexpressions, variables_in
 from .dimensions import expression_text
 from .expressions import Expression, ModelError, Operand, Term
 from .model_analysis import ModelAnalysis
 from .model_declaration import Contact, Output
 
+SMALL_SLIP = 1e-9  # m/s or rad/s, for the two sides of zero slip
+FORCE_TOLERANCE = 1e-6  # relative difference of forces that are equal
 MAX_TEXT_LENGTH = 80  # characters of an expression in a message
 OPERATIONS: dict[str, Callable[..., Any]] = {
     **ARITHMETIC,
@@ -36,12 +38,56 @@ def check_friction_forces(analysis: ModelAnalysis) -> None:
                 evaluate(e, values, {})
             except ModelError as error:
                 raise ModelError(f"{c.name}: {error}", c.location) from error
-        if has_direction(c, values):
+        check_symmetry(c, values, values | {e: evaluate(e, values, {}) for e in analysis.outputs})
+
+
+def check_symmetry(c: Contact, values: dict[Expression, float], load_values: dict[Expression, float]) -> None:
+    """Raise ModelError if the sliding force depends on the direction of the slip without saying so.
+
+    `load_values` also holds the values of outputs, in which the direction may be that of a load.
+    """
+    try:
+        forward, backward = (sliding_force(c, slip, values) for slip in (1.0, -1.0))
+        direct_forward, direct_backward = (sliding_force(c, slip, load_values) for slip in (1.0, -1.0))
+        ahead, behind = (sliding_force(c, slip, values) for slip in (SMALL_SLIP, -SMALL_SLIP))
+    except ModelError:
+        return  # no value at these slips
+    if forward == -backward != 0.0:
+        raise ModelError(
+            f"slide of {c.name} changes its sign with the slip: write the size of the force, which the solver "
+            "directs against the slip",
+            c.location,
+        )
+    if not has_condition_on(force_while_closed(c), variables_in(c.slip)):
+        if differ(direct_forward, direct_backward):
             raise ModelError(
-                f"slide of {c.name} changes its sign with the slip: write the size of the force, which the solver "
-                "directs against the slip",
+                f"slide of {c.name} is {direct_forward:g} {c.unit} at a slip of 1, but {direct_backward:g} {c.unit} at "
+                "-1: write the size of the slip by fabs(); declare a load that depends on the direction as an Output",
                 c.location,
             )
+    elif c.hold is None and differ(ahead, behind):
+        raise ModelError(
+            f"slide of {c.name} is {ahead:g} {c.unit} for small positive slips, but {behind:g} {c.unit} for negative "
+            "ones: declare as hold what the contact holds, at least the larger of both",
+            c.location,
+        )
+
+
+def sliding_force(c: Contact, slip: float, values: dict[Expression, float]) -> float:
+    """Return the sliding force at a slip, as if the contact were closed."""
+    slide = force_while_closed(c)
+    slips = [e for e in subexpressions(slide).values() if is_same_expression(e, c.slip)]
+    return evaluate(slide, values | dict.fromkeys(slips, slip), {})
+
+
+def force_while_closed(c: Contact) -> Operand:
+    """Return the sliding force as the model declares it."""
+    return c.slide.args[1] if c.lifts_off else c.slide
+
+
+def differ(a: float, b: float) -> bool:
+    """Return whether two forces differ by more than rounding errors."""
+    return abs(a - b) > FORCE_TOLERANCE * max(abs(a), abs(b))
 
 
 def check_state_ranges(analysis: ModelAnalysis) -> None:
@@ -53,15 +99,6 @@ def check_state_ranges(analysis: ModelAnalysis) -> None:
                 f"{s.name} starts at {values[s]!r}{s.unit_suffix}, but its declaration says that it is {s.allowed}",
                 s.location,
             )
-
-
-def has_direction(c: Contact, values: dict[Expression, float]) -> bool:
-    """Return whether the sliding forces at a slip of 1 and of -1 are opposite; False if one has no value."""
-    try:
-        forward, backward = (evaluate(substitute(c.slide, {c.slip: slip}), values, {}) for slip in (1.0, -1.0))
-    except ModelError:
-        return False
-    return forward == -backward != 0.0
 
 
 def start_values(analysis: ModelAnalysis) -> dict[Expression, float]:
