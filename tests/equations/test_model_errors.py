@@ -155,7 +155,7 @@ WRONG = {
     "a variable without a name": (
         RATE.replace("F - k * x", 'Parameter(1.0, "N", "pull") - k * x'),
         16,
-        "a uses a variable without a name: assign the variable to a name first",
+        "a uses a variable without a name: assign the variable to a name in the class first",
     ),
     "an alias of what is calculated": (
         RATE.replace("rate_of=v", 'rate_of=v, alias="b"'),
@@ -364,6 +364,28 @@ WRONG = {
         RATE + "    y = x**0.5\n",
         17,
         "** is not supported, because its rounding differs between platforms: write sqrt(x)",
+    ),
+    "a fourth power": (
+        RATE + "    y = x**4\n",
+        17,
+        "** is not supported, because its rounding differs between platforms: write x * x * x * x",
+    ),
+    "a negative power": (
+        RATE + "    y = x**-2\n",
+        17,
+        "** is not supported, because its rounding differs between platforms: write 1.0 / (x * x)",
+    ),
+    "a comma at the end": (
+        RATE + '    E = Output("N", "pull", k * x),\n',
+        17,
+        "E is a tuple, because its line ends with a comma: remove the comma",
+    ),
+    "an integer part": (RATE + "    y = int(x)\n", 17, "x has no value at build time, so functions of math and numpy"),
+    "a count of bodies": (
+        '    n = Parameter(3, "1", "number of bodies")\n' + RATE + "    for i in range(n):\n        pass\n",
+        18,
+        "n has no value at build time and cannot index a table: write a formula, or a piecewise one with "
+        "choose(condition, this, that); a count, as in range(n), must be a number such as n = 3",
     ),
     "a maximum": (
         RATE + "    y = max(x, 0.0)\n",

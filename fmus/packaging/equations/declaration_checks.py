@@ -33,7 +33,8 @@ def check_declarations(analysis: ModelRoles) -> None:
             for leaf in variables_in(part):
                 if not leaf.name:
                     raise ModelError(
-                        f"{e.name} uses a variable without a name: assign the variable to a name first", e.location
+                        f"{e.name} uses a variable without a name: assign the variable to a name in the class first",
+                        e.location,
                     )
                 if leaf not in known:
                     raise ModelError(f"{e.name} uses {leaf.name}, which is not declared in {analysis.name}", e.location)

@@ -28,7 +28,11 @@ FUNCTIONS: dict[str, Callable[[Operand, Operand], Operand]] = {
 }
 COMPARISONS = ("<", "<=", ">", ">=", "==")
 MAX_VALUE_LENGTH = 60  # characters of a value in a message
-POWERS: dict[object, str] = {2: "{0} * {0}", 3: "{0} * {0} * {0}", 0.5: "sqrt({0})", -1: "1.0 / {0}"}
+POWERS: dict[object, str] = {
+    **{n: " * ".join(["{0}"] * n) for n in range(2, 7)},
+    **{-n: f"1.0 / ({' * '.join(['{0}'] * n)})" for n in range(2, 7)},
+    **{0.5: "sqrt({0})", -1: "1.0 / {0}", 1.5: "{0} * sqrt({0})", -0.5: "1.0 / sqrt({0})"},
+}
 NO_VALUE = (
     "{name} has no value at build time, so functions of math and numpy do not take it: import functions from fmus, "
     f"which has {', '.join(FUNCTIONS)}"
@@ -132,10 +136,11 @@ class Expression:
         "&, |, ^ and ~ are not supported: nest choose(condition, this, that), one comparison in each"
     )
     __round__ = __trunc__ = __floor__ = __ceil__ = _refusal(NO_VALUE)
+    __int__ = _refusal(NO_VALUE)
     __iter__ = _refusal("{name} is a scalar: it cannot be iterated over")
     __index__ = _refusal(
         "{name} has no value at build time and cannot index a table: write a formula, or a piecewise one with "
-        "choose(condition, this, that)"
+        "choose(condition, this, that); a count, as in range(n), must be a number such as n = 3"
     )
     __array_ufunc__ = None  # disables numpy arithmetic
 

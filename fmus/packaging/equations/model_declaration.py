@@ -344,6 +344,8 @@ class _ClassBody(dict[str, Any]):
                 sentence = f"nothing calls the function {name}: a model has no methods, write its equation as an Output"
             elif close := get_close_matches(name, SETTINGS, 1):
                 sentence = f"nothing uses {name}: write {close[0]}, or remove it"
+            elif isinstance(value, tuple) and len(value) == 1 and isinstance(value[0], (Expression, Rule)):
+                sentence = f"{name} is a tuple, because its line ends with a comma: remove the comma"
             elif isinstance(value, Rule):
                 sentence = f"nothing uses the rule {name}: write rules = Rule(...), or a tuple of rules"
             else:
