@@ -95,6 +95,21 @@ def test_two_riders_on_one_carrier_break_away_and_stop_together(custom_model):
     assert max(abs(y[2] - y[4]) for _, y, _ in rows) < 1e-12
 
 
+@pytest.mark.parametrize("method", [ODE23, ODE45, DOP853, RODAS])
+def test_a_block_and_the_plank_below_it_stop_under_constant_forces(custom_model, method):
+    """The block slides on the plank, then both slide as one body: pieces of constant acceleration, in closed form."""
+    (plank, a), (block, b) = body("1", "F2 - F1", 3.0), body("2", "-F2", 1.0)
+    block[1] = block[1].replace('"speed of 2"', '"speed of 2", start=4.0')
+    lines = contact("1", "v1", 2.0, 2.0) + contact("2", "v2 - v1", 5.0, 5.0)
+    changes, rows = events(custom_model(*plank, *block, *lines, a, b), method, 1e-6, 10.0)
+    together = 4.0 / (5.0 + 1.0)  # s: accelerations 1 and -5 m/s2
+    stop = together + together / 0.5  # s: acceleration -0.5 m/s2
+    assert changes == [(pytest.approx(together), 1, 0), (pytest.approx(stop), 0, 0)]
+    for t, (_, v1, _, v2), _ in rows:
+        common = max(together - 0.5 * (t - together), 0.0)
+        assert (v1, v2) == pytest.approx((t, 4.0 - 5.0 * t) if t < together else (common, common), abs=1e-12)
+
+
 def test_contacts_whose_effects_on_each_other_cancel_move_as_single_ones(custom_model):
     """Between two equal blocks, and on their mean speed: the difference and the mean of their positions are those of
     two blocks that each slide on their own."""

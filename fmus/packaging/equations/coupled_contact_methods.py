@@ -128,8 +128,9 @@ def emit_solution(
     right_sides = [
         {c: names[n, c] for c in interacting} for n in range(len(unknowns)) if all((n, c) in names for c in interacting)
     ]
-    has_variable_levers = any(is_among(c, analysis.variable_lever_contacts) for c in interacting)
-    emit_elimination(printer, interacting, matrix, right_sides, has_variable_levers)
+    if right_sides:  # else all derivatives of the forces are zero
+        has_variable_levers = any(is_among(c, analysis.variable_lever_contacts) for c in interacting)
+        emit_elimination(printer, interacting, matrix, right_sides, has_variable_levers)
     for (n, c), name in names.items():
         printer.bound_names[unknowns[n].symbols[c]] = name
 
