@@ -21,7 +21,7 @@ def analyse(run: Trajectory) -> AnalysisResult:
     Raises
     ------
     HarnessError
-        if the driver does not move, the run has fewer than two slips, or a slip has too few samples
+        If the driver does not move, the run has fewer than two slips, or a slip has too few samples.
     """
     driver = run.get_parameter("v_driver", "the analysis 'slip'")
     v = run.column_of_role("velocity")

@@ -27,9 +27,12 @@ def step_collapse(ends: np.ndarray, h: np.ndarray, t: np.ndarray, v: np.ndarray)
 
     Parameters
     ----------
-    ends : (n + 1,) bounds of the steps in s
-    h : (n,) step sizes in s
-    t, v : (m,) sample times in s and velocities
+    ends : numpy.ndarray
+        Bounds (n + 1,) of the steps in s.
+    h : numpy.ndarray
+        Step sizes (n,) in s.
+    t, v : numpy.ndarray
+        Sample times (m,) in s and velocities (m,).
     """
     moving = np.flatnonzero(v)
     reversals = moving[1:][np.diff(np.sign(v[moving])) != 0]

@@ -30,8 +30,19 @@ FORCES = {"f": ("N", "friction force", False), "T_f": ("N.m", "joint torque", Tr
 
 @dataclass(frozen=True)
 class DecrementResult:
-    """The measured `result` (zeta, f or T_f) over `cycles` cycles, and `times` (s) and `positions` of the turning
-    points used."""
+    """Result of the analysis 'decay'.
+
+    Attributes
+    ----------
+    result : Quantity
+        Measured quantity: zeta, f or T_f.
+    cycles : float
+        Number of cycles over which it was measured.
+    times, positions : numpy.ndarray
+        Times (n,) in s and positions (n,) of the turning points of these cycles.
+    quantities : tuple of Quantity
+        Peaks at both ends, and the result.
+    """
 
     result: Quantity
     cycles: float
@@ -45,14 +56,17 @@ def analyse(run: "Trajectory", gives: str, first: int = 0, cycles: float | None 
 
     Parameters
     ----------
-    gives : what to measure: zeta, f or T_f
-    first : the cycle whose peak is x_0
-    cycles : number of cycles between x_0 and x_n; None for all that follow
+    gives : str
+        Quantity to measure: zeta, f or T_f.
+    first : int
+        Number of the cycle whose peak is x_0.
+    cycles : float, optional
+        Number of cycles between x_0 and x_n; None for all that follow.
 
     Raises
     ------
     HarnessError
-        if the run shows no decay, or has too few turning points or samples
+        If the run shows no decay, or has too few turning points or samples.
     """
     times, positions = find_extrema_from_velocity(
         run.time, run.column_of_role("position"), run.column_of_role("velocity")
@@ -95,7 +109,8 @@ def find_extrema_from_velocity(t: np.ndarray, x: np.ndarray, v: np.ndarray) -> t
 
     Parameters
     ----------
-    t, x, v : (n,) times in s, positions and velocities
+    t, x, v : numpy.ndarray
+        Times (n,) in s, positions (n,) and velocities (n,).
     """
     sign = np.sign(v)
     i = np.flatnonzero(sign[:-1] * sign[1:] < 0)
@@ -110,7 +125,7 @@ def find_extrema_from_velocity(t: np.ndarray, x: np.ndarray, v: np.ndarray) -> t
 
 
 def is_turning_point(sign: np.ndarray, i: int) -> bool:
-    """Return whether the zero velocity at sample i ends a motion that does not go on in the same direction."""
+    """Return whether the motion stops at sample i and does not continue in the same direction."""
     before = sign[i - 1] if i else 0.0
     if i and before == 0:
         return False  # the rest began earlier
@@ -141,7 +156,9 @@ def select_cycles(
     begin = 2 * first
     end = len(times) - 1 if cycles is None else begin + round(2 * cycles)
     if end >= len(times) or end <= begin:
-        least = max(end, begin + 1) + 1
-        have = f"the decay needs {least} turning points, and the run has {len(times)}"
-        raise HarnessError(f"{have}: set a later stop, a finer grid or fewer cycles")
+        required = max(end, begin + 1) + 1
+        raise HarnessError(
+            f"the decay needs {required} turning points, and the run has {len(times)}: set a later stop, a finer grid "
+            "or fewer cycles"
+        )
     return times[begin : end + 1], positions[begin : end + 1], (end - begin) / 2

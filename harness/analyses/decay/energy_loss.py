@@ -34,9 +34,12 @@ class EnergyLoss:
 
     Attributes
     ----------
-    amplitude : (n,) mean amplitudes of the half cycles between the turning points of the record
-    fraction : (n,) energy that each of them loses, relative to the mean of its energies at both ends
-    curves : amplitudes and fractions for each law
+    amplitude : numpy.ndarray
+        Mean amplitudes (n,) of the half cycles between the turning points of the record.
+    fraction : numpy.ndarray
+        Energy (n,) that each half cycle loses, relative to the mean of its energies at both ends.
+    curves : dict
+        Amplitudes (m,) and fractions (m,) for each law.
     """
 
     amplitude: np.ndarray
@@ -45,7 +48,7 @@ class EnergyLoss:
 
 
 def estimate_losses(a: np.ndarray, terms: Terms, is_pendulum: bool) -> np.ndarray:
-    """Return zeta, r and b (3,), none negative, from successive amplitudes a (n,); those not in `terms` are zero."""
+    """Return nonnegative zeta, r and b (3,) from successive amplitudes a (n,); those not in `terms` are zero."""
     mean = (a[:-1] + a[1:]) / 2
     if is_pendulum:
         nodes, weights = gauss_nodes()

@@ -39,14 +39,23 @@ from .return_map import iterate_return_map
 from .signal_model import LAW
 
 PRECISION = 1e-12  # relative to a small loss, of the single loss
-BRACKET = (2.0, 4.0, 8.0)  # times a small loss, where the single loss is sought
-STOPPED = 1e-6  # of the first amplitude: a root that misses the last amplitude by more is none
+BRACKET = (2.0, 4.0, 8.0)  # times a small loss: upper ends of the search for the single loss
+STOPPED = 1e-6  # of the first amplitude: a root that misses the last amplitude by more is not a solution
 
 
 @dataclass(frozen=True)
 class KnownParameters:
-    """What the user knows about the oscillator: stiffness `k` or mass `m` (SI; for a rotation N.m/rad, kg.m2), and
-    whether the restoring torque is that of a pendulum, k sin(theta)."""
+    """Parameters of the oscillator that the user knows.
+
+    Attributes
+    ----------
+    k : float or None
+        Stiffness in N/m, or N.m/rad for a rotation.
+    m : float or None
+        Mass in kg, or moment of inertia in kg.m2.
+    pendulum : bool
+        Whether the restoring torque is that of a pendulum, k sin(theta).
+    """
 
     k: float | None = None
     m: float | None = None
@@ -98,9 +107,12 @@ def make_estimates(
 
     Parameters
     ----------
-    law : the law whose values are reported
-    full : the full law
-    uncertainty : of the full law
+    law : FittedLaw
+        Law whose values are reported.
+    full : FittedLaw
+        Law with all terms.
+    uncertainty : FitUncertainty
+        Uncertainty of the full law.
     """
     estimates = {}
     at_bound = any(full.p[UNKNOWNS.index(term)] <= 0 for term in full.terms)  # elsewhere the bounds have no effect
@@ -132,8 +144,8 @@ def force_estimates(
 ) -> tuple[Estimate, ...]:
     """Return friction force, damping and drag constants if k or m is known.
 
-    f = k r, c = 2 zeta k/omega, q = b k/omega^2, for the `estimates` of r, zeta and b that are there, if the position
-    is in m or rad.
+    f = k r, c = 2 zeta k/omega, q = b k/omega^2, for those of r, zeta and b that are in `estimates`, if the position is
+    in m or rad.
     """
     if (parameters.k is None and parameters.m is None) or record.base not in ("m", "rad"):
         return ()
@@ -234,8 +246,10 @@ def solve_single_loss(unknown: int, first: float, last: float, count: int, is_pe
 
     Parameters
     ----------
-    unknown : index in UNKNOWNS of the loss: ZETA, R or B
-    first, last : amplitudes
+    unknown : int
+        Index in UNKNOWNS of the loss: ZETA, R or B.
+    first, last : float
+        Amplitudes, in one unit.
     """
     small_loss = {
         ZETA: damping_ratio(first, last, count / 2),
@@ -248,7 +262,7 @@ def solve_single_loss(unknown: int, first: float, last: float, count: int, is_pe
     p[[AMPLITUDE, OMEGA]] = first, 1.0
 
     def excess(loss: float) -> float:
-        """Return how much larger the last amplitude is with this loss; it is zero if the motion stops before."""
+        """Return the excess of the last amplitude with this loss; the amplitude is 0 if the motion stops before."""
         p[unknown] = loss
         amplitudes = iterate_return_map(p[None, LAW], is_pendulum, 0.0, count).amplitudes[:, 0]
         return float(amplitudes[-1]) - last if len(amplitudes) > count else -last

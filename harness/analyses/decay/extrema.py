@@ -1,6 +1,6 @@
 """Turning points of a record, noisy or clean, evenly sampled or not, about any rest position; and its noise.
 
-They are located in a smoothed copy of the record and only number and place the half cycles for the fits that follow.
+They are located in a smoothed copy of the record. The fits that follow use them only to number and locate half cycles.
 For a velocity the copy is its integral; for an acceleration it is -a/omega^2, which is the position except for the
 small contribution of the losses.  A turning point is a reversal that exceeds the noise.
 """
@@ -22,13 +22,20 @@ class Extrema:
 
     Attributes
     ----------
-    t, x : (n,) times in s and positions of the turning points after the start
-    t_start : time in s of the turning point at which the motion starts
-    half_period : in s
-    noise : standard deviation of a sample, in the unit of the record
-    quantiser_step : in the unit of the record; 0 if it does not exceed the noise
-    segment_start : time in s from which on the record has no gap
-    error : standard error of the positions
+    t, x : numpy.ndarray
+        Times (n,) in s and positions (n,) of the turning points after the start.
+    t_start : float
+        Time in s of the turning point at which the motion starts.
+    half_period : float
+        Half period in s.
+    noise : float
+        Standard deviation of a sample, in the unit of the record.
+    quantiser_step : float
+        Step of the quantiser in the unit of the record; 0 if it does not exceed the noise.
+    segment_start : float
+        Time in s from which on the record has no gap.
+    error : float
+        Standard error of the positions.
     """
 
     t: np.ndarray

@@ -1,7 +1,7 @@
 """Fit problem: a record in the units of the fit, starting values of its unknowns, and their least squares.
 
 Times count from the start of the record, values from a point near the rest position.  The law of a spring has no
-length of its own, so positions are in units of the first amplitude; those of a pendulum are in radians.  The sum of
+length scale, so positions are in units of the first amplitude; those of a pendulum are in radians.  The sum of
 squares is minimised by scipy over some of the unknowns, with nonnegative losses.
 """
 
@@ -32,13 +32,22 @@ class FitProblem:
 
     Attributes
     ----------
-    t, x : (n,) times in s and values, in the units of the fit
-    time_origin, offset, scale : a record has the time t + time_origin and the value x scale + offset
-    noise : standard deviation of a sample
-    drift : whether the drift of the rest position is fitted
-    half_period : in s
-    quantiser_step : in the unit of the record; 0 if it does not exceed the noise
-    cache : residuals and Jacobians of the last two evaluations
+    t, x : numpy.ndarray
+        Times (n,) in s and values (n,), in the units of the fit.
+    model : SignalModel
+        Model of the samples.
+    time_origin, offset, scale : float
+        The record has the time t + time_origin in s and the value x scale + offset in its unit.
+    noise : float
+        Standard deviation of a sample, in the unit of the fit.
+    drift : bool
+        Whether the drift of the rest position is fitted.
+    half_period : float
+        Half period in s.
+    quantiser_step : float
+        Step of the quantiser in the unit of the record; 0 if it does not exceed the noise.
+    cache : dict
+        Residuals and Jacobians of the last two evaluations.
     """
 
     t: np.ndarray
@@ -96,9 +105,9 @@ class FitProblem:
 
     def fit(self, p: np.ndarray, terms: Terms, max_steps: int = 30) -> FitResult:
         """Fit the law with these terms, from the starting values p."""
-        unknowns, every = self.unknowns(terms), len(self.t) // thresholds.MAX_COARSE_SAMPLES
-        if every > 1:
-            coarse = self.subset(slice(None, None, every))
+        unknowns, stride = self.unknowns(terms), len(self.t) // thresholds.MAX_COARSE_SAMPLES
+        if stride > 1:
+            coarse = self.subset(slice(None, None, stride))
             p, _ = least_squares(lambda q: coarse.residuals(q, terms), p, unknowns, max_steps)
         return least_squares(lambda q: self.residuals(q, terms), p, unknowns, max_steps)
 
@@ -186,10 +195,14 @@ def fit_numbered_extrema(
 
     Parameters
     ----------
-    start : starting values of UNKNOWNS
-    times, positions : (n,) measured turning points
-    weights : (n,) of the times, in 1/s
-    error : standard error of the positions
+    start : numpy.ndarray
+        Starting values (8,) of UNKNOWNS.
+    times, positions : numpy.ndarray
+        Times (n,) in s and positions (n,) of the measured turning points.
+    weights : numpy.ndarray
+        Weights (n,) of the times, in 1/s.
+    error : float
+        Standard error of the positions.
     """
     unknowns = unknown_indices(TERMS, False)
     if 2 * len(times) <= len(unknowns):
@@ -227,18 +240,24 @@ def least_squares(
 
     Parameters
     ----------
-    residual : function of p that returns residuals (n,) and their Jacobian (n, k)
-    p : starting values of all UNKNOWNS
-    unknowns : (k,) indices of those to fit
+    residual : callable
+        Function of p that returns residuals (n,) and their Jacobian (n, k).
+    p : numpy.ndarray
+        Starting values (8,) of all UNKNOWNS.
+    unknowns : numpy.ndarray
+        Indices (k,) of the unknowns to fit.
 
     Returns
     -------
-    p, sum of squares
+    p : numpy.ndarray
+        Values (8,) of all UNKNOWNS.
+    sum_of_squares : float
+        Sum of the squared residuals.
 
     Raises
     ------
     FitError
-        if the starting values give no motion
+        If the starting values give no motion.
     """
     start = p[unknowns]
 
@@ -291,8 +310,8 @@ def least_squares(
 def compress(r: np.ndarray, jacobian: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return residuals (k + 1,) and a Jacobian (k + 1, k) with the same sums of squares and products.
 
-    They save scipy the singular values of long matrices.  If a value is not finite no residual is, and scipy refuses
-    the step.
+    scipy decomposes these small matrices faster.  If one value is not finite, no residual is, and scipy refuses the
+    step.
     """
     both = np.column_stack([jacobian, r])
     scale = column_norms(both)

@@ -20,18 +20,26 @@ from .law import OMEGA, T0, TERMS, UNKNOWNS, Terms
 
 @dataclass(frozen=True)
 class FreeMotion:
-    """The free motion of a record, as far as it is selected.
+    """Free motion of a record after some steps of its selection.
 
     Attributes
     ----------
-    record, extrema : the record and its turning points
-    terms : of the law that is fitted
-    available : the samples from which the next step may select
-    problem : the samples that are selected
-    p : the values of UNKNOWNS that fit them
-    sum_of_squares : of their residuals
-    outliers : number of samples left out as outliers
-    notes : sentences on other samples left out
+    record, extrema : Record, Extrema
+        The record and its turning points.
+    terms : tuple of str
+        Terms of the law that is fitted.
+    available : FitProblem
+        Samples from which the next step may select.
+    problem : FitProblem
+        Samples that are selected.
+    p : numpy.ndarray
+        Values (8,) of UNKNOWNS that fit these samples.
+    sum_of_squares : float
+        Sum of squares of their residuals.
+    outliers : int
+        Number of samples left out as outliers.
+    notes : tuple of str
+        Sentences on other samples left out.
     """
 
     record: Record
@@ -98,7 +106,7 @@ def fit_with_fallback(problem: FitProblem, p: np.ndarray, terms: Terms) -> FitRe
 
 
 def skip_before_start(motion: FreeMotion) -> FreeMotion:
-    """Leave out the samples before the motion starts, or before a gap at its beginning."""
+    """Leave out the samples before the start of the motion, or before a gap near its beginning."""
     problem, segment_start = motion.problem, motion.extrema.segment_start
     start = max(segment_start - problem.time_origin, motion.p[T0])
     released = problem.subset(problem.t >= start)
@@ -154,7 +162,7 @@ def remove_outliers(motion: FreeMotion) -> FreeMotion:
 
 
 def skip_disturbed_start(motion: FreeMotion) -> FreeMotion:
-    """Start at the first turning point if the half cycle before it is no free motion."""
+    """Start at the first turning point if the half cycle before it is not a free motion."""
     problem, e = motion.problem, motion.residuals()
     _, starts = problem.half_cycles(motion.p, max_count=1)
     first = problem.t < starts[-1]
@@ -176,7 +184,7 @@ def skip_disturbed_start(motion: FreeMotion) -> FreeMotion:
 
 
 def truncate_at_disturbance(motion: FreeMotion) -> FreeMotion:
-    """Select the samples before the record departs from the law that it follows until then, if it does."""
+    """Select the samples before the time at which the record departs from the law, if it does."""
     selection, extrema, terms = motion.problem, motion.extrema, motion.terms
     rms = float(np.sqrt(motion.sum_of_squares / len(selection.t)))
     if rms <= thresholds.DISTURBED * selection.noise:
@@ -203,7 +211,7 @@ def truncate_at_disturbance(motion: FreeMotion) -> FreeMotion:
 
 
 def extend_to_departure(motion: FreeMotion, last: float) -> tuple[FreeMotion, float, float]:
-    """Return the motion up to `last` in s and as long as it follows the law, its noise, and when it departs."""
+    """Return the motion up to `last` or as long as it follows the law, its noise, and when it departs, in s."""
     problem, half_period = motion.available, motion.extrema.half_period
     for _ in range(thresholds.MAX_EXTENSIONS):  # each fit is valid a little farther than its samples
         early = problem.subset(problem.t <= last)

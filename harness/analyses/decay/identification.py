@@ -40,16 +40,26 @@ class DecayIdentification:
 
     Attributes
     ----------
-    record : the record, without spikes
-    extrema : its turning points
-    problem : the samples used, in the units of the fit
-    laws : the laws fitted, best first
-    uncertainty : of the full law
-    estimates : from the whole signal
-    extrema_estimates : from all turning points
-    two_peak_estimates : from the first and the last turning point
-    unavailable : why the estimates from turning points are empty, by method; an empty text if they are not
-    remarks : what to know before relying on the values
+    record : Record
+        The record, without spikes.
+    extrema : Extrema
+        Its turning points.
+    problem : FitProblem
+        Samples that are fitted, in the units of the fit.
+    laws : tuple of FittedLaw
+        Fitted laws, best first.
+    uncertainty : FitUncertainty
+        Uncertainty of the full law.
+    estimates : tuple of Estimate
+        Estimates from the whole signal.
+    extrema_estimates : tuple of Estimate
+        Estimates from all turning points.
+    two_peak_estimates : tuple of Estimate
+        Estimates from the first and the last turning point.
+    unavailable : dict
+        Reasons why the estimates from turning points are empty, by method; an empty text if they are not.
+    remarks : tuple of str
+        Sentences to read before relying on the values.
     """
 
     record: Record
@@ -149,15 +159,19 @@ def fit_decay(
 
     Parameters
     ----------
-    parameters : stiffness or mass, and whether the oscillator is a pendulum
-    drag : try laws with quadratic drag
-    drift : fit a constant drift of the rest position
-    report : receives the progress from 0 to 1
+    parameters : KnownParameters
+        Stiffness or mass, and whether the oscillator is a pendulum.
+    drag : bool
+        Whether to try laws with quadratic drag.
+    drift : bool
+        Whether to fit a constant drift of the rest position.
+    report : callable
+        Receives the progress from 0 to 1.
 
     Raises
     ------
     HarnessError
-        if there is no decay, or no law fits; the message says what to do if that is known
+        If there is no decay, or no law fits; the message says what to do if that is known.
     """
     try:
         return identify_record(record, parameters, drag, drift, report)

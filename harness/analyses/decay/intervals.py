@@ -41,14 +41,22 @@ class FitUncertainty:
 
     Attributes
     ----------
-    unknowns : (n,) indices in UNKNOWNS
-    standard_errors : (n,)
-    correlation : (n, n)
-    unconstrained : (n,) the values that the fit would have if losses could be negative
-    rms : root mean square of the residuals
-    neighbour_correlation : correlation of neighbouring residuals
-    is_correlated : whether the residuals differ significantly from white noise
-    degrees_of_freedom : samples less unknowns
+    unknowns : numpy.ndarray
+        Indices (n,) in UNKNOWNS.
+    standard_errors : numpy.ndarray
+        Standard errors (n,).
+    correlation : numpy.ndarray
+        Correlation matrix (n, n).
+    unconstrained : numpy.ndarray
+        Values (n,) that the fit would have if losses could be negative.
+    rms : float
+        Root mean square of the residuals.
+    neighbour_correlation : float
+        Correlation of neighbouring residuals.
+    is_correlated : bool
+        Whether the residuals differ significantly from white noise.
+    degrees_of_freedom : int
+        Number of samples less that of unknowns.
     """
 
     unknowns: np.ndarray
@@ -120,10 +128,14 @@ def confidence_interval(
 
     Parameters
     ----------
-    unknowns : (n,) indices in UNKNOWNS
-    center : (n,) measured values; losses may be negative here
-    standard_errors : (n,)
-    correlation : (n, n)
+    unknowns : numpy.ndarray
+        Indices (n,) in UNKNOWNS.
+    center : numpy.ndarray
+        Measured values (n,); losses may be negative here.
+    standard_errors : numpy.ndarray
+        Standard errors (n,).
+    correlation : numpy.ndarray
+        Correlation matrix (n, n).
     """
     wide = standard_errors * student_quantile(degrees_of_freedom) / NORMAL_QUANTILE
     losses = (unknowns >= ZETA) & (wide > 0)
@@ -141,12 +153,15 @@ def nonnegative_interval(z: np.ndarray, correlation: np.ndarray) -> tuple[float,
 
     Parameters
     ----------
-    z : (k,) measurements in standard errors
-    correlation : (k, k) correlation of the measurements
+    z : numpy.ndarray
+        Measurements (k,) in standard errors.
+    correlation : numpy.ndarray
+        Correlation matrix (k, k) of the measurements.
 
     Returns
     -------
-    low, high : bounds in standard errors
+    low, high : float
+        Bounds in standard errors.
     """
     cone = NonnegativeCone(correlation)
     most_likely, min_distance = cone.nearest(z)
@@ -155,7 +170,7 @@ def nonnegative_interval(z: np.ndarray, correlation: np.ndarray) -> tuple[float,
     draws = axes * np.sqrt(np.maximum(eigenvalues, 0.0)) @ axes.T @ quasirandom_normal(len(z))
 
     def excess_distance(m: float) -> float:
-        """Return how much farther z is from the means with first mean m than 95 % of the draws from them."""
+        """Return by how much z is farther from the means with first mean m than 95 % of the draws from them are."""
         means, square = cone.nearest(z, m)
         points = means[:, None] + draws
         increase = cone.squared_distances(points, m) - cone.squared_distances(points)
@@ -175,10 +190,10 @@ class NonnegativeCone:
     def __init__(self, correlation: np.ndarray) -> None:
         k = len(correlation)
         self.faces = []
-        for held in (list(indices) for size in range(k + 1) for indices in combinations(range(k), size)):
-            free = [i for i in range(k) if i not in held]
-            weight = np.linalg.pinv(correlation[np.ix_(held, held)])
-            self.faces.append((held, free, weight, correlation[np.ix_(free, held)] @ weight))
+        for fixed in (list(indices) for size in range(k + 1) for indices in combinations(range(k), size)):
+            free = [i for i in range(k) if i not in fixed]
+            weight = np.linalg.pinv(correlation[np.ix_(fixed, fixed)])
+            self.faces.append((fixed, free, weight, correlation[np.ix_(free, fixed)] @ weight))
 
     def nearest(self, z: np.ndarray, first: float | None = None) -> tuple[np.ndarray, float]:
         """Return the point of the cone nearest to z (k,) and the squared distance.
@@ -204,9 +219,9 @@ class NonnegativeCone:
         """
         if first is not None:
             z = np.concatenate([z[:1] - first, z[1:]])
-        for held, free, weight, slope in self.faces:
-            if first is None or 0 in held:
-                offset = z[held]
+        for fixed, free, weight, slope in self.faces:
+            if first is None or 0 in fixed:
+                offset = z[fixed]
                 moved = z[free] - slope @ offset
                 yield free, moved, np.where((moved >= 0).all(axis=0), (weight @ offset * offset).sum(axis=0), np.inf)
 

@@ -19,7 +19,19 @@ from .law import TERMS, ZETA, Terms, describe_law, sublaws
 
 @dataclass(frozen=True)
 class FittedLaw:
-    """A law with these `terms`, fitted: the values `p` of UNKNOWNS in the problem's units, the sum of squares, BIC."""
+    """Fit of a law.
+
+    Attributes
+    ----------
+    terms : tuple of str
+        Terms of the law.
+    p : numpy.ndarray
+        Values (8,) of UNKNOWNS, in the units of the problem.
+    sum_of_squares : float
+        Sum of squares of the residuals.
+    bic : float
+        Bayesian information criterion.
+    """
 
     terms: Terms
     p: np.ndarray
@@ -52,9 +64,12 @@ def fit_all_laws(
 
     Parameters
     ----------
-    full : fit of the law with all terms
-    amplitudes : (n,) amplitudes at the turning points, for starting values
-    report : receives the progress from 0 to 1
+    full : FitResult
+        Fit of the law with all terms.
+    amplitudes : numpy.ndarray
+        Amplitudes (n,) at the turning points, for starting values.
+    report : callable
+        Receives the progress from 0 to 1.
     """
     laws = sublaws(terms)
     fits = {terms: full}

@@ -17,7 +17,7 @@ from .model_selection import FittedLaw, deviance_difference
 def check_fit(
     record: Record, problem: FitProblem, full: FittedLaw, uncertainty: FitUncertainty, pendulum: bool
 ) -> None:
-    """Raise FitError if the best fit leaves too much of the motion, or gains energy."""
+    """Raise FitError if the best fit leaves large residuals, or gains energy."""
     e, _ = problem.residuals(full.p, full.terms)
     share = uncertainty.rms / problem.signal_rms
     if share > thresholds.NOT_A_DECAY and uncertainty.rms > thresholds.NOT_NOISE * problem.noise:
@@ -89,7 +89,7 @@ def make_remarks(
 
 
 def rounding_remark(problem: FitProblem, full: FittedLaw, unit: str) -> tuple[str, ...]:
-    """Return a remark if the sensor rounds all turning points alike, so that its rounding is no noise.
+    """Return a remark if the sensor rounds all turning points alike, so that its rounding errors are not noise.
 
     This happens if the loss of amplitude per cycle is close to a multiple of the quantiser step.  Rayleigh's test
     is applied to the positions of the turning points between two steps.
@@ -127,7 +127,7 @@ def drift_remark(record: Record, problem: FitProblem, full: FittedLaw) -> str:
 
 
 def ambiguity_remark(problem: FitProblem, laws: tuple[FittedLaw, ...]) -> tuple[str, ...]:
-    """Return a remark on laws that this record cannot distinguish from the best one, and on what would."""
+    """Return a remark on the laws that this record cannot distinguish from the best one, and on a record that would."""
     best, n = laws[0], len(problem.t)
     differences = [deviance_difference(problem, law, best) for law in laws]
     rivals = [
@@ -156,8 +156,10 @@ def compare_halves(
 
     Returns
     -------
-    estimates : with intervals that hold both values where the halves disagree significantly
-    remarks : one for each quantity in which they do
+    estimates : tuple of Estimate
+        The estimates; where the halves disagree significantly, the interval holds the values of both.
+    remarks : tuple of str
+        A remark on each quantity in which the halves disagree.
     """
     _, starts = problem.half_cycles(full.p)
     cut = int(np.searchsorted(starts, problem.t[len(problem.t) // 2]))

@@ -46,10 +46,14 @@ class HalfCycles:
 
     Attributes
     ----------
-    end : (L,) displacement at the end
-    duration : (L,) in theta
-    series_starts : (S,) start of each segment in theta
-    series : (ORDER + 1, S, L) Taylor coefficients
+    end : numpy.ndarray
+        Displacement (L,) at the end.
+    duration : numpy.ndarray
+        Duration (L,) in theta.
+    series_starts : numpy.ndarray
+        Start (S,) of each segment in theta.
+    series : numpy.ndarray
+        Taylor coefficients (ORDER + 1, S, L).
     """
 
     end: np.ndarray
@@ -64,10 +68,14 @@ class HalfCycleSequence:
 
     Attributes
     ----------
-    amplitudes : (N + 1, P); the last row is the end of the last half cycle
-    starts : (N + 1, P) start of each half cycle in theta
-    weights : (P, N, M) interpolation weights of the M nodes
-    node_cycles : half cycles from the nodes, all nodes of the first law first
+    amplitudes : numpy.ndarray
+        Amplitudes (N + 1, P) at the starts; the last row is the end of the last half cycle.
+    starts : numpy.ndarray
+        Start (N + 1, P) of each half cycle in theta.
+    weights : numpy.ndarray
+        Interpolation weights (P, N, M) of the M nodes.
+    node_cycles : HalfCycles
+        Half cycles from the nodes, all nodes of the first law first.
     """
 
     amplitudes: np.ndarray
@@ -80,7 +88,8 @@ class HalfCycleSequence:
 
         Returns
         -------
-        coefficients : (P, terms, S N); column s N + n is segment s of half cycle n, valid from series_starts[s] on
+        coefficients : numpy.ndarray
+            Coefficients (P, terms, S N); column s N + n is segment s of half cycle n, valid from series_starts[s] on.
         """
         laws, _, nodes = self.weights.shape
         at_nodes = self.node_cycles.series
@@ -102,10 +111,14 @@ def iterate_return_map(
 
     Parameters
     ----------
-    laws : (P, 4) rows of A, zeta, r, b
-    min_amplitude : half cycles from a smaller amplitude, or from one that friction holds, are left out
-    max_count : maximum number of half cycles
-    end : half cycles that start later, in theta, are left out
+    laws : numpy.ndarray
+        Rows (P, 4) of A, zeta, r, b.
+    min_amplitude : float
+        Half cycles from a smaller amplitude, or from one that friction holds, are left out.
+    max_count : int
+        Maximum number of half cycles.
+    end : float
+        Half cycles that start later, in theta, are left out.
     """
     first, _, r, b = laws.T
     low = sticking_limit(r, is_pendulum)
@@ -149,7 +162,7 @@ def taylor_coefficients(
     """Return the Taylor coefficients (ORDER + 1, L) of y about the states y, w (L,) of downward motion."""
     order, has_drag, d = ORDER[is_pendulum], bool(b.any()), b * w - 2 * zeta
     series, velocity = np.empty((order + 1, len(y))), np.empty((order, len(y)))
-    # what multiplies the velocity: for a pendulum C and G; with drag, the damping d, which is then not constant
+    # factors of the velocity: for a pendulum C and G; with drag also the damping d, which is then not constant
     factors = np.empty((2 * is_pendulum + has_drag, order, len(y)))
     series[0], velocity[0] = y, w
     if is_pendulum:
@@ -228,7 +241,8 @@ def integrate_half_cycles(
 
 
 def segment_length(c: np.ndarray, tolerance: float) -> float:
-    """Return how far all series c (K, L) are accurate: their last two terms are small relative to the first three."""
+    """Return the length over which all series c (K, L) are accurate: their last two terms are small relative to the
+    first three."""
     size = np.abs(c[:3]).max(axis=0)
     last = np.abs(c[-2:]).max(axis=0)
     return min(MAX_SEGMENT, float(np.min((tolerance * size / (last + 1e-300)) ** (1 / (len(c) - 1)))))

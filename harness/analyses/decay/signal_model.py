@@ -1,4 +1,4 @@
-"""Model of what a sensor records of a free decay, with its derivatives with respect to the unknowns.
+"""Model of the signal of a sensor in a free decay, with its derivatives with respect to the unknowns.
 
     signal = rest + drift (t - t_mid) + sign omega^k d^k y/dtheta^k        k = 0 position, 1 velocity, 2 acceleration
 
@@ -24,11 +24,16 @@ class SignalModel:
 
     Attributes
     ----------
-    initial_sign : +1 if the motion starts above its rest position, -1 if below
-    order : derivative of the position that is recorded
-    is_pendulum : restoring force sin y instead of y
-    t_mid : time in s at which the drift is zero
-    min_amplitude : amplitude below which half cycles are left out
+    initial_sign : float
+        +1 if the motion starts above its rest position, -1 if below.
+    order : int
+        Order of the derivative of the position that is recorded.
+    is_pendulum : bool
+        Whether the restoring force is sin y instead of y.
+    t_mid : float
+        Time in s at which the drift is zero.
+    min_amplitude : float
+        Amplitude below which half cycles are left out.
     """
 
     initial_sign: float
@@ -42,9 +47,12 @@ class SignalModel:
 
         Returns
         -------
-        laws : (1 + V, 4) rows of A, zeta, r, b
-        changed : (V,) index in UNKNOWNS of the unknown that each row changes
-        changes : (V,) by how much
+        laws : numpy.ndarray
+            Rows (1 + V, 4) of A, zeta, r, b.
+        changed : numpy.ndarray
+            Index (V,) in UNKNOWNS of the unknown that each further row changes.
+        changes : numpy.ndarray
+            Change (V,) of that unknown.
         """
         changed = unknowns[(unknowns == AMPLITUDE) | (unknowns >= ZETA)]
         a = p[AMPLITUDE]
@@ -103,9 +111,12 @@ class SignalModel:
 
         Returns
         -------
-        times : (count,) in s
-        positions : (count,)
-        jacobian : (2, count, k) of times and positions for k of the UNKNOWNS, without the drift
+        times : numpy.ndarray
+            Times (count,) in s.
+        positions : numpy.ndarray
+            Positions (count,).
+        jacobian : numpy.ndarray
+            Derivatives (2, count, k) of times and positions by k of the UNKNOWNS, without the drift.
         """
         laws, changed, changes = self.perturbed_laws(p, unknowns)
         sequence = iterate_return_map(laws, self.is_pendulum, self.min_amplitude, count)

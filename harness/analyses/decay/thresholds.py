@@ -1,4 +1,4 @@
-"""Thresholds of the identification of decays: the numbers that decide, each with its unit and its reason.
+"""Thresholds of the identification of decays, each with its unit and its reason.
 
 They are in the order of the steps of identification.py.  Numbers of the numerics (orders of series, nodes of
 interpolation) are with the code that they belong to, because they decide about accuracy only.
@@ -8,8 +8,8 @@ interpolation) are with the code that they belong to, because they decide about 
 OUTLIER = 8.0  # times the noise: white noise exceeds it in one of 1e15 samples
 MIN_SPIKE = 0.02  # of the range: a smaller spike hides no turning point
 MAX_SPIKE_ROUNDS = 40  # each round removes the outermost samples of a run of outliers
-MAX_SPIKES = 0.05  # fraction of the samples: a record with more is no record with outliers
-COARSE_STEP = 1.5  # times the noise: a larger step of the values is that of a quantiser
+MAX_SPIKES = 0.05  # fraction of the samples: with more, they are not outliers
+COARSE_STEP = 1.5  # times the noise: a larger step between values comes from a quantiser
 FINE_NOISE = 1 / 3  # of a step of the values: noise below it cannot be seen through the quantiser
 MIN_NOISE = 1e-13  # relative to the amplitude: no record is more precise than rounding
 

@@ -1,1 +1,1 @@
-"""What `decay` and `fit` have in common: the noise of a record, and estimates with 95 % intervals."""
+"""Code that `decay` and `fit` share: the noise of a record, and estimates with 95 % intervals."""

@@ -13,7 +13,23 @@ NORMAL_QUANTILE = float(special.ndtri(UPPER))
 
 @dataclass(frozen=True)
 class Estimate:
-    """A value with its standard error and its 95 % interval; NaN where the data leave no degrees of freedom."""
+    """Estimate of a quantity; its error and interval are NaN if the data leave no degrees of freedom.
+
+    Attributes
+    ----------
+    name : str
+        Name of the quantity.
+    value : float
+        Estimated value, in `unit`.
+    error : float
+        Standard error, in `unit`.
+    low, high : float
+        Ends of the 95 % interval, in `unit`.
+    unit : str
+        Unit of the quantity.
+    text : str
+        Description of the quantity.
+    """
 
     name: str
     value: float
@@ -39,11 +55,12 @@ def student_quantile(degrees_of_freedom: int) -> float:
 
 @dataclass(frozen=True)
 class UsedSamples:
-    """The samples of a record that were fitted.
+    """Fitted samples of a record.
 
     Attributes
     ----------
     record : str
+        Name of the record.
     t : numpy.ndarray
         Their times (n,) in s.
     n_record : int
@@ -72,7 +89,21 @@ class UsedSamples:
 
 @dataclass(frozen=True)
 class ColumnResiduals:
-    """Residuals of a measured column: root mean square, noise of the record, and range, all in `unit`."""
+    """Residuals of a measured column.
+
+    Attributes
+    ----------
+    record, name : str
+        Names of the record and of the column.
+    unit : str
+        Unit of the numbers below.
+    residual : float
+        Root mean square of the residuals.
+    noise : float
+        Standard deviation of the noise.
+    range : float
+        Range of the samples.
+    """
 
     record: str
     name: str
@@ -82,13 +113,13 @@ class ColumnResiduals:
     range: float
 
 
-def answer_as_json(
+def shared_json(
     samples: Sequence[UsedSamples],
     columns: Sequence[ColumnResiduals],
     estimates: Sequence[Estimate],
     remarks: Sequence[str],
 ) -> dict[str, Any]:
-    """Return the keys that the answers of `decay` and of `fit` share."""
+    """Return the JSON keys that the results of `decay` and `fit` share."""
     return {
         "record": ", ".join(used.record for used in samples),
         "records": [used.as_json() for used in samples],

@@ -21,9 +21,11 @@ def determined_combinations(
     Parameters
     ----------
     unknowns : tuple of Unknown
+        The k unknowns of the fit.
     values : numpy.ndarray
-        Values (k,).
+        Fitted values (k,).
     uncertainty : Uncertainty
+        Uncertainty of their coordinates.
     indeterminate : list of int
         Indices of the unknowns that the record does not determine.
     """

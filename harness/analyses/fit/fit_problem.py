@@ -27,9 +27,11 @@ class FitProblem:
     Parameters
     ----------
     records : sequence of MeasuredRecord
+        Records to fit.
     outputs : sequence of str
         Observed variables, one for each column of the records.
     unknowns : sequence of Unknown
+        Numbers to fit.
     fixed : mapping
         Values of parameters that are not fitted.
     robust : bool
@@ -183,6 +185,7 @@ class FitProblem:
         z : numpy.ndarray
             Coordinates (k,) to start from.
         max_steps : int
+            Maximum number of steps.
         min_gain : float
             Relative reduction of the sum of squares below which the steps end.
         free : numpy.ndarray, optional

@@ -45,6 +45,7 @@ class MeasuredRecord:
     simulator : Simulator
         Its specification has the observed outputs, one for each column.
     data : RecordData
+        The record in the units of the FMU.
     binned : bool
         Whether a long record is averaged.
 

@@ -41,11 +41,13 @@ class ComparedLaw:
     Attributes
     ----------
     fmu : str
+        Name of the FMU.
     unknowns : int
         Number of unknowns that were fitted.
     residual : float
         Root mean square of the residuals, in units of the noise.
     bic : float
+        Bayesian information criterion.
     difference : float
         BIC above that of the best law.
     """
@@ -81,6 +83,7 @@ def information_criterion(squares: float, n: int, n_unknowns: int, n_independent
     n : int
         Number of residuals.
     n_unknowns : int
+        Number of unknowns that were fitted.
     n_independent : float
         Number of residuals that count as independent.
 
@@ -108,6 +111,7 @@ class ParameterFit:
     correlation : numpy.ndarray
         Correlation (k, k) of the estimates.
     columns : tuple of ColumnResiduals
+        Residuals of each observed column.
     remarks : tuple of str
         Sentences about doubtful results.
     notes : tuple of str
@@ -119,11 +123,13 @@ class ParameterFit:
     n_independent : float
         Number of residuals that count as independent; fewer than there are, if they are correlated.
     n_searches, n_runs : int
+        Number of searches, and of runs of the FMU.
     seconds : float
         Processor time.
     log : tuple of str
         Course of the search.
     records : tuple of MeasuredRecord
+        The fitted records.
     predictions : tuple of numpy.ndarray
         Fitted signals (n, columns) of each record at its times.
     validation : Validation or None

@@ -57,6 +57,7 @@ class Trial:
     Attributes
     ----------
     distance : float
+        Distance of the coordinate from the minimum.
     height : float
         Root of the squares above the minimum, in units of the limit: 1 at the end of the interval, infinite if refused.
     z : numpy.ndarray

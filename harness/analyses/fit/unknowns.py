@@ -23,6 +23,7 @@ class Unknown:
     variable : str
         Variable of the FMU that it sets, or one of SENSOR.
     unit : str
+        Unit of the value.
     low, high : float
         Range to search.
     minimum, maximum : float

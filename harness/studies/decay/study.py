@@ -13,7 +13,7 @@ import numpy as np
 from ...analyses.decay.estimates import KnownParameters
 from ...analyses.decay.identification import DecayIdentification, fit_decay
 from ...analyses.decay.law import AMPLITUDE, T0
-from ...analyses.estimation.estimate import ColumnResiduals, UsedSamples, answer_as_json
+from ...analyses.estimation.estimate import ColumnResiduals, UsedSamples, shared_json
 from ...errors import HarnessError, SceneError, format_value
 from ...records.columns import ColumnOptions, read_record
 from ...records.record import Record, check_record
@@ -154,7 +154,7 @@ def identified_as_json(identified: DecayIdentification) -> dict[str, Any]:
         float(np.ptp(identified.x)),
     )
     return {
-        **answer_as_json([samples], [column], identified.estimates, identified.remarks),
+        **shared_json([samples], [column], identified.estimates, identified.remarks),
         "quantity": record.quantity,
         "unit": record.unit,
         "sentence": identified.sentence,

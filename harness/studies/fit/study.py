@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ...analyses.estimation.estimate import ColumnResiduals, UsedSamples, answer_as_json
+from ...analyses.estimation.estimate import ColumnResiduals, UsedSamples, shared_json
 from ...analyses.fit.fit_course import fit_records
 from ...analyses.fit.fit_description import describe_fit
 from ...analyses.fit.law_comparison import compare_laws
@@ -207,7 +207,7 @@ def fit_as_json(fit: ParameterFit) -> dict[str, Any]:
     used = [UsedSamples(record.name, record.sampled_t, len(record.sampled_t), record.width) for record in fit.records]
     return {
         "fmu": fit.fmu,
-        **answer_as_json(used, fit.columns, fit.estimates, fit.remarks),
+        **shared_json(used, fit.columns, fit.estimates, fit.remarks),
         "notes": list(fit.notes),
         "describes_record": fit.describes_record,
         "undetermined": list(fit.undetermined),
