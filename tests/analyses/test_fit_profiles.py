@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from harness.analyses.fit.feasible_region import FeasibleRegion
-from harness.analyses.fit.fit_course import extend_ends, starting_points
 from harness.analyses.fit.fit_problem import EXACT_STEPS, FitProblem
+from harness.analyses.fit.fit_procedure import extend_ends, starting_points
 from harness.analyses.fit.profile_likelihood import profile_bound, search_bound
 from harness.analyses.fit.uncertainty import Uncertainty
 from harness.analyses.fit.unknowns import Unknown

@@ -36,10 +36,10 @@ def test_a_validation_record_is_averaged_only_where_its_means_are_those_of_the_o
     fitted = MeasuredRecord(SIMULATOR, data, binned=True)
     problem = FitProblem([fitted], ["x"], [Unknown("size", "size", "m", 0.5, 2.0)], {})
     z = np.zeros(1)
-    course = SimpleNamespace(z=z, uncertainty=SimpleNamespace(residuals=problem.residuals(z, problem.all)))
-    same, longer = validate(problem, course, [data, make_record(60.0)]).records
+    raw_fit = SimpleNamespace(z=z, uncertainty=SimpleNamespace(residuals=problem.residuals(z, problem.all)))
+    same, longer = validate(problem, raw_fit, [data, make_record(60.0)]).records
     assert (fitted.width, same.width, longer.width) == (2, 2, 1)
-    validation = validate(problem, course, [make_record(60.0)])
+    validation = validate(problem, raw_fit, [make_record(60.0)])
     assert validation.columns[0].residual == pytest.approx(NOISE, rel=0.1)
     assert validation.remarks == ()
 
@@ -51,6 +51,6 @@ def test_the_inputs_of_a_validation_record_are_as_fine_as_those_of_the_fit():
     fitted.subdivide(4)
     problem = FitProblem([fitted], ["x"], [Unknown("size", "size", "m", 0.5, 2.0)], {})
     z = np.zeros(1)
-    course = SimpleNamespace(z=z, uncertainty=SimpleNamespace(residuals=problem.residuals(z, problem.all)))
-    (record,) = validate(problem, course, [driven]).records
+    raw_fit = SimpleNamespace(z=z, uncertainty=SimpleNamespace(residuals=problem.residuals(z, problem.all)))
+    (record,) = validate(problem, raw_fit, [driven]).records
     assert len(record.fine_t) == len(record.driven["F"]) == 4 * (len(data.t) - 1) + 1

@@ -1,4 +1,4 @@
-"""The region in which a fit may look: half spaces given by bounds, and learned where the FMU refuses values."""
+"""Region that a fit may search: half spaces from bounds, and from values that the FMU refuses."""
 
 from collections.abc import Callable, Sequence
 
@@ -9,7 +9,7 @@ from .unknowns import Unknown
 
 MAX_PLANES = 40
 BISECTIONS = 30
-PROBE = 1e-3  # distance at which the direction of a wall is probed
+PROBE = 1e-3  # distance at which the direction of a boundary is probed
 
 
 class FeasibleRegion:
@@ -28,7 +28,7 @@ class FeasibleRegion:
         self.normals.append(normal)
         self.bounds.append(bound)
 
-    def learn(self, is_refused: Callable[[np.ndarray], bool], z: np.ndarray, step: np.ndarray) -> None:
+    def add_refusal(self, is_refused: Callable[[np.ndarray], bool], z: np.ndarray, step: np.ndarray) -> None:
         """Add the plane beyond which the FMU refuses values, if it refuses z + step.
 
         The plane is found by bisection along the step, and its direction by bisection along each axis.

@@ -1,4 +1,4 @@
-"""Description of a fit for its user: estimates, combinations, residuals and remarks."""
+"""Conversion of a fit to its result: estimates, combinations, residuals and remarks."""
 
 from collections.abc import Sequence
 from math import inf, isfinite, nan
@@ -7,8 +7,8 @@ import numpy as np
 
 from ..estimation.estimate import ColumnResiduals, Estimate
 from .combinations import determined_combinations
-from .fit_course import FitCourse
 from .fit_problem import FitProblem
+from .fit_procedure import RawFit
 from .measured_record import MeasuredRecord
 from .noise import correlation_length
 from .parameter_fit import ParameterFit, Profile
@@ -17,14 +17,14 @@ from .uncertainty import INDETERMINATE, Uncertainty, split_residuals
 
 UNFIT_SHARE, UNFIT_NOISE = 0.1, 2.0  # residuals as a share of the range, and in units of the noise
 REST_PARTS, AVERAGED = 20, 0.5  # means of noise over so many parts are smaller than this share of it
-SHIFTED = 0.25  # share of a variance that the error of the inputs adds before it is remarked
+SHIFTED = 0.25  # share of a variance that the error of the inputs adds, from which there is a remark
 
 
 def describe_fit(
-    fmu: str, problem: FitProblem, course: FitCourse, notes: Sequence[str], n_runs: int, seconds: float
+    fmu: str, problem: FitProblem, raw_fit: RawFit, notes: Sequence[str], n_runs: int, seconds: float
 ) -> ParameterFit:
     """Return the result of a fit: estimates with intervals, combinations, residuals and remarks."""
-    z, uncertainty = course.z, course.uncertainty
+    z, uncertainty = raw_fit.z, raw_fit.uncertainty
     residuals = split_residuals(problem, uncertainty.residuals)
     columns = column_residuals(problem.records, residuals, problem.outputs)
     predictions = problem.predict(z, problem.all)
@@ -33,30 +33,32 @@ def describe_fit(
         column.residual > max(UNFIT_SHARE * column.range, UNFIT_NOISE * column.noise) and not is_rest
         for column, is_rest in zip(columns, find_rests(problem.records, predictions, residuals), strict=True)
     )
-    estimates, several = make_estimates(problem, course, is_unfit)
+    estimates, ambiguous = make_estimates(problem, raw_fit, is_unfit)
     undetermined = [i for i, estimate in enumerate(estimates) if not isfinite(estimate.error)]
     values = np.array([estimate.value for estimate in estimates])
     combinations = () if is_unfit else determined_combinations(problem.unknowns, values, uncertainty, undetermined)
     deviations = np.sqrt(np.diag(uncertainty.covariance))
     remarks = (
-        unfit_remark(columns) if is_unfit else fit_remarks(problem, course, columns, estimates, several, undetermined)
+        unfit_remark(columns)
+        if is_unfit
+        else fit_remarks(problem, raw_fit, columns, estimates, ambiguous, undetermined)
     )
     return ParameterFit(
         fmu=fmu,
         estimates=estimates,
         combinations=combinations,
-        profiles=() if is_unfit else make_profiles(problem, course),
+        profiles=() if is_unfit else make_profiles(problem, raw_fit),
         correlation=uncertainty.covariance / np.outer(deviations, deviations),
         columns=columns,
-        remarks=(*remarks, *course.doubts),
+        remarks=(*remarks, *raw_fit.doubts),
         notes=tuple(notes),
         describes_record=not is_unfit,
         squares=uncertainty.squares,
         n_independent=count_independent(problem, uncertainty),
-        n_searches=course.n_searches,
+        n_searches=raw_fit.n_searches,
         n_runs=n_runs,
         seconds=seconds,
-        log=tuple(course.log),
+        log=tuple(raw_fit.log),
         records=problem.records,
         predictions=tuple(predictions),
     )
@@ -88,8 +90,9 @@ def find_rests(
 ) -> list[bool]:
     """Return for every observed column of every record whether it is at rest, in the fit and in the record.
 
-    Its range is then that of its noise, which residuals cannot be small against. The record is at rest where residuals,
-    even of coloured noise, average out over parts of it; those of a drift or of a slip that the model lacks do not.
+    The range of such a column is that of its noise, so the residuals cannot be small relative to it. A record is at
+    rest if its residuals, even those of coloured noise, average out over its parts; residuals of a drift or of a slip
+    that the model lacks do not.
     """
     rests = []
     for record, prediction, e in zip(records, predictions, residuals, strict=True):
@@ -99,21 +102,21 @@ def find_rests(
     return rests
 
 
-def make_estimates(problem: FitProblem, course: FitCourse, is_unfit: bool) -> tuple[tuple[Estimate, ...], list[str]]:
+def make_estimates(problem: FitProblem, raw_fit: RawFit, is_unfit: bool) -> tuple[tuple[Estimate, ...], list[str]]:
     """Return the estimates, and the names of those whose intervals hold other minima."""
-    z, uncertainty, several, estimates = course.z, course.uncertainty, [], []
+    z, uncertainty, ambiguous, estimates = raw_fit.z, raw_fit.uncertainty, [], []
     loose = uncertainty.deviations > INDETERMINATE
     for i, unknown in enumerate(problem.unknowns):
         value = unknown.to_value(float(z[i]))
         if is_unfit:
             estimates.append(Estimate(unknown.name, value, nan, nan, nan, unknown.unit, ""))
             continue
-        sides = {side: course.ends[i, side] for side in (-1, 1)}
-        for minimum in course.other_minima:
+        sides = {side: raw_fit.ends[i, side] for side in (-1, 1)}
+        for minimum in raw_fit.other_minima:
             for side, end in sides.items():
                 if end is not None and (minimum[i] - end) * side > 1e-3 * abs(z[i] - end):
                     sides[side] = float(minimum[i])
-                    several.append(unknown.name)
+                    ambiguous.append(unknown.name)
         low, high = unknown.value_interval(sides[-1], sides[1])
         deviation = unknown.error_of(float(uncertainty.deviations[i]), value)
         if low is None or high is None or loose[i]:
@@ -122,19 +125,19 @@ def make_estimates(problem: FitProblem, course: FitCourse, is_unfit: bool) -> tu
             error = max(deviation, (high - low) / 2 / uncertainty.quantile)
         ends = -inf if low is None else low, inf if high is None else high
         estimates.append(Estimate(unknown.name, value, error, *ends, unknown.unit, ""))
-    return tuple(estimates), [*dict.fromkeys(several)]
+    return tuple(estimates), [*dict.fromkeys(ambiguous)]
 
 
-def make_profiles(problem: FitProblem, course: FitCourse) -> tuple[Profile, ...]:
+def make_profiles(problem: FitProblem, raw_fit: RawFit) -> tuple[Profile, ...]:
     """Return the profiles of the unknowns, where the squares with each value are finite."""
     profiles = []
     for i, unknown in enumerate(problem.unknowns):
         points = sorted(
             (unknown.to_value(coordinate), excess)
             for coordinate, excess in (
-                (float(course.z[i]), 0.0),
-                *course.profiles.get((i, -1), ()),
-                *course.profiles.get((i, 1), ()),
+                (float(raw_fit.z[i]), 0.0),
+                *raw_fit.profiles.get((i, -1), ()),
+                *raw_fit.profiles.get((i, 1), ()),
             )
         )
         profiles.append(Profile(unknown.name, *zip(*points, strict=True)))
@@ -152,14 +155,14 @@ def unfit_remark(columns: Sequence[ColumnResiduals]) -> list[str]:
 
 def fit_remarks(
     problem: FitProblem,
-    course: FitCourse,
+    raw_fit: RawFit,
     columns: Sequence[ColumnResiduals],
     estimates: Sequence[Estimate],
-    several: Sequence[str],
+    ambiguous: Sequence[str],
     undetermined: Sequence[int],
 ) -> list[str]:
     """Return the remarks on a fit."""
-    uncertainty, remarks = course.uncertainty, []
+    uncertainty, remarks = raw_fit.uncertainty, []
     largest = max(columns, key=lambda column: column.residual / column.noise)
     if uncertainty.correlation or largest.residual > ROUGH * largest.noise:
         remarks.append(
@@ -177,9 +180,9 @@ def fit_remarks(
         remarks.append(
             f"The inputs between their samples are uncertain, which affects {', '.join(shifted)}: sample them faster."
         )
-    if several:
-        remarks.append(f"Other values fit as well; the intervals of {', '.join(several)} include them.")
-    tails = [estimates[i].name for i in dict.fromkeys(course.flat_tails) if isfinite(estimates[i].error)]
+    if ambiguous:
+        remarks.append(f"Other values fit as well; the intervals of {', '.join(ambiguous)} include them.")
+    tails = [estimates[i].name for i in dict.fromkeys(raw_fit.flat_tails) if isfinite(estimates[i].error)]
     if tails:
         remarks.append(
             f"Values of {', '.join(tails)} far outside of their intervals fit nearly as well, because a small part of "

@@ -70,7 +70,7 @@ class FitProblem:
         return self.fixed | fitted
 
     def predict(self, z: np.ndarray, selection: Selection) -> list[np.ndarray] | None:
-        """Return what the sensors show at the selected samples of each record; None if the FMU refuses the values."""
+        """Return the sensor signals at the selected samples of each record; None if the FMU refuses the values."""
         if max(map(abs, z.tolist())) > MAX_COORDINATE:
             return None
         predicted = []
@@ -82,7 +82,7 @@ class FitProblem:
         return predicted
 
     def predict_record(self, z: np.ndarray, record: MeasuredRecord, i: int, index: np.ndarray) -> np.ndarray | None:
-        """Return what the sensors show at samples of a record, with the values of record `i`; None if refused."""
+        """Return the sensor signals at samples of a record, with the values of record `i`; None if refused."""
         delays = self.sensor_values(z, i, DELAY)
         y = record.simulate(self.values(z, i), index, delays)
         if y is None:
@@ -141,7 +141,7 @@ class FitProblem:
     def jacobian(
         self, z: np.ndarray, e: np.ndarray, selection: Selection, free: np.ndarray, central: bool
     ) -> np.ndarray:
-        """Return the derivatives (n, free) of the residuals e (n,); a side that is refused is left out."""
+        """Return the derivatives (n, free) of the residuals e (n,), one-sided if the FMU refuses the other side."""
         columns, h = np.zeros((len(e), len(free))), self.steps[central]
         for j, i in enumerate(free):
             d = h * np.eye(len(z))[i]
@@ -191,8 +191,8 @@ class FitProblem:
         free : numpy.ndarray, optional
             Indices of the coordinates to fit; by default all.
         goal : float
-            Sum of squares that matters: the steps also end where `max_steps` like the last two would not reach it, and
-            the last one gains less than the one before. The first steps along a curved valley gain more and more.
+            Target for the sum of squares. The steps also end if the last one gains less than the one before and
+            `max_steps` such steps would not reach the goal: along a curved valley the first steps gain more and more.
         """
         free = np.arange(len(z)) if free is None else free
         e, damping = self.residuals(z, selection), 1e-2
@@ -217,7 +217,7 @@ class FitProblem:
                 if new is not None and new @ new < squares:
                     break
                 if new is None:
-                    self.region.learn(self.is_refused, z, step)
+                    self.region.add_refusal(self.is_refused, z, step)
                 damping = max(damping * 2.0 ** (n + 1), 1e-8)
             else:
                 return squares, z
@@ -239,19 +239,19 @@ class FitProblem:
         selection: Selection,
         free: np.ndarray,
     ) -> np.ndarray:
-        """Return the correction of the `free` coordinates of a step that follows a curved valley, or zeros.
+        """Return a correction of the `free` coordinates for a step along a curved valley; zeros without one.
 
         References
         ----------
         M. K. Transtrum, J. P. Sethna, Improvements to the Levenberg-Marquardt algorithm for nonlinear least-squares
         minimization, arXiv:1201.5885 (2012)
         """
-        none = np.zeros(len(free))
+        zeros = np.zeros(len(free))
         near = self.residuals(z + PROBE_SHARE * step, selection)
         if near is None:
-            return none
+            return zeros
         acceleration = 2 / PROBE_SHARE * ((near - e) / PROBE_SHARE - jacobian @ step[free])
         correction = self.region.constrained_step(matrix, jacobian.T @ acceleration, z + step, free) / 2
         scale = np.sqrt(np.diag(matrix))
         is_small = np.linalg.norm(scale * correction) < MAX_CORRECTION * np.linalg.norm(scale * step[free])
-        return correction if is_small else none
+        return correction if is_small else zeros

@@ -8,8 +8,8 @@ from .parameter_fit import CLEAR_DIFFERENCE, ComparedLaw, LawComparison, Paramet
 def compare_laws(fits: Sequence[ParameterFit]) -> LawComparison:
     """Compare fits of two or more FMUs to the same samples.
 
-    Correlated residuals count as fewer: as many as those of the law with the smallest residuals. Those of a wrong law
-    are correlated because it is wrong.
+    Correlated residuals count as fewer independent ones. Their number is that of the law with the smallest residuals,
+    because those of a wrong law are correlated by its error.
 
     References
     ----------
@@ -28,7 +28,7 @@ def compare_laws(fits: Sequence[ParameterFit]) -> LawComparison:
 
 
 def verdict(laws: Sequence[ComparedLaw], describes_record: bool) -> str:
-    """Return what the comparison says, in a sentence."""
+    """Return the conclusion of the comparison, in a sentence."""
     best, close = laws[0].fmu, [law.fmu for law in laws[1:] if law.difference < CLEAR_DIFFERENCE]
     others = " and ".join(f"{law.difference:.3g} ({law.fmu})" for law in laws[1:])
     if close:

@@ -1,4 +1,4 @@
-"""A measured record as a fit uses it: samples, noise, inputs between samples, and the run at the same times."""
+"""A measured record in a fit: samples, noise, inputs between samples, and the run at the same times."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -12,7 +12,7 @@ from .noise import bin_means, estimate_noise
 
 MAX_SAMPLES = 2500  # twice as many are averaged to this number of means of neighbours
 INPUT_POINTS = 500  # of an input that suffice for a search
-MAX_PARTS = 32  # that are kept
+MAX_PARTS = 32  # in the cache of a record
 SHORTEST_STEP = 1e-6  # between communication points, in intervals between samples
 
 
@@ -27,8 +27,21 @@ class RecordPart:
 
 @dataclass(frozen=True)
 class RecordData:
-    """A record in the units of the FMU: times (n,) in s, observed columns (n, columns), inputs (n,) by name, and the
-    standard deviation of the noise of each column, if it is known."""
+    """A record in the units of the FMU.
+
+    Attributes
+    ----------
+    name : str
+        Name of the record.
+    t : numpy.ndarray
+        Times (n,) in s.
+    y : numpy.ndarray
+        Observed columns (n, columns).
+    inputs : mapping
+        Inputs (n,) by name.
+    sigma : tuple of float or None
+        Standard deviation of the noise of each column; None if it is not known.
+    """
 
     name: str
     t: np.ndarray
@@ -38,7 +51,7 @@ class RecordData:
 
 
 class MeasuredRecord:
-    """Samples y (n, columns) at the times t (n,), the inputs that acted, and the runs at the same times.
+    """Samples y (n, columns) at the times t (n,), the inputs between them, and the runs at the same times.
 
     Parameters
     ----------
@@ -110,7 +123,7 @@ class MeasuredRecord:
         return self.run(values) if len(index) == len(self.t) else self.part(index).run(values)
 
     def part(self, index: np.ndarray) -> RecordPart:
-        """Return what a run for the samples `index` needs. It is kept, for an index serves many runs."""
+        """Return the data of a run for the samples `index`. They are cached, because many runs use the same index."""
         if id(index) not in self.parts:
             if len(self.parts) >= MAX_PARTS:
                 self.parts.clear()
@@ -131,20 +144,20 @@ class MeasuredRecord:
         """
         t, begin = self.t[index], self.t[0]
         shortest = SHORTEST_STEP * (self.t[-1] - begin) / len(self.t)  # an FMU may refuse tiny steps
-        earlier = [t - delays.get(j, 0.0) for j in range(len(self.simulator.spec.outputs))]
-        shown = [np.where(shifted_t - begin > shortest, shifted_t, begin) for shifted_t in earlier]
+        shifted = [t - delays.get(j, 0.0) for j in range(len(self.simulator.spec.outputs))]
+        sensor_times = [np.where(times - begin > shortest, times, begin) for times in shifted]
         knots, inputs = self.t[[0, index[-1]]], {}
         if self.inputs and len(index) == len(self.t):
             knots, inputs = self.fine_t, self.driven
         elif self.inputs:
             grid = np.arange(0, index[-1] + 1, max(1, len(self.t) // INPUT_POINTS))
             knots, inputs = self.t[grid], {name: u[grid] for name, u in self.inputs.items()}
-        points = np.unique(np.concatenate(shown))
-        times = merge_points(points, knots, shortest)
-        y = self.prepare(points, times, {name: np.interp(times, knots, u) for name, u in inputs.items()})(values)
+        points = np.unique(np.concatenate(sensor_times))
+        steps = merge_points(points, knots, shortest)
+        y = self.prepare(points, steps, {name: np.interp(steps, knots, u) for name, u in inputs.items()})(values)
         if y is None:
             return None
-        return np.stack([y[np.searchsorted(points, shifted_t), j] for j, shifted_t in enumerate(shown)], axis=1)
+        return np.stack([y[np.searchsorted(points, times), j] for j, times in enumerate(sensor_times)], axis=1)
 
     def quantisation_errors(self, y: np.ndarray) -> np.ndarray:
         """Return the errors (n, columns) that the quantisers of a record of the signals y (n, columns) would make.
@@ -159,17 +172,17 @@ class MeasuredRecord:
             errors[:, j] = bin_means(column_errors, self.width) if self.width > 1 else column_errors
         return errors
 
-    def means_hold(self, values: Mapping[str, float]) -> bool:
-        """Return whether the means of the outputs over the samples are the outputs at the mean times."""
+    def can_be_averaged(self, values: Mapping[str, float]) -> bool:
+        """Return whether the means of the outputs over neighbouring samples are the outputs at their mean times."""
         if self.width == 1 or self.inputs:
             return True
-        y, whole = self.run(values), self.prepare(self.sampled_t, self.sampled_t, {})(values)
-        if y is None or whole is None:
+        y, at_samples = self.run(values), self.prepare(self.sampled_t, self.sampled_t, {})(values)
+        if y is None or at_samples is None:
             return False
-        return bool(np.abs((bin_means(whole, self.width) - y) / self.noise).max() < 0.3)
+        return bool(np.abs((bin_means(at_samples, self.width) - y) / self.noise).max() < 0.3)
 
-    def stretches(self, shares: Sequence[float], points: int) -> list[np.ndarray]:
-        """Return samples of longer and longer parts of the record, each with a share of all motion."""
+    def growing_parts(self, shares: Sequence[float], points: int) -> list[np.ndarray]:
+        """Return samples of growing parts of the record; each part has a share of the whole motion."""
         n, width = len(self.t), max(1, len(self.t) // 200)
         edges = np.arange(0, n, width)
         smooth = np.add.reduceat(self.y, edges) / np.diff(np.append(edges, n))[:, None]

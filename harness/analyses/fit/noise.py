@@ -6,11 +6,12 @@ from ..estimation.noise import interpolation_residuals, residual_correlation, ro
 
 MAX_DIVISOR = 8  # of the smallest difference of two levels that is tried as the step of a quantiser
 MAX_STEP_ERROR = 0.02  # of a step, by which levels may miss multiples of it
-FEW_LEVELS = 100  # at most, none a step apart perhaps: larger divisors are tried, with levels that hit multiples
+# with fewer levels, none of which may be one step apart, larger divisors are tried with a smaller error
+FEW_LEVELS = 100
 MAX_DIVISOR_OF_FEW, MAX_STEP_ERROR_OF_FEW = 10_000, 1e-5
 SMALLEST_NOISE = 1e-9  # of the range
 SUMMED_SHARES = (20, 60, 200)  # sums are over so many parts of the record
-SHORTEST_CORRELATION = 0.05  # at which the sum of correlations ends
+SHORTEST_CORRELATION = 0.05  # correlation at which the sum of correlations ends
 
 
 def estimate_noise(t: np.ndarray, x: np.ndarray) -> tuple[float, float]:

@@ -14,9 +14,17 @@ SMALLEST_MEAN_SQUARE = 1e-12  # in units of the noise
 
 @dataclass(frozen=True)
 class Profile:
-    """Profile likelihood of an unknown: values (m,), and the least squares with each value.
+    """Profile likelihood of an unknown.
 
-    `excess` (m,) is the sum of squares above the minimum, in units of the limit at which the 95 % interval ends.
+    Attributes
+    ----------
+    name : str
+        Name of the unknown.
+    value : tuple of float
+        Values (m,) of the unknown.
+    excess : tuple of float
+        Least sum of squares (m,) with each value, above the minimum and in units of the limit at which the 95 %
+        interval ends.
     """
 
     name: str
@@ -26,7 +34,19 @@ class Profile:
 
 @dataclass(frozen=True)
 class Validation:
-    """Records that were not fitted: residuals of each column, samples, predicted signals (n, columns), and remarks."""
+    """Prediction of records that were not fitted.
+
+    Attributes
+    ----------
+    columns : tuple of ColumnResiduals
+        Residuals of each observed column.
+    records : tuple of MeasuredRecord
+        The records.
+    predictions : tuple of numpy.ndarray
+        Predicted signals (n, columns) of each record at its times.
+    remarks : tuple of str
+        Remarks on columns that are predicted badly.
+    """
 
     columns: tuple[ColumnResiduals, ...]
     records: tuple[MeasuredRecord, ...]
@@ -61,7 +81,17 @@ class ComparedLaw:
 
 @dataclass(frozen=True)
 class LawComparison:
-    """Laws, best first, the number of residuals that count as independent, and the verdict in a sentence."""
+    """Comparison of laws that were fitted to the same records.
+
+    Attributes
+    ----------
+    laws : tuple of ComparedLaw
+        The laws, best first.
+    n_independent : float
+        Number of residuals that count as independent.
+    verdict : str
+        Conclusion in a sentence.
+    """
 
     laws: tuple[ComparedLaw, ...]
     n_independent: float
@@ -107,7 +137,7 @@ class ParameterFit:
     combinations : tuple of Estimate
         Combinations that the record determines, of parameters that it does not.
     profiles : tuple of Profile
-        Of the estimates, in their order; empty if the fit does not describe the record.
+        Profiles of the estimates, in their order; empty if the fit does not describe the record.
     correlation : numpy.ndarray
         Correlation (k, k) of the estimates.
     columns : tuple of ColumnResiduals
@@ -127,13 +157,13 @@ class ParameterFit:
     seconds : float
         Processor time.
     log : tuple of str
-        Course of the search.
+        A line for each search.
     records : tuple of MeasuredRecord
         The fitted records.
     predictions : tuple of numpy.ndarray
         Fitted signals (n, columns) of each record at its times.
     validation : Validation or None
-        What the values predict for records that were not fitted.
+        Prediction of records that were not fitted.
     against : tuple of ParameterFit
         Fits of other FMUs to the same records.
     comparison : LawComparison or None

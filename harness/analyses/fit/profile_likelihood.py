@@ -13,13 +13,13 @@ from .fit_problem import FitProblem
 from .uncertainty import Uncertainty
 
 MAX_TRIALS = 14
-MAX_STEPS, MIN_GAIN = 40, 5e-4  # of a fit of the other coordinates; least gain of a step, in units of the limit
+MAX_STEPS, MIN_GAIN = 40, 5e-4  # of a fit of the other coordinates; smallest gain of a step, in units of the limit
 LONGEST_FIRST_STEP = 0.25  # distance of the first trial
-MIN_GROWTH, MAX_GROWTH = 0.05, 2.0  # next step outwards: least share of the distance, and ratio to the last step
+MIN_GROWTH, MAX_GROWTH = 0.05, 2.0  # next step outwards: smallest share of the distance, and ratio to the last step
 MIN_SHARE, MAX_SHARE = 0.1, 0.95  # of a bracket, between which the next trial lies
 FARTHEST = 2.0  # times the farthest inner trial, up to which a parabola is extrapolated
 CLOSE = 0.02  # difference of a height from 1 at which a trial is the end
-JUMP, SHORT = 0.1, 0.1  # height above what is expected of a higher branch; relative step that need not be shorter
+JUMP, SHORT = 0.1, 0.1  # excess height that indicates a higher branch; relative step that need not be shorter
 NARROW = 0.01  # relative width of a bracket that needs no more trials, where the squares jump
 BETTER = 0.02  # of the limit, by which the squares of a better minimum are lower
 NEAR_LIMIT = 0.05  # distance of a coordinate from the limits of the fit at which it has no bound
@@ -34,11 +34,11 @@ class Bound:
     Attributes
     ----------
     end : float or None
-        The coordinate at the end of the interval; None if there is no end.
+        Coordinate of the end; None if the interval has none.
     better : numpy.ndarray or None
-        Coordinates (k,) of a better minimum, if the profile met one.
+        Coordinates (k,) of a lower minimum, if the profile reaches one.
     profile : tuple of (float, float)
-        Coordinates of the profile, with the squares above the minimum in units of the limit.
+        Coordinates of the profile, and the squares above the minimum in units of the limit.
     has_flat_tail : bool
         Whether values far beyond the end fit nearly as well as those at the end. A small part of the record excludes
         them, such as the last samples, in which a slip begins or does not.
@@ -75,8 +75,8 @@ class Trial:
 class Bracket:
     """Trials of one side of a profile, about the distance at which it reaches its limit.
 
-    A trial that is much higher than the inner ones let expect may be in a minimum of the other coordinates that lies
-    higher. It is outside until trials nearer to the inner ones show that the profile is as steep.
+    A trial that is much higher than the inner ones suggest may be in a higher minimum of the other coordinates. It
+    counts as outside until trials nearer to the inner ones show that the profile is as steep.
 
     Parameters
     ----------
@@ -122,7 +122,7 @@ class Bracket:
         return trial.height > last.height + self.slope * step + JUMP and step > SHORT * trial.distance
 
     def add(self, trial: Trial) -> None:
-        """Add a trial, which lies between the last inner and the outer one, or is the outer one anew."""
+        """Add a trial between the last inner and the outer one, or one that replaces the outer one."""
         outer = self.outer
         if trial.height < 1 and not self.is_jump(trial):
             self.inner.append(trial)
@@ -161,11 +161,11 @@ class Bracket:
         is_narrow = outer is not None and outer.height >= 1 and outer.distance - last.distance < NARROW * outer.distance
         return outer if is_narrow else None
 
-    def last_resort(self) -> Trial | None:
-        """Return the end of a profile that took too many trials; None if it does not reach its limit.
+    def fallback_end(self) -> Trial | None:
+        """Return the end of a profile after too many trials; None if it does not reach its limit.
 
-        Trials on higher branches may have ended it too early: it reaches at least to where the line through its inner
-        trials does.
+        Trials on higher branches may have ended it too early: the end is at least that of the line through the inner
+        trials.
         """
         if self.outer is None:
             return None
@@ -197,7 +197,7 @@ def profile_bound(
     Parameters
     ----------
     ends_at_better : bool
-        Whether there is no end where a better minimum is met; otherwise the profile is followed on.
+        Whether the search stops, without an end, at a better minimum; otherwise it follows the profile further.
     excess : float
         Squares at z above the minimum, less than those of the limit; above 0 where z is another minimum.
     """
@@ -215,24 +215,24 @@ def profile_bound(
         starts = [bracket.extrapolate(distance), bracket.inner[-1].z.copy()]
         for start in starts:
             start[i] = z[i] + side * distance
-        squares, there = fit_others(
+        squares, position = fit_others(
             problem, z, starts, others, MIN_GAIN * target / uncertainty.squares, uncertainty.squares + target
         )
         if squares < uncertainty.squares - BETTER * target:
-            better = there
+            better = position
             if ends_at_better:
                 return Bound(None, better)
         height = float(np.sqrt(max(squares - uncertainty.squares, 0.0) / target))
-        bracket.add(Trial(distance, height, there, len(bracket.inner)))
+        bracket.add(Trial(distance, height, position, len(bracket.inner)))
         end = bracket.end()
         if end or bracket.inner[-1].distance >= farthest:
             break
     else:
-        end = bracket.last_resort()
+        end = bracket.fallback_end()
     trials = [*bracket.inner[1:], *([end] if end and end.height >= 1 else [])]
     profile = tuple((float(trial.z[i]), trial.height**2) for trial in trials if np.isfinite(trial.height))
-    there = next(trial.z for trial in (end, bracket.inner[-1]) if trial and np.isfinite(trial.height))
-    if end is None or depends_on_limits(problem, there, i, target):
+    position = next(trial.z for trial in (end, bracket.inner[-1]) if trial and np.isfinite(trial.height))
+    if end is None or depends_on_limits(problem, position, i, target):
         return Bound(None, better, profile)
     coordinate = float(z[i] + side * end.distance)
     return Bound(coordinate if low < coordinate < high else None, better, profile)
@@ -272,10 +272,10 @@ def search_bound(
 def fit_others(
     problem: FitProblem, z: np.ndarray, starts: list[np.ndarray], others: np.ndarray, min_gain: float, limit: float
 ) -> tuple[float, np.ndarray]:
-    """Return the least squares and the coordinates from the best of the starts (k,) on, with only the `others` fitted.
+    """Fit the `others` from the best of the starts (k,); return the sum of squares and the coordinates.
 
-    The squares are infinite if the region holds no values of the others there, and need not be the least ones above the
-    limit. The way from z (k,) to a start shows where the FMU refuses values.
+    The sum is infinite if the region holds no such values of the others, and need not be the smallest one above the
+    limit. The path from z (k,) to a start shows where the FMU refuses values.
     """
     best, lowest = starts[0], np.inf
     for start in starts:
@@ -285,7 +285,7 @@ def fit_others(
         start[others] += into_region
         e = problem.residuals(start, problem.all)
         if e is None:
-            problem.region.learn(problem.is_refused, z, start - z)
+            problem.region.add_refusal(problem.is_refused, z, start - z)
         elif e @ e < lowest:
             best, lowest = start, e @ e
     return problem.minimize(best, problem.all, MAX_STEPS, min_gain, others, goal=limit)
@@ -294,7 +294,7 @@ def fit_others(
 def depends_on_limits(problem: FitProblem, z: np.ndarray, i: int, target: float) -> bool:
     """Return whether coordinate i is at a limit of the fit at z (k,), or wider limits of others lower its profile.
 
-    At a minimum within limits, the squares fall by their slope where a limit moves, whatever the others then do.
+    At a minimum within limits, the squares fall by at least their slope times the shift of a limit.
     """
     limits = np.array([unknown.limits for unknown in problem.unknowns])
     outward = np.where(z < limits[:, 0] + NEAR_LIMIT, -1.0, 0.0) + np.where(z > limits[:, 1] - NEAR_LIMIT, 1.0, 0.0)

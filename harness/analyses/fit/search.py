@@ -1,10 +1,10 @@
-"""Global search for the best values: continuation in time, and differential evolution, in turn.
+"""Global search for the best values: continuation in time and differential evolution alternate.
 
-Continuation in time judges a Sobol set on the first stretch of the record, where the squares have few minima, and
-carries what fits into longer and longer stretches. Every other evolution starts from the minima so far, which it
-combines. A search of one kind repeats its own errors, so the search ends where searches of both kinds have found the
-same minimum. A minimum whose residuals are as small as the noise is also accepted where two more searches find nothing
-lower; other residuals are coloured noise or those of a wrong minimum, and more searches must find it.
+Continuation in time compares a Sobol set on the first part of the record, where the squares have few minima, and
+refines the best points on growing parts. Every other evolution also starts from the minima found so far, which it
+combines. A search of one kind repeats its own errors, so the search ends when searches of both kinds have found the
+same minimum. A minimum whose residuals are as small as the noise is also accepted after two more searches without a
+lower one. Larger residuals are coloured noise or those of a wrong minimum, so more searches must find such a minimum.
 """
 
 from collections.abc import Callable
@@ -17,10 +17,10 @@ from scipy.stats import qmc
 
 from .fit_problem import FitProblem, Selection
 
-STRETCHES, SURVIVORS, SOBOL_POINTS, SEARCH_SAMPLES = (0.15, 0.3, 0.55, 1.0), (40, 24, 12, 6), 2048, 250
+PART_SHARES, SURVIVORS, SOBOL_POINTS, SEARCH_SAMPLES = (0.15, 0.3, 0.55, 1.0), (40, 24, 12, 6), 2048, 250
 EVOLUTION = {"maxiter": 150, "tol": 1e-2}
 POPULATION = 10  # members of an evolution for each unknown, at least
-COMBINED = 4  # of so many searches in turn, the last one is an evolution that starts from the minima so far
+COMBINED = 4  # every so many searches, an evolution also starts from the minima found so far
 SMALL_GAIN = 0.01  # relative reduction of the squares below which a minimum is not lower
 PATIENCE = 40  # generations without a lower minimum, after which an evolution ends
 NEAR_KNOWN = 1.2  # times the squares of the known minimum, at which an evolution has found it again
@@ -31,14 +31,28 @@ EXPLAINED = 4.0  # standard errors of the squares of white noise: a minimum with
 REQUIRED_AFTER = 2  # searches that find nothing lower than such a minimum
 REFINED = 4  # minima of a search that are refined
 ROUGH = 1.5  # times the noise: larger residuals ask for more searches
-DISTINCT = 0.02  # distance of coordinates from which minima are different ones
+DISTINCT = 0.02  # distance of coordinates from which minima are distinct
 
 Minimum = tuple[float, np.ndarray]  # sum of squares, coordinates
 
 
 @dataclass
 class SearchResult:
-    """The best minimum, all others, how many searches there were, how many found the best, and whether they suffice."""
+    """Result of a search.
+
+    Attributes
+    ----------
+    best : Minimum or None
+        Lowest minimum; None if the FMU refuses all values that were tried.
+    minima : list of Minimum
+        All minima.
+    n_searches, n_hits : int
+        Number of searches, and of those that found the best minimum.
+    is_agreed : bool
+        Whether enough searches found it.
+    log : list of str
+        A line for each search.
+    """
 
     best: Minimum | None = None
     minima: list[Minimum] = field(default_factory=list)
@@ -66,11 +80,13 @@ def search(
     for number in range(1, MAX_SEARCHES + 1):
         report((number - 1) / MAX_SEARCHES)
         is_evolution = number % 2 == 0
-        combined = result.minima if number % COMBINED == 0 else []
-        is_known = not combined and ((result.best and result.best[0] < explained) or result.n_hits >= REQUIRED)
-        known = result.best[1] if result.best and is_known else None
+        initial_minima = result.minima if number % COMBINED == 0 else []
+        is_known = not initial_minima and ((result.best and result.best[0] < explained) or result.n_hits >= REQUIRED)
+        known_minimum = result.best[1] if result.best and is_known else None
         candidates = (
-            evolve(problem, number, known, combined) if is_evolution else continue_in_time(problem, number, starts)
+            evolve(problem, number, known_minimum, initial_minima)
+            if is_evolution
+            else continue_in_time(problem, number, starts)
         )
         minima = [problem.minimize(z, selection, 20, 1e-6) for _, z in candidates[:REFINED]]
         result.minima += minima
@@ -94,15 +110,15 @@ def search(
 
 
 def continue_in_time(problem: FitProblem, seed: int, starts: np.ndarray) -> list[Minimum]:
-    """Return the minima that survive from a Sobol set and the `starts` as the record grows."""
-    parts = stretches(problem)
+    """Return the minima that remain of a Sobol set and the `starts` on growing parts of the records."""
+    parts = growing_parts(problem)
     points = np.vstack([starts, sobol_set(problem, seed, SOBOL_POINTS)])
     costs = np.array([absolute_cost(problem, z, parts[0]) for z in points])
     order = [i for i in np.argsort(costs)[: SURVIVORS[0]] if costs[i] < REFUSED_COST]
     order += [i for i in range(len(starts)) if i not in order and costs[i] < REFUSED_COST]
     minima = [(float(costs[i]), points[i]) for i in order]
     for part, survivors in zip(parts, SURVIVORS, strict=True):
-        minima = distinct([problem.minimize(z, part, 6, 1e-3) for _, z in minima], survivors)
+        minima = select_distinct([problem.minimize(z, part, 6, 1e-3) for _, z in minima], survivors)
     return minima
 
 
@@ -111,25 +127,27 @@ def sobol_set(problem: FitProblem, seed: int, count: int) -> np.ndarray:
     return problem.low + (problem.high - problem.low) * qmc.Sobol(len(problem.unknowns), seed=seed).random(count)
 
 
-def evolve(problem: FitProblem, seed: int, known: np.ndarray | None, combined: list[Minimum]) -> list[Minimum]:
+def evolve(
+    problem: FitProblem, seed: int, known_minimum: np.ndarray | None, initial_minima: list[Minimum]
+) -> list[Minimum]:
     """Return the minima near the best members of a differential evolution of the absolute residuals.
 
     Least squares start from each new best member, which is near a minimum long before the population is.
 
     Parameters
     ----------
-    known : numpy.ndarray or None
+    known_minimum : numpy.ndarray or None
         Coordinates (k,) of a minimum that explains the records or that several searches found: the evolution ends when
         it finds one that is about as low.
-    combined : list of Minimum
+    initial_minima : list of Minimum
         Minima to start from, in addition to a Sobol set.
     """
-    part = stretches(problem)[-1]
-    enough = 0.0 if known is None else NEAR_KNOWN * problem.minimize(known, part, 6, 1e-3)[0]
+    part = growing_parts(problem)[-1]
+    goal = 0.0 if known_minimum is None else NEAR_KNOWN * problem.minimize(known_minimum, part, 6, 1e-3)[0]
     minima: list[Minimum] = []
     best_member, last_improvement = np.array([]), 0
     population = sobol_set(problem, seed, 2 ** ceil(log2(POPULATION * len(problem.unknowns))))
-    for i, (_, z) in enumerate(distinct(combined, len(population) // 2)):
+    for i, (_, z) in enumerate(select_distinct(initial_minima, len(population) // 2)):
         population[i] = np.clip(z, problem.low, problem.high)
 
     def minimize_from_best(intermediate_result: OptimizeResult) -> bool:
@@ -142,7 +160,7 @@ def evolve(problem: FitProblem, seed: int, known: np.ndarray | None, combined: l
                 last_improvement = intermediate_result.nit
             minima.append(minimum)
         is_idle = intermediate_result.nit - last_improvement >= PATIENCE
-        return is_idle or min(squares for squares, _ in minima) < enough
+        return is_idle or min(squares for squares, _ in minima) < goal
 
     differential_evolution(
         lambda columns: np.array([absolute_cost(problem, z, part) for z in columns.T]),
@@ -155,26 +173,26 @@ def evolve(problem: FitProblem, seed: int, known: np.ndarray | None, combined: l
         callback=minimize_from_best,
         **EVOLUTION,
     )
-    return distinct(minima, SURVIVORS[-1])
+    return select_distinct(minima, SURVIVORS[-1])
 
 
-def stretches(problem: FitProblem) -> list[Selection]:
-    """Return selections of longer and longer parts of the records."""
+def growing_parts(problem: FitProblem) -> list[Selection]:
+    """Return selections of growing parts of the records."""
     points = max(SEARCH_SAMPLES // len(problem.records), 60)
-    return [*zip(*(record.stretches(STRETCHES, points) for record in problem.records), strict=True)]
+    return [*zip(*(record.growing_parts(PART_SHARES, points) for record in problem.records), strict=True)]
 
 
 def absolute_cost(problem: FitProblem, z: np.ndarray, selection: Selection) -> float:
-    """Return the sum of absolute residuals, in which single events count less than in squares."""
+    """Return the sum of absolute residuals, to which single events contribute less than to squares."""
     e = problem.residuals(z, selection)
     return REFUSED_COST if e is None else float(np.abs(e).sum())
 
 
-def distinct(minima: list[Minimum], most: int) -> list[Minimum]:
+def select_distinct(minima: list[Minimum], most: int) -> list[Minimum]:
     """Return the lowest minima that differ from each other."""
-    kept: list[Minimum] = []
+    selected: list[Minimum] = []
     for squares, z in sorted(minima, key=lambda minimum: minimum[0]):
-        is_new = all(np.abs(z - other).max() > DISTINCT for _, other in kept)
-        if np.isfinite(squares) and len(kept) < most and is_new:
-            kept.append((squares, z))
-    return kept
+        is_new = all(np.abs(z - other).max() > DISTINCT for _, other in selected)
+        if np.isfinite(squares) and len(selected) < most and is_new:
+            selected.append((squares, z))
+    return selected

@@ -1,4 +1,4 @@
-"""Covariance of fitted values, and by how much the noise of the record exceeds white noise.
+"""Covariance of fitted values, and its increase by noise that is not white.
 
 Residuals that are not white carry less information than white ones: the covariance is that of the scores summed over
 blocks. A quantiser makes errors that depend on the signal: they are computed for signals near the fitted one.
@@ -14,7 +14,7 @@ from .fit_problem import FitProblem
 from .noise import correlation_length, significant_correlation
 
 STIFF = 100.0  # ratio of the axes of the squares from which one-sided differences are too coarse
-INDETERMINATE = 0.5  # relative standard error of what cannot be determined
+INDETERMINATE = 0.5  # relative standard error from which a value counts as not determined
 BLOCK_SIZES = (20, 60, 200, 600)
 MIN_BLOCKS, MAX_BLOCKS = 12, 400
 CORRELATED_DEGREES_OF_FREEDOM = 20  # of the intervals, where residuals are correlated
@@ -36,9 +36,9 @@ class Uncertainty:
     indeterminate : numpy.ndarray
         Directions (k, m) that the record does not determine.
     residuals : numpy.ndarray
-        In units of the noise.
+        Residuals (n,) in units of the noise.
     correlation : float
-        Of neighbouring residuals; 0 if they are white.
+        Correlation of neighbouring residuals; 0 if they are white.
     input_shift : numpy.ndarray
         Displacements (k,) by the error of the inputs between samples.
     """
@@ -78,7 +78,7 @@ def estimate_uncertainty(
     input_error : numpy.ndarray
         Changes (n,) of the residuals by the error of the inputs between samples.
     min_variance : float
-        Least variance of the residuals: 1 if the noise is known, otherwise 0.
+        Lower bound of the variance of the residuals: 1 if the noise is known, otherwise 0.
     """
     e = problem.residuals(z, problem.all)
     assert e is not None

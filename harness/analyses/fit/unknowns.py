@@ -9,7 +9,8 @@ import numpy as np
 OFFSET, GAIN, DELAY = "offset", "gain", "delay"  # of a sensor
 SENSOR = (OFFSET, GAIN, DELAY)
 RANGE_FACTOR = 4.0  # of the range that is searched by default, about the start value of the FMU
-BEYOND_FACTOR = 2.0  # times the range, or so many quarters of one that holds zero, are the limits of a fit
+# limits of a fit beyond the range to search: a factor, or for a range that holds zero a number of its quarters
+BEYOND_FACTOR = 2.0
 
 
 @dataclass(frozen=True)

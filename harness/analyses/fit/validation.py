@@ -1,4 +1,4 @@
-"""Validation of a fit: what its values predict for records that were not fitted."""
+"""Validation of a fit by records that were not fitted."""
 
 from collections.abc import Iterator, Sequence
 
@@ -6,18 +6,18 @@ import numpy as np
 
 from ...errors import HarnessError
 from ..estimation.estimate import ColumnResiduals
-from .fit_course import FitCourse
 from .fit_description import column_residuals
 from .fit_problem import FitProblem
+from .fit_procedure import RawFit
 from .measured_record import MeasuredRecord, RecordData
 from .parameter_fit import Validation
 from .uncertainty import split_residuals
 
-WORSE = 2.0  # residuals of a validation record over those of the fitted ones, from which there is a remark
+WORSE = 2.0  # ratio of the residuals of validation and fitted records from which there is a remark
 
 
-def validate(problem: FitProblem, course: FitCourse, data: Sequence[RecordData]) -> Validation:
-    """Return what the fitted values predict for records that were not fitted.
+def validate(problem: FitProblem, raw_fit: RawFit, data: Sequence[RecordData]) -> Validation:
+    """Predict records that were not fitted with the fitted values.
 
     Raises
     ------
@@ -28,11 +28,11 @@ def validate(problem: FitProblem, course: FitCourse, data: Sequence[RecordData])
     fitted = problem.records[0]
     for record_data in data:
         record = MeasuredRecord(fitted.simulator, record_data, fitted.width > 1)
-        if not record.means_hold(problem.values(course.z, 0)):
+        if not record.can_be_averaged(problem.values(raw_fit.z, 0)):
             record = MeasuredRecord(fitted.simulator, record_data, binned=False)
         record.noise = np.where(np.ptp(record.y, axis=0) > 0.0, record.noise, fitted.noise)  # of a body at rest
         record.subdivide(fitted.subdivision)
-        prediction = problem.predict_record(course.z, record, 0, record.all)
+        prediction = problem.predict_record(raw_fit.z, record, 0, record.all)
         if prediction is None:
             raise HarnessError(
                 f"the FMU refuses the fitted values in the run of the validation record {record_data.name}"
@@ -44,18 +44,18 @@ def validate(problem: FitProblem, course: FitCourse, data: Sequence[RecordData])
     ]
     columns = column_residuals(records, residuals, problem.outputs)
     return Validation(
-        columns, tuple(records), tuple(predictions), tuple(validation_remarks(problem, course, columns, residuals))
+        columns, tuple(records), tuple(predictions), tuple(validation_remarks(problem, raw_fit, columns, residuals))
     )
 
 
 def validation_remarks(
-    problem: FitProblem, course: FitCourse, columns: Sequence[ColumnResiduals], residuals: Sequence[np.ndarray]
+    problem: FitProblem, raw_fit: RawFit, columns: Sequence[ColumnResiduals], residuals: Sequence[np.ndarray]
 ) -> Iterator[str]:
-    """Yield a remark for each column that the values predict much worse than they fit the fitted records.
+    """Yield a remark for each column whose residuals are much larger than those of the fitted records.
 
-    Both are compared without the effect of outliers if the fit is robust.
+    If the fit is robust, outliers have no effect on either.
     """
-    fitted = [root_mean_squares(e) for e in split_residuals(problem, course.uncertainty.residuals)]
+    fitted = [root_mean_squares(e) for e in split_residuals(problem, raw_fit.uncertainty.residuals)]
     limits = WORSE * np.maximum(np.max(fitted, axis=0), 1.0)
     ratios = np.concatenate([root_mean_squares(problem.limit_outliers(e)) for e in residuals])
     for column, ratio, limit in zip(columns, ratios, np.tile(limits, len(residuals)), strict=True):

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from ...analyses.estimation.estimate import ColumnResiduals, UsedSamples, shared_json
-from ...analyses.fit.fit_course import fit_records
 from ...analyses.fit.fit_description import describe_fit
+from ...analyses.fit.fit_procedure import fit_records
 from ...analyses.fit.law_comparison import compare_laws
 from ...analyses.fit.measured_record import MeasuredRecord
 from ...analyses.fit.parameter_fit import ParameterFit
@@ -182,12 +182,12 @@ def fit_tables(
     data = [record_data(resolved, table) for table in tables]
     unknowns = make_unknowns(resolved, data)
     with open_simulator(replace(resolved.shared, fmu=native_equivalent(request.run.fmu))) as simulator:
-        problem, course = fit_records(simulator, data, unknowns, resolved.fixed, request.robust, report, averages)
+        problem, raw_fit = fit_records(simulator, data, unknowns, resolved.fixed, request.robust, report, averages)
         prediction = (
-            validate(problem, course, [record_data(resolved, table) for table in validation]) if validation else None
+            validate(problem, raw_fit, [record_data(resolved, table) for table in validation]) if validation else None
         )
         notes = [note for table in (*tables, *validation) for note in table.notes]
-        fit = describe_fit(resolved.name, problem, course, notes, simulator.n_runs, process_time() - begun)
+        fit = describe_fit(resolved.name, problem, raw_fit, notes, simulator.n_runs, process_time() - begun)
     units = {name: resolved.variables[name].unit for name in request.observe}
     fit = replace(fit, columns=with_units(fit.columns, units))
     if prediction:

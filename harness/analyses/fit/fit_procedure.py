@@ -1,4 +1,4 @@
-"""Course of a fit: search, refinement, other minima and intervals."""
+"""Procedure of a fit: search, refinement, other minima and intervals."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from ...running.whole_run import Simulator
 from .fit_problem import FitProblem, Selection
 from .measured_record import MeasuredRecord, RecordData
 from .profile_likelihood import profile_bound, search_bound
-from .search import DISTINCT, Minimum, distinct, search
+from .search import DISTINCT, Minimum, search, select_distinct
 from .uncertainty import Uncertainty, estimate_uncertainty
 from .unknowns import Unknown
 
@@ -21,16 +21,35 @@ INPUT_CHANGE = 0.1  # of the noise, at which a finer subdivision is not needed
 SPLINE_RATIO = 15.0  # differences of splines through half of the samples, in errors of that through all
 MAX_THIN, THIN = 3000, 2000  # samples above which a search uses fewer, and their number
 DRAWS, MAX_OTHER_MINIMA, DRAW_SIZE = 24, 8, 0.3  # starts for other minima
-COARSE_SAMPLES = 500  # of each record, in which other minima are sought first
+COARSE_SAMPLES = 500  # of each record, used for the first search for other minima
 ROUNDS = 6  # starts, all but the first from better minima
 SHALLOW = 0.1  # variances of the residuals by which a minimum must be lower to count as better
 
 
 @dataclass
-class FitCourse:
-    """Intermediate results of a fit; ends and profiles by index of the unknown and side.
+class RawFit:
+    """Fit in the coordinates of the unknowns, before `describe_fit` converts it to their values.
 
-    `flat_tails` are the indices of the unknowns of which values far outside of the interval fit nearly as well.
+    Attributes
+    ----------
+    z : numpy.ndarray
+        Coordinates (k,) of the minimum.
+    uncertainty : Uncertainty
+        Uncertainty of these coordinates.
+    ends : dict
+        End of the 95 % interval by index of the unknown and side (-1 or 1); None if there is none.
+    profiles : dict
+        Coordinates and excess of the squares along each profile, by index of the unknown and side.
+    flat_tails : list of int
+        Indices of the unknowns of which values far outside of the interval fit nearly as well.
+    other_minima : list of numpy.ndarray
+        Coordinates (k,) of minima that are about as low.
+    doubts : list of str
+        Remarks on the search.
+    log : list of str
+        A line for each search.
+    n_searches : int
+        Number of searches.
     """
 
     z: np.ndarray
@@ -52,13 +71,13 @@ def fit_records(
     robust: bool,
     report: Callable[[float], None],
     averages: bool = True,
-) -> tuple[FitProblem, FitCourse]:
+) -> tuple[FitProblem, RawFit]:
     """Fit the unknowns.
 
     Parameters
     ----------
     averages : bool
-        Whether long records are fitted as means of neighbouring samples, where that changes nothing.
+        Whether long records are fitted as means of neighbouring samples, if these are the signal at their mean times.
 
     Raises
     ------
@@ -68,25 +87,25 @@ def fit_records(
     for record_data in data:
         if not np.ptp(record_data.y, axis=0).all():
             raise HarnessError(f"{record_data.name} shows no motion in a column: nothing can be determined from it")
-    warm: np.ndarray | None = None
+    warm_start: np.ndarray | None = None
     for binned in (True, False) if averages else (False,):
         records = [MeasuredRecord(simulator, record_data, binned) for record_data in data]
         problem = FitProblem(records, simulator.spec.outputs, unknowns, fixed, robust)
-        course = find_course(problem, warm, any(any(record_data.sigma) for record_data in data), report)
-        values = [problem.values(course.z, i) for i in range(len(records))]
-        if all(record.means_hold(record_values) for record, record_values in zip(records, values, strict=True)):
+        raw_fit = search_and_refine(problem, warm_start, any(any(record_data.sigma) for record_data in data), report)
+        values = [problem.values(raw_fit.z, i) for i in range(len(records))]
+        if all(record.can_be_averaged(record_values) for record, record_values in zip(records, values, strict=True)):
             break
-        warm = course.z
-    return problem, course
+        warm_start = raw_fit.z
+    return problem, raw_fit
 
 
-def find_course(
-    problem: FitProblem, warm: np.ndarray | None, noise_is_known: bool, report: Callable[[float], None]
-) -> FitCourse:
-    """Search, refine and find intervals; start again wherever a better minimum appears."""
-    starts = starting_points(problem, warm)
-    thin = thin_selection(problem)
-    result = search(problem, thin, starts, lambda share: report(0.5 * share))
+def search_and_refine(
+    problem: FitProblem, warm_start: np.ndarray | None, noise_is_known: bool, report: Callable[[float], None]
+) -> RawFit:
+    """Search, refine and find intervals; start again at each better minimum."""
+    starts = starting_points(problem, warm_start)
+    selection = thin_selection(problem)
+    result = search(problem, selection, starts, lambda share: report(0.5 * share))
     if result.best is None:
         raise HarnessError("the FMU refuses all values that were tried: give other ranges, as in --free k=10:1000")
     doubts = []
@@ -129,10 +148,10 @@ def find_course(
     others = [minimum for minimum in minima if np.abs(minimum[1] - z).max() > DISTINCT]
     extend_ends(problem, z, uncertainty, ends, others)
     other_minima = [position for _, position in others]
-    return FitCourse(z, uncertainty, ends, profiles, flat_tails, other_minima, doubts, result.log, result.n_searches)
+    return RawFit(z, uncertainty, ends, profiles, flat_tails, other_minima, doubts, result.log, result.n_searches)
 
 
-def starting_points(problem: FitProblem, warm: np.ndarray | None) -> np.ndarray:
+def starting_points(problem: FitProblem, warm_start: np.ndarray | None) -> np.ndarray:
     """Return the coordinates (m, k) of given start values and of an earlier fit."""
     middle = (problem.low + problem.high) / 2
     start_values = [
@@ -140,7 +159,7 @@ def starting_points(problem: FitProblem, warm: np.ndarray | None) -> np.ndarray:
         for i, unknown in enumerate(problem.unknowns)
     ]
     has_start = any(unknown.start is not None for unknown in problem.unknowns)
-    starts = ([np.array(start_values)] if has_start else []) + ([] if warm is None else [warm])
+    starts = ([np.array(start_values)] if has_start else []) + ([] if warm_start is None else [warm_start])
     return np.array(starts).reshape(len(starts), len(problem.unknowns))
 
 
@@ -174,9 +193,9 @@ def subdivide_inputs(problem: FitProblem, z: np.ndarray) -> np.ndarray:
     numpy.ndarray
         Changes (n,) of the residuals by the error of the splines through the samples of the inputs.
     """
-    none = np.zeros(problem.n_samples)
+    no_change = np.zeros(problem.n_samples)
     if not any(record.inputs for record in problem.records):
-        return none
+        return no_change
     before = problem.residuals(z, problem.all)
     parts = 1
     while parts < MAX_SUBDIVISION:
@@ -193,26 +212,26 @@ def subdivide_inputs(problem: FitProblem, z: np.ndarray) -> np.ndarray:
     coarse = problem.residuals(z, problem.all)
     for record in problem.records:
         record.subdivide(parts)
-    return none if coarse is None or before is None else (coarse - before) / SPLINE_RATIO
+    return no_change if coarse is None or before is None else (coarse - before) / SPLINE_RATIO
 
 
 def find_other_minima(
     problem: FitProblem, z: np.ndarray, uncertainty: Uncertainty, minima: list[Minimum], squares: float
 ) -> list[Minimum]:
-    """Return minima about as low as that at z (k,), found from those of the search and from draws around z."""
+    """Return minima about as low as that at z (k,), from the minima of the search and from draws around z."""
     limit = max(map(uncertainty.limit, range(len(z))))
     random = np.random.default_rng(0)
-    starts = [position for value, position in distinct(minima, MAX_OTHER_MINIMA) if value < squares + 3 * limit]
+    starts = [position for value, position in select_distinct(minima, MAX_OTHER_MINIMA) if value < squares + 3 * limit]
     eigenvalues, axes = np.linalg.eigh(uncertainty.covariance * uncertainty.inflation.mean())
     reach = 2 * np.minimum(np.sqrt(np.maximum(eigenvalues, 0.0)), DRAW_SIZE)
     starts += [z + axes @ (reach * random.normal(size=len(z))) for _ in range(DRAWS)]
     steps = 25 if problem.central else 12
     if problem.n_samples > 2 * COARSE_SAMPLES * len(problem.records):
-        few = tuple(np.unique(np.linspace(0, index[-1], COARSE_SAMPLES).astype(int)) for index in problem.all)
-        coarse = distinct([problem.minimize(start, few, steps, 1e-4) for start in starts], len(starts))
+        sparse = tuple(np.unique(np.linspace(0, index[-1], COARSE_SAMPLES).astype(int)) for index in problem.all)
+        coarse = select_distinct([problem.minimize(start, sparse, steps, 1e-4) for start in starts], len(starts))
         starts = [position for value, position in coarse if value < coarse[0][0] + 3 * limit]
     ends = [problem.minimize(start, problem.all, steps, 1e-6) for start in starts]
-    return distinct([end for end in ends if end[0] < squares + limit], len(ends))
+    return select_distinct([end for end in ends if end[0] < squares + limit], len(ends))
 
 
 def extend_ends(
@@ -222,7 +241,7 @@ def extend_ends(
     ends: dict[tuple[int, int], float | None],
     other_minima: list[Minimum],
 ) -> None:
-    """Follow the profile from the minimum that lies farthest out, if it lies where an interval ends or beyond."""
+    """Extend each interval by the profile from the farthest minimum, if that is near its end or beyond."""
     for (i, side), end in ends.items():
         below = [(max(squares - uncertainty.squares, 0.0), position) for squares, position in other_minima]
         below = [minimum for minimum in below if minimum[0] < uncertainty.limit(i)]
