@@ -41,7 +41,7 @@ def certify(file: Path) -> list[CertifiedFile]:
     Raises
     ------
     HarnessError
-        if the FMU is not built, does not offer both methods, or the methods disagree
+        If the FMU is not built, does not offer both methods, or the methods disagree.
     """
     fmu = file.with_suffix(".fmu")
     if not fmu.is_file():
@@ -100,15 +100,19 @@ def certify_default_run(
 
     Parameters
     ----------
-    model : class of the model inside its FMU
-    file : of the model or its FMU, for messages
-    values : parameter values other than the defaults
-    times : output times in s; by default the common points of the default run
+    model : type
+        Class of the model inside its FMU.
+    file : pathlib.Path
+        File of the model or of its FMU, for messages.
+    values : mapping, optional
+        Parameter values other than the defaults.
+    times : list of float, optional
+        Output times in s; by default the points that a default run and its certified result share.
 
     Raises
     ------
     HarnessError
-        if the FMU does not offer both methods, or they disagree
+        If the FMU does not offer both methods, or they disagree.
     """
     if missing := METHODS.keys() - method_numbers(model):
         methods = ", ".join(sorted(missing))

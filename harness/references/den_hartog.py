@@ -19,9 +19,12 @@ class SteadyMotion:
 
     Attributes
     ----------
-    amplitude : in m
-    phase : of the force when the mass starts backward, in rad
-    stop : how long the mass sticks in each half cycle, in s; 0 if it never stops
+    amplitude : float
+        Largest displacement in m.
+    phase : float
+        Phase in rad of the force when the mass starts backward.
+    stop : float
+        Time in s for which the mass sticks in each half cycle; 0 if it never stops.
     """
 
     amplitude: float

@@ -26,9 +26,12 @@ class HybridProblem:
 
     Attributes
     ----------
-    start : initial states, those that the solver of the FMU integrates
-    stop : in s
-    first : modes of the contacts at the start; contacts come before conditions
+    start : tuple of float
+        Initial values of the states that the solver of the FMU integrates.
+    stop : float
+        Stop time in s.
+    first : tuple of int
+        Modes of the contacts at the start; contacts come before conditions.
     """
 
     start: tuple[float, ...]

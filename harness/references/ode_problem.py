@@ -23,11 +23,16 @@ class OdeProblem:
 
     Attributes
     ----------
-    start : initial position (in `unit`) and velocity
-    stop : in s
-    has_dry_friction : whether the body can stick
-    is_stiff : whether peers need an implicit method
-    atol_factor : absolute tolerance divided by the relative one
+    start : (float, float)
+        Initial position (in `unit`) and velocity.
+    stop : float
+        Stop time in s.
+    has_dry_friction : bool
+        Whether the body can stick.
+    is_stiff : bool
+        Whether peers need an implicit method.
+    atol_factor : float
+        Absolute tolerance divided by the relative one.
     """
 
     start: tuple[float, float]

@@ -74,11 +74,16 @@ class ModeInterval:
 
     Attributes
     ----------
-    samples : (n, 2) states at the output times passed
-    end : in s
-    state : at the end
-    has_stopped : whether the velocity became zero
-    evaluations : of right-hand side and Jacobian
+    samples : numpy.ndarray
+        States (n, 2) at the output times in the interval.
+    end : float
+        Time in s at which the interval ends.
+    state : (float, float)
+        State at the end.
+    has_stopped : bool
+        Whether the velocity became zero.
+    evaluations : int
+        Number of evaluations of right-hand side and Jacobian.
     """
 
     samples: np.ndarray
@@ -106,12 +111,13 @@ def solve(
 
     Parameters
     ----------
-    times : (n,) output times, from 0 to the stop in s
+    times : numpy.ndarray
+        Output times (n,), from 0 to the stop in s.
 
     Raises
     ------
     HarnessError
-        if the solver fails or exceeds a limit
+        If the solver fails or exceeds a limit.
     """
     task = SolverTask(method, problem, wrapper, rtol, atol)
     solve_mode = partial({"scipy": solve_with_scipy, "cvode": solve_with_cvode}[peer], task)

@@ -35,11 +35,16 @@ class SpringMassSystem:
 
     Attributes
     ----------
-    m, k, c : mass, stiffness and damping
-    slide, hold : friction while sliding, and the largest load that it holds
-    u : velocity of the driver; an input with a rate counts as a driver too, whose velocity alone is `ramp`
-    force : constant part of the input
-    has_dry_friction : whether the body can stick
+    m, k, c : mpf
+        Mass, stiffness and damping.
+    slide, hold : mpf
+        Friction while sliding, and the largest load that friction holds.
+    u : mpf
+        Velocity of the driver. An input with a rate counts as a driver too; its velocity alone is `ramp`.
+    force : mpf
+        Constant part of the input.
+    has_dry_friction : bool
+        Whether the body can stick.
     """
 
     m: Any

@@ -46,10 +46,14 @@ class CommunicationGrid:
 
     Attributes
     ----------
-    start, stop : in s
-    intervals : number of equal communication steps
-    changes : times in s at which values change
-    at_events : whether there is a point at each event
+    start, stop : float
+        Start and stop in s.
+    intervals : int
+        Number of equal communication steps.
+    changes : tuple of float
+        Times in s at which values change.
+    at_events : bool
+        Whether there is a point at each event.
     """
 
     start: float

@@ -25,8 +25,10 @@ class CoupledBodies:
 
     Attributes
     ----------
-    m, k, c, hold, slide, driver : (n,) mass, stiffness, damping, static and sliding friction, driver velocity
-    couplings : (sink, source, output, factor) each
+    m, k, c, hold, slide, driver : numpy.ndarray
+        Mass, stiffness, damping, static and sliding friction, and driver velocity (n,) of each body.
+    couplings : tuple of (int, int, str, float)
+        Sink, source, output and factor of each coupling.
     """
 
     m: np.ndarray
@@ -54,7 +56,8 @@ def build_bodies(scene: CoupledScene, defaults: dict[str, dict[str, float]]) -> 
 
     Parameters
     ----------
-    defaults : parameter values of each model, which the scene overrides
+    defaults : dict
+        Parameter values of each model, which the scene overrides.
     """
     values = [defaults[part.model] | part.values for part in scene.parts.values()]
     indices = {name: i for i, name in enumerate(scene.parts)}
@@ -87,12 +90,13 @@ def solve_bodies(system: CoupledBodies, start: np.ndarray, times: np.ndarray) ->
 
     Parameters
     ----------
-    start : (2 n,) state (x, v) at the first time
+    start : numpy.ndarray
+        State (x, v), (2 n,), at the first time.
 
     Raises
     ------
     HarnessError
-        if there are more than MAX_EVENTS events
+        If there are more than MAX_EVENTS events.
     """
     n, state, t, stop = len(system.m), start.copy(), float(times[0]), float(times[-1])
     positions = np.empty((len(times), n))
