@@ -23,20 +23,20 @@ class Difference:
 
     Attributes
     ----------
-    name, unit
+    name, unit : str
         Name and unit of the variable.
-    largest
+    largest : float
         Largest absolute difference, NaN if a value is not finite.
-    at
+    at : float
         Time in s of the largest difference, or of the first value that is not finite.
-    rms
+    rms : float
         Root-mean-square difference.
-    relative
+    relative : float
         `largest` divided by `size`.
-    size
+    size : float
         Largest absolute value of either side.
-    left, right : (n,)
-        Values of both sides at the times of comparison; for strings 0, or 1 if they differ.
+    left, right : numpy.ndarray
+        Values (n,) of both sides at the times of comparison; for strings 0, or 1 if they differ.
     """
 
     name: str

@@ -40,12 +40,12 @@ class SignalInterpolant:
 
         Parameters
         ----------
-        name
+        name : str
             Name of the variable.
-        at : (n,)
-            Times in s, within the trajectory.
-        jumps : (k, 2)
-            Time intervals in s, in each of which the variable jumps once.
+        at : numpy.ndarray
+            Times (n,) in s, within the trajectory.
+        jumps : numpy.ndarray
+            Time intervals (k, 2) in s, in each of which the variable jumps once.
         """
         t, y = self.trajectory.time, self.trajectory.columns[name]
         index = self.sample_indices(at)

@@ -11,29 +11,29 @@ class Convergence:
 
     Attributes
     ----------
-    title
+    title : str
         Title of the scene.
-    read
+    read : tuple of (str, str, int)
         Recorded variables: element, variable, value reference.
-    labels, units
+    labels, units : tuple of str
         Labels and units of these variables.
-    steps
+    steps : tuple of float
         Communication steps in s, decreasing.
-    stop
+    stop : float
         Stop time in s.
-    reference
+    reference : str
         Description of the reference.
-    values
+    values : str
         Name of the parameter set in the archive.
-    time : (m,)
-        Times in s of the run with the smallest step.
-    x : (m, n)
-        Recorded values of that run.
-    truth : (m, n)
-        Reference values.
-    errors
+    time : numpy.ndarray
+        Times (m,) in s of the run with the smallest step.
+    x : numpy.ndarray
+        Recorded values (m, n) of that run.
+    truth : numpy.ndarray
+        Reference values (m, n).
+    errors : tuple of float
         Largest error for each step.
-    engines
+    engines : dict
         For each engine: last row, largest error at the smallest step, and the reason if it failed.
     """
 

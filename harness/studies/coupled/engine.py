@@ -27,6 +27,7 @@ def run_engine(
     Parameters
     ----------
     engine : str
+        Name of the engine, a key of ENGINES.
     run : RunSpec
         The archive in place of the FMU, the communication step `grid`, the stop, and the names of the variables.
     variables : sequence of ElementVariable

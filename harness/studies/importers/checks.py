@@ -36,19 +36,19 @@ class Importer:
 
     Attributes
     ----------
-    name
+    name : str
         Name of the tool.
-    adapter
+    adapter : str
         Module of the adapter.
-    packages
+    packages : tuple of str
         Required packages.
-    shows_log
+    shows_log : bool
         Whether the tool passes on log messages.
-    checks_status
+    checks_status : bool
         Whether the tool checks the status of a step.
-    exits_on_error
+    exits_on_error : bool
         Whether the tool exits if initialisation fails.
-    needs_model_exchange
+    needs_model_exchange : bool
         Whether the tool requires the functions of model exchange in every FMU.
     """
 

@@ -21,12 +21,18 @@ class Rival:
 
     Attributes
     ----------
-    name : for the command line
-    title : for people
-    module : file in engines/ without its ending
-    package : package of pip
-    default, best : settings
-    purpose : what the engine is made for, and what dry friction it has
+    name : str
+        Name on the command line.
+    title : str
+        Name in tables and figures.
+    module : str
+        File in engines/ without its suffix.
+    package : str
+        Package that pip installs.
+    default, best : dict
+        Default and best setting.
+    purpose : str
+        Purpose of the engine, and the dry friction that it offers.
     """
 
     name: str

@@ -29,12 +29,18 @@ class RivalReply:
 
     Attributes
     ----------
-    gap : why there is no result; empty if there is one
-    states : (n, 3) at the times of the scene
-    has_modes : whether the changes are those of modes, or those of a slip that passes the level of the scene
-    changes : times in s, and what begins there
-    steps : number of internal steps
-    seconds : processor time of the fastest run, with building the model
+    gap : str
+        Reason why there is no result; empty if there is one.
+    states : list of list of float
+        States (n, 3) at the times of the scene.
+    has_modes : bool
+        Whether the changes are those of modes, or those of a slip that passes the level of the scene.
+    changes : list of (float, int)
+        Times in s, and the mode or the slip (1 begins, 0 ends) from then on.
+    steps : int
+        Number of internal steps.
+    seconds : float
+        Processor time in s of the fastest run, including that to build the model.
     """
 
     gap: str = ""

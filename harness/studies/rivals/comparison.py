@@ -14,12 +14,18 @@ class Result:
 
     Attributes
     ----------
-    rival, version, setting : title, version of its package, and name of the setting
-    options : values of its options
-    scene : name of the scene
-    lines : lines of code that a user writes for all scenes
-    measures : None for a gap
-    gap : why there is no result
+    rival, version, setting : str
+        Title of the rival, version of its package, and name of the setting.
+    options : dict
+        Values of its options.
+    scene : str
+        Name of the scene.
+    lines : int
+        Lines of code that a user writes for all scenes.
+    measures : Measures or None
+        Measures of the run; None for a gap.
+    gap : str
+        Reason why there is no result.
     """
 
     rival: str

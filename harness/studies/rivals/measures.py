@@ -19,12 +19,18 @@ class Measures:
 
     Attributes
     ----------
-    error : largest error at the compared points, in the unit of the scene
-    creep : median slip where the body should stick, in m/s or rad/s
-    missed, spurious : number of events without a partner in the run, and in the reference
-    event_error : largest error of the times of the others, in s; NaN if there is none
-    steps : number of internal steps
-    seconds : processor time in s
+    error : float
+        Largest error at the compared points, in the unit of the scene.
+    creep : float
+        Median slip where the body should stick, in m/s or rad/s.
+    missed, spurious : int
+        Number of reference events that the run lacks, and of events of the run that the reference lacks.
+    event_error : float
+        Largest error in s of the times of the matched events; NaN if there are none.
+    steps : int
+        Number of internal steps.
+    seconds : float
+        Processor time in s.
     """
 
     error: float

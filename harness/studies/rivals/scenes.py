@@ -37,19 +37,32 @@ class Scene:
 
     Attributes
     ----------
-    name, title : for commands, and for people
-    stop, interval : duration and distance of the compared points, in s
-    start : position x, speed v, and speed w of the partner at 0 s
-    load : force on the body without friction, over time and position
-    slide : sliding friction over time and the size of the slip
-    hold : largest friction at rest, over time
-    level : slip in m/s or rad/s above which a motion without modes counts as slipping
-    inertia, partner : of the body, and of what it rubs on
-    stiffness : of the spring that is a part of the load
-    unit : of the error, which is that of x, or of both speeds with a second inertia
-    has_one_coefficient : whether static and sliding friction are the same constant
-    has_constant_sliding : whether sliding friction is constant
-    is_rotation : whether x is an angle
+    name, title : str
+        Name on the command line, and name in tables and figures.
+    stop, interval : float
+        Duration of the scene and distance of the compared points, in s.
+    start : (float, float, float)
+        Position x, speed v, and speed w of the partner at 0 s.
+    load : callable
+        Force on the body without friction, as a function of time and position.
+    slide : callable
+        Sliding friction, as a function of time and of the size of the slip.
+    hold : callable
+        Largest friction at rest, as a function of time.
+    level : float
+        Slip in m/s or rad/s above which a motion without modes counts as slipping.
+    inertia, partner : float
+        Inertia of the body and of its partner.
+    stiffness : float
+        Stiffness of the spring that is a part of the load.
+    unit : str
+        Unit of the error: that of x, or of both speeds with a second inertia.
+    has_one_coefficient : bool
+        Whether static and sliding friction are the same constant.
+    has_constant_sliding : bool
+        Whether sliding friction is constant.
+    is_rotation : bool
+        Whether x is an angle.
     """
 
     name: str

@@ -31,10 +31,14 @@ def run_rivals(names: tuple[str, ...], timeout: float, out: Path, report: Callab
 
     Parameters
     ----------
-    names : names of rivals; the FMU of this project always runs, because times are relative to its own
-    timeout : seconds that a run may take
-    out : folder of results
-    report : receives the name of each rival that runs
+    names : tuple of str
+        Names of rivals. The FMU of this project always runs, because times are relative to its own.
+    timeout : float
+        Time limit of a run in s.
+    out : pathlib.Path
+        Folder of results.
+    report : callable
+        Receives the name of each rival that runs.
     """
     require_reference_packages()
     rivals = find_rivals(names)

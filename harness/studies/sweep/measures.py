@@ -36,17 +36,17 @@ class TrajectoryMeasure:
 
     Attributes
     ----------
-    variables
+    variables : tuple of str
         Variables that the FMU must have.
-    unit, text
+    unit, text : str
         Unit and description.
-    measure
-        Computes the measure.
-    modes
+    measure : callable
+        Computes the measure of a run.
+    modes : bool
         Whether the friction law must have modes.
-    decay
-        Whether the model must not have a driver.
-    role
+    decay : bool
+        Whether the model must have no driver.
+    role : str
         Role of the output that has the same unit.
     """
 

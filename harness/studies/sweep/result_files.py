@@ -64,17 +64,17 @@ class SweepResult:
 
     Attributes
     ----------
-    runs
+    runs : int
         Number of runs.
-    folder
+    folder : pathlib.Path
         Folder of the results.
-    n_resumed
+    n_resumed : int
         Number of runs taken from the checkpoint of an interrupted sweep.
-    damaged
+    damaged : bool
         Whether that checkpoint was damaged and not used.
-    failures
+    failures : tuple of FailureGroup
         Failed runs by kind, most frequent first.
-    seconds
+    seconds : float
         Run time of the new runs in s.
     """
 
@@ -96,15 +96,15 @@ class SweepDescription:
 
     Attributes
     ----------
-    varied
+    varied : dict
         Unit and description of each varied parameter.
-    columns
+    columns : tuple of MeasureColumn
         Measured columns.
-    constants
+    constants : dict
         Value and unit of the other parameters.
-    stop
+    stop : float
         Stop time in s.
-    boundaries
+    boundaries : tuple of Boundary
         Known boundaries in the parameter space.
     """
 

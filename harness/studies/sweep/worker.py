@@ -21,11 +21,11 @@ class BlockResult:
 
     Attributes
     ----------
-    values : (runs, columns)
-        Measures; NaN for failed runs.
-    messages
+    values : numpy.ndarray
+        Measures (runs, columns); NaN for failed runs.
+    messages : dict
         Error messages by index in the block.
-    seconds
+    seconds : float
         Run time in s.
     """
 
