@@ -162,6 +162,7 @@ def refuse_ignored_options(context: click.Context, fmus: Iterable[Path]) -> None
     Parameters
     ----------
     context : click.Context
+        Context of the command.
     fmus : iterable of pathlib.Path
         FMUs that are run with the options of the command line; scenes have their own.
     """

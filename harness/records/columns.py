@@ -86,6 +86,7 @@ def read_record(source: str, columns: ColumnOptions, name: str) -> Record:
     source : str
         Path of the file; "-" for standard input.
     columns : ColumnOptions
+        Options for the columns.
     name : str
         Name of the record.
 

@@ -50,13 +50,13 @@ class Sketch:
 
     Attributes
     ----------
-    text
+    text : str
         Text alternative.
-    curve
+    curve : str
         Points of the whole curve.
-    stuck
+    stuck : tuple of str
         Points of each part at which the body sticks.
-    zero
+    zero : float or None
         Height of zero; None if it is not in the box.
     """
 
@@ -80,27 +80,27 @@ class Summary:
 
     Attributes
     ----------
-    study
+    study : str
         Name of the study, as in `SECTIONS` of the report.
-    title
+    title : str
         Title of the result.
-    sentences
+    sentences : tuple of str
         Findings and remarks.
-    tables
-        Tables.
-    picture
+    tables : tuple of SummaryTable
+        Tables; the main table has no title.
+    picture : str
         Text alternative of figure.svg in the folder; empty without one.
-    outcome
-        What the study concludes, if anything is judged.
-    sketches
+    outcome : Outcome or None
+        Conclusion of the study; None if it judges nothing.
+    sketches : tuple of Sketch
         Small drawings of a run: position over time, and speed over position.
-    missing
+    missing : tuple of MissingResult
         Results that the study left out.
-    origin
+    origin : tuple of str
         Sentences on the origin: files, versions, date, command, parameters.
-    files
+    files : tuple of str
         Names of the CSV files in the folder.
-    version
+    version : int
         Version of the schema.
     """
 

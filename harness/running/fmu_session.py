@@ -79,6 +79,7 @@ class FmuSession:
     Parameters
     ----------
     description : ModelDescription
+        Model description of the FMU.
     folder : path
         Directory of the unpacked FMU.
     exchange : bool
@@ -86,6 +87,7 @@ class FmuSession:
     name : str, optional
         Name of the instance; by default its model identifier.
     log : LogCapture, optional
+        Stores the log messages; by default a new log.
 
     Raises
     ------
@@ -247,6 +249,7 @@ class PreparedRuns:
     Parameters
     ----------
     session : FmuSession
+        Session of the FMU.
     values : dict
         Values that all runs share, by name.
     varied : sequence of str

@@ -73,12 +73,15 @@ class ModelExchange:
     Parameters
     ----------
     session : FmuSession
+        Session for model exchange.
     grid : TimeGrid
+        Communication points.
     rtol : float
         Relative tolerance.
     report_work : callable
         Called at every evaluation.
     signals : InputSignals, optional
+        Input signals.
     max_steps : int
         Largest number of solver steps from point to point.
     """

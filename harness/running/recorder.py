@@ -99,6 +99,7 @@ def default_outputs(description: Any, values: Mapping[str, Any] | None = None) -
     Parameters
     ----------
     description : ModelDescription
+        Model description of the FMU.
     values : mapping, optional
         Values that are set. Structural parameters among them determine the shapes of arrays.
 
@@ -144,7 +145,9 @@ class Recorder:
     Parameters
     ----------
     session : FmuSession
+        Session whose variables are read.
     selection : sequence of (variable, shape)
+        Variables to read, with the shapes of arrays.
     write : callable
         Receives the bytes of each row.
     strings : StringTable, optional

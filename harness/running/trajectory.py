@@ -128,7 +128,7 @@ class Trajectory:
     Attributes
     ----------
     spec : RunSpec
-        The run as it was done; of signals from a file, the file stands in place of the FMU.
+        Effective settings of the run. For signals from a file, `fmu` is the path of that file.
     time : numpy.ndarray
         Time (n,) in s.
     columns : dict
@@ -139,8 +139,8 @@ class Trajectory:
         Descriptions of columns by name.
     parameters : dict
         Effective values by name.
-    steps, events, statistics : optional
-        Present if the FMU exposes them.
+    steps, events, statistics : SolverSteps, ModeChanges, Statistics
+        Internal steps, changes of mode, and counts; None if the FMU does not expose them.
     note : str
         Estimated accuracy.
     failure : str

@@ -80,6 +80,7 @@ class RunSession:
     Parameters
     ----------
     fmu : pathlib.Path
+        FMU for co-simulation.
     limit : float
         Processor time in s that one run may take.
     """
@@ -127,6 +128,7 @@ class PreparedRun:
     spec : RunSpec
         Its steps end at the communication points only: it does not follow the solver.
     runs : RunSession
+        Session in which the run is done.
 
     Attributes
     ----------

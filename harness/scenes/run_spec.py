@@ -31,7 +31,8 @@ class RunSpec:
 
     Attributes
     ----------
-    fmu : pathlib.Path
+    fmu : Annotated[Path, TEXT]
+        Path of the FMU.
     outputs : tuple of str
         Outputs to record.
     values : dict

@@ -123,9 +123,13 @@ class Scene:
     source : str
         Path of the scene file, or the name of a scene that is built in.
     run : RunSpec
+        Run of the scene.
     title, about : str
+        Title of one line, and description of the model.
     analyses, plots : tuple of str
+        Names of the analyses and plots.
     decay : DecayOptions
+        Options of the analysis decay.
     published : dict
         Published quantities by name, and their source.
     """

@@ -74,6 +74,7 @@ def refine(spec: RunSpec, description: Any, run: RunFunction) -> RefinementResul
     spec : RunSpec
         The run, with its start and stop.
     description : ModelDescription
+        Model description of the FMU.
     run : callable
         Runs the FMU with a communication step in s and a tolerance; returns a RefinementRun.
     """
