@@ -34,16 +34,16 @@ def main() -> None:
 
 
 def run_command(load: Callable[[], click.Command], name: str) -> None:
-    """Run a command with the arguments of this process, and exit as all commands of this project do.
+    """Run a command with the arguments of this process, and exit with its status.
 
     click's own main() is not used because it handles Ctrl-C differently.
 
     Parameters
     ----------
     load : callable
-        Imports and returns the command; a signal may arrive meanwhile.
+        Imports and returns the command. Signals during the import are handled.
     name : str
-        How the user calls it.
+        Name by which the user called the command.
     """
     with exit_on_error(), interruptible():
         command = load()
@@ -54,7 +54,7 @@ def run_command(load: Callable[[], click.Command], name: str) -> None:
 
 
 def run_arguments(command: click.Command, name: str, arguments: list[str]) -> None:
-    """Run a command with these arguments; `name` is how the user calls it."""
+    """Run a command with these arguments; `name` is the one by which the user called it."""
     try:
         with command.make_context(name, arguments) as context:
             command.invoke(context)

@@ -1,4 +1,4 @@
-"""Exceptions with an exit status, and the wording of error messages."""
+"""Exceptions with an exit status, and texts of error messages."""
 
 from collections.abc import Collection, Iterable
 from difflib import get_close_matches
@@ -11,7 +11,7 @@ MAX_LISTED_NAMES = 100  # names listed in a message
 
 
 class HarnessError(Exception):
-    """A run or an analysis failed. The text is one sentence for the user."""
+    """A run or an analysis failed. The text is a sentence for the user."""
 
     status = 1
 
@@ -42,7 +42,7 @@ def unknown_name_message(category: str, name: object, allowed: Iterable[str]) ->
     Parameters
     ----------
     category : str
-        What the name stands for, as in "output" or "scene".
+        Category of the name, as in "output" or "scene".
     name : object
         The invalid name.
     allowed : iterable of str
@@ -56,7 +56,7 @@ def unknown_name_message(category: str, name: object, allowed: Iterable[str]) ->
 
 
 def unknown_source_message(category: str, source: str, allowed: Iterable[str], other: str = "") -> str:
-    """Return the message about a source that is no allowed name; it says so if there is no file of that name either.
+    """Return the message about a source that is not an allowed name, and about a path that does not exist.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ def unknown_source_message(category: str, source: str, allowed: Iterable[str], o
     source : str
         The invalid name or path.
     other : str
-        What else is allowed, as in ", or the path of a .toml file".
+        Other allowed sources, as in ", or the path of a .toml file".
     """
     message = unknown_name_message(category, source, allowed) + other
     if exists(source):
@@ -82,7 +82,7 @@ def check_names(category: str, names: Iterable[str], allowed: Collection[str]) -
             raise SceneError(unknown_name_message(category, name, allowed))
 
 
-def optional(package: str, purpose: str, extra: str) -> Any:
+def import_optional(package: str, purpose: str, extra: str) -> Any:
     """Import an optional package.
 
     Raises

@@ -1,4 +1,4 @@
-"""The decay of a record from Python: `identify_decay`."""
+"""Identification of a decay from Python: `identify_decay`."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import SceneError
 from .options import QUIET, Progress
-from .tables import make_table, table_of
+from .tables import build_table, convert_to_table
 
 if TYPE_CHECKING:
     import pandas
@@ -46,23 +46,23 @@ def identify_decay(
     unit : str, optional
         Unit of the samples, as ``"mm"``, ``"deg/s"`` or ``"g"``; required for arrays, otherwise that of the heading.
     quantity : {"position", "velocity", "acceleration"}, optional
-        What was measured, if neither its unit nor its name says so.
+        Measured quantity, if it follows neither from the unit nor from the name of the column.
     time, column : str, optional
-        Headings of the time and of the samples, if the table has several.
+        Headings of the columns of times and samples, if the table has several.
     k, m : float, optional
-        Stiffness in N/m or mass in kg (N.m/rad or kg.m2 for a rotation), one of them: gives forces in N.
+        Stiffness in N/m or mass in kg (N.m/rad or kg.m2 for a rotation). Give one of them to obtain forces in N.
     pendulum : bool
-        The restoring torque is k sin(theta).
+        Whether the restoring torque is k sin(theta).
     drag : bool
-        Also try laws with quadratic drag.
+        Whether to try laws with quadratic drag, too.
     drift : bool
-        Let the rest position drift at a constant rate.
+        Whether the rest position drifts at a constant rate.
     begin, end : float, optional
-        The part of the record to use, in s.
+        Start and end in s of the part of the record to use.
     rate : float, optional
         Sampling rate in Hz, which replaces the times of a file or table.
     progress : callable, optional
-        Called with the finished share of the fit.
+        Receives the progress from 0 to 1.
 
     Returns
     -------
@@ -103,18 +103,18 @@ def identify_decay(
         source = str(record)
         loaded = read_record(source, columns, Path(source).stem)
     else:
-        loaded = record_from(record, x, columns)
+        loaded = to_record(record, x, columns)
     return fit_decay(loaded, KnownParameters(k, m, pendulum), drag, drift, progress or QUIET)
 
 
-def record_from(source: Any, x: Any, columns: Any) -> "Record":
+def to_record(source: Any, x: Any, columns: Any) -> "Record":
     """Return the record in a DataFrame, a trajectory or two arrays."""
     import numpy as np
 
     from ..records.columns import parse_record
     from ..running.trajectory import Trajectory
 
-    name, table = "the record", table_of(source)
+    name, table = "the record", convert_to_table(source)
     if isinstance(source, Trajectory):
         name = source.spec.model
         if columns.position is None and columns.quantity is None:
@@ -126,7 +126,7 @@ def record_from(source: Any, x: Any, columns: Any) -> "Record":
             raise SceneError("x is missing: identify_decay takes a file, a table, or times and samples, as in (t, x)")
         if columns.unit is None:
             raise SceneError("unit is missing: name the unit of the samples, as in unit='mm'")
-        table = make_table({"t": np.asarray(source), "signal": np.asarray(x)}, {"t": "s"})
+        table = build_table({"t": np.asarray(source), "signal": np.asarray(x)}, {"t": "s"})
         columns = replace(columns, position="signal")
     assert table is not None
     return parse_record(replace(table, name=name), columns, name)

@@ -1,12 +1,12 @@
-"""The parameters of an FMU from measured records, in Python: `fit`."""
+"""Parameters of an FMU from measured records, from Python: `fit`."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..errors import SceneError
+from ..errors import SceneError, format_value
 from .options import QUIET, Progress
-from .tables import table_of
+from .tables import convert_to_table
 
 if TYPE_CHECKING:
     from ..analyses.fit.parameter_fit import ParameterFit
@@ -47,39 +47,39 @@ def fit(
         them in ``attrs["units"]``.
     free : sequence or mapping
         Parameters to fit, with the range to search, or None for a factor of 4 about the start value of the FMU.
-        ``offset(x)``, ``gain(x)`` and ``delay(x)`` are unknowns of the sensor of the output ``x``, which shows gain
-        times output plus offset, and that after a delay.
+        ``offset(x)``, ``gain(x)`` and ``delay(x)`` are unknowns of the sensor of the output ``x``: its signal is gain
+        times output plus offset, after the delay.
     observe, inputs : sequence or mapping
         Measured outputs and driven inputs of the FMU, with the headings of their columns.
     fixed : mapping, optional
         Values of other parameters.
     sigma : mapping, optional
-        Known standard deviations of the noise by output, in the units of the FMU; by default the scatter of
-        neighbouring samples.
+        Known standard deviations of the noise by output, in the units of the FMU. By default they are estimated from
+        the scatter of neighbouring samples.
     start : mapping, ParameterFit or path, optional
-        Values to start from, in addition to those of the search. Of an earlier fit, or the folder of its result, those
-        of the parameters that are free again.
+        Values to start from, in addition to those of the search. An earlier fit, or the folder of its result, gives
+        the values of the parameters that are free again.
     each : sequence of str
         Parameters with a value of their own for each record.
     against : str, path or sequence of these
-        Other FMUs, which are fitted to the same records and compared by the Bayesian information criterion. Each law
-        frees and fixes those of the given names that it has; ``notes`` names what it lacks.
+        Other FMUs, which are fitted to the same records and compared by the Bayesian information criterion. Each FMU
+        frees and fixes those of the given names that it has; ``notes`` lists the names that it lacks.
     validate : path, DataFrame, Trajectory or sequence of these
         Records that are predicted with the fitted values, but not fitted.
     robust : bool
-        Whether residuals beyond three times the noise count linearly.
+        Whether residuals beyond three times the noise count linearly instead of by their squares.
     time, rate, begin, end
         Time column, sampling rate in Hz that replaces it, and the time range in s.
     timeout : float
         Seconds of processor time that one run may take.
     progress : callable, optional
-        Called with the finished share.
+        Receives the progress from 0 to 1.
 
     Returns
     -------
     ParameterFit
-        Values with 95 % intervals by profile likelihood, combinations of parameters that the records do not determine,
-        residuals and remarks; with `against`, the other fits and the comparison.
+        Values with 95 % intervals by profile likelihood, combinations of parameters that the records determine although
+        they do not determine each parameter, residuals and remarks; with `against`, the other fits and the comparison.
 
     Raises
     ------
@@ -90,8 +90,8 @@ def fit(
 
     Examples
     --------
-    >>> found = fit("stickslip", "pull.csv", ["mu_s", "mu_d", "k"], observe={"x": "laser"})  # doctest: +SKIP
-    >>> found["mu_s"].low, found["mu_s"].value, found["mu_s"].high  # doctest: +SKIP
+    >>> result = fit("stickslip", "pull.csv", ["mu_s", "mu_d", "k"], observe={"x": "laser"})  # doctest: +SKIP
+    >>> result["mu_s"].low, result["mu_s"].value, result["mu_s"].high  # doctest: +SKIP
     """
     from math import inf
 
@@ -117,8 +117,8 @@ def fit(
         run=RunSpec(fmus[0], values=dict(fixed or {}), timeout=timeout),
         against=tuple(fmus[1:]),
         free=ranges,
-        observe=headings_of(observe),
-        inputs=headings_of(inputs),
+        observe=map_headings(observe),
+        inputs=map_headings(inputs),
         sigma=sigma or {},
         start=start or {},
         each=tuple(each),
@@ -135,7 +135,7 @@ def fit(
         return [
             study.load_record(str(source), request)
             if isinstance(source, str | Path)
-            else study.RecordTable(record_name, signal_table_of(source))
+            else study.RecordTable(record_name, to_signal_table(source))
             for source, record_name in zip(sources, names, strict=True)
         ]
 
@@ -143,16 +143,16 @@ def fit(
     return study.fit_laws(laws, fitted, predicted, progress or QUIET)
 
 
-def headings_of(signals: Any) -> dict[str, str]:
-    """Return the heading of each signal; its name if there is none."""
+def map_headings(signals: Any) -> dict[str, str]:
+    """Return the heading of each signal; without a heading, the name of the signal."""
     if isinstance(signals, Mapping):
         return {str(name): str(heading) for name, heading in signals.items()}
     return {str(name): str(name) for name in ([signals] if isinstance(signals, str) else signals)}
 
 
-def signal_table_of(source: Any) -> "Table":
+def to_signal_table(source: Any) -> "Table":
     """Return the table of a trajectory or a DataFrame."""
-    table = table_of(source)
+    table = convert_to_table(source)
     if table is None:
-        raise SceneError("records must be files, DataFrames or trajectories")
+        raise SceneError(f"records must be files, DataFrames or trajectories, not {format_value(source)}")
     return table

@@ -1,4 +1,4 @@
-"""Options that functions of the Python API have in common."""
+"""Options that functions of the Python API share."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -12,11 +12,11 @@ if TYPE_CHECKING:
 Progress = Callable[[float], None]  # takes the finished share, from 0 to 1
 
 INTERFACES = {"CoSimulation": False, "ModelExchange": True}
-QUIET: Progress = lambda share: None  # noqa: E731 - as short as what it does
+QUIET: Progress = lambda share: None  # noqa: E731 - a function without effect needs no def
 
 
-def exchange_of(interface: str | None) -> bool | None:
-    """Whether an interface is model exchange; None if none is named."""
+def parse_interface(interface: str | None) -> bool | None:
+    """Return whether an interface is model exchange; None if no interface is given."""
     if interface is None:
         return None
     if interface not in INTERFACES:
@@ -24,7 +24,7 @@ def exchange_of(interface: str | None) -> bool | None:
     return INTERFACES[interface]
 
 
-def with_options(
+def apply_options(
     spec: "RunSpec",
     stop: float | None = None,
     interval: float | None = None,
@@ -34,7 +34,7 @@ def with_options(
     interface: str | None = None,
     timeout: float | None = None,
 ) -> "RunSpec":
-    """Return a run with the options that are not None."""
+    """Return a run with those of the options that are not None."""
     from ..running.fmu_archive import exposes_solver_steps, read_description
     from ..scenes.schema import is_number
 
@@ -53,7 +53,7 @@ def with_options(
         raise SceneError(f"stop = {format_value(stop)} must be a finite number of seconds")
     if isinstance(outputs, str):
         outputs = (outputs,)
-    exchange = exchange_of(interface)
+    exchange = parse_interface(interface)
     return replace(
         spec,
         values=values,

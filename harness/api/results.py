@@ -1,9 +1,9 @@
-"""Stored results from Python: `load_result`."""
+"""Stored results for Python: `load_result`."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..errors import SceneError, optional
+from ..errors import SceneError, import_optional
 
 if TYPE_CHECKING:
     import xarray
@@ -22,7 +22,7 @@ def load_result(folder: "str | Path") -> "Trajectory | xarray.Dataset | dict[str
     Returns
     -------
     Trajectory, xarray.Dataset or dict
-        The trajectory of a run, the dataset of a sweep, or the numbers of a decay, a fit or a comparison.
+        Trajectory of a run, dataset of a sweep, or JSON of a decay, a fit or a comparison.
 
     Raises
     ------
@@ -33,7 +33,7 @@ def load_result(folder: "str | Path") -> "Trajectory | xarray.Dataset | dict[str
 
     path = Path(folder)
     if (path / "sweep.nc").is_file():
-        library = optional("xarray", "to read a sweep", "sweep")
+        library = import_optional("xarray", "to read a sweep", "sweep")
         with library.open_dataset(path / "sweep.nc") as data:
             loaded: xarray.Dataset = data.load()
         return loaded
@@ -42,11 +42,14 @@ def load_result(folder: "str | Path") -> "Trajectory | xarray.Dataset | dict[str
             numbers: dict[str, Any] = json.loads((path / name).read_text(encoding="utf-8"))
             return numbers
     if not (path / "trajectory.csv").is_file():
-        raise SceneError(f"{folder} holds no result: name a folder with trajectory.csv, sweep.nc or decay.json")
-    return stored_run(path)
+        raise SceneError(
+            f"{folder} holds no result: name a folder with trajectory.csv, sweep.nc, decay.json, fit.json or "
+            "compare.json"
+        )
+    return read_run(path)
 
 
-def stored_run(folder: Path) -> "Trajectory":
+def read_run(folder: Path) -> "Trajectory":
     """Read the run in a result folder."""
     import numpy as np
 

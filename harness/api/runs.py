@@ -5,8 +5,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..errors import HarnessError, SceneError
-from .options import QUIET, Progress, with_options
+from ..errors import HarnessError, SceneError, format_value
+from .options import QUIET, Progress, apply_options
 
 if TYPE_CHECKING:
     import numpy as np
@@ -55,30 +55,30 @@ def simulate(
     method : str or int, optional
         Integration method of an FMU of this project, as ``"exact"`` or ``"dop853"``.
     rtol : float, optional
-        Relative tolerance: of the solver in an FMU of this project. Any other FMU is run with ever shorter
+        Relative tolerance of the solver of an FMU of this project. Other FMUs are run with shorter and shorter
         communication steps until two results agree to this tolerance.
     interface : {"CoSimulation", "ModelExchange"}, optional
-        Interface to use where the FMU offers both; co-simulation by default.
+        Interface to use if the FMU offers both; co-simulation by default.
     inputs : mapping or DataFrame, optional
         Input signals: the column ``time`` in s and a column for each input. Values between two rows are interpolated;
-        a time that occurs twice is a jump. In co-simulation an input is constant within a communication step, at its
-        value in the middle of the step.
+        a time that occurs twice is a jump. In co-simulation an input is constant within a communication step and has
+        its value at the middle of the step.
     timeout : float, optional
         Seconds allowed for one call of an FMU that is not of this project; 60 by default.
     progress : callable, optional
-        Called with the finished share of the run.
+        Receives the progress from 0 to 1.
 
     Returns
     -------
     Trajectory
-        Time, columns by name, units, events, statistics and the parameters in force.
+        Time, columns by name, units, events, statistics and effective parameters.
 
     Raises
     ------
     SceneError
         If the source or an argument is not valid.
     HarnessError
-        If the run fails; the message is that of the FMU.
+        If the run fails; the text is the message of the FMU.
 
     Examples
     --------
@@ -92,12 +92,12 @@ def simulate(
     if values:
         spec = replace(spec, values={**spec.values, **values})
     if inputs is not None:
-        spec = replace(spec, inputs={str(name): column for name, column in table_of(inputs).items()})
+        spec = replace(spec, inputs={str(name): column for name, column in read_input_columns(inputs).items()})
     if times is not None:
-        spec = replace(spec, times=tuple(row_of_numbers("times", times).tolist()))
-    spec = with_options(spec, stop, interval, outputs, method, rtol, interface, timeout)
+        spec = replace(spec, times=tuple(to_finite_row("times", times).tolist()))
+    spec = apply_options(spec, stop, interval, outputs, method, rtol, interface, timeout)
     if interval is not None and spec.inputs:
-        spec = replace(spec, grid=fine_step(spec, interval))
+        spec = replace(spec, grid=choose_fine_step(spec, interval))
     trajectory = runner.run(spec, progress or QUIET)
     if trajectory.failure:
         raise HarnessError(trajectory.failure)
@@ -120,11 +120,11 @@ def compare(
     ----------
     a, b : Trajectory, str or path
         Trajectories, result folders, files (fmpy, OpenModelica, Dymola, any table with the time in its first column),
-        FMUs or scenes. What has to be run is run to the times of the other one.
+        FMUs or scenes. FMUs and scenes are run at the times of the other side.
     stop, rtol, interface, timeout
         Options for FMUs that have to be run, as in `simulate`.
     progress : callable, optional
-        Called with the finished share.
+        Receives the progress from 0 to 1.
 
     Returns
     -------
@@ -134,14 +134,14 @@ def compare(
     Raises
     ------
     HarnessError
-        If the two have no variable or no time in common.
+        If the two sides have no variable or no time in common.
     """
     from ..running.trajectory import Trajectory
     from ..scenes.run_spec import RunSpec
     from ..studies.compare.difference import compare as difference
     from ..studies.compare.trajectory_sources import display_names, load_both
 
-    options = with_options(RunSpec(Path()), stop=stop, interface=interface, timeout=timeout)
+    options = apply_options(RunSpec(Path()), stop=stop, interface=interface, timeout=timeout)
     if rtol is not None:
         options = replace(options, tolerance=rtol)
     first, second = load_both(
@@ -158,8 +158,8 @@ def compare(
     return difference(first, second)
 
 
-def fine_step(spec: "RunSpec", interval: float) -> float:
-    """Return a communication step in s for input signals: a whole part of the interval, at most 1/4096 of the run."""
+def choose_fine_step(spec: "RunSpec", interval: float) -> float:
+    """Return a communication step in s for inputs: an integer fraction of the interval, at most 1/4096 of the run."""
     from math import ceil
 
     from ..running.fmu_archive import read_description, resolve_time_span
@@ -169,25 +169,29 @@ def fine_step(spec: "RunSpec", interval: float) -> float:
     return interval / ceil(interval * DEFAULT_EQUAL_STEPS / (stop - start))
 
 
-def table_of(inputs: Any) -> dict[str, tuple[float, ...]]:
+def read_input_columns(inputs: Any) -> dict[str, tuple[float, ...]]:
     """Return the columns of a mapping or a DataFrame; the index of a DataFrame may be its time."""
     if not isinstance(inputs, Mapping) and not hasattr(inputs, "columns"):
-        raise SceneError("inputs must be a mapping or a DataFrame with the column 'time' and one for each input")
+        raise SceneError(
+            "inputs must be a mapping or a DataFrame with the column 'time' and a column for each input, not "
+            f"{format_value(inputs)}"
+        )
     names = inputs.columns if hasattr(inputs, "columns") else inputs
     columns = {str(name): inputs[name] for name in names}
     if "time" not in columns and getattr(getattr(inputs, "index", None), "name", None) == "time":
         columns = {"time": inputs.index} | columns
-    return {name: tuple(row_of_numbers(f"inputs: {name}", column).tolist()) for name, column in columns.items()}
+    return {name: tuple(to_finite_row(f"inputs: {name}", column).tolist()) for name, column in columns.items()}
 
 
-def row_of_numbers(name: str, numbers: "ArrayLike") -> "np.ndarray":
-    """Return numbers as an array (n,) of floats; SceneError with their name if they are no row of finite numbers."""
+def to_finite_row(name: str, numbers: "ArrayLike") -> "np.ndarray":
+    """Return numbers as an array (n,) of floats; raise SceneError unless they are a row of finite numbers."""
     import numpy as np
 
     row = np.atleast_1d(np.asarray(numbers))
     if row.ndim != 1 or row.dtype.kind not in "fiub":
-        raise SceneError(f"{name} must be a row of numbers")
+        raise SceneError(f"{name} must be a row of numbers, not {format_value(numbers)}")
     row = row.astype(float)
     if not np.isfinite(row).all():
-        raise SceneError(f"{name} holds a value that is not a finite number")
+        index = int(np.argmin(np.isfinite(row)))
+        raise SceneError(f"{name} holds {row[index]} at index {index}: give finite numbers")
     return row

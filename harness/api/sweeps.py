@@ -5,8 +5,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..errors import SceneError, optional
-from .options import QUIET, Progress, with_options
+from ..errors import SceneError, import_optional
+from .options import QUIET, Progress, apply_options
 
 if TYPE_CHECKING:
     import xarray
@@ -37,38 +37,39 @@ def sweep(
     source : str or path
         The name of a model or the path of an FMU.
     grid : mapping
-        The values of each varied parameter; every combination is run. With `samples`, the lower and the upper bound of
-        each.
+        Values of each varied parameter; every combination is run. With `samples`, the lower and the upper bound of
+        each parameter.
     values : mapping, optional
         Parameters that all runs share.
     samples : int, optional
-        Number of points of a Latin hypercube, in place of a grid.
+        Number of points of a Latin hypercube, instead of a grid.
     seed : int
         Seed of the Latin hypercube.
     measures : sequence of str
-        What to measure, as ``"final"``, ``"period"`` or ``"steps"``; the final values by default.
+        Measures, as ``"final"``, ``"period"`` or ``"steps"``; by default the final values, and events if the FMU
+        counts them.
     stop, rtol, interface, timeout
         As in `simulate`; `rtol` is for FMUs that are not of this project.
     workers : int, optional
-        Number of worker processes; by default all runs are done in this process. With workers, a script needs the
-        usual ``if __name__ == "__main__":``.
+        Number of worker processes; by default all runs are done in this process. A script with workers must call
+        `sweep` below ``if __name__ == "__main__":``.
     scheduler : str, optional
         Address of a Dask cluster, as ``"tcp://host:8786"``.
     folder : path, optional
-        Keep the files of the sweep in this folder; an interrupted sweep continues from there.
+        Folder for the files of the sweep; an interrupted sweep is resumed from it.
     progress : callable, optional
-        Called with the finished share.
+        Receives the progress from 0 to 1.
 
     Returns
     -------
     xarray.Dataset
         A dimension for each varied parameter (``run`` for samples), a variable for each measure, and ``error``, the
-        reason why a run failed, which is empty if it did not.
+        error message of a failed run, otherwise empty.
 
     Raises
     ------
     HarnessError
-        If xarray is not installed or no run can be done.
+        If xarray, dask or netCDF4 is not installed, or no run can be done.
     """
     from contextlib import nullcontext
 
@@ -79,10 +80,10 @@ def sweep(
     from ..studies.sweep.runner import SweepSpec
     from ..studies.sweep.sampling import SweepPoints, axis_from_numbers
 
-    library, *_ = (optional(package, "a sweep", "sweep") for package in ("xarray", "dask", "netCDF4"))
+    library, *_ = (import_optional(package, "a sweep", "sweep") for package in ("xarray", "dask", "netCDF4"))
     if not grid:
         raise SceneError("grid is empty: name at least one parameter and its values, as in {'mu_d': [0.3, 0.6]}")
-    run = with_options(RunSpec(find_fmu(str(source)), follow=False), stop=stop, interface=interface, timeout=timeout)
+    run = apply_options(RunSpec(find_fmu(str(source)), follow=False), stop=stop, interface=interface, timeout=timeout)
     run = replace(run, values=dict(values or {}), tolerance=run.tolerance if rtol is None else rtol)
     axes = tuple(axis_from_numbers(name, column, samples is not None) for name, column in grid.items())
     points = SweepPoints(axes, samples, seed)

@@ -1,4 +1,4 @@
-"""Tables in memory, DataFrames and trajectories, read as the tables in files."""
+"""Conversion of DataFrames, trajectories and arrays to the tables that records are read from."""
 
 from typing import TYPE_CHECKING, Any
 
@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from ..records.table_files import Table
 
 
-def table_of(source: Any) -> "Table | None":
+def convert_to_table(source: Any) -> "Table | None":
     """Return the table in a trajectory or a DataFrame, with units in its headings; None for any other source.
 
     A DataFrame has its units in ``attrs["units"]``. A named index is a column.
@@ -26,23 +26,23 @@ def table_of(source: Any) -> "Table | None":
     from ..running.trajectory import Trajectory
 
     if isinstance(source, Trajectory):
-        return make_table({"t": source.time, **source.columns}, {"t": "s", **source.units})
+        return build_table({"t": source.time, **source.columns}, {"t": "s", **source.units})
     if hasattr(source, "columns"):
         frame = source if source.index.name is None else source.reset_index()
         units = {str(name): str(unit) for name, unit in frame.attrs.get("units", {}).items()}
         columns = {str(name): np.asarray(frame[name]) for name in frame.columns}
-        return make_table({column_heading(name, units.get(name, "")): column for name, column in columns.items()}, {})
+        return build_table({column_heading(name, units.get(name, "")): column for name, column in columns.items()}, {})
     return None
 
 
-def make_table(columns: "dict[str, np.ndarray]", units: dict[str, str]) -> "Table":
-    """Return a table of columns (n,) by name; texts are read as those in a file."""
+def build_table(columns: "dict[str, np.ndarray]", units: dict[str, str]) -> "Table":
+    """Return a table of columns (n,) by name; texts are parsed like those in a file."""
     from ..records.table_files import Table
     from ..results.files import column_heading
 
     cells = []
     for name, column in columns.items():
         if column.ndim != 1 or len(column) != len(next(iter(columns.values()))):
-            raise SceneError(f"{name} has the shape {column.shape}: times and samples must be equally long rows")
+            raise SceneError(f"{name} has the shape {column.shape}: times and samples must be rows of the same length")
         cells.append(column.astype(float) if column.dtype.kind in "fiub" else [str(cell) for cell in column])
     return Table("the record", tuple(column_heading(name, units.get(name, "")) for name in columns), tuple(cells))

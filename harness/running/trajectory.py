@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import HarnessError, check_names, optional
+from ..errors import HarnessError, check_names, import_optional
 from ..results.files import column_heading, write_csv, write_signals
 from ..results.quantity import Quantity, format_number, step_size_quantities
 from ..results.summary import STEPS_TABLE, Summary, SummaryTable, make_table, write_summary
@@ -208,7 +208,7 @@ class Trajectory:
         HarnessError
             If pandas is not installed.
         """
-        library = optional("pandas", "to_pandas()", "sweep")
+        library = import_optional("pandas", "to_pandas()", "sweep")
         frame: pandas.DataFrame = library.DataFrame(self.columns, index=library.Index(self.time, name="time"))
         frame.attrs["units"] = {"time": "s"} | {name: self.units[name] for name in self.columns}
         return frame
@@ -219,15 +219,15 @@ class Trajectory:
         Returns
         -------
         xarray.Dataset
-            A variable for each output with the attributes ``units`` and ``long_name``; the parameters in force are
-            attributes of the dataset.
+            A variable for each output with the attributes ``units`` and ``long_name``; the effective parameters
+            are attributes of the dataset.
 
         Raises
         ------
         HarnessError
             If xarray is not installed.
         """
-        library = optional("xarray", "to_xarray()", "sweep")
+        library = import_optional("xarray", "to_xarray()", "sweep")
         variables = {
             name: ("time", column, {"units": self.units[name] or "1", "long_name": self.descriptions.get(name, name)})
             for name, column in self.columns.items()
