@@ -1,4 +1,4 @@
-"""Command line: one file per command. A command parses its options, calls one function and prints the result."""
+"""Command line: one file for each command. A command parses its options, calls one function and prints the result."""
 
 from importlib import import_module
 from pkgutil import iter_modules
@@ -36,7 +36,7 @@ class FullHelpGroup(click.Group):
 def commands(context: click.Context, terminal: Terminal) -> None:
     """Run FMUs with dry friction, measure them, and compare the results with published values.
 
-    Without a command, all published cases are run.  Exit status: 0 success, 1 a run or check failed, 2 wrong usage,
+    Without a command, it runs all published cases.  Exit status: 0 success, 1 a run or check failed, 2 wrong usage,
     130 interrupted by Ctrl-C, 143 terminated by SIGTERM.  An interrupted command leaves no incomplete results.
 
     \b
@@ -46,9 +46,8 @@ def commands(context: click.Context, terminal: Terminal) -> None:
       friction-fmus run my-scene.toml --out elsewhere
       friction-fmus list
     """
-    context.default_map = dict.fromkeys(
-        commands.commands, vars(terminal)
-    )  # options before the command apply to it as well
+    # options before the command apply to the command as well
+    context.default_map = dict.fromkeys(commands.commands, vars(terminal))
     if context.invoked_subcommand is None:
         from ..studies.run import study
         from ..studies.run.table import results_table

@@ -8,16 +8,16 @@ from .terminal import Terminal, result_options
 @click.command()
 @result_options
 def bench(terminal: Terminal) -> None:
-    """Run the benchmarks.  Each is measured against its target and against a peer in the same run.
+    """Run the benchmarks.  Each result is compared with its target and with a peer in the same run.
 
     \b
     Example:
       friction-fmus bench
     """
-    from ..studies.bench import study as work
+    from ..studies.bench import study
     from ..studies.bench.table import benchmark_table
 
-    selected = work.all_benchmarks()
+    selected = study.all_benchmarks()
     with terminal.progress(len(selected)) as report:
-        benchmarks = work.run_benchmarks(selected, terminal.out, report)
-    terminal.print_result(benchmarks, benchmark_table(benchmarks), folder=terminal.out / work.FOLDER)
+        benchmarks = study.run_benchmarks(selected, terminal.out, report)
+    terminal.print_result(benchmarks, benchmark_table(benchmarks), folder=terminal.out / study.FOLDER)

@@ -2,10 +2,10 @@
 
 import click
 
-ANY = {"ignore_unknown_options": True, "help_option_names": []}
+PASS_ALL_OPTIONS = {"ignore_unknown_options": True, "help_option_names": []}
 
 
-@click.command("build", context_settings=ANY, add_help_option=False)
+@click.command("build", context_settings=PASS_ALL_OPTIONS, add_help_option=False)
 @click.argument("arguments", nargs=-1, type=click.UNPROCESSED, metavar="[NAME | FILE.py]... [OPTIONS]")
 @click.pass_context
 def build(context: click.Context, arguments: tuple[str, ...]) -> None:

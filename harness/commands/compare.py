@@ -19,7 +19,7 @@ from .terminal import FiniteFloat, Terminal, refuse_ignored_options, refuse_opti
     type=FiniteFloat(min=0),
     help="Allowed difference, relative to the largest value.",
 )
-@click.option("--atol", type=FiniteFloat(min=0), help="Allowed difference on top, in the unit of the variable.")
+@click.option("--atol", type=FiniteFloat(min=0), help="Allowed difference in addition, in the unit of the variable.")
 @result_options
 @click.pass_context
 def compare(
@@ -36,8 +36,8 @@ def compare(
 
     Both sides share one time grid: FMUs and scenes are run at the times of the other side, and two FMUs with the
     fixed internal step that one of them declares.  Between samples, a variable is interpolated with its rate if the
-    rate was recorded, otherwise monotonically; integers are held.  With --rtol or --atol, exit status 1 means that a
-    difference exceeds the tolerance, events do not match, or a run failed.
+    rate was recorded, otherwise monotonically; an integer keeps its last value.  With --rtol or --atol, exit status 1
+    means that a difference exceeds the tolerance, events do not match, or a run failed.
 
     \b
     Examples:

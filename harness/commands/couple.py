@@ -13,10 +13,11 @@ from .terminal import POSITIVE, Terminal, result_options
 @result_options
 def couple(scene: str, stop: float | None, terminal: Terminal) -> None:
     """Couple the FMUs of a SCENE.  The scene is written as an SSP archive, run by Ecos, libcosim and fmpy, and compared
-    with one model of the whole system.
+    with a single model of the whole system.
 
-    SCENE is two-masses, driven, chain, the path of a TOML file (keys: see harness/scenes/coupled/scene.py), or the path
-    of an SSP archive (.ssp).  An archive is compared with its own run at the smallest communication step.
+    SCENE is two-masses, driven, chain, the path of a TOML file (its keys are described in
+    harness/scenes/coupled/scene.py), or the path of an SSP archive (.ssp).  An archive is compared with its own run at
+    the smallest communication step.
 
     \b
     Examples:

@@ -7,7 +7,7 @@ import click
 
 from .terminal import POSITIVE, Terminal, refuse_options, result_options
 
-COLUMN_OPTIONS = (
+COLUMN_OPTIONS = (  # of records
     "time",
     "position",
     "velocity",
@@ -17,7 +17,7 @@ COLUMN_OPTIONS = (
     "time_unit",
     "names",
     "rate",
-)  # of records
+)
 
 
 @click.command()
@@ -39,7 +39,7 @@ COLUMN_OPTIONS = (
 @click.option("--until", "end", type=click.FLOAT, default=float("inf"), help="Ignore samples after this time in s.")
 @click.option("--k", type=POSITIVE, help="Stiffness in N/m or N.m/rad; required for the friction force.")
 @click.option("--m", type=POSITIVE, help="Mass in kg, or moment of inertia in kg.m2; an alternative to --k.")
-@click.option("--pendulum", is_flag=True, help="The restoring torque is k sin(theta), with k = m g a.")
+@click.option("--pendulum", is_flag=True, help="Fit a pendulum: the restoring torque is k sin(theta), with k = m g a.")
 @click.option("--drag/--no-drag", default=True, show_default=True, help="Fit the models with quadratic drag as well.")
 @click.option("--drift", is_flag=True, help="Fit a linear drift of the rest position or sensor offset.")
 @result_options

@@ -20,7 +20,7 @@ from .terminal import POSITIVE, Terminal, result_options
     metavar="NAME=VALUE,...|RESULT",
     help="Values to start from, or the folder of an earlier fit; repeatable.",
 )
-@click.option("--each", metavar="NAME,...", help="Parameters with a value of their own for each record.")
+@click.option("--each", metavar="NAME,...", help="Parameters that have a separate value for each record.")
 @click.option("--sigma", multiple=True, metavar="OUTPUT=NOISE,...", help="Known noise, in the unit of the FMU.")
 @click.option("--against", multiple=True, metavar="MODEL|FMU", help="Other law to fit and compare; repeatable.")
 @click.option("--validate", multiple=True, metavar="FILE", help="Record to predict, not to fit; repeatable.")
@@ -59,11 +59,11 @@ def fit(
     FMU.  Without LOW:HIGH, a factor of 4 about the start value is searched.  offset(OUTPUT), gain(OUTPUT)
     and delay(OUTPUT) are unknowns of a sensor.
 
-    --against fits other laws to the same records and compares all by the Bayesian information criterion.  Each law
+    --against fits other laws to the same records and compares all by the Bayesian information criterion.  Each FMU
     frees and fixes those of the given names that it has.
 
-    The results are values with 95 % confidence intervals.  Parameters that the record does not determine are named,
-    with the combinations that it does.
+    The results are values with 95 % confidence intervals.  Parameters that the record does not determine are listed,
+    with the combinations of them that it does determine.
 
     \b
     Examples:
@@ -83,10 +83,10 @@ def fit(
     from ..studies.fit.table import result_parts
 
     fmu, *others = map(find_fmu, (model, *against))
-    for each_fmu in (fmu, *others):
-        check_built(each_fmu, SceneError)
+    for path in (fmu, *others):
+        check_built(path, SceneError)
     ranges = options.parse_ranges(free)
-    each_record = tuple(options.split_list([each or ""]))
+    per_record = tuple(options.split_list([each or ""]))
     request = FitRequest(
         run=RunSpec(fmu, values=options.parse_values("--fixed", fixed), timeout=timeout),
         against=tuple(others),
@@ -94,8 +94,8 @@ def fit(
         observe=options.parse_columns("--observe", observe),
         inputs=options.parse_columns("--input", inputs),
         sigma=options.parse_numbers("--sigma", sigma),
-        start=options.parse_starts(start, ranges, each_record),
-        each=each_record,
+        start=options.parse_starts(start, ranges, per_record),
+        each=per_record,
         robust=robust,
         columns=ColumnOptions(**columns),
     )

@@ -20,11 +20,11 @@ def importers(fmus: Path, terminal: Terminal) -> None:
       friction-fmus importers
       friction-fmus importers --fmus fmus/native
     """
-    from ..studies.importers import table as work
+    from ..studies.importers import table as checks
     from ..studies.importers.checks import IMPORTERS
 
     with terminal.progress(len(IMPORTERS)) as report:
-        rows = work.run_importer_checks(fmus, terminal.out, report)
+        rows = checks.run_importer_checks(fmus, terminal.out, report)
     failed = (f"{row.importer}, {row.check}: {', '.join(row.failed)}" for row in rows if row.failed)
-    output = (work.importer_table(rows), *work.legend_lines(rows))
-    terminal.print_result(rows, *output, folder=terminal.out / work.FOLDER, failed=failed)
+    output = (checks.importer_table(rows), *checks.legend_lines(rows))
+    terminal.print_result(rows, *output, folder=terminal.out / checks.FOLDER, failed=failed)

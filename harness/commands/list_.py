@@ -1,16 +1,18 @@
-"""list: the scenes that come with the harness."""
+"""list: the shipped scenes."""
 
 import click
 
 from .terminal import Terminal, json_option
 
+HEADINGS = ("command", "scene", "model", "title")
+
 
 @click.command("list")
 @json_option
 def list_(as_json: bool) -> None:
-    """List what comes with the harness: scenes and models for `run`, coupled FMUs for `couple`.
+    """List the shipped scenes and models for `run`, and the coupled scenes for `couple`.
 
-    A model whose name is also the scene has no scene file; `run` uses its defaults, once it is built by name.
+    A model without a scene file is listed as a scene of its own name; build it by name, and `run` uses its defaults.
 
     \b
     Example:
@@ -33,6 +35,3 @@ def list_(as_json: bool) -> None:
     for row in rows:
         table.add_row(*row)
     Terminal(False, as_json).print_result([dict(zip(HEADINGS, row, strict=True)) for row in rows], table)
-
-
-HEADINGS = ("command", "scene", "model", "title")

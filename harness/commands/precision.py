@@ -12,9 +12,9 @@ from .terminal import Terminal, result_options
 def precision(models: tuple[str, ...], terminal: Terminal, quick: bool) -> None:
     """Measure error against run time and right-hand side evaluations for each MODEL.  Default: all shipped models.
 
-    MODEL is a name or the path of a file: belt.py with belt.fmu beside it, or belt.fmu.  A shipped model is compared
-    with an independent reference.  Any other model is compared with its certified result (belt.csv, see references), or
-    with the solution on which two of its own methods agree.
+    MODEL is a name or the path of a file: belt.py with belt.fmu in the same folder, or belt.fmu.  A shipped model is
+    compared with an independent reference.  Any other model is compared with its certified result (belt.csv, see
+    references), or with the solution on which two of its own methods agree.
 
     \b
     Examples:

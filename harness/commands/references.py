@@ -16,10 +16,10 @@ FILE = click.Path(exists=True, dir_okay=False, path_type=Path)
 def references(files: tuple[Path, ...], quiet: bool, as_json: bool) -> None:
     """Compute the certified result of the model in each FILE.py and write it to FILE.csv.  The FMU must be built.
 
-    The default run is solved by two methods that share no formula.  If they agree, FILE.csv is written, and
-    FILE-events.csv with the changes of mode if the model sticks; the next build includes them in the FMU and on its
-    page.  The shipped models use closed forms, power series and independent solvers instead, for each friction law;
-    this takes some minutes.
+    Two methods that share no formula solve the default run.  If they agree, FILE.csv is written, and for a model that
+    sticks FILE-events.csv with the changes of mode; the next build includes both in the FMU and on its page.  The
+    shipped models use closed forms, power series and independent solvers instead, for each friction law; this takes
+    some minutes.
 
     \b
     Example:

@@ -14,8 +14,8 @@ from .terminal import json_option, out_option, print_json, quiet_option
 def report(out: Path, quiet: bool, as_json: bool) -> None:
     """Write report.html, a self-contained page of all results.
 
-    Nothing is run: missing results are listed with the commands that produce them.  The page includes the interactive
-    web page if `friction-fmus build --web` has built it.
+    The command runs nothing: it lists missing results with the commands that produce them.  The page includes the
+    interactive web page if `friction-fmus build --web` has built it.
 
     \b
     Example:

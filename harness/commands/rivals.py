@@ -12,27 +12,28 @@ from .terminal import POSITIVE, Terminal, result_options
     type=POSITIVE,
     default=300.0,
     show_default=True,
-    help="Seconds that a run may take.",
+    help="Time limit of a run in s.",
 )
 @result_options
 def rivals(names: tuple[str, ...], timeout: float, terminal: Terminal) -> None:
-    """Run the same scenes with dry friction in other engines, and measure error, creep, events, run time and code.
+    """Run the same scenes with dry friction in other engines, and measure error, creep, events, run time and lines of
+    code.
 
     RIVAL is one of scipy, pathsim, drake-events, drake-discrete, drake-continuous, mujoco, exudyn, dart and pybullet.
-    Default: all.  Each runs at its defaults and at its best setting, in processes of its own.  Rivals that are not
-    installed are listed with their reasons (pip install 'friction-fmus[rivals]').
+    Default: all.  Each runs with its default and with its best setting, in a separate process.  Rivals that are
+    not installed are listed and skipped (pip install 'friction-fmus[rivals]').
 
     \b
     Examples:
       friction-fmus rivals
       friction-fmus rivals scipy mujoco
     """
-    from ..studies.rivals import study as work
+    from ..studies.rivals import study
     from ..studies.rivals.catalogue import find_rivals
     from ..studies.rivals.table import rivals_table, sentences
 
     with terminal.progress(len(find_rivals(names)) + 1) as report:
-        comparison = work.run_rivals(names, timeout, terminal.out, report)
+        comparison = study.run_rivals(names, timeout, terminal.out, report)
     terminal.print_result(
-        comparison, rivals_table(comparison), "", *sentences(comparison), folder=terminal.out / work.FOLDER
+        comparison, rivals_table(comparison), "", *sentences(comparison), folder=terminal.out / study.FOLDER
     )

@@ -96,7 +96,7 @@ def run(
 
 
 def repeat_call(context: click.Context, folder: Path, provenance: dict[str, Any], terminal: Terminal) -> None:
-    """Repeat the recorded call of a command; the recorded text of the command is for readers and is never run."""
+    """Repeat the recorded call of a command; the recorded command text is only displayed, never run."""
     root, call = context.find_root(), provenance.get("call")
     if call is None or call["name"] not in FOLDER_DEPTHS:
         raise HarnessError(

@@ -9,12 +9,12 @@ from .terminal import Terminal, result_options
 @click.argument("models", metavar="[MODEL]...", nargs=-1)
 @result_options
 def stability(models: tuple[str, ...], terminal: Terminal) -> None:
-    """Run stiff and extreme cases with every method.  Each must finish within its error bound, or be rejected with an
-    error message.
+    """Run stiff and extreme cases with every method.  Each case must finish within its error bound, or be rejected with
+    an error message.
 
-    MODEL is a name or the path of a file: belt.py with belt.fmu beside it, or belt.fmu.  Default: all shipped models.
-    For a file, the parameters are varied, and the reference is the solution on which two of its methods agree.  Exit
-    status 1 if a case fails.
+    MODEL is a name or the path of a file: belt.py with belt.fmu in the same folder, or belt.fmu.  Default: all shipped
+    models. For a file, the parameters are varied, and the reference is the solution on which two of its methods agree.
+    Exit status 1 if a case fails.
 
     \b
     Examples:

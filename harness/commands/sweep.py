@@ -26,7 +26,7 @@ WORKERS = click.IntRange(1, 1024)
     multiple=True,
     required=True,
     metavar="NAME=LO:HI:N",
-    help="Parameter to vary; append :log, or list a,b,c.",
+    help="Parameter to vary; append :log for logarithmic spacing, or list the values: a,b,c.",
 )
 @click.option("--set", "values", multiple=True, metavar="NAME=VALUE", help="Value set in every run.")
 @click.option(
@@ -75,7 +75,7 @@ def sweep(
         refuse_options(context, "without --random", "seed")
     if scheduler is not None:
         refuse_options(context, "with --scheduler: the cluster has its own workers", "workers")
-    for package in ("xarray", "dask", "netCDF4"):  # checked before the runs, whose results they write
+    for package in ("xarray", "dask", "netCDF4"):  # checked before the runs: they write the results
         if find_spec(package) is None:
             raise HarnessError(f"a sweep needs {package}: python -m pip install 'friction-fmus[sweep]'")
     from ..scenes.assignments import parse_assignment

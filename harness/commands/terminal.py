@@ -26,7 +26,7 @@ FORMER_TIMEOUT = "--patience"
 
 
 class RenamedOption(click.Option):
-    """An option that was renamed: help shows its first name; the others are former names, which still work."""
+    """Option that was renamed: the help shows its first name only; its former names still work."""
 
     def get_help_record(self, ctx: click.Context) -> Any:
         names, self.opts = self.opts, self.opts[:1]
@@ -63,7 +63,7 @@ overwrite_option = click.option(
 )
 
 
-COMMON_OPTIONS = ("out", "quiet", "as_json", "overwrite")  # of every run of a command, not of its result
+COMMON_OPTIONS = ("out", "quiet", "as_json", "overwrite")  # not recorded: they do not change a result
 
 
 def result_options(command: Callable[..., Any]) -> Callable[..., Any]:
@@ -90,7 +90,7 @@ def record_call(context: click.Context) -> None:
 
 
 def build_arguments(command: click.Command, options: Mapping[str, Any]) -> list[str]:
-    """Return the command line of recorded options; the command itself checks their values.
+    """Return command-line arguments for recorded options; the command itself checks their values.
 
     Raises
     ------
@@ -157,14 +157,14 @@ def refuse_options(context: click.Context, reason: str, *options: str) -> None:
 
 
 def refuse_ignored_options(context: click.Context, fmus: Iterable[Path]) -> None:
-    """Raise UsageError for an option of the command line that applies to none of the FMUs to which options apply.
+    """Raise UsageError for an option on the command line that has no effect on any of the FMUs.
 
     Parameters
     ----------
     context : click.Context
         Context of the command.
     fmus : iterable of pathlib.Path
-        FMUs that are run with the options of the command line; scenes have their own.
+        FMUs that are run with the options of the command line; scenes have their own options.
     """
     from ..running.fmu_archive import exposes_solver_steps, read_description
 
@@ -205,7 +205,7 @@ def prepare_process() -> None:
 
 @contextmanager
 def progress(quiet: bool, total: int) -> Iterator[Callable[[str, float], None]]:
-    """Show a progress bar on standard error; yield a callback that takes the current scene and its fraction done."""
+    """Show a progress bar on standard error; yield a callback that receives the scene and its finished share."""
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
