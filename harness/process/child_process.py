@@ -1,7 +1,7 @@
-"""Child processes of this project that answer requests, for whatever can crash or hang.
+"""Child processes that answer requests, for code that may crash or hang.
 
-Requests and replies are lines of JSON on standard input and output. A process answers any number of requests; each has
-a time limit, which every progress report renews. Whatever else the process prints is captured.
+Requests and replies are lines of JSON on standard input and output. A process answers any number of requests. Each
+request has a time limit, which every progress report renews. All other output of the process is captured.
 """
 
 import json
@@ -29,12 +29,12 @@ READY, PROGRESS, REPLY, ERROR = "ready", "progress", "reply", "error"  # kinds o
 START_TIMEOUT = 60.0  # s until a process that was started is ready
 EXIT_TIMEOUT = 5.0  # s until a process that closes its standard output has ended
 REPORT_INTERVAL = 0.2  # s between progress reports
-MAX_OUTPUT_BYTES = 1_000_000  # of what a process prints, as far as it reports progress
+MAX_OUTPUT_BYTES = 1_000_000  # captured output of a process; checked when it reports progress
 ORPHAN_INTERVAL = 0.5  # s between two checks of a child process for its parent
 
 
 class ChildError(HarnessError):
-    """The process did not answer; it was killed if it had not ended. `messages` are what it printed."""
+    """The process did not answer and has ended or was killed. `messages` is its captured output."""
 
     def __init__(self, text: str, messages: str) -> None:
         super().__init__(text)
@@ -54,7 +54,7 @@ class ChildDiedError(ChildError):
 
 
 class ChildProcess:
-    """A process that answers requests; a context manager that kills it. It is replaced when it has ended.
+    """A process that answers requests, and a context manager that kills it. The next request replaces an ended process.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ class ChildProcess:
     Attributes
     ----------
     messages : str
-        What the process printed while it answered the last request.
+        Captured output of the last request.
     """
 
     def __init__(self, module: str) -> None:
@@ -130,7 +130,7 @@ class ChildProcess:
         self.receive(START_TIMEOUT)
 
     def send(self, request: Any) -> None:
-        """Send a request. The process reads it at once, because it has answered the one before."""
+        """Send a request. The process reads it at once, because it has answered the previous one."""
         assert self.process is not None
         assert self.process.stdin is not None
         with suppress(OSError):  # it died, and `receive` says why
@@ -160,11 +160,11 @@ class ChildProcess:
         return self.process.wait()
 
     def read_messages(self) -> str:
-        """Return what the process has printed since the last request was sent."""
+        """Return the output that was captured since the last request was sent."""
         return self.output_file.read_text(encoding="utf-8", errors="replace")
 
     def finish(self) -> None:
-        """End the process, if it runs, when it has no request left; raise ChildError if it crashes or hangs."""
+        """Close standard input, on which the process ends; raise ChildError if it crashes or hangs."""
         if self.process is None:
             return
         assert self.process.stdin is not None
@@ -179,13 +179,13 @@ class ChildProcess:
             self.kill()
 
     def kill(self) -> None:
-        """Kill the process and its own child processes, whatever they are doing, and remove its files."""
+        """Kill the process and its child processes, and remove its files."""
         process, self.process = self.process, None
         if process is not None:
             kill_process_group(process)
             process.wait()
             assert process.stdin is not None
-            with suppress(OSError):  # what could not be sent
+            with suppress(OSError):  # closing sends the rest of a request, which may fail
                 process.stdin.close()
         self.resources.close()
 
@@ -218,10 +218,10 @@ def to_plain(value: Any) -> Any:
 
 
 class RequestServer:
-    """In a child process, answers the requests of the parent.
+    """Answers the requests of the parent, in a child process.
 
-    Other output, such as that of FMUs, is redirected to standard error, and there is nothing to read on standard
-    input. The process exits if its parent is killed.
+    Other output, such as that of FMUs, is redirected to standard error, and standard input is empty for other readers.
+    The process exits if its parent is killed.
 
     Parameters
     ----------
@@ -286,7 +286,7 @@ def parent_process_id() -> int:
 
 
 def exit_when_orphaned(parent: int) -> None:
-    """Exit once the process has another parent: the one that started it was killed."""
+    """Exit once the parent that started the process has been killed, so that it has another parent."""
     while os.getppid() == parent:
         sleep(ORPHAN_INTERVAL)
     os._exit(1)  # sys.exit would end this thread only, and the main thread may be in a call of an FMU

@@ -1,7 +1,7 @@
 """Ctrl-C and SIGTERM end a command at once, remove its files and processes and return the usual exit status.
 
-Both signals raise KeyboardInterrupt. C callbacks and FMUs in Python may swallow that exception, so loops that run for
-long call `check_interrupt`.
+Both signals raise KeyboardInterrupt. C callbacks and FMUs in Python may swallow that exception, so long loops call
+`check_interrupt`.
 """
 
 import atexit
@@ -59,7 +59,7 @@ def record_signal(number: int, frame: Any) -> None:
 
 @contextmanager
 def defer_signals() -> Iterator[None]:
-    """Defer signals to the end of the block, for actions that must not be left half done."""
+    """Defer signals to the end of the block, for actions that must not stop halfway."""
     handled = current_thread() is main_thread() and [
         number for number in SIGNALS if signal.getsignal(number) == handle_signal
     ]

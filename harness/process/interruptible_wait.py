@@ -1,4 +1,4 @@
-"""Waiting for other threads and processes such that a signal leaves no lock held.
+"""Waiting for threads and processes without leaving a lock acquired after a signal.
 
 A signal between two lines of concurrent.futures would leave its lock acquired, and the command would wait forever.
 """

@@ -1,4 +1,4 @@
-"""Programs in child processes with temporary directories of their own. Both end with the command that started them."""
+"""Programs in child processes, each with a temporary directory; the parent removes both when it ends."""
 
 import os
 import subprocess
@@ -20,7 +20,7 @@ POLL_INTERVAL = 0.1  # s between two checks for signals, which a blocked thread 
 
 
 class SubprocessTimeoutError(HarnessError):
-    """The process timed out and was killed. `process` holds its output up to then."""
+    """The process timed out and was killed. `process` holds its output."""
 
     def __init__(self, timeout: float, process: subprocess.CompletedProcess[str]) -> None:
         super().__init__(f"no answer after {timeout:g} s")
@@ -87,7 +87,7 @@ def run_subprocess(
 
 
 def run_module(module: str, *arguments: str, **options: Any) -> subprocess.CompletedProcess[str]:
-    """Run a module of this project with the present interpreter, from any working directory; see `run_subprocess`."""
+    """Run a module of this project with the current interpreter, from any working directory; see `run_subprocess`."""
     return run_subprocess([sys.executable, "-m", module, *arguments], environment=project_environment(), **options)
 
 

@@ -1,8 +1,8 @@
 """Temporary directories with paths that every library can read, and locks of folders that are in use.
 
-A lock ends with the process that holds it, so a temporary folder without one was left by a kill. The first temporary
-directory of a process removes those of killed processes. Locks exist on POSIX (fcntl), but not on all of its file
-systems.
+A lock ends with the process that holds it, so a temporary folder without a lock belongs to a killed process. Before a
+process creates its first temporary directory, it removes those of killed processes. Locks exist on POSIX (fcntl), but
+not on all file systems.
 """
 
 import os
@@ -84,7 +84,7 @@ def remove_abandoned_directories(root: Path) -> None:
 def create_locked_folder(create: Callable[[], Path], resources: ExitStack) -> Path:
     """Create a folder and lock it; `resources` holds the lock.
 
-    Another process may take a folder without a lock for a leftover and remove it: then another one is created.
+    Between both steps another process may remove the folder, because it has no lock yet; then another one is created.
     """
     while True:
         folder = create()
@@ -97,7 +97,7 @@ def create_locked_folder(create: Callable[[], Path], resources: ExitStack) -> Pa
 
 @contextmanager
 def lock_path(path: Path, wait: bool = False) -> Iterator[None]:
-    """Lock a folder or a file, where locks exist; raise OSError if another process has it and `wait` is false."""
+    """Lock a folder or a file, where locks exist; raise OSError if another process holds it and `wait` is false."""
     if sys.platform == "win32":
         yield
         return

@@ -1,4 +1,4 @@
-"""Worker pool. Workers exit with the parent, ignore SIGINT and discard what they print.
+"""Worker pool. Workers exit with the parent, ignore SIGINT and discard their output.
 
 Each worker has its own pipe, so a killed worker cannot deadlock the others.
 """
@@ -53,12 +53,12 @@ class Worker:
         child_connection.close()
 
     def send_task(self, function: Callable[..., Any], *arguments: Any) -> None:
-        """Start function(*arguments) in the worker, in the present working directory."""
+        """Start function(*arguments) in the worker, in the current working directory."""
         with self.raise_if_died():
             self.connection.send((Path.cwd(), function, arguments))
 
     def receive_result(self) -> Any:
-        """Return what the function returned, or the exception that it raised."""
+        """Return the result of the function, or the exception that it raised."""
         with self.raise_if_died():
             return self.connection.recv()
 
@@ -72,7 +72,7 @@ class Worker:
             raise WorkerDiedError(f"the process died with exit code {self.process.exitcode}") from None
 
     def kill(self) -> None:
-        """Kill the process, whatever it is doing."""
+        """Kill the process."""
         self.process.kill()
         self.process.join()
         self.connection.close()
@@ -129,7 +129,7 @@ class WorkerPool:
         return {future for future in futures if future.done()}
 
     def kill(self) -> None:
-        """Kill all workers, whatever they are doing."""
+        """Kill all workers."""
         for process in multiprocessing.active_children():
             process.kill()
             process.join()
@@ -141,7 +141,7 @@ def run_tasks(connection: Connection, folder: str) -> None:
     while True:
         try:
             directory, function, arguments = connection.recv()
-        except EOFError:  # the parent is gone
+        except EOFError:  # the parent has ended
             exit_with_parent(folder)
         os.chdir(directory)
         try:
