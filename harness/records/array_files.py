@@ -1,7 +1,7 @@
-"""Reads named arrays with their units from .npy, .npz, .mat, HDF5, Parquet and JSON files.
+"""Readers of named arrays with units from .npy, .npz, .mat, HDF5, Parquet and JSON files.
 
-Each reader returns a dictionary of arrays, texts and dictionaries, as the file nests them. A unit is a text beside its
-array: `x_unit`, an entry `units` for all arrays of a dictionary, or a `unit` beside a single array.
+Each reader returns a dictionary of arrays, texts and dictionaries, nested as in the file. The unit of an array is a
+text in the same dictionary: `x_unit` for `x`, `units` for all arrays, or `unit` for a single array.
 """
 
 import io
@@ -20,15 +20,15 @@ from ..process.temporary_directory import temporary_directory
 from .size_limits import check_size, check_zip
 
 UNIT_KEYS = ("unit", "units")
-VALUE_KEYS = ("value", "values", "data", "signal")  # names of the only array in a dictionary: it has that of its parent
+VALUE_KEYS = ("value", "values", "data", "signal")  # an only array of such a name has the name of its dictionary
 NUMERIC = "fiub"
-TIME_KINDS = "mM"  # durations and times of the calendar
+TIME_KINDS = "mM"  # durations and calendar times
 MAX_DEPTH = 20  # of dictionaries
 
 
 @dataclass(frozen=True)
 class ArrayColumn:
-    """Name, values (numbers or texts) and unit of a column of an array file."""
+    """Column of an array file: name, values (numbers or texts) and unit."""
 
     name: str
     values: Any
@@ -79,7 +79,7 @@ def read_matlab_objects(data: bytes) -> dict[str, Any]:
 
 
 def columns_of_frame(frame: Any) -> dict[str, Any]:
-    """Return the columns of a DataFrame, its times first, with the units that MATLAB keeps in its attributes."""
+    """Return the columns of a DataFrame, its times first, with the units that MATLAB stores in its attributes."""
     columns: dict[str, Any] = {}
     if frame.index.dtype.kind in TIME_KINDS:
         columns[str(frame.index.name or "Time")] = np.asarray(frame.index)
@@ -221,7 +221,7 @@ def split_array(name: str, values: Any, unit: str | None, units: list[str]) -> l
     if isinstance(values, list):
         return [ArrayColumn(name, [str(cell) for cell in values], unit)]
     if values.dtype.kind in TIME_KINDS:
-        return [ArrayColumn(name, seconds(values), "s")]
+        return [ArrayColumn(name, to_seconds(values), "s")]
     values = values.astype(float)
     if values.ndim == 1 or min(values.shape) == 1:
         return [ArrayColumn(name, values.ravel(), unit)]
@@ -231,8 +231,8 @@ def split_array(name: str, values: Any, unit: str | None, units: list[str]) -> l
     return [ArrayColumn(f"{name}{i + 1}", matrix[:, i], units[i]) for i in range(matrix.shape[1])]
 
 
-def seconds(times: np.ndarray) -> np.ndarray:
-    """Return durations or times of the calendar (n,) in s from the first; NaN for missing ones."""
+def to_seconds(times: np.ndarray) -> np.ndarray:
+    """Return durations or calendar times (n,) in s, counted from the first; NaN for missing ones."""
     first = next((time for time in times if not np.isnat(time)), np.zeros(1, times.dtype)[0])
     return np.asarray((times - first) / np.timedelta64(1, "ns") * 1e-9, float)
 
@@ -259,7 +259,7 @@ def unit_text(value: Any) -> str | None:
 
 
 def unit_texts(value: Any) -> list[str]:
-    """Return units as texts: of a text, bytes, or an array or list of these."""
+    """Return the units in a text, in bytes, or in an array or list of these, as texts."""
     items = np.ravel(value).tolist() if isinstance(value, np.ndarray | list | tuple) else [value]
     texts = [item.decode("utf-8", "replace") if isinstance(item, bytes) else item for item in items]
     return [text.strip() for text in texts] if all(isinstance(text, str) for text in texts) else []

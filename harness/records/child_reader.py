@@ -1,6 +1,6 @@
-"""Reads spreadsheets, .mat, HDF5 and Parquet files in a child process with limited memory.
+"""Reader of spreadsheets, .mat, HDF5 and Parquet files in a child process with limited memory.
 
-The libraries for these formats end their process for some files: one cell in the last row and column of a sheet makes
+Some files make the libraries for these formats end the process: a cell in the last row and column of a sheet makes
 python-calamine allocate 549 GB, and scipy reads beyond the end of some damaged .mat files.
 """
 
@@ -27,7 +27,7 @@ class ReadRequest:
 
 
 def read_in_child(data: bytes, name: str, file_format: str) -> dict[str, Any]:
-    """Return what `read_workbook` or `read_arrays` returns for a file.
+    """Return the result of `read_workbook` or `read_arrays` for a file.
 
     Raises
     ------
@@ -40,7 +40,7 @@ def read_in_child(data: bytes, name: str, file_format: str) -> dict[str, Any]:
         path = folder / "record"
         path.write_bytes(data)
         try:
-            answer: dict[str, Any] = ask_once(__name__, ReadRequest(str(path), name, file_format), TIMEOUT)
+            contents: dict[str, Any] = ask_once(__name__, ReadRequest(str(path), name, file_format), TIMEOUT)
         except ChildTimeoutError:
             raise SceneError(f"{name} takes longer than {TIMEOUT:g} s to read: save its columns as .csv") from None
         except ChildDiedError:
@@ -50,9 +50,9 @@ def read_in_child(data: bytes, name: str, file_format: str) -> dict[str, Any]:
             ) from None
         except HarnessError as error:
             raise SceneError(str(error)) from None
-    if "library" in answer:
-        raise ImportError(name=answer["library"])
-    return answer
+    if "library" in contents:
+        raise ImportError(name=contents["library"])
+    return contents
 
 
 def answer_request(request: ReadRequest) -> dict[str, Any]:
@@ -68,7 +68,7 @@ def answer_request(request: ReadRequest) -> dict[str, Any]:
 
 
 def read_workbook(request: ReadRequest) -> dict[str, Any]:
-    """Return headings, rows, number of the row before the first one, and names of the sheets with tables."""
+    """Return headings and rows of the longest table, the number of the row before it, and the sheets with tables."""
     from python_calamine import CalamineWorkbook
 
     candidates = []
@@ -90,7 +90,7 @@ def read_workbook(request: ReadRequest) -> dict[str, Any]:
 
 
 def read_arrays(request: ReadRequest) -> dict[str, Any]:
-    """Return the columns of an array file, and the names of all that it has."""
+    """Return the columns of an array file, and the names of all its entries."""
     os.environ["OPENBLAS_NUM_THREADS"] = "1"  # each thread would reserve some of the memory
     from . import array_files
 

@@ -116,7 +116,7 @@ def parse_record(table: Table, columns: ColumnOptions, name: str) -> Record:
         times = "" if time_column is None or interval else f"{time_column.heading} is used as time in s and "
         notes.append(f"The file has no headings: {times}{motion_column.heading} is the signal; --columns names them.")
     elif time_column is not None and columns.time is None:
-        notes += runs_side_by_side(candidates, time_column, motion_column)
+        notes += describe_further_runs(candidates, time_column, motion_column)
     label, unit = motion_column.name or motion_column.heading, columns.unit or motion_column.unit
     x = parse_numbers(table, motion_column.index).copy()
     others = [column.heading for column in candidates if column not in (time_column, motion_column)]
@@ -147,17 +147,17 @@ def parse_record(table: Table, columns: ColumnOptions, name: str) -> Record:
 def find_complete_rows(
     t: np.ndarray, x: np.ndarray, labels: tuple[str, str], file: str
 ) -> tuple[np.ndarray, list[str]]:
-    """Return which rows have a time and a value, up to the last with either, and notes on the others.
+    """Return a mask of the rows with a time and a value, up to the last row with either, and notes on the others.
 
     Marks of missing samples become NaN in `t` and `x`.
 
     Raises
     ------
     SceneError
-        If too many rows have none.
+        If too many rows lack a time or a value.
     """
     is_used = np.isfinite(t) | np.isfinite(x)
-    length = int(np.flatnonzero(is_used)[-1]) + 1 if is_used.any() else 0  # a run beside it may be longer
+    length = int(np.flatnonzero(is_used)[-1]) + 1 if is_used.any() else 0  # another run in the table may be longer
     empty = length - int((np.isfinite(t) & np.isfinite(x))[:length].sum())
     notes = [f"{empty} of {length} rows have a missing cell and are skipped."] if empty else []
     for values, label in zip((t, x), labels, strict=True):
@@ -172,7 +172,7 @@ def find_complete_rows(
 
 
 def list_columns(table: Table) -> list[Column]:
-    """Return the columns of a table. Headings that occur twice are numbered; columns without any are named."""
+    """Return the columns of a table, with numbers after headings that occur twice, and names without any heading."""
     headings = list(table.column_headings)
     if not any(headings):
         headings = [f"column {i}" for i in range(1, len(headings) + 1)]
@@ -186,7 +186,7 @@ def list_columns(table: Table) -> list[Column]:
 
 
 def no_time_message(table: Table) -> str:
-    """Return the sentence about a table without a column of times."""
+    """Return the message about a table without a column of times."""
     names = ", ".join(filter(None, table.column_headings))
     if len(table.column_headings) == 1:
         return (
@@ -234,9 +234,10 @@ def find_column(heading: str, table: Table, candidates: Sequence[Column]) -> Col
 
 
 def find_time_column(table: Table, candidates: Sequence[Column], columns: ColumnOptions) -> Column | None:
-    """Return the requested time column; otherwise the one named or measured as a time, or the first if it rises.
+    """Return the requested time column; otherwise that with the name or unit of a time, or the first if it rises.
 
-    Of several, it is the nearest one before the requested signal, or the first.  None if the table has no times.
+    Of several time columns, the nearest one before the requested signal is chosen, or the first.  None if there is
+    none.
     """
     if columns.time is not None:
         return find_column(columns.time, table, candidates)
@@ -261,7 +262,7 @@ def find_time_column(table: Table, candidates: Sequence[Column], columns: Column
 
 
 def find_time_columns(candidates: Sequence[Column]) -> list[Column]:
-    """Return the columns that are named and measured as a time, or else named, or else measured as one."""
+    """Return the columns with the name and the unit of a time, or else with the name, or else with the unit."""
     by_name = [part for part in candidates if TIME_NAME.search(part.name)]
     by_name = [part for part in by_name if not DATE_NAME.search(part.name)] or by_name
     by_unit = [part for part in candidates if part.unit and time_unit_size(part.unit) and find_unit(part.unit) is None]
@@ -269,11 +270,11 @@ def find_time_columns(candidates: Sequence[Column]) -> list[Column]:
 
 
 def is_time_column(column: Column) -> bool:
-    """Return whether a column is named as a time or has a unit."""
+    """Return whether a column has the name of a time, or a unit."""
     return bool(TIME_NAME.search(column.name) or column.unit)
 
 
-def runs_side_by_side(candidates: Sequence[Column], time_column: Column, motion_column: Column) -> list[str]:
+def describe_further_runs(candidates: Sequence[Column], time_column: Column, motion_column: Column) -> list[str]:
     """Return a note if the table has several columns of times, each with signals after it."""
     time_columns = find_time_columns(candidates)
     ends = [*(part.index for part in time_columns[1:]), len(candidates)][: len(time_columns)]
@@ -288,7 +289,7 @@ def runs_side_by_side(candidates: Sequence[Column], time_column: Column, motion_
     selected = next(part for part, _ in runs if part is not time_column)
     return [
         f"The table has {len(others) + 1} runs side by side: {time_column.heading} with {motion_column.heading} is "
-        f"used, beside {', '.join(others)}; --time '{selected.heading}' selects another."
+        f"used, and {', '.join(others)} is not; --time '{selected.heading}' selects another."
     ]
 
 
@@ -319,13 +320,14 @@ def find_signal_column(
     if len(same_unit) == 1 or (order == 0 and same_unit[0].name.lower() in ("x", "theta")):
         return same_unit[0], []
     deviations = [np.nanstd(parse_numbers(table, part.index, strict=False)) for part in same_unit]
-    liveliest = same_unit[int(np.argmax(deviations))]
+    most_varying = same_unit[int(np.argmax(deviations))]
     names = ", ".join(part.heading for part in same_unit)
-    return liveliest, [f"Of {names} the one that varies most is used: {liveliest.heading}; --position selects another."]
+    note = f"Of {names}, {most_varying.heading} is used, because it varies most; --position selects another."
+    return most_varying, [note]
 
 
 def resolve_unit(name: str, unit: str | None, columns: ColumnOptions, file: str) -> tuple[int, str, float, str]:
-    """Return the order, base unit and SI factor of a column, and a note on what had to be assumed."""
+    """Return the order, base unit and SI factor of a column, and a note on an assumption."""
     requested = None if columns.quantity is None else QUANTITIES.index(columns.quantity)
     order_of_name, size = order_from_name(name), 1.0
     if columns.per_count is not None:
@@ -391,7 +393,7 @@ def read_times(table: Table, time_column: Column, columns: ColumnOptions) -> np.
 
 
 def parse_numbers(table: Table, i: int, strict: bool = True) -> np.ndarray:
-    """Return the numbers (n,) of a column, NaN for missing cells. They are parsed once for a table.
+    """Return the numbers (n,) of a column, NaN for missing cells. The table caches them.
 
     Raises
     ------
@@ -408,12 +410,12 @@ def parse_numbers(table: Table, i: int, strict: bool = True) -> np.ndarray:
 
 
 def parse_cells(cells: Cells) -> tuple[np.ndarray, int | None]:
-    """Return the numbers (n,) in cells, NaN for others, and the index of the first that is neither one nor missing."""
+    """Return the numbers (n,) in cells, NaN for other cells, and the index of the first invalid cell or None."""
     if isinstance(cells, np.ndarray):
         return cells, None
     try:
-        everywhere = all("," in cell for cell in cells)
-        return np.array([cell.replace(",", ".") for cell in cells] if everywhere else cells, dtype=float), None
+        has_commas = all("," in cell for cell in cells)
+        return np.array([cell.replace(",", ".") for cell in cells] if has_commas else cells, dtype=float), None
     except ValueError:
         pass
     numbers, invalid = np.full(len(cells), np.nan), None

@@ -1,7 +1,7 @@
 """Times and values as data loggers write them.
 
-Times are numbers, times of day, time stamps, or rounded. Some samples are no measurements: values such as -9999 that
-stand for a missing sample, and those of a saturated sensor.
+Times are numbers, times of day or time stamps, and may be rounded. Some values are not measurements: marks of missing
+samples, such as -9999, and the values of a saturated sensor.
 """
 
 import re
@@ -25,7 +25,7 @@ NINES = re.compile(r"9{3,}(\.9+)?")
 MAX_SENTINELS = 3  # different ones in a column
 MIN_LEVELS = 50  # different values of a signal whose values seldom repeat
 MIN_DOMINANCE = 5  # times as often as any other value
-MIN_JUMPS, JUMP = 3, 0.1  # times that a value is away from its neighbours, by this share of the range of the others
+MIN_JUMPS, JUMP = 3, 0.1  # times that a value differs from its neighbours by this share of the range of the others
 MIN_JUMP_SHARE = 0.2  # of the times that the value occurs
 MIN_OTHERS = 3  # different values of the signal
 MIN_STAY = 3  # samples at the largest value, in a peak
@@ -145,7 +145,7 @@ def mark_dropouts(values: np.ndarray, name: str) -> list[str]:
     values[finite[is_mark]] = np.nan
     return [
         f"{int(is_mark.sum())} of {len(values)} values of {name} are {mark:.15g}, several times far from the samples "
-        "beside them: they mark missing samples and are left out."
+        "before and after: they mark missing samples and are left out."
     ]
 
 
@@ -170,19 +170,19 @@ def leave_out_saturated(record: Record) -> Record:
 
 
 def find_saturated(x: np.ndarray) -> tuple[np.ndarray, int]:
-    """Return which samples of x (n,) are cut off at the largest value, and in how many peaks; none if it is not.
+    """Return a mask of the samples of x (n,) that are cut off at the largest value, and the number of their peaks.
 
     A motion that is cut off stays at its largest value in several peaks, and is rarely near it otherwise.  A motion
-    that is only rounded passes the level before the last nearly as long; one that is held before its release is at
-    rest in one peak, so the longest stay does not count.
+    that is only rounded stays nearly as long at the next lower level; one that is held before its release is at rest
+    in one peak, so the longest stay does not count.
     """
-    none = np.zeros(len(x), bool), 0
+    not_saturated = np.zeros(len(x), bool), 0
     is_highest, is_low = x == x.max(), x < (x.max() + x.min()) / 2
     if not is_low.any():
-        return none
+        return not_saturated
     peak = np.cumsum(np.diff(is_low.astype(int), prepend=0) < 0)  # number of the peak; the motion is low between two
     stays = np.bincount(peak[is_highest])
     stays = np.sort(stays[stays >= MIN_STAY])[:-1]
     second = x[~is_highest].max()
     near = int(((x >= second - (x.max() - second) / 2) & ~is_highest).sum())
-    return (is_highest, len(stays) + 1) if stays.sum() > MIN_DWELL * near else none
+    return (is_highest, len(stays) + 1) if stays.sum() > MIN_DWELL * near else not_saturated

@@ -9,6 +9,7 @@ from ..errors import SceneError
 from .columns import (
     Column,
     ColumnOptions,
+    describe_further_runs,
     find_column,
     find_time_column,
     is_time_column,
@@ -16,7 +17,6 @@ from .columns import (
     no_time_message,
     parse_numbers,
     read_times,
-    runs_side_by_side,
 )
 from .headings import split_heading
 from .record import MIN_SAMPLES, Record, check_record
@@ -29,7 +29,7 @@ MAX_MISSING_SHARE = 0.2  # of the rows
 
 @dataclass(frozen=True)
 class SignalSource:
-    """Where a signal comes from: the heading of its column, and the unit into which it is converted (or empty)."""
+    """Source of a signal: the heading of its column, and the unit to convert to (empty for a ratio or a count)."""
 
     heading: str
     unit: str
@@ -37,7 +37,7 @@ class SignalSource:
 
 @dataclass(frozen=True)
 class SignalTable:
-    """Signals (n,) by name over the times (n,) in s, and notes on what was assumed when reading."""
+    """Signals (n,) by name over the times (n,) in s, and notes on assumptions made when reading."""
 
     name: str
     t: np.ndarray
@@ -84,7 +84,7 @@ def parse_signals(table: Table, sources: Mapping[str, SignalSource], options: Co
         if options.time is None and any(table.column_headings) and not is_time_column(time_column):
             notes.append(f"{time_column.heading} is used as time; --time selects another column.")
         if options.time is None:
-            notes += runs_side_by_side(candidates, time_column, first)
+            notes += describe_further_runs(candidates, time_column, first)
     columns = {}
     for signal, (column, unit) in selected.items():
         x, remarks = mark_missing(parse_numbers(table, column.index), column.heading)
@@ -96,9 +96,9 @@ def parse_signals(table: Table, sources: Mapping[str, SignalSource], options: Co
 
 
 def mark_missing(values: np.ndarray, name: str) -> tuple[np.ndarray, list[str]]:
-    """Return values (n,) with NaN for those that mark missing samples, and remarks on these and on a saturated sensor.
+    """Return values (n,) with NaN for marks of missing samples, and remarks on these and on a saturated sensor.
 
-    A value that most samples have is that of a rest, not a mark: the speed of a body that sticks is often exactly 0.
+    A value that most samples have is that at rest, not a mark: the speed of a body that sticks is often exactly 0.
     """
     x = values.copy()
     notes = mark_sentinels(x, name)
@@ -118,7 +118,7 @@ def mark_missing(values: np.ndarray, name: str) -> tuple[np.ndarray, list[str]]:
 
 
 def find_signal(heading: str, table: Table, candidates: list[Column]) -> tuple[Column, str | None]:
-    """Return a column and its unit. A heading may override the unit of the file, as in "laser [mm]"."""
+    """Return the column with a heading, and its unit. As "laser [mm]", the heading overrides the unit of the file."""
     try:
         column = find_column(heading, table, candidates)
     except SceneError:
@@ -130,10 +130,10 @@ def find_signal(heading: str, table: Table, candidates: list[Column]) -> tuple[C
 
 
 def unit_factor(column: Column, unit: str | None, target: str, signal: str, file: str) -> tuple[float, list[str]]:
-    """Return the factor from the unit of a column to that of the FMU, and a note if it had to be assumed."""
+    """Return the factor from the unit of a column to that of the FMU, and a note if the unit is assumed."""
     if not unit:
-        assumed = f"{column.heading} has no unit in {file}: {target} is assumed, the unit of {signal} in the FMU."
-        return 1.0, [assumed] if target else []
+        note = f"{column.heading} has no unit in {file}: {target} is assumed, the unit of {signal} in the FMU."
+        return 1.0, [note] if target else []
     factor = conversion_factor(unit, target or "1")
     if factor is None:
         raise SceneError(

@@ -1,4 +1,4 @@
-"""Reads tables from files: text, spreadsheets (.xlsx, .xls, .ods), MATLAB .mat, HDF5, numpy .npy and .npz, Parquet,
+"""Reader of tables in files: text, spreadsheets (.xlsx, .xls, .ods), MATLAB .mat, HDF5, numpy .npy and .npz, Parquet,
 JSON, or any of them gzipped or alone in a .zip archive.
 
 The format is detected from the first bytes, so standard input works for all of them.
@@ -31,14 +31,18 @@ class Table:
 
     Attributes
     ----------
+    name : str
+        Name of the file.
     column_headings : tuple of str
-        May be empty texts.
+        Headings; an empty text for a column without one.
+    columns : tuple
+        Cells (n,) of each column: numbers or texts.
     line : int
-        Line number before the first row.
+        Number of the line before the first row.
     interval : float or None
         Sampling interval in s, if the file has one and no times.
     notes : tuple of str
-        What was chosen when reading.
+        Choices made when reading.
     parsed_columns : dict
         Cache of the numbers of a column by its index, and the index of its first cell that is no number.
     """
@@ -122,9 +126,9 @@ def parse_table_file(data: bytes, name: str) -> Table:
                 check_mat(data, name)
             if file_format in ("npy", "npz"):  # numpy checks what it reads
                 return table_from_arrays(array_files.READERS[file_format](data, name), name)
-            answer = read_in_child(data, name, file_format)
-            columns = [array_files.ArrayColumn(*column) for column in answer["columns"]]
-            return table_from_columns(columns, answer["names"], name)
+            contents = read_in_child(data, name, file_format)
+            columns = [array_files.ArrayColumn(*column) for column in contents["columns"]]
+            return table_from_columns(columns, contents["names"], name)
     if data.lstrip()[:1] in (b"{", b"["):
         arrays = array_files.read_json(text_table.decode_text(data, name))
         if arrays is not None:
@@ -143,7 +147,7 @@ ARRAY_FORMATS = (
 
 
 def find_member(names: list[str], name: str) -> str | None:
-    """Return the only table in a .zip archive, or its raw data as phyphox names them; None if it is a workbook."""
+    """Return the only table in a .zip archive, or the raw data of phyphox; None if the archive is a workbook."""
     if any(member in ("[Content_Types].xml", "mimetype") for member in names):
         return None
     is_description = re.compile(r"(^|/)(meta|__MACOSX)/", re.I)
@@ -177,10 +181,10 @@ def table_from_rows(headings: list[str], rows: list[list[Any]], line: int, name:
     )
 
 
-def table_from_workbook(answer: dict[str, Any], name: str) -> Table:
+def table_from_workbook(contents: dict[str, Any], name: str) -> Table:
     """Return the table of a workbook, with a note if several sheets have one."""
-    table = table_from_rows(answer["headings"], answer["rows"], answer["line"], name)
-    sheets = answer["sheets"]
+    table = table_from_rows(contents["headings"], contents["rows"], contents["line"], name)
+    sheets = contents["sheets"]
     note = f"{name} has a table in several sheets ({', '.join(sheets)}): the longest is used."
     return replace(table, notes=(note,) if len(sheets) > 1 else ())
 

@@ -1,4 +1,4 @@
-"""Reads tables from text files of instruments, spreadsheets and phones.
+"""Reader of tables in text files of instruments, spreadsheets and phones.
 
 Delimiter, headings and first row are detected. The numbers begin at two consecutive lines of the usual width that are
 mostly numeric; the last lines of that width before them are names and units, also in comments. Python's csv module
@@ -36,8 +36,19 @@ MAX_LINES = 5_000_000
 
 
 class TextTable(NamedTuple):
-    """Headings (none if the file has none), rows of cells, the number of the line before the first row, and the
-    sampling interval in s if the file has one, or None."""
+    """Table of a text file.
+
+    Attributes
+    ----------
+    headings : list of str
+        Headings; empty if the file has none.
+    rows : list of list of str
+        Cells of each row.
+    line : int
+        Number of the line before the first row.
+    interval : float or None
+        Sampling interval in s, if the file has one.
+    """
 
     headings: list[str]
     rows: list[list[str]]
@@ -231,7 +242,7 @@ def find_headings(preceding: list[list[str]], width: int) -> list[str]:
 
 
 def add_units(names: list[str], units: Sequence[str]) -> list[str]:
-    """Return headings with the units of a row below or above them; those that have a known unit in brackets keep it."""
+    """Return headings with the units of another row; a heading with a known unit in brackets keeps its unit."""
     if not names or not units:
         return names
     cells = [cell.strip("[]() ") for cell in units]
@@ -255,8 +266,8 @@ def looks_like_unit(cell: str) -> bool:
 def find_commented_headings(preceding: list[str], delimiter: str, width: int) -> list[str]:
     """Return the headings in the comments before the numbers.
 
-    They are the comment with one cell for each column, one of which is a time, that has the most known names and
-    units; otherwise the last comment.
+    These are the cells of the comment with one cell for each column, among them a time, and the most known names and
+    units; otherwise those of the last comment.
     """
     comments = [strip_comment(line) for line in preceding if is_comment(line) and not UNITS_LINE.match(line)]
     comments = [comment for comment in comments[-SAMPLE_LINES:] if len(comment) <= MAX_LINE_LENGTH]
@@ -274,13 +285,13 @@ def find_commented_headings(preceding: list[str], delimiter: str, width: int) ->
 
 
 def is_time_heading(heading: str) -> bool:
-    """Return whether a heading is named or measured as a time."""
+    """Return whether a heading has the name or the unit of a time."""
     name, unit = split_heading(heading)
     return bool(TIME_NAME.search(name) or (unit and time_unit_size(unit)))
 
 
 def count_known_parts(heading: str) -> int:
-    """Return how many of the name and the unit of a heading are those of a time or a motion."""
+    """Return the number of known parts of a heading, 0 to 2: its name and its unit, of a time or a motion."""
     name, unit = split_heading(heading)
     return int(bool(TIME_NAME.search(name)) or order_from_name(name) is not None) + int(is_unit(unit or ""))
 

@@ -1,4 +1,4 @@
-"""Units: of measured motions, and conversion between units of any quantity, as in kN, mm/s, N.m/rad or lbf.in.
+"""Units of measured motions, and conversion between units of any quantity, as in kN, mm/s, N.m/rad or lbf.in.
 
 In conversions angles are numbers, so that N.m/rad is N.m. Cycles are not: Hz is neither 1/s nor rad/s, which differ by
 2 pi in use.
@@ -74,7 +74,7 @@ def normalize_unit(text: str) -> str:
 
 
 def find_unit(text: str) -> MotionUnit | None:
-    """Return a unit of motion by name, or None; in any case, but Nm is a torque and no nanometre."""
+    """Return a unit of motion by name, or None. Upper and lower case are equal, except that Nm is a torque."""
     name = normalize_unit(text)
     if name not in UNITS and not name.startswith("N"):
         name = name.lower()
@@ -83,7 +83,7 @@ def find_unit(text: str) -> MotionUnit | None:
 
 
 def time_unit_size(text: str) -> float | None:
-    """Return the size in s of a unit of time, also of a multiple as in 0.01s, or None."""
+    """Return the size in s of a unit of time or of a multiple of it, as 0.01s; None for other texts."""
     number, name = re.fullmatch(r"([0-9.]*(?:e-?[0-9]+)?)(.*)", normalize_unit(text).lower(), re.S).groups()  # type: ignore[union-attr]
     size = TIMES.get(UNIT_SYNONYMS.get(name, name))
     try:
@@ -119,9 +119,9 @@ UNITS = build_unit_table()
 
 
 def unit_factors(text: str) -> Powers | None:
-    """Return the powers of the factors of a unit by name, as in {"m": 1, "s": -2} for m/s2, m.s-2 and m s^-2.
+    """Return the powers of the factors of a unit by name, as {"m": 1, "s": -2} for m/s2, m.s-2 and m s^-2.
 
-    None if it is not a unit. The names need not be known.
+    The names need not be known. Returns None if the text is not a unit.
     """
     text = text.replace("**", "").translate(CHARACTER_SUBSTITUTES)
     text = re.sub(r"\b(Nm|Nmm|kNm)\b", lambda match: TORQUES[match[0]], text)
@@ -170,7 +170,7 @@ def named_unit(name: str) -> tuple[float, Powers] | None:
 def conversion_factor(unit: str, other: str) -> float | None:
     """Return the factor from `unit` to `other`, 1 for two spellings of one unit.
 
-    None if they differ in dimension or one is not known.
+    Returns None if they differ in dimension, or if one is not known.
     """
     factors = unit_factors(unit)
     if unit == other or (factors is not None and factors == unit_factors(other)):

@@ -140,6 +140,6 @@ def test_one_of_two_runs_side_by_side_is_read_and_the_other_named(tmp_path, opti
     if "time" in options:
         assert record.notes == ()
     elif options:
-        assert f"{second} is used, beside {first}; --time 't [s]' selects another" in record.notes[0]
+        assert f"{second} is used, and {first} is not; --time 't [s]' selects another" in record.notes[0]
     else:
-        assert f"{first} is used, beside {second}; --time 't [s] #2' selects another" in record.notes[0]
+        assert f"{first} is used, and {second} is not; --time 't [s] #2' selects another" in record.notes[0]
