@@ -29,7 +29,7 @@ TIMEOUT = 120.0  # s, for each method
 
 @dataclass(frozen=True)
 class CertifiedFile:
-    """The `path` of a result that was written, and the largest relative `difference` of the two methods."""
+    """Certified result in a file: its `path`, and the largest relative `difference` of the two methods."""
 
     path: Path
     difference: float
@@ -48,8 +48,10 @@ def certify(file: Path) -> list[CertifiedFile]:
         raise HarnessError(f"there is no {fmu}: build it with `friction-fmus build {file}`")
     model = load_model_class(fmu)
     references = generate_all(file) or {file.stem: certify_default_run(model, file)}
-    heads = ["t [s]", *(column_heading(name, unit) for name, unit in states(model))]
-    return [write_reference(file.with_name(f"{name}.csv"), heads, reference) for name, reference in references.items()]
+    headings = ["t [s]", *(column_heading(name, unit) for name, unit in list_states(model))]
+    return [
+        write_reference(file.with_name(f"{name}.csv"), headings, reference) for name, reference in references.items()
+    ]
 
 
 def generate_all(file: Path) -> dict[str, Solution]:
@@ -66,16 +68,16 @@ def generate_all(file: Path) -> dict[str, Solution]:
     return {str(name): generate_reference(case) for name, case in cases.items()}
 
 
-def write_reference(path: Path, heads: list[str], reference: Solution) -> CertifiedFile:
+def write_reference(path: Path, headings: list[str], reference: Solution) -> CertifiedFile:
     """Write a reference to a file, and its changes of mode to another."""
     rows = np.column_stack([reference.times, reference.states]).tolist()
-    write_csv_rows(path, heads, rows, f"# {reference.method}{ERROR_LABEL}{reference.estimated_error:.1e}\n")
+    write_csv_rows(path, headings, rows, f"# {reference.method}{ERROR_LABEL}{reference.estimated_error:.1e}\n")
     if reference.modes:
         write_csv_rows(path.with_name(f"{path.stem}-events.csv"), ["t [s]", "mode"], reference.modes)
     return CertifiedFile(path, reference.estimated_error)
 
 
-def states(model: type) -> list[tuple[str, str]]:
+def list_states(model: type) -> list[tuple[str, str]]:
     """Return name and unit of each state that the solver integrates, in order."""
     declared = [value for cls in model.__mro__ for value in vars(cls).values() if getattr(value, "role", "") == "state"]
     return [(state.name, state.unit) for state in declared if not state.rate]
@@ -119,11 +121,11 @@ def certify_default_run(
         raise HarnessError(f"{file.with_suffix('.fmu')} does not offer {methods}: build it with all of its methods")
     times = np.linspace(0.0, model.stop_time, POINTS).tolist() if times is None else times
     first, second = (EmbeddedModel.create(model, values or {}, method, rtol) for method, rtol in METHODS.items())
-    answers = [run.solve(times, TIMEOUT) for run in (first, second)]
-    methods, difference = " and ".join(METHODS), max_relative_difference(*answers)
+    solutions = [run.solve(times, TIMEOUT) for run in (first, second)]
+    methods, difference = " and ".join(METHODS), max_relative_difference(*solutions)
     if not difference <= AGREEMENT_TOLERANCE:
         raise HarnessError(
             f"{file.name}: {methods} differ by {difference:.1e}, more than {AGREEMENT_TOLERANCE:g}, so the result is "
             "not certified: shorten the default run, or smooth a discontinuous law"
         )
-    return replace(answers[0], events=answers[0].events or [], method=methods, estimated_error=difference)
+    return replace(solutions[0], events=solutions[0].events or [], method=methods, estimated_error=difference)

@@ -58,13 +58,13 @@ def steady_motion_with_stops(m: float, k: float, f: float, P: float, Omega: floa
         return x, omega * (c_2 * cos(omega * t) - c_1 * sin(omega * t)) - Omega * p * sin(Omega * t + phase)
 
     def arrival(phase: float) -> float:
-        """Return when the mass stops."""
+        """Return the time in s at which the mass stops."""
         times = [half_period * i / GRID for i in range(1, GRID + 1)]
         end = next((t for t in times if motion(t, phase)[1] >= 0.0), half_period)
         return float(brentq(lambda t: motion(t, phase)[1], end - half_period / GRID, end, xtol=1e-16))
 
     def distance(phase: float) -> float:
-        """Return how far the mass stops from -A."""
+        """Return the distance in m from -A at which the mass stops."""
         return motion(arrival(phase), phase)[0] + (f + P * cos(phase)) / k
 
     phases = [pi * i / GRID for i in range(1, GRID)]

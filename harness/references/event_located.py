@@ -1,9 +1,9 @@
 """Second formulations of the models in fmus/more, integrated by scipy from event to event.
 
-Nothing here is shared with the FMUs.  A problem has modes, which are constant between events: the mode of each contact
-(-1, 0 stuck, 1), and the signs of the conditions where its equations have a kink or a jump.  A sliding contact has one
-guard, its slip; a stuck one has two, the distances of its load from both limits; a condition has one, its value.  An
-event is the zero of a guard.
+This module shares nothing with the FMUs.  A problem has modes, which are constant between events: the mode of each
+contact (-1, 0 stuck, 1), and the signs of the conditions where its equations have a kink or a jump.  A sliding contact
+has one guard, its slip; a stuck one has two, the distances of its load from both limits; a condition has one, its
+value.  An event is the zero of a guard.
 """
 
 from collections.abc import Callable, Sequence
@@ -51,10 +51,10 @@ class HybridProblem:
         return []
 
     def stop_slip(self, y: np.ndarray, modes: list[int]) -> None:
-        """Remove the slips of stuck contacts that rounding errors leave."""
+        """Set the slips of stuck contacts, which have rounding errors, to zero."""
 
     def guards(self, t: float, y: StateVector, modes: list[int]) -> list[float]:
-        """Return the values that are positive while the modes last."""
+        """Return the guards, which are positive until the next event."""
         values = []
         for mode, (slip, force, hold) in zip(modes, self.contacts(t, y, modes), strict=False):
             values += [mode * slip] if mode else [hold - force, hold + force]
@@ -63,7 +63,7 @@ class HybridProblem:
         return values + [sign * value for sign, value in zip(signs, conditions, strict=True)]
 
     def change(self, index: int, modes: list[int]) -> None:
-        """Change the mode whose guard of this index fell to zero."""
+        """Change the mode whose guard, of this index, fell to zero."""
         for i, mode in enumerate(modes):
             is_stuck = i < len(self.first) and mode == 0
             size = 2 if is_stuck else 1
@@ -73,16 +73,16 @@ class HybridProblem:
             index -= size
 
     def resolve(self, t: float, y: np.ndarray, modes: list[int]) -> None:
-        """Let contacts slip whose loads exceed their limits, one after the other."""
+        """Set stuck contacts whose loads exceed their limits to slip, one after the other."""
         self.stop_slip(y, modes)
         while True:
-            table = self.contacts(t, y, modes)
+            contacts = self.contacts(t, y, modes)
             overloaded = [
-                i for i, (_, f, hold) in enumerate(table) if modes[i] == 0 and abs(f) > hold * (1.0 + OVERLOAD)
+                i for i, (_, f, hold) in enumerate(contacts) if modes[i] == 0 and abs(f) > hold * (1.0 + OVERLOAD)
             ]
             if not overloaded:
                 return
-            modes[overloaded[0]] = 1 if table[overloaded[0]][1] > 0.0 else -1
+            modes[overloaded[0]] = 1 if contacts[overloaded[0]][1] > 0.0 else -1
 
 
 Events = list[tuple[float, tuple[int, ...]]]
@@ -185,7 +185,7 @@ class CoulombBelt(Belt):
 
 
 class Bristles(HybridProblem):
-    """Mass pulled through a spring, with LuGre friction; the kink is where the speed changes its sign."""
+    """Mass pulled through a spring, with LuGre friction, which has a kink where the speed changes its sign."""
 
     start: tuple[float, ...] = (0.0, 0.0, 0.0)
     stop = 20.0
@@ -203,7 +203,7 @@ class Bristles(HybridProblem):
         return [y[1]]
 
     def plastic_share(self, v: float, z: float, modes: list[int]) -> float:
-        """Return which share of the motion is plastic."""
+        """Return the plastic share of the motion."""
         return modes[0] * self.sigma_0 * z / self.steady_force(v)
 
     def rates(self, t: float, y: StateVector, modes: list[int]) -> list[float]:
@@ -213,7 +213,7 @@ class Bristles(HybridProblem):
 
 
 class DryBlock(Bristles):
-    """The same mass with Coulomb and viscous friction, which sticks: what bristles approximate."""
+    """The same mass with Coulomb and viscous friction, the law with sticking that bristle models approximate."""
 
     start, first = (0.0, 0.0), (0,)
 
@@ -233,7 +233,7 @@ class DryBlock(Bristles):
 
 
 class ElastoplasticBristles(Bristles):
-    """The same with elasto-plastic friction; its law is smooth where the deflection passes z_ba and z_ss."""
+    """The same mass with elasto-plastic friction; its law is smooth where the deflection passes z_ba and z_ss."""
 
     z_ba = 7e-6
 

@@ -1,10 +1,10 @@
-"""Generation of the references of models with an independent implementation, which takes some minutes.
+"""Generation of references of the models with an independent implementation, which takes some minutes.
 
 piecewise linear laws   closed form in 40 digits; the tests compare it with a second one
 pendulum                Taylor series in 25 digits, and DOP853 restarted at every change of mode
 magic formula           DOP853, which is explicit, and Radau, which is implicit
 
-It shares no code with the FMUs.
+This module shares no code with the FMUs.
 """
 
 from collections.abc import Callable, Iterator
@@ -34,9 +34,9 @@ def generate_reference(case: ReferenceCase) -> Solution:
     problem, name = case.problem, case.reference_source
     assert isinstance(name, str)
     times = np.linspace(0.0, problem.stop, POINTS)
-    answer = solve_independently(name, problem, times)
+    solution = solve_independently(name, problem, times)
     start_mode = problem.resolve_mode(0.0, *problem.start) if problem.has_dry_friction else None
-    return replace(answer, start_mode=start_mode)
+    return replace(solution, start_mode=start_mode)
 
 
 def solve_independently(name: str, problem: OdeProblem, times: np.ndarray) -> Solution:
@@ -45,10 +45,10 @@ def solve_independently(name: str, problem: OdeProblem, times: np.ndarray) -> So
         return evaluate_closed_form(name, times)
     explicit = solve("scipy", "DOP853", problem, times, 3e-14, 1e-16)  # the smallest tolerance it can meet
     if isinstance(problem, PendulumProblem):
-        answer = solve_pendulum(problem, times.tolist())
-        late = event_time_error(answer.events or [], explicit.events or []) / times[-1]
-        difference = max(max_relative_difference(answer, explicit), late)
-        return replace(answer, method="Taylor series in 25 digits and DOP853", estimated_error=difference)
+        solution = solve_pendulum(problem, times.tolist())
+        event_error = event_time_error(solution.events or [], explicit.events or []) / times[-1]
+        difference = max(max_relative_difference(solution, explicit), event_error)
+        return replace(solution, method="Taylor series in 25 digits and DOP853", estimated_error=difference)
     implicit = solve("scipy", "Radau", problem, times, 1e-11, 1e-14)
     difference = max_relative_difference(explicit, implicit)
     return replace(explicit, method="DOP853 and Radau", estimated_error=difference)

@@ -1,4 +1,4 @@
-"""Oscillators as the user of another solver writes them: equations and modes, independent of the FMUs.
+"""Oscillators in the form that the user of another solver writes: equations and modes, independent of the FMUs.
 
     d(x, v)/dt = rates(mode)(t, (x, v)),    mode = -1 sliding backward, 0 stuck, 1 sliding forward
 
@@ -58,14 +58,14 @@ class OdeProblem:
         raise NotImplementedError
 
     def resolve_mode(self, t: float, x: float, v: float) -> int:
-        """Return the mode that holds from here on."""
+        """Return the mode that begins at time t."""
         if not self.has_dry_friction:
             return 1
         load, _, limit = self.static_load(t, x)
         return int(copysign(1, v)) if v else int(copysign(1, load)) if abs(load) > limit else 0
 
     def breakaway(self, t: float, x: float) -> tuple[float, int]:
-        """Return when a stuck body breaks away, and in which direction; the load is linear in time."""
+        """Return the time in s and the direction of the break-away of a stuck body; the load is linear in time."""
         load, rate, limit = self.static_load(t, x)
         direction = int(copysign(1, rate))
         return (t + (limit - direction * load) / abs(rate), direction) if rate else (inf, 0)

@@ -1,6 +1,6 @@
 """Peer solvers: scipy's solve_ivp, and CVODE of SUNDIALS through scikit-sundae, on the same problems.
 
-Each is used at its best: restarted at every change of mode, and with the Jacobian if the method is implicit.
+Each solver runs with its best settings: it is restarted at every change of mode, and implicit methods use the Jacobian.
 """
 
 import warnings
@@ -32,13 +32,13 @@ def without_limit(rates: RhsFunction) -> RhsFunction:
 
 
 def limit_evaluations(limit: int) -> RhsWrapper:
-    """Return a wrapper that stops a run after `limit` evaluations of all right-hand sides together."""
+    """Return a wrapper that stops a run after `limit` evaluations in total of all right-hand sides."""
     calls = count(1)
     return raise_when(lambda: next(calls) > limit, f"{limit} right-hand sides")
 
 
 def limit_run_time(seconds: float) -> RhsWrapper:
-    """Return a wrapper that stops a run after a run time from now on."""
+    """Return a wrapper that stops a run when this time in s has passed since the call of this function."""
     end = perf_counter() + seconds
     return raise_when(lambda: perf_counter() > end, f"{seconds:g} s of run time")
 
@@ -209,7 +209,7 @@ def solve_with_cvode(
     evaluations = int(run.nfev + run.njev)
     if run.t_events is not None and len(run.t_events):
         end = float(run.t_events[-1])
-        passed = int(np.searchsorted(times, end, side="right"))
-        return ModeInterval(run.y[1 : passed + 1], end, (float(run.y_events[-1][0]), 0.0), True, evaluations)
+        n_passed = int(np.searchsorted(times, end, side="right"))
+        return ModeInterval(run.y[1 : n_passed + 1], end, (float(run.y_events[-1][0]), 0.0), True, evaluations)
     samples = run.y[1:] if len(times) > 1 else run.y[-1:]  # with two times CVODE returns its own steps
     return ModeInterval(samples, problem.stop, tuple(run.y[-1].tolist()), False, evaluations)

@@ -93,13 +93,13 @@ def solve_segments(spans: list[ParameterSpan], friction: FrictionLaw | None = No
                 duration = time_to_breakaway(s, load)
             else:
                 duration = time_to_standstill(s, mode, v, load - mode * s.slide)
-            ahead = mpf(end) - t if duration is None or t + duration >= end else duration
-            x, v = at(ahead)
-            t, drive = t + ahead, drive + s.u * ahead
-            if ahead != duration:
+            step = mpf(end) - t if duration is None or t + duration >= end else duration
+            x, v = at(step)
+            t, drive = t + step, drive + s.u * step
+            if step != duration:
                 break
             v, load = mpf(0), s.load(x, drive)
-            if is_stuck:  # the load equals the limit by definition, so that rounding cannot decide the direction
+            if is_stuck:  # set the load to the limit, so that rounding cannot decide the direction
                 mode = 1 if s.u > 0 else -1
                 load = mode * s.hold
             else:
@@ -110,9 +110,9 @@ def solve_segments(spans: list[ParameterSpan], friction: FrictionLaw | None = No
 def threshold_segments(s: SpringMassSystem, eps: float, stop: float) -> Iterator[Segment]:
     """Yield the segments of the sled, from rest, under the threshold law in the limit of exact integration.
 
-    Below the speed `eps` (m/s) friction balances the load, but only as far as static friction can.  The sled starts
-    with static friction until its speed is eps, then slides.  Once it has slowed down to eps, it moves on at that speed
-    until the load exceeds static friction.
+    Below the speed `eps` (m/s) friction balances the load up to static friction.  The sled accelerates under static
+    friction until its speed is eps, then slides.  When it has slowed down to eps, it keeps that speed until the load
+    exceeds static friction.
     """
     level = mpf(eps)
     t, x, v = mpf(0), mpf(0), mpf(0)
@@ -181,6 +181,6 @@ def time_to_standstill(s: SpringMassSystem, mode: int, v: Any, net: Any) -> Any:
 
 
 def positive_angle(angle: Any, period: Any) -> Any:
-    """Return the angle modulo `period` in (0, period]; zero, or zero but for rounding, becomes a whole period."""
+    """Return the angle modulo `period` in (0, period]; zero, also with a rounding error, becomes a whole period."""
     remainder = angle % period
     return period if remainder < TINY else remainder

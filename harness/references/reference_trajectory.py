@@ -1,8 +1,8 @@
 """References for any parameter values, for the stability table and the benchmarks.
 
-They are closed forms in 120 digits, or runs of scipy's methods at tolerances of 1e-11 and less, restarted at every
-change of mode or value, as the module of the model in models/ defines.  They share no code with the FMUs.  For a model
-without such a module, certification.py compares two methods of its FMU.
+The module of a model in models/ defines its reference: a closed form in 120 digits, or a run of a method of scipy at a
+tolerance of at most 1e-11, restarted at every change of mode or value.  References share no code with the FMUs.  For a
+model without such a module, certification.py compares two methods of its FMU.
 """
 
 from collections.abc import Iterable
@@ -65,8 +65,8 @@ class CommunicationGrid:
     def times(self, events: Iterable[float]) -> list[float]:
         """Return the points in s, given the times of the events."""
         duration = self.stop - self.start
-        even = [self.start + duration * i / self.intervals for i in range(self.intervals)]
-        return sorted({*even, self.stop, *self.changes, *(events if self.at_events else ())})
+        points = [self.start + duration * i / self.intervals for i in range(self.intervals)]
+        return sorted({*points, self.stop, *self.changes, *(events if self.at_events else ())})
 
 
 def compute_reference(model: str, spans: list[ParameterSpan], grid: CommunicationGrid) -> Solution:

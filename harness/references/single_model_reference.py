@@ -1,4 +1,4 @@
-"""Reference of a coupled scene: the same bodies in a single model, without communication steps.
+"""Reference of a coupled scene: a single model of the same bodies, without communication steps.
 
     m_i a_i = F_i + k_i (v_driver_i t - x_i) - c_i v_i - F_friction_i,    F_i = sum of factor * output of a body
 
@@ -74,7 +74,7 @@ def build_bodies(scene: CoupledScene, defaults: dict[str, dict[str, float]]) -> 
 
 
 def couplings(scene: CoupledScene, indices: dict[str, int]) -> Iterator[tuple[int, int, str, float]]:
-    """Yield what acts on each body from the others; a spring acts on its flange a by k (x_b - x_a) + c (v_b - v_a)."""
+    """Yield the couplings of the bodies; a spring acts on its flange a with k (x_b - x_a) + c (v_b - v_a)."""
     for signal in scene.direct_connections:
         yield indices[signal.sink], indices[signal.source], signal.output, 1.0
     for spring in scene.springs:
@@ -104,9 +104,9 @@ def solve_bodies(system: CoupledBodies, start: np.ndarray, times: np.ndarray) ->
     for _ in range(MAX_EVENTS):
         options = {"events": event_functions(system, mode), "dense_output": True, "rtol": RTOL, "atol": ATOL}
         run = solve_ivp(rates(system, mode), (t, stop), state, "DOP853", **options)
-        covered = (times >= t) & (times <= run.t[-1])
-        if covered.any():
-            positions[covered] = run.sol(times[covered])[:n].T
+        in_run = (times >= t) & (times <= run.t[-1])
+        if in_run.any():
+            positions[in_run] = run.sol(times[in_run])[:n].T
         t, state = float(run.t[-1]), run.y[:, -1].copy()
         if run.status != 1 or t >= stop:
             return positions

@@ -1,7 +1,7 @@
 """Independent implementations of models, one module each.
 
-A module provides the problems for peer solvers, CASES with certified references, `solve_segments`, which returns the
-motion for any parameter values, and CLOSED_FORMS if there are any.
+A module provides the problems for peer solvers, CASES with certified references, the function `solve_segments`, which
+returns the motion for any parameter values, and CLOSED_FORMS if the model has any.
 """
 
 from importlib import import_module

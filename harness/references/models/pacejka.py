@@ -14,7 +14,7 @@ from .stickslip import StickslipProblem
 
 
 class MagicFormula:
-    """Coefficient of friction and its slope as functions of the velocity."""
+    """Coefficient of friction `mu` and its `slope` in s/m, as functions of the velocity in m/s."""
 
     def __init__(self, p: ParameterValues):
         self.D, self.C = p["mu_s"], 1 + (1 - 2 * asin(p["mu_d"] / p["mu_s"]) / pi)

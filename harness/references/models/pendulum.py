@@ -13,7 +13,7 @@ from ..ode_problem import JacobianFunction, OdeProblem, RhsFunction, StateVector
 from ..segments import MotionFunction, ParameterSpan, ParameterValues, Segment, constant_velocity, shift_time
 
 POUND, INCH = 0.45359237, 0.0254
-REACTION = 2  # the number of pin_load = reaction
+REACTION = 2  # value of the enumeration pin_load
 PI_REMAINDER = 1.2246467991473532e-16  # pi minus its double
 
 
@@ -89,9 +89,9 @@ def shift_angle(at: MotionFunction, origin: float) -> MotionFunction:
 
 
 class PinJoint:
-    """The torques of one span, with time from its beginning.
+    """Torques of one span; the time counts from its beginning.
 
-    `down` is 1 if the angle counts from the hanging position, -1 if from the inverted one.
+    `down` is 1 if the angle counts from the hanging position, -1 if it counts from the inverted one.
     """
 
     def __init__(self, p: ParameterValues, down: int):
@@ -109,7 +109,7 @@ class PinJoint:
         return int(copysign(1, load)) if abs(load) > self.arm * self.weight else 0
 
     def time_to_breakaway(self, load: float) -> float:
-        """Return how long the pendulum stays at rest."""
+        """Return the time in s for which the pendulum stays at rest."""
         return (self.arm * self.weight - copysign(1, self.rate) * load) / abs(self.rate) if self.rate else inf
 
     def acceleration(self, t: float, angle: float, omega: float, mode: int) -> float:
@@ -134,7 +134,12 @@ def integrate_to_standstill(
 
     Returns
     -------
-    duration in s, angle, angular velocity, motion
+    duration : float
+        Duration in s.
+    angle, omega : float
+        Angle in rad and angular velocity in rad/s at the end.
+    motion : callable
+        Angle and angular velocity as functions of the time from `begin` on, in s.
     """
 
     from scipy.integrate import solve_ivp
