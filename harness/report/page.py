@@ -1,4 +1,4 @@
-"""Writes the HTML page. All HTML of the harness is in page.html."""
+"""HTML page of the report. All HTML of the harness is in page.html."""
 
 import os
 from base64 import b64encode
@@ -81,7 +81,7 @@ def render_page(
     scenes: Sequence[PublishedScene],
     results: Path,
 ) -> str:
-    """Return the HTML of the page. It refers to no other file, so that a copy of it is complete."""
+    """Return the HTML of the page. It refers to no other file, so a copy of the page is complete."""
     summaries = {item.summary.title: item.summary for item in items if item.summary.sketches}
     gallery = [(scene, summaries[scene.name].sketches) for scene in scenes if scene.name in summaries and scene.about]
     # without results of the shipped models, the page begins with the runs of the user's models

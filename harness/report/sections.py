@@ -42,7 +42,19 @@ class ResultItem:
 
 @dataclass(frozen=True)
 class Section:
-    """A section: `study` of its results, title, introduction, and the name and the command of what may be missing."""
+    """Section of the report.
+
+    Attributes
+    ----------
+    study : str
+        Study whose results are shown.
+    title, intro : str
+        Title and introduction.
+    missing_name, command : str
+        Name and command of a result of the study, for the list of missing results.
+    items : tuple of ResultItem
+        Results in the section.
+    """
 
     study: str
     title: str
@@ -150,7 +162,7 @@ def read_picture(file: Path) -> str:
     """Return a figure as a data URL; raise HarnessError if it is not a complete SVG drawing."""
     data = file.read_bytes()
     if not (b"<svg" in data and data.rstrip().endswith(b"</svg>")):
-        raise HarnessError(f"{file.name} is not a complete SVG drawing: run the command again that made it")
+        raise HarnessError(f"{file.name} is not a complete SVG drawing: repeat the command that wrote it")
     return f"data:image/svg+xml;base64,{b64encode(data).decode()}"
 
 
@@ -184,7 +196,7 @@ def steps_item(table: SummaryTable) -> ResultItem:
 
 
 def collect_tables(items: Iterable[ResultItem], title: str) -> tuple[SummaryTable, ...]:
-    """Return one table of the rows of all judged results in tables with a title; nothing without rows."""
+    """Return one table with the rows of all tables of this title in judged results; nothing without rows."""
     tables = [table for item in items if item.summary.outcome for table in item.summary.tables if table.title == title]
     return (replace(tables[0], rows=tuple(row for table in tables for row in table.rows)),) if tables else ()
 
@@ -192,7 +204,7 @@ def collect_tables(items: Iterable[ResultItem], title: str) -> tuple[SummaryTabl
 def list_missing(
     items: Iterable[ResultItem], sections: Sequence[Section], scenes: Sequence[PublishedScene]
 ) -> list[MissingResult]:
-    """Return the missing results, and what the studies left out."""
+    """Return the missing results, and those that the studies left out."""
     titles = [(find_section(item), item.summary.title) for item in items]
     missing = [
         MissingResult(scene.name, f"run {scene.name}") for scene in scenes if (PUBLISHED, scene.name) not in titles

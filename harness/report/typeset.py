@@ -1,4 +1,4 @@
-"""Typesets texts of results as HTML: code, powers of ten, and columns of texts."""
+"""Typesetting of texts of results as HTML: code, powers of ten, and columns of texts."""
 
 import re
 

@@ -8,7 +8,19 @@ from ..results.summary import MAX_DEVIATION, Outcome, Summary
 
 @dataclass(frozen=True)
 class Verdict:
-    """A number or word, what it means, details, the section that shows more, and whether all is as it should be."""
+    """Verdict on the results of a study.
+
+    Attributes
+    ----------
+    value, meaning : str
+        Number or word, and its meaning.
+    details : tuple of str
+        Further lines.
+    section : str
+        Section of the report that shows the results.
+    is_good : bool
+        Whether all results are as expected.
+    """
 
     value: str
     meaning: str
@@ -37,7 +49,7 @@ def build_verdicts(summaries: Sequence[Summary]) -> list[Verdict]:
 
 
 def judge_published(outcomes: Sequence[tuple[str, Outcome]]) -> Verdict:
-    """Return how many published cases are reproduced, with the worst deviation."""
+    """Return the number of reproduced published cases, with the largest deviation."""
     details = [f"{title}: {outcome.text}" for title, outcome in outcomes if not outcome.is_good]
     good = [
         (abs(outcome.deviation or 0.0), f"{title}: {outcome.text}") for title, outcome in outcomes if outcome.is_good

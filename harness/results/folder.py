@@ -1,12 +1,12 @@
 """Result folders, which are replaced completely or not at all.
 
-A result is written to a new folder beside the old one, and the two are then exchanged. On Linux (renameat2,
+A result is written to a new folder next to the old one, and the two are then exchanged. On Linux (renameat2,
 RENAME_EXCHANGE) and macOS (renamex_np, RENAME_SWAP) the exchange is atomic: any reader, at any moment and after a kill,
 finds either the old or the new result. Elsewhere, and on file systems without exchange, it takes two steps. A kill
 between them leaves the old result under another name, from which the next run restores it.
 
-A run removes what killed runs left in the same place, but not folders that another process is writing: these are locked
-where locks exist (fcntl).
+A run removes the folders that killed runs left, but not those that another process is writing: these are locked where
+locks exist (fcntl).
 """
 
 import ctypes
@@ -33,7 +33,7 @@ AT_FDCWD, RENAME_EXCHANGE, RENAME_SWAP = -100, 2, 2  # of Linux and macOS
 
 @contextmanager
 def replace_folder(folder: Path, own_files: Sequence[str], source: str = "") -> Iterator[Path]:
-    """Yield a new folder; it replaces `folder` if nothing is raised, and is removed otherwise.
+    """Yield a new folder, which replaces `folder` at the end of the block, or is removed after an exception.
 
     The provenance of the new result describes how it differs from the old one.
 
@@ -103,7 +103,7 @@ def check_same_source(folder: Path, source: str) -> None:
 
 
 def create_new_folder(folder: Path) -> Path:
-    """Create a new folder beside the result; the umask determines its permissions."""
+    """Create a new folder next to the result; the umask determines its permissions."""
     # absolute: fmpy changes the working directory while it loads a library, and a signal may arrive then
     new_folder = folder.parent.absolute() / f".{folder.name}-{token_hex(4)}{FRESH}"
     new_folder.mkdir()
@@ -111,7 +111,7 @@ def create_new_folder(folder: Path) -> Path:
 
 
 def clean_up(folder: Path, own_files: Collection[str]) -> None:
-    """Restore a result after a kill between the two steps of an exchange, and remove what killed runs left."""
+    """Restore a result after a kill between the two steps of an exchange, and remove folders of killed runs."""
     pattern = re.compile(rf"\.{re.escape(folder.name)}-[a-z0-9_]{{8}}({FRESH}|{OLD})")
     for leftover in sorted(folder.parent.iterdir()):
         if (

@@ -1,7 +1,7 @@
 """Provenance of a result: a file in its folder with the command, versions, input files and parameters.
 
-The file may be damaged or edited. It is validated like any other input, a new result never depends on that of an old
-one, and its `command` is text for readers, which is never run.
+The file may be damaged or edited. It is validated like any other input. A new result never depends on the provenance of
+an old one, and the `command` in it is only displayed, never run.
 """
 
 import json
@@ -57,7 +57,7 @@ class StoredParameter:
 
 @dataclass(frozen=True)
 class StoredCall:
-    """Name of the command that made a result, and the values of its arguments and options."""
+    """Name of the command that wrote a result, and the values of its arguments and options."""
 
     name: Annotated[str, STRING]
     options: dict[str, Annotated[Any, VALUE]]
@@ -100,13 +100,13 @@ def write_provenance(
     parameters : mapping, optional
         Effective value and unit by name.
     scene : object, optional
-        What was analysed and plotted, or the options of a study.
+        Analyses and plots of a scene, or options of a study.
     source : str
         Source of the result, as given on the command line.
     command : str, optional
-        What made the result, if no command did.
+        Text to record for a result that no command wrote; by default the command line of this process.
     run : RunSpec, optional
-        The run, as it was done.
+        Effective settings of the run.
     """
     content = {
         "source": source,
@@ -131,7 +131,7 @@ def prefix_parameters(parts: Mapping[str, Parameters]) -> Parameters:
 
 
 def describe_sources(*sources: str) -> str:
-    """Return sources for the provenance: absolute paths of existing files, other words unchanged."""
+    """Return sources for the provenance: absolute paths of existing files, other names unchanged."""
     return ", ".join(str(Path(source).resolve()) if Path(source).exists() else source for source in sources)
 
 
@@ -228,7 +228,7 @@ def format_option(name: str, value: object) -> str:
 
 
 def replacement_note(folder: Path) -> str:
-    """Return the note about the replaced result, for readers; empty if there was none."""
+    """Return the note about the replaced result; empty if there was none."""
     try:
         return str(read_table(folder / FILE).get(REPLACED, ""))
     except (OSError, SceneError):
@@ -255,14 +255,13 @@ def load_verified_provenance(folder: Path) -> dict[str, Any]:
         if (present_digest := file_digest(file)) != stored_digest:
             raise HarnessError(
                 f"{file} has changed since it was used for this result (sha256 {stored_digest[:12]} then, "
-                f"{present_digest[:12]} now): put it "
-                f"back, or create a new result with `{content['command']}`"
+                f"{present_digest[:12]} now): restore the file, or create a new result with `{content['command']}`"
             )
     return content
 
 
 def describe_origin(content: dict[str, Any]) -> tuple[str, ...]:
-    """Return sentences for readers about the origin of a result, from the content of its provenance."""
+    """Return sentences about the origin of a result, from the content of its provenance."""
     files = [f"{Path(name).name} (sha256 {digest[:12]})" for name, digest in content["files"].items()]
     versions = content["versions"]
     origin = (

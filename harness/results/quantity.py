@@ -12,7 +12,7 @@ PUBLISHED_UNITS = {
     "lbf.in": ("N.m", 0.45359237 * 9.80665 * 0.0254),
 }
 
-MAX_ASYMMETRY = 0.1  # relative to the width; more asymmetric intervals are written by their ends
+MAX_ASYMMETRY = 0.1  # relative to the width; more asymmetric intervals are written with both ends
 MAX_DIGITS = 8  # of a value with an interval
 
 
@@ -44,7 +44,7 @@ class Quantity:
 
 @dataclass(frozen=True)
 class AnalysisResult:
-    """Quantities that an analysis measured."""
+    """Quantities that an analysis has measured."""
 
     quantities: tuple[Quantity, ...]
 
@@ -62,8 +62,8 @@ def format_number(value: float, digits: int = 5) -> str:
 def format_interval(value: float, low: float, high: float) -> str:
     """Return a value with its interval for display.
 
-    The digits follow from the margin. The interval is written as ± half of its width, or by its ends if
-    asymmetric. Without an interval (NaN or infinity) the value is returned alone.
+    The margin determines the digits. The interval is written as ± half of its width, or with both ends if it is
+    asymmetric. Without an interval (NaN or infinity) only the value is returned.
     """
     lower_margin, upper_margin = value - low, high - value
     if not isfinite(upper_margin):

@@ -31,12 +31,15 @@ class SummaryTable:
 
     def __post_init__(self) -> None:
         if any(len(row) != len(self.headings) for row in self.rows):
-            raise ValueError("a table whose rows are not as long as its headings")
+            raise ValueError("a table whose rows are not as long as its headings")  # follows "tables[0] = "
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a study concludes, as a value and in words; `deviation` is the largest from published values, in percent."""
+    """Conclusion of a study: a value, and a text.
+
+    `deviation` is the largest deviation from published values in percent, None without published values.
+    """
 
     value: str
     text: str
@@ -68,7 +71,7 @@ class Sketch:
 
 @dataclass(frozen=True)
 class MissingResult:
-    """A result that a study left out, and the command that makes it."""
+    """A result that a study left out, and the command that computes it."""
 
     name: str
     command: str
@@ -119,7 +122,7 @@ class Summary:
     def __post_init__(self) -> None:
         outside = [name for name in self.files if Path(name).name != name]
         if outside:
-            raise ValueError(f"{outside[0]}, which is not the name of a file in the folder")
+            raise ValueError(f"{outside[0]}, which is not the name of a file in the folder")  # follows "files = "
 
 
 def make_table(headings: Iterable[str], rows: Iterable[Iterable[object]], title: str = "") -> tuple[SummaryTable, ...]:
@@ -143,7 +146,7 @@ def read_cells(table: "rich.table.Table", title: str = "") -> tuple[SummaryTable
 
 
 def write_summary(folder: Path, summary: Summary) -> None:
-    """Write the summary of a result, and add its origin and its files, which are complete."""
+    """Add origin and files to the summary of a result, and write it; the other files must be complete."""
     content = json.loads((folder / provenance.FILE).read_text(encoding="utf-8"))
     complete = replace(
         summary,
@@ -176,5 +179,5 @@ def read_summary(folder: Path) -> Summary:
         reason = "is not complete"
     except SceneError as error:
         reason = f"is not valid ({error})"
-    command = provenance.load_provenance(folder).get("command", "the command that made it")
+    command = provenance.load_provenance(folder).get("command", "the command that wrote it")
     raise HarnessError(f"{SUMMARY_FILE} {reason}: run `{command}` again")
