@@ -94,7 +94,7 @@ def ignore_sigint() -> Iterator[None]:
 def exit_after_signal() -> None:
     """Exit at once after a signal.
 
-    Python would otherwise report SIGINT again for an interrupt during an import, and an FMU in Python may pass on an
+    Python would otherwise report SIGINT again for an interrupt during an import, and a Python FMU may pass on an
     interrupt late.
     """
     if RECEIVED_SIGNALS:

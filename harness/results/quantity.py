@@ -25,7 +25,7 @@ class Quantity:
     unit: str
     text: str
 
-    def formatted(self) -> tuple[str, str]:
+    def format(self) -> tuple[str, str]:
         """Return value and unit for display: five digits, times below a second in ms."""
         value, unit = self.value, self.unit
         if unit == "s" and abs(value) < 1:

@@ -1,4 +1,4 @@
-"""Runs FMUs in a C program (host.c), compiled on demand by the system's compiler."""
+"""Runs of FMUs in a C program (host.c), compiled on demand by the system's compiler."""
 
 import os
 import shutil
@@ -27,7 +27,7 @@ class MissingToolError(HarnessError):
 
 @dataclass(frozen=True)
 class Library:
-    """Library of an FMU, its value references by name, and what the host needs to load it."""
+    """Library of an FMU with its value references by name, and the data with which the host loads it."""
 
     file: Path
     references: dict[str, int]
@@ -47,7 +47,7 @@ class Library:
 
 @cache
 def load_library(fmu: Path) -> Library:
-    """Unpack a built FMU for Linux and return its library; for an FMU in Python, preload its interpreter."""
+    """Unpack a built FMU for Linux and return its library; for a Python FMU, preload its interpreter."""
     directory = PROCESS_RESOURCES.enter_context(unpack(fmu))
     libraries = list((directory / "binaries" / "linux64").glob("*.so"))
     if len(libraries) != 1:

@@ -1,4 +1,4 @@
-"""Runs the model class of a built FMU in this process, without FMI."""
+"""Runs of the model class of a built FMU in this process, without FMI."""
 
 import sys
 from collections.abc import Callable
@@ -25,7 +25,7 @@ def load_model_class(fmu: Path) -> type:
     Raises
     ------
     HarnessError
-        If it is not an FMU of this project in Python.
+        If the FMU is not a Python FMU of this project.
     """
     check_built(fmu)
     names = {variable.name for variable in read_description(fmu, lenient=True).modelVariables}
@@ -40,9 +40,7 @@ def import_model_class(fmu: Path) -> type:
     with unpack(fmu) as directory:
         resources = directory / "resources"
         if not (resources / SCRIPT_NAME_FILE).is_file():
-            raise HarnessError(
-                f"{fmu.name} is a native FMU; give the one in Python, which `friction-fmus build` builds"
-            )
+            raise HarnessError(f"{fmu.name} is a native FMU; give the Python FMU, which `friction-fmus build` builds")
         package = (resources / SCRIPT_NAME_FILE).read_text(encoding="utf-8").removesuffix("_fmu")
         sys.path.insert(0, str(resources))
         try:
@@ -64,7 +62,7 @@ def create_run(model: Any) -> Any:
 
 @dataclass
 class EmbeddedModel:
-    """Model with its values and its run, ready to run from 0 s; SI units."""
+    """Model with values, and its run from 0 s on; all in SI units."""
 
     model: Any
     run: Any
@@ -111,7 +109,7 @@ class EmbeddedModel:
 
     @property
     def state_reader(self) -> Callable[[Any], tuple[float, ...]]:
-        """Return a function that reads the states at the present point of the solver."""
+        """Return a function that reads the states at the current point of the solver."""
         names = [self.solver_attribute(name) for name in self.model.states]
         return attrgetter(*names) if len(names) > 1 else lambda solver: (getattr(solver, names[0]),)
 

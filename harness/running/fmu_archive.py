@@ -1,7 +1,7 @@
-"""The archive of an FMU: its model description, which is read and validated, and its files, which are unpacked.
+"""Archive of an FMU: reads and validates the model description, and unpacks the files.
 
 The libraries of pythonfmu 0.7.0 and pythonfmu3 0.3.4 decode only %20 in the URI of the resources; other escapes, and a
-missing directory, crash or hang. Temporary files therefore lie where the URI needs no escape, and FMUs in Python that
+missing directory, crash or hang. Therefore the paths of temporary files need no escape in a URI, and Python FMUs that
 lack required files are refused.
 """
 
@@ -29,9 +29,8 @@ Result = TypeVar("Result")
 DESCRIPTION_FILE = "modelDescription.xml"
 MAX_LISTED_FAULTS = 50  # violations listed in a message
 REQUIRED_VARIABLES = ("solver.t_next", "solver.steps", "solver.rejected", "solver.evaluations")  # of this project
-SCRIPT_NAME_FILE = (
-    "slavemodule.txt"  # names the script of an FMU in Python; the libraries of both packages contain its name
-)
+# file with the name of the script of a Python FMU; the libraries of both packages contain this file name
+SCRIPT_NAME_FILE = "slavemodule.txt"
 PROCESS_RESOURCES = ExitStack()  # directories that exist until the process ends
 atexit.register(PROCESS_RESOURCES.close)
 
@@ -79,7 +78,7 @@ def validate_description(path: Path, lenient: bool) -> Any:
         count = "1 place" if len(violations) == 1 else f"{len(violations)} places"
         raise HarnessError(
             f"{path.name} violates the FMI standard in {count}:\n- {listed}\n"
-            "--lenient (run, compare) or lenient = true (a scene) runs it anyway, if possible"
+            "to try to run it, use --lenient (run, compare) or lenient = true (in a scene)"
         ) from None
     except (AttributeError, IndexError, TypeError) as error:  # fmpy reads elements and attributes that are missing
         problem = f"its modelDescription.xml lacks a required element or the FMI version ({first_line(error)})"
@@ -141,7 +140,9 @@ def read_fmi_version(path: Path) -> str:
     """Return the FMI version in the model description; raise ValueError if there are several."""
     with ZipFile(path) as archive, archive.open(DESCRIPTION_FILE) as file:
         if (count := archive.namelist().count(DESCRIPTION_FILE)) > 1:
-            raise ValueError(f"it holds {DESCRIPTION_FILE} {count} times, and which one counts is not defined")
+            raise ValueError(
+                f"it holds {DESCRIPTION_FILE} {count} times, and the standard does not define which one applies"
+            )
         return next(ElementTree.iterparse(file, ["start"]))[1].get("fmiVersion", "")
 
 
@@ -171,7 +172,7 @@ def unpack(fmu: Path) -> Iterator[Path]:
 
 @cached_by_mtime
 def unpack_once(fmu: Path) -> Path:
-    """Unpack an FMU for as long as the process lasts."""
+    """Unpack an FMU; its files exist until the process ends."""
     return PROCESS_RESOURCES.enter_context(unpack(fmu))
 
 
@@ -182,14 +183,14 @@ def is_python_fmu(directory: Path) -> bool:
 
 
 def check_python_fmu(fmu: Path, directory: Path) -> None:
-    """Check the files that the library of an FMU in Python requires but does not check itself."""
+    """Check the files that the library of a Python FMU requires but does not check."""
     if not has_plain_uri(directory):
         raise HarnessError(
-            f"{fmu.name} is an FMU in Python, which cannot be run from {directory}: its library reads plain characters "
+            f"{fmu.name} is a Python FMU, which cannot be run from {directory}: its library reads plain characters "
             "only; set another temporary directory, as in TMPDIR=/tmp"
         )
     name_file = directory / "resources" / SCRIPT_NAME_FILE
     script = name_file.read_text(encoding="utf-8", errors="replace").split("\n")[0] if name_file.is_file() else ""
     if not script or not (name_file.parent / f"{script}.py").is_file():
         missing = f"resources/{script}.py" if script else f"resources/{SCRIPT_NAME_FILE}"
-        raise HarnessError(f"{fmu.name} lacks {missing}, without which an FMU in Python crashes: build it again")
+        raise HarnessError(f"{fmu.name} lacks {missing}, without which a Python FMU crashes: build it again")

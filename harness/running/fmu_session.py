@@ -24,7 +24,7 @@ from ..errors import HarnessError, first_line
 
 WARNING, DISCARD = 1, 2  # of the statuses; any status above a warning is a failure
 STATUS_NAMES = ("OK", "Warning", "Discard", "Error", "Fatal", "Pending")
-MAX_MESSAGES = 50  # log messages that are kept
+MAX_MESSAGES = 50  # log messages that are stored
 
 
 class StepError(Exception):
@@ -61,7 +61,7 @@ class LogCapture:
 
     @property
     def error_message(self) -> str:
-        """Return the last message above a warning, or the last line on standard error, in one line; empty if none."""
+        """Return the last message above a warning, or the last line on standard error; empty if there is none."""
         logged = [text for status, text in self.messages if status > WARNING and text.strip()]
         printed = self.stderr.getvalue().strip().splitlines() if self.stderr else []
         return " ".join((logged or printed or [""])[-1].split())
@@ -83,7 +83,7 @@ class FmuSession:
     folder : path
         Directory of the unpacked FMU.
     exchange : bool
-        Model exchange instead of co-simulation.
+        Whether to use model exchange instead of co-simulation.
     name : str, optional
         Name of the instance; by default its model identifier.
     log : LogCapture, optional
@@ -92,7 +92,7 @@ class FmuSession:
     Raises
     ------
     HarnessError
-        If it cannot be instantiated.
+        If the FMU cannot be instantiated.
     """
 
     def __init__(
@@ -118,14 +118,14 @@ class FmuSession:
 
     def instantiate(self, folder: str, name: str | None) -> Any:
         """Return fmpy's instance."""
-        kinds: dict[tuple[bool, bool], Any] = {
+        classes: dict[tuple[bool, bool], Any] = {
             (True, False): FMU2Slave,
             (True, True): FMU2Model,
             (False, False): FMU3Slave,
             (False, True): FMU3Model,
         }
         try:
-            fmu = kinds[self.is_fmi2, self.exchange](
+            fmu = classes[self.is_fmi2, self.exchange](
                 guid=self.description.guid or "",
                 unzipDirectory=folder,
                 modelIdentifier=self.interface.modelIdentifier,
@@ -139,7 +139,9 @@ class FmuSession:
                     loggingOn=True, logMessage=lambda instance, status, category, text: log.add(status, text)
                 )
         except Exception as error:  # fmpy raises bare Exceptions
-            hint = "; it needs the tool that made it (needsExecutionTool)" if self.interface.needsExecutionTool else ""
+            hint = (
+                "; it needs the tool that exported it (needsExecutionTool)" if self.interface.needsExecutionTool else ""
+            )
             raise HarnessError(f"{first_line(error).replace(f'{folder}{os.sep}', '')}{hint}") from None
         return fmu
 
@@ -205,7 +207,7 @@ class FmuSession:
         FMICallException
             If the step fails.
         HarnessError
-            If the FMU returns early, which it is not allowed.
+            If the FMU returns early, which is not allowed.
         """
         status = self.do_step(self.instance, t, h, 1, *self.step_arguments)  # type: ignore[misc]
         if status > WARNING:
@@ -244,7 +246,8 @@ class FmuSession:
 class PreparedRuns:
     """Runs of one session of FMI 2.0 from start to stop in one communication step, each with other values.
 
-    A run by closed form takes 40 microseconds, as long as a few calls through fmpy: all calls and buffers are prepared.
+    A run by closed form takes 40 microseconds, as long as a few calls through fmpy, so all calls and buffers are
+    prepared.
 
     Parameters
     ----------
@@ -335,11 +338,11 @@ def set_variable(fmu: Any, description: Any, variable: Any, value: Any) -> None:
     setter([variable.valueReference], value if isinstance(value, list) else [value])
 
 
-LOGS: WeakValueDictionary[int, LogCapture] = WeakValueDictionary()  # by the environment of an instance of FMI 2.0
+LOGS: WeakValueDictionary[int, LogCapture] = WeakValueDictionary()  # by the component environment of FMI 2.0
 
 
 def log_fmi2_message(environment: int | None, name: bytes, status: int, category: bytes, text: bytes) -> None:
-    """Store a log message of FMI 2.0; in the last log if the FMU does not pass its environment on."""
+    """Store a log message of FMI 2.0, in the last log if the FMU does not pass its environment."""
     log = LOGS.get(environment or 0) or LOGS.get(max(LOGS, default=0))
     if log is not None:
         log.add(status, text)

@@ -1,20 +1,20 @@
-/* FMI 2.0 host without Python: executes FMI calls on the library of an FMU, one per line of standard input.
+/* FMI 2.0 host without Python: reads FMI calls from standard input, one per line, and makes them in an FMU's library.
  *
  *     host LIBRARY GUID RESOURCES
  *
  *     I new NAME [quiet [exchange]]                  I begin [T]             I step T H
- *     I setr REFERENCE VALUE                         I calls STATES INDICATORS TURNS
+ *     I setr REFERENCE VALUE                         I calls STATES INDICATORS CALLS
  *     I getr REFERENCE...    I pass REFERENCE J TO   I save                  I restore             I reset
  *     I free                 I time REPEAT STOP STEPS WORD...                0 unload
  *
- * I and J are indices of instances. step prints the status, getr the values. After a refused value all steps have its
- * status, until the instance is reset. Any other failure exits.
+ * I and J are indices of instances. step prints the status, getr prints the values. After a refused value, all steps
+ * print its status until the instance is reset. After any other failure the program exits.
  *
  * time simulates from t = 0 to STOP in STEPS equal communication steps, REPEAT times. A word R=VALUE sets the Real with
  * value reference R before each run, iR=VALUE an Integer; a word R reads that Real at every point. It prints the run
  * time of the fastest run in s, including initialization and reading, and the values at every point of the last run.
  *
- * calls measures the model exchange calls of a solver, TURNS calls at a time. It prints the shortest time per call in
+ * calls measures the model exchange calls of a solver, CALLS calls at a time. It prints the shortest time per call in
  * s: to set the time, to set the states, to get the derivatives, to get the event indicators.
  */
 #define _POSIX_C_SOURCE 199309L
@@ -110,7 +110,7 @@ static double now(void)
 static double run(fmi2Component c, const Reals *set, const Integers *choices, const Reals *read, double stop, int steps,
                   double *out)
 {
-    double begun = now(), t = 0.0;
+    double start_time = now(), t = 0.0;
     if (set->count) DO(SetReal(c, set->references, set->count, set->values));
     if (choices->count) DO(SetInteger(c, choices->references, choices->count, choices->values));
     DO(SetupExperiment(c, fmi2False, 0.0, 0.0, fmi2True, stop));
@@ -123,7 +123,7 @@ static double run(fmi2Component c, const Reals *set, const Integers *choices, co
         t = next;
         DO(GetReal(c, read->references, read->count, out += read->count));
     }
-    return now() - begun;
+    return now() - start_time;
 }
 
 static void time_runs(fmi2Component c, char **words, int count)
@@ -154,14 +154,14 @@ static void time_runs(fmi2Component c, char **words, int count)
     do {                                                                 \
         double fastest = INFINITY;                                       \
         for (int i = 0; i < REPETITIONS; i++) {                          \
-            double begun = now();                                        \
-            for (long turn = 0; turn < turns; turn++) DO(call);          \
-            fastest = fmin(fastest, now() - begun);                      \
+            double start_time = now();                                        \
+            for (long n = 0; n < n_calls; n++) DO(call);                 \
+            fastest = fmin(fastest, now() - start_time);                      \
         }                                                                \
-        printf(" %.9g", fastest / (double)turns);                        \
+        printf(" %.9g", fastest / (double)n_calls);                        \
     } while (0)
 
-static void time_calls(fmi2Component c, size_t states, size_t indicators, long turns)
+static void time_calls(fmi2Component c, size_t states, size_t indicators, long n_calls)
 {
     double x[WORDS], rates[WORDS], values[WORDS];
     fmi2EventInfo event = {.newDiscreteStatesNeeded = fmi2True};
@@ -170,7 +170,7 @@ static void time_calls(fmi2Component c, size_t states, size_t indicators, long t
     DO(EnterContinuousTimeMode(c));
     DO(GetContinuousStates(c, x, states));
     printf("seconds");
-    TIME(SetTime(c, 1e-6 * (double)turn));
+    TIME(SetTime(c, 1e-6 * (double)n));
     TIME(SetContinuousStates(c, x, states));
     TIME(GetDerivatives(c, rates, states));
     TIME(GetEventIndicators(c, values, indicators));

@@ -22,7 +22,7 @@ LOG_FILES = ("SUNLOGGER_ERROR_FILENAME", "SUNLOGGER_WARNING_FILENAME")  # enviro
 
 
 class CheckedCVode(CVodeSolver):
-    """CVode that counts right-hand sides, reports that it works, and stops at a failed FMI call."""
+    """CVode that counts right-hand sides, reports each of them as progress, and stops at a failed FMI call."""
 
     error: BaseException | None = None
     n_rhs = 0
@@ -30,7 +30,7 @@ class CheckedCVode(CVodeSolver):
     def __init__(self, report_work: Callable[[], Any], **options: Any) -> None:
         self.report_work, self.max_steps = report_work, options["maxNumSteps"]
         before = dict(os.environ)
-        os.environ.update(dict.fromkeys(LOG_FILES, os.devnull) | before)  # fmpy raises what CVode would print
+        os.environ.update(dict.fromkeys(LOG_FILES, os.devnull) | before)  # fmpy raises the messages of CVode
         try:
             super().__init__(**options)
         finally:

@@ -1,4 +1,4 @@
-"""Native FMU of the same model as an FMU in Python, built on demand."""
+"""Native FMU of the model of a Python FMU, built on demand."""
 
 from pathlib import Path
 from typing import Any
@@ -14,15 +14,15 @@ from .fmu_archive import PROCESS_RESOURCES, cached_by_mtime, is_python_fmu, read
 from .whole_run import open_simulator, real_variables
 
 BUILD_TIMEOUT = 300.0  # s
-COMPARED_POINTS, AGREEMENT = 51, 1e-6  # of the run that two FMUs of one model have in common
+COMPARED_POINTS, AGREEMENT = 51, 1e-6  # of the run by which two FMUs are compared
 
 
 @cached_by_mtime
 def native_equivalent(fmu: Path) -> Path:
     """Return the native FMU of the same model, or the FMU itself if there is none.
 
-    The one in the folder native beside the FMU is taken, or one is built from the model file beside the FMU or of
-    this project. Either must be the same model.
+    It is read from the subfolder native, or built from the model file in the same folder or of this project. In both
+    cases it must be the same model.
     """
     if not is_python_fmu(unpack_once(fmu)):
         return fmu

@@ -1,6 +1,6 @@
-"""Rows of recorded values: a session's variables are read into one buffer, which is written at once.
+"""Rows of recorded values. The variables of a session are read into one buffer, which is written at once.
 
-A row in a file therefore survives a crash of the FMU.
+So a row in a file survives a crash of the FMU.
 """
 
 import json
@@ -185,12 +185,12 @@ class Recorder:
             self.calls.append(session.prepare_call(name, references, len(variables), values, *count))
 
     def cell(self, name: str) -> c_double:
-        """Return what holds the last recorded value of a Float64."""
+        """Return the ctypes object with the last recorded value of a Float64."""
         buffer, i = self.cells[name]
         return c_double.from_buffer(buffer, i * sizeof(c_double))
 
     def record(self, t: float) -> None:
-        """Write a row of the present values at a time in s."""
+        """Write a row of the current values at a time in s."""
         self.time.value = t
         for name, function, arguments in self.calls:
             status = function(*arguments)

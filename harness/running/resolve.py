@@ -1,4 +1,4 @@
-"""Finds the run that a user names by a model, an FMU, a scene or a stored result."""
+"""Run that a user specifies by a model, an FMU, a scene or a stored result."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -13,7 +13,7 @@ FMU_SUFFIXES = (".fmu", ".py")
 
 
 def resolve(source: str | Path, options: RunSpec | None = None, scenes_first: bool = False) -> RunSpec:
-    """Return the run that a user names.
+    """Return the run that a user specifies.
 
     Parameters
     ----------
@@ -23,12 +23,12 @@ def resolve(source: str | Path, options: RunSpec | None = None, scenes_first: bo
     options : RunSpec, optional
         Options of the run of an FMU or a model; scenes and stored results have their own.
     scenes_first : bool
-        Whether a name that a scene and a model have in common is that of the scene.
+        Whether a name that a scene and a model share means the scene.
 
     Raises
     ------
     HarnessError
-        If there is no such source, or if the files of a stored result have changed since.
+        If there is no such source, or if the files of a stored result have changed since it was written.
     """
     path, name = Path(source), str(source)
     scenes = {file.stem for file in shipped_scenes()} if scenes_first else set()
@@ -49,7 +49,7 @@ def resolve(source: str | Path, options: RunSpec | None = None, scenes_first: bo
 
 
 def read_stored_run(folder: Path) -> RunSpec:
-    """Return the run that made a stored result; HarnessError if its files have changed since."""
+    """Return the run of a stored result; raise HarnessError if its files have changed since it was written."""
     provenance = load_verified_provenance(folder)
     scene = provenance["scene"] or {}
     try:

@@ -27,7 +27,7 @@ class Solution:
     start_mode : int or None
         Mode at the start; None if nothing sticks or it is not known.
     method : str
-        The solver, or the methods that were compared.
+        Name of the solver, or names of the methods that were compared.
     estimated_error : float
         Largest difference of two methods, relative to the largest value of each column; NaN if it is not known.
     """

@@ -1,4 +1,4 @@
-"""Runs an SSP archive with fmpy in a child process; JSON input and output as for the other co-simulation engines.
+"""Child process that runs an SSP archive with fmpy; requests and replies as for the other co-simulation engines.
 
 fmpy reads a parameter set only if it is passed explicitly, and records no values before the first step.
 """

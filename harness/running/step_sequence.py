@@ -1,6 +1,6 @@
-"""Runs of an FMU of this project by given communication steps and value changes, to the end or to an error.
+"""Runs of an FMU of this project with given communication steps and changes of values, to the end or to an error.
 
-Values are not checked before they are set, since studies of stability and errors also set NaN.
+Values are set without a check, because studies of stability and errors also set NaN.
 """
 
 import io
@@ -36,7 +36,7 @@ class RefusedRun:
 
 @dataclass(frozen=True)
 class RefusalSummary:
-    """Number of values that were tried, and a description of each failure."""
+    """Number `n_tried` of invalid values that were set, and a description of each failure."""
 
     n_tried: int
     failures: tuple[str, ...]
@@ -44,7 +44,7 @@ class RefusalSummary:
 
 @contextmanager
 def open_reusable_session(spec: RunSpec) -> Iterator[FmuSession]:
-    """Instantiate an FMU whose files stay unpacked as long as the process lasts."""
+    """Instantiate an FMU, whose files stay unpacked until the process ends."""
     with open_session(spec, unpack_once(spec.fmu)) as session:
         yield session
 
@@ -55,7 +55,7 @@ def initialize(session: FmuSession, spec: RunSpec) -> None:
 
 
 def settings(session: FmuSession, values: dict[str, float]) -> list[tuple[Any, float]]:
-    """Return variables and values, from values by name."""
+    """Return pairs of variable and value, from values by name."""
     variables = [session.variables[name] for name in values]
     return [
         (variable, value if variable.type in REAL_TYPES else int(value))
@@ -98,7 +98,7 @@ def run_steps(spec: RunSpec, steps: CommunicationSteps, changes: ScheduledChange
     Parameters
     ----------
     spec : RunSpec
-        FMU, values, start and stop. Without a stop, the FMU does not receive any.
+        FMU, values, start and stop. The stop may be missing; then the FMU receives none.
     steps : list of (float, float)
         Communication steps as (start, size) in s.
     changes : dict

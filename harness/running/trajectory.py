@@ -1,6 +1,6 @@
-"""Trajectory of a run: time, columns, steps, events, statistics and the specification.
+"""Trajectory of a run: time, columns, steps, events, statistics and specification.
 
-A contact of an FMU of this project has a friction force and a mode, and the name of its force.
+A contact of an FMU of this project has a friction force and a mode. Its name is that of its force.
 """
 
 import re
@@ -24,14 +24,24 @@ if TYPE_CHECKING:
     import xarray
 
 FILES = ("trajectory.csv", "steps.csv", "events.csv")
-MOST_PANELS = 8  # of a plot that names no outputs
+MAX_PANELS = 8  # of a plot without named outputs
 MIN_SAMPLES = 8  # in a half cycle or a slip: a parabola through the top samples is then accurate to 1e-4
 MODE_TEXT = re.compile(r"mode of (\w+): ")  # how the description of a mode begins; it names the force of the contact
 
 
 @dataclass(frozen=True)
 class SolverSteps:
-    """Internal steps: ends `t` (n + 1,) in s, start included; sizes `h` (n,) in s; `rejected` attempts (n,)."""
+    """Internal steps of the solver.
+
+    Attributes
+    ----------
+    t : numpy.ndarray
+        Start of the run and ends of the steps (n + 1,) in s.
+    h : numpy.ndarray
+        Step sizes (n,) in s.
+    rejected : numpy.ndarray
+        Number (n,) of rejected attempts before each step.
+    """
 
     t: np.ndarray
     h: np.ndarray
@@ -40,7 +50,7 @@ class SolverSteps:
 
 @dataclass(frozen=True)
 class ModeChanges:
-    """Changes of mode: the modes hold from the times on. The first entry is the start.
+    """Changes of mode. Each mode begins at its time; the first entry is the start.
 
     Attributes
     ----------
@@ -103,7 +113,7 @@ class Statistics:
     events : int
         Changes of mode.
     last_event : float
-        Time of the last change of mode in s; that of the start without any, NaN if the FMU does not expose it.
+        Time of the last change of mode in s, or of the start without changes; NaN if the FMU does not expose it.
     """
 
     steps: int
@@ -261,7 +271,7 @@ class Trajectory:
         if texts:
             raise HarnessError(f"{texts[0]} is a text, which has no curve: name other outputs")
         inputs = [] if names else [name for name in self.spec.inputs if name != "time" and name not in self.columns]
-        return plot(self, names or choose_outputs(numeric, self.contacts, MOST_PANELS), inputs)
+        return plot(self, names or choose_outputs(numeric, self.contacts, MAX_PANELS), inputs)
 
     @property
     def contacts(self) -> tuple[str, ...]:
@@ -276,9 +286,9 @@ class Trajectory:
         return {contact: self.events.sticking(contact, float(self.time[-1])) for contact in self.contacts}
 
     def contact_of(self, name: str) -> str:
-        """Return the contact whose sticking belongs to the panel of an output; empty if there is none.
+        """Return the contact whose sticking is shown in the panel of an output; empty if there is none.
 
-        That is the only contact of the model, or the one whose friction force or mode the output is.
+        It is the only contact of the model, or the contact whose friction force or mode the output is.
         """
         if len(self.contacts) == 1:
             return self.contacts[0]
@@ -343,12 +353,12 @@ class Trajectory:
     def check_sampling(self, starts: np.ndarray, ends: np.ndarray, interval_name: str) -> None:
         """Raise HarnessError if an interval between `starts` and `ends` (n,), in s, has fewer than MIN_SAMPLES samples.
 
-        `interval_name` says what an interval is.
+        `interval_name` is the name of an interval in the message.
         """
         counts = np.searchsorted(self.time, ends, "right") - np.searchsorted(self.time, starts, "left")
         if len(counts) and counts.min() < MIN_SAMPLES:
             i = int(np.argmin(counts))
-            # half the step that would do: with few samples the bounds of an interval are uncertain themselves
+            # half of the necessary step: with few samples the bounds of an interval are uncertain
             step = 0.5 * float((ends - starts).min()) / MIN_SAMPLES
             raise HarnessError(
                 f"each {interval_name} needs at least {MIN_SAMPLES} samples, and the one from t = {starts[i]:.6g} s to "
@@ -375,7 +385,7 @@ def summarize_run(run: Trajectory, title: str) -> Summary:
 
 
 def format_value(value: object) -> str:
-    """Return a number with five digits; anything else as it is."""
+    """Return a number with five digits, any other value as text."""
     return format_number(value) if isinstance(value, float) else str(value)
 
 
@@ -384,7 +394,7 @@ def summarize_steps(run: Trajectory, title: str) -> tuple[SummaryTable, ...]:
     if run.steps is None or not len(run.steps.h):
         return ()
     quantities = step_size_quantities(run.steps.h, int(run.steps.rejected.sum()))
-    row = (title, *(" ".join(quantity.formatted()).strip() for quantity in quantities))
+    row = (title, *(" ".join(quantity.format()).strip() for quantity in quantities))
     return make_table(("case", *(quantity.text for quantity in quantities)), (row,), STEPS_TABLE)
 
 
@@ -395,7 +405,7 @@ def contact_of_mode(description: str | None) -> str:
 
 
 def find_contacts(variables: Mapping[str, Any]) -> dict[str, str]:
-    """Return the contacts of an FMU of this project: the output that is the mode, by the name of the contact.
+    """Return the contacts of an FMU of this project: the mode, an output, by the name of the contact.
 
     A contact has the name of its friction force, or that of its mode if the description of the mode names no force.
     """
@@ -407,7 +417,7 @@ def find_contacts(variables: Mapping[str, Any]) -> dict[str, str]:
 
 
 def choose_outputs(outputs: Sequence[str], contacts: Collection[str], count: int) -> tuple[str, ...]:
-    """Return the first outputs, `count` in all, with the friction forces among them if there is space for these."""
+    """Return the first outputs, at most `count`, with preference for friction forces."""
     forces = [name for name in outputs if name in contacts][:count]
     others = [name for name in outputs if name not in contacts][: count - len(forces)]
     return tuple(name for name in outputs if name in forces or name in others)

@@ -26,8 +26,11 @@ def convert_value(variable: Any, value: Any, shape: tuple[int, ...] = ()) -> Any
         texts = value.replace(",", " ").split() if isinstance(value, str) else []
         parts = [*map(parse_element, texts)] or np.ravel(value).tolist()
         if len(parts) != prod(shape):
-            has = f"{variable.name} = {format_value(value)} has {len(parts)} elements"
-            raise SceneError(f"{has}, not {' x '.join(map(str, shape))}; separate them by commas, row by row")
+            expected = " x ".join(map(str, shape))
+            raise SceneError(
+                f"{variable.name} = {format_value(value)} has {len(parts)} elements, not {expected}; separate them by "
+                "commas, row by row"
+            )
         return [convert_value(variable, part) for part in parts]
     if variable.type == "Enumeration":
         items = enumeration_labels(variable)

@@ -1,9 +1,10 @@
-/* One co-simulation run in one call: sets values, initializes, steps over the given times and reads outputs.
+/* One co-simulation run in one call: sets values, initializes, takes the steps between the given times and reads outputs.
  *
- * The instance is new or has been reset. The functions of the FMU are passed as pointers, so the library links nothing
- * but the C library. Of the inputs u (n, n_in), the first row is set at the start, and each other one before the step to
- * its time. The outputs y are read at the times that are `kept`. The result is 0, REFUSED if the FMU does not initialize, FAILED if a later call fails or an
- * output is not finite, or TOO_SLOW after `limit` seconds of processor time.
+ * The instance is new or has been reset. The functions of the FMU are passed as pointers, so the library links only the
+ * C library. The first row of the inputs u (n, n_in) is set at the start, and each other row before the step to its
+ * time. The outputs y are read at the times at which `is_recorded` is true. The result is 0, REFUSED if the FMU does not
+ * initialize, FAILED if a later call fails or an output is not finite, or TOO_SLOW after `limit` seconds of processor
+ * time.
  */
 #include <math.h>
 #include <stdbool.h>
@@ -93,22 +94,22 @@ static bool step(const Fmu *fmu, double t, double h)
 }
 
 int run(const Fmu *fmu, const Variables *parameters, const Variables *inputs, const Variables *outputs,
-        const double *t, const bool *kept, size_t n)
+        const double *t, const bool *is_recorded, size_t n)
 {
     double *y = outputs->values;
     const double *u = inputs->values;
-    clock_t begun = clock();
+    clock_t start_time = clock();
     if (!initialize(fmu, parameters, inputs, t[0], t[n - 1])) return REFUSED;
     for (size_t i = 0; i < n; i++) {
         if (i > 0) {
             u += inputs->count;
             if (!set(fmu, inputs, u) || !step(fmu, t[i - 1], t[i] - t[i - 1])) return FAILED;
         }
-        if (kept[i]) {
+        if (is_recorded[i]) {
             if (!get(fmu, outputs, y)) return FAILED;
             y += outputs->count;
         }
-        if (i % STEPS_PER_CHECK == 0 && (double)(clock() - begun) > fmu->limit * CLOCKS_PER_SEC) return TOO_SLOW;
+        if (i % STEPS_PER_CHECK == 0 && (double)(clock() - start_time) > fmu->limit * CLOCKS_PER_SEC) return TOO_SLOW;
     }
     return 0;
 }

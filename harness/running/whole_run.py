@@ -109,7 +109,7 @@ class RunSession:
         self.is_new = False
 
     def make_struct(self, names: tuple[str, ...], values: np.ndarray) -> VariablesStruct:
-        """Return the struct of variables, whose value references are kept, and of their values."""
+        """Return the struct of variables and values; the value references are cached."""
         if names not in self.references:
             references = [self.session.variables[name].valueReference for name in names]
             self.references[names] = (c_uint32 * len(names))(*references)
@@ -121,12 +121,12 @@ class RunSession:
 
 
 class PreparedRun:
-    """A run as whole_run.c receives it: for runs that differ in Reals only, all but their values stays.
+    """Arguments of whole_run.c for runs that differ in Reals only, and the runs.
 
     Parameters
     ----------
     spec : RunSpec
-        Its steps end at the communication points only: it does not follow the solver.
+        Specification of the runs, which must not follow the steps of the solver.
     runs : RunSession
         Session in which the run is done.
 
@@ -134,12 +134,12 @@ class PreparedRun:
     ----------
     t : numpy.ndarray
         Communication points (n,) in s.
-    kept : numpy.ndarray
-        Whether the outputs are read at each of them (n,).
+    is_recorded : numpy.ndarray
+        Whether the outputs are read at each point (n,).
     u : numpy.ndarray
         Inputs (n, inputs) at the start, and of each step.
     y : numpy.ndarray
-        Outputs (kept points, outputs).
+        Outputs (recorded points, outputs).
     """
 
     def __init__(self, spec: RunSpec, runs: RunSession) -> None:
@@ -149,27 +149,27 @@ class PreparedRun:
         start, stop = resolve_time_span(spec, session.description)
         grid = make_grid(spec, start, stop)
         self.t = grid.points
-        self.kept = np.full(len(self.t), len(spec.times) in (0, len(self.t)))
-        if not self.kept[0]:
-            self.kept[np.searchsorted(self.t, np.asarray(spec.times, dtype=float) - grid.tolerance)] = True
+        self.is_recorded = np.full(len(self.t), len(spec.times) in (0, len(self.t)))
+        if not self.is_recorded[0]:
+            self.is_recorded[np.searchsorted(self.t, np.asarray(spec.times, dtype=float) - grid.tolerance)] = True
         self.u = values_of_steps(spec.inputs, self.t)
-        self.y = np.empty((np.count_nonzero(self.kept), len(spec.outputs)))
+        self.y = np.empty((np.count_nonzero(self.is_recorded), len(spec.outputs)))
         self.outputs, self.inputs = spec.outputs, tuple(name for name in spec.inputs if name != TIME)
         self.names: tuple[str, ...] | None = None
 
     def name_values(self, names: tuple[str, ...]) -> None:
-        """Prepare for values of the variables of these names."""
+        """Prepare the arguments for values of these variables."""
         self.names, self.x = names, np.zeros(len(names))
         self.structs = [
             self.runs.make_struct(*variables)
             for variables in ((names, self.x), (self.inputs, self.u), (self.outputs, self.y))
         ]
         pointers = [byref(self.runs.handle), *map(byref, self.structs)]
-        arrays = [c_void_p(array.ctypes.data) for array in (self.t, self.kept)]
+        arrays = [c_void_p(array.ctypes.data) for array in (self.t, self.is_recorded)]
         self.arguments = (*pointers, *arrays, c_size_t(len(self.t)))
 
     def run(self, values: Mapping[str, float]) -> np.ndarray | None:
-        """Return the outputs (kept points, outputs); None if the FMU refuses the values or is too slow."""
+        """Return the outputs (recorded points, outputs); None if the FMU refuses the values or is too slow."""
         if tuple(values) != self.names:
             self.name_values(tuple(values))
         self.x[:] = [*values.values()]
@@ -186,8 +186,8 @@ class PreparedRun:
         return self.y.copy()
 
     def run_in_python(self) -> None:
-        """Make the calls of whole_run.c from Python; raise RunTimeError if the run does not end well."""
-        session, t, begun = self.runs.session, self.t.tolist(), process_time()
+        """Make the calls of whole_run.c from Python; raise RunTimeError if it would return FAILED or TOO_SLOW."""
+        session, t, start_time = self.runs.session, self.t.tolist(), process_time()
         inputs = [session.variables[name] for name in self.inputs]
         assert self.names is not None
         start = [*zip(self.names, self.x.tolist(), strict=True), *zip(self.inputs, self.u[0].tolist(), strict=True)]
@@ -198,16 +198,16 @@ class PreparedRun:
                 for variable, value in zip(inputs, self.u[i].tolist(), strict=True):
                     session.set(variable, value)
                 session.step(t[i - 1], t[i] - t[i - 1])
-            if self.kept[i]:
+            if self.is_recorded[i]:
                 next(rows)[:] = [session.get(name) for name in self.outputs]
-            if i % STEPS_PER_CHECK == 0 and process_time() - begun > self.runs.limit:
+            if i % STEPS_PER_CHECK == 0 and process_time() - start_time > self.runs.limit:
                 raise RunTimeError
         if not np.isfinite(self.y).all():
             raise RunTimeError
 
 
 class RunTimeError(Exception):
-    """A run does not reach its end in time, or outputs are not finite."""
+    """A run exceeds its time limit, or outputs are not finite."""
 
 
 class ChildSession:
@@ -216,7 +216,7 @@ class ChildSession:
     Parameters
     ----------
     spec : RunSpec
-        What all runs share.
+        Settings that all runs share.
     folder : pathlib.Path
         Folder for specifications and results.
     """
@@ -248,7 +248,7 @@ class ChildRun:
         finalize(self, self.path.unlink, missing_ok=True)
 
     def run(self, values: Mapping[str, float]) -> np.ndarray | None:
-        """Return the outputs (kept points, outputs); None if the FMU refuses the values, crashes or is too slow."""
+        """Return the outputs (recorded points, outputs); None if the FMU refuses the values, crashes or is too slow."""
         try:
             results = self.runs.process.ask({"spec": self.path, "values": values}, self.runs.timeout)
         except ChildError:
@@ -257,16 +257,16 @@ class ChildRun:
 
 
 class Simulator:
-    """Runs of one FMU with ever different values.
+    """Runs of one FMU with different values.
 
     Attributes
     ----------
     spec : RunSpec
-        What all runs share.
+        Settings that all runs share.
     variables : dict of RealVariable
         The scalar Reals of the FMU by name.
     n_runs : int
-        Number of runs so far.
+        Number of runs up to now.
     """
 
     def __init__(
@@ -280,7 +280,7 @@ class Simulator:
         Parameters
         ----------
         spec : RunSpec
-            That of the simulator with other outputs, inputs or times.
+            Specification of the simulator with other outputs, inputs or times.
 
         Returns
         -------
@@ -304,8 +304,8 @@ def open_simulator(spec: RunSpec) -> Iterator[Simulator]:
     Parameters
     ----------
     spec : RunSpec
-        What all runs share: the FMU, values of variables of any type, and as `timeout` the seconds of processor time
-        that one run may take.
+        Settings that all runs share: the FMU, values of variables of any type, and as `timeout` the seconds of
+        processor time that one run may take.
 
     Raises
     ------
@@ -351,5 +351,5 @@ def compile_loop() -> CDLL | None:
     else:
         return None
     library = PROCESS_RESOURCES.enter_context(temporary_directory("loop-")) / "whole_run.so"
-    done = run_subprocess([*compiler, *OPTIONS, str(SOURCE), "-o", str(library)])
-    return None if done.returncode else CDLL(str(library))
+    compilation = run_subprocess([*compiler, *OPTIONS, str(SOURCE), "-o", str(library)])
+    return None if compilation.returncode else CDLL(str(library))

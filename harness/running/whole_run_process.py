@@ -10,7 +10,7 @@ from ..process.child_process import RequestServer
 from ..scenes.run_spec import RunSpec
 from .whole_run import PreparedRun, RunSession
 
-MAX_PREPARED = 64  # runs that are kept
+MAX_PREPARED = 64  # runs in the cache
 
 
 @cache
@@ -28,7 +28,7 @@ def prepare_run(path: str) -> PreparedRun:
 
 @lru_cache(MAX_PREPARED)
 def open_results(folder: Path, shape: tuple[int, ...]) -> np.memmap:
-    """Return an array in a file, which the results of a shape share."""
+    """Return an array in a file, into which all results of this shape are written."""
     return np.lib.format.open_memmap(folder / f"y{shape}.npy", "w+", float, shape)
 
 

@@ -337,7 +337,7 @@ def edited_description(change):
             {"binaries/linux64/Midpoint.so": None},
             "has no binary linux64/Midpoint for this machine",
         ),
-        ("Midpoint", {"binaries/linux64/Midpoint.so": b"\x7fELF"}, "needs the tool that made it"),
+        ("Midpoint", {"binaries/linux64/Midpoint.so": b"\x7fELF"}, "needs the tool that exported it"),
         (
             "Fmi3Midpoint",
             {"binaries/x86_64-linux/Fmi3Midpoint.so": None},

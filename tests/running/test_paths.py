@@ -48,7 +48,7 @@ def test_paths_of_temporary_files_fmus_and_results_may_contain_any_character(odd
 def test_without_a_plain_folder_a_python_fmu_is_refused_and_others_run(odd_folder, fmus, monkeypatch):
     monkeypatch.setattr("harness.process.temporary_directory.FALLBACK_DIRECTORIES", ())
     monkeypatch.setattr(tempfile, "tempdir", str(odd_folder))
-    refused = pytest.raises(HarnessError, match=r"smd\.fmu is an FMU in Python, which cannot be run from .*TMPDIR")
+    refused = pytest.raises(HarnessError, match=r"smd\.fmu is a Python FMU, which cannot be run from .*TMPDIR")
     with refused, fmu_archive.unpack(fmus / "smd.fmu"):
         pass
     compiled = copy_without(fmus / "smd.fmu", odd_folder / "c.fmu", lambda name: name.startswith("binaries/"))

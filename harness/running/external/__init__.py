@@ -1,1 +1,1 @@
-"""Runs external FMUs in a child process, so that a hang, crash or output of the FMU is reported in one sentence."""
+"""Runs of external FMUs in a child process. A hang, a crash or output of the FMU is reported in one sentence."""

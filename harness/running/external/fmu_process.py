@@ -1,4 +1,4 @@
-"""Child process that runs an external FMU: it writes rows to files and replies with a result."""
+"""Child process that runs an external FMU, writes rows to files and replies with a result."""
 
 import os
 from collections.abc import Callable
@@ -26,7 +26,7 @@ from .step_refinement import (
     refine,
 )
 
-REMAINING_SHARE = 0.8  # of the progress bar after each run
+REMAINING_SHARE = 0.8  # share of the rest of the progress bar that a run leaves
 
 
 def memory_size() -> int | None:
@@ -38,7 +38,7 @@ def memory_size() -> int | None:
 
 
 class ExternalFmu:
-    """Runs an external FMU, each time with a new instance.
+    """Runs an external FMU, with a new instance for each run.
 
     Parameters
     ----------
@@ -57,14 +57,14 @@ class ExternalFmu:
         self.description = fmpy.read_model_description(folder, validate=False)
         variables = {variable.name: variable for variable in self.description.modelVariables}
         self.settings = [(variables[name], value) for name, value in spec.values.items()]
-        self.chosen = select_variables(spec, variables, spec.values)
+        self.selection = select_variables(spec, variables, spec.values)
         self.strings, self.report = StringTable(directory / STRINGS_FILE), report
         self.n_runs, self.progress = 0, 0.0
 
     def report_progress(self, progress: float | None = None) -> None:
-        """Report the progress of the present run, from 0 to 1, or that the process works.
+        """Report the progress of the current run, from 0 to 1, or that the process works.
 
-        The number of runs is unknown: each run takes a fixed share of what remains of the progress bar.
+        The number of runs is not known in advance, so each run takes a fixed share of the rest of the progress bar.
         """
         self.progress = self.progress if progress is None else progress
         self.report(1 - REMAINING_SHARE ** (self.n_runs + self.progress))
@@ -84,7 +84,7 @@ class ExternalFmu:
             cause = error
         message = first_line(cause) if cause else ""
         path.touch()
-        time, columns = read_rows(path.read_bytes(), self.chosen, self.description.fmiVersion == "2.0")
+        time, columns = read_rows(path.read_bytes(), self.selection, self.description.fmiVersion == "2.0")
         for file in self.directory.glob(f"{ROWS_PREFIX}*") if not message else ():
             if file != path:
                 file.unlink()  # superseded by a complete run
@@ -108,7 +108,7 @@ class ExternalFmu:
             else CoSimulation(session, grid, signals, only_grid=True)
         )
         with path.open("wb", buffering=0) as file:
-            recorder = Recorder(session, self.chosen, file.write, self.strings, only_finite=True)
+            recorder = Recorder(session, self.selection, file.write, self.strings, only_finite=True)
             try:
                 step_to_stop(stepper, grid, recorder.record, self.report_progress)
             except StepError:  # after any other failure the next call may crash; the exit frees the instance

@@ -1,4 +1,4 @@
-"""Runs an external FMU in a child process and collects its result."""
+"""Run of an external FMU in a child process, and its result."""
 
 import json
 import signal
@@ -53,8 +53,8 @@ def simulate(spec: RunSpec, description: Any, report: Callable[[float], None]) -
     exchange = spec.exchange or description.coSimulation is None
     if exchange and description.modelExchange is None:
         interfaces = " and ".join(offered_interfaces(description)) or "no interface"
-        lacks = "model exchange is not among them" if spec.exchange else "neither co-simulation nor model exchange"
-        raise HarnessError(f"{spec.fmu.name} offers {interfaces}; {lacks}")
+        problem = "model exchange is not among them" if spec.exchange else "neither co-simulation nor model exchange"
+        raise HarnessError(f"{spec.fmu.name} offers {interfaces}; {problem}")
     values = convert_values(spec, variables)
     check_inputs(spec.inputs, variables)
     selection = select_variables(spec, variables, values)
@@ -63,7 +63,7 @@ def simulate(spec: RunSpec, description: Any, report: Callable[[float], None]) -
         check_library(spec.fmu, description, exchange, folder)
         inputs = {name: tuple(map(float, column)) for name, column in spec.inputs.items()}
         resolved = replace(spec, exchange=exchange, start=start, stop=stop, values=values, inputs=inputs)
-        outcome, printed = run_fmu_process(resolved, folder, directory, report)
+        outcome, output = run_fmu_process(resolved, folder, directory, report)
         time, columns = read_longest_rows(directory, outcome.run_number, selection, description.fmiVersion == "2.0")
         texts = [json.loads(line) for line in read_lines(directory / STRINGS_FILE)]
     failed = f"{spec.fmu.name}: {outcome.failure}" if outcome.failure else ""
@@ -71,7 +71,7 @@ def simulate(spec: RunSpec, description: Any, report: Callable[[float], None]) -
         failed += f", after t = {time[-1]:.9g} s"
     if len(time) < 2:
         raise HarnessError(failed or f"{spec.fmu.name} returns no values")
-    note_on_output = f"it printed: {printed[-1][:MAX_VALUE_LENGTH]}" if printed else ""
+    note_on_output = f"it printed: {output[-1][:MAX_VALUE_LENGTH]}" if output else ""
     note = "; ".join(filter(None, (outcome.note, note_on_output)))
     trajectory = build_trajectory(spec, variables, values, selection, time, columns, texts)
     return replace(trajectory, note=note, failure=failed)
@@ -115,14 +115,14 @@ def check_library(fmu: Path, description: Any, exchange: bool, folder: Path) -> 
         return
     others = sorted(file.name for file in folder.glob("binaries/*"))
     available = f"it has {', '.join(others)}" if others else "it has no binaries at all"
-    sources = "; it carries C sources: `fmpy compile` may make one" if any(folder.glob("sources/*.c")) else ""
+    sources = "; it contains C sources: `fmpy compile` may build a binary" if any(folder.glob("sources/*.c")) else ""
     raise HarnessError(f"{fmu.name} has no binary {platform}/{identifier} for this machine: {available}{sources}")
 
 
 def run_fmu_process(
     spec: RunSpec, folder: Path, directory: Path, report: Callable[[float], None]
 ) -> tuple[RefinementResult, list[str]]:
-    """Run the child process and return its result, or the reason why there is none, and the lines that it printed."""
+    """Run the child process; return its result, or the reason why there is none, and the lines of its output."""
     request = {"run": replace_nonfinite(spec), "folder": folder, "directory": directory}
     with ChildProcess(f"{__package__}.fmu_process") as child:
         try:
@@ -161,7 +161,7 @@ def build_trajectory(
     recorded: Columns,
     texts: list[str],
 ) -> Trajectory:
-    """Build the trajectory of a run from what was recorded."""
+    """Build the trajectory of a run from the recorded columns."""
     columns, units, descriptions = {}, {}, {}
     for variable, shape in selection:
         for name in element_names(variable.name, shape):
@@ -178,10 +178,10 @@ def build_trajectory(
                 variable_unit(variable),
             )
     effective_values = {name: effective_value(variables[name], value) for name, value in values.items()}
-    as_done = replace(spec, outputs=tuple(columns), values=effective_values)
-    return Trajectory(as_done, time, columns, units, descriptions, parameters)
+    effective_spec = replace(spec, outputs=tuple(columns), values=effective_values)
+    return Trajectory(effective_spec, time, columns, units, descriptions, parameters)
 
 
 def alias_key(variable: Any) -> tuple[str, int]:
-    """Return what alias variables have in common."""
+    """Return type and value reference of a variable, which alias variables share."""
     return "Integer" if variable.type == "Enumeration" else variable.type, variable.valueReference

@@ -1,8 +1,8 @@
-"""Refines steps until two results agree, to estimate the error of an external FMU.
+"""Refinement of steps until two results agree, which estimates the error of an external FMU.
 
 Co-simulation halves the communication step; model exchange divides the solver tolerance by ten. If halving changes
-nothing, the FMU has internal steps whose error is not visible from outside, unless a smaller tolerance passed at the
-start changes the result.
+nothing, the FMU has internal steps; their error can only be estimated if a smaller tolerance, passed at the start,
+changes the result.
 """
 
 from collections.abc import Callable
@@ -45,7 +45,17 @@ class RefinementRun:
 
 @dataclass(frozen=True)
 class RefinementResult:
-    """Selected run, None if there is none; a note on its accuracy; the reason for failure, empty if it is complete."""
+    """Result of a refinement.
+
+    Attributes
+    ----------
+    run_number : int or None
+        Number of the selected run; None if there is none.
+    note : str
+        Accuracy of the run.
+    failure : str
+        Reason why the run is incomplete; empty if it is complete.
+    """
 
     run_number: int | None
     note: str
@@ -58,7 +68,7 @@ RunFunction = Callable[[float, float], RefinementRun]  # (communication step in 
 def coarsest_grid(spec: RunSpec) -> TimeGrid:
     """Return the points of the coarsest run.
 
-    The steps of all other runs are whole fractions of its steps, so that every run has its points.
+    The steps of all other runs are integer fractions of its steps, so every run has these points.
     """
     assert spec.start is not None
     assert spec.stop is not None  # of a resolved run
@@ -81,27 +91,27 @@ def refine(spec: RunSpec, description: Any, run: RunFunction) -> RefinementResul
     duration = coarsest_grid(spec).duration
     requested_step = None if spec.follow else spec.grid or (inf if len(spec.times) else None)
     if spec.exchange:
-        return refine_tolerance(spec, requested_step or whole_fraction(spec, MIN_OUTPUT_STEPS), run)
+        return refine_tolerance(spec, requested_step or integer_fraction(spec, MIN_OUTPUT_STEPS), run)
     fixed_step = declared_step(description)
     if fixed_step:
-        result = run(communication_step(fixed_step, duration), solver_tolerance(spec))
-        return accept_run(result, f"declared fixed internal step of {fixed_step:g} s, error unknown")
+        fixed_run = run(communication_step(fixed_step, duration), solver_tolerance(spec))
+        return accept_run(fixed_run, f"declared fixed internal step of {fixed_step:g} s, error unknown")
     if requested_step:
-        result = run(requested_step, solver_tolerance(spec))
+        requested_run = run(requested_step, solver_tolerance(spec))
         requested = f"step of {requested_step:g} s" if requested_step < inf else "times"
-        return accept_run(result, f"requested communication {requested}, error unknown")
-    answer = refine_steps(spec, run)
+        return accept_run(requested_run, f"requested communication {requested}, error unknown")
+    result = refine_steps(spec, run)
     default_step = description.defaultExperiment.stepSize if description.defaultExperiment else None
-    if answer.run_number is None and default_step:  # no run advanced by a step
-        result = run(float(default_step), solver_tolerance(spec))
-        if not result.message:
+    if result.run_number is None and default_step:  # no run advanced by a step
+        default_run = run(float(default_step), solver_tolerance(spec))
+        if not default_run.message:
             note = f"declared communication step of {float(default_step):g} s, error unknown"
-            return accept_run(result, f"{note}: {answer.failure}")
-    return answer
+            return accept_run(default_run, f"{note}: {result.failure}")
+    return result
 
 
 def declared_step(description: Any) -> float | None:
-    """Return the fixed internal step in s that an FMU declares for co-simulation, None without a possible one."""
+    """Return the fixed internal step in s that an FMU declares for co-simulation; None without a valid one."""
     try:
         fixed_step = float(description.coSimulation.fixedInternalStepSize or 0.0)
     except ValueError:
@@ -110,12 +120,12 @@ def declared_step(description: Any) -> float | None:
 
 
 def communication_step(fixed_step: float, duration: float) -> float:
-    """Return the shortest multiple of a fixed internal step in s that makes at most `MAX_STEPS` steps."""
+    """Return the shortest multiple of a fixed internal step in s with at most `MAX_STEPS` steps."""
     return fixed_step * ceil(duration / fixed_step / MAX_STEPS)
 
 
-def whole_fraction(spec: RunSpec, steps: int) -> float:
-    """Return the longest whole fraction in s of the coarsest communication step that makes at least `steps` steps."""
+def integer_fraction(spec: RunSpec, steps: int) -> float:
+    """Return the longest integer fraction in s of the coarsest communication step with at least `steps` steps."""
     grid = coarsest_grid(spec)
     return grid.h / ceil(steps * grid.h / grid.duration)
 
@@ -131,7 +141,7 @@ def solver_tolerance(spec: RunSpec) -> float:
 
 
 def refine_steps(spec: RunSpec, run: RunFunction) -> RefinementResult:
-    """Halve the communication step until two results agree at the times of the coarsest."""
+    """Halve the communication step until two results agree at the times of the coarsest run."""
     coarsest, difference = coarsest_grid(spec), inf
     duration, h = coarsest.duration, coarsest.h
     previous: RefinementRun | None = None
@@ -174,7 +184,7 @@ def refine_solver_tolerance(spec: RunSpec, h: float, current: RefinementRun, run
     if not any(np.ptp(column) for column in current.columns.values()):
         return accept_run(current, f"communication step {h:.4g} s; no output changes")
     tolerance = solver_tolerance(spec)
-    short_step = min(whole_fraction(spec, STEPS_TO_SEE_INTERNAL_STEP), coarsest_grid(spec).h / 4)
+    short_step = min(integer_fraction(spec, STEPS_TO_SEE_INTERNAL_STEP), coarsest_grid(spec).h / 4)
     for _ in range(3):
         tolerance = max(tolerance / 100, MIN_TOLERANCE)
         refined = run(short_step, tolerance)
@@ -196,7 +206,7 @@ def refine_solver_tolerance(spec: RunSpec, h: float, current: RefinementRun, run
 def find_fixed_step(samples: RefinementRun) -> float | None:
     """Return the fixed internal step of an FMU in s, or None.
 
-    It is visible where outputs stay constant between equidistant times.
+    It is visible if outputs are constant between equidistant times.
     """
     changes = np.zeros(len(samples.time) - 1, bool)
     for column in samples.columns.values():

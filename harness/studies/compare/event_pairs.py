@@ -58,7 +58,7 @@ class EventPairs:
         """Return what holds after an event, with the name of the contact if there are several."""
         return f"{self.contacts[int(contact)]} to {mode:g}" if self.contacts else f"to {mode:g}"
 
-    def listed(self, rows: np.ndarray) -> list[list[float | str]]:
+    def list_rows(self, rows: np.ndarray) -> list[list[float | str]]:
         """Return time in s and new mode of events (k, 3), and the name of the contact if there are several."""
         names = [[self.contacts[int(contact)]] if self.contacts else [] for contact in rows[:, 2]]
         return [[*row, *name] for row, name in zip(rows[:, :2].tolist(), names, strict=True)]

@@ -82,9 +82,9 @@ def events(comparison: Comparison) -> dict[str, Any]:
     return {
         "events": comparison.events,
         "event_shift": pairs.shift,
-        "matched": {"one": pairs.listed(pairs.one), "two": pairs.listed(pairs.two), "shift": pairs.largest_shift},
-        "only_one": pairs.listed(pairs.unmatched[0]),
-        "only_two": pairs.listed(pairs.unmatched[1]),
+        "matched": {"one": pairs.list_rows(pairs.one), "two": pairs.list_rows(pairs.two), "shift": pairs.largest_shift},
+        "only_one": pairs.list_rows(pairs.unmatched[0]),
+        "only_two": pairs.list_rows(pairs.unmatched[1]),
     }
 
 

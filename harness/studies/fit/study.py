@@ -173,7 +173,7 @@ def fit_tables(
     HarnessError
         If the fit fails.
     """
-    request, begun = resolved.request, process_time()
+    request, start_time = resolved.request, process_time()
     if validation and request.each and len(tables) > 1:
         raise SceneError(
             f"{', '.join(request.each)} has a value of its own for each record, and none for the validation record: "
@@ -187,7 +187,7 @@ def fit_tables(
             validate(problem, raw_fit, [record_data(resolved, table) for table in validation]) if validation else None
         )
         notes = [note for table in (*tables, *validation) for note in table.notes]
-        fit = describe_fit(resolved.name, problem, raw_fit, notes, simulator.n_runs, process_time() - begun)
+        fit = describe_fit(resolved.name, problem, raw_fit, notes, simulator.n_runs, process_time() - start_time)
     units = {name: resolved.variables[name].unit for name in request.observe}
     fit = replace(fit, columns=with_units(fit.columns, units))
     if prediction:

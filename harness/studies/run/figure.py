@@ -255,7 +255,7 @@ def plot_steps(axes: Axes, plotted: PlottedRun, name: str) -> None:
         }
         for word, (mean, color, style) in means.items():
             if mean is not None:
-                label_text = " ".join(Quantity("mean_step", mean, "s", "").formatted())
+                label_text = " ".join(Quantity("mean_step", mean, "s", "").format())
                 axes.axhline(mean, color=color, linestyle=style, label=f"{word} {label_text}")
     axes.set_title("step size of the solver")
     add_legend(axes)

@@ -82,10 +82,10 @@ def run_and_write(scene: Scene, folder: Path, report: Callable[[float], None]) -
         check_published(scene, quantities)
     run.write_tables(folder)
     stop = scene.run.stop if run.failure else float(run.time[-1])
-    run_as_done = replace(run.spec, outputs=scene.run.outputs, start=float(run.time[0]), stop=stop)
+    effective_run = replace(run.spec, outputs=scene.run.outputs, start=float(run.time[0]), stop=stop)
     presentation = {name: value for name, value in vars(scene).items() if name != "run"}
     write_provenance(
-        folder, [scene.run.fmu], run.effective_parameters, presentation, source=scene.source, run=run_as_done
+        folder, [scene.run.fmu], run.effective_parameters, presentation, source=scene.source, run=effective_run
     )
     summary = summarize_run(run, scene.name)
     if scene.about and not run.failure:

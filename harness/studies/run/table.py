@@ -67,7 +67,7 @@ def row(quantity: Quantity, figure: object) -> tuple[str, str, str, str, str]:
         figure, unit = figure
         value = quantity.to_unit(unit)
     if not isinstance(figure, int | float):
-        measured, unit = quantity.formatted()
+        measured, unit = quantity.format()
         return text, measured, unit, str(figure or ""), ""
     published = repr(figure)
     measured = format_number(value, max(5, len(published.replace(".", "").lstrip("0"))))
