@@ -7,9 +7,9 @@ class NumberWithText(float):
     """Number with its original text, for string variables and integers beyond the precision of a float."""
 
     def __new__(cls, text: str) -> "NumberWithText":
-        new = super().__new__(cls, text)
-        new.text = text
-        return new
+        number = super().__new__(cls, text)
+        number.text = text
+        return number
 
     text: str
 

@@ -11,7 +11,7 @@ MORE = (Path("fmus") / "more", PROJECT / "more")  # folders of models that are n
 
 
 def find_fmu(name: str) -> Path:
-    """Return the path of a model's FMU, built or not. A model is given by its name or by a .py or .fmu file."""
+    """Return the path of a model's FMU, whether built or not. A model is given by its name or by a .py or .fmu file."""
     if (path := Path(name)).suffix in (".py", ".fmu"):
         fmu = path.with_suffix(".fmu")
         if not path.exists() and not fmu.exists() and path != fmu:
@@ -55,7 +55,7 @@ def _names_in(folders: tuple[Path, ...]) -> set[str]:
 
 
 def check_built(fmu: Path, error: type[HarnessError] = HarnessError) -> None:
-    """Check that the FMU exists."""
+    """Raise an error that names the build command if the FMU does not exist."""
     if not fmu.is_file():
         model = fmu.with_suffix(".py")
         if fmu.parent in MORE:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from .roles import find_roles
 from .schema import FLAG, NAMES, NUMBER, POSITIVE, TABLE, TEXT, TIMES, Constraint, is_whole, parse_table
 
-DEFAULT_EQUAL_STEPS = 4096  # communication steps of a run that names neither a grid nor whether to follow the solver
+DEFAULT_EQUAL_STEPS = 4096  # communication steps of a run that sets neither `grid` nor `follow`
 MAX_REPEATS = 1000
 NATURAL_NUMBER = Constraint(lambda value: is_whole(value, 0, inf), "a whole number of at least 0")
 REPEAT_COUNT = Constraint(lambda value: is_whole(value, 1, MAX_REPEATS), f"a whole number from 1 to {MAX_REPEATS}")
@@ -19,15 +19,15 @@ if TYPE_CHECKING:
 
     Numbers = tuple[float, ...] | np.ndarray
 else:
-    Numbers = tuple[Annotated[float, NUMBER], ...]  # in files; an import of numpy would take time in every command
+    Numbers = tuple[Annotated[float, NUMBER], ...]  # in files; importing numpy would take time in every command
 
 
 @dataclass(frozen=True)
 class RunSpec:
     """Specification of one run of an FMU.
 
-    Scenes, options of commands, arguments of the Python API, points of sweeps and stability cases are run from it. Its
-    JSON is stored in the provenance of a result, and `from_json` reads it back.
+    Scenes, commands, the Python API, sweeps and stability cases build one for each run. Its JSON is stored in the
+    provenance of a result, and `from_json` reads it.
 
     Attributes
     ----------
@@ -40,16 +40,16 @@ class RunSpec:
     inputs : mapping
         Table of input signals: the column "time" in s and one column for each input, tuples or arrays.
     start, stop : float or None
-        Start and stop in s; None for those of the FMU, or for a stop at the last of the `times`.
+        Start and stop in s. None stands for those of the FMU, or for a stop at the last of the `times`.
     grid : float or None
         Communication step in s.
     times : tuple of float, or numpy.ndarray
-        Increasing times in s to keep; empty to keep every point. Communication steps end there and at the rows of the
-        inputs too.
+        Increasing times in s to record; empty to record every point. Communication steps end at these times, and at
+        the rows of the inputs.
     equal_steps : int
         Number of equal communication steps if there is no `grid`.
     interval : float or None
-        Time in s between the points to keep, multiples of it and the last point; None to keep every point.
+        Time in s between recorded points: its multiples and the last point are recorded. None to record every point.
     follow : bool
         Whether to step to the ends of internal steps as well. An external FMU does not expose them; its communication
         steps are refined instead until two results agree to the `tolerance`.
@@ -58,7 +58,7 @@ class RunSpec:
     tolerance : float
         Tolerance of the step refinement of external FMUs, or of the solver in model exchange.
     exchange : bool
-        Whether to use model exchange; automatic if the FMU offers nothing else. External FMUs only.
+        Whether to use model exchange; always used if an external FMU offers nothing else. External FMUs only.
     lenient : bool
         Whether to run an FMU that violates the standard.
     timeout : float
@@ -89,7 +89,7 @@ class RunSpec:
 
     @property
     def options(self) -> dict[str, Any]:
-        """Return everything but the FMU, for commands that run several."""
+        """Return all settings except the FMU, for commands that run several FMUs."""
         return {name: value for name, value in vars(self).items() if name != "fmu"}
 
     @property
@@ -103,5 +103,5 @@ class RunSpec:
         return find_roles(self.outputs)
 
 
-# keys of a scene file that are those of its run; the FMU has other keys, and a scene keeps every point or its `times`
+# keys of a scene file that set its run; the FMU has other keys, and a scene records every point or its `times`
 SCENE_KEYS = tuple(name for name in get_annotations(RunSpec) if name not in ("fmu", "equal_steps", "interval"))

@@ -1,4 +1,4 @@
-"""Scenes: what to run, record, analyze and plot. Format of the TOML file:
+"""Scenes: specifications of what to run, record, analyse and plot. Format of the TOML file:
 
     title = "..."             one line
     about = "..."             description of the model, for the report
@@ -95,7 +95,7 @@ class DecayOptions:
 
 @dataclass(frozen=True, kw_only=True)
 class SceneKeys:
-    """Keys of a scene file besides those of its run (`run_spec.SCENE_KEYS`)."""
+    """Keys of a scene file other than those of its run (`run_spec.SCENE_KEYS`)."""
 
     title: Annotated[str, TITLE]
     about: Annotated[str, TITLE] = ""
@@ -114,7 +114,7 @@ class SceneKeys:
 
 @dataclass(frozen=True)
 class Scene:
-    """Scene: the run, and what to analyse, plot and compare.
+    """A scene: its run, its analyses and plots, and published values to compare with.
 
     Attributes
     ----------
@@ -201,7 +201,7 @@ def scene_from_provenance(provenance: dict[str, Any]) -> Scene:
 
 
 def build_scene(path: Path, table: dict[str, Any], source: str, run: RunSpec | None = None) -> Scene:
-    """Build a scene from the table in its file, or from that without the keys of the run and from the run."""
+    """Build a scene from the table in its file; if `run` is given, it replaces the keys of the run in the table."""
     allowed = {*field_names(SceneKeys), *SCENE_KEYS}
     if unknown := {*table} - allowed:
         raise SceneError(unknown_name_message("key", min(unknown), allowed))
@@ -228,12 +228,12 @@ def build_run(fmu: Path, keys: SceneKeys, table: dict[str, Any]) -> RunSpec:
 
 
 def is_panel(name: str, outputs: Collection[str]) -> bool:
-    """Return whether a plot is a panel of this program; an output of the same name takes precedence."""
+    """Return whether a plot is one of PLOTS; an output of the same name takes precedence."""
     return name in PLOTS and name not in outputs
 
 
 def default_plots(outputs: tuple[str, ...], preferred_outputs: tuple[str, ...] = ()) -> tuple[str, ...]:
-    """Return the plots of a scene that names none: the preferred outputs or the first ones, and the phase plane."""
+    """Return the default plots of a scene: the preferred outputs or the first ones, and the phase plane."""
     motion = find_roles(outputs)
     names = {output: role for role, output in motion.items() if is_panel(role, outputs)}
     has_phase = is_panel("phase", outputs) and all(role in motion for role in PLOTS["phase"])

@@ -83,7 +83,7 @@ Hook = Callable[[Any, Any], Any]
 
 @cache
 def converter() -> "Converter":
-    """Return what converts tables to dataclasses."""
+    """Return the converter from tables to dataclasses."""
     from cattrs import Converter
 
     hooks: tuple[tuple[Any, Any], ...] = (
@@ -93,10 +93,10 @@ def converter() -> "Converter":
         (has_origin(tuple), make_list_hook),
         (find_constraint, make_value_hook),
     )
-    new = Converter(forbid_extra_keys=True)
-    for concerns, make_hook in hooks:
-        new.register_structure_hook_factory(concerns, make_hook)
-    return new
+    result = Converter(forbid_extra_keys=True)
+    for is_responsible, make_hook in hooks:
+        result.register_structure_hook_factory(is_responsible, make_hook)
+    return result
 
 
 def find_constraint(annotation: Any) -> Constraint | None:
@@ -167,7 +167,7 @@ def parse_table(table: dict[str, Any], schema: type[Schema]) -> Schema:
 
 
 def find_faults(error: Exception, path: str = "") -> Iterator[tuple[int, str]]:
-    """Yield (rank, message) for each error in a table; an unknown key explains most and has rank 0."""
+    """Yield (rank, message) for each error in a table; rank 0, an unknown key, is the most helpful."""
     from cattrs.errors import (
         ClassValidationError,
         ForbiddenExtraKeysError,
@@ -210,7 +210,7 @@ def read_toml(path: Path) -> dict[str, Any]:
     except OSError as error:
         raise SceneError(f"cannot read the scene {path}: {error.strerror}; {LIST_HINT}") from None
     except UnicodeDecodeError:
-        raise SceneError(f"scene {path.stem}: not a text file in UTF-8: save it in UTF-8") from None
+        raise SceneError(f"scene {path.stem}: not a text file in UTF-8; save it in UTF-8") from None
     except RecursionError:
         raise SceneError(f"scene {path.stem}: not valid TOML: brackets are nested too deeply") from None
     except tomllib.TOMLDecodeError as error:

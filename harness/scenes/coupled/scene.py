@@ -15,9 +15,9 @@
     to = "right"
     factor = 40.0
 
-Every spring and every factor becomes an FMU of its own (fmus/more/spring.py), because few tools support factors in
-archives. Its inputs are the velocities of its ends, its outputs the forces on them. A factor is a spring with one end
-fixed.
+Every spring and every factor becomes a separate FMU (fmus/more/spring.py), because few tools support factors in
+archives. Its inputs are the velocities of its ends, its outputs are the forces on them. A factor is a spring with one
+fixed end.
 """
 
 import re
@@ -73,7 +73,7 @@ class ConnectionKeys:
 
 @dataclass(frozen=True)
 class CoupledKeys:
-    """Keys of the file."""
+    """Keys of a coupled scene file."""
 
     title: Annotated[str, TITLE]
     stop: Annotated[float, POSITIVE]
@@ -216,10 +216,10 @@ def build_coupled_scene(path: Path, keys: CoupledKeys, models: Collection[str]) 
     scene = CoupledScene(
         path.stem, keys.title, float(keys.stop), check_communication_steps(keys), {}, tuple(springs), tuple(direct)
     )
-    driven = [connection.sink for connection in scene.connections]
-    twice = [name for name in keys.parts if driven.count(name) > 1]
-    if twice:
-        raise SceneError(f"part {twice[0]} is driven twice; an input accepts one connection")
+    sinks = [connection.sink for connection in scene.connections]
+    repeated = [name for name in keys.parts if sinks.count(name) > 1]
+    if repeated:
+        raise SceneError(f"part {repeated[0]} is driven twice; an input accepts one connection")
     parts = {
         name: RunSpec(
             find_fmu(part.model), values={key: float(value) for key, value in part.values.items()}, stop=scene.stop
