@@ -52,7 +52,23 @@ class Difference:
 
 @dataclass(frozen=True)
 class Comparison:
-    """Comparison of two trajectories at `time` (n,) in s; `pairs` holds their matched events if they are known."""
+    """Comparison of two trajectories.
+
+    Attributes
+    ----------
+    one, two : Trajectory
+        The two sides.
+    time : numpy.ndarray
+        Times (n,) in s of the comparison.
+    interpolated : bool
+        Whether one side is interpolated.
+    differences : tuple of Difference
+        Differences of the variables.
+    left_out : tuple of str
+        Remarks on variables that are skipped, converted or only on one side.
+    pairs : EventPairs or None
+        Matched events; None if a side has none.
+    """
 
     one: Trajectory
     two: Trajectory
@@ -107,11 +123,11 @@ def compare(one: Trajectory, two: Trajectory) -> Comparison:
         contents = [f"{side.name} ({', '.join(side.columns)})" for side in (one, two)]
         raise HarnessError(f"{' and '.join(contents)} have no variable in common")
     begin, end = common_span(one, two)
-    time, interpolated = times(one, two, begin, end)
-    pairs, jumps = events(one, two, begin, end)
+    time, interpolated = choose_times(one, two, begin, end)
+    pairs, jumps = pair_events(one, two, begin, end)
     motions, differences, left_out = tuple(encode_strings(one, two)), [], []
     for name in shared:
-        unit, factor, remark = units(one, two, name)
+        unit, factor, remark = compare_units(one, two, name)
         left_out += [remark] if remark else []
         if unit is not None:
             left_bounds, right_bounds = (
@@ -122,24 +138,24 @@ def compare(one: Trajectory, two: Trajectory) -> Comparison:
             )
             if is_string(one, name):
                 left, right = np.zeros(len(time)), (left != right).astype(float)
-            differences.append(difference(name, unit, time, left, right))
+            differences.append(measure_difference(name, unit, time, left, right))
     if not differences:
         raise HarnessError(f"nothing to compare: {'; '.join(left_out)}")
     for side, other in ((one, two), (two, one)):
-        is_isolated = [name for name in side.columns if name not in other.columns]
-        left_out += [f"only in {side.name}: {', '.join(is_isolated)}"] if is_isolated else []
+        unmatched = [name for name in side.columns if name not in other.columns]
+        left_out += [f"only in {side.name}: {', '.join(unmatched)}"] if unmatched else []
     return Comparison(one, two, time, interpolated, tuple(differences), tuple(left_out), pairs)
 
 
-def units(one: Trajectory, two: Trajectory, name: str) -> tuple[str | None, float, str]:
+def compare_units(one: Trajectory, two: Trajectory, name: str) -> tuple[str | None, float, str]:
     """Return the unit of comparison (None if impossible), the factor from the second unit to it, and a remark."""
     left, right = (side.units[name] for side in (one, two))
     if is_string(one, name) != is_string(two, name):
         text, number = (one, two) if is_string(one, name) else (two, one)
         return None, 1.0, f"{name} is a string in {text.name} and a number in {number.name}; skipped"
     if bool(left) != bool(right):
-        lacks = (two if left else one).name
-        return left or right, 1.0, f"{name} has no unit in {lacks}; assumed {left or right}"
+        without_unit = (two if left else one).name
+        return left or right, 1.0, f"{name} has no unit in {without_unit}; assumed {left or right}"
     factor = conversion_factor(right, left)
     if factor is None:
         return None, 1.0, f"{name} is in {left} in {one.name} and in {right} in {two.name}; skipped"
@@ -165,8 +181,8 @@ def closest_values(left: ValueBounds, right: ValueBounds) -> tuple[np.ndarray, n
     return one, np.clip(one, right.low, right.high)
 
 
-def difference(name: str, unit: str, time: np.ndarray, left: np.ndarray, right: np.ndarray) -> Difference:
-    """Return the difference of one variable; values are divided by the largest one to avoid overflow."""
+def measure_difference(name: str, unit: str, time: np.ndarray, left: np.ndarray, right: np.ndarray) -> Difference:
+    """Return the difference of one variable. Values are divided by the largest one to avoid overflow."""
     nonfinite = ~(np.isfinite(left) & np.isfinite(right))
     if nonfinite.any():
         at = float(time[int(np.argmax(nonfinite))])
@@ -178,7 +194,7 @@ def difference(name: str, unit: str, time: np.ndarray, left: np.ndarray, right: 
     return Difference(name, unit, relative * size, float(time[i]), rms * size, relative, size, left, right)
 
 
-def times(one: Trajectory, two: Trajectory, begin: float, end: float) -> tuple[np.ndarray, bool]:
+def choose_times(one: Trajectory, two: Trajectory, begin: float, end: float) -> tuple[np.ndarray, bool]:
     """Return the times of comparison (n,) and whether one side is interpolated.
 
     These are the common times if there are enough of them, otherwise the times of the coarser side.
@@ -193,7 +209,7 @@ def times(one: Trajectory, two: Trajectory, begin: float, end: float) -> tuple[n
     return coarser, True
 
 
-def events(
+def pair_events(
     one: Trajectory, two: Trajectory, begin: float, end: float
 ) -> tuple[EventPairs | None, tuple[np.ndarray, np.ndarray]]:
     """Match the events of both sides, and return the time intervals (k, 2) in s in which each side jumps.

@@ -1,4 +1,4 @@
-"""Matches events of two trajectories by kind and nearest time."""
+"""Matching of events of two trajectories by kind and nearest time."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,9 +14,14 @@ MAX_LISTED = 3  # unmatched events listed in the summary
 class EventPairs:
     """Matched changes of mode.
 
-    `one` and `two` (k, 3) hold time in s, new mode and number of the contact, with the same event in each row;
-    `unmatched` holds the other events of each side. `contacts` are the names of the contacts by number; empty for a
-    single contact.
+    Attributes
+    ----------
+    one, two : numpy.ndarray
+        Time in s, new mode and number of the contact (k, 3) on both sides, with the same event in each row.
+    unmatched : (numpy.ndarray, numpy.ndarray)
+        The other events (m, 3) of each side.
+    contacts : tuple of str
+        Names of the contacts by number; empty for a single contact.
     """
 
     one: np.ndarray
@@ -55,7 +60,7 @@ class EventPairs:
         return "; ".join(parts)
 
     def state(self, mode: float, contact: float) -> str:
-        """Return what holds after an event, with the name of the contact if there are several."""
+        """Return the mode after an event, with the name of the contact if there are several."""
         return f"{self.contacts[int(contact)]} to {mode:g}" if self.contacts else f"to {mode:g}"
 
     def list_rows(self, rows: np.ndarray) -> list[list[float | str]]:
@@ -78,8 +83,8 @@ def stack_events(changes: ModeChanges, contacts: Sequence[str], begin: float, en
 def match_events(one: np.ndarray, two: np.ndarray, contacts: Sequence[str] = ()) -> EventPairs:
     """Match the events of two trajectories, (n, 3) and (m, 3), sorted by time.
 
-    If both sequences of modes are equal, events are matched in order; otherwise mutual nearest neighbours of the same
-    kind are matched, which is the contact and its new mode.
+    If both sequences of modes are equal, events are matched in order. Otherwise mutual nearest neighbours of the same
+    kind (contact and new mode) are matched.
     """
     names = tuple(contacts)
     if len(one) == len(two) and (one[:, 1:] == two[:, 1:]).all():
@@ -89,16 +94,16 @@ def match_events(one: np.ndarray, two: np.ndarray, contacts: Sequence[str] = ())
         i, j = (np.flatnonzero((rows[:, 1:] == kind).all(axis=1)) for rows in (one, two))
         if not len(j):
             continue
-        to, back = nearest(one[i, 0], two[j, 0]), nearest(two[j, 0], one[i, 0])
-        mutual = np.flatnonzero(back[to] == np.arange(len(i)))
-        matches += zip(i[mutual].tolist(), j[to[mutual]].tolist(), strict=True)
+        in_two, in_one = find_nearest(one[i, 0], two[j, 0]), find_nearest(two[j, 0], one[i, 0])
+        mutual = np.flatnonzero(in_one[in_two] == np.arange(len(i)))
+        matches += zip(i[mutual].tolist(), j[in_two[mutual]].tolist(), strict=True)
     left, right = np.array(sorted(matches), int).reshape(-1, 2).T
     return EventPairs(one[left], two[right], (np.delete(one, left, axis=0), np.delete(two, right, axis=0)), names)
 
 
-def nearest(times: np.ndarray, among: np.ndarray) -> np.ndarray:
-    """Return for each time the index of the nearest one in the sorted array `among`."""
-    after = np.clip(np.searchsorted(among, times), 1, max(len(among) - 1, 1))
+def find_nearest(times: np.ndarray, candidates: np.ndarray) -> np.ndarray:
+    """Return for each time the index of the nearest one in the sorted array `candidates`."""
+    after = np.clip(np.searchsorted(candidates, times), 1, max(len(candidates) - 1, 1))
     before = after - 1
-    after = np.minimum(after, len(among) - 1)
-    return np.where(np.abs(among[after] - times) < np.abs(among[before] - times), after, before)
+    after = np.minimum(after, len(candidates) - 1)
+    return np.where(np.abs(candidates[after] - times) < np.abs(candidates[before] - times), after, before)

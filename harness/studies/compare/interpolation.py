@@ -2,8 +2,8 @@
 
 If the rate of a variable was recorded, interpolation is by cubic Hermite polynomials of values and rates, otherwise by
 monotone cubics (F. N. Fritsch, J. Butland, A method for constructing local monotone piecewise cubic interpolants, SIAM
-J. Sci. Stat. Comput. 5 (1984) 300-304).  Integers, such as modes, are held.  Across a jump, every value between both
-sides is accepted.
+J. Sci. Stat. Comput. 5 (1984) 300-304).  Integers, such as modes, keep their last value.  Across a jump, every value
+between both sides is accepted.
 """
 
 from dataclasses import dataclass
@@ -31,7 +31,7 @@ class ValueBounds:
 
 @dataclass(frozen=True)
 class SignalInterpolant:
-    """Interpolates a trajectory between its samples."""
+    """Interpolation of a trajectory between its samples."""
 
     trajectory: Trajectory
 
@@ -50,8 +50,8 @@ class SignalInterpolant:
         t, y = self.trajectory.time, self.trajectory.columns[name]
         index = self.sample_indices(at)
         if not np.isfinite(y).all():
-            held = np.where(index < 0, np.nan, y[index])  # unknown between samples
-            return ValueBounds(held, held)
+            sampled = np.where(index < 0, np.nan, y[index])  # unknown between samples
+            return ValueBounds(sampled, sampled)
         if (index >= 0).all():
             smooth = y[index]
         elif (y == np.rint(y)).all():
@@ -75,7 +75,7 @@ class SignalInterpolant:
         return ValueBounds(low, high)
 
     def sample_indices(self, at: np.ndarray) -> np.ndarray:
-        """Return the indices (n,) of the samples at given times in s, -1 between samples; of a jump the second one.
+        """Return the indices (n,) of the samples at given times in s, -1 between samples; at a jump, the second sample.
 
         The times of one grid may differ by rounding in two runs.
         """
@@ -123,7 +123,7 @@ class SignalInterpolant:
 
 
 def interpolate(t: np.ndarray, y: np.ndarray, slope: np.ndarray | None, at: np.ndarray) -> np.ndarray:
-    """Interpolate at the times `at`; if a time occurs twice, its second value counts."""
+    """Interpolate at the times `at`; if a time occurs twice, its second value is used."""
     is_last = np.append(np.diff(t) > 0, True)
     t, y = t[is_last], y[is_last]
     if slope is None:

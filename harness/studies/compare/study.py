@@ -1,4 +1,4 @@
-"""Compares two FMUs, scenes, result folders or files, and writes the result folder."""
+"""Study that compares two FMUs, scenes, result folders or files, and writes the result folder."""
 
 from dataclasses import replace
 from math import isnan
@@ -67,11 +67,11 @@ def comparison_as_json(comparison: Comparison) -> dict[str, Any]:
             for variable in comparison.differences
         ],
         "left_out": list(comparison.left_out),
-        **events(comparison),
+        **events_as_json(comparison),
     }
 
 
-def events(comparison: Comparison) -> dict[str, Any]:
+def events_as_json(comparison: Comparison) -> dict[str, Any]:
     """Return the events for JSON output: time in s, new mode, and the contact if there are several.
 
     The shift is NaN if some are unmatched.
@@ -92,8 +92,8 @@ def difference_table(comparison: Comparison) -> Table:
     """Return the table of differences, with one row per variable."""
     result = make_terminal_table()
     result.add_column("")
-    for head in ("largest difference", "at t [s]", "rms", "relative to largest"):
-        result.add_column(head, justify="right", no_wrap=True)
+    for heading in ("largest difference", "at t [s]", "rms", "relative to largest"):
+        result.add_column(heading, justify="right", no_wrap=True)
     result.add_column("", no_wrap=True)
     for variable in comparison.differences:
         cells = (f"{variable.largest:.3e}", f"{variable.at:.6g}", f"{variable.rms:.3e}", f"{variable.relative:.2e}")

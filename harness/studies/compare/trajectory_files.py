@@ -1,4 +1,4 @@
-"""Reads trajectories from result folders, from files of fmpy, OpenModelica and Dymola (.csv, .mat), and from any table
+"""Reader of trajectories in result folders, in files of fmpy, OpenModelica and Dymola (.csv, .mat), and in any table
 whose first column is time."""
 
 import csv
@@ -38,8 +38,8 @@ def read_trajectory(path: Path) -> Trajectory:
     file = path / "trajectory.csv" if path.is_dir() else path
     if path.is_dir() and not file.is_file():
         raise SceneError(f"{path} is not a result folder: trajectory.csv is missing")
-    (clock, time), *others = (read_modelica(file) or read_csv(file) or read_table(file)).items()
-    unit = parse_heading(clock)[1] or "s"
+    (time_heading, time), *others = (read_modelica(file) or read_csv(file) or read_table(file)).items()
+    unit = parse_heading(time_heading)[1] or "s"
     if unit not in TIMES:
         raise SceneError(f"{file.name}: the first column must be time, but its unit is '{unit}'")
     if time.dtype.kind == "U":
@@ -48,9 +48,9 @@ def read_trajectory(path: Path) -> Trajectory:
     if not ((np.abs(time) < MAX_TIME).all() and (np.diff(time) >= 0).all()):
         raise SceneError(f"{file.name}: the time in the first column must increase and stay below {MAX_TIME:g} s")
     columns, units = Columns(), dict[str, str]()
-    for head, column in others:
-        name, unit = parse_heading(head)
-        if name in columns or name == parse_heading(clock)[0]:
+    for heading, column in others:
+        name, unit = parse_heading(heading)
+        if name in columns or name == parse_heading(time_heading)[0]:
             raise SceneError(f"{file.name}: two columns are named {format_value(name)}")
         columns[name], units[name] = column, unit
     return Trajectory(RunSpec(file), time, columns, units, {}, {}, events=read_events(path), label=path.stem)
@@ -67,21 +67,21 @@ def read_events(path: Path) -> ModeChanges | None:
     return ModeChanges(rows[:, 0], dict(zip(contacts, rows[:, 1:].T.astype(int), strict=True)))
 
 
-def parse_heading(head: str) -> tuple[str, str]:
+def parse_heading(heading: str) -> tuple[str, str]:
     """Split a heading into name and unit."""
-    if ELEMENT.fullmatch(head):
-        return head, ""
-    name, unit = split_heading(head)
+    if ELEMENT.fullmatch(heading):
+        return heading, ""
+    name, unit = split_heading(heading)
     return name, unit or ""
 
 
 def read_table(file: Path) -> Columns:
     """Read a table of an instrument, a spreadsheet or MATLAB; SceneError if there is none."""
-    heads, values = read_numeric(file)
-    duplicates = [head for i, head in enumerate(heads) if head in heads[:i]]
+    headings, values = read_numeric(file)
+    duplicates = [heading for i, heading in enumerate(headings) if heading in headings[:i]]
     if duplicates:
         raise SceneError(f"{file.name}: two columns are named {format_value(duplicates[0])}")
-    return dict(zip(heads, values.T, strict=True))
+    return dict(zip(headings, values.T, strict=True))
 
 
 def read_csv(file: Path) -> Columns | None:
@@ -90,30 +90,30 @@ def read_csv(file: Path) -> Columns | None:
     Cells are numbers, Booleans, strings, or arrays separated by blanks, as fmpy writes them.
     """
     try:
-        heads, *rows = csv.reader(io.StringIO(read_content(file).decode("utf-8-sig"), newline=""))
+        headings, *rows = csv.reader(io.StringIO(read_content(file).decode("utf-8-sig"), newline=""))
     except (UnicodeDecodeError, ValueError, csv.Error):
         return None
-    names = [head.strip() for head in heads]
+    names = [heading.strip() for heading in headings]
     if not rows or not all(names) or len(set(names)) < len(names) or {len(row) for row in rows} != {len(names)}:
         return None
     if len(names) < 2 or parse_numbers([row[0] for row in rows]) is None:
         return None
     columns = Columns()
-    for head, cells in zip(names, zip(*rows, strict=True), strict=True):
-        columns |= parse_column(head, [cell.strip() for cell in cells])
+    for name, cells in zip(names, zip(*rows, strict=True), strict=True):
+        columns |= parse_column(name, [cell.strip() for cell in cells])
     return columns
 
 
-def parse_column(head: str, cells: list[str]) -> Columns:
+def parse_column(name: str, cells: list[str]) -> Columns:
     """Parse one column; an array gives one column per element."""
     values = parse_numbers(cells)
     widths = {len(cell.split()) for cell in cells}
     if values is None and len(widths) == 1:
         parts = [parse_numbers(part) for part in zip(*map(str.split, cells), strict=True)]
-        elements_found = [part for part in parts if part is not None]
-        if len(elements_found) == len(parts):
-            return dict(zip(element_names(head, (len(parts),)), elements_found, strict=True))
-    return {head: np.array(cells) if values is None else values}
+        elements = [part for part in parts if part is not None]
+        if len(elements) == len(parts):
+            return dict(zip(element_names(name, (len(parts),)), elements, strict=True))
+    return {name: np.array(cells) if values is None else values}
 
 
 def parse_numbers(cells: Sequence[str]) -> np.ndarray | None:
@@ -135,13 +135,12 @@ def read_modelica(file: Path) -> Columns | None:
     if not is_modelica:
         read_in_child(data, file.name, "mat")  # loadmat ends this process for some damaged files
     try:
-        content_of: dict[str, Any] = loadmat(io.BytesIO(data), chars_as_strings=False)
-        if "Aclass" not in content_of:
+        contents: dict[str, Any] = loadmat(io.BytesIO(data), chars_as_strings=False)
+        if "Aclass" not in contents:
             return None
-        transposed = {"binTrans": True, "binNormal": False}[characters_to_text(content_of["Aclass"][3])]
+        transposed = {"binTrans": True, "binNormal": False}[characters_to_text(contents["Aclass"][3])]
         name, description, info, values = (
-            content_of[key].T if transposed else content_of[key]
-            for key in ("name", "description", "dataInfo", "data_2")
+            contents[key].T if transposed else contents[key] for key in ("name", "description", "dataInfo", "data_2")
         )
         columns = Columns()
         for text, comment, (matrix, signed, *_) in zip(
@@ -149,8 +148,8 @@ def read_modelica(file: Path) -> Columns | None:
         ):
             if matrix in (0, 2):  # trajectories and time
                 unit = re.search(r"\[([^][|:]+)[^][]*\]\s*$", comment)
-                head = f"{text} [{unit[1]}]" if unit else text
-                columns[head] = np.sign(signed) * values[:, abs(int(signed)) - 1]
+                heading = f"{text} [{unit[1]}]" if unit else text
+                columns[heading] = np.sign(signed) * values[:, abs(int(signed)) - 1]
         return columns
     except Exception as error:  # scipy raises various exceptions for a damaged file
         if not is_modelica:

@@ -1,4 +1,4 @@
-"""Loads the two trajectories of a comparison from result folders, files, or runs of FMUs and scenes."""
+"""The two trajectories of a comparison, from result folders, files, or runs of FMUs and scenes."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -23,11 +23,11 @@ RUN_SUFFIXES = (*FMU_SUFFIXES, ".toml")  # sources that are run
 def load_both(
     sources: Sequence[str | Trajectory], options: RunSpec, report: ProgressCallback
 ) -> tuple[Trajectory, Trajectory]:
-    """Load the trajectories of two folders, files, FMUs or scenes; keep what is loaded already.
+    """Load the trajectories of two folders, files, FMUs or scenes; return given trajectories unchanged.
 
     Both sides share one time grid: FMUs and scenes are run with the communication step of the other side, if it has
-    one, or else with the fixed internal step that one of them declares, and to the same stop time. Other options are in
-    `options`.
+    one, or else with the fixed internal step that one of them declares, and to the same stop time. `options` holds
+    their other settings.
     """
     recordings = [source if isinstance(source, Trajectory) else read_recorded(source) for source in sources]
     runs = [
@@ -56,7 +56,7 @@ def load_both(
 
 
 def display_names(sources: tuple[str, str]) -> list[str]:
-    """Return short names of two sources; equal names are extended by the folders or suffixes in which they differ."""
+    """Return short names of two sources; equal names are extended by folders or suffixes that differ."""
     paths = [Path(abspath(source)) if Path(source).exists() else Path("scene", source) for source in sources]
     stems = [path if path.is_dir() or path.parts[0] == "scene" else path.with_suffix("") for path in paths]
     has_same_stem = stems[0] == stems[1] and paths[0] != paths[1]
