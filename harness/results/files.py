@@ -16,23 +16,23 @@ def column_heading(name: str, unit: str) -> str:
     return f"{name} [{unit}]" if unit else name
 
 
-def write_csv(path: Path, heads: Sequence[str], columns: Sequence[np.ndarray]) -> None:
+def write_csv(path: Path, headings: Sequence[str], columns: Sequence[np.ndarray]) -> None:
     """Write columns of equal length to a CSV file; every number reads back exactly."""
-    write_csv_rows(path, heads, zip(*(column.tolist() for column in columns), strict=True))
+    write_csv_rows(path, headings, zip(*(column.tolist() for column in columns), strict=True))
 
 
 def write_signals(path: Path, time: np.ndarray, columns: Mapping[str, np.ndarray], units: Mapping[str, str]) -> None:
     """Write signals (n,) by name over time (n,) in s to a CSV file with units."""
-    heads = ["t [s]", *(column_heading(name, units[name]) for name in columns)]
-    write_csv(path, heads, [time, *columns.values()])
+    headings = ["t [s]", *(column_heading(name, units[name]) for name in columns)]
+    write_csv(path, headings, [time, *columns.values()])
 
 
-def write_csv_rows(path: Path, heads: Sequence[str], rows: Iterable[Sequence[object]], first: str = "") -> None:
+def write_csv_rows(path: Path, headings: Sequence[str], rows: Iterable[Sequence[object]], first: str = "") -> None:
     """Write rows to a CSV file, below an optional `first` line; None becomes an empty cell."""
     with path.open("w", encoding="utf-8", newline="") as file:
         file.write(first)
         writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(heads)
+        writer.writerow(headings)
         writer.writerows(rows)
 
 

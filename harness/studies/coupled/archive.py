@@ -1,4 +1,4 @@
-"""Writes a coupled scene as an SSP archive (System Structure and Parameterization 1.0) with pyssp_standard.
+"""Writer of a coupled scene as an SSP archive (System Structure and Parameterization 1.0), with pyssp_standard.
 
 For compatibility, connections have no factors, values are in files, names are identifiers, and the archive has the
 annotation that OMSimulator requires.  Each element has its own parameter file for Ecos and libcosim;

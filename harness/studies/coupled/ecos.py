@@ -1,4 +1,4 @@
-"""Runs an SSP archive with Ecos (package ecospy; the library of the package tbb must be loaded first)."""
+"""Child process that runs an SSP archive with Ecos (package ecospy, which needs the library of the package tbb)."""
 
 import ctypes
 import sys

@@ -9,7 +9,7 @@ from ...scenes.run_spec import RunSpec
 ENGINE_TIMEOUT = 300.0  # s, for one run
 EXTRA = "python -m pip install 'friction-fmus[coupled]'"
 MAIN_ENGINE = "Ecos"
-ENGINES = {  # modules
+ENGINES = {  # modules of the child processes
     "Ecos": f"{__package__}.ecos",
     "libcosim": f"{__package__}.libcosim",
     "fmpy": "harness.running.ssp",
@@ -29,24 +29,24 @@ def run_engine(
     engine : str
         Name of the engine, a key of ENGINES.
     run : RunSpec
-        The archive in place of the FMU, the communication step `grid`, the stop, and the names of the variables.
+        Run of the archive, whose path is in `fmu`: communication step `grid`, stop, and names of the variables.
     variables : sequence of ElementVariable
-        The same variables as the engines address them.
+        Element, name and value reference of each variable, by which engines address it.
     parameter_set : str
         Name of the parameter set in the archive; empty for none.
 
     Raises
     ------
     HarnessError
-        If the engine fails or times out; with its last line of output.
+        If the engine fails or times out; the message has the last line of its output.
     """
     failed = f"{engine} could not run {run.fmu.name}"
     request = {"run": run, "variables": variables, "parameter_set": parameter_set}
     try:
         rows: list[list[float]] = ask_once(ENGINES[engine], request, ENGINE_TIMEOUT)
-    except ChildDiedError as died:
-        hint = f"; {EXTRA}" if "ModuleNotFoundError" in died.last_line else ""
-        raise HarnessError(f"{failed}: {died.last_line}{hint}") from None
+    except ChildDiedError as error:
+        hint = f"; {EXTRA}" if "ModuleNotFoundError" in error.last_line else ""
+        raise HarnessError(f"{failed}: {error.last_line}{hint}") from None
     except HarnessError as error:
         raise HarnessError(f"{failed}: {error}") from None
     return rows

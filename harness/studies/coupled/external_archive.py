@@ -1,4 +1,4 @@
-"""Reads a given SSP archive: recorded outputs, communication steps and parameters."""
+"""Reader of a given SSP archive: outputs to record, communication steps and parameters."""
 
 import zipfile
 from collections.abc import Iterator
@@ -20,7 +20,7 @@ COARSEST, HALVINGS = 100, 4  # steps of the first run, and number of halvings
 
 
 def read_archive(source: Path, file: Path, stop: float | None) -> Convergence:
-    """Return the study to run, which records every Real output of every component; the archive is copied to `file`."""
+    """Copy an archive to `file`; return its study, which records every Real output of every component."""
     if not source.is_file():
         raise SceneError(f"{source} does not exist: give an existing archive, or a scene of `friction-fmus list`")
     copy(source, file)

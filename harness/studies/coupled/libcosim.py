@@ -1,4 +1,4 @@
-"""Runs an SSP archive with libcosim (package libcosimpy); the first row is that after the first step."""
+"""Child process that runs an SSP archive with libcosim (package libcosimpy); its first row is after the first step."""
 
 from ...process.child_process import RequestServer
 from ...scenes.run_spec import RunSpec

@@ -1,4 +1,4 @@
-"""Runs a coupled scene: writes its archive, runs it at several communication steps, and computes the errors.
+"""Study of a coupled scene: writes an archive, runs it at several communication steps, and computes the errors.
 
 A given archive is run in the same way; its reference is the run with the smallest step.
 """
@@ -53,13 +53,13 @@ def run_coupled(source: str, out: Path, stop: float | None, report: ProgressCall
             defaults = {model: start_values(find_fmu(model)) for model in BODY_MODELS}
             check_values(scene, defaults)
             name, file = scene.name, temporary_folder / f"{scene.identifier}.ssp"
-            plan, fmus = unsolved_study(scene), [part.fmu for part in scene.parts.values()]
+            plan, fmus = plan_study(scene), [part.fmu for part in scene.parts.values()]
         folder = out / FOLDER / name
         with replace_folder(folder, (*FILES, file.name), describe_sources(source)) as new_folder:
             if scene:
-                archive.write(scene, values(scene, defaults), element_fmus(scene, temporary_folder), file)
+                archive.write(scene, element_values(scene, defaults), element_fmus(scene, temporary_folder), file)
             copy(file, new_folder)
-            result = study(plan, file, solver(scene, defaults) if scene else None, report)
+            result = run_study(plan, file, make_reference_solver(scene, defaults) if scene else None, report)
             save(result, new_folder)
             draw(result, new_folder / "figure.svg")
             settings = {"stop": result.stop} | (vars(scene) if scene else {})
@@ -71,7 +71,7 @@ def run_coupled(source: str, out: Path, stop: float | None, report: ProgressCall
 
 
 def check_values(scene: CoupledScene, defaults: Starts) -> None:
-    """Check that all parameters of the scene exist."""
+    """Raise HarnessError if a parameter of the scene does not exist."""
     for name, part in scene.parts.items():
         unknown = sorted(set(part.values) - set(defaults[part.model]))
         if unknown:
@@ -87,7 +87,7 @@ def start_values(fmu: Path) -> dict[str, float]:
     }
 
 
-def values(scene: CoupledScene, defaults: Starts) -> Starts:
+def element_values(scene: CoupledScene, defaults: Starts) -> Starts:
     """Return the values to set in each element; springs start at the positions of their parts."""
     models = {name: defaults[part.model] | part.values for name, part in scene.parts.items()}
     values_by_element = {name: part.values for name, part in scene.parts.items() if part.values}
@@ -107,27 +107,27 @@ def element_fmus(scene: CoupledScene, folder: Path) -> dict[str, Path]:
     return fmus | {spring.name: folder / "spring.fmu" for spring in scene.springs}
 
 
-def unsolved_study(scene: CoupledScene) -> Convergence:
+def plan_study(scene: CoupledScene) -> Convergence:
     """Return the study to run, which records the positions of the parts."""
-    read = tuple((name, "x", reference(part.fmu, "x")) for name, part in scene.parts.items())
+    read = tuple((name, "x", value_reference(part.fmu, "x")) for name, part in scene.parts.items())
     labels = tuple(f"{name} ({part.model})" for name, part in scene.parts.items())
     return Convergence(scene.title, read, labels, ("m",) * len(read), scene.steps, scene.stop, "single-model reference")
 
 
-def reference(fmu: Path, name: str) -> int:
+def value_reference(fmu: Path, name: str) -> int:
     """Return the value reference of a variable."""
     return next(
         int(variable.valueReference) for variable in read_description(fmu).modelVariables if variable.name == name
     )
 
 
-def solver(scene: CoupledScene, defaults: Starts) -> Callable[[np.ndarray], np.ndarray]:
+def make_reference_solver(scene: CoupledScene, defaults: Starts) -> Callable[[np.ndarray], np.ndarray]:
     """Return a function that computes reference positions (m, n) at times (m,) in s."""
     system, start = build_bodies(scene, defaults)
     return lambda times: solve_bodies(system, start, times)
 
 
-def study(
+def run_study(
     plan: Convergence,
     archive: Path,
     solve_reference: Callable[[np.ndarray], np.ndarray] | None,
@@ -168,12 +168,14 @@ def run_step(engine: str, plan: Convergence, archive: Path, step: float) -> np.n
 
 def save(result: Convergence, folder: Path) -> None:
     """Write trajectory.csv, error.csv and engines.csv."""
-    heads, reference_heads, final_heads = (
+    headings, reference_headings, final_headings = (
         [column_heading(name + suffix, size) for name, size in zip(result.names, result.units, strict=True)]
         for suffix in ("", " reference", " at the stop")
     )
     write_csv(
-        folder / "trajectory.csv", ["t [s]", *heads, *reference_heads], [result.time, *result.x.T, *result.truth.T]
+        folder / "trajectory.csv",
+        ["t [s]", *headings, *reference_headings],
+        [result.time, *result.x.T, *result.truth.T],
     )
     columns = [np.array(result.steps[: len(result.errors)]), np.array(result.errors)]
     write_csv(folder / "error.csv", ["communication step [s]", column_heading("largest error", result.unit)], columns)
@@ -183,7 +185,9 @@ def save(result: Convergence, folder: Path) -> None:
     ]
     table.append([result.reference, *result.truth[-1].tolist(), 0.0, ""])
     write_csv_rows(
-        folder / "engines.csv", ["engine", *final_heads, column_heading("largest error", result.unit), "failure"], table
+        folder / "engines.csv",
+        ["engine", *final_headings, column_heading("largest error", result.unit), "failure"],
+        table,
     )
 
 
