@@ -90,9 +90,9 @@ def decay(
     if columns["rate"] is not None and (columns["time"] is not None or columns["time_unit"] is not None):
         raise click.UsageError("--rate replaces the times in the file: omit --time and --time-unit")
     columns_spec, parameters = ColumnOptions(**columns), KnownParameters(k, m, pendulum)
-    with decays.gc_paused(), terminal.progress(1) as report:
+    with decays.pause_gc(), terminal.progress(1) as report:
         progress = partial(report, "standard input" if source == "-" else source)
         result, folder = decays.identify_decay(source, columns_spec, parameters, drag, drift, terminal.out, progress)
     terminal.print_result(
-        decays.identified_as_json(result), decay_table(result), "", *summary_lines(result), folder=folder
+        decays.identification_as_json(result), decay_table(result), "", *summary_lines(result), folder=folder
     )

@@ -16,7 +16,7 @@ from harness.analyses.decay.identification import fit_decay
 from harness.analyses.decay.law import LAWS
 from harness.analyses.estimation.figure import MAX_POINTS, extremes
 from harness.studies.decay.figure import draw
-from harness.studies.decay.study import identified_as_json
+from harness.studies.decay.study import identification_as_json
 from harness.studies.decay.table import decay_table
 
 
@@ -26,7 +26,7 @@ def test_the_table_has_a_row_for_every_value():
 
 
 def test_the_quantities_keep_their_names():
-    fit = identified_as_json(fit_decay(decay_record(0.02, 0.003, noise=1e-4), KnownParameters()))
+    fit = identification_as_json(fit_decay(decay_record(0.02, 0.003, noise=1e-4), KnownParameters()))
     assert {"fit", "remarks", "laws", "sentence", "turning_points", "published"} <= set(fit)
     check_shared_keys(fit)
     assert {item["name"] for item in fit["fit"]} == {"omega", "zeta", "r", "b", "rest"}

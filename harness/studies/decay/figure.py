@@ -15,49 +15,49 @@ MARGINS = {"left": 0.105, "right": 0.985, "bottom": 0.055, "top": 0.97, "hspace"
 COLOURS: dict[Terms, str] = {("zeta",): GREEN, ("r",): BLUE, ("b",): "#CC79A7"}  # colours of the laws with one term
 
 
-def draw(identified: DecayIdentification, path: Path) -> None:
+def draw(identification: DecayIdentification, path: Path) -> None:
     """Save the figure."""
     with open_figure(path, 1.8 * WIDTH, 3.4 * HEIGHT, layout=None) as figure:
         grid = figure.add_gridspec(3, 1, height_ratios=(3, 1.2, 2.2), **MARGINS)
         signal_axes = figure.add_subplot(grid[0])
         residual_axes = figure.add_subplot(grid[1], sharex=signal_axes)
-        plot_signal(signal_axes, identified)
-        unit, size = display_unit(identified.record.unit)
-        residuals = (identified.x - identified.fit_values) / size
-        noise = identified.problem.noise * identified.problem.scale / size
-        plot_residuals(residual_axes, identified.t, residuals, noise, "", unit)
+        plot_signal(signal_axes, identification)
+        unit, size = display_unit(identification.record.unit)
+        residuals = (identification.x - identification.fit_values) / size
+        noise = identification.problem.noise * identification.problem.scale / size
+        plot_residuals(residual_axes, identification.t, residuals, noise, "", unit)
         residual_axes.set_xlabel("t [s]")
-        plot_energy_loss(figure.add_subplot(grid[2]), identified)
+        plot_energy_loss(figure.add_subplot(grid[2]), identification)
 
 
-def plot_signal(axes: Axes, identified: DecayIdentification) -> None:
+def plot_signal(axes: Axes, identification: DecayIdentification) -> None:
     """Plot record, fit, rest position, turning points, and excluded samples."""
-    record, t = identified.record, identified.t
+    record, t = identification.record, identification.t
     unit, size = display_unit(record.unit)
-    is_fitted = np.isin(record.t - identified.problem.time_origin, identified.problem.t)
-    plot_record(axes, t, identified.x / size, record.name, axis_label(record.symbol, unit))
+    is_fitted = np.isin(record.t - identification.problem.time_origin, identification.problem.t)
+    plot_record(axes, t, identification.x / size, record.name, axis_label(record.symbol, unit))
     if not is_fitted.all():
         plot_samples(axes, record.t[~is_fitted], record.x[~is_fitted] / size, color=GREY, label="excluded")
-    times = np.linspace(t[0], t[-1], MAX_POINTS) if len(t) < MAX_POINTS else t[extremes(identified.x)]
+    times = np.linspace(t[0], t[-1], MAX_POINTS) if len(t) < MAX_POINTS else t[extremes(identification.x)]
     axes.plot(
         times,
-        identified.signal(identified.best, times) / size,
+        identification.signal(identification.best, times) / size,
         color=ORANGE,
         linewidth=0.9,
-        label=f"fit: {identified.best.description}",
+        label=f"fit: {identification.best.description}",
     )
-    rest = identified.rest(identified.best, times[[0, -1]]) / size
+    rest = identification.rest(identification.best, times[[0, -1]]) / size
     axes.plot(times[[0, -1]], rest, color=GREY, linestyle="--", linewidth=0.8, label="rest")
     if not record.order:
         style: dict[str, Any] = {"color": "black", "fillstyle": "none", "markersize": 5}
-        axes.plot(identified.extrema.t, identified.extrema.x / size, "o", label="turning points", **style)
+        axes.plot(identification.extrema.t, identification.extrema.x / size, "o", label="turning points", **style)
     plot_legend(axes)
 
 
-def plot_energy_loss(axes: Axes, identified: DecayIdentification) -> None:
+def plot_energy_loss(axes: Axes, identification: DecayIdentification) -> None:
     """Plot the relative energy loss per half cycle, with the curves of all laws."""
-    best, others, loss = identified.best, identified.laws[1:], identified.energy_loss
-    unit, size = display_unit(identified.record.base)
+    best, others, loss = identification.best, identification.laws[1:], identification.energy_loss
+    unit, size = display_unit(identification.record.base)
 
     def curve(loss: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
         """Return amplitudes and losses in percent."""

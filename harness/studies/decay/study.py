@@ -1,4 +1,4 @@
-"""Identifies the decay of a measured record or a scene, and writes the result folder."""
+"""Study that identifies the decay of a measured record or a scene, and writes the result folder."""
 
 import gc
 from collections.abc import Callable, Iterator
@@ -43,18 +43,19 @@ def identify_decay(
     record, properties, provenance_data = load_record(source, columns, parameters, report)
     options = vars(columns) | vars(parameters) | {"drag": drag, "drift": drift}
     folder = out / FOLDER / record.name
-    named = provenance.describe_sources(source)
-    with replace_folder(folder, FILES, named) as new_folder:  # before the fit, so that conflicts are reported at once
-        identified = fit_decay(record, properties, drag, drift, report)
-        write_results(identified, new_folder)
-        provenance.write_provenance(new_folder, **provenance_data, scene=options, source=named)
-        write_summary(new_folder, summarize_decay(identified))
-    return identified, folder
+    source_text = provenance.describe_sources(source)
+    # opened before the fit, so that conflicts are reported at once
+    with replace_folder(folder, FILES, source_text) as new_folder:
+        identification = fit_decay(record, properties, drag, drift, report)
+        write_results(identification, new_folder)
+        provenance.write_provenance(new_folder, **provenance_data, scene=options, source=source_text)
+        write_summary(new_folder, summarize_decay(identification))
+    return identification, folder
 
 
 @contextmanager
-def gc_paused() -> Iterator[None]:
-    """Disable garbage collection of cycles, which takes a quarter of the run time of a short command."""
+def pause_gc() -> Iterator[None]:
+    """Pause garbage collection of cycles in the block; it takes a quarter of the run time of a short command."""
     gc.disable()
     try:
         yield
@@ -122,67 +123,72 @@ def record_of_scene(
     return record, parameters, provenance_data
 
 
-def write_results(identified: DecayIdentification, folder: Path) -> None:
+def write_results(identification: DecayIdentification, folder: Path) -> None:
     """Write decay.json, turning points, fit and figure."""
     from .figure import draw
 
-    unit = identified.record.unit
-    (folder / "decay.json").write_text(to_json(identified_as_json(identified)) + "\n", encoding="utf-8")
+    unit = identification.record.unit
+    (folder / "decay.json").write_text(to_json(identification_as_json(identification)) + "\n", encoding="utf-8")
     write_csv(
         folder / "turning-points.csv",
-        ["t [s]", column_heading("x", identified.record.base)],
-        [identified.extrema.t, identified.extrema.x],
+        ["t [s]", column_heading("x", identification.record.base)],
+        [identification.extrema.t, identification.extrema.x],
     )
-    name = identified.record.symbol
-    heads = ["t [s]", column_heading(name, unit), column_heading("fit", unit), column_heading("residual", unit)]
-    columns = [identified.t, identified.x, identified.fit_values, identified.x - identified.fit_values]
-    write_csv(folder / "fit.csv", heads, columns)
-    draw(identified, folder / "figure.svg")
+    name = identification.record.symbol
+    headings = ["t [s]", column_heading(name, unit), column_heading("fit", unit), column_heading("residual", unit)]
+    columns = [
+        identification.t,
+        identification.x,
+        identification.fit_values,
+        identification.x - identification.fit_values,
+    ]
+    write_csv(folder / "fit.csv", headings, columns)
+    draw(identification, folder / "figure.svg")
 
 
-def identified_as_json(identified: DecayIdentification) -> dict[str, Any]:
+def identification_as_json(identification: DecayIdentification) -> dict[str, Any]:
     """Return the identified decay for JSON output."""
-    problem, record, best = identified.problem, identified.record, identified.best
-    loss = identified.energy_loss
-    samples = UsedSamples(record.name, identified.t, len(record.t))
+    problem, record, best = identification.problem, identification.record, identification.best
+    loss = identification.energy_loss
+    samples = UsedSamples(record.name, identification.t, len(record.t))
     column = ColumnResiduals(
         record.name,
         record.symbol,
         record.unit,
-        identified.rms,
+        identification.rms,
         problem.noise * problem.scale,
-        float(np.ptp(identified.x)),
+        float(np.ptp(identification.x)),
     )
     return {
-        **shared_json([samples], [column], identified.estimates, identified.remarks),
+        **shared_json([samples], [column], identification.estimates, identification.remarks),
         "quantity": record.quantity,
         "unit": record.unit,
-        "sentence": identified.sentence,
-        "noise": identified.extrema.noise,
-        "residual": identified.rms,
-        "turning points": len(identified.extrema.t),
+        "sentence": identification.sentence,
+        "noise": identification.extrema.noise,
+        "residual": identification.rms,
+        "turning points": len(identification.extrema.t),
         "used": samples.as_json(),
         "release": {
             "time": float(best.p[T0]) + problem.time_origin,
             "amplitude": float(best.p[AMPLITUDE]) * problem.scale,
             "unit": record.base,
         },
-        "turning_points": [asdict(estimate) for estimate in identified.extrema_estimates],
-        "published": [asdict(estimate) for estimate in identified.two_peak_estimates],
-        "why_empty": {name: reason for name, reason in identified.unavailable.items() if reason},
+        "turning_points": [asdict(estimate) for estimate in identification.extrema_estimates],
+        "published": [asdict(estimate) for estimate in identification.two_peak_estimates],
+        "why_empty": {name: reason for name, reason in identification.unavailable.items() if reason},
         "laws": [
             {
                 "terms": list(law.terms),
                 "bic": law.bic,
-                "residual": float(np.sqrt(law.sum_of_squares / len(identified.t))) * problem.scale,
+                "residual": float(np.sqrt(law.sum_of_squares / len(identification.t))) * problem.scale,
             }
-            for law in identified.laws
+            for law in identification.laws
         ],
         "loss": {
             "unit": record.base,
             "amplitude": loss.amplitude.tolist(),
             "share_of_energy": loss.fraction.tolist(),
-            "laws": {"+".join(law.terms): loss.curves[law.terms][1].tolist() for law in identified.laws},
-            "laws_amplitude": {"+".join(law.terms): loss.curves[law.terms][0].tolist() for law in identified.laws},
+            "laws": {"+".join(law.terms): loss.curves[law.terms][1].tolist() for law in identification.laws},
+            "laws_amplitude": {"+".join(law.terms): loss.curves[law.terms][0].tolist() for law in identification.laws},
         },
     }
