@@ -15,7 +15,7 @@ from ...analyses.fit.parameter_fit import ParameterFit, Profile
 from ...results.quantity import display_unit
 from ...results.style import GREEN, GREY, HEIGHT, ORANGE, WIDTH, Axes, axis_label, open_figure
 
-MAX_COLUMNS, MAX_PROFILES = 6, 12  # that are drawn
+MAX_COLUMNS, MAX_PROFILES = 6, 12  # drawn at most
 COLOURS = (ORANGE, GREEN, "#CC79A7", "#56B4E9")  # of the laws
 RECORD, RESIDUALS, PROFILES = 2.0, 1.0, 1.3  # relative heights of the panels
 PROFILES_IN_ROW = 4

@@ -1,4 +1,4 @@
-"""Requests of a comparison of laws: each FMU frees and fixes the names that it has."""
+"""Requests for a comparison of laws: each FMU frees and fixes those names that it has."""
 
 from dataclasses import dataclass, replace
 from itertools import chain
@@ -21,14 +21,14 @@ from .request import (
 
 @dataclass(frozen=True)
 class ResolvedLaws:
-    """A checked request for each FMU, the one to fit first, and notes on the names that each lacks."""
+    """A checked request for each FMU, the FMU to fit first, and notes on the names that each FMU lacks."""
 
     requests: tuple[ResolvedRequest, ...]
     notes: tuple[tuple[str, ...], ...]
 
 
 def resolve_laws(request: FitRequest) -> ResolvedLaws:
-    """Check a request against the FMU and those to compare it with.
+    """Check a request against the FMU and against those to compare it with.
 
     Raises
     ------

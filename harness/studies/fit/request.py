@@ -1,4 +1,4 @@
-"""Checked request of a fit: what is fitted, fixed, observed and driven."""
+"""Request of a fit, checked against the FMU: unknowns, fixed values, observed variables and inputs."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -21,10 +21,10 @@ from ...scenes.run_spec import RunSpec
 
 SAMPLES_PER_UNKNOWN = 4
 GAIN_RANGE = (0.5, 2.0)
-DELAY_SHARE = 0.1  # of the shortest record, which is searched for a delay
+DELAY_SHARE = 0.1  # of the duration of the shortest record: default range of a delay
 READABLE = ("output", "local")  # causalities of variables that can be observed
-TOLERANCE, SOLVER_RTOL = 1e-8, "solver.rtol"  # looser, the steps of the solver roughen the derivatives of residuals
-# at this tolerance, dop853 takes half of the time of ode45, and less than that of ode23
+TOLERANCE, SOLVER_RTOL = 1e-8, "solver.rtol"  # larger tolerances make the derivatives of residuals inaccurate
+# at this tolerance, dop853 takes half of the time of ode45, and ode23 takes longer than ode45
 METHOD, SOLVER_METHOD, SLOWER_METHODS = "dop853", "solver.method", ("ode23", "ode45")
 
 Range = tuple[float, float] | None
@@ -32,15 +32,15 @@ Range = tuple[float, float] | None
 
 @dataclass(frozen=True)
 class FitRequest:
-    """What a user asks of a fit.
+    """Request of a fit by a user.
 
     Attributes
     ----------
     run : RunSpec
         The FMU, the values of other variables, and as `timeout` the seconds of processor time that one run may take.
     free : mapping
-        Range to search of each unknown, None for the default. ``offset(x)``, ``gain(x)`` and ``delay(x)`` are
-        those of the sensor of an observed variable.
+        Range to search of each unknown, None for the default. ``offset(x)``, ``gain(x)`` and ``delay(x)`` are unknowns
+        of the sensor of an observed variable.
     observe, inputs : mapping
         Headings of the columns of observed variables and of inputs, by variable.
     sigma : mapping
@@ -48,9 +48,9 @@ class FitRequest:
     start : mapping
         Values to start from, by free parameter; for one record of several, by a name as in ``x0[1]``.
     each : tuple of str
-        Unknowns with a value of its own for each record.
+        Unknowns that have a separate value for each record.
     robust : bool
-        Whether outliers count little.
+        Whether large residuals count linearly instead of by their squares.
     columns : ColumnOptions
         Options for the time column.
     against : tuple of pathlib.Path
@@ -74,10 +74,12 @@ class FitRequest:
 
 @dataclass(frozen=True)
 class ResolvedRequest:
-    """A request that fits the FMU.
+    """A request that has been checked against the FMU.
 
     Attributes
     ----------
+    request : FitRequest
+        The request.
     variables : mapping
         The scalar Reals of the FMU.
     sources : mapping
@@ -85,7 +87,7 @@ class ResolvedRequest:
     fixed : mapping
         Values of Reals that are not fitted.
     shared : RunSpec
-        What all runs of the fit have in common: the observed outputs, and values that are no Reals.
+        Settings that all runs of the fit share: the observed outputs, and values that are not Reals.
     """
 
     request: FitRequest
@@ -194,15 +196,15 @@ def settable_names(description: Any) -> list[str]:
 
 
 def make_unknowns(resolved: ResolvedRequest, records: Sequence[RecordData]) -> tuple[Unknown, ...]:
-    """Return the unknowns; one that is free in each record once for each, named as in x0[1]."""
+    """Return the unknowns; one with a separate value for each record occurs once per record, named as in x0[1]."""
     request, unknowns = resolved.request, []
     for name, limits in request.free.items():
         start = request.start.get(name)
         if name in request.each and len(records) > 1:
             for i in range(len(records)):
-                own_name = f"{name}[{i + 1}]"
-                unknown = make_unknown(name, limits, request.start.get(own_name, start), resolved, records)
-                unknowns.append(replace(unknown, name=own_name, record=i))
+                indexed_name = f"{name}[{i + 1}]"
+                unknown = make_unknown(name, limits, request.start.get(indexed_name, start), resolved, records)
+                unknowns.append(replace(unknown, name=indexed_name, record=i))
         else:
             unknowns.append(make_unknown(name, limits, start, resolved, records))
     samples = sum(record.y.size for record in records)

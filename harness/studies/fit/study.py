@@ -1,4 +1,4 @@
-"""Fits the parameters of an FMU to record files, and writes the result folder."""
+"""Study that fits the parameters of an FMU to record files, and writes the result folder."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
@@ -65,7 +65,7 @@ def fit_files(
 
 @dataclass(frozen=True)
 class RecordTable:
-    """A record as it was read, and its name."""
+    """Table of a record, and the name of the record."""
 
     name: str
     table: Table
@@ -85,9 +85,9 @@ def fit_laws(
     validation: Sequence[RecordTable],
     report: Callable[[float], None],
 ) -> ParameterFit:
-    """Fit an FMU, and those to compare it with, to the same records, and predict those for validation.
+    """Fit an FMU, and the FMUs to compare it with, to the same records, and predict the validation records.
 
-    All fits use the same samples: where one of them cannot use means of neighbouring samples, none of them does.
+    All fits use the same samples: if one of them cannot use means of neighbouring samples, none of them does.
     """
     count, fits = len(laws.requests), []
 
@@ -143,7 +143,7 @@ def convert_outputs(fit: ParameterFit, target: ParameterFit) -> ParameterFit:
 def convert_columns(
     columns: Sequence[ColumnResiduals], targets: Sequence[ColumnResiduals]
 ) -> tuple[ColumnResiduals, ...]:
-    """Return the residuals of columns in the units of others of the same samples, whose noise is the same."""
+    """Return the residuals of columns in the units of target columns, which have the same samples and noise."""
     return tuple(
         replace(target, residual=own.residual * (target.noise / own.noise))
         for own, target in zip(columns, targets, strict=True)
@@ -189,14 +189,14 @@ def fit_tables(
         notes = [note for table in (*tables, *validation) for note in table.notes]
         fit = describe_fit(resolved.name, problem, raw_fit, notes, simulator.n_runs, process_time() - start_time)
     units = {name: resolved.variables[name].unit for name in request.observe}
-    fit = replace(fit, columns=with_units(fit.columns, units))
+    fit = replace(fit, columns=set_units(fit.columns, units))
     if prediction:
-        prediction = replace(prediction, columns=with_units(prediction.columns, units))
+        prediction = replace(prediction, columns=set_units(prediction.columns, units))
         fit = replace(fit, validation=prediction, remarks=(*fit.remarks, *prediction.remarks))
     return fit
 
 
-def with_units(columns: Sequence[ColumnResiduals], units: Mapping[str, str]) -> tuple[ColumnResiduals, ...]:
+def set_units(columns: Sequence[ColumnResiduals], units: Mapping[str, str]) -> tuple[ColumnResiduals, ...]:
     """Return columns with the units of their variables."""
     return tuple(replace(column, unit=units[column.name]) for column in columns)
 
@@ -242,17 +242,19 @@ def write_fitted_signals(
     records: Sequence[MeasuredRecord],
     predictions: Sequence[Sequence[np.ndarray]],
 ) -> None:
-    """Write records, and what each law predicts for them."""
-    heads = ["record", "t [s]"]
+    """Write records, and the prediction of each law for them."""
+    headings = ["record", "t [s]"]
     numbers = np.concatenate([np.full(len(record.t), float(i + 1)) for i, record in enumerate(records)])
     columns = [numbers, np.concatenate([record.t for record in records])]
     for j, column in enumerate(laws[0].columns[: predictions[0][0].shape[1]]):
         measured = np.concatenate([record.y[:, j] for record in records])
-        heads.append(column_heading(column.name, column.unit))
+        headings.append(column_heading(column.name, column.unit))
         columns.append(measured)
         for law, signals in zip(laws, predictions, strict=True):
             fitted = np.concatenate([signal[:, j] for signal in signals])
             name = "" if law is laws[0] else f" {law.fmu}"
-            heads += [column_heading(f"{column.name}{suffix}{name}", column.unit) for suffix in (" fit", " residual")]
+            headings += [
+                column_heading(f"{column.name}{suffix}{name}", column.unit) for suffix in (" fit", " residual")
+            ]
             columns += [fitted, measured - fitted]
-    write_csv(path, heads, columns)
+    write_csv(path, headings, columns)

@@ -23,10 +23,10 @@ def fit_table(fit: ParameterFit) -> Table:
 
 
 def format_estimate(estimate: Estimate) -> str:
-    """Format value and interval; of an interval with one end, that end."""
+    """Format value and interval; an interval with one end is written as a limit."""
     if isfinite(estimate.error) or not (isfinite(estimate.low) or isfinite(estimate.high)):
-        interval = isfinite(estimate.low) and isfinite(estimate.high)
-        return format_interval(estimate.value, estimate.low, estimate.high) if interval else "not determined"
+        has_interval = isfinite(estimate.low) and isfinite(estimate.high)
+        return format_interval(estimate.value, estimate.low, estimate.high) if has_interval else "not determined"
     if isfinite(estimate.low) and isfinite(estimate.high):
         return f"{estimate.low:.3g} to {estimate.high:.3g}"
     return f"> {estimate.low:.3g}" if isfinite(estimate.low) else f"< {estimate.high:.3g}"
@@ -46,7 +46,7 @@ def comparison_table(fit: ParameterFit) -> Table:
 
 
 def result_parts(fit: ParameterFit) -> list[Table | str]:
-    """Return the tables and sentences of a fit, and of those it is compared with."""
+    """Return the tables and sentences of a fit, and of the fits that it is compared with."""
     parts: list[Table | str] = [fit_table(fit), "", *summary_lines(fit)]
     for law in fit.against:
         parts += ["", fit_table(law), "", *summary_lines(law)]
