@@ -1,4 +1,4 @@
-"""Executes requests in a C program (running/host.c), which takes calls and prints values instead of JSON."""
+"""Adapter of a C program (running/host.c), which reads calls and prints values instead of JSON."""
 
 import re
 import subprocess
@@ -11,33 +11,33 @@ from .request import ImporterReply, ImporterRequest
 
 
 def run_request(request: ImporterRequest, timeout: float) -> tuple[ImporterReply, str]:
-    """Run a request in the C program; return the reply and what the program printed on standard error."""
+    """Run a request in the C program; return the reply and the output on standard error."""
     library = load_library(request.run.fmu)
-    calls = [*(reset_cycle_calls(request) * request.reset_cycles or runs(request)), "0 unload"]
+    calls = [*(reset_cycle_calls(request) * request.reset_cycles or list_calls(request)), "0 unload"]
     process = run_subprocess(library.command, "".join(f"{call}\n" for call in calls), library.environment, timeout)
     if process.returncode:
         raise ChildDiedError(process.returncode, process.stderr)
-    return reply(request, process.stdout), process.stderr
+    return parse_reply(request, process.stdout), process.stderr
 
 
-def reply(request: ImporterRequest, text: str) -> ImporterReply:
+def parse_reply(request: ImporterRequest, text: str) -> ImporterReply:
     """Parse the output of one request."""
     rows, statuses = parse_output(text.splitlines(), len(request.instances))
     size = len(rows) if request.reset_cycles else request.steps + 1
-    return ImporterReply(version(), rows[:size], rows[size:], sum(statuses[: request.steps]))
+    return ImporterReply(compiler_version(), rows[:size], rows[size:], sum(statuses[: request.steps]))
 
 
-def runs(request: ImporterRequest) -> list[str]:
+def list_calls(request: ImporterRequest) -> list[str]:
     """Return the calls of all runs of a request without reset cycles."""
     all_instances = range(len(request.instances))
     calls = [f"{i} new {name}" for i, name in enumerate(request.instances)]
-    calls += run(request, request.run.values, request.midrun_changes)
+    calls += list_run_calls(request, request.run.values, request.midrun_changes)
     if request.rerun:
-        calls += [f"{i} reset" for i in all_instances] + run(request, {}, {})
+        calls += [f"{i} reset" for i in all_instances] + list_run_calls(request, {}, {})
     return calls + [f"{i} free" for i in all_instances]
 
 
-def run(request: ImporterRequest, values: dict[str, float], midrun_changes: dict[str, float]) -> list[str]:
+def list_run_calls(request: ImporterRequest, values: dict[str, float], midrun_changes: dict[str, float]) -> list[str]:
     """Return the calls of one run."""
     references, all_instances = request.references, range(len(request.instances))
     read = "getr " + " ".join(str(references[name]) for name in request.run.outputs)
@@ -74,7 +74,7 @@ def parse_output(lines: list[str], count: int) -> tuple[list[list[float]], list[
 
 
 @cache
-def version() -> str:
+def compiler_version() -> str:
     """Return the version of the compiler."""
     process = subprocess.run([find_compiler(), "--version"], capture_output=True, text=True, check=True)
     return (re.findall(r"\d+(?:\.\d+)+", process.stdout.splitlines()[0]) or ["unknown version"])[-1]

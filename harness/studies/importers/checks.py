@@ -1,7 +1,7 @@
-"""The checks of every FMU in every importer.
+"""Checks of every FMU in every importer.
 
-Values agree if they differ by less than TOLERANCE, relative to the largest value of the variable: importers compute
-time differently, and a slightly later change during the run causes other internal steps.
+Values agree if they differ by at most TOLERANCE, relative to the largest value of the variable: importers compute time
+differently, and a slightly later change during the run causes other internal steps.
 """
 
 from collections.abc import Callable
@@ -43,7 +43,7 @@ class Importer:
     packages : tuple of str
         Required packages.
     shows_log : bool
-        Whether the tool passes on log messages.
+        Whether the tool prints log messages of the FMU.
     checks_status : bool
         Whether the tool checks the status of a step.
     exits_on_error : bool
@@ -120,14 +120,14 @@ def has_function(fmu: Path, function: str) -> bool:
 def run_request(importer: Importer, request: ImporterRequest) -> AdapterResult:
     """Run a request in an importer; CheckFailedError if its process crashes or times out."""
     prepare(importer, [request])
-    answer = RESULTS[importer.adapter, repr(request)]
-    if isinstance(answer, CheckFailedError):
-        raise answer
-    return answer
+    result = RESULTS[importer.adapter, repr(request)]
+    if isinstance(result, CheckFailedError):
+        raise result
+    return result
 
 
 def prepare(importer: Importer, requests: list[ImporterRequest]) -> None:
-    """Run all new requests of an importer in one process; after a crash or timeout another process goes on."""
+    """Run all new requests of an importer in one process; after a crash or timeout, another process continues."""
     keys = {(importer.adapter, repr(request)): request for request in requests}
     new_requests = {key: request for key, request in keys.items() if key not in RESULTS}
     with ChildProcess(f"{__package__}.{importer.adapter}") as process:
@@ -204,9 +204,9 @@ def largest_difference(rows: list[list[float]], expected: list[list[float]]) -> 
     if len(rows) != len(expected):
         raise CheckFailedError(f"{len(rows)} points instead of {len(expected)}")
     worst = 0.0
-    for mine, right in zip(zip(*rows[1:], strict=True), zip(*expected[1:], strict=True), strict=True):
-        size = max(abs(value) for value in right) or 1.0
-        worst = max(worst, *(abs(a - b) / size if a == a else 1.0 for a, b in zip(mine, right, strict=True)))
+    for column, reference in zip(zip(*rows[1:], strict=True), zip(*expected[1:], strict=True), strict=True):
+        size = max(abs(value) for value in reference) or 1.0
+        worst = max(worst, *(abs(a - b) / size if a == a else 1.0 for a, b in zip(column, reference, strict=True)))
     if not worst <= TOLERANCE:
         raise CheckFailedError(f"differs from fmpy by {worst:.0e}")
     return worst
@@ -215,29 +215,26 @@ def largest_difference(rows: list[list[float]], expected: list[list[float]]) -> 
 def check_failure(importer: Importer, request: ImporterRequest) -> str:
     """Check a failing run: a message on standard error and in the log, no result afterwards, success after a reset.
 
-    After a failure every value reads NaN.  A refused value changes nothing; a tool that ignores the refusal goes on
-    with the previous value, and only the message shows it.
+    After a failure every value is NaN.  A refused value changes nothing: a tool that ignores the refusal continues with
+    the previous value, and only the message shows the refusal.
     """
-    sentence = expected_message(request)
+    message = expected_message(request)
     try:
-        run_instances = run_request(importer, request)
-    except CheckFailedError as wrong:
-        if importer.exits_on_error and request.run.values and sentence in str(wrong):
+        result = run_request(importer, request)
+    except CheckFailedError as error:
+        if importer.exits_on_error and request.run.values and message in str(error):
             return "message, exits"
         raise
     instance = request.instances[0]
-    lines = [line for line in run_instances.stderr.splitlines() if sentence in line]
-    names = (
-        f"({instance}): ",
-        f"{request.run.fmu.name}): ",
-        f"({instance}.0.fmu): ",
-    )  # the last one inside a container
+    lines = [line for line in result.stderr.splitlines() if message in line]
+    # the third name is that in a container
+    names = (f"({instance}): ", f"{request.run.fmu.name}): ", f"({instance}.0.fmu): ")
     own_lines = [line for line in lines if any(name in line for name in names)]
     if not own_lines:
         raise CheckFailedError("no message on standard error")
     if importer.shows_log and len(lines) != 2 * len(own_lines):
         raise CheckFailedError("no message in the log")
-    rows, accepted = run_instances.reply.rows, run_instances.reply.accepted
+    rows, accepted = result.reply.rows, result.reply.accepted
     if importer.checks_status and accepted == request.steps:
         raise CheckFailedError("every step was accepted")
     unchanged = replace(request.run, values={})
@@ -249,7 +246,7 @@ def check_failure(importer: Importer, request: ImporterRequest) -> str:
             raise CheckFailedError(f"returns {rows[-1][0]!r} after the failure")
     elif not all(isnan(value) for value in rows[-1]):
         largest_difference(rows, expected)
-    largest_difference(run_instances.reply.rerun, expected)
+    largest_difference(result.reply.rerun, expected)
     return "message"
 
 

@@ -1,4 +1,4 @@
-"""Executes requests in Ecos (package ecospy; the library of the package tbb must be loaded first)."""
+"""Adapter of Ecos (package ecospy; the library of the package tbb must be loaded first)."""
 
 import ctypes
 import sys

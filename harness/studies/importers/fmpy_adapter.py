@@ -1,4 +1,4 @@
-"""Executes requests with the FMI functions of fmpy."""
+"""Adapter of fmpy, which calls its FMI functions."""
 
 import ctypes
 import sys
@@ -17,7 +17,7 @@ from .request import ImporterReply, ImporterRequest, serve
 def run_request(request: ImporterRequest, prefixes: tuple[str, ...] = ("",)) -> ImporterReply:
     """Execute a request; print log messages that start with one of `prefixes`."""
     fmu_description = read_description(request.run.fmu)
-    callbacks = logging(prefixes)
+    callbacks = make_callbacks(prefixes)
     arguments = {
         "guid": fmu_description.guid,
         "modelIdentifier": fmu_description.coSimulation.modelIdentifier,
@@ -80,12 +80,12 @@ def run(
                 instance.doStep(request.step * i, request.step)
             accepted += not refused
         except FMICallException as error:
-            refused.append(error)  # the tool logs it; the check reads the values from here on
+            refused.append(error)  # the tool logs the error; the check reads the later values
         rows.append(row())
     return rows, accepted
 
 
-def logging(prefixes: tuple[str, ...]) -> fmi2.fmi2CallbackFunctions:
+def make_callbacks(prefixes: tuple[str, ...]) -> fmi2.fmi2CallbackFunctions:
     """Return callbacks that print log messages that start with one of `prefixes`."""
 
     def print_message(environment: Any, name: bytes, status: int, category: bytes, text: bytes) -> None:

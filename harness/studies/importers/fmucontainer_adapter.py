@@ -1,4 +1,4 @@
-"""Executes requests in the C runtime of FMUContainer (package fmu-manipulation-toolbox).
+"""Adapter of the C runtime of FMUContainer (package fmu-manipulation-toolbox).
 
 The instances are embedded in a container FMU, which fmpy runs; values pass through inputs and outputs of the container.
 Only log messages of the embedded FMUs are printed, because the container itself is verbose.
@@ -28,9 +28,8 @@ def run_request(request: ImporterRequest) -> ImporterReply:
     settable = [
         variable.name for variable in reals if variable.causality == "input" or variable.variability == "tunable"
     ]
-    inputs = dict.fromkeys(
-        [*settable, *request.run.values, *request.midrun_changes]
-    )  # equal for most requests, so that the container is cached
+    # equal for most requests, so that the container is cached
+    inputs = dict.fromkeys([*settable, *request.run.values, *request.midrun_changes])
     container: dict[str, Any] = {
         "name": "container.fmu",
         "fmu": files,

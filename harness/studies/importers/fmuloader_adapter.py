@@ -1,4 +1,4 @@
-"""Executes requests with fmuloader, with the same calls as fmpy."""
+"""Adapter of fmuloader, with the same calls as fmpy."""
 
 import re
 import sys
@@ -32,12 +32,12 @@ class Instance:
     def call(self, name: str, *arguments: Any, **named: Any) -> Any:
         """Call a function; raise FMICallException for a status above warning, also for discard."""
         try:
-            answer = getattr(self.slave, name)(*arguments, **{snake_case(key): value for key, value in named.items()})
+            result = getattr(self.slave, name)(*arguments, **{snake_case(key): value for key, value in named.items()})
         except Fmi2Error as error:
             raise FMICallException(error.func_name, int(error.status)) from None
-        if answer is Fmi2Status.DISCARD:
-            raise FMICallException(name, int(answer))
-        return answer
+        if result is Fmi2Status.DISCARD:
+            raise FMICallException(name, int(result))
+        return result
 
 
 def snake_case(name: str) -> str:

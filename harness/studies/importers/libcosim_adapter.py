@@ -1,4 +1,4 @@
-"""Executes requests in libcosim (package libcosimpy), which has no reset: a rerun is a new execution."""
+"""Adapter of libcosim (package libcosimpy), which has no reset: a rerun is a new execution."""
 
 from importlib.metadata import version
 

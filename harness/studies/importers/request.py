@@ -1,6 +1,6 @@
 """Requests to the adapters and their replies.
 
-An adapter prints log messages of the FMU to standard error if the tool passes them on.
+An adapter prints log messages of the FMU to standard error if the tool forwards them.
 """
 
 from collections.abc import Callable
@@ -13,7 +13,7 @@ from ...scenes.run_spec import RunSpec
 
 @dataclass(frozen=True)
 class ImporterRequest:
-    """A run of instances of one FMU by equal communication steps from 0 s on; its values are set in the first one."""
+    """Run of instances of one FMU with equal communication steps from 0 s on; values are set in the first instance."""
 
     run: RunSpec
     references: dict[str, int]  # value references of all variables
@@ -43,8 +43,17 @@ class ImporterRequest:
 
 @dataclass(frozen=True)
 class ImporterReply:
-    """Version of the tool, rows of values (one per communication point), rows of the rerun, and number of accepted
-    steps."""
+    """Reply of an adapter.
+
+    Attributes
+    ----------
+    version : str
+        Version of the tool.
+    rows, rerun : list of list of float
+        Rows of values at the communication points, of the run and of the rerun.
+    accepted : int
+        Number of accepted steps.
+    """
 
     version: str
     rows: list[list[float]]

@@ -1,4 +1,4 @@
-"""Runs the checks of all importers, and formats the table."""
+"""Runs of the checks of all importers, and their table."""
 
 from collections.abc import Callable
 from contextlib import closing
@@ -71,8 +71,8 @@ def run_checks(folder: Path, report: Callable[[str, float], None]) -> list[Check
     for fmu in find_fmus(folder):
         try:
             subjects.append(describe_fmu(fmu))
-        except UnsuitableFmuError as unfit:
-            results.append(CheckResult(fmu.name, "", reason=str(unfit)))
+        except UnsuitableFmuError as error:
+            results.append(CheckResult(fmu.name, "", reason=str(error)))
     if not subjects:
         raise HarnessError(f"no FMU in {folder} can be checked: {results[0].reason}; give another folder")
     names = tuple(subject.fmu.stem for subject in subjects)
@@ -130,8 +130,8 @@ def check_cell(judge: CheckFunction, importer: Importer, request: ImporterReques
     """Return the cell of one check."""
     try:
         return judge(importer, request)
-    except CheckFailedError as wrong:
-        return f"FAILED: {wrong}"
+    except CheckFailedError as error:
+        return f"FAILED: {error}"
 
 
 def importer_table(results: list[CheckResult]) -> Table:
