@@ -30,10 +30,10 @@ def rivals(names: tuple[str, ...], timeout: float, terminal: Terminal) -> None:
     """
     from ..studies.rivals import study
     from ..studies.rivals.catalogue import find_rivals
-    from ..studies.rivals.table import rivals_table, sentences
+    from ..studies.rivals.table import rivals_table, summary_lines
 
     with terminal.progress(len(find_rivals(names)) + 1) as report:
         comparison = study.run_rivals(names, timeout, terminal.out, report)
     terminal.print_result(
-        comparison, rivals_table(comparison), "", *sentences(comparison), folder=terminal.out / study.FOLDER
+        comparison, rivals_table(comparison), "", *summary_lines(comparison), folder=terminal.out / study.FOLDER
     )

@@ -1,5 +1,5 @@
-"""The same scenes with dry friction in other engines, each at its defaults and at its best setting.
+"""The same scenes with dry friction in other engines, each with its default and with its best setting.
 
-scenes.py defines the scenes and what a rival returns, engines/ has one file for each engine, catalogue.py their
-settings, and child.py runs one of them in a process of its own.
+scenes.py defines the scenes and the results of a rival, engines/ has one file for each engine, catalogue.py has their
+settings, and child.py runs an engine in a separate process.
 """

@@ -45,7 +45,7 @@ class Rival:
 
     @property
     def settings(self) -> dict[str, Setting]:
-        """The settings by name."""
+        """Return the settings by name."""
         return {"default": self.default, "best": self.best}
 
     @property
@@ -58,7 +58,7 @@ class Rival:
 
     @property
     def lines(self) -> int:
-        """Return how many lines of code a user writes for all scenes."""
+        """Return the number of lines of code that a user writes for all scenes."""
         files = [ENGINES / f"{self.module}.py"]
         if self is OWN:
             files += [MODELS / name for name in ("coulomb.py", "stickslip.py", "pendulum.py", "more/belt.py")]
@@ -69,12 +69,12 @@ class Rival:
 def count_lines(source: str) -> int:
     """Return the number of lines of code: without blank lines, comments and docstrings."""
     documented = (ast.Module, ast.ClassDef, ast.FunctionDef)
-    left_out: set[int] = set()
+    excluded: set[int] = set()
     for node in ast.walk(ast.parse(source)):
         if isinstance(node, documented) and ast.get_docstring(node) is not None:
-            left_out.update(range(node.body[0].lineno, (node.body[0].end_lineno or 0) + 1))
+            excluded.update(range(node.body[0].lineno, (node.body[0].end_lineno or 0) + 1))
     lines = enumerate(source.splitlines(), start=1)
-    return sum(1 for number, line in lines if number not in left_out and re.match(r"\s*[^#\s]", line))
+    return sum(1 for number, line in lines if number not in excluded and re.match(r"\s*[^#\s]", line))
 
 
 OWN = Rival(
@@ -86,7 +86,7 @@ OWN = Rival(
     {"solver.rtol": 1e-12},
     "co-simulation in any FMI tool; stick and slip are modes",
 )
-STEP = 1e-4  # s, of the engines with constant steps at their best
+STEP = 1e-4  # s, best setting of engines with constant steps
 USER_EVENTS = "the user programs stick and slip as events, here for one contact"
 CONTACTS = "robots with contacts; they creep below stiction_tolerance, and joints have no dry friction"
 OTHERS = (
@@ -176,6 +176,6 @@ RIVALS = {rival.name: rival for rival in (OWN, *OTHERS)}
 
 
 def find_rivals(names: tuple[str, ...]) -> list[Rival]:
-    """Return the rivals of these names, all without names; the FMU, with which the others are compared, is first."""
+    """Return the rivals of these names, by default all. The first is the FMU, with which the others are compared."""
     check_names("rival", names, RIVALS)
     return [rival for rival in RIVALS.values() if rival is OWN or not names or rival.name in names]

@@ -1,4 +1,4 @@
-"""Runs rivals in a process of their own."""
+"""Child process that runs rivals."""
 
 from dataclasses import dataclass, field
 from importlib import import_module
@@ -25,7 +25,7 @@ class RivalCase:
 
 @dataclass(frozen=True)
 class RivalReply:
-    """What came of a run.
+    """Reply of a rival.
 
     Attributes
     ----------
@@ -52,7 +52,7 @@ class RivalReply:
 
 
 def run_case(case: RivalCase) -> RivalReply:
-    """Run a rival; what it raises becomes a gap."""
+    """Run a rival; an exception becomes a gap."""
     scene = SCENES[case.scene]
     try:
         simulate = import_module(f"{__package__}.engines.{case.module}").simulate

@@ -46,7 +46,7 @@ class Comparison:
     results: tuple[Result, ...]
 
     def of_scene(self, scene: Scene) -> list[Result]:
-        """Return the results of a scene, the most exact first."""
+        """Return the results of a scene, the most accurate first."""
         results = [result for result in self.results if result.scene == scene.name and result.measures]
         return sorted(results, key=lambda result: result.measures.error if result.measures else nan)
 
@@ -60,6 +60,6 @@ class Comparison:
 
 
 def format_setting(name: str, options: Setting) -> str:
-    """Return a setting in words."""
+    """Return the name of a setting with its options."""
     values = ", ".join(f"{option} = {value}" for option, value in options.items())
     return f"{name}: {values}" if values else name

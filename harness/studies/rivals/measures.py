@@ -1,4 +1,4 @@
-"""What is measured in a run: error, creep, and events."""
+"""Measures of a run: error, creep, and events."""
 
 from dataclasses import dataclass
 from math import inf, nan
@@ -54,11 +54,14 @@ def measure(scene: Scene, reference: Solution, reply: RivalReply) -> Measures:
 
 
 def match_events(changes: Events, expected: Events, stop: float) -> tuple[int, int, float]:
-    """Match events of the same kind by nearest times, at most half the shortest distance of expected ones apart.
+    """Match events of the same kind by nearest times, at most half of the shortest expected interval apart.
 
     Returns
     -------
-    number of missed events, of spurious ones, and the largest difference of the times of the others in s
+    missed, spurious : int
+        Number of missed events, and of spurious events.
+    largest_difference : float
+        Largest difference in s of the times of matched events; NaN if there are none.
     """
     missed, spurious, differences = 0, 0, [] if expected and changes else [nan]
     for kind in {kind for _, kind in (*changes, *expected)}:

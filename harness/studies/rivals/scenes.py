@@ -1,6 +1,6 @@
-"""The scenes that all rivals simulate, and what a rival returns.
+"""The scenes that all rivals simulate, and the solution that a rival returns.
 
-In every scene one body rubs on a partner: on the ground, on a belt, or on a second inertia.
+In every scene one body slides on a partner: the ground, a belt, or a second inertia.
 
     inertia v' = load(t, x) - F,   partner w' = F,   x' = v,   slip = v - w
     sliding:   F = slide(t, |slip|) sign(slip)
@@ -24,7 +24,7 @@ from ...references.models.stickslip import StickslipProblem
 from ...running.solution import Events as Events
 from ...running.solution import Solution as Solution
 
-Setting = dict[str, float | str]  # values of an engine's own options by name; empty for its defaults
+Setting = dict[str, float | str]  # options of an engine by name; empty for its defaults
 
 
 class NotOfferedError(Exception):
@@ -84,17 +84,17 @@ class Scene:
 
     @property
     def times(self) -> np.ndarray:
-        """The compared points (n,) in s, from 0 to the stop."""
+        """Return the compared points (n,) in s, from 0 to the stop."""
         return np.linspace(0.0, self.stop, round(self.stop / self.interval) + 1)
 
     @property
     def has_second_inertia(self) -> bool:
-        """Whether the partner moves freely."""
+        """Return whether the partner moves freely."""
         return self.partner < inf
 
     @property
     def compared_columns(self) -> slice:
-        """The states whose errors count."""
+        """Return the states that are compared."""
         return slice(1, 3) if self.has_second_inertia else slice(0, 1)
 
 
@@ -104,7 +104,7 @@ def sample(solution: Solution, times: np.ndarray) -> np.ndarray:
 
 
 def slip_changes(solution: Solution, level: float) -> Events:
-    """Return when a slip begins (1) and ends (0), that is, when its size passes the level."""
+    """Return the times in s at which a slip begins (1) and ends (0): its size passes the level."""
     slip, changes, t = solution.states[:, 1] - solution.states[:, 2], Events(), solution.times
     for side in (1, -1):
         excess = side * slip - level

@@ -1,4 +1,4 @@
-"""Runs all rivals in all scenes, each setting in one process, and writes rivals.csv and figure.svg."""
+"""Study that runs all rivals in all scenes, each setting in one process, and writes rivals.csv and figure.svg."""
 
 from collections.abc import Callable, Iterator
 from math import nan
@@ -19,7 +19,7 @@ from .figure import draw
 from .measures import measure
 from .reference_motions import compute_reference_motion
 from .scenes import SCENES
-from .table import rivals_table, sentences
+from .table import rivals_table, summary_lines
 
 FOLDER, FILE, FIGURE = "rivals", "rivals.csv", "figure.svg"
 OWN_MODELS = ("coulomb", "stickslip", "belt", "clutch", "pendulum")
@@ -55,7 +55,7 @@ def run_rivals(names: tuple[str, ...], timeout: float, out: Path, report: Callab
         draw(comparison, folder / FIGURE)
         write_provenance(folder, map(find_fmu, OWN_MODELS), scene=versions(comparison), source=source)
         tables, text = read_cells(rivals_table(comparison)), "Error over processor time of each rival, by scene"
-        write_summary(folder, Summary("rivals", "Scenes", tuple(sentences(comparison)), tables, text))
+        write_summary(folder, Summary("rivals", "Scenes", tuple(summary_lines(comparison)), tables, text))
     return comparison
 
 
@@ -74,7 +74,7 @@ def run_rival(rival: Rival, references: dict[str, Solution], timeout: float) -> 
 
 
 def run_in_child(cases: list[RivalCase], timeout: float) -> list[RivalReply]:
-    """Run cases in one process. A crash and a hang are gaps, after which another process goes on."""
+    """Run cases in one process. After a crash or a timeout, which is a gap, another process continues."""
     replies: list[RivalReply] = []
     with ChildProcess(f"{__package__}.child") as child:
         for case in cases:
@@ -92,9 +92,9 @@ def versions(comparison: Comparison) -> dict[str, str]:
 
 def save(comparison: Comparison, path: Path) -> None:
     """Write one row for each rival, setting and scene."""
-    heads = ["scene", "unit of the error", "rival", "version", "setting", *MEASURES, "relative processor time"]
+    headings = ["scene", "unit of the error", "rival", "version", "setting", *MEASURES, "relative processor time"]
     write_csv_rows(
-        path, [*heads, "lines of code", "gap"], (csv_row(comparison, result) for result in comparison.results)
+        path, [*headings, "lines of code", "gap"], (csv_row(comparison, result) for result in comparison.results)
     )
 
 

@@ -1,4 +1,4 @@
-"""The table of all rivals, and the sentences about it."""
+"""The table of all rivals, and its summary."""
 
 from collections.abc import Iterator
 
@@ -13,7 +13,7 @@ EXACT = 1e-9  # in the unit of the error
 
 
 def rivals_table(comparison: Comparison) -> Table:
-    """Return the table, the most exact rival of each scene first."""
+    """Return the table, the most accurate rival of each scene first."""
     table = Table(box=None, padding=(0, 1, 0, 0))
     table.add_column("rival, setting", no_wrap=True)
     for name in ("error", "creep", "lost/extra", "late", "steps", "time", "lines"):
@@ -43,8 +43,8 @@ def cells(comparison: Comparison, result: Result) -> list[str]:
     ]
 
 
-def sentences(comparison: Comparison) -> Iterator[str]:
-    """Yield who is exact, the settings, the purposes and the gaps."""
+def summary_lines(comparison: Comparison) -> Iterator[str]:
+    """Yield sentences on exact rivals, settings, purposes and gaps."""
     exact = exact_rivals(comparison)
     if exact:
         yield f"Exact to {EXACT:g} in every scene, without missed or spurious events: {'; '.join(exact)}."
@@ -61,7 +61,7 @@ def sentences(comparison: Comparison) -> Iterator[str]:
 
 
 def exact_rivals(comparison: Comparison) -> list[str]:
-    """Return the rivals and settings that are exact in every scene; those of others first."""
+    """Return the rivals and settings that are exact in every scene, the FMU last."""
     groups: dict[str, list[Result]] = {}
     for result in comparison.results:
         groups.setdefault(f"{result.rival} ({result.setting})", []).append(result)

@@ -1,4 +1,4 @@
-"""Drake's MultibodyPlant: a ball that rubs on the ground, with steps (time_step > 0) or continuous (time_step = 0).
+"""Drake's MultibodyPlant: a ball that slides on the ground, with steps (time_step > 0) or continuous (time_step = 0).
 
 Contacts have static and dynamic friction, regularised below stiction_tolerance; joints have no dry friction.
 """
