@@ -37,7 +37,7 @@ RIGHT_COLUMN = ("phase", "steps")  # plots in the right column; plots over time 
 CONTACT_HEIGHT = 0.12  # of a row of the panel with all contacts, in heights of a panel
 LIMITS = np.array([[1.01, -0.01], [-0.01, 1.01]])  # limits of a time axis from start and stop, with a margin of 1 %
 CURVE_POINTS = 1000  # points of a smooth curve
-MAX_MARKED = 100  # most reversals that are marked; more are indistinguishable
+MAX_MARKED = 100  # reversals that are marked; more would be indistinguishable
 PUBLISHED_PEAKS = {"sample_0": 0, "x_0": 0, "sample_n": -1, "x_n": -1}  # published value and index of its turning point
 PEAK_LEVELS = {"velocity": "peak_speed", "acceleration": "peak_acceleration"}
 
@@ -169,12 +169,10 @@ def mark_modes(axes: Axes, run: Trajectory, contact: str) -> None:
     for begin, end in run.sticking[contact]:
         axes.axvspan(begin, end, color=GREY, alpha=0.15, linewidth=0, label="stuck")
     times, modes = run.events.changes(contact)
-    turns = times[1:][(modes[1:] != 0) & (modes[1:] == -modes[:-1])]
-    if 0 < len(turns) <= MAX_MARKED:
-        t, y = (
-            np.repeat(turns, 3),
-            np.tile([0.0, 1.0, np.nan], len(turns)),
-        )  # one artist: layout would measure each of many
+    reversals = times[1:][(modes[1:] != 0) & (modes[1:] == -modes[:-1])]
+    if 0 < len(reversals) <= MAX_MARKED:
+        # one artist for all reversals, because the layout measures every artist
+        t, y = np.repeat(reversals, 3), np.tile([0.0, 1.0, np.nan], len(reversals))
         transform = axes.get_xaxis_transform()
         axes.plot(t, y, color=GREY, linewidth=0.5, linestyle=":", label="reversal", transform=transform)
 
@@ -225,11 +223,11 @@ def envelope(decay: Any, value: float) -> np.ndarray:
 def add_legend(axes: Axes) -> None:
     """Put a legend without duplicates above the panel."""
     handles, labels = axes.get_legend_handles_labels()
-    once = dict(zip(labels, handles, strict=True))
-    if once:
-        axes.legend(once.values(), once, **LEGEND_ABOVE, ncols=len(once))
+    entries = dict(zip(labels, handles, strict=True))
+    if entries:
+        axes.legend(entries.values(), entries, **LEGEND_ABOVE, ncols=len(entries))
         title = axes.get_title(loc="left")
-        if len(title) + sum(len(text) + HANDLE_WIDTH for text in once) > LINE_WIDTH:
+        if len(title) + sum(len(text) + HANDLE_WIDTH for text in entries) > LINE_WIDTH:
             axes.set_title(title, pad=TITLE_PAD)
 
 

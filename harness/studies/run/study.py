@@ -1,4 +1,4 @@
-"""Runs of one scene, of all published scenes, and of an FMU given by its path.
+"""Study that runs one scene, all published scenes, or an FMU given by its path.
 
 Analyses and plots are imported only when a scene requests them.
 """
@@ -22,14 +22,14 @@ from ...scenes.run_spec import RunSpec
 from ...scenes.scene import MAX_DEFAULT_PLOTS, Scene, default_plots, is_panel, load_scene, shipped_scenes
 from .table import SceneOutcome, summarize_quantities, write_quantities
 
-FILES = (
+FILES = (  # of a result folder; earlier versions wrote figures.csv
     "trajectory.csv",
     "steps.csv",
     "events.csv",
     "quantities.csv",
     "figure.svg",
     "figures.csv",
-)  # a result folder may hold; earlier versions wrote figures.csv
+)
 
 
 def decay(run: Trajectory, scene: Scene) -> Any:
@@ -104,7 +104,7 @@ def run_and_write(scene: Scene, folder: Path, report: Callable[[float], None]) -
 
 
 def check_steps(scene: Scene, run: Trajectory) -> None:
-    """Check that the FMU exposes its solver steps if the scene needs them."""
+    """Raise SceneError if the scene needs solver steps that the FMU does not expose."""
     panels = [name for name in scene.plots if is_panel(name, scene.run.outputs)]
     if run.steps is None and "steps" in (*scene.analyses, *panels):
         raise SceneError(
@@ -113,7 +113,7 @@ def check_steps(scene: Scene, run: Trajectory) -> None:
 
 
 def check_published(scene: Scene, quantities: tuple[Quantity, ...]) -> None:
-    """Check that every published value has a measured quantity with a compatible unit."""
+    """Raise SceneError unless every published value has a measured quantity with a compatible unit."""
     quantities_by_name = {quantity.name: quantity for quantity in quantities}
     for name, value in scene.published.items():
         if name == "source":

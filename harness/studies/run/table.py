@@ -54,40 +54,40 @@ def results_table(outcomes: Iterable[SceneOutcome], everything: bool) -> Table:
         table.add_row(title, *("", "", Text("\n" + published.get("source", ""), style="italic"))[: width - 1])
         for quantity in outcome.quantities:
             if everything or quantity.name in published or quantity.name in ALWAYS_SHOWN:
-                cells = row(quantity, published.get(quantity.name))
+                cells = quantity_row(quantity, published.get(quantity.name))
                 table.add_row(*map(Text, cells[:width]))
                 table.caption = OTHER_MACHINE if cells[-1] == "other CPU" else table.caption
     return table
 
 
-def row(quantity: Quantity, figure: object) -> tuple[str, str, str, str, str]:
+def quantity_row(quantity: Quantity, published_value: object) -> tuple[str, str, str, str, str]:
     """Return description, measured value, unit, published value and difference, in the unit of the published value."""
     text, value, unit = f"  {quantity.text}", quantity.value, quantity.unit
-    if isinstance(figure, tuple):
-        figure, unit = figure
+    if isinstance(published_value, tuple):
+        published_value, unit = published_value
         value = quantity.to_unit(unit)
-    if not isinstance(figure, int | float):
+    if not isinstance(published_value, int | float):
         measured, unit = quantity.format()
-        return text, measured, unit, str(figure or ""), ""
-    published = repr(figure)
+        return text, measured, unit, str(published_value or ""), ""
+    published = repr(published_value)
     measured = format_number(value, max(5, len(published.replace(".", "").lstrip("0"))))
-    percent = deviation(quantity, (figure, unit))
+    percent = deviation(quantity, (published_value, unit))
     difference = "" if percent is None else f"{percent:+.2g} %"
     difference = "other CPU" if quantity.name == "run_time" else difference
     return text, measured, "" if unit == "1" else unit, published, difference
 
 
-def deviation(quantity: Quantity, figure: object) -> float | None:
+def deviation(quantity: Quantity, published_value: object) -> float | None:
     """Return the difference from a published value in percent, with two digits; None for texts, zeros and run times."""
-    value, unit = figure if isinstance(figure, tuple) else (figure, quantity.unit)
+    value, unit = published_value if isinstance(published_value, tuple) else (published_value, quantity.unit)
     if not isinstance(value, int | float) or not value or quantity.name == "run_time":
         return None
     return float(f"{100 * (quantity.to_unit(unit) / value - 1):.2g}")
 
 
 def quantity_rows(quantities: Iterable[Quantity], published: dict[str, Any]) -> list[tuple[str, ...]]:
-    """Return description, measured value, unit, and with published values these and the differences."""
-    rows = [row(quantity, published.get(quantity.name)) for quantity in quantities]
+    """Return description, measured value and unit, and with published values also these and the differences."""
+    rows = [quantity_row(quantity, published.get(quantity.name)) for quantity in quantities]
     return [(text.strip(), *cells)[: len(quantity_headings(published))] for text, *cells in rows]
 
 
@@ -125,7 +125,7 @@ def round_run_time(cells: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def judge_deviations(quantities: Iterable[Quantity], published: dict[str, Any], run: Trajectory) -> Outcome | None:
-    """Return the largest difference from a published value, and why the steps of a law that chatters differ."""
+    """Return the largest difference from a published value, with a reason if the law chatters."""
     differences = [(deviation(quantity, published.get(quantity.name)), quantity.text) for quantity in quantities]
     deviations = [(percent, name) for percent, name in differences if percent is not None]
     if not deviations:
