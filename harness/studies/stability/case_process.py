@@ -29,13 +29,13 @@ def solve_reference(model: str, spans: list[Any], grid: dict[str, Any]) -> Solut
 
 def find_modes(model: str) -> list[str]:
     """Return the modes of a model; HarnessError if it has no position with a speed."""
-    carried: Any = load_model_class(find_fmu(model))
-    if not {*carried.states} & {*carried.states.values()}:
+    model_class: Any = load_model_class(find_fmu(model))
+    if not {*model_class.states} & {*model_class.states.values()}:
         raise HarnessError(f"{model}: no state is the rate of another one; the cases need a position and a speed")
-    return list(carried.contacts)
+    return list(model_class.contacts)
 
 
-ANSWERS: dict[str, Callable[..., Any]] = {
+HANDLERS: dict[str, Callable[..., Any]] = {
     "modes": find_modes,
     "reference": solve_reference,
     "steps": lambda run, calls, changes: run_steps(read_run(run), calls, dict(changes)),
@@ -44,4 +44,4 @@ ANSWERS: dict[str, Callable[..., Any]] = {
 
 
 if __name__ == "__main__":
-    RequestServer().serve(lambda request: ANSWERS[request[0]](**request[1]))
+    RequestServer().serve(lambda request: HANDLERS[request[0]](**request[1]))

@@ -17,12 +17,15 @@ RTOL = 1e-6
 POINTS = 200
 LOOSE = 3e-2  # allowed error at RTOL for user models, where errors may accumulate from slip to slip
 DRIVING = ("F_ext", "T_ext", "v_driver")  # variables that supply energy to the shipped models
-OWN = ("start", "stop", "rtol", "calls")  # keys that `each` may vary besides values
+RUN_KEYS = ("start", "stop", "rtol", "calls")  # keys other than values that `each` may vary
 
 
 @dataclass(frozen=True)
 class StabilityCase:
-    """One scene with one method: `max_error` is the allowed error, `expected_message` part of the expected message."""
+    """One scene with one method.
+
+    `max_error` is the allowed error, and `expected_message` is part of the expected error message.
+    """
 
     title: str
     model: str
@@ -62,8 +65,11 @@ def load_scenes(file: Path = FILE) -> tuple[list[dict[str, Any]], dict[str, floa
 
 
 def generic_scenes(model: str, info: FmuInfo, has_comparable_events: bool) -> list[dict[str, Any]]:
-    """Return scenes for a user model: parameters scaled by 0.1 and 10, tolerances, few communication steps, and values
-    that are not finite.  `has_comparable_events`: whether its events are comparable."""
+    """Return scenes for a user model.
+
+    They scale its parameters by 0.1 and 10, vary tolerances, use a single communication step, and set values that are
+    not finite. If `has_comparable_events` is false, events are not compared.
+    """
     common = {"model": model, "either": True, "driven": True, "events": "all" if has_comparable_events else "none"}
     parameters = {
         n: x for n, x in info.start_values.items() if x and n not in info.enumerations and not n.startswith("solver.")
@@ -92,7 +98,7 @@ def expand_scene(scene: dict[str, Any]) -> Iterator[dict[str, Any]]:
             continue
         ((name, values),) = scene["each"].items()
         for value in values:
-            varied_keys = {name: value} if name in OWN else {"values": {**scene.get("values", {}), name: value}}
+            varied_keys = {name: value} if name in RUN_KEYS else {"values": {**scene.get("values", {}), name: value}}
             label = value if name != "calls" else ", then ".join(f"{h!r} s from {t!r} s" for t, h in value)
             labels = {"title": scene["title"].format(label), "pattern": scene["title"], "varied": value}
             yield {**scene, **varied_keys, "model": model, **labels}

@@ -13,9 +13,22 @@ FINISHED, REFUSED, WRONG = "finished", "refused", "wrong"
 
 @dataclass(frozen=True)
 class CaseOutcome:
-    """Outcome of a case: `ended` is finished, refused or wrong; `text` is the message of the FMU or the reason.
+    """Outcome of a case.
 
-    `error` and `energy_rise` (without external work) are relative to the largest values; NaN if undefined.
+    Attributes
+    ----------
+    case : StabilityCase
+        The case.
+    ended : str
+        FINISHED, REFUSED or WRONG.
+    text : str
+        Message of the FMU, or reason why the outcome is wrong.
+    error : float
+        Largest error relative to the largest value; NaN if undefined.
+    energy_rise : float
+        Rise of the energy without external work, relative to its largest value; NaN if undefined.
+    motion : Trajectory or None
+        Run of the case, if it finished.
     """
 
     case: StabilityCase

@@ -1,4 +1,4 @@
-"""Runs stiff and extreme cases: each must finish within its error bound or be rejected with a message, never hang.
+"""Study of stiff and extreme cases: each must finish within its error bound or be rejected with a message, never hang.
 
 Scenes and expected outcomes are in stability.toml, references are independent of the FMUs, and every run has a time
 limit in a separate process.
@@ -126,7 +126,7 @@ def run_group(group: Iterable[StabilityCase], process: ChildProcess) -> Iterator
                         raise
                     reference_error = str(error)  # the run may reject such values
             times = reference.times.tolist() if reference else case.grid.times(())
-            calls = case.calls or [(t, ahead - t) for t, ahead in pairwise(times)]
+            calls = case.calls or [(t, next_t - t) for t, next_t in pairwise(times)]
             outcome = run_case(case, calls, process)
             if isinstance(outcome, RefusedRun):
                 yield judge_refusal(case, outcome)
@@ -154,8 +154,8 @@ def run_case(case: StabilityCase, calls: CommunicationSteps, process: ChildProce
         return RefusedRun(**reply)
     columns = {name: np.array(column) for name, column in reply["columns"].items()}
     run, statistics = replace(case.run, outputs=tuple(columns)), Statistics(**reply["statistics"])
-    described = reply["units"], reply["descriptions"], reply["parameters"]
-    return Trajectory(run, np.array(reply["time"]), columns, *described, statistics=statistics)
+    metadata = reply["units"], reply["descriptions"], reply["parameters"]
+    return Trajectory(run, np.array(reply["time"]), columns, *metadata, statistics=statistics)
 
 
 def judge_injections(case: StabilityCase, ending: RefusalSummary) -> CaseOutcome:
@@ -216,9 +216,9 @@ def stability_regions(rows: Iterable[CaseOutcome]) -> list[StabilityRegion]:
 
 def write_table(rows: list[CaseOutcome], path: Path) -> None:
     """Write stability.csv with one line per case."""
-    heads = ["model", "scene", "method", "expected", "ended", "error [1]", "energy rise [1]"]
-    heads += ["events", "steps", "rejected", "evaluations", "run time [s]", "sentence"]
-    write_csv_rows(path, heads, map(table_line, rows))
+    headings = ["model", "scene", "method", "expected", "ended", "error [1]", "energy rise [1]"]
+    headings += ["events", "steps", "rejected", "evaluations", "run time [s]", "sentence"]
+    write_csv_rows(path, headings, map(table_line, rows))
 
 
 def table_line(row: CaseOutcome) -> list[Any]:
