@@ -1,6 +1,7 @@
 """Known boundaries in the parameter space of a model, drawn into the map of a sweep.
 
-An FMU contains them as documentation/boundaries.toml; the source is a file beside the model, such as `stickslip.toml`:
+An FMU contains them as documentation/boundaries.toml; the source is a file in the folder of the model, such as
+`stickslip.toml`:
 
     [[boundaries]]
     text = "first break-away at the stop, v_driver = mu_s m g/(k t)"     label
@@ -68,12 +69,12 @@ class Arithmetic:
 
 
 def parse_arithmetic(text: str) -> Arithmetic:
-    """Parse numbers, names, + - * /, parentheses and `FUNCTIONS`; the text is never run as Python.
+    """Parse numbers, names, + - * /, parentheses and `FUNCTIONS`. The text is never executed as Python.
 
     Raises
     ------
     ValueError, SyntaxError
-        If the text is anything else, or too long or too deeply nested.
+        If the text contains anything else, or is too long or too deeply nested.
     """
     if len(text) > MAX_LENGTH:
         raise ValueError(f"it has {len(text)} characters, more than {MAX_LENGTH}")

@@ -23,7 +23,17 @@ BLOCK_SIZE = 1000  # runs read or written at a time
 
 @dataclass(frozen=True)
 class RunBlock:
-    """Runs from number `first` on: `values` (runs, columns), NaN for failed runs, and error `messages` by index."""
+    """Block of consecutive runs.
+
+    Attributes
+    ----------
+    first : int
+        Number of the first run.
+    values : numpy.ndarray
+        Values (runs, columns); NaN for failed runs.
+    messages : dict
+        Error messages by index in the block.
+    """
 
     first: int
     values: np.ndarray
@@ -41,7 +51,7 @@ class Checkpoint:
     Parameters
     ----------
     path : pathlib.Path
-        File of values and status. The error messages are beside it, with the suffix ``.messages``.
+        File of values and status. The error messages are in a file of the same name with the suffix ``.messages``.
     runs, columns : int
         Number of runs, and of values per run.
 
@@ -53,7 +63,7 @@ class Checkpoint:
     Attributes
     ----------
     damaged : bool
-        Whether the files found were damaged and are not used.
+        Whether existing files were damaged, so that they are not used.
     n_done : int
         Number of finished and failed runs.
     """
@@ -66,7 +76,7 @@ class Checkpoint:
 
     def read(self) -> None:
         """Read how many runs are done."""
-        with self.os_errors_reported():
+        with self.convert_os_errors():
             self.unmap()
             exists = self.path.exists()
             is_intact = exists and self.is_intact()
@@ -74,7 +84,7 @@ class Checkpoint:
             self.n_done = int(np.count_nonzero(self.array["status"])) if is_intact else 0
 
     @contextmanager
-    def os_errors_reported(self) -> Iterator[None]:
+    def convert_os_errors(self) -> Iterator[None]:
         """Convert OSError to HarnessError."""
         try:
             yield
@@ -122,14 +132,14 @@ class Checkpoint:
         At the end they are deleted if no run is done.  Raises HarnessError if another command has them open.
         """
         with ExitStack() as files:
-            with self.os_errors_reported():
+            with self.convert_os_errors():
                 self.path.parent.mkdir(parents=True, exist_ok=True)
                 self.message_file = files.enter_context(self.message_path.open("ab"))
                 try:
                     files.enter_context(lock_path(self.message_path))
                 except BlockingIOError:
                     raise HarnessError("another command runs this sweep; wait until it has finished") from None
-                self.read()  # again: another command may have finished meanwhile
+                self.read()  # again: another command may have finished runs meanwhile
                 if not self.n_done:
                     self.create()
             try:
@@ -142,7 +152,7 @@ class Checkpoint:
     def create(self) -> None:
         """Create the array, with the status MISSING for each run, and remove all messages.
 
-        The zeros are written, not left out: a full disk is an error here, but ends the process when a map is written.
+        The file is filled with zeros: a full disk is an error here, but would end the process at a write to the map.
         """
         self.unmap()
         self.message_file.seek(0)
@@ -159,7 +169,7 @@ class Checkpoint:
         """Write the runs of a block: messages and values first, then the status."""
         runs = self.array[block.first : block.last]
         status = np.full(len(runs), FINISHED)
-        with self.os_errors_reported():
+        with self.convert_os_errors():
             for index, message in block.messages.items():
                 status[index] = FAILED + self.message_file.tell()
                 self.message_file.write(json.dumps(message).encode() + b"\n")
@@ -177,7 +187,7 @@ class Checkpoint:
         sentences = [""] * len(status)
         if len(failed):
             try:
-                with self.os_errors_reported(), self.message_path.open("rb") as file:
+                with self.convert_os_errors(), self.message_path.open("rb") as file:
                     for index in failed:
                         file.seek(int(status[index]) - FAILED)
                         sentences[index] = json.loads(file.readline())

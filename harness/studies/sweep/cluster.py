@@ -10,7 +10,7 @@ from typing import Any
 from ...errors import HarnessError, first_line
 from ...process.interruptible_wait import wait_for_any
 
-WORKER_TIMEOUT = 60.0  # s without any worker
+WORKER_TIMEOUT = 60.0  # s without a worker, after which the sweep ends
 EXTRA = "python -m pip install 'friction-fmus[sweep]'"
 
 
@@ -67,5 +67,5 @@ def connect_cluster(address: str, unload: Callable[[], None]) -> Iterator[DaskCl
             yield cluster
         finally:
             cluster.pool.shutdown(wait=False)
-            with suppress(Exception):  # a worker may be gone
+            with suppress(Exception):  # a worker may have ended
                 client.run(unload)

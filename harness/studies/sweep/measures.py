@@ -18,7 +18,7 @@ from ...running.trajectory import Trajectory
 from ...running.variable_values import variable_unit
 from ...scenes.roles import find_roles
 
-N_STEPS = 400  # communication steps along a trajectory, besides the internal steps
+N_STEPS = 400  # communication steps along a trajectory, in addition to the internal steps
 
 
 @dataclass(frozen=True)
@@ -94,8 +94,8 @@ def rest(run: Trajectory) -> float:
 
 def unsteady(run: Trajectory) -> float:
     driver = run.get_parameter("v_driver", "the measure 'unsteady'")
-    late = run.column_of_role("velocity")[2 * run.time > run.time[0] + run.time[-1]]
-    return float(np.ptp(late) / 2 / abs(driver)) if driver else np.nan
+    second_half = run.column_of_role("velocity")[2 * run.time > run.time[0] + run.time[-1]]
+    return float(np.ptp(second_half) / 2 / abs(driver)) if driver else np.nan
 
 
 def evaluate_decay(run: Trajectory, law: Callable[[float, float, float], float]) -> float:
@@ -136,9 +136,8 @@ TRAJECTORY_MEASURES = {
     "zeta": TrajectoryMeasure(("c",), "1", "damping ratio by logarithmic decrement", zeta, decay=True),
     "f_over_k": TrajectoryMeasure(("mode",), "", ENVELOPE, f_over_k, decay=True, role="position"),
 }
-OUTPUT_MEASURES: dict[
-    str, tuple[Callable[[np.ndarray], Any], str]
-] = {  # of every recorded output: function and description
+# of every recorded output: function and description
+OUTPUT_MEASURES: dict[str, tuple[Callable[[np.ndarray], Any], str]] = {
     "final": (lambda column: column[-1], "at the end"),
     "smallest": (np.min, "smallest at the points of the run"),
     "largest": (np.max, "largest at the points of the run"),

@@ -1,4 +1,4 @@
-"""Runs a sweep and writes its files: sweep.nc for xarray, sweep.csv with the same content, and the figure.
+"""Study that runs a sweep and writes its files: sweep.nc for xarray, sweep.csv with the same content, and the figure.
 
 Values are read from the checkpoint and written in parts, so that memory does not grow with the number of runs.
 Contents of sweep.nc:
@@ -51,7 +51,17 @@ NUMBER = re.compile(r"-?\b\d+\.?\d*(e[-+]?\d+)?")
 
 @dataclass(frozen=True)
 class FailureGroup:
-    """Number of runs with the same error message up to numbers; `sentence` and `where` are those of the first run."""
+    """Runs that failed with the same error message, except for numbers in it.
+
+    Attributes
+    ----------
+    runs : int
+        Number of runs.
+    sentence : str
+        Error message of the first run.
+    where : dict
+        Varied values of the first run.
+    """
 
     runs: int
     sentence: str
@@ -139,7 +149,8 @@ def run_sweep(
         "seed": points.seed,
         "measures": runs.measures,
     }
-    with replace_folder(folder, FILES, source) as new_folder:  # before the runs, so that conflicts are reported at once
+    # opened before the runs, so that conflicts are reported at once
+    with replace_folder(folder, FILES, source) as new_folder:
         seconds = run_pending(sweep, checkpoint, scheduler, workers, report)
         failures = write_files(sweep, checkpoint, about, new_folder)
         write_provenance(new_folder, [file], about.constants, options, source=source)

@@ -33,7 +33,17 @@ from .measures import (
 
 @dataclass(frozen=True)
 class SweepSpec:
-    """What the runs of a sweep share: the `run` without the `varied` values, and `measures` (empty: default ones)."""
+    """Settings that the runs of a sweep share.
+
+    Attributes
+    ----------
+    run : RunSpec
+        The run, without the varied values.
+    varied : tuple of str
+        Names of the varied parameters.
+    measures : tuple of str
+        Names of the measures; empty for the default ones.
+    """
 
     run: RunSpec
     varied: tuple[str, ...]
@@ -56,10 +66,10 @@ class OwnFmuRunner:
         plan = plan_run(replace(runs.run, outputs=outputs), fmu_description)
         self.stop = plan.grid.stop
         ends = [name for name in measures if name in FINAL_MEASURES]
-        self.along = [
+        self.trajectory_measures = [
             name for name in measures if name in TRAJECTORY_MEASURES or (name in OUTPUT_MEASURES and name != "final")
         ]
-        if self.along:
+        if self.trajectory_measures:
             step = (plan.grid.stop - plan.grid.start) / N_STEPS
             plan = plan_run(replace(plan.spec, grid=step, follow=True), fmu_description)
         self.plan, shared = plan, {variable.name: value for variable, value in plan.settings}
@@ -68,7 +78,9 @@ class OwnFmuRunner:
         self.columns = measure_columns(measures, self.variables, outputs)
         read = [
             column.name
-            for column in measure_columns(["final", *ends, "run_time", *self.along], self.variables, outputs)
+            for column in measure_columns(
+                ["final", *ends, "run_time", *self.trajectory_measures], self.variables, outputs
+            )
         ]
         self.order = [read.index(column.name) for column in self.columns]
 
@@ -85,12 +97,12 @@ class OwnFmuRunner:
     def measure_run(self, point: Sequence[float]) -> list[float]:
         """Return the measures; raise an exception if the run fails."""
         self.runs.start(point)
-        start_time, along = perf_counter(), []
-        if self.along:
+        start_time, trajectory_values = perf_counter(), []
+        if self.trajectory_measures:
             recorded = record_run(self.plan, self.session, lambda share: None)
             trajectory = build_trajectory(self.plan, self.session, recorded, 0.0)
-            for name in self.along:
-                along += (
+            for name in self.trajectory_measures:
+                trajectory_values += (
                     measure_outputs(name, trajectory.columns)
                     if name in OUTPUT_MEASURES
                     else [TRAJECTORY_MEASURES[name].measure(trajectory)]
@@ -98,7 +110,7 @@ class OwnFmuRunner:
         else:
             self.runs.step_to_stop()
         seconds = perf_counter() - start_time
-        values = [*self.runs.read(), seconds, *along]
+        values = [*self.runs.read(), seconds, *trajectory_values]
         return [values[i] for i in self.order]
 
     def constants(self) -> dict[str, tuple[object, str]]:

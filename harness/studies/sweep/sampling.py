@@ -22,7 +22,7 @@ class SweepAxis:
     log: bool = False
 
     def __str__(self) -> str:
-        """Describe the axis for readers; `sweep.nc` holds all values."""
+        """Describe the axis in words; `sweep.nc` holds all values."""
         return f"{len(self.values)} values, {self.values[0]!r} to {self.values[-1]!r}{', logarithmic' * self.log}"
 
 
@@ -86,9 +86,12 @@ def evenly_spaced(low: float, high: float, count: int, ratio: bool) -> tuple[flo
 
 @dataclass(frozen=True)
 class SweepPoints:
-    """The points of a sweep: a grid, computed on demand with the last axis fastest, or `random` points of a Latin
-    hypercube, held in memory.
+    """Points of a sweep: a grid, or `random` points of a Latin hypercube.
 
+    Grid points are computed on demand, with the last axis fastest; random points are held in memory.
+
+    References
+    ----------
     M. D. McKay, R. J. Beckman, W. J. Conover, Technometrics 21 (1979).
     """
 
@@ -109,7 +112,7 @@ class SweepPoints:
 
     @property
     def n_runs(self) -> int:
-        """Return the number of points, before the check also one that is too large for len()."""
+        """Return the number of points; unlike len(), also a number that is too large."""
         return prod(len(axis.values) for axis in self.axes) if self.random is None else self.random
 
     def __len__(self) -> int:

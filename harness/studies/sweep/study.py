@@ -1,4 +1,4 @@
-"""Runs a sweep: one FMU, many points, many workers, and a checkpoint that survives a kill.
+"""Runs of a sweep: one FMU, many points, many workers, and a checkpoint that survives a kill.
 
 Every finished block of runs is written to the checkpoint, so that the same command resumes an interrupted sweep.
 Results do not depend on the worker or the order of execution, and only the blocks in progress are held in memory.  A
@@ -39,7 +39,7 @@ Span = tuple[int, int]  # range of runs: first, and one after the last
 
 @dataclass(frozen=True)
 class Sweep:
-    """A sweep: `runs` at `points` with the FMU as bytes; each run has `columns` values."""
+    """A sweep: the settings of its `runs`, its `points`, the content of the FMU, and the number of `columns`."""
 
     runs: SweepSpec
     points: SweepPoints
@@ -54,7 +54,7 @@ class Sweep:
     @cached_property
     def key(self) -> str:
         """Return a key that identifies the sweep."""
-        run = self.runs.run.options | {"model": self.runs.run.model}  # wherever the FMU is
+        run = self.runs.run.options | {"model": self.runs.run.model}  # the folder of the FMU does not matter
         identity = [run, self.runs.varied, self.runs.measures, asdict(self.points), self.digest]
         return sha256(json.dumps(identity, sort_keys=True).encode()).hexdigest()[:16]
 
@@ -65,7 +65,7 @@ class Sweep:
 def run_pending(
     sweep: Sweep, checkpoint: Checkpoint, scheduler: str | None, workers: int | None, report: Callable[[float], None]
 ) -> float:
-    """Do the remaining runs and write them to the checkpoint; return the elapsed time in s."""
+    """Do the missing runs and write them to the checkpoint; return the elapsed time in s."""
     start = perf_counter()
     if not checkpoint.missing_spans:
         return 0.0
@@ -85,7 +85,7 @@ def run_pending(
 
 
 class InProcess:
-    """Runs tasks at once in this process, for callers that do not want worker processes."""
+    """Runs tasks at once in this process, for callers without worker processes."""
 
     size = 1
     death_errors: tuple[type[Exception], ...] = ()

@@ -12,7 +12,7 @@ from .runner import Runner, SweepSpec, open_runner
 
 BUSY = Lock()  # a pythonfmu FMU must be used by one thread at a time
 LOADED: dict[tuple[str, str], Runner] = {}  # the runner of the current sweep, by its specification and FMU
-RESOURCES = ExitStack()  # its resources
+RESOURCES = ExitStack()  # of this runner
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class BlockResult:
 
 
 def run_block(points: np.ndarray, runs: SweepSpec, digest: str, fmu: bytes) -> BlockResult | None:
-    """Run a block with the FMU of a digest; return None if the FMU is neither loaded nor passed."""
+    """Run a block with the FMU of this digest; return None if that FMU is neither loaded nor passed in `fmu`."""
     with BUSY:
         runner = LOADED.get((repr(runs), digest))
         if not runner:
