@@ -14,7 +14,7 @@ if __name__ == "__main__":
     gc.disable()  # objects of a build live until its end; collecting garbage takes a tenth of the build time
 
     def load_command() -> Any:
-        from build_fmus import main  # where a signal is handled, because the imports take half a second
+        from build_fmus import main  # imported here, where run_command handles signals: it takes half a second
 
         return main
 
@@ -38,9 +38,8 @@ from harness.process.temporary_directory import temporary_directory
 
 HERE = Path(__file__).parent
 SCENES = HERE / "harness" / "scenes"
-FMUS = (
-    HERE / "fmus" if (HERE / "pyproject.toml").is_file() else Path("fmus")
-)  # an installed package builds into the current folder
+# an installed package builds into the current folder
+FMUS = HERE / "fmus" if (HERE / "pyproject.toml").is_file() else Path("fmus")
 
 
 @click.command(context_settings={"help_option_names": ["-h", "--help"]})
@@ -51,7 +50,7 @@ FMUS = (
 @click.option(
     "--web",
     is_flag=True,
-    help="Write a page that runs the models in a browser, web/index.html, instead of FMUs; with --more web/more.html.",
+    help="Write web/index.html (web/more.html with --more), a page that runs the models in a browser, instead of FMUs.",
 )
 @click.option(
     "--method",
@@ -74,7 +73,7 @@ FMUS = (
 @click.option(
     "--release",
     type=click.Path(file_okay=False, path_type=Path),
-    help="Write one zip file with the FMUs of every kind, the live page, references, licences and checksums.",
+    help="Write one zip file with all FMUs, the live page, references, licences and checksums.",
 )
 @click.option(
     "--stages",
@@ -98,7 +97,7 @@ def main(
     """Build an FMU for each model NAME or model file FILE.py; without arguments, for the five models
     of fmus.  FMUs of fmus/more are written there.
 
-    Prints file size, import time in Python, and SHA-256 digest.
+    The command prints the size of each file, its import time in Python, and the first digits of its SHA-256 digest.
 
     \b
     Examples:
@@ -120,7 +119,8 @@ def main(
         raise CommandLineError(
             "--stages writes texts, not FMUs: remove --native, --web, --platform, --out and --fmi 3."
         )
-    compiled, kind = compiled or fmi == "3", "native/fmi3" if fmi == "3" else "native" if compiled else ""
+    compiled = compiled or fmi == "3"
+    subfolder = "native/fmi3" if fmi == "3" else "native" if compiled else ""
     try:
         names = models if models and not more else (*models, *(more_model_names() if more else model_names()))
         sources = {model: find_model(model) for model in names}
@@ -138,7 +138,7 @@ def main(
         print_summary(path)
         return
     if stages is not None:
-        from fmus.packaging.stages import write_stages  # imported late, as the C compiler is
+        from fmus.packaging.stages import write_stages  # needs the C compiler, an optional package
 
         for source in sources.values():
             try:
@@ -147,20 +147,20 @@ def main(
                 raise click.ClickException(str(error)) from error
         return
     for model, source in sources.items():
-        folder = out or default_folder(model, source) / kind
+        folder = out or default_folder(model, source) / subfolder
         try:
             if compiled:
                 with show_progress(
                     f"{source.name}: compiling (the first build also compiles the C libraries, half a minute)"
                 ):
                     path = build_native(source.path, folder, methods, laws, platforms, fmi)
-                weight = ""
+                import_time = ""
             else:
                 path = build(source.path, folder, methods, laws, platforms)
-                weight = f"  {1000 * measure_import_time(path):3.0f} ms"
+                import_time = f"  {1000 * measure_import_time(path):3.0f} ms"
         except BuildError as error:
             raise click.ClickException(str(error)) from error
-        print_summary(path, weight)
+        print_summary(path, import_time)
 
 
 def default_folder(model: str, source: ModelFile) -> Path:
@@ -177,16 +177,16 @@ def show_progress(text: str) -> AbstractContextManager[Any]:
     return Console(stderr=True).status(text)
 
 
-def print_summary(path: Path, weight: str = "") -> None:
+def print_summary(path: Path, import_time: str = "") -> None:
     """Print name, size, import time and digest of a file that was built."""
     content = path.read_bytes()
-    click.echo(f"{path.name}  {len(content) / 1000:4.0f} kB{weight}  {sha256(content).hexdigest()[:16]}")
+    click.echo(f"{path.name}  {len(content) / 1000:4.0f} kB{import_time}  {sha256(content).hexdigest()[:16]}")
 
 
 def build_native(
     model: Path, folder: Path, methods: tuple[str, ...], laws: tuple[str, ...], platforms: tuple[str, ...], fmi: str
 ) -> Path:
-    """Build the native FMU; imported late because it needs further packages."""
+    """Build the native FMU; the import is in the function because it needs optional packages."""
     from fmus.packaging.native import build
 
     return build(model, folder, methods, laws, platforms, fmi)
@@ -206,7 +206,7 @@ def release_archive(folder: Path) -> Path:
 def build_page(
     models: list[ModelFile], folder: Path, methods: tuple[str, ...], laws: tuple[str, ...], more: bool
 ) -> Path:
-    """Build the web page that runs the models; that of fmus/more leaves the page of the shipped models as it is."""
+    """Build the web page that runs the models; the page of fmus/more has a file name of its own."""
     from fmus.packaging.web import FILE, MORE_FILE, build
 
     try:
@@ -225,7 +225,7 @@ class CommandLineError(click.ClickException):
 def temporary_files() -> Iterator[None]:
     """Create all temporary files of a build in one directory, which is removed on exit.
 
-    The C compiler caches its own parts in the home directory, or in the temporary directory without one.
+    The C compiler caches its own parts in the home directory or, if there is none, in the temporary directory.
     """
     os.environ.setdefault("HOME", tempfile.gettempdir())
     with temporary_directory("build-") as directory:
