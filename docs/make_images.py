@@ -1,8 +1,8 @@
 """Make the pictures of the documentation in docs/images, and the outputs of its notebook.
 
 `python docs/make_images.py [NAME...]` makes all pictures or those named (without the ending).  Pictures of results are
-the figures that the code blocks of the pages make; those that no command makes are drawn here.  The FMUs must be built,
-for friction-laws those of fmus/more, too; the pictures of the live page and of the report need chromium.
+the figures that the code blocks of the pages write; this script draws the others.  The FMUs must be built, for
+friction-laws also those of fmus/more; the pictures of the live page and of the report need chromium.
 """
 
 import csv
@@ -27,7 +27,7 @@ DOCS = Path(__file__).resolve().parent
 IMAGES = DOCS / "images"
 FMUS = DOCS.parent / "fmus"
 
-# The figures of results: the page whose code blocks make them, and where they are.
+# Figures of results: the page whose code blocks write them, and their paths.
 FIGURES_OF_PAGES = {
     "stickslip": ("tutorials/first_run.md", "results/stickslip/figure.svg"),
     "compare-laws": ("tutorials/first_run.md", "results/compare/*/figure.svg"),
@@ -40,7 +40,7 @@ FIGURES_OF_PAGES = {
     "compare": ("how-to/external_fmus.md", "results/compare/coulomb-coulomb-sign/figure.svg"),
     "my_scene": ("reference/scene_files.md", "results/my_scene/figure.svg"),
 }
-# Those of commands that pages show but do not run.
+# Figures of commands that pages show but do not run: the command and the path.
 FIGURES_OF_COMMANDS = {
     "coulomb": ("run coulomb", "results/coulomb/figure.svg"),
     "pendulum": ("run pendulum", "results/pendulum/figure.svg"),
@@ -54,8 +54,8 @@ def harness(folder: Path, command: str) -> None:
     """Run a command in a folder that has the built FMUs."""
     if not (folder / "fmus").exists():
         (folder / "fmus").symlink_to(FMUS.resolve())
-    words = [sys.executable, "-m", "harness", *command.split(), "--quiet"]
-    subprocess.run(words, cwd=folder, check=True, env=os.environ | {"PYTHONPATH": str(DOCS.parent)})
+    arguments = [sys.executable, "-m", "harness", *command.split(), "--quiet"]
+    subprocess.run(arguments, cwd=folder, check=True, env=os.environ | {"PYTHONPATH": str(DOCS.parent)})
 
 
 def run_blocks_of_page(page: str, folder: Path) -> None:
@@ -65,15 +65,15 @@ def run_blocks_of_page(page: str, folder: Path) -> None:
     working_directory = os.getcwd()
     os.chdir(folder)
     try:
-        faults = run_page(DOCS / page)
+        failures = run_page(DOCS / page)
     finally:
         os.chdir(working_directory)
-    if faults:
-        sys.exit("\n".join(faults))
+    if failures:
+        sys.exit("\n".join(failures))
 
 
 def copy_figure(figure: Path, picture: Path) -> None:
-    """Copy a figure with coordinates of a tenth of a point, which halves long curves."""
+    """Copy a figure, with coordinates rounded to a tenth of a point, which halves the size of long curves."""
     text = figure.read_text(encoding="utf-8")
     text = re.sub(r' d="[^"]*"', lambda line: re.sub(r"(\.\d)\d+", r"\1", line[0]), text)
     picture.write_text(text, encoding="utf-8")
@@ -98,27 +98,27 @@ LIGHT = {"text": "#1f2328", "line": "#d0d7de", "hybrid": "#0072B2", "sign": "#D5
 DARK = {"text": "#e6edf3", "line": "#3d444d", "hybrid": "#4aa8e0", "sign": "#f08a4b"}
 
 
-def columns(path: Path) -> dict[str, np.ndarray]:
-    """The columns of a result, by name without unit."""
+def read_columns(path: Path) -> dict[str, np.ndarray]:
+    """Return the columns (n,) of a CSV file by name without unit."""
     with path.open(newline="") as file:
-        heads, *rows = csv.reader(file)
-    return dict(zip((head.split(" ")[0] for head in heads), np.array(rows, float).T, strict=True))
+        headings, *rows = csv.reader(file)
+    return dict(zip((heading.split(" ")[0] for heading in headings), np.array(rows, float).T, strict=True))
 
 
-def stick(folder: Path) -> None:
-    """The opening picture: true sticking beside sign(v), in a version for light and one for dark pages."""
+def draw_stick(folder: Path) -> None:
+    """Draw the first picture of the pages, a stop with true sticking and with sign(v), for light and for dark pages."""
     runs = {}
     for law in ("hybrid", "sign"):
         (folder / f"{law}.toml").write_text(SCENE.format(law=law))
         harness(folder, f"run {law}.toml")
         result = folder / "results" / law
-        runs[law] = columns(result / "trajectory.csv") | {"steps": columns(result / "steps.csv")["t"]}
+        runs[law] = read_columns(result / "trajectory.csv") | {"steps": read_columns(result / "steps.csv")["t"]}
     for name, colours in (("light", LIGHT), ("dark", DARK)):
-        draw_stick(runs, colours, IMAGES / f"stick-{name}.svg")
+        plot_stick(runs, colours, IMAGES / f"stick-{name}.svg")
 
 
-def draw_stick(runs: dict[str, dict[str, np.ndarray]], colours: dict[str, str], path: Path) -> None:
-    """The motion to a standstill, and three close-ups of the end."""
+def plot_stick(runs: dict[str, dict[str, np.ndarray]], colours: dict[str, str], path: Path) -> None:
+    """Plot the motion to a standstill, the creep and the speed after the stop, and the number of steps."""
     style = {
         "font.size": 10,
         "font.family": "DejaVu Sans",
@@ -139,18 +139,20 @@ def draw_stick(runs: dict[str, dict[str, np.ndarray]], colours: dict[str, str], 
     with plt.rc_context(style):
         figure = plt.figure(figsize=(8.0, 4.7), layout="constrained")
         grid = figure.add_gridspec(2, 3, height_ratios=(1.15, 1.0))
-        whole = figure.add_subplot(grid[0, :])
+        position = figure.add_subplot(grid[0, :])
         creep, speed, count = (figure.add_subplot(grid[1, i]) for i in range(3))
         for law in ("sign", "hybrid"):
             run, line_style = runs[law], {"color": colours[law], "zorder": 3 if law == "hybrid" else 2}
             t, x, v = run["t"], run["x"], run["v"]
-            even = np.unique(np.searchsorted(t, np.arange(0.0, 6.0, 0.01)))
-            whole.plot(t[even], 100 * x[even], lw=1.8 if law == "hybrid" else 3.4, label=labels[law], **line_style)
-            late = even[t[even] >= begin]
-            creep.plot(t[late], 1e6 * (x[late] - x[late[0]]), lw=1.8, **line_style)
-            near = (t >= begin) & (t <= begin + span)
+            samples = np.unique(np.searchsorted(t, np.arange(0.0, 6.0, 0.01)))
+            position.plot(
+                t[samples], 100 * x[samples], lw=1.8 if law == "hybrid" else 3.4, label=labels[law], **line_style
+            )
+            after_stop = samples[t[samples] >= begin]
+            creep.plot(t[after_stop], 1e6 * (x[after_stop] - x[after_stop[0]]), lw=1.8, **line_style)
+            close_up = (t >= begin) & (t <= begin + span)
             if law == "sign":
-                speed.plot(1e3 * (t[near] - begin), 1e6 * v[near], lw=1.4, **line_style)
+                speed.plot(1e3 * (t[close_up] - begin), 1e6 * v[close_up], lw=1.4, **line_style)
             else:  # one internal step covers the standstill
                 speed.plot([0.0, 1e3 * span], [0.0, 0.0], lw=1.8, **line_style)
             steps = run["steps"]
@@ -159,9 +161,9 @@ def draw_stick(runs: dict[str, dict[str, np.ndarray]], colours: dict[str, str], 
             count.annotate(
                 f"{len(steps):,}".replace(",", " "), (5.95, 1.3 * len(steps)), ha="right", color=colours[law]
             )
-        whole.set(xlabel="time, s", ylabel="position, cm", xlim=(0, 6))
-        whole.set_title("A mass on a spring, stopped by dry friction")
-        whole.legend(loc="upper right", frameon=False, ncols=2)
+        position.set(xlabel="time, s", ylabel="position, cm", xlim=(0, 6))
+        position.set_title("A mass on a spring, stopped by dry friction")
+        position.legend(loc="upper right", frameon=False, ncols=2)
         creep.set(xlabel="time, s", ylabel="µm", title="Creep after the stop")
         speed.set(xlabel="time after 4.001 s, ms", ylabel="µm/s", title="Speed after the stop")
         count.set(xlabel="time, s", title="Solver steps so far", yscale="log", ylim=(1, 2e6), xlim=(0, 6))
@@ -169,8 +171,8 @@ def draw_stick(runs: dict[str, dict[str, np.ndarray]], colours: dict[str, str], 
     plt.close(figure)
 
 
-def laws(folder: Path) -> None:
-    """The friction force over the speed, for the four laws."""
+def draw_laws(folder: Path) -> None:
+    """Draw the friction force over the speed, for the four laws."""
     mu_s, mu_d, x_m = 0.9, 0.6, 0.2
     C = 2 - 2 * np.arcsin(mu_d / mu_s) / np.pi
     B = 2 * mu_s / (x_m * C * mu_s)
@@ -202,8 +204,8 @@ def laws(folder: Path) -> None:
     plt.close(figure)
 
 
-def friction_laws(folder: Path) -> None:
-    """Speed in a slip under four laws, and the displacement under a load below the limit."""
+def draw_friction_laws(folder: Path) -> None:
+    """Draw the speed in a slip under four laws, and the displacement under a load below the limit."""
     sys.path.insert(0, str(DOCS.parent))
     import harness as api
 
@@ -214,42 +216,44 @@ def friction_laws(folder: Path) -> None:
     style = {"font.size": 9, "svg.fonttype": "path", "svg.hashsalt": "friction", "axes.titlelocation": "left"}
     style |= {"axes.titlesize": 9, "axes.grid": True, "grid.color": "#dddddd"}
     with plt.rc_context(style):
-        figure, (slip, held) = plt.subplots(1, 2, figsize=(8.0, 3.0), layout="constrained")
+        figure, (slip, displacement) = plt.subplots(1, 2, figsize=(8.0, 3.0), layout="constrained")
         for name, label in names.items():
             values = weight if name in ("stickslip", "pacejka") else {"sigma_2": 0.0}
             values |= {"x_m": 0.001} if name == "pacejka" else {}
             fmu = FMUS / ("more" if "sigma_2" in values else "") / f"{name}.fmu"
             run = api.simulate(fmu, values | {"m": 1.0, "k": 2.0, "v_driver": 0.1}, stop=10.0, rtol=1e-6)
-            near = run.time > 7.2
+            in_slip = run.time > 7.2
             line_style = {"color": colours[name], "label": label}
-            slip.plot(run.time[near], run.columns["v"][near], **line_style)
+            slip.plot(run.time[in_slip], run.columns["v"][in_slip], **line_style)
             free = values | {"m": 1.0, "k": 0.0, "v_driver": 0.0}
             run = api.simulate(fmu, free, stop=40.0, interval=0.1, inputs=load, rtol=1e-8)
-            held.plot(run.time, 1e6 * np.asarray(run.columns["x"]), **line_style)
+            displacement.plot(run.time, 1e6 * np.asarray(run.columns["x"]), **line_style)
         slip.set(title="The first slip", xlabel="time, s", ylabel="speed, m/s")
         slip.legend(fontsize=8)
-        held.set(title="Under 0.5 N, on and off", xlabel="time, s", ylabel="displacement, µm", ylim=(-0.5, 12.0))
+        displacement.set(
+            title="Under 0.5 N, on and off", xlabel="time, s", ylabel="displacement, µm", ylim=(-0.5, 12.0)
+        )
         figure.savefig(IMAGES / "friction-laws.svg", metadata={"Date": None})
     plt.close(figure)
 
 
-def live(folder: Path) -> None:
-    """The opening of the live page, as chromium shows it."""
+def draw_live_page(folder: Path) -> None:
+    """Save a screenshot of the beginning of the live page."""
     build = [sys.executable, "-m", "build_fmus", "--web", "--out", str(folder / "live")]
     environment = os.environ | {"PYTHONPATH": str(DOCS.parent)}
     subprocess.run(build, cwd=folder, check=True, env=environment, capture_output=True)
-    photograph(folder / "live" / "index.html", IMAGES / "live.png", folder, 900)
+    save_screenshot(folder / "live" / "index.html", IMAGES / "live.png", folder, 900)
 
 
-def report(folder: Path) -> None:
-    """The beginning of a report, as chromium shows it."""
+def draw_report(folder: Path) -> None:
+    """Save a screenshot of the beginning of a report."""
     for command in ("", "precision --quick", "stability stickslip", "decay coulomb", "report"):
         harness(folder, command)
-    photograph(folder / "results" / "report.html", IMAGES / "report.png", folder, 1250)
+    save_screenshot(folder / "results" / "report.html", IMAGES / "report.png", folder, 1250)
 
 
-def photograph(page: Path, picture: Path, folder: Path, height: int) -> None:
-    """Save a picture of a page, as chromium shows it."""
+def save_screenshot(page: Path, picture: Path, folder: Path, height: int) -> None:
+    """Save a screenshot of a page by chromium; `height` is in pixels."""
     chromium = next((path for word in ("chromium", "google-chrome") if (path := shutil.which(word))), None)
     if chromium is None:
         print(f"{picture.name}: skipped, chromium is not installed")
@@ -257,7 +261,7 @@ def photograph(page: Path, picture: Path, folder: Path, height: int) -> None:
     options = ["--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars", f"--window-size=1200,{height}"]
     options += [
         "--virtual-time-budget=8000",
-        "--force-prefers-reduced-motion",  # the opening of the live page at its end
+        "--force-prefers-reduced-motion",  # shows the first animation of the live page at its end
         f"--screenshot={folder / picture.name}",
         f"--user-data-dir={folder / 'profile'}",
     ]
@@ -268,8 +272,8 @@ def photograph(page: Path, picture: Path, folder: Path, height: int) -> None:
     image.quantize(64).save(picture, optimize=True)
 
 
-def notebook(folder: Path) -> None:
-    """The notebook, with its outputs."""
+def run_notebook(folder: Path) -> None:
+    """Run the notebook and store its outputs in it."""
     import nbformat
     from nbclient import NotebookClient
 
@@ -283,12 +287,12 @@ def notebook(folder: Path) -> None:
 
 INLINE = "module://matplotlib_inline.backend_inline"
 DRAWINGS: dict[str, Callable[[Path], None]] = {
-    "stick": stick,
-    "laws": laws,
-    "friction-laws": friction_laws,
-    "live": live,
-    "report": report,
-    "notebook": notebook,
+    "stick": draw_stick,
+    "laws": draw_laws,
+    "friction-laws": draw_friction_laws,
+    "live": draw_live_page,
+    "report": draw_report,
+    "notebook": run_notebook,
 }
 
 

@@ -1,7 +1,7 @@
-"""Draw the records of docs/records/pulled_block.csv and sled.csv: synthetic, not measured.
+"""Draw the synthetic records docs/records/pulled_block.csv and sled.csv.
 
-The motion is integrated from event to event by scipy (harness/references/event_located.py), which shares nothing with
-the FMUs. Sensors have noise, steps and an uneven clock; one value is missing in each.
+The motion is integrated from event to event by scipy (harness/references/event_located.py), which is
+independent of the FMUs. The sensors have noise, steps and irregular intervals; each record lacks one value.
 
     python docs/make_records.py FOLDER
 """
@@ -21,7 +21,7 @@ RTOL, ATOL = 1e-11, 1e-13
 
 
 class PulledBlock(HybridProblem):
-    """Block that a motor pulls over a table through a spring, with friction mu_s at rest and mu_d when it slides."""
+    """Block that a motor pulls over a table through a spring, with friction mu_s at rest and mu_d while it slides."""
 
     start, stop, first = (0.0, 0.0), 8.0, (0,)
     m, k, v_driver = 1.25, 180.0, 0.020
@@ -51,7 +51,7 @@ class PulledBlock(HybridProblem):
         return [(y[1], self.force(t, y[0]), self.holding())]
 
     def stop_slip(self, y: np.ndarray, modes: list[int]) -> None:
-        """Stop the block that has stuck."""
+        """Set the speed of a stuck block to zero."""
         if modes[0] == 0:
             y[1] = 0.0
 
@@ -73,7 +73,7 @@ class StribeckSled(PulledBlock):
 
 
 def draw_clock(rate: float, stop: float, random: Random) -> list[float]:
-    """Return the times in s of a clock with an uneven rate in Hz, in whole ms, from 0 on."""
+    """Return times in s at irregular intervals, in whole ms, from 0 to `stop`; `rate` in Hz is the mean."""
     times = [0.0]
     while times[-1] + 1.5 / rate < stop:
         times.append(round(times[-1] + random.uniform(0.7, 1.3) / rate, 3))
@@ -81,15 +81,15 @@ def draw_clock(rate: float, stop: float, random: Random) -> list[float]:
 
 
 def measure(value: float, noise: float, step: float, random: Random) -> float:
-    """Return what a sensor with noise and steps shows."""
+    """Return the reading of a sensor with noise and steps, all in the same unit."""
     return round((value + random.gauss(0.0, noise)) / step) * step
 
 
 def draw_pulled_block() -> str:
-    """Return the record of a load cell and a laser."""
+    """Return the text of a record of a load cell and a laser."""
     problem, random = PulledBlock(), Random(20261123)
     times = draw_clock(50.0, problem.stop, random)
-    x = motion(problem, times)
+    x = integrate(problem, times)
     lines = [
         "# Block on a table, pulled through a spring by a motor. Synthetic record, drawn by docs/make_records.py",
         "# block 1.250 kg; motor 20 mm/s; force: load cell, steps of 0.02 N; position: laser, steps of 0.05 mm",
@@ -103,7 +103,7 @@ def draw_pulled_block() -> str:
 
 
 def draw_sled() -> str:
-    """Return the record of a laser."""
+    """Return the text of a record of a laser."""
     problem, random = StribeckSled(), Random(20261124)
     times = draw_clock(40.0, problem.stop, random)
     lines = [
@@ -111,13 +111,13 @@ def draw_sled() -> str:
         "# sled 12.5 kg; motor 34 mm/s; spring 742.5 N/m; laser in steps of 0.5 mm",
         "time [s],laser [mm]",
     ]
-    for i, (t, at) in enumerate(zip(times, motion(problem, times), strict=True)):
+    for i, (t, at) in enumerate(zip(times, integrate(problem, times), strict=True)):
         lines.append(f"{t:.3f},{'NaN' if i == 200 else f'{measure(1e3 * at, 0.8, 0.5, random):.1f}'}")
     return "\n".join(lines) + "\n"
 
 
-def motion(problem: HybridProblem, times: Sequence[float]) -> list[float]:
-    """Return the positions at the times."""
+def integrate(problem: HybridProblem, times: Sequence[float]) -> list[float]:
+    """Return the positions (n,) in m at the times in s."""
     states, _ = solve(problem, times, "DOP853", RTOL, ATOL)
     return [float(x) for x in states[:, 0]]
 

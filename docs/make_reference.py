@@ -1,6 +1,6 @@
 """Write the generated parts of the reference pages: commands, FMU variables, scene keys, result and record files.
 
-`python docs/make_reference.py FMUS` reads the built FMUs in the folder FMUS (default: fmus) and replaces what stands
+`python docs/make_reference.py FMUS` reads the built FMUs in the folder FMUS (default: fmus) and replaces the text
 between the comments <!-- generated: NAME --> and <!-- end --> in docs/reference.
 """
 
@@ -24,8 +24,8 @@ SCENE_TEXTS = {
     "fmu": "The path of an FMU, relative to the scene file.",
     "start": "Start time in s. Default: that of the FMU.",
     "stop": "Stop time in s. Default: the last of the `times`, or that of the FMU.",
-    "method": "Value of `solver.method`, by name.",
-    "law": "Value of `friction`, by name.",
+    "method": "Name of the integration method, the value of `solver.method`.",
+    "law": "Name of the friction law, the value of `friction`.",
     "rtol": "Value of `solver.rtol`.",
     "atol": "Value of `solver.atol`, in SI units.",
     "h_max": "Value of `solver.h_max`, in s.",
@@ -33,12 +33,12 @@ SCENE_TEXTS = {
     "times": "Times in s, such as those of a measurement; only these are recorded.",
     "follow": "Also visit the end of every internal step of the solver. Without `grid`, visit these only. "
     "Default: `true` without `grid`, `false` with it.",
-    "repeat": "Time the run this many times and report the fastest.",
-    "tolerance": "Relative tolerance for an FMU that does not show its internal steps.",
+    "repeat": "Number of runs for the measurement of the run time; the shortest time is reported.",
+    "tolerance": "Relative tolerance for an FMU that does not expose its internal steps.",
     "exchange": "Run such an FMU by model exchange, if it offers both interfaces.",
-    "lenient": "Run such an FMU although it violates the FMI standard.",
+    "lenient": "Run such an FMU even if it violates the FMI standard.",
     "timeout": "Seconds allowed for one call of such an FMU.",
-    "about": "What the model does; the report prints it.",
+    "about": "Description of the model, which the report prints.",
     "analyses": "Analyses to perform: `decay`, `slip`, `steps`.",
     "plots": "Panels of the figure: `position`, `velocity`, `acceleration`, `phase`, `steps`, or the name of an "
     "output, which takes precedence; `[]` for no figure. Default: the first six outputs and the phase plane.",
@@ -50,8 +50,8 @@ SCENE_TEXTS = {
 }
 DECAY_TEXTS = {
     "gives": "The quantity to calculate from the peaks: damping ratio, friction force or friction torque.",
-    "first": "How many peaks to skip at the start.",
-    "cycles": "How many cycles to use. Default: all.",
+    "first": "Number of peaks to skip at the start.",
+    "cycles": "Number of cycles to use. Default: all.",
 }
 COUPLED_TEXTS = {
     "title": "One line that describes the scene.",
@@ -71,20 +71,20 @@ COUPLED_TEXTS = {
 }
 
 
-def table(heads: Iterable[str], rows: Iterable[Iterable[object]]) -> str:
-    """A Markdown table."""
-    heads = list(heads)
-    lines = [heads, ["---"] * len(heads), *([str(cell).replace("|", "\\|") for cell in row] for row in rows)]
+def format_table(headings: Iterable[str], rows: Iterable[Iterable[object]]) -> str:
+    """Return a Markdown table."""
+    headings = list(headings)
+    lines = [headings, ["---"] * len(headings), *([str(cell).replace("|", "\\|") for cell in row] for row in rows)]
     return "".join(f"| {' | '.join(line)} |\n" for line in lines)
 
 
-def number(text: object) -> str:
-    """A number of a model description, shortened to seven digits."""
+def format_number(text: object) -> str:
+    """Return a number of a model description with at most seven digits."""
     return "" if text is None else f"{float(str(text)):.7g}"
 
 
 def variables(fmus: Path, model: str) -> str:
-    """The declared variables of a model."""
+    """Return the table of the declared variables of a model."""
     from fmpy import read_model_description
 
     description = read_model_description(str(fmus / f"{model}.fmu"))
@@ -92,7 +92,7 @@ def variables(fmus: Path, model: str) -> str:
     for variable in description.modelVariables:
         if variable.name.startswith(("solver.", "events.")):
             continue
-        start, unit = number(variable.start), variable.unit or ""
+        start, unit = format_number(variable.start), variable.unit or ""
         if variable.type == "Enumeration":
             items = [f"{item.value} {item.name}" for item in variable.declaredType.items]
             start, unit = start and items[int(float(start)) - 1], ", ".join(items)
@@ -106,11 +106,11 @@ def variables(fmus: Path, model: str) -> str:
                 variable.description,
             )
         )
-    return table(("name", "kind", "start", "unit or items", "description"), rows)
+    return format_table(("name", "kind", "start", "unit or items", "description"), rows)
 
 
 def common_variables(fmus: Path) -> str:
-    """The variables of the solver and of the events, which all FMUs share."""
+    """Return the table of the variables of the solver and of the events, which all FMUs have."""
     from fmpy import read_model_description
 
     description = read_model_description(str(fmus / "stickslip.fmu"))
@@ -125,11 +125,11 @@ def common_variables(fmus: Path) -> str:
         for variable in description.modelVariables
         if variable.name.startswith(("solver.", "events."))
     ]
-    return table(("name", "type", "kind", "unit", "description"), rows)
+    return format_table(("name", "type", "kind", "unit", "description"), rows)
 
 
 def enumerations(fmus: Path) -> str:
-    """The items of all enumerations, with the FMUs that have them."""
+    """Return the table of the items of all enumerations, with the FMUs that have them."""
     from fmpy import read_model_description
 
     models_by_item: dict[tuple[str, str, str, str], list[str]] = {}
@@ -145,33 +145,33 @@ def enumerations(fmus: Path) -> str:
         (f"`{name}`", value, item, text, ", ".join(models))
         for (name, value, item, text), models in sorted(models_by_item.items())
     ]
-    return table(("variable", "value", "name", "meaning", "FMUs"), rows)
+    return format_table(("variable", "value", "name", "meaning", "FMUs"), rows)
 
 
 def constraints(annotation: Any) -> list[str]:
-    """What a value must be, in words: the text in each annotation of a type."""
-    marks = getattr(annotation, "__metadata__", ())
-    return [text for mark in marks for text in vars(mark).values() if isinstance(text, str)]
+    """Return the constraints of a type as texts, which its annotations contain."""
+    markers = getattr(annotation, "__metadata__", ())
+    return [text for marker in markers for text in vars(marker).values() if isinstance(text, str)]
 
 
 def schema_within(schema: Any, key: str) -> Any:
-    """The dataclass of the tables under a key."""
+    """Return the dataclass of the tables under a key."""
     annotation = next(field.type for field in fields(schema) if field.name == key)
     return next((part for part in get_args(annotation) if is_dataclass(part)), annotation)
 
 
 def keys(texts: dict[str, str], *schemas: Any) -> str:
-    """The keys with a text, which are fields of the dataclasses that are the schema."""
+    """Return the table of the keys that have a text; they are fields of the dataclasses of the schema."""
     declared = {field.name.rstrip("_"): field for schema in schemas for field in fields(schema)}
     rows = []
     for name, text in texts.items():
         field = declared[name]
-        words = next(iter(constraints(field.type)), "a table")
-        inner = [text for part in get_args(field.type) for text in constraints(part)]
-        if words == "a table" and inner:
-            words = f"a table; each value is {inner[0]}"
-        if words == "a table" and str(field.type).startswith("tuple"):
-            words = "a list of tables"
+        constraint = next(iter(constraints(field.type)), "a table")
+        item_constraints = [text for part in get_args(field.type) for text in constraints(part)]
+        if constraint == "a table" and item_constraints:
+            constraint = f"a table; each value is {item_constraints[0]}"
+        if constraint == "a table" and str(field.type).startswith("tuple"):
+            constraint = "a list of tables"
         is_required = field.default is MISSING and field.default_factory is MISSING
         default = field.default
         if is_required:
@@ -180,18 +180,18 @@ def keys(texts: dict[str, str], *schemas: Any) -> str:
             default_text = ""
         else:
             default_text = f"`{str(default).lower() if isinstance(default, bool) else default}`"
-        rows.append((f"`{name}`", words, default_text, text))
-    return table(("key", "value", "default", "meaning"), rows)
+        rows.append((f"`{name}`", constraint, default_text, text))
+    return format_table(("key", "value", "default", "meaning"), rows)
 
 
 def coupled_keys(schema: Any) -> str:
-    """The keys of a table of a coupled scene."""
+    """Return the keys of one table of a coupled scene."""
     names = [field.name.rstrip("_") for field in fields(schema)]
     return keys({name: COUPLED_TEXTS[name] for name in names}, schema)
 
 
 def result_files(fmus: Path) -> str:
-    """The files of a sample run, with their columns."""
+    """Return the table of the files of sample commands, with their columns."""
     import tempfile
 
     from run_blocks import Block, run
@@ -203,14 +203,14 @@ def result_files(fmus: Path) -> str:
         for command in SAMPLES:
             run(Block("sh", "", f"cd {folder} && python -m harness {command} --quiet", 0, "", (0, 0), ""), folder, {})
         for file in sorted(folder.glob("results/**/*.csv")):
-            head = next(line for line in file.read_text().splitlines() if not line.startswith("#"))
-            columns = ", ".join(f"`{cell.strip()}`" for cell in head.split(",") if cell.strip())
+            headings = next(line for line in file.read_text().splitlines() if not line.startswith("#"))
+            columns = ", ".join(f"`{heading.strip()}`" for heading in headings.split(",") if heading.strip())
             rows.append((f"`{file.relative_to(folder)}`", columns))
-    return table(("file", "columns"), rows)
+    return format_table(("file", "columns"), rows)
 
 
 def all_commands() -> dict[str, Any]:
-    """Every command by what a user types, the build first."""
+    """Return every command by its full name, such as `friction-fmus run`; the build is the first subcommand."""
     from build_fmus import main
     from harness.commands import commands
 
@@ -221,21 +221,21 @@ def all_commands() -> dict[str, Any]:
 
 
 def command_list() -> str:
-    """Every command with its purpose."""
+    """Return the table of the commands with their purposes."""
     rows = []
     for name, command in all_commands().items():
         anchor = name.replace(" ", "-")
         rows.append((f"[`{name}`](#{anchor})", command.get_short_help_str(limit=1000)))
-    return table(("command", "purpose"), rows)
+    return format_table(("command", "purpose"), rows)
 
 
 def command_texts() -> str:
-    """Description, usage and options of every command."""
+    """Return description, usage and options of every command."""
     return "\n".join(command_text(name, command) for name, command in all_commands().items())
 
 
 def command_text(name: str, command: Any) -> str:
-    """The section of one command."""
+    """Return the section of one command."""
     import click
 
     context = click.Context(command, info_name=name)
@@ -252,33 +252,33 @@ def command_text(name: str, command: Any) -> str:
     return (
         "\n".join(lines)
         + "\n"
-        + table(("option", "meaning"), ((f"`{option}`", text) for option, text in filter(None, records) if text))
+        + format_table(("option", "meaning"), ((f"`{option}`", text) for option, text in filter(None, records) if text))
     )
 
 
 def record_formats() -> str:
-    """Every format of a record that the tests write, and what `decay` does with it."""
+    """Return the table of the record formats that the tests write, with the options that `decay` needs to read them."""
     sys.path.append(str(DOCS.parent / "tests" / "support"))
     from record_formats import FORMATS
 
     rows = []
     for record_format in FORMATS:
-        words = (
+        arguments = (
             f"--{RECORD_OPTIONS.get(key, key)} {shlex.quote(f'{value}')}"
             for key, value in record_format.options.items()
         )
-        options = " ".join(f"`{word}`" for word in words)
-        answer = "read" + (f" with {options}" if options else "")
+        options = " ".join(f"`{argument}`" for argument in arguments)
+        result = "read" + (f" with {options}" if options else "")
         if record_format.base == "units":
-            answer += "; has no unit, `--unit` sets it"
+            result += "; has no unit, `--unit` sets it"
         rows.append(
             (
                 record_format.text,
                 f"`{record_format.file}`",
-                f"refused: {record_format.refusal}" if record_format.refusal else answer,
+                f"refused: {record_format.refusal}" if record_format.refusal else result,
             )
         )
-    return table(("format", "example", "answer"), rows)
+    return format_table(("format", "example", "result"), rows)
 
 
 RECORD_OPTIONS = {
@@ -295,7 +295,7 @@ SAMPLES = (
 
 
 def parts(fmus: Path) -> dict[str, Callable[[], str]]:
-    """What generates each part, by its name."""
+    """Return the function that generates each part, by the name of the part."""
     from harness.scenes import scene
     from harness.scenes.coupled import scene as coupled
     from harness.scenes.run_spec import RunSpec
@@ -317,10 +317,10 @@ def parts(fmus: Path) -> dict[str, Callable[[], str]]:
     }
 
 
-def generated(page: str, fmus: Path) -> str:
-    """A page with its generated parts up to date."""
-    makers = parts(fmus)
-    return PART.sub(lambda part: f"{part[1]}\n{makers[part[2]]()}\n{part[3]}", page)
+def update_page(page: str, fmus: Path) -> str:
+    """Return a page with new generated parts."""
+    generators = parts(fmus)
+    return PART.sub(lambda part: f"{part[1]}\n{generators[part[2]]()}\n{part[3]}", page)
 
 
 def main() -> None:
@@ -328,7 +328,7 @@ def main() -> None:
     fmus = Path(sys.argv[1]) if len(sys.argv) > 1 else DOCS.parent / "fmus"
     for page in sorted((DOCS / "reference").glob("*.md")):
         text = page.read_text(encoding="utf-8")
-        page.write_text(generated(text, fmus), encoding="utf-8")
+        page.write_text(update_page(text, fmus), encoding="utf-8")
 
 
 if __name__ == "__main__":

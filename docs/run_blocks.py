@@ -1,4 +1,4 @@
-"""Run the code blocks of Markdown pages, in order, in one folder and one Python process a page.
+"""Run the code blocks of Markdown pages, in order, in one folder and in one Python process for each page.
 
     sh                          run by bash; it must exit with status 0
     python                      executed; the blocks of a page share their names
@@ -29,7 +29,25 @@ TIMEOUT = 120.0  # s
 
 @dataclass(frozen=True)
 class Block:
-    """A code block: its language, file name, text, line, indentation and place in the page, and why it is not run."""
+    """A code block of a page.
+
+    Attributes
+    ----------
+    language : str
+        Language after the fence, such as sh.
+    title : str
+        Name of the file to write; empty if the block is not a file.
+    text : str
+        Text without indentation.
+    line : int
+        Number of the line of the fence.
+    indent : str
+        Indentation in the page.
+    span : tuple of (int, int)
+        Start and end of the text in the page, in characters.
+    skipped : str
+        Reason for which the block is not run; empty if it is run.
+    """
 
     language: str
     title: str
@@ -40,21 +58,27 @@ class Block:
     skipped: str
 
 
-def blocks(page: str) -> list[Block]:
-    """All code blocks of a page."""
-    result = []
+def find_blocks(page: str) -> list[Block]:
+    """Return all code blocks of a page."""
+    blocks = []
     for fence in FENCE.finditer(page):
         skip = SKIP.search(page[: fence.start()])
         indent = fence["indent"]
         text = "".join(line.removeprefix(indent) for line in fence["text"].splitlines(keepends=True))
         line = page.count("\n", 0, fence.start()) + 1
         reason = skip[1] if skip else ""
-        result.append(Block(fence["language"], fence["title"] or "", text, line, indent, fence.span("text"), reason))
-    return result
+        blocks.append(Block(fence["language"], fence["title"] or "", text, line, indent, fence.span("text"), reason))
+    return blocks
 
 
 def run(block: Block, page: Path, names: dict[str, object]) -> str:
-    """Run one block in the current folder; its output.  RuntimeError if it fails."""
+    """Run one block in the current folder and return its output.
+
+    Raises
+    ------
+    RuntimeError
+        If the block fails.
+    """
     if block.language == "sh":
         process = subprocess.run(
             ["bash", "-euo", "pipefail", "-c", block.text], capture_output=True, text=True, timeout=TIMEOUT
@@ -68,49 +92,55 @@ def run(block: Block, page: Path, names: dict[str, object]) -> str:
 
 
 def run_page(page: Path, write: bool = False) -> list[str]:
-    """Run the blocks of a page in the current folder; the faults, one text each."""
+    """Run the blocks of a page in the current folder, and return a message for each failure.
+
+    Parameters
+    ----------
+    write : bool
+        Whether the outputs in the page are replaced by those of the blocks.
+    """
     text = page.read_text(encoding="utf-8")
     names: dict[str, object] = {"__name__": "__main__"}
-    faults, output, changes, last = [], "", [], ""
+    failures, output, changes, last_language = [], "", [], ""
     check, options = OutputChecker(), ELLIPSIS | NORMALIZE_WHITESPACE
-    for block in blocks(text):
+    for block in find_blocks(text):
         try:
             if block.title:
                 Path(block.title).parent.mkdir(parents=True, exist_ok=True)
                 Path(block.title).write_text(block.text, encoding="utf-8")
             elif block.language in RUN and not block.skipped:
-                output, last = run(block, page, names), block.language
+                output, last_language = run(block, page, names), block.language
                 continue
             elif (
                 block.language == "text"
-                and last
+                and last_language
                 and not block.skipped
                 and not check.check_output(block.text, output, options)
             ):
-                faults.append(f"{page.name}, line {block.line}: the output is\n{output}")
+                failures.append(f"{page.name}, line {block.line}: the output is\n{output}")
                 changes.append((block, output))
         except Exception as error:
-            faults.append(f"{page.name}, line {block.line}: {type(error).__name__}: {error}")
-        last = ""
+            failures.append(f"{page.name}, line {block.line}: {type(error).__name__}: {error}")
+        last_language = ""
     if write:
         for block, output in reversed(changes):
             begin, end = block.span
             new = "".join(f"{block.indent}{line.rstrip()}\n" for line in output.splitlines())
             text = text[:begin] + new + text[end:]
         page.write_text(text, encoding="utf-8")
-    return faults
+    return failures
 
 
 def main() -> None:
     """Run pages in a folder; exit with status 1 if a block fails."""
-    words = [word for word in sys.argv[1:] if word != "--write"]
-    folder, *pages = (Path(word).resolve() for word in words)
+    arguments = [argument for argument in sys.argv[1:] if argument != "--write"]
+    folder, *pages = (Path(argument).resolve() for argument in arguments)
     bin = str(Path(sys.executable).parent)
     os.environ.update(PATH=f"{bin}{os.pathsep}{os.environ['PATH']}", MPLBACKEND="agg", COLUMNS="80")
     os.chdir(folder)
     sys.path.insert(0, str(folder))
-    faults = [fault for page in pages for fault in run_page(page, "--write" in sys.argv)]
-    sys.exit("\n\n".join(faults) or 0)
+    failures = [failure for page in pages for failure in run_page(page, "--write" in sys.argv)]
+    sys.exit("\n\n".join(failures) or 0)
 
 
 if __name__ == "__main__":

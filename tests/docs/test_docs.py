@@ -30,7 +30,7 @@ def runnable(page):
     """Whether a page has a block that runs."""
     return any(
         block.language in scripts.RUN and not block.title and not block.skipped
-        for block in scripts.blocks((DOCS / page).read_text(encoding="utf-8"))
+        for block in scripts.find_blocks((DOCS / page).read_text(encoding="utf-8"))
     )
 
 
@@ -54,7 +54,7 @@ def test_examples_of_docstrings_run(source):
 
 def test_each_python_or_sh_block_that_is_not_run_has_a_reason():
     for page in PAGES:
-        for block in scripts.blocks((DOCS / page).read_text(encoding="utf-8")):
+        for block in scripts.find_blocks((DOCS / page).read_text(encoding="utf-8")):
             assert block.language, f"{page}, line {block.line}: the block has no language"
             assert not block.skipped or len(block.skipped.split()) >= 3, f"{page}, line {block.line}: give a reason"
 
@@ -64,14 +64,14 @@ def test_generated_tables_are_up_to_date(fmus):
     reference = load("make_reference")
     for page in sorted((DOCS / "reference").glob("*.md")):
         text = page.read_text(encoding="utf-8")
-        assert reference.generated(text, fmus) == text, f"run `python docs/make_reference.py` for {page.name}"
+        assert reference.update_page(text, fmus) == text, f"run `python docs/make_reference.py` for {page.name}"
 
 
 def test_the_page_on_code_generation_quotes_the_numerics_as_they_are():
     """Its other texts are outputs of commands, which run with the page."""
     (quoted,) = [
         block.text
-        for block in scripts.blocks((DOCS / "explanation" / "equation_to_c.md").read_text(encoding="utf-8"))
+        for block in scripts.find_blocks((DOCS / "explanation" / "equation_to_c.md").read_text(encoding="utf-8"))
         if block.language == "text" and "model.rates(" in block.text and "modes)" in block.text
     ]
     lines = {line.strip() for line in (ROOT / "fmus" / "runtime" / "ode23.py").read_text(encoding="utf-8").splitlines()}

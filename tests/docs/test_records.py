@@ -32,7 +32,7 @@ def test_the_force_of_the_drawn_block_swings_as_in_the_closed_form():
     """While it slides, the force swings about that of friction; it begins with the rate of the motor, k v."""
     block = make_records.PulledBlock()
     times = [0.001 * i for i in range(3001)]
-    forces = [block.force(t, x) for t, x in zip(times, make_records.motion(block, times), strict=True)]
+    forces = [block.force(t, x) for t, x in zip(times, make_records.integrate(block, times), strict=True)]
     weight, omega = block.m * make_records.G, (block.k / block.m) ** 0.5
     swing = (((block.mu_s - block.mu_d) * weight) ** 2 + (block.k * block.v_driver / omega) ** 2) ** 0.5
     assert max(forces) == pytest.approx(block.mu_d * weight + swing, abs=1e-3)
