@@ -12,7 +12,7 @@ HEADINGS = ("command", "scene", "model", "title")
 def list_(as_json: bool) -> None:
     """List the shipped scenes and models for `run`, and the coupled scenes for `couple`.
 
-    A model without a scene file is listed as a scene of its own name; build it by name, and `run` uses its defaults.
+    A model without a scene file is listed by its name: build it by this name; `run` then uses its defaults.
 
     \b
     Example:

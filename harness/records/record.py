@@ -80,6 +80,6 @@ def check_record(record: Record) -> None:
     if len(not_increasing):
         time = float(record.t[not_increasing[0]])
         raise SceneError(
-            f"{record.name}: time does not rise after t = {time!r} s; sort the rows and keep one per time, and give a "
-            "second run a file of its own"
+            f"{record.name}: time does not rise after t = {time!r} s; sort the rows, keep one row for each time, and "
+            "save a second run in a separate file"
         )

@@ -106,7 +106,7 @@ def summarize_quantities(
 ) -> Summary:
     """Return the summary of a run with its quantities in place of first and last values.
 
-    Those without a published value have a table of their own, unless no quantity has one.
+    Quantities without a published value are in a second table, unless no quantity has a published value.
     """
     headings = quantity_headings(published)
     rows = [round_run_time(cells) for cells in quantity_rows(quantities, published)]
