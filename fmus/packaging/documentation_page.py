@@ -26,14 +26,14 @@ CAPABILITIES = """\
 | | in Python | native | native, FMI 3.0 |
 | FMI | 2.0 | 2.0 | 3.0 |
 | co-simulation; save, restore and serialize the state | yes | yes | yes |
-| model exchange: event indicators, time events, nominals | | yes | yes |
-| partial derivatives, by start values and parameters too | | yes | yes, adjoint too |
+| model exchange: event indicators, time events, nominal values | | yes | yes |
+| partial derivatives, also with respect to start values and parameters | | yes | yes, also adjoint |
 | derivatives of outputs (order 1) | | yes | yes |
 | derivatives of inputs up to order 8 | | yes | |
 | event mode, early return at stick and slip | | | yes |
 | intermediate update after each internal step, where inputs can be set | | | yes |
 | terminal `flange`: position, speed, force | | | yes |
-"""  # capabilities of each kind of FMU; the README has the same table
+"""  # of each kind of FMU; docs/how-to/fmi3.md has the same table
 UNRESTRICTED = VariableDeclaration("", "").allowed  # the range text of an unbounded variable
 
 

@@ -49,8 +49,8 @@ def test_a_native_fmu_has_the_same_page_and_each_states_which_hosts_run_it(conte
 CAPABILITIES = {  # names as they begin in the model descriptions of both versions; attributes that are not false
     "FMI": (".", "fmiVersion"),
     "co-simulation; save, restore and serialize the state": ("CoSimulation", "canSerializeFMU"),
-    "model exchange: event indicators, time events, nominals": ("ModelExchange", "modelIdentifier"),
-    "partial derivatives, by start values and parameters too": ("CoSimulation", "providesDirectional"),
+    "model exchange: event indicators, time events, nominal values": ("ModelExchange", "modelIdentifier"),
+    "partial derivatives, also with respect to start values and parameters": ("CoSimulation", "providesDirectional"),
     "derivatives of outputs (order 1)": ("CoSimulation", "maxOutputDerivativeOrder"),
     "derivatives of inputs up to order 8": (
         "CoSimulation",
