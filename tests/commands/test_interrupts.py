@@ -203,9 +203,10 @@ def ends(pid):
 
 
 def test_a_program_that_times_out_ends_with_all_its_children(tmp_path):
-    script = "sleep 100 & echo $! > pid; wait"
+    script, begun = "sleep 100 & echo $! > pid; wait", time.monotonic()
     with pytest.raises(SubprocessTimeoutError, match=r"no answer after 0\.5 s") as late:
         run_subprocess(["sh", "-c", f"cd '{tmp_path}'; echo so far; {script}"], timeout=0.5)
+    assert time.monotonic() - begun < 50  # not when the children have ended
     assert late.value.process.stdout == "so far\n"
     assert ends((tmp_path / "pid").read_text())
 

@@ -8,7 +8,8 @@ import time
 import pytest
 
 from harness.errors import HarnessError
-from harness.process.child_process import ChildDiedError, ChildProcess, ChildTimeoutError, ask_once
+from harness.process import interrupt
+from harness.process.child_process import MAX_OUTPUT_BYTES, ChildDiedError, ChildProcess, ChildTimeoutError, ask_once
 
 SERVER = """
 import ctypes, os, signal, sys, time
@@ -23,6 +24,13 @@ def report(count):
         time.sleep(0.25)
         server.report(i / count)
     return count
+
+def flood(size):
+    for i in range(3):
+        os.write(2, size * b".")
+        time.sleep(0.25)
+        server.report(i / 3)
+    return size
 
 def speak(text):
     print(text)
@@ -39,6 +47,7 @@ ANSWERS = {
     "fail": int,
     "refuse": refuse,
     "report": report,
+    "flood": flood,
     "speak": speak,
     "allocate": lambda request: len(bytearray(request)),
     "leave": lambda request: signal.setitimer(signal.ITIMER_REAL, 0.05) and None,
@@ -115,6 +124,20 @@ def test_what_a_process_prints_belongs_to_its_request(child):
     assert sorted(child.messages.split("\n")) == ["", "and an error", "one"]
     child.ask(["echo", 1])
     assert child.messages == ""
+
+
+def test_no_more_than_the_largest_output_is_kept(child):
+    child.ask(["flood", 2 * MAX_OUTPUT_BYTES // 5])
+    assert len(child.messages) <= MAX_OUTPUT_BYTES
+
+
+def test_a_signal_that_reached_another_thread_ends_a_request(child, monkeypatch):
+    first, _ = child.ask(["process", None])
+    monkeypatch.setattr(interrupt, "RECEIVED_SIGNALS", [signal.SIGINT])
+    with pytest.raises(KeyboardInterrupt):
+        child.ask(["hang", None], timeout=5.0)
+    with pytest.raises(ProcessLookupError):
+        os.kill(first, 0)
 
 
 def test_a_process_that_died_after_its_reply_is_replaced(child):
