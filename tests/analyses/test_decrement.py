@@ -1,6 +1,7 @@
 """The decay analysis on signals with known parameters."""
 
 from math import cos, exp, pi, sin, sqrt
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -8,6 +9,8 @@ import pytest
 from harness.analyses.decay.decrement import find_extrema_from_velocity, select_cycles
 from harness.analyses.decay.law import damping_ratio, friction_from_envelope
 from harness.errors import HarnessError
+from harness.running.trajectory import Trajectory
+from harness.scenes.run_spec import RunSpec
 
 
 def damped(zeta, n=4001):
@@ -94,3 +97,11 @@ def test_a_signal_without_decay_is_refused(x_0, x_n):
         damping_ratio(x_0, x_n, 1)
     with pytest.raises(HarnessError, match="do not decay"):
         friction_from_envelope(x_0, x_n, 1, 1.0)
+
+
+def test_a_half_cycle_needs_eight_samples_with_those_at_its_ends():
+    time = np.arange(16.0)
+    run = Trajectory(RunSpec(Path("swing.fmu")), time, {}, {}, {}, {})
+    run.check_sampling(time[[0, 7]], time[[7, 14]], "half cycle")
+    with pytest.raises(HarnessError, match="the one from t = 7 s to 13 s has 7"):
+        run.check_sampling(time[[0, 7]], time[[7, 13]], "half cycle")

@@ -281,6 +281,7 @@ def test_numbers_and_times_are_read_in_any_notation(tmp_path, name):
 
 ROWS = "\n".join(f"{i},{i}" for i in range(20))
 CLOCK = "\n".join(f"10:00:{i:02},{i % 5}" for i in range(20))
+UNITS = "\n".join(f"{i} sec,{i % 5} {'cm' if i == 3 else 'mm'}" for i in range(20))
 
 
 @pytest.mark.parametrize(
@@ -292,6 +293,7 @@ CLOCK = "\n".join(f"10:00:{i:02},{i % 5}" for i in range(20))
         (f"t [s],x [m]\n{ROWS}", ColumnOptions(position="y"), "unknown column 'y'"),
         (f"t [h/m],x [m]\n{ROWS}", ColumnOptions(), "unknown unit of t 'h/m'"),
         (f"t [s],x [m]\n{ROWS}\n20,abc", ColumnOptions(), "'abc' in row 22, column x [m], is not a number"),
+        (f"t,x\n{UNITS}", ColumnOptions(), "'0 mm' in row 2, column x, is not a number"),  # not all are in mm
         (f"t [s],x [m]\n{ROWS}\n20,1,2", ColumnOptions(), "row 22 has 3 cells where the heading has 2"),
         (f"t [s],x [m]\n{ROWS}\n5,5", ColumnOptions(), "time does not rise after t = 19.0 s"),
         (f"time,x [m]\n{CLOCK}\n10:00:05,5", ColumnOptions(), "time does not rise after t = 19.0 s"),
@@ -419,6 +421,11 @@ def test_a_record_has_at_least_twelve_samples():
                 check_record(record)
         else:
             check_record(record)
+
+
+def test_a_selected_interval_includes_the_samples_at_both_ends():
+    t = np.arange(5.0)
+    assert Record("swing", t, t).select(1.0, 3.0).t.tolist() == [1.0, 2.0, 3.0]
 
 
 @pytest.mark.parametrize(
