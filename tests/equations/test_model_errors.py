@@ -106,6 +106,11 @@ WRONG = {
         17,
         "laws must be (HYBRID,), (HYBRID, SIGN) or (HYBRID, THRESHOLD), got ('sign',)",
     ),
+    "the hybrid law after another one": (
+        DRY.replace("slide=f", "slide=f, laws=(SIGN, HYBRID)") + STUCK,
+        17,
+        "laws must be (HYBRID,), (HYBRID, SIGN) or (HYBRID, THRESHOLD), got ('sign', 'hybrid')",
+    ),
     "three laws": (
         DRY.replace("slide=f", "slide=f, laws=(HYBRID, SIGN, THRESHOLD), eps=f") + STUCK,
         17,
