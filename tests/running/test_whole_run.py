@@ -56,6 +56,7 @@ JUMPS = {"time": (1.0, 2.0, 2.0, 5.0, 5.0), "F_ext": (0.0, 30.0, 10.0, 40.0, -40
 RUNS = {
     "even times": {"times": T},
     "times apart from start and stop": {"times": UNEVEN, "stop": 8.0},
+    "times a rounding from start and stop": {"times": [1e-13, *UNEVEN, 8.0 - 1e-13], "stop": 8.0},
     "a grid": {"grid": 0.03, "stop": 8.0},
     "equal steps": {"equal_steps": 100, "stop": 8.0},
     "times and a grid": {"grid": 0.03, "times": UNEVEN, "stop": 8.0},
@@ -123,6 +124,14 @@ def test_external_fmus_run_in_a_process_of_their_own(name):
     assert np.ptp(first) > 0
     assert np.array_equal(first, second)
     assert coarse.shape == (51, 1)
+
+
+def test_the_file_of_a_run_that_is_no_longer_used_is_removed():
+    spec = RunSpec(build_external_fmus() / "Midpoint.fmu", ("x",), times=np.linspace(0.0, 1.0, 11), follow=False)
+    with open_simulator(spec) as simulator:
+        for _ in range(3):
+            assert simulator.prepare(spec)({}) is not None
+            assert not list(simulator.session.folder.glob("*.json"))
 
 
 @pytest.mark.parametrize(("name", "value"), [("Faulty", {"kind": 5}), ("Fmi3Midpoint", {"limit": 0.5})])
