@@ -98,12 +98,15 @@ def test_a_missing_peer_is_listed_and_skipped(fmus, monkeypatch):
     assert "cvode" not in [job.tool for job in solver_jobs(CASE["smd"], load_model_class(file), file)]
 
 
-def test_a_run_is_limited_in_steps_and_in_time():
+def test_a_run_is_limited_in_steps_and_in_time(fmus):
     solve = partial(peer_solvers.solve, "scipy", "RK23", CASE["smd"].problem, load_reference("smd").times, 1e-9, 1e-12)
     with pytest.raises(HarnessError, match=r"^at t = .* s after 500 right-hand sides$"):
         solve(peer_solvers.limit_evaluations(500))
     with pytest.raises(HarnessError, match=r"^at t = .* s after 0\.001 s of run time$"):
         solve(peer_solvers.limit_run_time(1e-3))
+    embedded = EmbeddedModel.create(load_model_class(fmus / "smd.fmu"), {}, None, 1e-9)
+    with pytest.raises(HarnessError, match=r"^at t = .* s after 1e-06 s of run time$"):
+        embedded.solve(load_reference("smd").times.tolist(), timeout=1e-6)
 
 
 def test_a_failed_run_is_a_gap_and_tighter_ones_after_a_slow_run_are_skipped():
