@@ -18,8 +18,9 @@ from harness.process.child_process import ChildProcess, ChildTimeoutError
 from harness.references.models.pacejka import MagicFormula
 from harness.references.reference_trajectory import CommunicationGrid, compute_reference
 from harness.results.provenance import load_provenance
+from harness.running import step_sequence
 from harness.running.solution import Solution
-from harness.running.step_sequence import RefusalSummary, RefusedRun
+from harness.running.step_sequence import RefusalSummary, RefusedRun, inject_nonfinite
 from harness.running.trajectory import Statistics, Trajectory
 from harness.scenes.run_spec import RunSpec
 from harness.studies.stability.cases import StabilityCase, expand_scene, load_scenes, value_spans
@@ -195,6 +196,15 @@ def test_a_refusal_needs_its_message_and_no_values(case):
         assert judge_refusal(expecting, wrong).ended == WRONG
     assert judge_refusal(case, RefusedRun("mu_d is 1.0", True)).ended == WRONG
     assert judge_injections(expecting, RefusalSummary(6, ("m = nan was taken",))).ended == WRONG
+
+
+@pytest.mark.parametrize("wrong", [{"all_nan": False}, {"message": "a value is refused"}])
+def test_a_refused_number_needs_its_name_in_the_message_and_no_values(fmus, monkeypatch, wrong):
+    run, read_refusal = RunSpec(fmus / "smd.fmu"), step_sequence.read_refusal
+    summary = inject_nonfinite(run)
+    assert summary.failures == ()
+    monkeypatch.setattr(step_sequence, "read_refusal", lambda session: replace(read_refusal(session), **wrong))
+    assert len(inject_nonfinite(run).failures) == summary.n_tried > 0
 
 
 def test_the_slope_is_that_of_the_stiff_end(case):
