@@ -7,7 +7,10 @@ import pytest
 from decays import OMEGA, T, decay_record, remarks_text
 
 from harness.analyses.decay.estimates import KnownParameters
+from harness.analyses.decay.extrema import find_extrema
+from harness.analyses.decay.fit_problem import prepare_problem
 from harness.analyses.decay.identification import fit_decay
+from harness.analyses.decay.law import DRIFT, REST
 from harness.errors import HarnessError
 from harness.records.record import Record
 
@@ -20,6 +23,15 @@ def test_drift_is_reported_and_fitted_on_request():
     assert by_name["drift"].value == pytest.approx(0.002, rel=2e-2)
     assert by_name["zeta"].low < 0.01 < by_name["zeta"].high
     assert fit.remarks == ()
+
+
+@pytest.mark.parametrize("drift", [-0.02, 0.03])
+def test_the_fit_of_a_drift_starts_with_that_of_the_turning_points(drift):
+    """The rest position is that in the middle of the record, at 2 s."""
+    record = decay_record(0.01, 0.001, rest=0.02, drift=drift)
+    problem, p = prepare_problem(record, find_extrema(record, False), False, True)
+    assert problem.scale * p[DRIFT] == pytest.approx(drift, rel=2e-3)
+    assert problem.scale * p[REST] + problem.offset == pytest.approx(0.02 + 2.0 * drift, abs=2e-5)
 
 
 def test_correlated_noise_is_reported_and_widens_the_intervals():

@@ -85,6 +85,11 @@ def test_no_step_loses_the_cycles_of_the_record(unknown, best, low, high):
     assert low < p[unknown] < high
 
 
+def test_a_loss_that_few_steps_from_zero_have_not_reached_is_not_absent():
+    p, _ = least_squares(lambda p: (p[ZETA] - (LINE - 2.5), np.ones((len(T), 1))), START, np.array([ZETA]), max_steps=2)
+    assert 0.0 < p[ZETA] < 0.01
+
+
 def test_a_loss_that_would_be_negative_is_exactly_zero():
     """The line falls, so that no combination of rising powers fits it better than a constant."""
     unknowns = np.array([REST, ZETA, R, B])
