@@ -1,11 +1,20 @@
 """Confidence intervals of nonnegative quantities, and of few samples."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from scipy.stats import norm
 
-from harness.analyses.decay.intervals import N_DRAWS, confidence_interval, nonnegative_interval, quasirandom_normal
-from harness.analyses.decay.law import OMEGA
+from harness.analyses.decay.intervals import (
+    N_DRAWS,
+    confidence_interval,
+    estimate_uncertainty,
+    nonnegative_interval,
+    quasirandom_normal,
+)
+from harness.analyses.decay.law import OMEGA, REST, UNKNOWNS, ZETA
+from harness.analyses.estimation.estimate import NORMAL_QUANTILE, Estimate
 
 
 def test_nonnegative_intervals_cover_95_percent():
@@ -70,3 +79,25 @@ def test_the_draws_are_those_of_the_additive_recurrence_of_roberts():
             assert row[0] == pytest.approx((0.5 + g**-i) % 1, abs=1e-12)
             assert row[-1] == pytest.approx((0.5 + N_DRAWS * g**-i) % 1, abs=1e-9)
             assert np.abs(np.sort(row) - (np.arange(N_DRAWS) + 0.5) / N_DRAWS).max() < 10 / N_DRAWS
+
+
+def test_unconstrained_values_are_those_of_least_squares_with_a_negative_loss():
+    t, unknowns, p = np.linspace(0.0, 10.0, 200), np.array([REST, ZETA]), np.zeros(len(UNKNOWNS))
+    columns, p[OMEGA] = np.stack([np.ones_like(t), t], axis=1), 2.0
+    y = 1.0 - 0.3 * t + np.random.default_rng(1).normal(size=len(t))
+    problem = SimpleNamespace(
+        t=t,
+        residual_floor=0.0,
+        unknowns=lambda terms: unknowns,
+        residuals=lambda p, terms: (columns @ p[unknowns] - y, columns),
+    )
+    expected = np.linalg.lstsq(columns, y, rcond=None)[0]
+    assert estimate_uncertainty(problem, p, ("zeta",)).unconstrained == pytest.approx(expected, rel=1e-9)
+    assert expected[1] < -0.2
+
+
+def test_the_product_of_a_loss_and_an_uncertain_factor_is_not_negative():
+    force = Estimate("r", 1.0, 0.4, 0.2, 1.8, "m", "").multiply(2.0, "f", "N", "", relative_error=0.5)
+    assert (force.value, force.low) == (2.0, 0.0)
+    assert force.high == pytest.approx(2.0 + np.hypot(1.6, NORMAL_QUANTILE))
+    assert force.error == pytest.approx(np.hypot(0.8, 1.0))
