@@ -55,3 +55,10 @@ def test_means_of_a_quantised_rest_keep_the_error_of_one_sample():
     assert errors[record.t < 4.9] == pytest.approx(-0.03)
     difference = record.y[1:, 0] - np.interp(record.t[1:], t, moving)
     assert errors[1:] == pytest.approx(difference, abs=1.1 * step / record.width)
+
+
+def test_the_known_noise_of_a_sample_is_that_of_a_mean_times_the_root_of_their_number():
+    t = np.linspace(0.0, 10.0, 20_001)
+    record = MeasuredRecord(SIMULATOR, RecordData("record", t, np.sin(t)[:, None], {}, (0.3,)), binned=True)
+    assert record.width > 1
+    assert record.noise == pytest.approx(0.3 / record.width**0.5)

@@ -9,8 +9,8 @@ import pytest
 from harness.analyses.fit.feasible_region import FeasibleRegion
 from harness.analyses.fit.fit_problem import EXACT_STEPS, FitProblem
 from harness.analyses.fit.fit_procedure import extend_ends, starting_points
-from harness.analyses.fit.profile_likelihood import profile_bound, search_bound
-from harness.analyses.fit.uncertainty import Uncertainty
+from harness.analyses.fit.profile_likelihood import depends_on_limits, profile_bound, search_bound
+from harness.analyses.fit.uncertainty import Uncertainty, estimate_uncertainty
 from harness.analyses.fit.unknowns import Unknown
 
 QUANTILE = 1.96  # for many residuals
@@ -188,3 +188,43 @@ def test_differences_of_runs_that_scatter_show_how_weak_a_direction_is():
     jacobian = problem.choose_steps(MINIMUM, problem.residuals(MINIMUM, ()))
     errors, expected = (np.sqrt(np.diag(np.linalg.inv(slopes.T @ slopes))) for slopes in (jacobian, matrix))
     assert errors == pytest.approx(expected, rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("z", "best", "expected"),
+    [
+        ((0.0, 0.0), 0.0, False),
+        ((1.68, 0.0), 0.0, True),
+        ((0.0, 1.68), 0.0, False),
+        ((0.0, 1.68), 100.0, True),
+        ((0.0, -1.68), 100.0, False),
+    ],
+)
+def test_a_profile_depends_on_a_limit_that_it_reaches_or_that_ends_the_fall_of_the_squares(z, best, expected):
+    """The limits of a and b are 1 + ln 2 and its negative; the least squares are at a = 0 and b = `best`."""
+    problem = Residuals(lambda a, b: (a, b - best), reach=1.0)
+    assert depends_on_limits(problem, np.array(z), 0, 1.0) is expected
+
+
+def test_the_error_of_the_inputs_is_added_to_the_variance():
+    random = np.random.default_rng(1)
+    jacobian, e, error = random.normal(size=(400, 2)), random.normal(size=400), random.normal(size=400)
+    problem = SimpleNamespace(
+        all=(),
+        residuals=lambda z, selection: e,
+        choose_steps=lambda z, e: jacobian,
+        records=[SimpleNamespace(y=e[:, None], step=np.zeros(1), noise=np.ones(1))],
+    )
+    without, with_error = (estimate_uncertainty(problem, MINIMUM, size * error, 0.0).deviations for size in (0.0, 9.0))
+    shift = 9.0 * np.linalg.pinv(jacobian) @ error
+    assert with_error**2 == pytest.approx(without**2 + shift**2)
+
+
+@pytest.mark.parametrize(
+    ("count", "correlation", "quantile"), [(1002, 0.0, 1.9623), (1002, 0.3, 2.0860), (12, 0.3, 2.2281)]
+)
+def test_correlated_residuals_have_at_most_20_degrees_of_freedom(count, correlation, quantile):
+    """Quantiles of a printed table."""
+    uncertainty = uncertainty_at(Residuals(valley), MINIMUM)
+    uncertainty = replace(uncertainty, residuals=np.zeros(count), correlation=correlation)
+    assert uncertainty.quantile == pytest.approx(quantile, abs=1e-4)

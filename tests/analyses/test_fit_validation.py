@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from harness.analyses.fit.fit_course import subdivide_inputs
 from harness.analyses.fit.fit_problem import FitProblem
 from harness.analyses.fit.measured_record import MeasuredRecord, RecordData
 from harness.analyses.fit.unknowns import Unknown
@@ -54,3 +55,13 @@ def test_the_inputs_of_a_validation_record_are_as_fine_as_those_of_the_fit():
     raw_fit = SimpleNamespace(z=z, uncertainty=SimpleNamespace(residuals=problem.residuals(z, problem.all)))
     (record,) = validate(problem, raw_fit, [driven]).records
     assert len(record.fine_t) == len(record.driven["F"]) == 4 * (len(data.t) - 1) + 1
+
+
+def test_inputs_pass_through_all_samples_after_their_error_has_been_estimated():
+    data = make_record(6.0)
+    force = np.random.default_rng(1).normal(size=len(data.t))
+    record = MeasuredRecord(SIMULATOR, RecordData(data.name, data.t, data.y, {"F": force}, data.sigma), binned=False)
+    problem = FitProblem([record], ["x"], [Unknown("size", "size", "m", 0.5, 2.0)], {})
+    subdivide_inputs(problem, np.zeros(1))
+    assert record.subdivision > 1
+    assert record.driven["F"][:: record.subdivision] == pytest.approx(force, abs=1e-9)
