@@ -53,6 +53,21 @@ def test_a_checkpoint_is_read_back(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
+def test_runs_that_another_command_has_finished_meanwhile_are_kept(tmp_path):
+    checkpoint = Checkpoint(tmp_path / "a.checkpoint", 10, 2)
+    example_checkpoint(checkpoint.path)
+    with checkpoint.open():
+        assert (checkpoint.n_done, checkpoint.missing_spans) == (2, [(0, 3), (5, 10)])
+
+
+def test_a_run_that_is_added_twice_counts_once(tmp_path):
+    checkpoint = Checkpoint(tmp_path / "a.checkpoint", 10, 1)
+    with checkpoint.open():
+        for end in (2, 3):
+            checkpoint.add(RunBlock(0, np.zeros((end, 1)), {}))
+        assert checkpoint.n_done == 3
+
+
 @pytest.mark.parametrize("spans", [[], [(0, 1)], [(999, 1001)], [(0, 1000)], [(2499, 2500)], [(0, 2500)]])
 def test_missing_runs_are_found_in_every_part(tmp_path, spans):
     checkpoint = Checkpoint(tmp_path / "a.checkpoint", 2500, 1)
