@@ -122,6 +122,12 @@ def path(name, times, events=None, **columns):
     return signals(name, times, columns, {name: UNITS.get(name, "") for name in columns}, events)
 
 
+@pytest.mark.parametrize(("other", "interpolated"), [([0.0, 0.5, 1.5, 2.5, 3.0], False), ([0.5, 1.5, 2.5, 3.0], True)])
+def test_nothing_is_interpolated_where_half_of_the_times_are_common(other, interpolated):
+    one, two = (path("x", np.array(t), x=np.array(t)) for t in ([0.0, 1.0, 2.0, 3.0], other))
+    assert compare(one, two).interpolated is interpolated
+
+
 def test_interpolation_follows_the_rate_or_stays_between_neighbours():
     one, two = np.linspace(0, 6, 1001), np.linspace(0.0005, 5.9, 400)
     comparison = compare(*(path("x and v", t, x=np.sin(t), v=np.cos(t)) for t in (one, two)))
