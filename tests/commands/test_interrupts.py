@@ -246,6 +246,19 @@ def test_a_child_process_exits_if_its_parent_was_killed_during_its_imports(tmp_p
     assert ends(child_of_killed_parent(code, tmp_path / "pid"))
 
 
+def test_a_worker_exits_and_removes_its_files_after_its_parent_was_killed(tmp_path):
+    folder = tmp_path / "files"
+    folder.mkdir()
+    code = (
+        "import os, time\nfrom pathlib import Path\nfrom harness.process.worker_pool import WorkerPool\n"
+        f"pool = WorkerPool(1, Path({str(folder)!r}), [])\nfuture = pool.submit(os.getpid)\n"
+        "while not pool.wait_for_any([future]):\n    pass\n"
+        f"Path({str(tmp_path / 'pid')!r}).write_text(str(future.result()))\ntime.sleep(100)"
+    )
+    assert ends(child_of_killed_parent(code, tmp_path / "pid"))
+    assert not folder.exists()
+
+
 def test_a_program_awaited_by_a_thread_ends_with_the_command(tmp_path, monkeypatch):
     monkeypatch.setattr(interrupt, "RECEIVED_SIGNALS", [])
     ended = []
