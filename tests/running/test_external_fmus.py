@@ -15,6 +15,7 @@ import pytest
 from fmpy.model_description import Dimension, ModelVariable
 
 from harness.errors import HarnessError, SceneError
+from harness.results.provenance import load_provenance
 from harness.running.external.simulation import read_longest_rows
 from harness.running.external.step_refinement import RefinementRun, refine
 from harness.running.fmu_archive import read_description
@@ -217,6 +218,13 @@ def test_a_hang_crash_exception_or_nan_is_one_sentence_and_keeps_its_samples(run
     assert done.stderr.count("\n") == 1
     assert rows["t [s]"][-1] == 0.5
     assert (rows["x"] == rows["t [s]"]).all()
+
+
+def test_a_scene_that_fails_keeps_its_stop_time_for_a_repetition(external_fmu_folder, tmp_path):
+    scene = SCENE.format(fmu=external_fmu_folder / "Faulty.fmu", outputs=["x"], more="stop = 0.9\nvalues.kind = 5")
+    (tmp_path / "mine.toml").write_text(scene)
+    assert_refused(commands.harness(tmp_path, "run", "mine.toml", blank=True), 1, "x is nan at t = 0.5")
+    assert load_provenance(tmp_path / "results" / "mine")["run"]["stop"] == 0.9
 
 
 def test_the_longest_of_the_aborted_refinement_runs_is_kept(tmp_path):
