@@ -39,6 +39,7 @@ def test_a_grid_has_every_combination_and_a_sample_every_stratum():
     assert sorted(np.floor(20 * (sample[:, 0] - 1))) == list(range(20))
     assert sorted(np.floor(20 * np.log(sample[:, 1]) / np.log(100))) == list(range(20))
     assert (sample[5:9] == SweepPoints(spread, 20, 1).coordinates(5, 9)).all()
+    assert not np.isin(sample, SweepPoints(spread, 20, 2).coordinates(0, 20)).any()
 
 
 @pytest.mark.parametrize(
