@@ -67,11 +67,12 @@ def test_the_verdicts_are_the_number_reproduced_the_fastest_methods_and_the_case
     summaries = [
         published("sled", ("period", 0.5), ("peak", -2.0)),
         published("sled-rough", ("steps", -50.0), ("run_time", 80.0)),
+        published("pendulum", ("period", 1.0)),
         summarize("precision", "sled", tabulate_choices(make_study(*POINTS), 0.0)[1]),
         summarize_stability("finished", "refused", "wrong"),
     ]
     reproduced, methods, stability = build_verdicts(summaries)
-    assert (reproduced.value, reproduced.is_good) == ("1 of 2", False)
+    assert (reproduced.value, reproduced.is_good) == ("2 of 3", False)
     assert reproduced.details == (
         "sled-rough: steps differs by -50 %",
         "largest deviation of the others: sled: peak differs by -2 %",
