@@ -11,6 +11,9 @@ import web_page
 from build_cache import ROOT, build_user_model, run_published_cases
 from commands import harness
 
+from harness.errors import HarnessError
+from harness.report.sections import read_picture
+
 EMPTY = {"meta", "link", "img", "br"}
 
 
@@ -111,6 +114,13 @@ def test_a_report_with_only_users_models_begins_with_them(tmp_path):
     assert headings[:3] == ["Runs", "sleds", "What to use"]
     assert headings.count("sleds") == 1
     assert "Oscillators as FMUs" not in page
+
+
+@pytest.mark.parametrize("text", ["", "<svg><g>", "<svg></svg><g>", "</svg>"])
+def test_a_figure_that_is_cut_off_is_not_shown(tmp_path, text):
+    (tmp_path / "figure.svg").write_text(text)
+    with pytest.raises(HarnessError, match=r"figure\.svg is not a complete SVG drawing"):
+        read_picture(tmp_path / "figure.svg")
 
 
 def test_without_results_there_is_no_report(tmp_path):

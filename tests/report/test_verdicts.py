@@ -3,6 +3,7 @@
 import re
 from dataclasses import replace
 from math import nan
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -10,11 +11,12 @@ from precision_points import make_point
 
 from harness.references.models import CASES
 from harness.report.page import write_report
+from harness.report.sections import STEPS, ResultItem, build_sections
 from harness.report.typeset import typeset
 from harness.report.verdicts import build_verdicts
 from harness.results.provenance import write_provenance
 from harness.results.quantity import Quantity
-from harness.results.summary import Summary, write_summary
+from harness.results.summary import STEPS_TABLE, Summary, make_table, write_summary
 from harness.studies.bench.benchmark import Baseline, Benchmark
 from harness.studies.bench.table import summarize_benchmarks
 from harness.studies.precision.method_choice import choose_method, tabulate_choices
@@ -153,6 +155,14 @@ def test_the_table_of_methods_has_the_rows_of_all_models(tmp_path):
     cells = [re.findall("<p[^>]*>([^<]*)</p>", cell) for cell in re.findall(r"<t[dh][^>]*>(.*?)</t[dh]>", table, re.S)]
     assert cells[4:6] == [["one", "quick run"], ["exact", "1 ms", "2.6 times faster than scipy LSODA"]]
     assert cells[8] == ["two", "quick run"]
+
+
+def test_the_table_of_steps_has_the_rows_of_published_cases_only():
+    sled, mine = (make_table(("case", "steps"), [(title, 5)], STEPS_TABLE) for title in ("sled", "mine"))
+    summaries = replace(published("sled", ("period", 0.5)), tables=sled), Summary("run", "mine", tables=mine)
+    sections = build_sections([ResultItem(Path(), summary) for summary in summaries], [])
+    (item,) = next(section.items for section in sections if section.study == STEPS)
+    assert item.summary.tables[0].rows == sled[0].rows
 
 
 def test_failed_stability_cases_are_shown_first_with_their_reason(tmp_path):
