@@ -100,6 +100,12 @@ def test_an_invalid_command_line_is_one_sentence_and_leaves_no_result(workspace,
     assert [file for file in workspace.glob("results/**/*") if file.is_file()] == []
 
 
+def test_an_option_that_applies_to_one_of_two_fmus_is_accepted(workspace):
+    other = external_fmus.build_external_fmus() / "Midpoint.fmu"
+    done = commands.harness(workspace, "compare", OWN, other, "--timeout", 30, "--stop", 0.1, blank=True)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
 SCENE = 'title = "a decay"\nfmu = "{fmu}"\noutputs = ["x"]\n{more}\n'
 
 

@@ -17,6 +17,8 @@ from fmpy import read_model_description
 from models import MODELS
 
 from harness import load_result
+from harness.commands.run import run
+from harness.commands.terminal import build_arguments
 from harness.errors import HarnessError
 from harness.results.folder import replace_folder
 from harness.results.summary import read_summary
@@ -151,7 +153,8 @@ def test_a_result_is_reproduced_from_its_folder_bit_for_bit(example_run, tmp_pat
         assert read_provenance(folder)[key] == provenance[key]
     if command == "run":
         assert "the same, bit for bit" in done.stdout
-        assert harness(workspace, "run", folder.relative_to(workspace), "--quiet").returncode == 0  # and again
+        quiet = harness(workspace, "run", folder.relative_to(workspace), "--quiet")  # and again
+        assert (quiet.returncode, quiet.stdout) == (0, "")
 
 
 @pytest.mark.slow
@@ -353,6 +356,11 @@ def test_an_edited_provenance_file_ends_a_repetition_in_one_sentence(workspace, 
         assert done.returncode in (1, 2)
         assert done.stderr.count("Error: ") == 1
         assert "Traceback" not in done.stderr
+
+
+def test_a_recorded_source_that_looks_like_an_option_is_none():
+    with run.make_context("run", build_arguments(run, {"scene": "--quiet"})) as context:
+        assert (context.params["scene"], context.params["quiet"]) == ("--quiet", False)
 
 
 def test_the_text_of_a_command_is_never_run(workspace):
