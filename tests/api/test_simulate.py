@@ -1,6 +1,7 @@
 """harness.simulate: models, scenes, FMUs and stored results, with options and input signals."""
 
 import sys
+from dataclasses import replace
 from math import pi
 
 import fmi3_fixtures
@@ -10,6 +11,9 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import harness
+from harness.api.runs import fine_step
+from harness.running.resolve import resolve
+from harness.scenes.run_spec import DEFAULT_EQUAL_STEPS
 
 pytestmark = pytest.mark.usefixtures("in_workspace")
 
@@ -99,6 +103,13 @@ def test_outputs_at_a_jump_have_the_input_after_it(interface, at_jump):
     assert sampled_force == pytest.approx([0.0, 5.0, 5.0], abs=1e-12)
     assert force[run.time == 1.0] == pytest.approx(at_jump, abs=1e-12)
     assert force[run.time != 1.0] == pytest.approx(np.where(run.time[run.time != 1.0] > 1.0, 5.0, 0.0), abs=1e-12)
+
+
+@pytest.mark.parametrize("interval", [1e-5, 0.25, 0.3, 2.0])
+def test_the_step_of_inputs_is_a_whole_part_of_the_interval_and_a_small_one_of_the_run(interval):
+    step = fine_step(replace(resolve("smd"), stop=2.0), interval)
+    assert step <= 2.0 / DEFAULT_EQUAL_STEPS
+    assert interval / step == pytest.approx(round(interval / step), rel=1e-12)
 
 
 def test_a_data_frame_drives_inputs():
