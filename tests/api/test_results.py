@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from commands import harness as harness_command
+from external_fmus import build_external_fmus
 
 import harness
 
@@ -37,8 +38,11 @@ def test_functions_document_every_parameter():
             assert parameter in body, (name, parameter)
 
 
-def test_a_stored_run_loads_bit_for_bit():
-    run = harness.simulate("stickslip", {"mu_s": 0.7})
+@pytest.mark.parametrize("start", [0.0, 1.0])
+def test_a_stored_run_loads_bit_for_bit(start):
+    text = f'title = "late"\nmodel = "stickslip"\noutputs = ["x", "F_spring"]\nstart = {start}\nvalues.mu_s = 0.7\n'
+    Path("late.toml").write_text(text)
+    run = harness.simulate("late.toml")
     run.save("saved")
     loaded = harness.load_result("saved")
     assert {*loaded.columns} == {*run.columns}
@@ -116,6 +120,14 @@ def test_a_sweep_measures_what_single_runs_measure(values):
             assert float(point["final_x"]) == run["x"][-1]
             assert int(point["events"]) == len(run.events.t) - 1
     assert (data["error"] == "").all()
+
+
+def test_the_tolerance_of_a_sweep_is_that_of_its_runs():
+    pytest.importorskip("xarray")
+    fmu = build_external_fmus() / "Midpoint.fmu"
+    for rtol in (1e-2, 1e-4):
+        data = harness.sweep(fmu, {"k": [40.0]}, rtol=rtol)
+        assert float(data["final_x"][0]) == harness.simulate(fmu, {"k": 40.0}, rtol=rtol)["x"][-1]
 
 
 def test_samples_are_reproducible_and_stored():
