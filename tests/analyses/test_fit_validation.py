@@ -6,8 +6,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from harness.analyses.fit.fit_course import subdivide_inputs
 from harness.analyses.fit.fit_problem import FitProblem
+from harness.analyses.fit.fit_procedure import subdivide_inputs
 from harness.analyses.fit.measured_record import MeasuredRecord, RecordData
 from harness.analyses.fit.unknowns import Unknown
 from harness.analyses.fit.validation import validate

@@ -11,7 +11,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import harness
-from harness.api.runs import fine_step
+from harness.api.runs import choose_fine_step
 from harness.running.resolve import resolve
 from harness.scenes.run_spec import DEFAULT_EQUAL_STEPS
 
@@ -107,7 +107,7 @@ def test_outputs_at_a_jump_have_the_input_after_it(interface, at_jump):
 
 @pytest.mark.parametrize("interval", [1e-5, 0.25, 0.3, 2.0])
 def test_the_step_of_inputs_is_a_whole_part_of_the_interval_and_a_small_one_of_the_run(interval):
-    step = fine_step(replace(resolve("smd"), stop=2.0), interval)
+    step = choose_fine_step(replace(resolve("smd"), stop=2.0), interval)
     assert step <= 2.0 / DEFAULT_EQUAL_STEPS
     assert interval / step == pytest.approx(round(interval / step), rel=1e-12)
 
