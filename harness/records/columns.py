@@ -404,8 +404,10 @@ def parse_numbers(table: Table, i: int, strict: bool = True) -> np.ndarray:
         table.parsed_columns[i] = parse_cells(table.columns[i])
     numbers, invalid = table.parsed_columns[i]
     if strict and invalid is not None:
-        row = f"row {table.line + 1 + invalid}, column {table.column_headings[i]}"
-        raise SceneError(f"{table.name}: '{table.columns[i][invalid][:40]}' in {row}, is not a number")
+        cell, heading, row = table.columns[i][invalid], table.column_headings[i], table.line + 1 + invalid
+        if cell == heading:
+            raise SceneError(f"{table.name}: row {row} repeats the headings: save each run in a separate file")
+        raise SceneError(f"{table.name}: '{cell[:40]}' in row {row}, column {heading}, is not a number")
     return numbers
 
 

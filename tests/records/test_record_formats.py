@@ -293,6 +293,11 @@ UNITS = "\n".join(f"{i} sec,{i % 5} {'cm' if i == 3 else 'mm'}" for i in range(2
         (f"t [s],x [m]\n{ROWS}", ColumnOptions(position="y"), "unknown column 'y'"),
         (f"t [h/m],x [m]\n{ROWS}", ColumnOptions(), "unknown unit of t 'h/m'"),
         (f"t [s],x [m]\n{ROWS}\n20,abc", ColumnOptions(), "'abc' in row 22, column x [m], is not a number"),
+        (
+            f"t [s],x [m]\n{ROWS}\n\nt [s],x [m]\n{ROWS}",
+            ColumnOptions(),
+            "row 22 repeats the headings: save each run in a separate file",
+        ),
         (f"t,x\n{UNITS}", ColumnOptions(), "'0 mm' in row 2, column x, is not a number"),  # not all are in mm
         (f"t [s],x [m]\n{ROWS}\n20,1,2", ColumnOptions(), "row 22 has 3 cells where the heading has 2"),
         (f"t [s],x [m]\n{ROWS}\n5,5", ColumnOptions(), "time does not rise after t = 19.0 s"),
