@@ -44,11 +44,11 @@ class Chain(CoupledFriction):
     def rates(self, t, y, modes):
         return np.zeros(self.n)  # the rates of forces are constant
 
-    def answer(self):
+    def answer(self, tie_tolerance=ROUNDOFF_MARGIN):
         """Return the modes, found from all contacts stuck, and whether they are consistent."""
         vectors.contact_indices[:] = range(self.n)
         y, status = np.zeros(self.n), np.full(self.n, AT_REST)
-        modes, fits = contact_lcp.solve_modes(self, 0.0, y, np.zeros(self.n), status, 1.0, ROUNDOFF_MARGIN)
+        modes, fits = contact_lcp.solve_modes(self, 0.0, y, np.zeros(self.n), status, 1.0, tie_tolerance)
         return tuple(map(int, modes)), fits
 
     def fits(self, modes):
@@ -96,6 +96,15 @@ def test_a_load_at_the_limit_breaks_away_if_it_grows_and_sticks_otherwise(rate):
         chain.b = chain.A @ (chain.limit * [1.0, -1.0]) * (1.0 + draw.choice([-1.0, 0.0, 1.0]) * 4.0 * 2.0**-52)
         chain.b_rate = chain.A @ ([rate, -rate])
         assert chain.answer() == ((1, -1) if rate > 0.0 else (0, 0), True)
+
+
+@pytest.mark.parametrize(
+    ("rate", "tie_tolerance", "mode"), [(-1.0, 1e-5, 0), (-1.0, 1e-7, 1), (0.0, 1e-5, 1), (1.0, 1e-5, 1)]
+)
+def test_a_load_above_the_limit_sticks_only_if_it_decreases_and_within_the_tolerance(rate, tie_tolerance, mode):
+    chain = Chain(np.random.default_rng(1), 1, 1.0, False)
+    chain.b, chain.b_rate = chain.A @ chain.limit * (1.0 + 1e-6), chain.A @ [rate]
+    assert chain.answer(tie_tolerance) == ((mode,), True)
 
 
 def test_a_contact_with_more_sliding_than_static_friction_is_reported():
