@@ -22,7 +22,7 @@ from fmpy.validation import validate_fmu
 from models import declared
 
 from fmus.packaging import BuildError
-from fmus.packaging.archive import write
+from fmus.packaging.archive import write, zip_entries
 from fmus.packaging.embedded_modules import embedded_files, installed_package
 from fmus.packaging.fmi_variables import declared_variables
 from fmus.packaging.model_description import describe
@@ -294,6 +294,15 @@ def test_a_missing_pythonfmu_error_says_what_to_install(tmp_path):
     assert run.stderr.startswith("Error: pythonfmu is not installed")
     assert "pip install pythonfmu" in run.stderr
     assert run.stderr.count("\n") == 1
+
+
+def test_an_archive_does_not_depend_on_the_order_of_its_entries():
+    entries = {"model.png": b"an icon", "binaries/linux64/a.so": b"a library"}
+    one, other = (
+        zip_entries(dict(order), datetime(2026, 1, 1, tzinfo=UTC))
+        for order in (entries.items(), reversed(entries.items()))
+    )
+    assert one == other
 
 
 def test_a_failed_write_leaves_the_previous_fmu_and_nothing_else(tmp_path, monkeypatch):
