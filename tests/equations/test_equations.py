@@ -11,8 +11,18 @@ from models import EXAMPLE_MODELS, LARGER_MODELS, MODELS, ROOT
 
 import fmus
 from fmus.packaging.equations.algebra import ARITHMETIC, rounding_scale
+from fmus.packaging.equations.dimensions import expression_text
 from fmus.packaging.equations.expressions import FUNCTIONS, Term
-from fmus.packaging.equations.model_declaration import Choice, Contact, Model, Output, Rule, SettableVariable, Variable
+from fmus.packaging.equations.model_declaration import (
+    Choice,
+    Contact,
+    Model,
+    Output,
+    Parameter,
+    Rule,
+    SettableVariable,
+    Variable,
+)
 from fmus.packaging.model_lookup import find_model
 
 SOURCES = [*MODELS, *EXAMPLE_MODELS]
@@ -299,3 +309,17 @@ def test_the_test_models_have_choices_and_contacts():
     assert {Choice, Contact} <= kinds
     functions = {name for source in SOURCES for name in FUNCTIONS if f"{name}(" in find_model(source).generated_source}
     assert functions == {*FUNCTIONS}
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        *("a - (b - c)", "a - (b + c)", "a - b - c", "a + b - c", "a / (b / c)", "a / (b * c)", "a / b / c"),
+        *("a * (b - c)", "a - b * c", "-(a + b) * c", "-a / b", "a - -b"),
+    ],
+)
+def test_the_text_of_an_expression_has_the_parentheses_that_it_needs(text):
+    names = {name: Parameter(1.0, "1", "a number") for name in "abc"}
+    for name, parameter in names.items():
+        parameter.name = name
+    assert expression_text(eval(text, names)) == text
