@@ -10,7 +10,7 @@ from build_cache import ROOT
 from commands import harness, run_process
 
 from harness.errors import HarnessError
-from harness.process.temporary_directory import has_plain_uri, temporary_directory
+from harness.process.temporary_directory import has_plain_uri, remove_abandoned_directories, temporary_directory
 from harness.running import fmu_archive
 
 ODD = "a#b'+(,&@[{;=!$^%20 é\u3042`~)"
@@ -65,6 +65,14 @@ def test_a_python_fmu_without_the_files_of_its_library_is_refused(fmus, tmp_path
     assert done.stderr.count("\n") == 1
     assert done.stderr.startswith("Error: ")
     assert "broken.fmu lacks resources/" in done.stderr
+
+
+def test_a_directory_in_use_is_not_taken_for_an_abandoned_one(tmp_path, monkeypatch):
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    with temporary_directory() as used:
+        (tmp_path / "friction-fmus-abandoned").mkdir()
+        remove_abandoned_directories.__wrapped__(tmp_path)  # without its cache, as in another process
+        assert list(tmp_path.iterdir()) == [used]
 
 
 def test_an_unwritable_temporary_folder_is_reported(tmp_path, monkeypatch):
