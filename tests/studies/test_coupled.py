@@ -90,6 +90,20 @@ def test_two_equal_coupled_masses_agree_with_their_closed_form(couple, tmp_path)
     assert table[:, 4] == pytest.approx([-x for x in expected], abs=1e-9)
 
 
+@pytest.mark.parametrize("factor", [60.0, -60.0])
+def test_a_connection_with_a_factor_pushes_in_its_direction(couple, tmp_path, factor):
+    """A mass that hardly moves from 0.1 m pushes an oscillator with a constant force."""
+    parts = 'parts.a = { model = "smd", values = { m = 1e9, k = 0.0, c = 0.0, x0 = 0.1 } }\n'
+    parts += 'parts.b = { model = "smd", values = { c = 0.0, x0 = 0.0 } }\n'
+    connection = f'connections = [{{ from = "a.x", to = "b", factor = {factor} }}]\n'
+    done = couple(f'title = "a push"\nstop = 0.2\nsteps = [0.004, 0.002]\n{parts}{connection}')
+    assert (done.returncode, done.stderr) == (0, "")
+    table = np.loadtxt(tmp_path / "results/coupled/mine/trajectory.csv", delimiter=",", skiprows=1)
+    expected = [0.1 * factor / 157.9 * (1.0 - cos(sqrt(157.9) * t)) for t in table[:, 0]]
+    assert table[:, 4] == pytest.approx(expected, abs=1e-8)
+    assert table[:, 2] == pytest.approx(expected, abs=2e-3)
+
+
 @pytest.fixture
 def run(fmus):
     """Return run(scene): the results folder of a shipped scene, which is run once."""
