@@ -111,6 +111,13 @@ def test_a_communication_step_is_timed_against_an_empty_fmu_with_the_same_output
     assert 0.0 < lean < 10 * lean_empty
 
 
+def test_the_baseline_of_many_runs_is_their_number_times_one_run(all_measures, monkeypatch):
+    monkeypatch.setattr(bench_speed, "time_fastest_call", lambda call, repeats: 2.0)
+    (measure,) = of(all_measures, time_many_runs)
+    (baseline,) = measure().baselines
+    assert baseline.value == 2.0 * 20
+
+
 def test_the_best_run_after_a_warm_up_counts():
     calls = []
     assert 0.0 <= time_fastest_call(partial(calls.append, 1), 4) < inf
