@@ -154,3 +154,32 @@ def test_fmi2_asks_for_step_events_where_a_law_has_them():
         description = fmpy.read_model_description(build_native_fmus() / f"{name}.fmu")
         needs[name] = description.modelExchange.needsCompletedIntegratorStep
     assert needs == {"coulomb": True, "smd": False}
+
+
+GRAZING = """from fmus import HYBRID, SIGN, Contact, Mode, Model, Output, Parameter, State, choose
+
+
+class Grazing(Model):
+    \"\"\"Block on a spring, and on a soft one beyond x = c.\"\"\"
+
+    m = Parameter(1.0, "kg", "mass", above=0)
+    k = Parameter(100.0, "N/m", "stiffness", low=0)
+    f = Parameter(2.0, "N", "dry friction", low=0)
+    c = Parameter(0.88, "m", "position of the soft spring", low=0)
+    x = State("m", "position", start=-1.0)
+    v = State("m/s", "speed", rate_of=x)
+    mode = Mode()
+    F = Contact("N", "friction force", mode=mode, slip=v, slide=f, laws=(HYBRID, SIGN))
+    a = Output("m/s2", "acceleration", (-k * x - F - choose(x > c, 1e-6 * k * (x - c), 0.0)) / m, rate_of=v)
+"""
+
+
+@pytest.mark.parametrize("method", [ODE23, RODAS])
+def test_a_mode_counts_once_where_a_later_condition_is_in_doubt(worker, tmp_path, method):
+    """The third turning point is near 0.88 m, where the motion is repeated with a tighter tolerance."""
+    (tmp_path / "grazing.py").write_text(GRAZING)
+    fmu = worker.instantiate(build_user_model(tmp_path / "grazing.py") / "grazing.fmu")
+    fmu.begin({"friction": SIGN, "solver.method": method, "solver.rtol": 1e-3}, stop=1.6)
+    fmu.step(0.0, 1.6)
+    assert fmu.get("events.count") == 6  # the start and five turning points
+    fmu.free()
