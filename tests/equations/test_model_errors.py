@@ -547,6 +547,12 @@ WRONG = {
         17,
         "x.start is set after the declaration of x: write start=... in that line",
     ),
+    "a declaration after the class": (
+        RATE + "Mine.y = Output('m', 'position', 2.0 * Mine.x)\n",
+        17,
+        "Mine.y is set after the class: declare y in the body of the class",
+    ),
+    "a number in place of a declaration": (RATE + "Mine.k = 5.0\n", 17, "Mine.k is set after the class: declare k in"),
     "a bound that grows": (RATE + "    k.low += 1.0\n", 17, "k.low is set after the declaration of k: write low=..."),
     "a name of the class in a comprehension": (
         RATE + "    y = sum([k * x for _i in range(2)])\n",

@@ -376,6 +376,15 @@ class _ModelMeta(type):
         model.location = author_location()
         return model
 
+    def __setattr__(cls, name: str, value: object) -> None:
+        """Set an attribute; raise ModelError if it is a declaration, which must be in the body of the class."""
+        if any(isinstance(item, (Expression, Rule)) for item in (value, vars(cls).get(name))):
+            raise ModelError(
+                f"{cls.__name__}.{name} is set after the class: declare {name} in the body of the class",
+                author_location(),
+            )
+        super().__setattr__(name, value)
+
 
 class Model(metaclass=_ModelMeta):
     """Base class of models: the docstring becomes the documentation page, the body declares variables and equations.
