@@ -94,6 +94,15 @@ def test_the_parameters_of_a_drawn_record_are_found(name):
 
 
 @pytest.mark.slow
+def test_means_of_samples_do_not_shift_the_values_of_a_long_record():
+    """Quantised, so that the noise is smaller than it seems: means across the slips shifted k by 10 standard errors."""
+    record, fit = fit_drawn("force", [57721, 3, 18], max_samples=20_000)
+    assert len(record.t) == 13_381
+    for parameter, truth in record.truth.items():
+        assert holds(fit[parameter], truth)
+
+
+@pytest.mark.slow
 def test_a_long_curved_valley_does_not_hide_the_best_values():
     """Runs with the default tolerance scattered so much that fits of this record ended halfway along the valley."""
     record, fit = fit_drawn("Stribeck", [8101, 6, 65], max_samples=20_000)

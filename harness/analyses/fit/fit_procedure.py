@@ -8,7 +8,7 @@ import numpy as np
 from ...errors import HarnessError
 from ...running.whole_run import Simulator
 from .fit_problem import FitProblem, Selection
-from .measured_record import MeasuredRecord, RecordData
+from .measured_record import MAX_AVERAGING_ERROR, MeasuredRecord, RecordData
 from .profile_likelihood import profile_bound, search_bound
 from .search import DISTINCT, Minimum, search, select_distinct
 from .uncertainty import Uncertainty, estimate_uncertainty
@@ -23,6 +23,7 @@ MAX_THIN, THIN = 3000, 2000  # samples above which a search uses fewer, and thei
 DRAWS, MAX_OTHER_MINIMA, DRAW_SIZE = 24, 8, 0.3  # starts for other minima
 COARSE_SAMPLES = 500  # of each record, used for the first search for other minima
 ROUNDS = 6  # starts, all but the first from better minima
+MAX_AVERAGING_SHIFT = 0.2  # of the values, in standard errors, by the means of neighbouring samples
 SHALLOW = 0.1  # variances of the residuals by which a minimum must be lower to count as better
 
 
@@ -92,11 +93,23 @@ def fit_records(
         records = [MeasuredRecord(simulator, record_data, binned) for record_data in data]
         problem = FitProblem(records, simulator.spec.outputs, unknowns, fixed, robust)
         raw_fit = search_and_refine(problem, warm_start, any(any(record_data.sigma) for record_data in data), report)
-        values = [problem.values(raw_fit.z, i) for i in range(len(records))]
-        if all(record.can_be_averaged(record_values) for record, record_values in zip(records, values, strict=True)):
+        if is_averaging_negligible(problem, raw_fit):
             break
         warm_start = raw_fit.z
     return problem, raw_fit
+
+
+def is_averaging_negligible(problem: FitProblem, raw_fit: RawFit) -> bool:
+    """Return whether a fit of means of neighbouring samples has nearly the values of a fit of all samples."""
+    z, uncertainty, errors = raw_fit.z, raw_fit.uncertainty, []
+    for i, record in enumerate(problem.records):
+        record_errors = record.averaging_errors(problem.values(z, i))
+        if record_errors is None or np.abs(record_errors).max() >= MAX_AVERAGING_ERROR:
+            return False
+        errors.append(record_errors.ravel())
+    jacobian = problem.jacobian(z, uncertainty.residuals, problem.all, np.arange(len(z)), central=True)
+    shift = np.linalg.lstsq(jacobian, np.concatenate(errors), rcond=None)[0]
+    return bool((np.abs(shift) <= MAX_AVERAGING_SHIFT * uncertainty.deviations).all())
 
 
 def search_and_refine(

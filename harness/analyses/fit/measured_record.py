@@ -11,6 +11,7 @@ from ...running.whole_run import Run, Simulator
 from .noise import bin_means, estimate_noise
 
 MAX_SAMPLES = 2500  # twice as many are averaged to this number of means of neighbours
+MAX_AVERAGING_ERROR = 0.3  # of a mean of neighbouring samples, in units of the noise
 INPUT_POINTS = 500  # of an input that suffice for a search
 MAX_PARTS = 32  # in the cache of a record
 SHORTEST_STEP = 1e-6  # between communication points, in intervals between samples
@@ -174,12 +175,24 @@ class MeasuredRecord:
 
     def can_be_averaged(self, values: Mapping[str, float]) -> bool:
         """Return whether the means of the outputs over neighbouring samples are the outputs at their mean times."""
+        errors = self.averaging_errors(values)
+        return errors is not None and bool(np.abs(errors).max() < MAX_AVERAGING_ERROR)
+
+    def averaging_errors(self, values: Mapping[str, float]) -> np.ndarray | None:
+        """Return by how much means of the outputs over neighbouring samples exceed the outputs at their mean times.
+
+        Returns
+        -------
+        numpy.ndarray or None
+            Differences (n, columns) in units of the noise; None if the FMU refuses the values. Zero for records with
+            inputs, which are known as means only.
+        """
         if self.width == 1 or self.inputs:
-            return True
+            return np.zeros(self.y.shape)
         y, at_samples = self.run(values), self.prepare(self.sampled_t, self.sampled_t, {})(values)
         if y is None or at_samples is None:
-            return False
-        return bool(np.abs((bin_means(at_samples, self.width) - y) / self.noise).max() < 0.3)
+            return None
+        return np.asarray((bin_means(at_samples, self.width) - y) / self.noise)
 
     def growing_parts(self, shares: Sequence[float], points: int) -> list[np.ndarray]:
         """Return samples of growing parts of the record; each part has a share of the whole motion."""
