@@ -3,6 +3,7 @@
 import os
 import random
 import re
+import shlex
 import subprocess
 import sys
 import threading
@@ -272,7 +273,7 @@ def test_the_report_survives_any_content_of_a_result(tmp_path):
 
 def python(folder, *arguments, shell=None, **environment):
     environment = os.environ | {"PYTHONPATH": str(ROOT)} | environment
-    command = " ".join([sys.executable, "-m", "harness", *map(str, arguments), shell or ""])
+    command = f"{shlex.join([sys.executable, '-m', 'harness', *map(str, arguments)])} {shell or ''}"
     return subprocess.run(
         ["sh", "-c", command], cwd=folder, env=environment, capture_output=True, text=True, timeout=120
     )
