@@ -107,6 +107,8 @@ def is_averaging_negligible(problem: FitProblem, raw_fit: RawFit) -> bool:
         if record_errors is None or np.abs(record_errors).max() >= MAX_AVERAGING_ERROR:
             return False
         errors.append(record_errors.ravel())
+    if not any(map(np.any, errors)):
+        return True  # nothing was averaged
     jacobian = problem.jacobian(z, uncertainty.residuals, problem.all, np.arange(len(z)), central=True)
     shift = np.linalg.lstsq(jacobian, np.concatenate(errors), rcond=None)[0]
     return bool((np.abs(shift) <= MAX_AVERAGING_SHIFT * uncertainty.deviations).all())

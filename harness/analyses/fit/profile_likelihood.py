@@ -201,7 +201,6 @@ def profile_bound(
     excess : float
         Squares at z above the minimum, less than those of the limit; above 0 where z is another minimum.
     """
-    others = np.delete(np.arange(len(z)), i)
     target = uncertainty.limit(i)
     variance = max(uncertainty.covariance[i, i], 1e-300)
     reach = max(float(np.sqrt((target - excess) / uncertainty.variance * variance)), 1e-6)
@@ -213,11 +212,8 @@ def profile_bound(
     for _ in range(MAX_TRIALS):
         distance = min(bracket.next_distance(), farthest)
         starts = [bracket.extrapolate(distance), bracket.inner[-1].z.copy()]
-        for start in starts:
-            start[i] = z[i] + side * distance
-        squares, position = fit_others(
-            problem, z, starts, others, MIN_GAIN * target / uncertainty.squares, uncertainty.squares + target
-        )
+        goal = uncertainty.squares + target
+        squares, position = fit_at(problem, z, uncertainty, i, side * distance, starts, goal)
         if squares < uncertainty.squares - BETTER * target:
             better = position
             if ends_at_better:
@@ -255,18 +251,31 @@ def search_bound(
     if distance**2 < 2 * FLAT * (bound.end - z[i]) ** 2:  # where squares that are quadratic are not much above FLAT
         return bound
     tangent = side * uncertainty.covariance[:, i] / max(uncertainty.covariance[i, i], 1e-300)
-    starts = [z + distance * tangent, z.copy()]
-    for start in starts:
-        start[i] = z[i] + side * distance
-    min_gain, others = MIN_GAIN * target / uncertainty.squares, np.delete(np.arange(len(z)), i)
-    squares, there = fit_others(problem, z, starts, others, min_gain, uncertainty.squares + FLAT * target)
+    goal = uncertainty.squares + FLAT * target
+    squares, position = fit_at(problem, z, uncertainty, i, side * distance, [z + distance * tangent, z.copy()], goal)
     excess = (squares - uncertainty.squares) / target
     if excess < -BETTER and ends_at_better:
-        return Bound(None, there)
+        return Bound(None, position)
     if excess < 1:
-        behind = profile_bound(problem, there, uncertainty, i, side, ends_at_better, max(excess, 0.0) * target)
+        behind = profile_bound(problem, position, uncertainty, i, side, ends_at_better, max(excess, 0.0) * target)
         return replace(behind, profile=bound.profile + behind.profile)
     return replace(bound, has_flat_tail=excess < FLAT)
+
+
+def fit_at(
+    problem: FitProblem,
+    z: np.ndarray,
+    uncertainty: Uncertainty,
+    i: int,
+    displacement: float,
+    starts: list[np.ndarray],
+    goal: float,
+) -> tuple[float, np.ndarray]:
+    """Return the least squares and the coordinates with coordinate `i` displaced from z (k,); see `fit_others`."""
+    for start in starts:
+        start[i] = z[i] + displacement
+    min_gain = MIN_GAIN * uncertainty.limit(i) / uncertainty.squares
+    return fit_others(problem, z, starts, np.delete(np.arange(len(z)), i), min_gain, goal)
 
 
 def fit_others(
