@@ -42,19 +42,19 @@ FIGURES_OF_PAGES = {
 }
 # Figures of commands that pages show but do not run: the command and the path.
 FIGURES_OF_COMMANDS = {
-    "coulomb": ("run coulomb", "results/coulomb/figure.svg"),
-    "pendulum": ("run pendulum", "results/pendulum/figure.svg"),
-    "coupled": ("couple two-masses", "results/coupled/two-masses/figure.svg"),
-    "precision": ("precision stickslip --quick", "results/precision/stickslip/figure.svg"),
-    "rivals": ("rivals", "results/rivals/figure.svg"),  # needs the extra rivals
+    "coulomb": ("harness run coulomb", "results/coulomb/figure.svg"),
+    "pendulum": ("harness run pendulum", "results/pendulum/figure.svg"),
+    "coupled": ("harness couple two-masses", "results/coupled/two-masses/figure.svg"),
+    "precision": ("harness precision stickslip --quick", "results/precision/stickslip/figure.svg"),
+    "rivals": ("benchmarks rivals", "results/rivals/figure.svg"),  # needs the extra rivals
 }
 
 
-def harness(folder: Path, command: str) -> None:
-    """Run a command in a folder that has the built FMUs."""
+def run_command(folder: Path, command: str) -> None:
+    """Run a command of a package, as in "harness run coulomb", in a folder that has the built FMUs."""
     if not (folder / "fmus").exists():
         (folder / "fmus").symlink_to(FMUS.resolve())
-    arguments = [sys.executable, "-m", "harness", *command.split(), "--quiet"]
+    arguments = [sys.executable, "-m", *command.split(), "--quiet"]
     subprocess.run(arguments, cwd=folder, check=True, env=os.environ | {"PYTHONPATH": str(DOCS.parent)})
 
 
@@ -110,7 +110,7 @@ def draw_stick(folder: Path) -> None:
     runs = {}
     for law in ("hybrid", "sign"):
         (folder / f"{law}.toml").write_text(SCENE.format(law=law))
-        harness(folder, f"run {law}.toml")
+        run_command(folder, f"harness run {law}.toml")
         result = folder / "results" / law
         runs[law] = read_columns(result / "trajectory.csv") | {"steps": read_columns(result / "steps.csv")["t"]}
     for name, colours in (("light", LIGHT), ("dark", DARK)):
@@ -248,7 +248,7 @@ def draw_live_page(folder: Path) -> None:
 def draw_report(folder: Path) -> None:
     """Save a screenshot of the beginning of a report."""
     for command in ("", "precision --quick", "stability stickslip", "decay coulomb", "report"):
-        harness(folder, command)
+        run_command(folder, f"harness {command}")
     save_screenshot(folder / "results" / "report.html", IMAGES / "report.png", folder, 1250)
 
 
@@ -312,7 +312,7 @@ def main() -> None:
     for name, (command, file) in FIGURES_OF_COMMANDS.items():
         if name in names:
             with TemporaryDirectory() as folder:
-                harness(Path(folder), command)
+                run_command(Path(folder), command)
                 copy_figure(Path(folder, file), IMAGES / f"{name}.svg")
     for name, draw in DRAWINGS.items():
         if name in names:

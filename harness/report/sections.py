@@ -102,8 +102,6 @@ SECTIONS = (
         "Importers",
         "The same FMUs in other tools. Numbers are the largest difference from fmpy, relative to the largest value; "
         "message: the tool reports the error of the FMU; - : not checked with this tool.",
-        "importers",
-        "importers",
     ),
     Section(
         "sweep",
@@ -131,8 +129,6 @@ SECTIONS = (
         "bench",
         "Benchmarks",
         "Targets, measured values and baselines of the same run. Times depend on the machine and on its load.",
-        "benchmarks",
-        "bench",
     ),
 )
 

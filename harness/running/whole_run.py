@@ -5,6 +5,7 @@ made from Python, which takes about thirty times as long. The FMU is instantiate
 """
 
 import json
+import shutil
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
@@ -25,7 +26,6 @@ from ..process.subprocess_runner import run_subprocess
 from ..process.temporary_directory import temporary_directory
 from ..results.files import replace_nonfinite
 from ..scenes.run_spec import RunSpec
-from .c_host import COMPILER
 from .fmu_archive import (
     PROCESS_RESOURCES,
     exposes_solver_steps,
@@ -38,6 +38,7 @@ from .stepping import TIME, make_grid, values_of_steps
 from .variable_values import REAL_TYPES, effective_value, find_bound, variable_unit
 
 SOURCE = Path(__file__).with_name("whole_run.c")
+COMPILER = shutil.which("cc") or shutil.which("gcc")  # the compiler of the system
 FUNCTIONS = {  # in the order of the structs in whole_run.c
     "2.0": ("SetReal", "SetupExperiment", "EnterInitializationMode", "ExitInitializationMode", "GetReal", "DoStep"),
     "3.0": ("SetFloat64", "EnterInitializationMode", "ExitInitializationMode", "GetFloat64", "DoStep"),

@@ -17,6 +17,7 @@ from pathlib import Path
 import pytest
 from build_cache import ROOT
 
+from benchmarks.__main__ import main as BENCHMARKS
 from harness.commands.terminal import progress
 from harness.process import interrupt, interruptible_wait
 from harness.process.interrupt import CommandInterruptedError, check_interrupt, defer_signals, interruptible
@@ -51,10 +52,11 @@ def test_a_signal_ends_a_command_and_leaves_nothing_behind(workspace, command, n
     (workspace / "temporary").mkdir()
     (workspace / "slow.toml").write_text(SLOW)
     arguments, sign = COMMANDS[command]
+    module = "benchmarks" if command in BENCHMARKS.commands else "harness"
     environment = os.environ | {"PYTHONPATH": str(ROOT), "TMPDIR": str(workspace / "temporary")}
     reset_sigint = partial(signal.signal, signal.SIGINT, signal.SIG_DFL)  # a test run in the background ignores it
     process = subprocess.Popen(
-        [sys.executable, "-m", "harness", *arguments, "--out", "out"],
+        [sys.executable, "-m", module, *arguments, "--out", "out"],
         cwd=workspace,
         env=environment,
         stdout=subprocess.PIPE,

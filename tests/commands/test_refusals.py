@@ -76,7 +76,6 @@ COMMAND_LINES = [  # arguments, exit status, words of the sentence
     ([*FIT, "--free", "k", "--start", "k=3,m=2"], 2, "unknown free parameter 'm'"),
     ([*FIT, "--free", "k", "--start", "fmus"], 2, "fmus holds no result of a fit: name its folder or its fit.json"),
     (["precision", "stikslip"], 2, "unknown model 'stikslip' (nearest: 'stickslip'); allowed: belt, clutch, "),
-    (["rivals", "mujocco"], 2, "unknown rival 'mujocco' (nearest: 'mujoco'); allowed: "),
     (["sweep", "smd"], 2, "--vary"),
     (["sweep", "smd", "--vary", "mm=1:2:3"], 2, "unknown parameter to vary 'mm' (nearest: 'm')"),
     ([*SWEEP, "--vary", "m=1,2"], 2, "names a parameter twice"),

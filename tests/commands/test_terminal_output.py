@@ -23,19 +23,9 @@ from harness.report.typeset import typeset
 from harness.scenes.coupled import scene as coupled
 from harness.scenes.fmu_files import find_fmu
 from harness.scenes.scene import load_scene, shipped_scenes
-from harness.studies.bench.benchmark import Baseline, Benchmark
-from harness.studies.bench.table import benchmark_table
-from harness.studies.importers import table as importers
-from harness.studies.importers.checks import CHECKS
 from harness.studies.precision import law_deviations, table
 from harness.studies.precision.literature_problems import LiteratureRun
 from harness.studies.precision.study import FMU, ME, Point, Study
-from harness.studies.rivals.catalogue import RIVALS
-from harness.studies.rivals.comparison import Comparison as RivalComparison
-from harness.studies.rivals.comparison import Result as RivalResult
-from harness.studies.rivals.measures import Measures
-from harness.studies.rivals.scenes import SCENES
-from harness.studies.rivals.table import rivals_table
 from harness.studies.run.table import round_run_time
 
 WIDTH = 80
@@ -73,7 +63,6 @@ POINTS = [
     for case in CASES
     for tool in (FMU, ME)
 ]
-RIVAL_MEASURES = Measures(1.2e-16, 2e-13, 12, 34, 5e-12, 500000, 0.001)
 TABLES = {  # of slow commands, filled with long words
     "precision": (
         [table.work_precision_table(Study(m, tuple(c for c in CASES if c.model == m), tuple(POINTS))) for m in MODELS],
@@ -98,41 +87,6 @@ TABLES = {  # of slow commands, filled with long words
             )
         ],
         "error [SI]",
-    ),
-    "bench": (
-        [
-            benchmark_table(
-                [Benchmark("16 s of " + 9 * "words ", 0.0123, "s", 0.02, (Baseline("an empty FMU in Python", 0.1),))]
-            )
-        ],
-        "target",
-    ),
-    "importers": (
-        [
-            importers.importer_table(
-                [
-                    importers.CheckResult("libcosim 0.0.6", check, ("1.23e-16",) * 5, fmus=tuple(MODELS))
-                    for check in CHECKS
-                ]
-            )
-        ],
-        "pendulum",
-    ),
-    "rivals": (
-        [
-            rivals_table(
-                RivalComparison(
-                    tuple(RIVALS.values()),
-                    tuple(
-                        RivalResult(rival.title, "1.2.3", setting, {}, scene, rival.lines, RIVAL_MEASURES)
-                        for rival in RIVALS.values()
-                        for setting in rival.settings
-                        for scene in SCENES
-                    ),
-                )
-            )
-        ],
-        "lost/extra",
     ),
 }
 
@@ -169,7 +123,7 @@ def test_names_with_brackets_are_printed_literally(tmp_path):
     "arguments",
     [
         *("", "run stickslip", "run mine.toml", "decay coulomb", "compare smd coulomb", "sweep smd --vary c=1,2"),
-        *("couple two-masses", "precision smd", "bench", "importers"),
+        *("couple two-masses", "precision smd"),
     ],
 )
 def test_a_command_without_its_fmus_explains_how_to_build_them(tmp_path, monkeypatch, arguments):

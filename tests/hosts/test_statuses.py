@@ -13,7 +13,7 @@ import native_fmus
 import pytest
 from native_host import begin, run_host_script, value_references
 
-from harness.running import c_host
+from benchmarks import c_host
 
 OK, DISCARD, ERROR, FATAL = "0", "2", "3", "4"
 TERMINATED = ["0 0x0p+0", "0 1"]  # after no step: last successful time, and whether the FMU terminates

@@ -9,6 +9,8 @@ from types import SimpleNamespace
 import pytest
 from precision_points import make_point
 
+from benchmarks.bench.benchmark import Baseline, Benchmark
+from benchmarks.bench.table import summarize_benchmarks
 from harness.references.models import CASES
 from harness.report.page import write_report
 from harness.report.sections import STEPS, ResultItem, build_sections
@@ -17,8 +19,6 @@ from harness.report.verdicts import build_verdicts
 from harness.results.provenance import write_provenance
 from harness.results.quantity import Quantity
 from harness.results.summary import STEPS_TABLE, Summary, make_table, write_summary
-from harness.studies.bench.benchmark import Baseline, Benchmark
-from harness.studies.bench.table import summarize_benchmarks
 from harness.studies.precision.method_choice import choose_method, tabulate_choices
 from harness.studies.precision.study import FMPY, QUICK, Study
 from harness.studies.run.table import judge_deviations

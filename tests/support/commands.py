@@ -1,4 +1,4 @@
-"""Run `python -m harness` and `python build_fmus.py`, in this process or in one of its own."""
+"""Run `python -m harness`, `python -m benchmarks` and `python build_fmus.py`, in this process or in one of its own."""
 
 import os
 import subprocess
@@ -11,6 +11,7 @@ from unittest.mock import patch
 from click.testing import CliRunner
 
 import build_fmus
+from benchmarks.__main__ import main as benchmark_commands
 from harness.__main__ import exit_on_error, run_arguments
 from harness.commands import commands
 
@@ -32,6 +33,7 @@ class Program:
 
 
 HARNESS, BUILD = Program(commands, "python -m harness"), Program(build_fmus.main, "build_fmus.py")
+BENCHMARKS = Program(benchmark_commands, "python -m benchmarks")
 
 
 def harness(folder, *arguments, text="", blank=False, **environment):
@@ -41,6 +43,11 @@ def harness(folder, *arguments, text="", blank=False, **environment):
     """
     with blank_figures() if blank else nullcontext():
         return _run_here(HARNESS, folder, arguments, text, environment)
+
+
+def benchmarks(folder, *arguments, text="", **environment):
+    """Run `python -m benchmarks` in this process, in a folder, and return its exit status and output."""
+    return _run_here(BENCHMARKS, folder, arguments, text, environment)
 
 
 def build(*arguments, folder=ROOT, **environment):

@@ -53,8 +53,8 @@ def main(out):
     import pythonfmu
     import pythonfmu3
 
+    from benchmarks.c_host import HEADERS
     from fmus.packaging.native.compiler import compile_binaries
-    from harness.running.c_host import HEADERS
 
     for source in sorted(SOURCES.glob("*.py")):
         package = pythonfmu3 if "pythonfmu3" in source.read_text() else pythonfmu

@@ -1,0 +1,37 @@
+"""Entry point of `python -m benchmarks`."""
+
+import sys
+from pathlib import Path
+
+if __name__ == "__main__" and Path(sys.path[0]) != Path(__file__).parents[1]:  # a model here may be named math.py
+    sys.path += [str(Path(__file__).parents[1]), sys.path.pop(0)]
+
+import click
+
+from benchmarks.bench.command import bench
+from benchmarks.importers.command import importers
+from benchmarks.rivals.command import rivals
+from harness.__main__ import run_command
+from harness.commands import FullHelpGroup
+
+NAME = "python -m benchmarks"
+
+
+@click.group(cls=FullHelpGroup, context_settings={"help_option_names": ["-h", "--help"]})
+def main() -> None:
+    """Measure this project: speed and accuracy, the same scenes in other engines, the FMUs in other tools.
+
+    These commands need a checkout of the project and are not a part of the installed package.
+
+    \b
+    Examples:
+      python -m benchmarks bench
+      python -m benchmarks rivals scipy mujoco
+    """
+
+
+for command in (bench, importers, rivals):
+    main.add_command(command)
+
+if __name__ == "__main__":
+    run_command(lambda: main, NAME)

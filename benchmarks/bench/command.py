@@ -1,0 +1,23 @@
+"""bench: benchmarks with targets."""
+
+import click
+
+from harness.commands.terminal import Terminal, result_options
+
+
+@click.command()
+@result_options
+def bench(terminal: Terminal) -> None:
+    """Run the benchmarks.  Each result is compared with its target and with a peer in the same run.
+
+    \b
+    Example:
+      python -m benchmarks bench
+    """
+    from . import study
+    from .table import benchmark_table
+
+    selected = study.all_benchmarks()
+    with terminal.progress(len(selected)) as report:
+        benchmarks = study.run_benchmarks(selected, terminal.out, report)
+    terminal.print_result(benchmarks, benchmark_table(benchmarks), folder=terminal.out / study.FOLDER)
