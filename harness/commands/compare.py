@@ -36,8 +36,8 @@ def compare(
 
     Both sides share one time grid: FMUs and scenes are run at the times of the other side, and two FMUs with the
     fixed internal step that one of them declares.  Between samples, a variable is interpolated with its rate if the
-    rate was recorded, otherwise monotonically; an integer keeps its last value.  With --rtol or --atol, exit status 1
-    means that a difference exceeds the tolerance, events do not match, or a run failed.
+    rate was recorded, otherwise monotonically; a variable of an integer type keeps its last value.  With --rtol or
+    --atol, exit status 1 means that a difference exceeds the tolerance, events do not match, or a run failed.
 
     \b
     Examples:

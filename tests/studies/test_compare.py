@@ -208,10 +208,41 @@ def test_the_first_help_example_shows_no_more_than_the_curves_contain(harness, r
     assert a["largest"] < 9.0
 
 
-def test_modes_are_not_interpolated():
+@pytest.mark.parametrize("types", [(int, int), (int, float), (float, int)])
+def test_a_variable_that_is_an_integer_on_one_side_is_held(types):
     one, two = np.arange(30.0), np.arange(30.0) + 0.5
-    comparison = compare(path("one", one, mode=one // 10), path("two", two, mode=two // 10))
-    assert comparison.differences[0].largest in (0.0, 1.0)
+    sides = [path(str(t[0]), t, mode=(t // 10).astype(type_)) for t, type_ in zip((one, two), types, strict=True)]
+    (mode,) = compare(*sides).differences
+    assert {*mode.left, *mode.right} == {0.0, 1.0, 2.0}
+    assert mode.largest == 1.0
+
+
+def test_a_position_in_whole_millimetres_is_interpolated(tmp_path):
+    """The record is rounded to 1 mm, so it is at most 0.5 mm from the motion, and its interpolation hardly farther."""
+    coarse, fine = np.arange(0, 4.01, 0.05), np.arange(0.0125, 3.99, 0.025)
+    table = "".join(f"{t:.2f},{round(40 * cos(2 * t))}\n" for t in coarse)
+    (tmp_path / "laser.csv").write_text("t [s],x [mm]\n" + table)
+    motion = signals("model", fine, {"x": 40 * np.cos(2 * fine)}, {"x": "mm"})
+    for sides in ((read_trajectory(tmp_path / "laser.csv"), motion), (motion, read_trajectory(tmp_path / "laser.csv"))):
+        comparison = compare(*sides)
+        assert comparison.interpolated
+        assert comparison.differences[0].largest < 0.6  # 4 if it is held
+
+
+@pytest.mark.parametrize(
+    ("file", "text", "held"),
+    [
+        ("results/trajectory.csv", "t [s],mode,x [mm]\n0.0,0,1.0\n1.0,0,2.0\n2.0,1,3.0\n", {"mode"}),
+        ("fmpy.csv", '"time","mode","x","on"\n0.0,0,1.0,True\n1.0,0,2.0,True\n2.0,1,3.0,False\n', {"mode", "on"}),
+        ("omc.csv", '"time","mode","x","on"\n0,0,1,1\n1,0,2,1\n2,1,3,0\n', set()),
+        ("logger.csv", "t [s],mode,x [mm]\n0.0,0,1\n1.0,0,2\n2.0,1,3\n", set()),
+    ],
+)
+def test_a_file_has_integers_only_if_its_program_marks_reals(tmp_path, file, text, held):
+    (tmp_path / file).parent.mkdir(exist_ok=True)
+    (tmp_path / file).write_text(text)
+    read = read_trajectory(tmp_path / "results" if file.startswith("results") else tmp_path / file)
+    assert {name for name, column in read.columns.items() if column.dtype.kind == "i"} == held
 
 
 def test_results_without_a_common_variable_are_refused():

@@ -125,7 +125,7 @@ def compare(one: Trajectory, two: Trajectory) -> Comparison:
     begin, end = common_span(one, two)
     time, interpolated = choose_times(one, two, begin, end)
     pairs, jumps = pair_events(one, two, begin, end)
-    motions, differences, left_out = tuple(encode_strings(one, two)), [], []
+    motions, differences, left_out = tuple(make_interpolants(one, two)), [], []
     for name in shared:
         unit, factor, remark = compare_units(one, two, name)
         left_out += [remark] if remark else []
@@ -166,13 +166,23 @@ def is_string(trajectory: Trajectory, name: str) -> bool:
     return trajectory.columns[name].dtype.kind == "U"
 
 
-def encode_strings(one: Trajectory, two: Trajectory) -> Iterator[SignalInterpolant]:
-    """Yield interpolants of both trajectories, with strings replaced by numbers."""
+def is_discrete(trajectory: Trajectory, name: str) -> bool:
+    """Return whether a variable is an Integer, a Boolean, an Enumeration or a String."""
+    return trajectory.columns[name].dtype.kind in "biuU"
+
+
+def make_interpolants(one: Trajectory, two: Trajectory) -> Iterator[SignalInterpolant]:
+    """Yield interpolants of both trajectories, with strings replaced by numbers.
+
+    A variable that is discrete on one side is held on both, because many files have no types. Whole numbers alone do
+    not make a variable discrete: they may be a position in whole millimetres.
+    """
     texts = [name for name in one.columns if name in two.columns and is_string(one, name) and is_string(two, name)]
     values = {name: np.unique(np.concatenate([side.columns[name] for side in (one, two)])) for name in texts}
+    held = {name for side in (one, two) for name in side.columns if is_discrete(side, name)}
     for side in (one, two):
         codes = {name: np.searchsorted(values[name], side.columns[name]).astype(float) for name in texts}
-        yield SignalInterpolant(replace(side, columns=side.columns | codes))
+        yield SignalInterpolant(replace(side, columns=side.columns | codes), held)
 
 
 def closest_values(left: ValueBounds, right: ValueBounds) -> tuple[np.ndarray, np.ndarray]:

@@ -2,10 +2,11 @@
 
 If the rate of a variable was recorded, interpolation is by cubic Hermite polynomials of values and rates, otherwise by
 monotone cubics (F. N. Fritsch, J. Butland, A method for constructing local monotone piecewise cubic interpolants, SIAM
-J. Sci. Stat. Comput. 5 (1984) 300-304).  Integers, such as modes, keep their last value.  Across a jump, every value
-between both sides is accepted.
+J. Sci. Stat. Comput. 5 (1984) 300-304).  Held variables, such as modes, keep their last value.  Across a jump, every
+value between both sides is accepted.
 """
 
+from collections.abc import Set
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -31,9 +32,10 @@ class ValueBounds:
 
 @dataclass(frozen=True)
 class SignalInterpolant:
-    """Interpolation of a trajectory between its samples."""
+    """Interpolation of a trajectory between its samples; the variables in `held` keep their last value."""
 
     trajectory: Trajectory
+    held: Set[str] = frozenset()
 
     def bounds_at(self, name: str, at: np.ndarray, jumps: np.ndarray) -> ValueBounds:
         """Return the bounds of a variable at given times.
@@ -54,7 +56,7 @@ class SignalInterpolant:
             return ValueBounds(sampled, sampled)
         if (index >= 0).all():
             smooth = y[index]
-        elif (y == np.rint(y)).all():
+        elif name in self.held:
             smooth = y[np.searchsorted(t, at, "right") - 1]
         else:
             scale = REDUCTION if np.abs(y).max() > LARGE_VALUE else 1.0

@@ -23,6 +23,9 @@ from ...scenes.run_spec import RunSpec
 MAX_TIME = 1e100  # s; largest absolute time
 ELEMENT = re.compile(r".*\[\d+(,\d+)*\]")  # name of an array element; its brackets do not contain a unit
 BOOLEANS = {"True": 1.0, "False": 0.0, "true": 1.0, "false": 0.0}
+INTEGER = re.compile(r"[-+]?\d{1,18}")  # fits into 64 bits
+INTEGER_TYPE = re.compile(r"#\(type=(Boolean|Integer|Enumeration)\b", re.I)  # in the comment of a Modelica variable
+FMPY_TIME = '"time"'  # how a file of fmpy begins
 
 Columns = dict[str, np.ndarray]
 
@@ -38,7 +41,7 @@ def read_trajectory(path: Path) -> Trajectory:
     file = path / "trajectory.csv" if path.is_dir() else path
     if path.is_dir() and not file.is_file():
         raise SceneError(f"{path} is not a result folder: trajectory.csv is missing")
-    (time_heading, time), *others = (read_modelica(file) or read_csv(file) or read_table(file)).items()
+    (time_heading, time), *others = (read_modelica(file) or read_csv(file, path.is_dir()) or read_table(file)).items()
     unit = parse_heading(time_heading)[1] or "s"
     if unit not in TIMES:
         raise SceneError(f"{file.name}: the first column must be time, but its unit is '{unit}'")
@@ -84,13 +87,16 @@ def read_table(file: Path) -> Columns:
     return dict(zip(headings, values.T, strict=True))
 
 
-def read_csv(file: Path) -> Columns | None:
+def read_csv(file: Path, is_result: bool) -> Columns | None:
     """Read a CSV file with commas and one heading row, or return None if the file has another form.
 
-    Cells are numbers, Booleans, strings, or arrays separated by blanks, as fmpy writes them.
+    Cells are numbers, Booleans, strings, or arrays separated by blanks, as fmpy writes them. Results of this project
+    (`is_result`) and of fmpy have a decimal point or an exponent in every Real, so other numbers are integers there. In
+    any other file, whole numbers may be rounded Reals.
     """
     try:
-        headings, *rows = csv.reader(io.StringIO(read_content(file).decode("utf-8-sig"), newline=""))
+        text = read_content(file).decode("utf-8-sig")
+        headings, *rows = csv.reader(io.StringIO(text, newline=""))
     except (UnicodeDecodeError, ValueError, csv.Error):
         return None
     names = [heading.strip() for heading in headings]
@@ -99,13 +105,14 @@ def read_csv(file: Path) -> Columns | None:
     if len(names) < 2 or parse_numbers([row[0] for row in rows]) is None:
         return None
     columns = Columns()
+    is_typed = (is_result or text.startswith(FMPY_TIME)) and not any(INTEGER.fullmatch(row[0].strip()) for row in rows)
     for name, cells in zip(names, zip(*rows, strict=True), strict=True):
-        columns |= parse_column(name, [cell.strip() for cell in cells])
+        columns |= parse_column(name, [cell.strip() for cell in cells], is_typed)
     return columns
 
 
-def parse_column(name: str, cells: list[str]) -> Columns:
-    """Parse one column; an array gives one column per element."""
+def parse_column(name: str, cells: list[str], is_typed: bool) -> Columns:
+    """Parse one column; an array gives one column per element. If `is_typed`, only integers lack a decimal point."""
     values = parse_numbers(cells)
     widths = {len(cell.split()) for cell in cells}
     if values is None and len(widths) == 1:
@@ -113,7 +120,10 @@ def parse_column(name: str, cells: list[str]) -> Columns:
         elements = [part for part in parts if part is not None]
         if len(elements) == len(parts):
             return dict(zip(element_names(name, (len(parts),)), elements, strict=True))
-    return {name: np.array(cells) if values is None else values}
+    if values is None:
+        return {name: np.array(cells)}
+    is_integer = all(cell in BOOLEANS or (is_typed and INTEGER.fullmatch(cell)) for cell in cells)
+    return {name: values.astype(np.int64) if is_integer else values}
 
 
 def parse_numbers(cells: Sequence[str]) -> np.ndarray | None:
@@ -149,7 +159,9 @@ def read_modelica(file: Path) -> Columns | None:
             if matrix in (0, 2):  # trajectories and time
                 unit = re.search(r"\[([^][|:]+)[^][]*\]\s*$", comment)
                 heading = f"{text} [{unit[1]}]" if unit else text
-                columns[heading] = np.sign(signed) * values[:, abs(int(signed)) - 1]
+                column = np.sign(signed) * values[:, abs(int(signed)) - 1]
+                is_integer = INTEGER_TYPE.search(comment) and (column == np.rint(column)).all()
+                columns[heading] = column.astype(np.int64) if is_integer else column
         return columns
     except Exception as error:  # scipy raises various exceptions for a damaged file
         if not is_modelica:
