@@ -116,12 +116,14 @@ def keep_times(run: Trajectory, times: np.ndarray) -> Trajectory:
 
 
 def keep_interval(run: Trajectory, interval: float) -> Trajectory:
-    """Keep the points of a run at multiples of an interval in s, and its last one."""
+    """Keep one point of a run at each multiple of an interval in s, after an event there, and its last one."""
     start = run.time[0]
-    near = 1e-9 * interval
-    keep = np.abs(start + np.rint((run.time - start) / interval) * interval - run.time) <= near
-    keep[-1] = True
-    return keep_rows(run, keep)
+    multiples = np.rint((run.time - start) / interval)
+    distances = np.abs(start + multiples * interval - run.time)
+    near = np.flatnonzero(distances <= POINT_TOLERANCE * interval)
+    order = near[np.lexsort((-near, distances[near], multiples[near]))]  # of points as near as another, the last
+    rows = order[np.unique(multiples[order], return_index=True)[1]]
+    return keep_rows(run, np.union1d(rows, len(run.time) - 1))
 
 
 def keep_rows(run: Trajectory, rows: np.ndarray) -> Trajectory:

@@ -165,3 +165,9 @@ def test_nothing_is_printed(capfd):
 def test_a_failed_run_raises_the_message_of_the_fmu():
     with pytest.raises(harness.HarnessError, match="mu_d"):
         harness.simulate("stickslip", {"mu_s": 0.5, "mu_d": 0.6})
+
+
+def test_an_interval_records_every_multiple_once(in_workspace):
+    """The first internal step of pendulum takes 3.6 microseconds, a rounding of a long interval."""
+    run = harness.simulate("pendulum", stop=2e4, interval=1e4, outputs=["theta"])
+    assert run.time.tolist() == [0.0, 1e4, 2e4]
