@@ -18,7 +18,7 @@ def fit(
     records: Any,
     free: "Sequence[str] | Mapping[str, tuple[float, float] | None]",
     *,
-    observe: "Sequence[str] | Mapping[str, str]",
+    observe: "Sequence[str] | Mapping[str, str]" = (),
     inputs: "Sequence[str] | Mapping[str, str]" = (),
     fixed: Mapping[str, float | str] | None = None,
     sigma: Mapping[str, float] | None = None,
@@ -50,7 +50,9 @@ def fit(
         ``offset(x)``, ``gain(x)`` and ``delay(x)`` are unknowns of the sensor of the output ``x``: its signal is gain
         times output plus offset, after the delay.
     observe, inputs : sequence or mapping
-        Measured outputs and driven inputs of the FMU, with the headings of their columns.
+        Measured outputs and driven inputs of the FMU, with the headings of their columns. By default a column
+        that is named like an output is taken, of several the position, or else the only column whose unit fits one
+        output; ``notes`` states the choice.
     fixed : mapping, optional
         Values of other parameters.
     sigma : mapping, optional
@@ -101,6 +103,7 @@ def fit(
     from ..scenes.run_spec import RunSpec
     from ..studies.fit import study
     from ..studies.fit.laws import resolve_laws
+    from ..studies.fit.observed import choose_observed
     from ..studies.fit.options import read_fitted_values, select_starts
     from ..studies.fit.request import FitRequest
 
@@ -127,7 +130,6 @@ def fit(
             time=time, rate=rate, begin=-inf if begin is None else begin, end=inf if end is None else end
         ),
     )
-    laws = resolve_laws(request)
 
     def load(argument: Any, name: str) -> list[study.RecordTable]:
         sources = argument if isinstance(argument, list | tuple) else [argument]
@@ -140,7 +142,10 @@ def fit(
         ]
 
     fitted, predicted = load(records, "the record"), load(validate, "the validation record")
-    return study.fit_laws(laws, fitted, predicted, progress or QUIET)
+    if not fitted:
+        raise SceneError("records is empty: give at least one record")
+    request, choice = choose_observed(request, fitted[0].table)
+    return study.fit_laws(resolve_laws(request).with_note(choice), fitted, predicted, progress or QUIET)
 
 
 def map_headings(signals: Any) -> dict[str, str]:

@@ -12,7 +12,12 @@ from .terminal import POSITIVE, Terminal, result_options
 @click.argument("records", metavar="FILE...", nargs=-1, required=True)
 @click.option("--free", multiple=True, metavar="NAME[=LOW:HIGH],...", help="Parameters to fit, and ranges to search.")
 @click.option("--fixed", multiple=True, metavar="NAME=VALUE,...", help="Values of other parameters.")
-@click.option("--observe", multiple=True, metavar="OUTPUT=COLUMN", help="Measured output and its column; repeatable.")
+@click.option(
+    "--observe",
+    multiple=True,
+    metavar="OUTPUT=COLUMN",
+    help="Measured output and its column; repeatable. Default: a column named like an output.",
+)
 @click.option("--input", "inputs", multiple=True, metavar="INPUT=COLUMN", help="Input and its column; repeatable.")
 @click.option(
     "--start",

@@ -26,6 +26,11 @@ class ResolvedLaws:
     requests: tuple[ResolvedRequest, ...]
     notes: tuple[tuple[str, ...], ...]
 
+    def with_note(self, note: str) -> "ResolvedLaws":
+        """Return the same requests with a further note on the first; an empty text is no note."""
+        first, *others = self.notes
+        return replace(self, notes=((note, *first), *others)) if note else self
+
 
 def resolve_laws(request: FitRequest) -> ResolvedLaws:
     """Check a request against the FMU and against those to compare it with.

@@ -137,11 +137,14 @@ def resolve_request(request: FitRequest) -> ResolvedRequest:
             raise SceneError(f"sigma of {name} is {value!r}: it must be a finite number above 0")
     converted = {name: convert_value(declared[name], value) for name, value in request.run.values.items()}
     converted = solver_settings(declared) | converted
-    signals = {**request.observe, **request.inputs}
     return ResolvedRequest(
         request,
         variables,
-        {name: SignalSource(heading, variables[name].unit) for name, heading in signals.items()},
+        {
+            name: SignalSource(heading, variables[name].unit, is_input)
+            for signals, is_input in ((request.observe, False), (request.inputs, True))
+            for name, heading in signals.items()
+        },
         {name: value for name, value in converted.items() if name in variables},
         replace(
             request.run,
@@ -275,6 +278,7 @@ def record_data(resolved: ResolvedRequest, table: SignalTable) -> RecordData:
         table.name,
         table.t,
         np.stack([table.columns[name] for name in request.observe], axis=1),
-        {name: table.columns[name] for name in request.inputs},
+        dict(table.inputs),
         tuple(request.sigma.get(name) for name in request.observe),
+        table.input_t if table.inputs else None,
     )

@@ -26,6 +26,7 @@ from ...results.summary import write_summary
 from ...running.native_equivalent import native_equivalent
 from ...running.whole_run import open_simulator
 from .laws import ResolvedLaws, resolve_laws
+from .observed import choose_observed
 from .request import FitRequest, ResolvedRequest, make_unknowns, record_data
 from .table import summarize_fit
 
@@ -47,8 +48,9 @@ def fit_files(
     validation : sequence of str
         Record files that are predicted, but not fitted.
     """
-    laws = resolve_laws(request)
     records, others = ([load_record(file, request) for file in group] for group in (files, validation))
+    request, choice = choose_observed(request, records[0].table)
+    laws = resolve_laws(request).with_note(choice)
     folder = out / FOLDER / records[0].name
     source = provenance.describe_sources(*files)
     with replace_folder(folder, FILES, source) as new_folder:

@@ -1,0 +1,71 @@
+"""Choice of the observed outputs where the user names none."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+from ...errors import SceneError
+from ...records.columns import Column, find_time_column, list_columns
+from ...records.table_files import Table
+from ...records.units import conversion_factor
+from ...running.fmu_archive import read_description
+from ...running.whole_run import real_variables
+from ...scenes.roles import ROLES, find_roles
+from .request import FitRequest
+
+
+def choose_observed(request: FitRequest, table: Table) -> tuple[FitRequest, str]:
+    """Return a request that observes outputs, and a sentence on the choice; empty if the request names outputs.
+
+    A column that is named like an output is taken: of several, the position, the velocity, the acceleration or the
+    first. Otherwise it is the only column whose unit fits one output only.
+
+    Raises
+    ------
+    SceneError
+        If there is no such column.
+    """
+    if request.observe:
+        return request, ""
+    candidates = list_columns(table)
+    time_column = find_time_column(table, candidates, request.columns)
+    driven = {heading.lower() for heading in request.inputs.values()}
+    columns = [
+        column
+        for column in candidates
+        if column is not time_column and not {column.name.lower(), column.heading.lower()} & driven
+    ]
+    description = read_description(request.run.fmu)
+    outputs = {
+        name: variable.unit for name, variable in real_variables(description).items() if variable.causality == "output"
+    }
+    named = {column.name: column for column in columns if column.name in outputs}
+    if named:
+        roles = find_roles({variable.name: variable for variable in description.modelVariables})
+        output = next((roles[role] for role in ROLES if roles.get(role) in named), next(iter(named)))
+        others = ", ".join(name for name in named if name != output)
+        return replace(request, observe={output: named[output].heading}), (
+            f"{output} is observed, because a column has its name{f', and {others} not' if others else ''}; --observe "
+            "selects other outputs."
+        )
+    fits = list(fit_units(columns, outputs))
+    if len(fits) != 1:
+        headings = ", ".join(column.heading for column in columns if column.heading)
+        example = f"{fits[0][0] if fits else next(iter(outputs), 'x')}={(headings or 'position').split(',')[0]}"
+        raise SceneError(
+            f"nothing is observed: {table.name} has no column with the name of an output ({', '.join(outputs)}), and "
+            f"{'several units fit' if fits else 'no unit fits'}; name an output and its column, as in "
+            f"--observe '{example}'"
+        )
+    ((output, column),) = fits
+    return replace(request, observe={output: column.heading}), (
+        f"{output} is observed in {column.heading}, the only column with a unit of this output; --observe selects "
+        "another."
+    )
+
+
+def fit_units(columns: list[Column], outputs: dict[str, str]) -> Iterator[tuple[str, Column]]:
+    """Yield each output and column whose units measure the same quantity."""
+    for output, unit in outputs.items():
+        for column in columns:
+            if column.unit and unit and conversion_factor(column.unit, unit) is not None:
+                yield output, column
