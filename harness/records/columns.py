@@ -15,7 +15,14 @@ import numpy as np
 from ..errors import SceneError, unknown_name_message
 from .headings import DATE_NAME, MAGNITUDE_NAME, TIME_NAME, order_from_name, split_heading
 from .record import QUANTITIES, Record, check_record
-from .samples import leave_out_saturated, mark_dropouts, mark_sentinels, parse_timestamps, undo_time_rounding
+from .samples import (
+    find_repeated_times,
+    leave_out_saturated,
+    mark_dropouts,
+    mark_sentinels,
+    parse_timestamps,
+    undo_time_rounding,
+)
 from .table_files import Cells, Table, load_table
 from .text_table import GROUPED_NUMBER, MISSING, TIMESTAMP
 from .units import COUNT_NAMES, TIMES, find_unit, parse_per_count, time_unit_size
@@ -136,6 +143,9 @@ def parse_record(table: Table, columns: ColumnOptions, name: str) -> Record:
     t, rounding = undo_time_rounding(t[: len(is_complete)])
     notes += filter(None, (*gaps, rounding, assumption))
     t, x = t[is_complete], size * x[: len(is_complete)][is_complete]
+    is_repeated, repetition = find_repeated_times(t)
+    notes += filter(None, [repetition])
+    t, x = t[~is_repeated], x[~is_repeated]
     record = Record(name, t, x, base + RATE_SUFFIXES[order], order, base, tuple(notes)).select(
         columns.begin, columns.end
     )

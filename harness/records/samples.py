@@ -22,6 +22,7 @@ COLON_MILLISECONDS = re.compile(r"(:\d\d:\d\d):")  # milliseconds after a third 
 MAX_ROUNDING_ERROR = 0.51  # of the rounding unit
 MAX_UNEVENNESS = 0.02  # of a step; smaller variations are not rounding
 NINES = re.compile(r"9{3,}(\.9+)?")
+MAX_LISTED_TIMES = 5  # repeated times in a message
 MAX_SENTINELS = 3  # different ones in a column
 MIN_LEVELS = 50  # different values of a signal whose values seldom repeat
 MIN_DOMINANCE = 5  # times as often as any other value
@@ -29,6 +30,9 @@ MIN_JUMPS, JUMP = 3, 0.1  # times that a value differs from its neighbours by th
 MIN_JUMP_SHARE = 0.2  # of the times that the value occurs
 MIN_OTHERS = 3  # different values of the signal
 MIN_STAY = 3  # samples at the largest value, in a peak
+MIN_RARE_STEPS = 3  # of rounded times: a single step of another size is a repeated or a missing sample
+MAX_RARE_SPREAD = 2  # samples by which the distances between them differ
+MAX_REPEATED_SHARE = 0.2  # of the times
 MIN_DWELL = 4.0  # times the samples at the level before the last; 1/(sqrt(2) - 1) = 2.4 at a rounded turning point
 
 
@@ -64,7 +68,8 @@ def parse_timestamp(cell: str, name: str) -> float:
 def undo_time_rounding(t: np.ndarray) -> tuple[np.ndarray, str]:
     """Replace equidistant times that a logger has rounded by exactly equidistant ones.
 
-    Rounded times are multiples of a unit, have only a few different steps, and lie within half a unit of a line.
+    Rounded times are multiples of a unit, have only a few different steps, and lie within half a unit of a line. If
+    there are two steps, the rarer one occurs at even distances.
 
     Returns
     -------
@@ -80,6 +85,8 @@ def undo_time_rounding(t: np.ndarray) -> tuple[np.ndarray, str]:
     sizes = np.unique(np.round(steps, 9))
     if (steps < 0).any() or not t[-1] > t[0] or not 2 <= len(sizes) <= 3 or np.ptp(sizes) <= MAX_UNEVENNESS * typical:
         return t, ""
+    if not is_rounding_pattern(steps, sizes):
+        return t, ""
     unit = float(np.min(np.diff(sizes)))
     even_times = np.polyval(np.polyfit(np.arange(len(t)), t - t[0], 1), np.arange(len(t))) + t[0]
     deviation = t - even_times
@@ -93,6 +100,35 @@ def undo_time_rounding(t: np.ndarray) -> tuple[np.ndarray, str]:
     return even_times, (
         f"The times are rounded to {unit:.3g} s and replaced by equidistant ones, {step:.6g} s apart. This step, and "
         f"any frequency, has a relative uncertainty of about {relative_error:.0e}."
+    )
+
+
+def is_rounding_pattern(steps: np.ndarray, sizes: np.ndarray) -> bool:
+    """Return whether rounding can cause the sequence of the steps (n,) in s, which have two or three different sizes.
+
+    Rounding of equidistant times repeats the rarer of two steps every k or k + 1 samples; rounding of halves to even
+    moves it by one sample. A repeated or a missing sample is a single step of another size.
+    """
+    kinds = np.searchsorted(sizes, np.round(steps, 9))
+    rare = np.flatnonzero(kinds != np.argmax(np.bincount(kinds)))
+    return len(rare) >= MIN_RARE_STEPS and (len(sizes) > 2 or int(np.ptp(np.diff(rare))) <= MAX_RARE_SPREAD)
+
+
+def find_repeated_times(t: np.ndarray) -> tuple[np.ndarray, str]:
+    """Return a mask (n,) of the samples whose time is that of the sample before, and a sentence that names them.
+
+    There are none if many times are repeated, which a single sentence would not explain.
+    """
+    is_repeated = np.append(False, np.diff(t) == 0)
+    times = np.unique(t[is_repeated])
+    if not len(times) or is_repeated.sum() > MAX_REPEATED_SHARE * len(t):
+        return np.zeros(len(t), bool), ""
+    listed = ", ".join(f"{time:.6g} s" for time in times[:MAX_LISTED_TIMES])
+    more = f" and {len(times) - MAX_LISTED_TIMES} more" if len(times) > MAX_LISTED_TIMES else ""
+    verb = "occurs" if len(times) == 1 else "occur"
+    return is_repeated, (
+        f"The time{'s' * (len(times) > 1)} {listed}{more} {verb} more than once; the first sample is used, and "
+        f"{int(is_repeated.sum())} of {len(t)} samples are left out."
     )
 
 

@@ -1,7 +1,7 @@
 """Several signals over time from one file, converted to given units."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -20,7 +20,7 @@ from .columns import (
 )
 from .headings import split_heading
 from .record import MIN_SAMPLES, Record, check_record
-from .samples import find_saturated, mark_dropouts, mark_sentinels, undo_time_rounding
+from .samples import find_repeated_times, find_saturated, mark_dropouts, mark_sentinels, undo_time_rounding
 from .table_files import Table, load_table
 from .units import conversion_factor
 
@@ -29,20 +29,42 @@ MAX_MISSING_SHARE = 0.2  # of the rows
 
 @dataclass(frozen=True)
 class SignalSource:
-    """Source of a signal: the heading of its column, and the unit to convert to (empty for a ratio or a count)."""
+    """Source of a signal: the heading of its column, and the unit to convert to (empty for a ratio or a count).
+
+    An input (`is_input`) keeps every sample: commanded zeros and plateaus are no marks of missing samples.
+    """
 
     heading: str
     unit: str
+    is_input: bool = False
 
 
 @dataclass(frozen=True)
 class SignalTable:
-    """Signals (n,) by name over the times (n,) in s, and notes on assumptions made when reading."""
+    """Signals of a record.
+
+    Attributes
+    ----------
+    name : str
+        Name of the record.
+    t : numpy.ndarray
+        Times (n,) in s at which all measured signals have a value.
+    columns : mapping
+        Measured signals (n,) by name.
+    notes : tuple of str
+        Assumptions made when reading.
+    input_t : numpy.ndarray
+        All times (m,) in s from the first of `t` to the last; empty without inputs.
+    inputs : mapping
+        Inputs (m,) by name.
+    """
 
     name: str
     t: np.ndarray
     columns: Mapping[str, np.ndarray]
     notes: tuple[str, ...] = ()
+    input_t: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    inputs: Mapping[str, np.ndarray] = field(default_factory=dict)
 
 
 def read_signals(source: str, sources: Mapping[str, SignalSource], options: ColumnOptions, name: str) -> SignalTable:
@@ -87,12 +109,14 @@ def parse_signals(table: Table, sources: Mapping[str, SignalSource], options: Co
             notes += describe_further_runs(candidates, time_column, first)
     columns = {}
     for signal, (column, unit) in selected.items():
-        x, remarks = mark_missing(parse_numbers(table, column.index), column.heading)
-        notes += remarks
+        x = parse_numbers(table, column.index)
+        if not sources[signal].is_input:
+            x, remarks = mark_missing(x, column.heading)
+            notes += remarks
         factor, note = unit_factor(column, unit, sources[signal].unit, signal, table.name)
         notes += note
         columns[signal] = factor * x
-    return select_complete_rows(name, t, columns, options, notes)
+    return select_rows(table, name, t, columns, sources, options, notes)
 
 
 def mark_missing(values: np.ndarray, name: str) -> tuple[np.ndarray, list[str]]:
@@ -143,30 +167,74 @@ def unit_factor(column: Column, unit: str | None, target: str, signal: str, file
     return factor, []
 
 
-def select_complete_rows(
-    name: str, t: np.ndarray, columns: dict[str, np.ndarray], options: ColumnOptions, notes: list[str]
+def select_rows(
+    table: Table,
+    name: str,
+    t: np.ndarray,
+    columns: dict[str, np.ndarray],
+    sources: Mapping[str, SignalSource],
+    options: ColumnOptions,
+    notes: list[str],
 ) -> SignalTable:
-    """Return the rows that have a time in the range of the options and all signals."""
-    complete = np.isfinite(t) & np.all([np.isfinite(x) for x in columns.values()], axis=0)
-    filled_rows = np.flatnonzero(np.isfinite(t) & np.any([np.isfinite(x) for x in columns.values()], axis=0))
+    """Return the rows in the range of the options that have a time and all measured signals, and those of the inputs.
+
+    Raises
+    ------
+    SceneError
+        If too many rows lack a measured signal, or if an input lacks a sample.
+    """
+    has_time, outputs = np.isfinite(t), [x for signal, x in columns.items() if not sources[signal].is_input]
+    filled_rows = np.flatnonzero(has_time & np.any([np.isfinite(x) for x in columns.values()], axis=0))
     length = int(filled_rows[-1]) + 1 if len(filled_rows) else 0  # the table may continue with a longer run
-    empty_tail = int(np.isfinite(t[length:]).sum())
+    empty_tail = int(has_time[length:].sum())
     t, rounding = undo_time_rounding(t[:length])
     if empty_tail:
         notes.append(f"The last {empty_tail} rows have a time and no signal; they are left out.")
-    complete = complete[:length] & (t >= options.begin) & (t <= options.end)
-    in_range = int(((t >= options.begin) & (t <= options.end)).sum())
-    missing = in_range - int(complete.sum())
-    if missing > MAX_MISSING_SHARE * max(in_range, 1):
-        raise SceneError(f"{name}: {missing} of {in_range} rows lack a time or a signal: give other columns")
+    in_range = (t >= options.begin) & (t <= options.end)
+    complete = in_range & np.all([np.isfinite(x[:length]) for x in outputs], axis=0)
+    missing = int(in_range.sum() - complete.sum())
+    if missing > MAX_MISSING_SHARE * max(int(in_range.sum()), 1):
+        raise SceneError(f"{name}: {missing} of {in_range.sum()} rows lack a time or a signal: give other columns")
     if missing:
-        notes.append(f"{missing} of {in_range} rows have a missing cell and are skipped.")
+        notes.append(f"{missing} of {in_range.sum()} rows have a missing cell and are skipped.")
     if rounding:
         notes.append(rounding)
-    t = t[complete]
-    columns = {signal: x[:length][complete] for signal, x in columns.items()}
-    if len(t) < MIN_SAMPLES:
-        raise SceneError(f"{name} has {len(t)} samples in this interval; at least {MIN_SAMPLES} are required")
-    for x in columns.values():
-        check_record(Record(name, t, x))
-    return SignalTable(name, t, columns, tuple(notes))
+    rows = np.flatnonzero(complete)
+    is_repeated, repetition = find_repeated_times(t[rows])
+    notes += filter(None, [repetition])
+    rows = rows[~is_repeated]
+    if len(rows) < MIN_SAMPLES:
+        raise SceneError(f"{name} has {len(rows)} samples in this interval; at least {MIN_SAMPLES} are required")
+    signals = {signal: x[rows] for signal, x in columns.items() if not sources[signal].is_input}
+    for x in signals.values():
+        check_record(Record(name, t[rows], x))
+    run = slice(rows[0], rows[-1] + 1)  # from the first measured sample to the last
+    input_t, inputs = t[run], {signal: x[run] for signal, x in columns.items() if sources[signal].is_input}
+    for signal, x in inputs.items():
+        check_input(table, signal, sources[signal].heading, input_t, x, run.start)
+    is_first = np.append(True, np.diff(input_t) != 0)  # of the samples at one time, which are equal
+    input_t, inputs = input_t[is_first], {signal: x[is_first] for signal, x in inputs.items()}
+    for x in inputs.values():
+        check_record(Record(name, input_t, x))
+    return SignalTable(name, t[rows], signals, tuple(notes), input_t if inputs else t[:0], inputs)
+
+
+def check_input(table: Table, signal: str, heading: str, t: np.ndarray, x: np.ndarray, first: int) -> None:
+    """Raise SceneError if an input x (n,) lacks a sample at one of the times t (n,), or has two values at one.
+
+    `first` is the row of the table in which they begin. Between its samples an input is interpolated, so a gap would
+    drive the run with values that nobody measured.
+    """
+    gaps = np.flatnonzero(~(np.isfinite(t) & np.isfinite(x)))
+    if len(gaps):
+        row, lacking = table.line + 1 + first + int(gaps[0]), "value" if np.isfinite(t[gaps[0]]) else "time"
+        raise SceneError(
+            f"{table.name}: {heading}, the input {signal}, has no {lacking} in row {row}: fill the gap, or select a "
+            "part without gaps by --from and --until"
+        )
+    doubled = np.flatnonzero((np.diff(t) == 0) & (np.diff(x) != 0))
+    if len(doubled):
+        raise SceneError(
+            f"{table.name}: {heading}, the input {signal}, has two values at t = {t[doubled[0]]:.6g} s: keep one row "
+            "for each time"
+        )

@@ -197,3 +197,73 @@ def test_a_sensor_at_the_end_of_its_range_is_named_and_its_samples_kept(tmp_path
     signals = table(tmp_path, "t [s],Weg [m],Kraft [N]\n" + rows)
     assert len(signals.t) == 600
     assert "Weg [m] is exactly 0.6" in signals.notes[0]
+
+
+DRIVEN = {"x": SignalSource("x", "m"), "F": SignalSource("F", "N", is_input=True)}
+
+
+def driven_table(tmp_path, t, x, force):
+    """Return the signals of a record with the input F, read from a file; None makes an empty cell."""
+    cells = [["" if value is None else f"{value:.9g}" for value in row] for row in zip(t, x, force, strict=True)]
+    (tmp_path / "a.csv").write_text("t [s],x [m],F [N]\n" + "".join(",".join(row) + "\n" for row in cells))
+    return read_signals(str(tmp_path / "a.csv"), DRIVEN, ColumnOptions(), "a")
+
+
+def test_an_input_keeps_every_sample_that_a_measured_signal_would_lose(tmp_path):
+    """A commanded force is often 0 between pulses, saturated, and far from its other values; x has marks and holes."""
+    random = np.random.default_rng(0)
+    t = 0.01 * np.arange(1200)
+    force = np.where(np.arange(1200) % 9 < 3, random.uniform(20, 30, 1200).round(3), 0.0)
+    force[::100] = -9999.0
+    x = np.sin(3 * t)
+    lost = random.choice(np.arange(5, 1190), 40, replace=False)
+    for value in (-9999.0, None):
+        signals = driven_table(tmp_path, t, [value if i in lost else x[i] for i in range(1200)], force)
+        assert np.array_equal(signals.inputs["F"], force)
+        assert signals.input_t == pytest.approx(t)
+        assert signals.t == pytest.approx(np.delete(t, lost))
+        assert signals.columns["x"] == pytest.approx(np.delete(x, lost), abs=1e-8)
+    with pytest.raises(SceneError, match="818 of 1200 rows lack"):  # the same column as a measured signal
+        read_signals(str(tmp_path / "a.csv"), {**DRIVEN, "F": SignalSource("F", "N")}, ColumnOptions(), "a")
+
+
+@pytest.mark.parametrize(("row", "cells"), [(1, ("0.01", "0.5", "")), (41, ("", "0.5", "1"))])
+def test_a_gap_in_an_input_is_refused(tmp_path, row, cells):
+    rows = [(f"{0.01 * i:.2f}", f"{np.sin(i):.6f}", f"{np.cos(i):.6f}") for i in range(100)]
+    rows[row] = cells
+    lacking = "value" if cells[0] else "time"
+    (tmp_path / "a.csv").write_text("t [s],x [m],F [N]\n" + "".join(",".join(cells) + "\n" for cells in rows))
+    with pytest.raises(SceneError) as refused:
+        read_signals(str(tmp_path / "a.csv"), DRIVEN, ColumnOptions(), "a")
+    assert f"a.csv: F, the input F, has no {lacking} in row {row + 2}: fill the gap" in str(refused.value)
+
+
+@pytest.mark.parametrize("repeated", [[0], [1], [77], [0, 50], [3, 4], [10, 40, 95]])
+def test_a_repeated_time_is_dropped_and_named(tmp_path, repeated):
+    """A logger that writes a sample twice does not sample slower: no other time may move."""
+    t = 0.01 * np.arange(100)
+    rows = np.sort(np.append(np.arange(100), repeated))
+    signals = driven_table(tmp_path, t[rows], np.sin(t[rows]), np.cos(t[rows]))
+    assert signals.t == pytest.approx(t, abs=1e-12)
+    assert signals.input_t == pytest.approx(t, abs=1e-12)
+    assert signals.inputs["F"] == pytest.approx(np.cos(t), abs=1e-8)
+    (note,) = signals.notes
+    assert all(f"{t[i]:.6g} s" in note for i in repeated)
+    assert f"{len(repeated)} of {len(rows)} samples are left out" in note
+    record = read_record(str(tmp_path / "a.csv"), ColumnOptions(position="x"), "a")
+    assert record.t == pytest.approx(t, abs=1e-12)
+    assert note in record.notes
+
+
+@pytest.mark.parametrize("lost", [[5], [50], [20, 70]])
+def test_a_missing_row_moves_no_other_sample(tmp_path, lost):
+    t = np.delete(0.01 * np.arange(100), lost)
+    (tmp_path / "a.csv").write_text("t [s],x [m]\n" + "".join(f"{time:.2f},{np.sin(time):.9g}\n" for time in t))
+    record = read_record(str(tmp_path / "a.csv"), ColumnOptions(), "a")
+    assert record.t == pytest.approx(t, abs=1e-12)
+
+
+def test_an_input_with_two_values_at_one_time_is_refused(tmp_path):
+    t = np.append(0.0, 0.01 * np.arange(60))
+    with pytest.raises(SceneError, match="the input F, has two values at t = 0 s: keep one row for each time"):
+        driven_table(tmp_path, t, np.sin(t), np.append(7.0, np.cos(t[1:])))

@@ -39,9 +39,11 @@ class RecordData:
     y : numpy.ndarray
         Observed columns (n, columns).
     inputs : mapping
-        Inputs (n,) by name.
+        Inputs (m,) by name.
     sigma : tuple of float or None
         Standard deviation of the noise of each column; None if it is not known.
+    input_t : numpy.ndarray, optional
+        Times (m,) of the inputs in s, from the first of `t` to the last; by default these are `t`.
     """
 
     name: str
@@ -49,10 +51,13 @@ class RecordData:
     y: np.ndarray
     inputs: Mapping[str, np.ndarray]
     sigma: tuple[float | None, ...]
+    input_t: np.ndarray | None = None
 
 
 class MeasuredRecord:
     """Samples y (n, columns) at the times t (n,), the inputs between them, and the runs at the same times.
+
+    An input has samples where a measured signal lacks one, so the inputs (m,) have times of their own, `knots` (m,).
 
     Parameters
     ----------
@@ -74,15 +79,23 @@ class MeasuredRecord:
     """
 
     def __init__(self, simulator: Simulator, data: RecordData, binned: bool) -> None:
-        t, y, inputs = data.t, data.y, data.inputs
+        t, y = data.t, data.y
+        input_t = t if data.input_t is None else data.input_t
         self.simulator, self.name, self.sampled_t, self.sampled_y = simulator, data.name, t, y
         estimates = [estimate_noise(t, column) for column in y.T]
         self.step = np.array([step for _, step in estimates])
         self.width = len(t) // MAX_SAMPLES if binned and len(t) > 2 * MAX_SAMPLES else 1
-        self.t, self.y, self.inputs = t, y, dict(inputs)
+        self.t, self.y, inputs = t, y, dict(data.inputs)
         if self.width > 1:
             self.t, self.y = bin_means(t, self.width), bin_means(y, self.width)
-            self.inputs = {name: bin_means(u, self.width) for name, u in inputs.items()}
+            input_t = bin_means(input_t, self.width)
+            inputs = {name: bin_means(u, self.width) for name, u in inputs.items()}
+        self.knots = self.t
+        if inputs:
+            nearest = 0.0 if self.width == 1 else 0.5 * float(np.median(np.diff(input_t)))  # means at other times
+            self.knots = merge_points(self.t, input_t[input_t < self.t[-1]], nearest)
+        self.inputs = {name: np.interp(self.knots, input_t, u) for name, u in inputs.items()}
+        self.rows = np.searchsorted(self.knots, self.t)
         scatter = [estimate_noise(self.t, column)[0] for column in self.y.T]
         self.noise = np.maximum(scatter, self.step / 12**0.5)
         known = np.array([deviation or 0.0 for deviation in data.sigma])
@@ -93,14 +106,14 @@ class MeasuredRecord:
 
     def subdivide(self, parts: int, every: int = 1) -> None:
         """Divide the intervals between samples; there, inputs are splines through each `every`-th sample."""
-        self.subdivision = parts
+        self.subdivision, t = parts, self.knots
         shares = np.arange(parts) / parts
-        self.fine_t = np.append((self.t[:-1, None] + np.diff(self.t)[:, None] * shares).ravel(), self.t[-1])
+        self.fine_t = np.append((t[:-1, None] + np.diff(t)[:, None] * shares).ravel(), t[-1])
         if parts == every == 1:
             self.driven = self.inputs
         else:
-            knots = np.unique(np.append(self.all[::every], self.all[-1]))
-            self.driven = {name: CubicSpline(self.t[knots], u[knots])(self.fine_t) for name, u in self.inputs.items()}
+            used = np.unique(np.append(np.arange(0, len(t), every), len(t) - 1))
+            self.driven = {name: CubicSpline(t[used], u[used])(self.fine_t) for name, u in self.inputs.items()}
         self.run = self.prepare(self.t, self.fine_t, self.driven)
 
     def prepare(self, times: np.ndarray, knots: np.ndarray, inputs: Mapping[str, np.ndarray]) -> Run:
@@ -128,12 +141,16 @@ class MeasuredRecord:
         if id(index) not in self.parts:
             if len(self.parts) >= MAX_PARTS:
                 self.parts.clear()
-            grid = index
+            grid = self.rows[index]
             if self.inputs:
-                grid = np.union1d(np.arange(0, index[-1] + 1, max(1, len(self.t) // INPUT_POINTS)), index)
-            run = self.prepare(self.t[index], self.t[grid], {name: u[grid] for name, u in self.inputs.items()})
+                grid = np.union1d(self.sparse_knots(index), grid)
+            run = self.prepare(self.t[index], self.knots[grid], {name: u[grid] for name, u in self.inputs.items()})
             self.parts[id(index)] = RecordPart(index, self.y[index], run)
         return self.parts[id(index)]
+
+    def sparse_knots(self, index: np.ndarray) -> np.ndarray:
+        """Return rows of the inputs up to the last of the samples `index`, enough for a search."""
+        return np.arange(0, self.rows[index[-1]] + 1, max(1, len(self.knots) // INPUT_POINTS))
 
     def simulate_delayed(
         self, values: Mapping[str, float], index: np.ndarray, delays: Mapping[int, float]
@@ -151,8 +168,8 @@ class MeasuredRecord:
         if self.inputs and len(index) == len(self.t):
             knots, inputs = self.fine_t, self.driven
         elif self.inputs:
-            grid = np.arange(0, index[-1] + 1, max(1, len(self.t) // INPUT_POINTS))
-            knots, inputs = self.t[grid], {name: u[grid] for name, u in self.inputs.items()}
+            grid = self.sparse_knots(index)
+            knots, inputs = self.knots[grid], {name: u[grid] for name, u in self.inputs.items()}
         points = np.unique(np.concatenate(sensor_times))
         steps = merge_points(points, knots, shortest)
         y = self.prepare(points, steps, {name: np.interp(steps, knots, u) for name, u in inputs.items()})(values)

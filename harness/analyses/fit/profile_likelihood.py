@@ -274,7 +274,8 @@ def fit_at(
     """Return the least squares and the coordinates with coordinate `i` displaced from z (k,); see `fit_others`."""
     for start in starts:
         start[i] = z[i] + displacement
-    min_gain = MIN_GAIN * uncertainty.limit(i) / uncertainty.squares
+    limit = uncertainty.limit(i)
+    min_gain = MIN_GAIN * limit / max(uncertainty.squares, limit)  # the squares may be 0
     return fit_others(problem, z, starts, np.delete(np.arange(len(z)), i), min_gain, goal)
 
 

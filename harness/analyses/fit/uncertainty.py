@@ -19,6 +19,7 @@ BLOCK_SIZES = (20, 60, 200, 600)
 MIN_BLOCKS, MAX_BLOCKS = 12, 400
 CORRELATED_DEGREES_OF_FREEDOM = 20  # of the intervals, where residuals are correlated
 QUANTISER_DRAWS = 60
+ROUNDING = float(np.finfo(float).eps)  # of the largest value of a record: smallest standard deviation of its residuals
 
 
 @dataclass(frozen=True)
@@ -28,7 +29,7 @@ class Uncertainty:
     Attributes
     ----------
     squares, variance : float
-        Sum of squares, and that per degree of freedom.
+        Sum of squares, and that per degree of freedom; the variance is at least that of rounding errors.
     covariance : numpy.ndarray
         Covariance (k, k) for white noise.
     inflation : numpy.ndarray
@@ -83,7 +84,7 @@ def estimate_uncertainty(
     e = problem.residuals(z, problem.all)
     assert e is not None
     jacobian = problem.choose_steps(z, e)
-    variance = max(float(e @ e) / max(len(e) - len(z), 1), min_variance)
+    variance = max(float(e @ e) / max(len(e) - len(z), 1), min_variance, rounding_variance(problem))
     eigenvalues, axes = np.linalg.eigh(jacobian.T @ jacobian)
     eigenvalues = np.maximum(eigenvalues, max(1e-12 * eigenvalues.max(), 1e-200))
     inverse = axes / eigenvalues @ axes.T
@@ -103,6 +104,12 @@ def estimate_uncertainty(
     indeterminate = axes[:, deviation > INDETERMINATE]
     squares = float(e @ e)
     return Uncertainty(squares, variance, inverse * variance, inflation, indeterminate, e, correlation, shift)
+
+
+def rounding_variance(problem: FitProblem) -> float:
+    """Return the smallest variance that rounding errors of a column can have, in units of its noise."""
+    sizes = np.concatenate([np.abs(record.y).max(axis=0) / record.noise for record in problem.records])
+    return float((ROUNDING * sizes.min()) ** 2)
 
 
 def split_residuals(problem: FitProblem, e: np.ndarray) -> list[np.ndarray]:
