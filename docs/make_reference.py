@@ -46,7 +46,17 @@ SCENE_TEXTS = {
     "inputs": "Input signals: the times `time` in s and a list of values for each input, in SI units; linear between "
     "two times, and a time that occurs twice is a jump.",
     "decay": "Settings of the analysis `decay`, see below.",
-    "published": "Published numbers to compare with, see below.",
+    "remark": "Remark on the comparison with known values, which the report prints.",
+    "published": "Values of a publication, see below.",
+    "reference": "Values of a closed form or a certified result, see below.",
+    "parameter": "Parameters that the run sets, see below.",
+    "citation": "The publication of the values in `[published]`, see below.",
+}
+CITATION_TEXTS = {
+    "author": "Author or authors.",
+    "title": "Title of the publication.",
+    "year": "Year of the publication.",
+    "location": "Table, figure or page of the publication.",
 }
 DECAY_TEXTS = {
     "gives": "The quantity to calculate from the peaks: damping ratio, friction force or friction torque.",
@@ -307,6 +317,7 @@ def parts(fmus: Path) -> dict[str, Callable[[], str]]:
         "variables-common": lambda: common_variables(fmus),
         "enumerations": lambda: enumerations(fmus),
         "scene-keys": lambda: keys(SCENE_TEXTS, RunSpec, scene.SceneKeys),
+        "scene-citation": lambda: keys(CITATION_TEXTS, schema_within(scene.SceneKeys, "citation")),
         "scene-decay": lambda: keys(DECAY_TEXTS, schema_within(scene.SceneKeys, "decay")),
         "coupled-keys": lambda: coupled_keys(coupled.CoupledKeys),
         "coupled-parts": lambda: coupled_keys(schema_within(coupled.CoupledKeys, "parts")),

@@ -17,7 +17,7 @@ def benchmark_table(benchmarks: Iterable[Benchmark]) -> Table:
     table.add_column("benchmark")
     table.add_column("measured", justify="right", no_wrap=True)
     table.add_column("target", justify="right", no_wrap=True)
-    table.add_column("")
+    table.add_column("verdict")
     table.add_column("baseline")
     for benchmark in benchmarks:
         missed = Text("not measured", style="dim") if isnan(benchmark.value) else Text("missed", style="bold red")

@@ -34,10 +34,10 @@ class FullHelpGroup(click.Group):
 )
 @click.pass_context
 def commands(context: click.Context, terminal: Terminal) -> None:
-    """Run FMUs with dry friction, measure them, and compare the results with published values.
+    """Run FMUs with dry friction, measure them, and compare the results with published and other known values.
 
-    Without a command, it runs all published cases.  Exit status: 0 success, 1 a run or check failed, 2 wrong usage,
-    130 interrupted by Ctrl-C, 143 terminated by SIGTERM.  An interrupted command leaves no incomplete results.
+    Without a command, it runs all cases with known values.  Exit status: 0 success, 1 a run or check failed, 2 wrong
+    usage, 130 interrupted by Ctrl-C, 143 terminated by SIGTERM.  An interrupted command leaves no incomplete results.
 
     \b
     Examples:
@@ -49,15 +49,21 @@ def commands(context: click.Context, terminal: Terminal) -> None:
     # options before the command apply to the command as well
     context.default_map = dict.fromkeys(commands.commands, vars(terminal))
     if context.invoked_subcommand is None:
+        from ..report.verdicts import judge_cases
         from ..studies.run import study
-        from ..studies.run.table import results_table
+        from ..studies.run.table import judge_outcomes, results_table
 
-        names = study.published_scene_names()
+        names = study.compared_scene_names()
         with terminal.progress(len(names)) as report:
             outcomes = list(study.run_scenes(names, terminal.out, report))
         rows = [outcome_as_json(outcome, terminal.out) for outcome in outcomes]
         failed = (outcome.error for outcome in outcomes if outcome.error)
-        terminal.print_result(rows, results_table(outcomes, everything=False), folder=terminal.out, failed=failed)
+        table = results_table(outcomes, everything=False)
+        verdicts = [
+            "\n  ".join((f"{verdict.value} {verdict.meaning}.", *verdict.details))
+            for verdict in judge_cases(judge_outcomes(outcomes))
+        ]
+        terminal.print_result(rows, table, "", *verdicts, folder=terminal.out, failed=failed)
 
 
 for file in iter_modules(__path__):

@@ -22,11 +22,11 @@ def report(out: Path, quiet: bool, as_json: bool) -> None:
       friction-fmus && friction-fmus decay coulomb && friction-fmus report
     """
     from ..report.page import write_report
-    from ..report.sections import PublishedScene
+    from ..report.sections import ComparedScene
     from ..scenes.scene import load_scene, shipped_scenes
 
-    scenes = [scene for scene in map(load_scene, shipped_scenes()) if scene.published]
-    page = write_report(out, [PublishedScene(scene.name, scene.run.fmu.stem, scene.about) for scene in scenes])
+    scenes = [scene for scene in map(load_scene, shipped_scenes()) if scene.known]
+    page = write_report(out, [ComparedScene(scene.name, scene.run.fmu.stem, scene.about) for scene in scenes])
     if as_json:
         print_json({"page": str(page.path), "missing": [gap.name for gap in page.missing]})
     elif not quiet:

@@ -90,7 +90,8 @@ def run(
     with terminal.progress(1) as report:
         outcome = study.run_scene(selected_scene, terminal.out, partial(report, selected_scene.name))
     table = results_table([outcome], everything=True)
-    folder, notes = terminal.out / selected_scene.name, [outcome.run.note] if outcome.run and outcome.run.note else []
+    folder = terminal.out / selected_scene.name
+    notes = [*study.describe_known_values(selected_scene), *filter(None, [outcome.run.note if outcome.run else ""])]
     failed = failure_message(outcome.error, folder)
     terminal.print_result(outcome_as_json(outcome, terminal.out), table, *notes, folder=folder, failed=failed)
 
@@ -161,6 +162,8 @@ def format_value(value: float | str) -> str:
 def outcome_as_json(outcome: Any, out: Path) -> dict[str, object]:
     """Return the results of a scene for JSON output."""
     from ..results.provenance import replacement_note
+    from ..studies.run.table import comparison_as_json
 
     data = {"scene": outcome.name, "quantities": outcome.quantities, "error": outcome.error}
+    data["comparison"] = comparison_as_json(outcome)
     return data | {"said": [*filter(None, [replacement_note(out / outcome.name)])]}

@@ -1,25 +1,29 @@
 """HTML page of the report. All HTML of the harness is in page.html."""
 
 import os
-from base64 import b64encode
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import date
 from pathlib import Path
+from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import escape
 
 from ..errors import HarnessError
 from ..results.provenance import HARNESS, package_version
 from ..results.summary import METHODS_TABLE, SKETCH_SIZE, MissingResult
+from .embedding import MAX_PAGE_BYTES, Budget, encode_data
 from .sections import (
     COLLECTED_TABLES,
     RUNS,
-    PublishedScene,
+    USER_SECTIONS,
+    ComparedScene,
     ResultItem,
     Section,
     build_sections,
     collect_tables,
+    find_section,
     list_missing,
     read_items,
 )
@@ -27,7 +31,6 @@ from .typeset import is_text_column, typeset
 from .verdicts import build_verdicts
 
 FILE = "report.html"
-MAX_EMBEDDED_BYTES = 30_000  # larger data files are named, not embedded, so that the page loads at once
 LIVE_PAGE = Path("fmus/web/index.html")  # the interactive page, if it has been built
 ADVICE = (
     "For dry friction with sticking use the law hybrid: stick and slip are modes, a stuck body does not creep, and "
@@ -51,7 +54,7 @@ class ReportPage:
     missing: tuple[MissingResult, ...]
 
 
-def write_report(results: Path, scenes: Sequence[PublishedScene]) -> ReportPage:
+def write_report(results: Path, scenes: Sequence[ComparedScene]) -> ReportPage:
     """Write the page of all results in a folder to that folder.
 
     Raises
@@ -78,38 +81,45 @@ def render_page(
     items: Sequence[ResultItem],
     sections: Sequence[Section],
     missing: Sequence[MissingResult],
-    scenes: Sequence[PublishedScene],
+    scenes: Sequence[ComparedScene],
     results: Path,
 ) -> str:
-    """Return the HTML of the page. It refers to no other file, so a copy of the page is complete."""
-    summaries = {item.summary.title: item.summary for item in items if item.summary.sketches}
-    gallery = [(scene, summaries[scene.name].sketches) for scene in scenes if scene.name in summaries and scene.about]
-    # without results of the shipped models, the page begins with the runs of the user's models
-    leading = [] if gallery else [replace(section, title="Runs") for section in sections if section.study == RUNS]
-    has_live_page = LIVE_PAGE.is_file()
+    """Return the HTML of the page, which refers to no other file, so that a copy of the page is complete.
+
+    Figures, the live page and data files are embedded, in this order, as far as the page stays small; the results of
+    the user come first. Files that are not embedded are named.
+    """
+    sketches = {item.summary.title: item.summary.sketches for item in items if item.summary.sketches}
+    studies = [section.study for section in USER_SECTIONS]
+    content = {
+        "relative_path": lambda file: Path(os.path.relpath(file, results)).as_posix(),
+        "missing": missing,
+        "gallery": [(scene, sketches[scene.name]) for scene in scenes if scene.name in sketches and scene.about],
+        "sketch_size": SKETCH_SIZE,
+        "verdicts": build_verdicts(
+            [item.summary for item in items if item.summary.study != RUNS or find_section(item, scenes) != RUNS]
+        ),
+        "advice": ADVICE,
+        "collected_tables": COLLECTED_TABLES,
+        "choices": collect_tables(items, METHODS_TABLE),
+        "live": LIVE_PAGE.as_posix() if LIVE_PAGE.is_file() else "",
+        "made": f"{date.today()} by {HARNESS} {package_version(HARNESS)}",
+    }
+    size_without_files = len(render(content, sections, studies, Budget(0)).encode())
+    return render(content, sections, studies, Budget(MAX_PAGE_BYTES - size_without_files))
+
+
+def render(content: Mapping[str, Any], sections: Sequence[Section], studies: Sequence[str], budget: Budget) -> str:
+    """Return the HTML of the page with the files that fit into the budget."""
+    sections = [
+        replace(section, items=tuple(replace(item, picture=budget.take(item.picture)) for item in section.items))
+        for section in sections
+    ]
+    live = LIVE_PAGE.read_text(encoding="utf-8", errors="replace") if content["live"] else ""
     return TEMPLATE.render(
-        relative_path=lambda file: Path(os.path.relpath(file, results)).as_posix(),
-        embed_file=embed_file,
-        leading=leading,
-        sections=[section for section in sections if gallery or section.study != RUNS],
-        missing=missing,
-        gallery=gallery,
-        sketch_size=SKETCH_SIZE,
-        verdicts=build_verdicts([item.summary for item in items]),
-        advice=ADVICE,
-        collected_tables=COLLECTED_TABLES,
-        choices=collect_tables(items, METHODS_TABLE),
-        live=LIVE_PAGE.as_posix() if has_live_page else "",
-        live_content=LIVE_PAGE.read_text(encoding="utf-8", errors="replace") if has_live_page else "",
-        made=f"{date.today()} by {HARNESS} {package_version(HARNESS)}",
+        content,
+        yours=[section for section in sections if section.study in studies],
+        ours=[section for section in sections if section.study not in studies],
+        live_content=budget.take(live, escape),
+        embed_file=lambda file: budget.take(encode_data(file)),
     )
-
-
-def embed_file(file: Path) -> str:
-    """Return a data file as a data URL; empty if it is large or cannot be read."""
-    try:
-        if file.stat().st_size > MAX_EMBEDDED_BYTES:
-            return ""
-        return f"data:text/csv;base64,{b64encode(file.read_bytes()).decode()}"
-    except OSError:
-        return ""

@@ -1,12 +1,12 @@
 """Sections of the report, from the summaries of results; missing results are listed with their commands."""
 
-from base64 import b64encode
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from ..errors import HarnessError
 from ..results.provenance import FILE as PROVENANCE_FILE
+from ..results.provenance import load_provenance
 from ..results.summary import (
     METHODS_TABLE,
     PICTURE_FILE,
@@ -17,13 +17,15 @@ from ..results.summary import (
     SummaryTable,
     read_summary,
 )
+from .embedding import encode_figure
+from .verdicts import PUBLISHED, REFERENCE
 
 COLLECTED_TABLES = (STEPS_TABLE, METHODS_TABLE)  # shown together, not with each result
 
 
 @dataclass(frozen=True)
-class PublishedScene:
-    """A scene with published values: its name, its model, and a description of the model (may be empty)."""
+class ComparedScene:
+    """A shipped scene with known values: its name, its model, and a description of the model (may be empty)."""
 
     name: str
     model: str
@@ -32,10 +34,25 @@ class PublishedScene:
 
 @dataclass(frozen=True)
 class ResultItem:
-    """A result in the report: folder, summary, and the figure as a data URL; or the reason why it cannot be shown."""
+    """A result in the report.
+
+    Attributes
+    ----------
+    folder : pathlib.Path
+        Folder of the result.
+    summary : Summary
+        Summary of the result.
+    source : str
+        Source in its provenance: a shipped scene by name, or a path.
+    picture : str
+        Figure as a data URL; empty without one.
+    error : str
+        Reason why the result cannot be shown; otherwise empty.
+    """
 
     folder: Path
     summary: Summary
+    source: str = ""
     picture: str = ""
     error: str = ""
 
@@ -64,12 +81,9 @@ class Section:
     items: tuple[ResultItem, ...] = ()
 
 
-PUBLISHED, RUNS, STEPS = "published", "run", "steps"
-SECTIONS = (
-    Section(
-        PUBLISHED, "Published cases", "Each published value with the measured one. Run times depend on the machine."
-    ),
-    Section(RUNS, "Other runs", "User scenes and FMUs, with first and last values."),
+RUNS, STEPS = "run", "steps"
+USER_SECTIONS = (
+    Section(RUNS, "Runs", "Scenes, models and FMUs that you ran."),
     Section(
         "decay",
         "Decay",
@@ -78,6 +92,41 @@ SECTIONS = (
         "decay coulomb",
     ),
     Section("fit", "Fits", "Parameters of FMUs from measured records, with 95 % intervals."),
+    Section(
+        "sweep",
+        "Sweeps",
+        "Parameter sweeps; known boundaries are dashed.",
+        "a sweep",
+        "sweep stickslip --vary mu_d=0.3:0.9:60 --vary v_driver=0.01:0.1:60 --measure slips",
+    ),
+    Section(
+        "compare",
+        "Comparisons",
+        "Differences between two results or FMUs.",
+        "a comparison",
+        "compare results/coulomb results/coulomb-sign",
+    ),
+    Section(
+        "coupled",
+        "Coupled",
+        "Coupled FMUs, run by existing engines and compared with one model of the whole system.",
+        "a coupled scene",
+        "couple two-masses",
+    ),
+)
+OWN_SECTIONS = (
+    Section(
+        PUBLISHED,
+        "Published cases",
+        "Each value that a publication prints, beside the measured one; the publication is named with each case. "
+        "Run times depend on the machine.",
+    ),
+    Section(
+        REFERENCE,
+        "Cases with a reference or a parameter",
+        "Values that no publication prints: a reference is a closed form or a certified result; a parameter is the "
+        "value that was set.",
+    ),
     Section(
         STEPS,
         "Steps",
@@ -103,27 +152,6 @@ SECTIONS = (
         "The same FMUs in other tools. Numbers are the largest difference from fmpy, relative to the largest value; "
         "message: the tool reports the error of the FMU; - : not checked with this tool.",
     ),
-    Section(
-        "sweep",
-        "Sweeps",
-        "Parameter sweeps; known boundaries are dashed.",
-        "a sweep",
-        "sweep stickslip --vary mu_d=0.3:0.9:60 --vary v_driver=0.01:0.1:60 --measure slips",
-    ),
-    Section(
-        "compare",
-        "Comparisons",
-        "Differences between two results or FMUs.",
-        "a comparison",
-        "compare results/coulomb results/coulomb-sign",
-    ),
-    Section(
-        "coupled",
-        "Coupled",
-        "Coupled FMUs, run by existing engines and compared with one model of the whole system.",
-        "a coupled scene",
-        "couple two-masses",
-    ),
     Section("rivals", "Rivals", "The same scenes in other engines, at their defaults and at their best settings."),
     Section(
         "bench",
@@ -131,6 +159,7 @@ SECTIONS = (
         "Targets, measured values and baselines of the same run. Times depend on the machine and on its load.",
     ),
 )
+SECTIONS = USER_SECTIONS + OWN_SECTIONS
 
 
 def read_items(results: Path) -> list[ResultItem]:
@@ -146,34 +175,40 @@ def read_item(folder: Path, results: Path) -> ResultItem:
     """Read a result with its figure."""
     try:
         summary = read_summary(folder)
-        return ResultItem(folder, summary, read_picture(folder / PICTURE_FILE) if summary.picture else "")
+        picture = read_picture(folder / PICTURE_FILE) if summary.picture else ""
+        return ResultItem(folder, summary, load_provenance(folder).get("source", ""), picture)
     except (HarnessError, OSError) as error:
         first, *_ = folder.relative_to(results).parts
-        study = first if first in [section.study for section in SECTIONS[2:]] else RUNS
+        studies = [section.study for section in SECTIONS if section.study not in (PUBLISHED, REFERENCE, STEPS)]
+        study = first if first in studies else RUNS
         text = f"{folder} cannot be shown: {error}."
         return ResultItem(folder, Summary(study, folder.name, (text,)), error=text)
 
 
 def read_picture(file: Path) -> str:
     """Return a figure as a data URL; raise HarnessError if it is not a complete SVG drawing."""
-    data = file.read_bytes()
-    if not (b"<svg" in data and data.rstrip().endswith(b"</svg>")):
+    text = file.read_text(encoding="utf-8", errors="replace")
+    if not ("<svg" in text and text.rstrip().endswith("</svg>")):
         raise HarnessError(f"{file.name} is not a complete SVG drawing: repeat the command that wrote it")
-    return f"data:image/svg+xml;base64,{b64encode(data).decode()}"
+    return encode_figure(text)
 
 
-def build_sections(items: Sequence[ResultItem], scenes: Sequence[PublishedScene]) -> list[Section]:
-    """Return the sections that have results; published scenes are in their order, judged results first."""
+def build_sections(items: Sequence[ResultItem], scenes: Sequence[ComparedScene]) -> list[Section]:
+    """Return the sections that have results.
+
+    Shipped scenes are in their order. In other sections, results of the user are first, and judged ones among them.
+    """
     order = {scene.name: i for i, scene in enumerate(scenes)}
 
-    def rank(item: ResultItem) -> int:
-        is_published = find_section(item) == PUBLISHED
-        return order.get(item.summary.title, len(order)) if is_published else item.summary.outcome is None
+    def rank(item: ResultItem) -> tuple[int, bool]:
+        is_compared = find_section(item, scenes) in (PUBLISHED, REFERENCE)
+        position = order.get(item.summary.title, len(order)) if is_compared else int(item.source in order)
+        return position, item.summary.outcome is None
 
     items = sorted(items, key=rank)
     sections = []
     for section in SECTIONS:
-        selected = tuple(item for item in items if find_section(item) == section.study)
+        selected = tuple(item for item in items if find_section(item, scenes) == section.study)
         if section.study == STEPS:
             selected = tuple(steps_item(table) for table in collect_tables(items, STEPS_TABLE))
         if selected:
@@ -181,9 +216,12 @@ def build_sections(items: Sequence[ResultItem], scenes: Sequence[PublishedScene]
     return sections
 
 
-def find_section(item: ResultItem) -> str:
-    """Return the section of a result: a run is a published case if it is compared with published values."""
-    return PUBLISHED if item.summary.study == RUNS and item.summary.outcome else item.summary.study
+def find_section(item: ResultItem, scenes: Sequence[ComparedScene]) -> str:
+    """Return the section of a result: that of its study, or for the run of a shipped scene that of its values."""
+    outcome = item.summary.outcome
+    if item.summary.study == RUNS and outcome and item.source in [scene.name for scene in scenes]:
+        return PUBLISHED if outcome.kind == "published" else REFERENCE
+    return item.summary.study
 
 
 def steps_item(table: SummaryTable) -> ResultItem:
@@ -198,12 +236,14 @@ def collect_tables(items: Iterable[ResultItem], title: str) -> tuple[SummaryTabl
 
 
 def list_missing(
-    items: Iterable[ResultItem], sections: Sequence[Section], scenes: Sequence[PublishedScene]
+    items: Iterable[ResultItem], sections: Sequence[Section], scenes: Sequence[ComparedScene]
 ) -> list[MissingResult]:
     """Return the missing results, and those that the studies left out."""
-    titles = [(find_section(item), item.summary.title) for item in items]
+    titles = [(find_section(item, scenes), item.summary.title) for item in items]
     missing = [
-        MissingResult(scene.name, f"run {scene.name}") for scene in scenes if (PUBLISHED, scene.name) not in titles
+        MissingResult(scene.name, f"run {scene.name}")
+        for scene in scenes
+        if not {(PUBLISHED, scene.name), (REFERENCE, scene.name)} & {*titles}
     ]
     models = sorted({scene.model for scene in scenes})
     missing += [MissingResult(model, f"precision {model}") for model in models if ("precision", model) not in titles]

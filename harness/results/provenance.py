@@ -28,6 +28,7 @@ HARNESS = "friction-fmus"
 REPLACED = "replaced"
 # options of a result that follow from its parameters or input files
 IMPLIED_OPTIONS = {"values", "name", "fmu", "file", "source", "equal_steps"}
+KNOWN_VALUES = {"published", "reference", "parameter", "citation", "remark"}  # of a scene; they do not change its run
 PACKAGES = (HARNESS, "fmpy", "numpy", "scipy")
 MAX_DEPTH = 6  # of tables and lists within a scene
 
@@ -204,7 +205,8 @@ def note_replaced_result(old_folder: Path, new_folder: Path, file: str) -> None:
         if parameter != after["parameters"].get(name)
     ]
     options, new_options = (
-        (provenance.get("run") or {}) | (provenance["scene"] or {}) for provenance in (before, after)
+        {name: value for name, value in settings.items() if name not in KNOWN_VALUES}
+        for settings in ((item.get("run") or {}) | (item["scene"] or {}) for item in (before, after))
     )
     unchanged = [name for name in options if name in IMPLIED_OPTIONS or options[name] == new_options.get(name)]
     differences += [format_option(name, value) for name, value in options.items() if name not in unchanged]

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 SUMMARY_FILE, PICTURE_FILE = "summary.json", "figure.svg"
 VERSION = 1  # of the schema
 STEPS_TABLE, METHODS_TABLE = "Internal steps of the solver", "Fastest methods"  # rows that the report collects
-MAX_DEVIATION = 5.0  # percent; a published case counts as reproduced up to this difference
+MAX_DEVIATION = 5.0  # percent; a result agrees with its known values up to this difference
 SKETCH_SIZE = 320, 150  # width and height of the box of a sketch
 
 
@@ -38,13 +38,24 @@ class SummaryTable:
 class Outcome:
     """Conclusion of a study: a value, and a text.
 
-    `deviation` is the largest deviation from published values in percent, None without published values.
+    Attributes
+    ----------
+    value, text : str
+        Number or word, and its meaning.
+    is_good : bool
+        Whether the result is as expected.
+    deviation : float or None
+        Largest deviation from known values in percent; None without known values.
+    kind, source : str
+        Kind of the known values, "published", "reference" or "parameter", and their source; empty without any.
     """
 
     value: str
     text: str
     is_good: bool
     deviation: float | None = None
+    kind: str = ""
+    source: str = ""
 
 
 @dataclass(frozen=True)
@@ -126,9 +137,17 @@ class Summary:
 
 
 def make_table(headings: Iterable[str], rows: Iterable[Iterable[object]], title: str = "") -> tuple[SummaryTable, ...]:
-    """Return a table as the only item; nothing if it has no rows."""
-    cells = tuple(tuple(map(str, row)) for row in rows)
-    return (SummaryTable(tuple(headings), cells, title),) if cells else ()
+    """Return a table as the only item; nothing if it has no rows.
+
+    Raises
+    ------
+    ValueError
+        If a heading is empty, which a reader of the report could not interpret.
+    """
+    cells, names = tuple(tuple(map(str, row)) for row in rows), tuple(headings)
+    if not all(names):
+        raise ValueError(f"a heading is empty in {names}")
+    return (SummaryTable(names, cells, title),) if cells else ()
 
 
 def make_terminal_table(title: str | None = None) -> "rich.table.Table":
@@ -172,7 +191,10 @@ def read_summary(folder: Path) -> Summary:
         elif content["version"] != VERSION:
             reason = f"is of version {content['version']}, and this program reads version {VERSION}"
         else:
-            return parse_table(content, Summary)
+            summary = parse_table(content, Summary)
+            if summary.outcome is None or summary.outcome.deviation is None or summary.outcome.kind:
+                return summary
+            reason = "states no kind of its known values, as in results of earlier versions"
     except FileNotFoundError:
         reason = "is missing, as in results of earlier versions"
     except (OSError, ValueError, RecursionError):

@@ -2,6 +2,7 @@
 
     title = "..."             one line
     about = "..."             description of the model, for the report
+    remark = "..."            remark on the comparison with known values, for the report
     model = "smd"             fmus/smd.fmu in the working directory or the project; or fmu = "path/from/here.fmu"
     start, stop               s; default: those of the FMU
     method, law               solver.method and friction by name; default: those of the FMU
@@ -23,7 +24,11 @@
     [values]                  parameters and inputs by name, SI units; enumerations by label
     [inputs]                  input signals: time = [...] in s, and a list of values for each input
     [decay]                   gives = "zeta", "f" or "T_f"; first = peaks to skip; cycles = cycles to use (all)
-    [published]               source = "..."; published quantities: a number, [number, "unit"] or a text
+    [published]               published quantities: a number, [number, "unit"] or a text; source = "...", the program or
+                              method of the publication; these values need the table [citation]
+    [citation]                author, title, year, location (table, figure or page) of the publication
+    [reference]               the same for a closed form or a certified result; source = "...", its method
+    [parameter]               the same for parameters that the run sets; only one of these three tables is allowed
 
 Required are title, outputs, and either model or fmu.
 """
@@ -46,6 +51,7 @@ from .schema import (
     field_names,
     is_number,
     is_text,
+    is_whole,
     parse_table,
     read_toml,
 )
@@ -71,17 +77,20 @@ PLOTS: dict[str, tuple[str, ...]] = {
 }
 
 
-def is_published(value: Any) -> bool:
+def is_known_value(value: Any) -> bool:
     """Return whether a value is a number, [number, "unit"] or a text."""
     pair = isinstance(value, list) and len(value) == 2 and is_number(value[0]) and is_text(value[1])
     return pair or is_number(value) or is_text(value)
 
 
+KINDS = ("published", "reference", "parameter")  # of known values, by the name of their table
+LAST_YEAR = 9999  # of a publication
+YEAR = Constraint(lambda value: is_whole(value, 1, LAST_YEAR), "a year")
 DECAY_RESULT = Constraint(lambda value: value in ("zeta", "f", "T_f"), "'zeta', 'f' or 'T_f'")
 CYCLE_COUNT = Constraint(
     lambda value: POSITIVE.accepts(value) and (2.0 * value) % 1 == 0, "a whole or half number above 0"
 )
-PUBLISHED_VALUE = Constraint(is_published, "a number, [number, 'unit'] or a text")
+KNOWN_VALUE = Constraint(is_known_value, "a number, [number, 'unit'] or a text")
 
 
 @dataclass(frozen=True)
@@ -91,6 +100,60 @@ class DecayOptions:
     gives: Annotated[str | None, DECAY_RESULT] = None
     first: Annotated[int, NATURAL_NUMBER] = 0
     cycles: Annotated[float | None, CYCLE_COUNT] = None
+
+
+@dataclass(frozen=True)
+class Citation:
+    """Table [citation]: the publication of the published values; `location` is a table, a figure or a page of it."""
+
+    author: Annotated[str, TITLE]
+    title: Annotated[str, TITLE]
+    year: Annotated[int, YEAR]
+    location: Annotated[str, TITLE]
+
+    def __str__(self) -> str:
+        return f"{self.author}, {self.title}, {self.year}, {self.location}"
+
+
+@dataclass(frozen=True)
+class KnownValues:
+    """Values that are known before a run, which the measured quantities are compared with.
+
+    Attributes
+    ----------
+    table : {"published", "reference", "parameter"}
+        Table of the scene file that holds the values.
+    source : str
+        Program or method that gave the values; empty for parameters.
+    values : dict
+        A number, a pair (number, unit) or a text for each quantity.
+    citation : Citation or None
+        The publication of published values.
+    """
+
+    table: str
+    source: str
+    values: dict[str, Any]
+    citation: Citation | None = None
+
+    @property
+    def kind(self) -> str:
+        """Return the kind: "published" with a citation, "reference" for a closed form or a certified result, or
+        "parameter" for a parameter that the run sets. A table [published] without a citation, as in scenes of earlier
+        versions, holds reference values.
+        """
+        return "reference" if self.table == "published" and self.citation is None else self.table
+
+    @property
+    def label(self) -> str:
+        """Return the kind, and the source in parentheses."""
+        return f"{self.kind} ({self.source})" if self.source else self.kind
+
+    @property
+    def tables(self) -> dict[str, Any]:
+        """Return the tables of a scene file from which these values are read."""
+        source = {"source": self.source} if self.source else {}
+        return {self.table: source | self.values, "citation": self.citation}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -109,12 +172,16 @@ class SceneKeys:
     analyses: Annotated[tuple[str, ...], NAMES] = ()
     plots: Annotated[tuple[str, ...] | None, NAMES] = None
     decay: DecayOptions = field(default_factory=DecayOptions)
-    published: dict[str, Annotated[Any, PUBLISHED_VALUE]] = field(default_factory=dict)
+    remark: Annotated[str, TITLE] = ""
+    published: dict[str, Annotated[Any, KNOWN_VALUE]] = field(default_factory=dict)
+    reference: dict[str, Annotated[Any, KNOWN_VALUE]] = field(default_factory=dict)
+    parameter: dict[str, Annotated[Any, KNOWN_VALUE]] = field(default_factory=dict)
+    citation: Citation | None = None
 
 
 @dataclass(frozen=True)
 class Scene:
-    """A scene: its run, its analyses and plots, and published values to compare with.
+    """A scene: its run, its analyses and plots, and known values to compare with.
 
     Attributes
     ----------
@@ -124,14 +191,14 @@ class Scene:
         Path of the scene file, or the name of a scene that is built in.
     run : RunSpec
         Run of the scene.
-    title, about : str
-        Title of one line, and description of the model.
+    title, about, remark : str
+        Title of one line, description of the model, and remark on the comparison with the known values.
     analyses, plots : tuple of str
         Names of the analyses and plots.
     decay : DecayOptions
         Options of the analysis decay.
-    published : dict
-        Published quantities by name, and their source.
+    known : KnownValues or None
+        Published, reference or parameter values.
     """
 
     name: str
@@ -139,10 +206,17 @@ class Scene:
     run: RunSpec
     title: str
     about: str
+    remark: str
     analyses: tuple[str, ...]
     plots: tuple[str, ...]
     decay: DecayOptions
-    published: dict[str, Any]
+    known: KnownValues | None
+
+    @property
+    def presentation(self) -> dict[str, Any]:
+        """Return all of the scene except its run, by the keys of a scene file, for the provenance."""
+        own = {name: value for name, value in vars(self).items() if name not in ("run", "known")}
+        return own | (self.known.tables if self.known else {})
 
 
 def shipped_scenes() -> list[Path]:
@@ -210,9 +284,27 @@ def build_scene(path: Path, table: dict[str, Any], source: str, run: RunSpec | N
     plots = default_plots(run.outputs) if keys.plots is None else keys.plots
     check_names("name in analyses", keys.analyses, ANALYSES)
     check_names("name in plots", plots, (*PLOTS, *run.outputs))
-    scene = Scene(path.stem, source, run, keys.title, keys.about, keys.analyses, plots, keys.decay, keys.published)
+    known = find_known_values(keys)
+    texts = keys.title, keys.about, keys.remark
+    scene = Scene(path.stem, source, run, *texts, keys.analyses, plots, keys.decay, known)
     check_requirements(scene)
     return scene
+
+
+def find_known_values(keys: SceneKeys) -> KnownValues | None:
+    """Return the known values of a scene; None without any."""
+    tables = {name: getattr(keys, name) for name in KINDS if getattr(keys, name)}
+    if keys.citation is not None and "published" not in tables:
+        raise SceneError("[citation] has no effect without [published]: it names the publication of published values")
+    if len(tables) > 1:
+        raise SceneError(f"[{'] and ['.join(tables)}] are both given: a scene compares with values of one kind")
+    if not tables:
+        return None
+    ((name, table),) = tables.items()
+    source, values = table.get("source", ""), {name: value for name, value in table.items() if name != "source"}
+    if name != "parameter" and not is_text(source):
+        raise SceneError(f"[{name}] needs a source, as in source = 'MATLAB ode23'")
+    return KnownValues(name, source, values, keys.citation)
 
 
 def build_run(fmu: Path, keys: SceneKeys, table: dict[str, Any]) -> RunSpec:
@@ -261,8 +353,6 @@ def check_requirements(scene: Scene) -> None:
         raise SceneError(
             "the analysis 'decay' needs the table [decay] with gives = 'zeta', 'f' or 'T_f', and vice versa"
         )
-    if scene.published and not is_text(scene.published.get("source")):
-        raise SceneError("[published] needs a source, as in source = 'MATLAB ode23'")
 
 
 def locate_fmu(path: Path, keys: SceneKeys) -> Path:

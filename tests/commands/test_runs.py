@@ -82,9 +82,25 @@ def test_the_table_shows_the_published_values(main_job, case, quantity, measured
     assert line.replace(quantity, "", 1).replace("(time points)", "").split()[0] == measured
 
 
+def test_the_main_job_counts_published_cases_only_and_says_what_the_others_are(main_job):
+    text = " ".join(main_job[0].stdout.split())
+    assert "5 of 6 published cases agree" in text
+    assert "stickslip-threshold: mean step differs by" in text
+    assert "compared with a closed form or certified result: stickslip compared with the parameter" in text
+    assert "that was set: coulomb, coulomb-stop" in text
+
+
+@pytest.mark.parametrize(("case", "kind"), [("smd", "published"), ("stickslip", "reference"), ("coulomb", "parameter")])
+def test_json_states_the_kind_of_the_known_values(workspace, case, kind):
+    comparison = json.loads(harness(workspace, "run", case, "--json").stdout)["comparison"]
+    assert (comparison["kind"], comparison["agrees"]) == (kind, True)
+    assert bool(comparison["citation"]) == (kind == "published")
+    assert comparison["values"][0].keys() == {"name", "value", "percent"}
+
+
 def test_the_table_of_all_cases_fits_into_80_columns_without_truncation(main_job):
     lines = main_job[0].stdout.splitlines()
-    assert lines[0].split() == ["measured", "published", "difference"]
+    assert lines[0].split() == ["quantity", "measured", "unit", "compared", "with", "difference"]
     assert max(map(len, lines)) <= 80
     assert not [line for line in lines if re.search(r"\belsewh?e?r?$|[+-][\d.e-]+$", line)]
 
@@ -222,6 +238,11 @@ def test_the_grid_does_not_change_the_solver_steps(scene):
             "turning points",
         ),
         (BASE + "[published]\nsource = 'me'\nperiod = 3", 2, "unknown name in [published] 'period'"),
+        (
+            BASE + "analyses = ['slip']\n[parameter]\nperiod = 3",
+            2,
+            "period = 3 in [parameter] is not what the run sets",
+        ),
         (BASE.replace("model", "fmu"), 1, "there is no "),
     ],
 )

@@ -66,6 +66,7 @@ def test_existing_results_are_shown_and_missing_ones_listed_with_their_command(r
     assert "`friction-fmus run coulomb`" not in done.stdout
     assert "friction-fmus run smd" in page
     assert "friction force, 7.5 cycles" in page
+    assert "Published values: HJSIII, ME 481, course handout, 2020, figures of MATLAB." in page
     assert "Best described by dry friction" in page
 
 
@@ -75,10 +76,43 @@ def test_every_picture_has_alternative_text_and_nothing_is_loaded_from_elsewhere
     assert len(pictures) == 5
     for picture in pictures:
         assert len(picture["alt"]) > 20
-        assert picture["src"].startswith("data:image/svg+xml;base64,")
+        assert picture["src"].startswith("data:image/svg+xml,")
     assert not re.findall(r'(?:src|href)="(?!data:|#)', page)
-    assert "url(" not in page
+    assert not re.findall(r"url\((?!%23)", page)  # a figure refers to its own parts only
     assert tags.of("script") == []
+
+
+def test_every_heading_of_a_table_has_a_text_and_every_landmark_its_own_name(page):
+    tags = Tags(page)
+    cells = re.findall(r"<th [^>]*>(.*?)</th>", page)
+    assert len(cells) == len(tags.of("th")) > 20
+    assert all(cells)
+    names = [attributes["aria-label"] for _, attributes in tags.elements if attributes.get("role") == "region"]
+    assert len(names) == len({*names}) > 10
+
+
+def test_the_contents_list_every_section_and_result(page):
+    contents = re.search(r'<nav aria-label="Contents">.*?</nav>', page, re.S)[0]
+    identifiers = {attributes.get("id", "") for tag, attributes in Tags(page).elements if tag in ("section", "div")}
+    linked = set(re.findall(r'href="#([^"]+)"', contents))
+    assert linked <= identifiers | {"missing"}
+    assert {"decay", "compare", "reference", "reference-1", "published", "steps"} <= linked
+
+
+def test_a_page_stays_below_one_megabyte_and_names_what_it_leaves_out(tmp_path, report_run):
+    """Results of the user are embedded first."""
+    results = tmp_path / "results"
+    shutil.copytree(report_run[0] / "results", results)
+    for i in range(20):
+        shutil.copytree(results / "coulomb-sign", results / f"coulomb-sign-{i}")
+    assert harness(tmp_path, "report", "--quiet").returncode == 0
+    page = (results / "report.html").read_bytes()
+    assert 800_000 < len(page) < 1_000_000
+    text = page.decode()
+    named = re.findall(r"Figure, not in this page to keep it small: ([^<]+)</p>", text)
+    assert 10 < len(named) < 25
+    assert len(named) + len(Tags(text).of("img")) == 25
+    assert not [path for path in named if path.startswith(("decay", "compare"))]
 
 
 def test_every_link_of_a_copied_report_leads_to_an_anchor_or_carries_its_file(report_run, page):
@@ -111,9 +145,9 @@ def test_a_report_with_only_users_models_begins_with_them(tmp_path):
     assert harness(tmp_path, "report", "--quiet").returncode == 0
     page = (tmp_path / "results/report.html").read_text(encoding="utf-8")
     headings = re.findall(r"<h[23]>(.*?)</h[23]>", page)
-    assert headings[:3] == ["Runs", "sleds", "What to use"]
+    assert headings[:4] == ["Contents", "Runs", "sleds", "What to use"]
     assert headings.count("sleds") == 1
-    assert "Oscillators as FMUs" not in page
+    assert "the checks of this project" not in page
 
 
 @pytest.mark.parametrize("text", ["", "<svg><g>", "<svg></svg><g>", "</svg>"])
@@ -179,7 +213,7 @@ def test_the_report_begins_with_a_plot_of_the_computed_motion_to_its_stop(page):
 
 def test_published_values_are_shown_and_other_quantities_folded(page):
     part = re.search(r'<h3>coulomb-sign</h3>.*?<div class="figure"', page, re.S)[0]
-    compared, folded = part.split("<summary>Quantities without a published value</summary>")
+    compared, folded = part.split("<summary>Quantities without a known value</summary>")
     assert [cell in compared for cell in ("friction force, 3 cycles", "smallest step")] == [True, False]
     assert [cell in folded for cell in ("friction force, 3 cycles", "smallest step")] == [False, True]
 

@@ -13,29 +13,34 @@ from benchmarks.bench.benchmark import Baseline, Benchmark
 from benchmarks.bench.table import summarize_benchmarks
 from harness.references.models import CASES
 from harness.report.page import write_report
-from harness.report.sections import STEPS, ResultItem, build_sections
+from harness.report.sections import STEPS, ComparedScene, ResultItem, build_sections
 from harness.report.typeset import typeset
 from harness.report.verdicts import build_verdicts
 from harness.results.provenance import write_provenance
 from harness.results.quantity import Quantity
 from harness.results.summary import STEPS_TABLE, Summary, make_table, write_summary
+from harness.scenes.scene import Citation, KnownValues
 from harness.studies.precision.method_choice import choose_method, tabulate_choices
 from harness.studies.precision.study import FMPY, QUICK, Study
 from harness.studies.run.table import judge_deviations
 from harness.studies.stability.table import summarize_outcomes
 
 CASE = {case.name: case for case in CASES}
+CITATION = Citation("A. Author", "A title", 2020, "table 1")
 
 
 def summarize(study, title, outcome):
     return Summary(study, title, outcome=outcome)
 
 
-def published(title, *deviations, **parameters):
-    """The summary of a published case with quantities: name and difference in percent from a published value."""
+def published(title, *deviations, table="published", **parameters):
+    """The summary of a case with quantities: name and difference in percent from a known value."""
+    known = KnownValues(
+        table, "a method", dict.fromkeys(dict(deviations), 1.0), CITATION if table == "published" else None
+    )
     run = SimpleNamespace(parameters=parameters)
     quantities = [Quantity(name, 1 + percent / 100, "s", name.replace("_", " ")) for name, percent in deviations]
-    return summarize("run", title, judge_deviations(quantities, dict.fromkeys(dict(deviations), 1.0), run))
+    return summarize("run", title, judge_deviations(quantities, known, run))
 
 
 def summarize_stability(*endings):
@@ -70,16 +75,26 @@ def test_the_verdicts_are_the_number_reproduced_the_fastest_methods_and_the_case
         published("sled", ("period", 0.5), ("peak", -2.0)),
         published("sled-rough", ("steps", -50.0), ("run_time", 80.0)),
         published("pendulum", ("period", 1.0)),
+        published("spring", ("period", 9.0), table="reference"),
+        published("belt", ("period", 0.1), table="reference"),
+        published("wheel", ("period", 0.2), table="parameter"),
         summarize("precision", "sled", tabulate_choices(make_study(*POINTS), 0.0)[1]),
         summarize_stability("finished", "refused", "wrong"),
     ]
-    reproduced, methods, stability = build_verdicts(summaries)
+    reproduced, others, methods, stability = build_verdicts(summaries)
     assert (reproduced.value, reproduced.is_good) == ("2 of 3", False)
-    assert reproduced.details == (
+    assert reproduced.details[:2] == (
         "sled-rough: steps differs by -50 %",
         "largest deviation of the others: sled: peak differs by -2 %",
     )
-    assert methods.details == ("sled: exact",)
+    assert (others.value, others.is_good) == ("2 of 3", False)
+    assert others.details == (
+        "spring: period differs by +9 %",
+        "largest deviation of the others: wheel: period differs by +0.2 %",
+        "compared with a closed form or certified result: spring, belt",
+        "compared with the parameter that was set: wheel",
+    )
+    assert methods.details[0] == "sled: exact"
     assert (stability.value, stability.is_good, stability.details) == ("2 of 3", False, ("1 failed",))
 
 
@@ -92,7 +107,7 @@ def test_a_law_that_chatters_is_the_reason_why_its_steps_differ_but_not_its_peri
 def test_a_model_without_an_accurate_method_says_that_none_of_the_measured_ones_reached_the_accuracy():
     study = make_study(make_point("ode23", 1e-3, 2e-6), make_point("rodas", 1e-3, 5e-6))
     (methods,) = build_verdicts([summarize("precision", "sled", tabulate_choices(study, QUICK.min_ratio)[1])])
-    assert methods.details == ("sled: none of the measured methods reached it",)
+    assert methods.details[0] == "sled: none of the measured methods reached it"
 
 
 def test_without_results_there_is_no_verdict():
@@ -185,6 +200,31 @@ def test_missed_benchmarks_are_shown_and_others_folded(tmp_path):
     assert missed == ["slow", "0.0035", "0.00125", "s", "a peer 1.6; another 2.5"]
     assert met == ["fast", "0.0012", "0.00125", "s", "a peer 1.5"]
     assert skipped == ["skipped", "", "", "", "not found: a tool"]
+
+
+def test_results_of_the_user_come_first_in_the_page_and_in_each_section():
+    """A run of the user is one of his runs even if it agrees with published values."""
+    scenes = [ComparedScene(name, "sled", "") for name in ("sled", "spring")]
+    items = [
+        ResultItem(Path(), published("sled", ("period", 0.5)), "sled"),
+        ResultItem(Path(), published("spring", ("period", 0.5), table="reference"), "spring"),
+        ResultItem(Path(), Summary("decay", "ours"), "sled"),
+        ResultItem(Path(), Summary("decay", "mine"), "/records/mine.csv"),
+        ResultItem(Path(), published("sled", ("period", 0.5)), "/scenes/sled.toml"),
+        ResultItem(Path(), Summary("stability", "stability")),
+        ResultItem(Path(), Summary("sweep", "a sweep")),
+    ]
+    sections = [
+        (section.study, [item.summary.title for item in section.items]) for section in build_sections(items, scenes)
+    ]
+    assert sections == [
+        ("run", ["sled"]),
+        ("decay", ["mine", "ours"]),
+        ("sweep", ["a sweep"]),
+        ("published", ["sled"]),
+        ("reference", ["spring"]),
+        ("stability", ["stability"]),
+    ]
 
 
 @pytest.mark.parametrize(

@@ -62,6 +62,17 @@ def test_the_threshold_law_chatters_and_shows_the_published_slips(launch):
     assert max(a for v, a in rows if v > 0.01) == pytest.approx(2.95, abs=0.02)
 
 
+def test_the_steps_of_the_threshold_law_depend_on_the_last_digits_of_a_parameter(launch):
+    """This is why they differ from the published 10972, as the scene says."""
+    counts = []
+    for ulps in (0, 2, 10, 1e3, 1e6):
+        choice = {"friction": THRESHOLD, "k": 742.5 * (1.0 + ulps * 2.0**-52)}
+        times, _ = follow(launch, "stickslip", choice, 16.0, ("v",))
+        counts.append(len(times))
+    assert 7500 < min(counts) < 8500
+    assert 11500 < max(counts) < 12500
+
+
 @pytest.mark.parametrize(("name", "values"), [("smd", {}), ("coulomb", {}), ("coulomb", {"c": 2.0}), ("stickslip", {})])
 def test_a_tighter_tolerance_comes_closer_to_the_closed_form(launch, name, values):
     """Event location keeps the order of the method: the error falls with the tolerance and is of its size."""

@@ -1,10 +1,12 @@
 """Scene files: valid contents, and errors of invalid ones."""
 
+import json
 from pathlib import Path
 
 import pytest
 
 from harness.errors import SceneError
+from harness.results.files import to_json
 from harness.scenes.coupled.scene import CoupledKeys
 from harness.scenes.run_spec import RunSpec
 from harness.scenes.scene import load_scene, scene_from_provenance, shipped_scenes
@@ -21,11 +23,15 @@ def write(folder, extra="", **keys):
     return path
 
 
+CITATION = "[citation]\nauthor = 'me'\ntitle = 'mine'\nyear = 2020\nlocation = 'table 1'"
+
+
 @pytest.mark.parametrize("path", shipped_scenes(), ids=lambda path: path.stem)
 def test_every_shipped_scene_loads_and_names_its_source(path):
     scene = load_scene(path.stem)
     assert scene == load_scene(path)
-    assert scene.published["source"]
+    assert scene.known.values
+    assert bool(scene.known.citation) == (scene.known.kind == "published")
 
 
 def test_omitted_keys_are_left_to_the_fmu(tmp_path):
@@ -84,6 +90,17 @@ def test_a_scene_without_plots_shows_its_outputs(tmp_path, outputs, plots):
         ({"extra": "[decay]\ncycles = 0.3"}, "cycles = 0.3 is not a whole or half number above 0"),
         ({"extra": "[decay]\nfrist = 1"}, "unknown key in [decay] 'frist' (nearest: 'first')"),
         ({"extra": "[published]\nperiod = 3"}, "[published] needs a source"),
+        ({"extra": "[reference]\nperiod = 3"}, "[reference] needs a source"),
+        (
+            {"extra": "[parameter]\nf = 1\n[reference]\nsource = 'me'\nperiod = 3"},
+            "[reference] and [parameter] are both",
+        ),
+        ({"extra": "[parameter]\nf = 1\n" + CITATION}, "[citation] has no effect without [published]"),
+        ({"extra": "[published]\nsource = 'me'\n[citation]\nauthor = 'me'"}, "the key 'citation.title' is missing"),
+        (
+            {"extra": "[published]\nsource = 'me'\n" + CITATION.replace("2020", "'2020'")},
+            "citation.year = '2020' is not",
+        ),
         ({"extra": "[published]\nsource = 'me'\nperiod = [1, 2, 3]"}, "published.period = [1, 2, 3] is not"),
         ({"title": "'''"}, "not valid TOML"),
     ],
@@ -95,6 +112,15 @@ def test_an_invalid_scene_is_reported_in_one_sentence(tmp_path, keys, sentence):
     assert str(caught.value).startswith("scene mine: ")
     assert sentence in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_a_value_is_published_only_with_a_citation(tmp_path):
+    """A table [published] without one, as in earlier versions, holds references. A stored scene keeps its table."""
+    for citation, kind in ((CITATION, "published"), ("", "reference")):
+        scene = load_scene(write(tmp_path, extra=f"[published]\nsource = 'a method'\nperiod = 3\n{citation}"))
+        assert (scene.known.kind, scene.known.label) == (kind, f"{kind} (a method)")
+        stored = json.loads(to_json({"scene": scene.presentation, "run": scene.run}))
+        assert scene_from_provenance(stored).known == scene.known
 
 
 def test_a_scene_of_an_earlier_version_holds_the_keys_of_its_run():

@@ -116,12 +116,13 @@ def test_angles_are_in_degrees(draw):
         ("stickslip-threshold", "speed of the sled", ["peak_speed"]),
     ],
 )
-def test_a_published_figure_is_shown_for_comparison(draw, name, title, figures):
-    published = [SCENES[name]["published"][figure] for figure in figures]
+def test_a_known_value_is_shown_with_its_kind(draw, name, title, figures):
+    kind = "reference" if name == "stickslip" else "published"
+    known = [SCENES[name][kind][figure] for figure in figures]
     _, panels = draw(name)
-    lines = [line.get_ydata() for line in panels[title].lines if line.get_label().startswith("published")]
+    lines = [line.get_ydata() for line in panels[title].lines if line.get_label().startswith(kind)]
     levels = [y[0] for y in lines if len(set(y)) == 1]
-    assert levels == pytest.approx([value[0] if isinstance(value, list) else value for value in published])
+    assert levels == pytest.approx([value[0] if isinstance(value, list) else value for value in known])
 
 
 @pytest.mark.parametrize("name", ["smd", "stickslip-threshold", "pacejka-0.01"])
@@ -133,12 +134,13 @@ def test_the_published_mean_step_is_shown_for_comparison(draw, name):
 
 
 @pytest.mark.parametrize("name", ["smd", "coulomb", "pendulum"])
-def test_the_envelope_of_the_published_loss_passes_through_the_turning_points(draw, name):
-    """Within the difference between the published value and ours."""
+def test_the_envelope_of_the_known_loss_passes_through_the_turning_points(draw, name):
+    """Within the difference between the known value and the measured one."""
     _, panels = draw(name)
     lines = [(line.get_label(), np.asarray(line.get_ydata())) for line in next(iter(panels.values())).lines]
     turning_points = next(np.abs(y) for text, y in lines if text == "turning points")
-    upper = next(y for text, y in lines if text == "published" and len(y) > 1)
+    kind = "parameter" if name == "coulomb" else "published"
+    upper = next(y for text, y in lines if text == kind and len(y) > 1)
     assert upper == pytest.approx(turning_points, abs=0.02 * turning_points[0])
 
 

@@ -150,17 +150,24 @@ def compile_to_base64(name: str, files: Mapping[str, str]) -> str:
 # Keys of a scene and the variables they set; values of enumerations are labels.
 ENUMERATION_KEYS = {"law": "friction", "method": "solver.method"}
 NUMBER_KEYS = {"rtol": "solver.rtol", "atol": "solver.atol"}
-COPIED_KEYS = ("title", "model", "stop", "grid", "decay", "published")
+COPIED_KEYS = ("title", "model", "stop", "grid", "decay")
+KINDS = ("published", "reference", "parameter")  # of known values; a scene has one of these tables
 
 
 def read_presets(scenes: Iterable[Path], models: Collection[str]) -> list[dict[str, Any]]:
-    """Return the scenes with published values of one of the models, sorted by file name."""
+    """Return the scenes with known values of one of the models, sorted by file name.
+
+    The key "published" of a preset has these values, and "kind" has their kind.
+    """
     presets = []
     for path in sorted(scenes):
         scene = loads(path.read_text(encoding="utf-8"))
-        if "published" in scene and scene.get("model") in models:
+        kind = next((kind for kind in KINDS if kind in scene), None)
+        if kind and scene.get("model") in models:
             labels = {name: scene[key] for key, name in ENUMERATION_KEYS.items() if key in scene}
             numbers = {name: scene[key] for key, name in NUMBER_KEYS.items() if key in scene}
             copied = {key: scene[key] for key in COPIED_KEYS if key in scene}
-            presets.append({"name": path.stem, **copied, "labels": labels, "values": scene.get("values", {}) | numbers})
+            values = scene.get("values", {}) | numbers
+            known = {"kind": kind, "published": scene[kind]}
+            presets.append({"name": path.stem, **copied, **known, "labels": labels, "values": values})
     return presets

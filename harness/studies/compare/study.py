@@ -91,10 +91,10 @@ def events_as_json(comparison: Comparison) -> dict[str, Any]:
 def difference_table(comparison: Comparison) -> Table:
     """Return the table of differences, with one row per variable."""
     result = make_terminal_table()
-    result.add_column("")
+    result.add_column("variable")
     for heading in ("largest difference", "at t [s]", "rms", "relative to largest"):
         result.add_column(heading, justify="right", no_wrap=True)
-    result.add_column("", no_wrap=True)
+    result.add_column("unit", no_wrap=True)
     for variable in comparison.differences:
         cells = (f"{variable.largest:.3e}", f"{variable.at:.6g}", f"{variable.rms:.3e}", f"{variable.relative:.2e}")
         result.add_row(variable.name, *cells, variable.unit)

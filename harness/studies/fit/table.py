@@ -14,9 +14,9 @@ def fit_table(fit: ParameterFit) -> Table:
     """Return the table of values with 95 % intervals."""
     names = ", ".join(record.name for record in fit.records)
     result = make_terminal_table(f"{fit.fmu}: {names}")
-    result.add_column("")
+    result.add_column("parameter")
     result.add_column("value, 95 % interval", justify="right")
-    result.add_column("", no_wrap=True)
+    result.add_column("unit", no_wrap=True)
     for estimate in (*fit.estimates, *fit.combinations):
         result.add_row(estimate.name, format_estimate(estimate), estimate.unit)
     return result

@@ -1,11 +1,11 @@
 """Figure of a run, with one panel for each plot that the scene names, and small sketches of the motion for the report.
 
-Sticking is shaded, reversals are marked, published values are drawn in green, and angles are in degrees.  With several
+Sticking is shaded, reversals are marked, known values are drawn in green, and angles are in degrees.  With several
 contacts, only the panels of their friction forces and modes are shaded; a panel below shows when each contact sticks.
 The report draws the sketches, small curves with few points, in its own colours.
 """
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -31,14 +31,14 @@ from ...running.fmu_archive import exposes_solver_steps, read_description
 from ...running.plot import draw_sticking
 from ...running.runner import run_own_fmu
 from ...running.trajectory import Trajectory
-from ...scenes.scene import MAX_DEFAULT_PLOTS, is_panel
+from ...scenes.scene import MAX_DEFAULT_PLOTS, KnownValues, is_panel
 
 RIGHT_COLUMN = ("phase", "steps")  # plots in the right column; plots over time are in the left column
 CONTACT_HEIGHT = 0.12  # of a row of the panel with all contacts, in heights of a panel
 LIMITS = np.array([[1.01, -0.01], [-0.01, 1.01]])  # limits of a time axis from start and stop, with a margin of 1 %
 CURVE_POINTS = 1000  # points of a smooth curve
 MAX_MARKED = 100  # reversals that are marked; more would be indistinguishable
-PUBLISHED_PEAKS = {"sample_0": 0, "x_0": 0, "sample_n": -1, "x_n": -1}  # published value and index of its turning point
+KNOWN_PEAKS = {"sample_0": 0, "x_0": 0, "sample_n": -1, "x_n": -1}  # known value and index of its turning point
 PEAK_LEVELS = {"velocity": "peak_speed", "acceleration": "peak_acceleration"}
 
 HANDLE_WIDTH, LINE_WIDTH = 5, 75  # in characters: legend handle, width of a panel
@@ -52,11 +52,16 @@ Results = dict[str, Any]  # by the name of the analysis
 
 @dataclass(frozen=True)
 class PlottedRun:
-    """A run with enough points for smooth curves, the `results` of its analyses, and the `published` values."""
+    """A run with enough points for smooth curves, the `results` of its analyses, and the `known` values."""
 
     run: Trajectory
     results: Results
-    published: Mapping[str, Any]
+    known: KnownValues | None
+
+    @property
+    def kind(self) -> str:
+        """Return the kind of the known values, for labels."""
+        return self.known.kind if self.known else ""
 
     def unit(self, name: str) -> tuple[str, float]:
         """Return the display unit of an output and its size in the unit of the output."""
@@ -67,10 +72,10 @@ class PlottedRun:
         values, (_, size) = mask_undrawable(self.run.columns[name]), self.unit(name)
         return values if size == 1 else values / size
 
-    def published_value(self, name: str) -> float | None:
-        """Return a published value in SI units, or None."""
-        published = self.published.get(name)
-        value, unit = published if isinstance(published, tuple) else (published, "")
+    def known_value(self, name: str) -> float | None:
+        """Return a known value in SI units, or None."""
+        known = self.known.values.get(name) if self.known else None
+        value, unit = known if isinstance(known, tuple) else (known, "")
         return value * PUBLISHED_UNITS.get(unit, ("", 1.0))[1] if isinstance(value, int | float) else None
 
 
@@ -80,13 +85,13 @@ def draw(
     run: Trajectory,
     results: Results,
     path: Path,
-    published: Mapping[str, Any] | None = None,
+    known: KnownValues | None = None,
 ) -> None:
     """Save the figure of the named plots; arrays are drawn by element, strings are skipped."""
     columns = arrange_columns([panel for name in plots for panel in expand_plot(name, run)], run)
     if not columns:
         return
-    plotted = PlottedRun(refine(run), results, published or {})
+    plotted = PlottedRun(refine(run), results, known)
     # with several contacts, each column over time ends with a panel of all contacts
     below = [len(run.contacts) * CONTACT_HEIGHT + 0.2] if len(run.contacts) > 1 else []
     ratios = [[1.0] * len(names) + below * (not is_right(names[0], run)) for names in columns]
@@ -151,9 +156,9 @@ def plot_output(axes: Axes, plotted: PlottedRun, name: str) -> None:
     style = "steps-post" if values.dtype.kind in "iu" else "default"
     axes.plot(run.time, values, color=BLUE, drawstyle=style)
     mark_modes(axes, run, run.contact_of(name))
-    level = plotted.published_value(PEAK_LEVELS.get(role, ""))
+    level = plotted.known_value(PEAK_LEVELS.get(role, ""))
     if level is not None:
-        axes.axhline(level / size, color=GREEN, linestyle=":", label="published peak")
+        axes.axhline(level / size, color=GREEN, linestyle=":", label=f"{plotted.kind} peak")
     axes.set_title(run.descriptions[name])
     add_legend(axes)
     axes.set_ylabel(axis_label(name, unit))
@@ -195,20 +200,20 @@ def plot_position(axes: Axes, plotted: PlottedRun, name: str) -> None:
         decay = results["decay"]
         _, size = plotted.unit(run.spec.motion_outputs["position"])
         axes.plot(decay.times, decay.positions / size, "o", color=ORANGE, fillstyle="none", label="turning points")
-        for published, index in PUBLISHED_PEAKS.items():
-            peak = plotted.published_value(published)
+        for known, index in KNOWN_PEAKS.items():
+            peak = plotted.known_value(known)
             if peak is not None:
                 signed = np.copysign(peak / size, decay.positions[index])
-                axes.plot(decay.times[index], signed, "+", color=GREEN, markersize=11, label="published")
-        value = plotted.published_value(decay.result.name)
+                axes.plot(decay.times[index], signed, "+", color=GREEN, markersize=11, label=plotted.kind)
+        value = plotted.known_value(decay.result.name)
         if value is not None:
             top = envelope(decay, value) / size
             for side in (top, -top):
-                axes.plot(decay.times, side, color=GREEN, linestyle=":", label="published")
-    first, period = plotted.published_value("first_slip"), plotted.published_value("period")
+                axes.plot(decay.times, side, color=GREEN, linestyle=":", label=plotted.kind)
+    first, period = plotted.known_value("first_slip"), plotted.known_value("period")
     if first is not None and period is not None:
         for at in np.arange(first, run.time[-1], period):
-            axes.axvline(at, color=GREEN, linestyle=":", label="published slip")
+            axes.axvline(at, color=GREEN, linestyle=":", label=f"{plotted.kind} slip")
     plot_output(axes, plotted, name)
 
 
@@ -249,7 +254,7 @@ def plot_steps(axes: Axes, plotted: PlottedRun, name: str) -> None:
     if "steps" in plotted.results:
         means = {
             "mean": (published_mean_step(run.steps.h), ORANGE, "--"),
-            "published": (plotted.published_value("mean_step"), GREEN, ":"),
+            plotted.kind: (plotted.known_value("mean_step"), GREEN, ":"),
         }
         for word, (mean, color, style) in means.items():
             if mean is not None:

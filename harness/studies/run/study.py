@@ -1,4 +1,4 @@
-"""Study that runs one scene, all published scenes, or an FMU given by its path.
+"""Study that runs one scene, all scenes with known values, or an FMU given by its path.
 
 Analyses and plots are imported only when a scene requests them.
 """
@@ -79,26 +79,27 @@ def run_and_write(scene: Scene, folder: Path, report: Callable[[float], None]) -
     quantities = tuple(quantity for result in results.values() for quantity in result.quantities)
     quantities += run.statistics.quantities if run.statistics else ()
     if not run.failure:
-        check_published(scene, quantities)
+        check_known_values(scene, run, quantities)
     run.write_tables(folder)
     stop = scene.run.stop if run.failure else float(run.time[-1])
     effective_run = replace(run.spec, outputs=scene.run.outputs, start=float(run.time[0]), stop=stop)
-    presentation = {name: value for name, value in vars(scene).items() if name != "run"}
     write_provenance(
-        folder, [scene.run.fmu], run.effective_parameters, presentation, source=scene.source, run=effective_run
+        folder, [scene.run.fmu], run.effective_parameters, scene.presentation, source=scene.source, run=effective_run
     )
     summary = summarize_run(run, scene.name)
+    if results:
+        write_quantities(quantities, scene.known, folder / "quantities.csv")
+        summary = summarize_quantities(summary, quantities, scene.known, run)
+    if not run.failure:
+        summary = replace(summary, sentences=describe_scene(scene) or summary.sentences)
     if scene.about and not run.failure:
         from .figure import draw_sketches
 
-        summary = replace(summary, sentences=(scene.about,), sketches=draw_sketches(run))
-    if results:
-        write_quantities(quantities, scene.published, folder / "quantities.csv")
-        summary = summarize_quantities(summary, quantities, scene.published, run)
+        summary = replace(summary, sketches=draw_sketches(run))
     if scene.plots:
         from .figure import draw
 
-        draw(scene.title, scene.plots, run, results, folder / "figure.svg", scene.published)
+        draw(scene.title, scene.plots, run, results, folder / "figure.svg", scene.known)
     write_summary(folder, summary)
     return SceneOutcome(scene.name, scene, run, quantities, run.failure or None)
 
@@ -112,27 +113,45 @@ def check_steps(scene: Scene, run: Trajectory) -> None:
         )
 
 
-def check_published(scene: Scene, quantities: tuple[Quantity, ...]) -> None:
-    """Raise SceneError unless every published value has a measured quantity with a compatible unit."""
-    quantities_by_name = {quantity.name: quantity for quantity in quantities}
-    for name, value in scene.published.items():
-        if name == "source":
-            continue
+def describe_scene(scene: Scene) -> tuple[str, ...]:
+    """Return the description of a scene, the publication of its values, and the remark on the comparison."""
+    return (*filter(None, [scene.about]), *describe_known_values(scene))
+
+
+def describe_known_values(scene: Scene) -> tuple[str, ...]:
+    """Return the publication of the values of a scene, and the remark on the comparison with them."""
+    citation = scene.known.citation if scene.known else None
+    return tuple(filter(None, (f"Published values: {citation}." if citation else "", scene.remark)))
+
+
+def check_known_values(scene: Scene, run: Trajectory, quantities: tuple[Quantity, ...]) -> None:
+    """Raise SceneError unless each known value has a measured quantity with a compatible unit.
+
+    A value in the table [parameter] must be the one that the run sets.
+    """
+    if scene.known is None:
+        return
+    kind, quantities_by_name = scene.known.kind, {quantity.name: quantity for quantity in quantities}
+    for name, value in scene.known.values.items():
         if name not in quantities_by_name:
-            raise SceneError(unknown_name_message("name in [published]", name, quantities_by_name))
-        if isinstance(value, tuple):
-            try:
-                quantities_by_name[name].to_unit(value[1])
-            except KeyError:
-                unit = quantities_by_name[name].unit
-                raise SceneError(
-                    f"published {name} in '{value[1]}' is incompatible with the measured unit '{unit}'"
-                ) from None
+            raise SceneError(unknown_name_message(f"name in [{scene.known.table}]", name, quantities_by_name))
+        number, unit = value if isinstance(value, tuple) else (value, quantities_by_name[name].unit)
+        try:
+            quantities_by_name[name].to_unit(unit)
+        except KeyError:
+            measured = quantities_by_name[name].unit
+            raise SceneError(f"{name} in '{unit}' is incompatible with the measured unit '{measured}'") from None
+        is_set = name in run.parameters and (run.parameters[name], run.units[name]) == (number, unit)
+        if kind == "parameter" and not is_set:
+            raise SceneError(
+                f"{name} = {number!r} in [parameter] is not what the run sets: give the value of a parameter of "
+                f"{run.spec.model} in its own unit, or name the table [reference]"
+            )
 
 
-def published_scene_names() -> list[str]:
-    """Return the names of the shipped scenes with published values; HarnessError if an FMU is not built."""
-    scenes = [scene for scene in map(load_scene, shipped_scenes()) if scene.published]
+def compared_scene_names() -> list[str]:
+    """Return the names of the shipped scenes with known values; HarnessError if an FMU is not built."""
+    scenes = [scene for scene in map(load_scene, shipped_scenes()) if scene.known]
     for scene in scenes:
         check_built(scene.run.fmu)
     return [scene.name for scene in scenes]

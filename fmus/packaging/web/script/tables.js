@@ -86,7 +86,7 @@ export function publishedTable(session, state) {
   const modelInfo = session.models.get(state.model);
   const measured = measureQuantities(run, modelInfo.bodies[0], preset.decay, effectiveValues(modelInfo, state.values));
   const rows = Object.entries(preset.published).filter(([name]) => name !== "source").map(([name, published]) => comparisonRow(name, published, measured[name], significantDigits(run)));
-  return table(preset.title, ["", "this run", `published (${preset.published.source})`, "difference"], rows);
+  return table(preset.title, ["", "this run", preset.published.source ? `${preset.kind} (${preset.published.source})` : preset.kind, "difference"], rows);
 }
 
 function comparisonRow(name, published, value, resultDigits) {
