@@ -115,8 +115,9 @@ def repeat_call(context: click.Context, folder: Path, provenance: dict[str, Any]
 
 
 def run_fmu_file(path: Path, values: tuple[str, ...], options: dict[str, Any], terminal: Terminal) -> None:
-    """Run one FMU and print the first and last value of each output."""
-    from ..results.files import column_heading
+    """Run one FMU and print the first, last, smallest and largest value of each output."""
+    from ..results.summary import make_terminal_table
+    from ..running.trajectory import SPAN, span_of
     from ..scenes.assignments import parse_assignment
     from ..scenes.run_spec import DEFAULT_EQUAL_STEPS, RunSpec
     from ..studies.run.study import run_fmu
@@ -124,19 +125,24 @@ def run_fmu_file(path: Path, values: tuple[str, ...], options: dict[str, Any], t
     with terminal.progress(1) as report:
         spec = RunSpec(path, values=dict(map(parse_assignment, values)), equal_steps=DEFAULT_EQUAL_STEPS, **options)
         trajectory, folder = run_fmu(spec, terminal.out, partial(report, path.stem))
-    ends = {name: column[[0, -1]].tolist() for name, column in trajectory.columns.items()}
-    final = {name: last for name, (_, last) in ends.items()}
+    spans = {name: dict(zip(SPAN, span_of(column), strict=True)) for name, column in trajectory.columns.items()}
     data = {
         "fmu": trajectory.name,
         "note": trajectory.accuracy,
         "failed": trajectory.failure,
-        "final": final,
+        "final": {name: span["end"] for name, span in spans.items()},
+        "outputs": {name: {"unit": trajectory.units[name]} | span for name, span in spans.items()},
         "folder": folder,
     }
-    lines = [
-        f"{column_heading(name, trajectory.units[name])}: from {format_value(first)} to {format_value(last)}"
-        for name, (first, last) in ends.items()
-    ]
+    table = make_terminal_table()
+    table.add_column("output")
+    for heading in SPAN:
+        table.add_column(heading, justify="right")
+    table.add_column("unit")
+    for name, span in spans.items():
+        unit = trajectory.units[name]
+        table.add_row(name, *map(format_value, span.values()), "" if unit == "1" else unit)
+    lines: list[str] = []
     if trajectory.events:
         stuck = {contact: sum(end - begin for begin, end in rests) for contact, rests in trajectory.sticking.items()}
         changes = {contact: len(trajectory.events.changes(contact)[0]) - 1 for contact in stuck}
@@ -146,7 +152,7 @@ def run_fmu_file(path: Path, values: tuple[str, ...], options: dict[str, Any], t
             for contact, duration in stuck.items()
         ]
     failed = failure_message(trajectory.failure, folder)
-    terminal.print_result(data, *lines, *filter(None, [trajectory.accuracy]), folder=folder, failed=failed)
+    terminal.print_result(data, table, "", *lines, *filter(None, [trajectory.accuracy]), folder=folder, failed=failed)
 
 
 def failure_message(message: str | None, folder: Path) -> list[str]:

@@ -379,9 +379,18 @@ class Trajectory:
 def summarize_run(run: Trajectory, title: str) -> Summary:
     """Return the summary of a run without analyses."""
     signals = {"t [s]": run.time} | {column_heading(name, run.units[name]): run.columns[name] for name in run.columns}
-    rows = ((heading, *map(format_value, column[[0, -1]].tolist())) for heading, column in signals.items())
-    tables = make_table(("", "first", "last"), rows) + summarize_steps(run, title)
+    rows = ((heading, *map(format_value, span_of(column))) for heading, column in signals.items())
+    tables = make_table(("variable", *SPAN), rows) + summarize_steps(run, title)
     return Summary("run", title, tables=tables, picture=f"{title}: plots of the run")
+
+
+SPAN = ("start", "end", "smallest", "largest")  # what `span_of` returns
+
+
+def span_of(column: np.ndarray) -> list[Any]:
+    """Return the first, the last, the smallest and the largest value of a signal (n,); of texts the first and last."""
+    ends = column[[0, -1]].tolist()
+    return [*ends, *(["", ""] if column.dtype.kind == "U" else [np.fmin.reduce(column).item(), np.fmax.reduce(column).item()])]
 
 
 def format_value(value: object) -> str:
