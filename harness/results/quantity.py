@@ -14,6 +14,7 @@ PUBLISHED_UNITS = {
 
 MAX_ASYMMETRY = 0.1  # relative to the width; more asymmetric intervals are written with both ends
 MAX_DIGITS = 8  # of a value with an interval
+EXTRA_DIGITS = 2  # of a value whose margins differ, for the smaller one
 
 
 @dataclass(frozen=True)
@@ -62,8 +63,9 @@ def format_number(value: float, digits: int = 5) -> str:
 def format_interval(value: float, low: float, high: float) -> str:
     """Return a value with its interval for display.
 
-    The margin determines the digits. The interval is written as ± half of its width, or with both ends if it is
-    asymmetric. Without an interval (NaN or infinity) only the value is returned.
+    The margin determines the digits, the smaller one if the interval is asymmetric. The interval is written as ± half
+    of its width, or with both ends if it is asymmetric. Without an interval (NaN or infinity) only the value is
+    returned.
     """
     lower_margin, upper_margin = value - low, high - value
     if not isfinite(upper_margin):
@@ -74,6 +76,9 @@ def format_interval(value: float, low: float, high: float) -> str:
     digits = min(max(ceil(log10(abs(value) / margin)) + 1, 1), MAX_DIGITS) if margin > 0 else MAX_DIGITS
     if digits == MAX_DIGITS or abs(upper_margin - lower_margin) <= MAX_ASYMMETRY * (upper_margin + lower_margin):
         return f"{value:.{digits}g} ± {margin:.2g}"
+    smaller = min(lower_margin, upper_margin)
+    if smaller > 0:
+        digits = min(ceil(log10(abs(value) / smaller)) + 1, digits + EXTRA_DIGITS)
     digits = max(digits, 2)
     return f"{value:.{digits}g} ({low:.{digits}g} to {high:.{digits}g})"
 

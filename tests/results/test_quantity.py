@@ -21,6 +21,7 @@ def test_quantities_change_their_unit_but_not_their_dimension():
         (9.81234, 9.3, 10.32468, "9.81 ± 0.51"),
         (-2.0, -2.5, -1.5, "-2 ± 0.5"),
         (1.0, 0.93, 1.2, "1 (0.93 to 1.2)"),
+        (0.02007, 0.01899, 0.02791, "0.0201 (0.019 to 0.0279)"),  # to the smaller margin
         (1.0, 0.91, 1.1, "1 ± 0.1"),  # hardly asymmetric: the larger margin
         (1.0, 0.9, 1.09, "1 ± 0.1"),
         (3.0, 0.0, 40.0, "3 (0 to 40)"),  # two digits at least

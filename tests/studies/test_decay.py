@@ -7,6 +7,7 @@ from dataclasses import replace
 import commands
 import numpy as np
 import pytest
+from build_cache import ROOT
 from decays import decay_record
 from matplotlib.figure import Figure
 from shared_keys import check_shared_keys
@@ -23,6 +24,19 @@ from harness.studies.decay.table import decay_table
 def test_the_table_has_a_row_for_every_value():
     fit = fit_decay(decay_record(0.02, 0.003, noise=1e-4), KnownParameters(k=157.9))
     assert decay_table(fit).row_count == len(fit.estimates) == 8
+
+
+@pytest.mark.parametrize("arguments", [("coulomb",), (ROOT / "docs/records/spring.csv", "--m", "0.35")])
+def test_the_table_fits_into_80_columns_and_its_first_values_are_those_to_use(fmus, tmp_path, arguments):
+    (tmp_path / "fmus").symlink_to(fmus)
+    done = commands.harness(tmp_path, "decay", *arguments, blank=True, COLUMNS="80")
+    assert (done.returncode, done.stderr) == (0, "")
+    values, checks, *_ = done.stdout.split("\n\n")
+    lines = [line for table in (values, checks) for line in table.splitlines()]
+    assert max(map(len, lines)) <= 80
+    assert not [line for line in lines if line.startswith(" ")]  # no cell is wrapped
+    assert values.splitlines()[1].split() == ["quantity", "value", "to", "use,", "95", "%", "interval", "unit"]
+    assert checks.splitlines()[0].split() == ["check", "turning", "points", "two", "peaks", "(rough)", "unit"]
 
 
 def test_the_quantities_keep_their_names():

@@ -1,4 +1,4 @@
-"""An identified decay in the terminal and in its summary: a table of three methods, and remarks."""
+"""An identified decay in the terminal and in its summary: the values to use, their checks, and remarks."""
 
 import numpy as np
 from rich.table import Table
@@ -6,34 +6,67 @@ from rich.table import Table
 from ...analyses.decay.identification import DecayIdentification
 from ...analyses.estimation.estimate import Estimate
 from ...results.quantity import format_interval
-from ...results.summary import Summary, make_table, make_terminal_table, read_cells
+from ...results.summary import Summary, make_table, make_terminal_table
+
+CHECKS = ("turning points", "two peaks (rough)")  # values that check those of the whole signal
 
 
 def decay_table(identification: DecayIdentification) -> Table:
-    """Return the table of values with 95 % intervals from the whole signal, turning points, and two peaks."""
+    """Return the table of the values to use, from the whole signal, with 95 % intervals."""
     result = make_terminal_table(identification.record.name)
-    result.add_column("", min_width=14)
-    for heading in ("whole signal", "turning points", "two peaks"):
-        result.add_column(heading, justify="right")
-    result.add_column("", no_wrap=True)
-    by_extrema = {estimate.name: estimate for estimate in identification.extrema_estimates}
-    by_peaks = {estimate.name: estimate for estimate in identification.two_peak_estimates}
+    result.add_column("quantity")
+    result.add_column("value to use, 95 % interval", justify="right")
+    result.add_column("unit", no_wrap=True)
     for estimate in identification.estimates:
-        cells = [
-            format_estimate(source[estimate.name]) if estimate.name in source else ""
-            for source in (by_extrema, by_peaks)
-        ]
-        unit = "" if estimate.unit == "1" else estimate.unit
-        result.add_row(f"{estimate.text}, {estimate.name}", format_estimate(estimate), *cells, unit)
+        result.add_row(f"{estimate.text}, {estimate.name}", format_estimate(estimate), format_unit(estimate))
     return result
+
+
+def check_table(identification: DecayIdentification) -> Table:
+    """Return the table of the values from the turning points, and from two peaks as a rough check, by their symbols."""
+    result = make_terminal_table()
+    for heading in ("check", *CHECKS):
+        result.add_column(heading, justify="left" if heading == "check" else "right")
+    result.add_column("unit", no_wrap=True)
+    for estimate in identification.estimates:
+        cells = check_cells(identification, estimate.name)
+        if any(cells):
+            result.add_row(estimate.name, *cells, format_unit(estimate))
+    return result
+
+
+def check_cells(identification: DecayIdentification, name: str) -> list[str]:
+    """Return the values of a quantity from the turning points and from two peaks, empty without one."""
+    sources = (identification.extrema_estimates, identification.two_peak_estimates)
+    by_name = ({estimate.name: estimate for estimate in source} for source in sources)
+    return [format_estimate(source[name]) if name in source else "" for source in by_name]
+
+
+def format_unit(estimate: Estimate) -> str:
+    """Return the unit of an estimate; empty for a ratio."""
+    return "" if estimate.unit == "1" else estimate.unit
 
 
 def summarize_decay(identification: DecayIdentification) -> Summary:
     """Return the summary, with a table of the combinations of losses, best first."""
     sentence, ranked, _ = identification.sentence.partition(" (BIC ")
     sentence += "." if ranked else ""
-    (values,) = read_cells(decay_table(identification))
-    headings = ("", "whole signal", "turning points", "first and last peak, if this loss acted alone", "unit")
+    values = (
+        (
+            f"{estimate.text}, {estimate.name}",
+            format_estimate(estimate),
+            format_unit(estimate),
+            *check_cells(identification, estimate.name),
+        )
+        for estimate in identification.estimates
+    )
+    headings = (
+        "quantity",
+        "value to use, 95 % interval",
+        "unit",
+        "check: turning points",
+        "rough check: first and last peak, if this loss acted alone",
+    )
     samples, scale = len(identification.t), identification.problem.scale
     laws = (
         (law.description, f"{law.bic:.1f}", f"{np.sqrt(law.sum_of_squares / samples) * scale:.3g}")
@@ -45,7 +78,7 @@ def summarize_decay(identification: DecayIdentification) -> Summary:
         identification.record.name,
         (sentence, *identification.remarks),
         (
-            *make_table(headings, values.rows),
+            *make_table(headings, values),
             *make_table(law_headings, laws, "Combinations of losses, best first"),
         ),
         f"Decay of {identification.record.name}: signal, turning points, envelope and fit, and residuals. {sentence}",
@@ -63,7 +96,8 @@ def summary_lines(identification: DecayIdentification) -> list[str]:
     lines += [f"No {name}: {reason}." for name, reason in identification.unavailable.items() if reason]
     if identification.two_peak_estimates and len(identification.best.terms) > 1:
         lines.append(
-            "The two-peak values attribute the whole loss to one mechanism; with combined mechanisms each is too large."
+            "The values from two peaks are rough checks: each attributes the whole loss to one mechanism, and is too "
+            "large if several act."
         )
     t, record = identification.t, identification.record
     n_excluded = len(record.t) - len(t)
