@@ -82,6 +82,11 @@ def check_names(category: str, names: Iterable[str], allowed: Collection[str]) -
             raise SceneError(unknown_name_message(category, name, allowed))
 
 
+def install_command(extra: str) -> str:
+    """Return the command that adds an extra to the installed project, whether it is a clone or a wheel."""
+    return f"python -m pip install 'friction-fmus[{extra}]'"
+
+
 def import_optional(package: str, purpose: str, extra: str) -> Any:
     """Import an optional package.
 
@@ -93,5 +98,4 @@ def import_optional(package: str, purpose: str, extra: str) -> Any:
     try:
         return import_module(package)
     except ModuleNotFoundError:
-        install = f"python -m pip install 'friction-fmus[{extra}]'"
-        raise HarnessError(f"{purpose} needs {package}, which is not installed: {install}") from None
+        raise HarnessError(f"{purpose} needs {package}, which is not installed: {install_command(extra)}") from None

@@ -5,7 +5,6 @@ from pathlib import Path
 
 from benchmarks import command_line
 from harness.references.models import MODELS
-from harness.references.reference_trajectory import require_reference_packages
 from harness.results.files import write_csv_rows
 from harness.results.folder import replace_folder
 from harness.results.provenance import prefix_parameters, write_provenance
@@ -21,7 +20,6 @@ FOLDER, FILE = "bench", "bench.csv"
 
 def all_benchmarks() -> list[Callable[[], Benchmark]]:
     """Return all benchmarks: run times, native FMUs, stiff friction, model exchange, accuracy."""
-    require_reference_packages()
     from .accuracy import accuracy_benchmarks
     from .model_exchange import exchange_benchmarks
     from .native import native_benchmarks

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 from zipfile import ZipFile
 
-from harness.errors import HarnessError
+from harness.errors import HarnessError, install_command
 from harness.process.child_process import ChildError, ChildProcess
 from harness.running.fmu_archive import read_description
 from harness.running.whole_run import COMPILER
@@ -101,7 +101,7 @@ def unavailable_reason(importer: Importer, fmu: Path | None = None) -> str:
         try:
             version(package)
         except PackageNotFoundError:
-            return f"{package} is not installed: pip install -e '.[importers]'"
+            return f"{package} is not installed: {install_command('importers')}"
     if importer.adapter == "c_adapter":
         if COMPILER is None:
             return "no C compiler found"

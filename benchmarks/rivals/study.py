@@ -5,8 +5,8 @@ from math import nan
 from pathlib import Path
 
 from benchmarks import command_line
+from harness.errors import install_command
 from harness.process.child_process import ChildError, ChildProcess
-from harness.references.reference_trajectory import require_reference_packages
 from harness.results.files import write_csv_rows
 from harness.results.folder import replace_folder
 from harness.results.provenance import write_provenance
@@ -42,7 +42,6 @@ def run_rivals(names: tuple[str, ...], timeout: float, out: Path, report: Callab
     report : callable
         Receives the name of each rival that runs.
     """
-    require_reference_packages()
     rivals = find_rivals(names)
     source = ", ".join(names)
     with replace_folder(out / FOLDER, (FILE, FIGURE), source) as folder:
@@ -70,7 +69,7 @@ def run_rival(rival: Rival, references: dict[str, Solution], timeout: float) -> 
         if version:
             replies = run_in_child([RivalCase(rival.module, scene, setting) for scene in SCENES], timeout)
         else:
-            reason = f"{rival.package} is not installed: python -m pip install 'friction-fmus[rivals]'"
+            reason = f"{rival.package} is not installed: {install_command('rivals')}"
             replies = [RivalReply(reason)] * len(SCENES)
         for (scene_name, scene), reply in zip(SCENES.items(), replies, strict=True):
             measures = None if reply.gap else measure(scene, references[scene_name], reply)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ..errors import MAX_VALUE_LENGTH, HarnessError
+from ..errors import MAX_VALUE_LENGTH, HarnessError, install_command
 from .terminal import Terminal, refuse_ignored_options, refuse_options, result_options, run_options
 
 if TYPE_CHECKING:
@@ -77,7 +77,7 @@ def sweep(
         refuse_options(context, "with --scheduler: the cluster has its own workers", "workers")
     for package in ("xarray", "dask", "netCDF4"):  # checked before the runs: they write the results
         if find_spec(package) is None:
-            raise HarnessError(f"a sweep needs {package}: python -m pip install 'friction-fmus[sweep]'")
+            raise HarnessError(f"a sweep needs {package}: {install_command('sweep')}")
     from ..scenes.assignments import parse_assignment
     from ..scenes.fmu_files import find_fmu
     from ..scenes.run_spec import RunSpec

@@ -15,13 +15,12 @@ from zipfile import ZipFile
 
 import numpy as np
 
-from ..errors import HarnessError, SceneError, first_line, format_value
+from ..errors import HarnessError, SceneError, first_line, format_value, install_command
 from . import array_files, text_table
 from .child_reader import read_in_child
 from .size_limits import check_mat, check_zip, unpack_gzip
 
 TEXT_SUFFIXES = (".csv", ".tsv", ".txt")
-INSTALL_COMMAND = "python -m pip install 'friction-fmus[records]'"
 Cells = list[Any] | np.ndarray
 
 
@@ -83,7 +82,7 @@ def load_table(source: str, headings: str | None = None) -> Table:
     except HarnessError:
         raise
     except ImportError as error:
-        raise SceneError(f"{name} needs {error.name} to be read: {INSTALL_COMMAND}") from None
+        raise SceneError(f"{name} needs {error.name} to be read: {install_command('records')}") from None
     except Exception as error:  # the readers raise arbitrary exceptions for damaged files
         raise SceneError(f"{name} cannot be read: {first_line(error)}") from None
     if headings is None:

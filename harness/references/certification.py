@@ -19,7 +19,7 @@ from ..scenes.fmu_files import find_fmu
 from .certified_reference import ERROR_LABEL, FOLDER, POINTS, max_relative_difference
 from .event_located import PROBLEMS, certify_by_two_routes
 from .models import CASES
-from .reference_trajectory import CommunicationGrid, require_reference_packages
+from .reference_trajectory import CommunicationGrid
 from .segments import ParameterSpan, ParameterValues
 
 METHODS = {"dop853": 1e-13, "rodas": 1e-12}  # an explicit and a stiff method, with their relative tolerances
@@ -57,12 +57,10 @@ def certify(file: Path) -> list[CertifiedFile]:
 def generate_all(file: Path) -> dict[str, Solution]:
     """Return the references of all laws of a model by name; none if it has no independent implementation."""
     if file.resolve().parent == FOLDER / "more" and file.stem in PROBLEMS:
-        require_reference_packages()
         return {file.stem: certify_by_two_routes(file.stem)}
     cases = {case.reference_source: case for case in CASES if FOLDER / f"{case.model}.py" == file.resolve()}
     if not cases:
         return {}
-    require_reference_packages()
     from .generation import generate_reference
 
     return {str(name): generate_reference(case) for name, case in cases.items()}

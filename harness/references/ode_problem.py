@@ -11,6 +11,7 @@ from math import copysign, inf
 
 import numpy as np
 
+from .piecewise_linear import solve_segments
 from .segments import FrictionLaw, ParameterSpan, ParameterValues, Segment
 
 StateVector = Sequence[float] | np.ndarray
@@ -92,6 +93,4 @@ class UnspecifiedProblem(OdeProblem):
 
 def closed_form_segments(friction: FrictionLaw | None, spans: list[ParameterSpan]) -> Iterator[Segment]:
     """Return the motion over the spans in closed form, with or without dry friction."""
-    from .piecewise_linear import solve_segments  # imported here because it needs mpmath, an optional dependency
-
     return solve_segments(spans, friction)

@@ -7,12 +7,10 @@ model without such a module, certification.py compares two methods of its FMU.
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from importlib.util import find_spec
 from itertools import pairwise
 
 import numpy as np
 
-from ..errors import HarnessError
 from ..running.solution import Solution
 from .models import MODEL_MODULES
 from .segments import ParameterSpan, Segment
@@ -91,11 +89,3 @@ def sample_segments(segments: list[Segment], times: list[float]) -> np.ndarray:
         x, v = segments[i].at(t)
         rows.append((float(x), float(v)))
     return np.array(rows)
-
-
-def require_reference_packages() -> None:
-    """Raise HarnessError if a package that the references need is not installed."""
-    missing = [name for name in ("mpmath", "scipy") if find_spec(name) is None]
-    if missing:
-        names = " and ".join(missing)
-        raise HarnessError(f"the references need {names}: try `pip install {' '.join(missing)}`")

@@ -126,9 +126,9 @@ def test_a_crash_or_timeout_affects_only_its_own_check(tmp_path, monkeypatch):
 
 def test_an_excluded_tool_is_listed_with_the_reason():
     text = table.legend_lines(
-        [table.CheckResult("Ecos", "", reason="it is not installed: pip install -e '.[importers]'")]
+        [table.CheckResult("Ecos", "", reason="it is not installed: python -m pip install 'friction-fmus[importers]'")]
     )
-    assert "Ecos was skipped: it is not installed: pip install -e '.[importers]'" in text
+    assert "Ecos was skipped: it is not installed: python -m pip install 'friction-fmus[importers]'" in text
 
 
 def test_fmus_of_another_fmi_version_are_refused_in_one_sentence():

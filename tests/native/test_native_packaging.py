@@ -311,7 +311,7 @@ def test_a_mistake_is_reported_in_one_sentence():
 def test_a_missing_compiler_error_says_what_to_install(tmp_path, monkeypatch):
     """As an error that the command prints like that of an unknown platform."""
     monkeypatch.setitem(sys.modules, "ziglang", None)
-    with pytest.raises(BuildError, match=r"pip install -e '\.\[native\]'"):
+    with pytest.raises(BuildError, match=r"pip install 'friction-fmus\[native\]'"):
         native.build("smd", tmp_path)
     assert list(tmp_path.iterdir()) == []
 

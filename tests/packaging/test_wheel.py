@@ -1,16 +1,12 @@
 """The wheel, installed in a separate environment and used in an empty folder, is complete and stays unchanged."""
 
-import os
-import shutil
-import subprocess
-import sys
 from hashlib import sha256
 from pathlib import Path
 from zipfile import ZipFile
 
-import numpy
 import pytest
 from archives import read_archive
+from environments import build_wheel, call, install, make_environment
 from models import ROOT
 from native_fmus import build_for_all_platforms
 
@@ -19,40 +15,18 @@ from fmus.packaging.native.compiler import DEFAULT_PLATFORMS, PLATFORMS
 
 pytestmark = pytest.mark.slow
 
-LIBRARIES = Path(numpy.__file__).parents[1]  # the dependencies, which are not installed again
-
-
-def call(*command, cwd, **environment):
-    """Run a command, which must succeed, and return its output."""
-    others = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
-    environment = others | {key: str(value) for key, value in environment.items()}
-    done = subprocess.run([*map(str, command)], cwd=cwd, env=environment, capture_output=True, text=True, timeout=300)
-    assert done.returncode == 0, done.stdout + done.stderr
-    return done.stdout
-
 
 @pytest.fixture(scope="module")
 def wheel(tmp_path_factory):
-    """Built like pip does, from a copy, because setuptools leaves files behind; without network access."""
-    source = tmp_path_factory.mktemp("source")
-    for part in ("fmus", "harness"):
-        shutil.copytree(ROOT / part, source / part, ignore=shutil.ignore_patterns("__pycache__"))
-    for file in ("build_fmus.py", "pyproject.toml", "README.md", "LICENSE"):
-        shutil.copy(ROOT / file, source)
-    call(sys.executable, "-c", "from setuptools.build_meta import build_wheel as build; build('out')", cwd=source)
-    (file,) = (source / "out").iterdir()
-    return file
+    return build_wheel(tmp_path_factory.mktemp("source"))
 
 
 @pytest.fixture(scope="module")
 def installed(wheel, tmp_path_factory):
     """A Python with the wheel, and its site-packages, which are read-only."""
     folder = tmp_path_factory.mktemp("environment")
-    call(sys.executable, "-m", "venv", "--without-pip", folder, cwd=folder)
-    pip = (sys.executable, "-m", "pip", "install", "-q", "--no-deps", "--no-index", "--ignore-installed")
-    call(*pip, "--prefix", folder, wheel, cwd=folder)
-    (site_packages,) = folder.glob("lib/python*/site-packages")
-    (site_packages / "libraries.pth").write_text(f"{LIBRARIES}\n")
+    site_packages = make_environment(folder, "native")
+    install([wheel], folder)
     folders = [path for path in (site_packages, *site_packages.rglob("*")) if path.is_dir()]
     for path in folders:
         path.chmod(0o555)

@@ -101,7 +101,9 @@ def find_compiler() -> Path:
     """Return the folder of the package ziglang; raise BuildError if it is not installed."""
     spec = find_spec("ziglang")
     if spec is None or not spec.submodule_search_locations:
-        raise BuildError("Native FMUs need the C compiler in the package ziglang: pip install -e '.[native]'.")
+        raise BuildError(
+            "Native FMUs need the C compiler in the package ziglang: python -m pip install 'friction-fmus[native]'."
+        )
     return Path(spec.submodule_search_locations[0])
 
 

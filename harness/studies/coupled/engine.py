@@ -2,12 +2,12 @@
 
 from collections.abc import Sequence
 
-from ...errors import HarnessError
+from ...errors import HarnessError, install_command
 from ...process.child_process import ChildDiedError, ask_once
 from ...scenes.run_spec import RunSpec
 
 ENGINE_TIMEOUT = 300.0  # s, for one run
-EXTRA = "python -m pip install 'friction-fmus[coupled]'"
+EXTRA = "coupled"
 MAIN_ENGINE = "Ecos"
 ENGINES = {  # modules of the child processes
     "Ecos": f"{__package__}.ecos",
@@ -45,7 +45,7 @@ def run_engine(
     try:
         rows: list[list[float]] = ask_once(ENGINES[engine], request, ENGINE_TIMEOUT)
     except ChildDiedError as error:
-        hint = f"; {EXTRA}" if "ModuleNotFoundError" in error.last_line else ""
+        hint = f"; {install_command(EXTRA)}" if "ModuleNotFoundError" in error.last_line else ""
         raise HarnessError(f"{failed}: {error.last_line}{hint}") from None
     except HarnessError as error:
         raise HarnessError(f"{failed}: {error}") from None

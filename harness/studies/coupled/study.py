@@ -10,7 +10,7 @@ from shutil import copy
 
 import numpy as np
 
-from ...errors import HarnessError
+from ...errors import HarnessError, install_command
 from ...process.subprocess_runner import PROJECT_ROOT, run_module
 from ...process.temporary_directory import temporary_directory
 from ...references.single_model_reference import BODY_MODELS, build_bodies, solve_bodies
@@ -41,7 +41,7 @@ def run_coupled(source: str, out: Path, stop: float | None, report: ProgressCall
     try:
         from . import archive, external_archive
     except ImportError as error:
-        raise HarnessError(f"a coupled scene needs {error.name}: {EXTRA}") from None
+        raise HarnessError(f"a coupled scene needs {error.name}: {install_command(EXTRA)}") from None
     from .figure import draw
 
     with temporary_directory("ssp-") as temporary_folder:

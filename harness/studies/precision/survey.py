@@ -8,6 +8,7 @@ from functools import partial
 from math import isnan
 from pathlib import Path
 
+from ...errors import install_command
 from ...references.models import CASES, MODELS
 from ...references.peer_solvers import missing_packages
 from ...results.files import column_heading, write_csv_rows
@@ -91,7 +92,10 @@ def run_studies(models: Iterable[str], extent: SweepSettings, report: Callable[[
     advice = tuple(
         recommend(item, [law for law in deviations if law.model == item.model], extent.min_ratio) for item in studies
     )
-    missing_peers = (f"{peer} was skipped: pip install {package}" for peer, package in missing_packages().items())
+    missing_peers = (
+        f"{peer} was skipped: {package} is not installed: {install_command('peers')}"
+        for peer, package in missing_packages().items()
+    )
     return PrecisionSurvey(
         studies,
         tuple(deviations),
@@ -104,7 +108,7 @@ def run_studies(models: Iterable[str], extent: SweepSettings, report: Callable[[
 def count_failures(study: Study) -> str:
     """Return a sentence on the number of failed runs."""
     failed = sum(bool(point.failure) for point in study.points)
-    return f"{study.model}: {failed} of {len(study.points)} runs failed; see {study.model}.csv"
+    return f"{study.model}: {failed} of {len(study.points)} runs failed; see {study.model}/points.csv"
 
 
 def failure_reasons(studies: Iterable[Study]) -> Iterable[str]:

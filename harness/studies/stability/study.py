@@ -18,7 +18,7 @@ import numpy as np
 from ...errors import HarnessError
 from ...process.child_process import ChildProcess, ask_once
 from ...process.interruptible_wait import map_in_threads
-from ...references.reference_trajectory import max_or_nan, motion_error, require_reference_packages
+from ...references.reference_trajectory import max_or_nan, motion_error
 from ...results.files import write_csv_rows
 from ...results.folder import replace_folder
 from ...results.provenance import prefix_parameters, write_provenance
@@ -87,7 +87,6 @@ def grouped_cases(
 
     Models without their own scenes get the generic ones.
     """
-    require_reference_packages()
     for model in models:
         check_built(find_fmu(model))
     selected_scenes, bounds = load_scenes()

@@ -7,11 +7,10 @@ from contextlib import contextmanager, suppress
 from time import monotonic
 from typing import Any
 
-from ...errors import HarnessError, first_line
+from ...errors import HarnessError, first_line, install_command
 from ...process.interruptible_wait import wait_for_any
 
 WORKER_TIMEOUT = 60.0  # s without a worker, after which the sweep ends
-EXTRA = "python -m pip install 'friction-fmus[sweep]'"
 
 
 class DaskCluster:
@@ -52,7 +51,7 @@ def connect_cluster(address: str, unload: Callable[[], None]) -> Iterator[DaskCl
     try:
         from distributed import Client
     except ImportError:
-        raise HarnessError(f"a sweep over a cluster needs Dask: {EXTRA}") from None
+        raise HarnessError(f"a sweep over a cluster needs Dask: {install_command('sweep')}") from None
     for name in ("distributed", "distributed.client"):  # do not log lost workers
         logging.getLogger(name).setLevel(logging.ERROR)
     try:
