@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from .studies.compare.difference import Comparison
 
     __version__: str
+    """Version of the installed project."""
 
 __all__ = [
     "Comparison",

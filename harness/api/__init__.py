@@ -4,7 +4,7 @@ Each function imports what it needs when it is called, so that importing `harnes
 """
 
 from .decay import identify_decay
-from .fit import fit
+from .fits import fit
 from .results import load_result
 from .runs import compare, simulate
 from .sweeps import sweep

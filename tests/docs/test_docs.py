@@ -11,6 +11,8 @@ from pathlib import Path
 
 import pytest
 
+import harness
+
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
 SOURCES = [file for folder in ("fmus", "harness") for file in sorted((ROOT / folder).rglob("*.py"))]
@@ -101,4 +103,6 @@ def test_site_builds_without_warnings(tmp_path):
     command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet", "--site-dir", str(tmp_path)]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, env=ENVIRONMENT, timeout=300)
     assert (done.returncode, done.stderr) == (0, ""), done.stdout + done.stderr
-    assert (Path(tmp_path) / "reference" / "commands" / "index.html").is_file()
+    assert (tmp_path / "reference" / "commands" / "index.html").is_file()
+    page = (tmp_path / "reference" / "python" / "index.html").read_text(encoding="utf-8")
+    assert [name for name in harness.__all__ if f'id="harness.{name}"' not in page] == []

@@ -1,13 +1,16 @@
-"""What the README's first command installs: every command that needs no extra works, the others name their extra."""
+"""What the README's first command installs: every command that needs no extra works, the others name their extra, and
+type checkers find the packages."""
 
+import shlex
 import shutil
 import sys
 
 import pytest
 from build_cache import ROOT
-from environments import PROJECT, build_wheel, call, install, make_environment
+from environments import build_wheel, call, install, make_environment
 
 from harness.commands import commands
+from harness.errors import install_command
 
 pytestmark = pytest.mark.slow
 
@@ -24,8 +27,6 @@ WORK = {  # by command; all run in one folder, in this order
     "report": ["report"],
 }
 EXTRAS = {"sweep smd --vary c=1,2": "sweep", "couple two-masses": "coupled", "build --native smd": "native"}
-
-PIP = (sys.executable, "-m", "pip", "--python")
 
 
 @pytest.fixture(scope="module")
@@ -65,13 +66,40 @@ def test_a_command_that_needs_an_extra_names_it(without_extras, user, words, ext
     assert f"python -m pip install 'friction-fmus[{extra}]'" in output
 
 
-@pytest.mark.parametrize("extra", sorted(set(EXTRAS.values()) | {"records", "peers", "importers"}))
-def test_the_named_command_installs_an_extra_of_an_installed_project(wheel, tmp_path, extra):
-    """pip finds the extra in the installed project, without an index, and the packages of the extra."""
+@pytest.mark.parametrize("form", ["clone", "wheel"])
+def test_the_named_command_adds_an_extra_to_a_clone_and_to_a_wheel(wheel, tmp_path, form):
+    """pip finds the extras in the installed project, without an index, and the packages of the extras."""
+    extras = sorted(set(EXTRAS.values()) | {"records", "peers", "importers"})
     environment = tmp_path / "environment"
-    make_environment(environment, extra)
-    install([wheel], environment)
-    output = call(
-        *PIP, environment / "bin" / "python", "install", "--no-index", f"{PROJECT['name']}[{extra}]", cwd=tmp_path
-    )
-    assert "Requirement already satisfied: friction-fmus[" in output
+    make_environment(environment, *extras)
+    install(["-e", ROOT] if form == "clone" else [wheel], environment)
+    for extra in extras:
+        _, *arguments = shlex.split(install_command(extra).removeprefix("python -m pip "))
+        pip = (sys.executable, "-m", "pip", "--python", environment / "bin" / "python", "install", "--no-index")
+        output = call(*pip, *arguments, cwd=tmp_path)
+        assert f"Requirement already satisfied: friction-fmus[{extra}]" in output
+
+
+USER = """\
+from typing import assert_type
+
+import fmus
+import harness
+
+assert_type(harness.simulate("smd"), harness.Trajectory)
+assert_type(harness.fit("smd", "record.csv", ["c"], observe=["x"]), harness.ParameterFit)
+assert_type(fmus.Parameter(1.0, "kg", "mass").unit, str)
+harness.simulate(stop="late")
+"""
+
+
+def test_mypy_finds_the_types_of_a_clone_from_another_folder(tmp_path):
+    environment = tmp_path / "environment"
+    make_environment(environment)
+    install(["-e", ROOT], environment)
+    (tmp_path / "user.py").write_text(USER)
+    mypy = (sys.executable, "-m", "mypy", "--python-executable", environment / "bin" / "python", "user.py")
+    output = call(*mypy, cwd=tmp_path, status=1)
+    errors = [line for line in output.splitlines() if ": error:" in line]
+    assert [line.partition("  [")[2].rstrip("]") for line in errors] == ["call-arg", "arg-type"], output
+    assert all(line.startswith("user.py:9: ") for line in errors)

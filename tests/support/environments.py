@@ -64,7 +64,7 @@ def build_wheel(folder):
         shutil.copytree(ROOT / part, folder / part, ignore=shutil.ignore_patterns("__pycache__"))
     for file in ("build_fmus.py", "pyproject.toml", "README.md", "LICENSE"):
         shutil.copy(ROOT / file, folder)
-    call(sys.executable, "-c", "from setuptools.build_meta import build_wheel as build; build('out')", cwd=folder)
+    call(sys.executable, "-c", "from hatchling.build import build_wheel as build; build('out')", cwd=folder)
     (file,) = (folder / "out").iterdir()
     return file
 
