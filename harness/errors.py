@@ -28,9 +28,9 @@ def first_line(error: Exception) -> str:
 
 
 def format_value(value: object) -> str:
-    """Return the repr of a value, cut to `MAX_VALUE_LENGTH` characters."""
+    """Return the repr of a value in one line, cut to `MAX_VALUE_LENGTH` characters."""
     try:
-        text = repr(value)
+        text = " ".join(line.strip() for line in repr(value).splitlines())
     except (RecursionError, ValueError):  # ValueError: an integer of thousands of digits
         return "the given value"
     return text if len(text) <= MAX_VALUE_LENGTH else f"{text[:MAX_VALUE_LENGTH]}... ({len(text)} characters)"

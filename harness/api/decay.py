@@ -4,8 +4,21 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..arguments import (
+    FINITE,
+    FLAG,
+    PATH,
+    POSITIVE,
+    PROGRESS,
+    QUANTITY,
+    TEXT,
+    Progress,
+    Rule,
+    check_arguments,
+    row,
+)
 from ..errors import SceneError
-from .options import QUIET, Progress
+from .options import QUIET, check_time_range
 from .tables import build_table, convert_to_table
 
 if TYPE_CHECKING:
@@ -17,6 +30,36 @@ if TYPE_CHECKING:
     from ..running.trajectory import Trajectory
 
 
+def record_source(value: Any) -> Any:
+    """Return a file, a table, a trajectory, or times as a row of numbers."""
+    from ..running.trajectory import Trajectory
+
+    if isinstance(value, str | Path):
+        return PATH.convert(value)
+    return value if isinstance(value, Trajectory) or hasattr(value, "columns") else row(value)
+
+
+RECORD = Rule("a file, a DataFrame, a trajectory, or a row of times in s", record_source)
+SAMPLES = Rule("a row of numbers", row)
+
+
+@check_arguments(
+    record=RECORD,
+    x=SAMPLES,
+    unit=TEXT,
+    quantity=QUANTITY,
+    time=TEXT,
+    column=TEXT,
+    k=POSITIVE,
+    m=POSITIVE,
+    pendulum=FLAG,
+    drag=FLAG,
+    drift=FLAG,
+    begin=FINITE,
+    end=FINITE,
+    rate=POSITIVE,
+    progress=PROGRESS,
+)
 def identify_decay(
     record: "str | Path | pandas.DataFrame | Trajectory | ArrayLike",
     x: "ArrayLike | None" = None,
@@ -85,11 +128,11 @@ def identify_decay(
     from ..analyses.decay.estimates import KnownParameters
     from ..analyses.decay.identification import fit_decay
     from ..records.columns import ColumnOptions, read_record
+    from ..running.trajectory import Trajectory
 
     if k is not None and m is not None:
         raise SceneError("k and m are both given: leave one out, because the frequency determines it")
-    if rate is not None and not 0 < rate < inf:
-        raise SceneError(f"rate is {rate!r}: it must be a positive number of samples per second")
+    check_time_range(time, rate, begin, end)
     columns = ColumnOptions(
         time=time,
         position=column,
@@ -99,6 +142,12 @@ def identify_decay(
         begin=-inf if begin is None else begin,
         end=inf if end is None else end,
     )
+    is_table = isinstance(record, str | Path | Trajectory) or hasattr(record, "columns")
+    if is_table and x is not None:
+        raise SceneError("x has no effect, because the record has columns: leave it out, or name one by `column`")
+    for name, heading in (("time", time), ("column", column)) if not is_table else ():
+        if heading is not None:
+            raise SceneError(f"{name} = {heading!r} has no effect on arrays, which have no headings: leave it out")
     if isinstance(record, str | Path):
         source = str(record)
         loaded = read_record(source, columns, Path(source).stem)

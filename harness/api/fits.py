@@ -4,8 +4,26 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..arguments import (
+    FINITE,
+    FLAG,
+    HEADINGS,
+    NAMES,
+    NUMBERS,
+    PATH,
+    PATHS,
+    POSITIVE,
+    POSITIVES,
+    PROGRESS,
+    RANGES,
+    SETTINGS,
+    TEXT,
+    Progress,
+    Rule,
+    check_arguments,
+)
 from ..errors import SceneError, format_value
-from .options import QUIET, Progress
+from .options import QUIET, check_time_range
 from .tables import convert_to_table
 
 if TYPE_CHECKING:
@@ -13,6 +31,47 @@ if TYPE_CHECKING:
     from ..records.table_files import Table
 
 
+def starts(value: Any) -> Any:
+    """Return values to start from: a mapping to numbers, an earlier fit, or the folder of its result."""
+    from ..analyses.fit.parameter_fit import ParameterFit
+
+    if isinstance(value, ParameterFit):
+        return value
+    return NUMBERS.convert(value) if isinstance(value, Mapping) else PATH.convert(value)
+
+
+def record_sources(value: Any) -> list[Any]:
+    """Return records: files, DataFrames or trajectories, one or several."""
+    return [
+        PATH.convert(source) if isinstance(source, str | Path) else source
+        for source in (value if isinstance(value, list | tuple) else [value])
+    ]
+
+
+STARTS = Rule("a mapping from names to numbers, an earlier fit or the folder of its result", starts)
+RECORDS = Rule("a file, a DataFrame or a trajectory, or a list of these", record_sources)
+
+
+@check_arguments(
+    source=PATH,
+    records=RECORDS,
+    free=RANGES,
+    observe=HEADINGS,
+    inputs=HEADINGS,
+    fixed=SETTINGS,
+    sigma=POSITIVES,
+    start=STARTS,
+    each=NAMES,
+    against=PATHS,
+    validate=RECORDS,
+    robust=FLAG,
+    time=TEXT,
+    rate=POSITIVE,
+    begin=FINITE,
+    end=FINITE,
+    timeout=POSITIVE,
+    progress=PROGRESS,
+)
 def fit(
     source: "str | Path",
     records: Any,
@@ -107,12 +166,11 @@ def fit(
     from ..studies.fit.options import read_fitted_values, select_starts
     from ..studies.fit.request import FitRequest
 
-    others = [against] if isinstance(against, str | Path) else [*against]
-    fmus = [find_fmu(str(law)) for law in (source, *others)]
+    check_time_range(time, rate, begin, end)
+    fmus = [find_fmu(str(law)) for law in (source, *against)]  # type: ignore[misc] # a list by its rule
     for fmu in fmus:
         check_built(fmu, SceneError)
-    names = [free] if isinstance(free, str) else free
-    ranges = dict(names) if isinstance(names, Mapping) else dict.fromkeys(names)
+    ranges = dict(free)  # type: ignore[arg-type] # a mapping by its rule
     if isinstance(start, ParameterFit | str | Path):
         earlier = start.values if isinstance(start, ParameterFit) else read_fitted_values(Path(start))
         start = select_starts(earlier, ranges, each)
@@ -120,8 +178,8 @@ def fit(
         run=RunSpec(fmus[0], values=dict(fixed or {}), timeout=timeout),
         against=tuple(fmus[1:]),
         free=ranges,
-        observe=map_headings(observe),
-        inputs=map_headings(inputs),
+        observe=dict(observe),  # type: ignore[arg-type]
+        inputs=dict(inputs),  # type: ignore[arg-type]
         sigma=sigma or {},
         start=start or {},
         each=tuple(each),
@@ -132,13 +190,12 @@ def fit(
     )
 
     def load(argument: Any, name: str) -> list[study.RecordTable]:
-        sources = argument if isinstance(argument, list | tuple) else [argument]
-        names = [name] if len(sources) == 1 else [f"{name} {i + 1}" for i in range(len(sources))]
+        names = [name] if len(argument) == 1 else [f"{name} {i + 1}" for i in range(len(argument))]
         return [
             study.load_record(str(source), request)
             if isinstance(source, str | Path)
             else study.RecordTable(record_name, to_signal_table(source))
-            for source, record_name in zip(sources, names, strict=True)
+            for source, record_name in zip(argument, names, strict=True)
         ]
 
     fitted, predicted = load(records, "the record"), load(validate, "the validation record")
@@ -146,13 +203,6 @@ def fit(
         raise SceneError("records is empty: give at least one record")
     request, choice = choose_observed(request, fitted[0].table)
     return study.fit_laws(resolve_laws(request).with_note(choice), fitted, predicted, progress or QUIET)
-
-
-def map_headings(signals: Any) -> dict[str, str]:
-    """Return the heading of each signal; without a heading, the name of the signal."""
-    if isinstance(signals, Mapping):
-        return {str(name): str(heading) for name, heading in signals.items()}
-    return {str(name): str(name) for name in ([signals] if isinstance(signals, str) else signals)}
 
 
 def to_signal_table(source: Any) -> "Table":

@@ -1,27 +1,34 @@
 """Options that functions of the Python API share."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from ..errors import SceneError, format_value, unknown_name_message
+from ..arguments import PATH, Progress, Rule
+from ..errors import SceneError
 
 if TYPE_CHECKING:
     from ..scenes.run_spec import RunSpec
 
-Progress = Callable[[float], None]  # takes the finished share, from 0 to 1
-
-INTERFACES = {"CoSimulation": False, "ModelExchange": True}
 QUIET: Progress = lambda share: None  # noqa: E731 - a function without effect needs no def
 
 
-def parse_interface(interface: str | None) -> bool | None:
-    """Return whether an interface is model exchange; None if no interface is given."""
-    if interface is None:
-        return None
-    if interface not in INTERFACES:
-        raise SceneError(unknown_name_message("interface", interface, INTERFACES))
-    return INTERFACES[interface]
+def trajectory_or_path(value: Any) -> Any:
+    """Return a Trajectory, a name or a path."""
+    from ..running.trajectory import Trajectory
+
+    return value if isinstance(value, Trajectory) else PATH.convert(value)
+
+
+SIDE = Rule("a Trajectory, a name or a path", trajectory_or_path)
+
+
+def check_time_range(time: str | None, rate: float | None, begin: float | None, end: float | None) -> None:
+    """Raise SceneError if the options for the times of a record exclude each other."""
+    if rate is not None and time is not None:
+        raise SceneError("rate replaces the times in the column that `time` names: leave one of them out")
+    if begin is not None and end is not None and not begin < end:
+        raise SceneError(f"begin = {begin!r} s must be before end = {end!r} s")
 
 
 def apply_options(
@@ -35,34 +42,17 @@ def apply_options(
     timeout: float | None = None,
 ) -> "RunSpec":
     """Return a run with those of the options that are not None."""
-    from ..running.fmu_archive import exposes_solver_steps, read_description
-    from ..scenes.schema import is_number
+    from ..running.resolve import METHOD, set_rtol
 
-    values = dict(spec.values)
-    if method is not None:
-        values["solver.method"] = method
-    tolerance = spec.tolerance
-    if rtol is not None and spec.fmu.name and exposes_solver_steps(read_description(spec.fmu, spec.lenient)):
-        values["solver.rtol"] = rtol
-    elif rtol is not None:
-        tolerance = rtol
-    for name, number in (("interval", interval), ("timeout", timeout), ("rtol", rtol)):
-        if number is not None and not (is_number(number) and number > 0):
-            raise SceneError(f"{name} = {format_value(number)} must be a finite number above 0")
-    if stop is not None and not is_number(stop):
-        raise SceneError(f"stop = {format_value(stop)} must be a finite number of seconds")
-    if isinstance(outputs, str):
-        outputs = (outputs,)
-    exchange = parse_interface(interface)
-    return replace(
+    spec = replace(
         spec,
-        values=values,
-        tolerance=tolerance,
-        stop=spec.stop if stop is None else float(stop),
-        grid=spec.grid if interval is None else float(interval),
-        interval=spec.interval if interval is None else float(interval),
+        values=dict(spec.values) | ({} if method is None else {METHOD: method}),
+        stop=spec.stop if stop is None else stop,
+        grid=spec.grid if interval is None else interval,
+        interval=spec.interval if interval is None else interval,
         follow=True if interval is not None else spec.follow,
         outputs=spec.outputs if outputs is None else tuple(outputs),
-        exchange=spec.exchange if exchange is None else exchange,
-        timeout=spec.timeout if timeout is None else float(timeout),
+        exchange=spec.exchange if interface is None else interface == "ModelExchange",
+        timeout=spec.timeout if timeout is None else timeout,
     )
+    return spec if rtol is None else set_rtol(spec, rtol)

@@ -3,7 +3,8 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..errors import SceneError, import_optional
+from ..arguments import PATH, check_arguments
+from ..errors import SceneError, first_line, import_optional
 
 if TYPE_CHECKING:
     import xarray
@@ -11,6 +12,7 @@ if TYPE_CHECKING:
     from ..running.trajectory import Trajectory
 
 
+@check_arguments(folder=PATH)
 def load_result(folder: "str | Path") -> "Trajectory | xarray.Dataset | dict[str, Any]":
     """Read a stored result.
 
@@ -34,12 +36,18 @@ def load_result(folder: "str | Path") -> "Trajectory | xarray.Dataset | dict[str
     path = Path(folder)
     if (path / "sweep.nc").is_file():
         library = import_optional("xarray", "to read a sweep", "sweep")
-        with library.open_dataset(path / "sweep.nc") as data:
-            loaded: xarray.Dataset = data.load()
+        try:
+            with library.open_dataset(path / "sweep.nc") as data:
+                loaded: xarray.Dataset = data.load()
+        except (OSError, ValueError) as error:
+            raise SceneError(f"{path / 'sweep.nc'} cannot be read: {first_line(error)}") from None
         return loaded
     for name in ("decay.json", "fit.json", "compare.json"):
         if (path / name).is_file():
-            numbers: dict[str, Any] = json.loads((path / name).read_text(encoding="utf-8"))
+            try:
+                numbers: dict[str, Any] = json.loads((path / name).read_text(encoding="utf-8"))
+            except (OSError, ValueError) as error:
+                raise SceneError(f"{path / name} cannot be read: {first_line(error)}") from None
             return numbers
     if not (path / "trajectory.csv").is_file():
         raise SceneError(

@@ -2,11 +2,25 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..arguments import (
+    FINITE,
+    INTERFACE,
+    METHOD,
+    PATH,
+    POSITIVE,
+    PROGRESS,
+    ROW,
+    SETTINGS,
+    SOME_NAMES,
+    Progress,
+    check_arguments,
+)
 from ..errors import HarnessError, SceneError, format_value
-from .options import QUIET, Progress, apply_options
+from .options import QUIET, SIDE, apply_options
 
 if TYPE_CHECKING:
     import numpy as np
@@ -18,6 +32,19 @@ if TYPE_CHECKING:
     from ..studies.compare.difference import Comparison
 
 
+@check_arguments(
+    source=PATH,
+    values=SETTINGS,
+    stop=FINITE,
+    interval=POSITIVE,
+    times=ROW,
+    outputs=SOME_NAMES,
+    method=METHOD,
+    rtol=POSITIVE,
+    interface=INTERFACE,
+    timeout=POSITIVE,
+    progress=PROGRESS,
+)
 def simulate(
     source: "str | Path",
     values: Mapping[str, float | str] | None = None,
@@ -55,8 +82,8 @@ def simulate(
     method : str or int, optional
         Integration method of an FMU of this project, as ``"exact"`` or ``"dop853"``.
     rtol : float, optional
-        Relative tolerance of the solver of an FMU of this project. Other FMUs are run with shorter and shorter
-        communication steps until two results agree to this tolerance.
+        Relative tolerance of the solver of an FMU of this project; the method ``exact`` meets every tolerance.
+        Other FMUs are run with shorter and shorter communication steps until two results agree to this tolerance.
     interface : {"CoSimulation", "ModelExchange"}, optional
         Interface to use if the FMU offers both; co-simulation by default.
     inputs : mapping or DataFrame, optional
@@ -94,7 +121,7 @@ def simulate(
     if inputs is not None:
         spec = replace(spec, inputs={str(name): column for name, column in read_input_columns(inputs).items()})
     if times is not None:
-        spec = replace(spec, times=tuple(to_finite_row("times", times).tolist()))
+        spec = replace(spec, times=tuple(times.tolist()))  # type: ignore[union-attr] # a row by its rule
     spec = apply_options(spec, stop, interval, outputs, method, rtol, interface, timeout)
     if interval is not None and spec.inputs:
         spec = replace(spec, grid=choose_fine_step(spec, interval))
@@ -104,6 +131,7 @@ def simulate(
     return trajectory
 
 
+@check_arguments(a=SIDE, b=SIDE, stop=FINITE, rtol=POSITIVE, interface=INTERFACE, timeout=POSITIVE, progress=PROGRESS)
 def compare(
     a: "str | Path | Trajectory",
     b: "str | Path | Trajectory",
@@ -122,7 +150,7 @@ def compare(
         Trajectories, result folders, files (fmpy, OpenModelica, Dymola, any table with the time in its first column),
         FMUs or scenes. FMUs and scenes are run at the times of the other side.
     stop, rtol, interface, timeout
-        Options for FMUs that have to be run, as in `simulate`.
+        Options for FMUs and scenes that have to be run, as in `simulate`; refused if both sides are recorded.
     progress : callable, optional
         Receives the progress from 0 to 1.
 
@@ -141,13 +169,12 @@ def compare(
     from ..studies.compare.difference import compare as difference
     from ..studies.compare.trajectory_sources import display_names, load_both
 
-    options = apply_options(RunSpec(Path()), stop=stop, interface=interface, timeout=timeout)
-    if rtol is not None:
-        options = replace(options, tolerance=rtol)
+    options = {"stop": stop, "interface": interface, "timeout": timeout, "rtol": rtol}
     first, second = load_both(
         tuple(side if isinstance(side, Trajectory) else str(side) for side in (a, b)),
-        options,
+        RunSpec(Path(), stop=stop),
         progress or QUIET,
+        partial(adjust_runs, {name: value for name, value in options.items() if value is not None}),
     )
     paths = [side for side in (a, b) if not isinstance(side, Trajectory)]
     if len(paths) == 2:
@@ -156,6 +183,13 @@ def compare(
     elif first.name == second.name:
         first, second = replace(first, label=f"{first.name} (a)"), replace(second, label=f"{second.name} (b)")
     return difference(first, second)
+
+
+def adjust_runs(options: dict[str, Any], runs: "list[RunSpec]") -> "list[RunSpec]":
+    """Return the runs of a comparison with options; raise SceneError if there are none that could have them."""
+    if options and not runs:
+        raise SceneError(f"{next(iter(options))} has no effect, because both sides are recorded: leave it out")
+    return [apply_options(spec, **options) for spec in runs]
 
 
 def choose_fine_step(spec: "RunSpec", interval: float) -> float:

@@ -1,18 +1,53 @@
 """Sweeps from Python: `sweep`."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ..arguments import (
+    FINITE,
+    INTERFACE,
+    NAMES,
+    NATURAL,
+    PATH,
+    POSITIVE,
+    PROGRESS,
+    RUNS,
+    SETTINGS,
+    TEXT,
+    WORKERS,
+    Progress,
+    Rule,
+    check_arguments,
+    mapping,
+)
 from ..errors import SceneError, import_optional
-from .options import QUIET, Progress, apply_options
+from .options import QUIET, apply_options
 
 if TYPE_CHECKING:
     import xarray
     from numpy.typing import ArrayLike
 
 
+GRID = mapping(Rule("numbers", lambda values: values), "numbers")  # the axes check their values
+
+
+@check_arguments(
+    source=PATH,
+    grid=GRID,
+    values=SETTINGS,
+    samples=RUNS,
+    seed=NATURAL,
+    measures=NAMES,
+    stop=FINITE,
+    rtol=POSITIVE,
+    interface=INTERFACE,
+    timeout=POSITIVE,
+    workers=WORKERS,
+    scheduler=TEXT,
+    folder=PATH,
+    progress=PROGRESS,
+)
 def sweep(
     source: "str | Path",
     grid: "Mapping[str, ArrayLike]",
@@ -49,7 +84,7 @@ def sweep(
         Measures, as ``"final"``, ``"period"`` or ``"steps"``; by default the final values, and events if the FMU
         counts them.
     stop, rtol, interface, timeout
-        As in `simulate`; `rtol` is for FMUs that are not of this project.
+        As in `simulate`.
     workers : int, optional
         Number of worker processes; by default all runs are done in this process. A script with workers must call
         `sweep` below ``if __name__ == "__main__":``.
@@ -83,8 +118,12 @@ def sweep(
     library, *_ = (import_optional(package, "a sweep", "sweep") for package in ("xarray", "dask", "netCDF4"))
     if not grid:
         raise SceneError("grid is empty: name at least one parameter and its values, as in {'mu_d': [0.3, 0.6]}")
-    run = apply_options(RunSpec(find_fmu(str(source)), follow=False), stop=stop, interface=interface, timeout=timeout)
-    run = replace(run, values=dict(values or {}), tolerance=run.tolerance if rtol is None else rtol)
+    if workers is not None and scheduler is not None:
+        raise SceneError("workers has no effect with scheduler, whose cluster has its own workers: leave one out")
+    run = RunSpec(find_fmu(str(source)), values=dict(values or {}), follow=False)
+    run = apply_options(run, stop=stop, rtol=rtol, interface=interface, timeout=timeout)
+    if twice := set(grid) & set(run.values):
+        raise SceneError(f"{min(twice)} is varied by grid and has a value for all runs: remove one")
     axes = tuple(axis_from_numbers(name, column, samples is not None) for name, column in grid.items())
     points = SweepPoints(axes, samples, seed)
     spec = SweepSpec(run, points.names, tuple(measures))

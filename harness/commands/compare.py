@@ -6,7 +6,7 @@ from typing import Any
 
 import click
 
-from .terminal import FiniteFloat, Terminal, refuse_ignored_options, refuse_options, result_options, run_options
+from .terminal import NONNEGATIVE, Terminal, refuse_ignored_options, refuse_options, result_options, run_options
 
 
 @click.command()
@@ -16,10 +16,10 @@ from .terminal import FiniteFloat, Terminal, refuse_ignored_options, refuse_opti
 @click.option(
     "--rtol",
     "--within",
-    type=FiniteFloat(min=0),
+    type=NONNEGATIVE,
     help="Allowed difference, relative to the largest value.",
 )
-@click.option("--atol", type=FiniteFloat(min=0), help="Allowed difference in addition, in the unit of the variable.")
+@click.option("--atol", type=NONNEGATIVE, help="Allowed difference in addition, in the unit of the variable.")
 @result_options
 @click.pass_context
 def compare(

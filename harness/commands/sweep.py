@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from ..arguments import NATURAL, RUNS, WORKERS
 from ..errors import MAX_VALUE_LENGTH, HarnessError, install_command
-from .terminal import Terminal, refuse_ignored_options, refuse_options, result_options, run_options
+from .terminal import RuleType, Terminal, refuse_ignored_options, refuse_options, result_options, run_options
 
 if TYPE_CHECKING:
     from ..studies.sweep.result_files import SweepResult
 
 MAX_FAILURE_KINDS = 10  # kinds of failures printed
-WORKERS = click.IntRange(1, 1024)
 
 
 @click.command()
@@ -30,11 +30,13 @@ WORKERS = click.IntRange(1, 1024)
 )
 @click.option("--set", "values", multiple=True, metavar="NAME=VALUE", help="Value set in every run.")
 @click.option(
-    "--random", type=click.IntRange(min=1), help="Number of points of a Latin hypercube; requires --vary NAME=LO:HI."
+    "--random", type=RuleType(RUNS), help="Number of points of a Latin hypercube; requires --vary NAME=LO:HI."
 )
-@click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True, help="Seed of the Latin hypercube.")
+@click.option("--seed", type=RuleType(NATURAL), default=1, show_default=True, help="Seed of the Latin hypercube.")
 @click.option("--measure", help="Measures, separated by commas. Default: final, and events if the FMU counts them.")
-@click.option("--workers", type=WORKERS, default=lambda: os.cpu_count() or 1, help="Processes on this machine.")
+@click.option(
+    "--workers", type=RuleType(WORKERS), default=lambda: os.cpu_count() or 1, help="Processes on this machine."
+)
 @click.option("--scheduler", metavar="ADDRESS", help="Scheduler of a running Dask cluster: tcp://host:8786.")
 @click.option("--name", help="Name of the result folder.")
 @run_options

@@ -11,14 +11,15 @@ from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from functools import wraps
 from io import TextIOWrapper
-from math import isfinite
 from pathlib import Path
 from typing import Any
 
 import click
 from click.core import ParameterSource
 
-from ..errors import HarnessError, check_names
+from .. import arguments
+from ..arguments import Rule
+from ..errors import HarnessError, check_names, format_value
 from ..process.interrupt import check_interrupt
 from ..process.temporary_directory import temporary_root
 
@@ -92,12 +93,16 @@ def record_call(context: click.Context) -> None:
 def build_arguments(command: click.Command, options: Mapping[str, Any]) -> list[str]:
     """Return command-line arguments for recorded options; the command itself checks their values.
 
+    Options that choose where to write, or what to replace, are none of them: the file may come from anyone.
+
     Raises
     ------
     SceneError
         If the command has no such option.
     """
-    parameters = {parameter.name or "": parameter for parameter in command.params}
+    parameters = {
+        parameter.name or "": parameter for parameter in command.params if parameter.name not in COMMON_OPTIONS
+    }
     check_names(f"option of {command.name} in provenance.json", options, parameters)
     named, positional = [], []
     for name, value in options.items():
@@ -111,23 +116,25 @@ def build_arguments(command: click.Command, options: Mapping[str, Any]) -> list[
     return [*named, "--", *positional]
 
 
-class FiniteFloat(click.FloatRange):
-    """A finite number, optionally in a range. click accepts NaN."""
+class RuleType(click.FloatRange):
+    """Type of an option whose value follows a rule of the Python API; the help shows its range."""
 
-    name = "number"
+    def __init__(self, rule: Rule) -> None:
+        super().__init__()
+        self.rule, self.name = rule, "integer range" if rule.parse is int else "number"
 
     def _describe_range(self) -> str:
-        """Return no text for an unbounded range, which click describes as None."""
-        return "" if self.min is self.max is None else super()._describe_range()
+        """Return the range of the rule, which click appends to the help of the option."""
+        return self.rule.span
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        number = super().convert(value, param, ctx)
-        if not isfinite(number):
-            self.fail(f"{value!r} is not a finite number", param, ctx)
-        return number
+        try:
+            return self.rule.convert(self.rule.parse(value) if isinstance(value, str) else value)
+        except (OverflowError, TypeError, ValueError):
+            self.fail(f"{format_value(value)} is not {self.rule.text}", param, ctx)
 
 
-FINITE, POSITIVE = FiniteFloat(), FiniteFloat(min=0, min_open=True)
+FINITE, POSITIVE, NONNEGATIVE = map(RuleType, (arguments.FINITE, arguments.POSITIVE, arguments.NONNEGATIVE))
 STOP_OPTION = click.option("--stop", type=FINITE, help="Stop time in s. Default: that of the FMU.")
 EXTERNAL_FMU_OPTIONS = (  # for FMUs that do not expose their solver steps
     click.option("--tolerance", type=POSITIVE, default=1e-6, show_default=True, help="Relative tolerance of the run."),

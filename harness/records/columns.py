@@ -12,9 +12,10 @@ from pathlib import Path
 
 import numpy as np
 
+from ..arguments import QUANTITIES
 from ..errors import SceneError, unknown_name_message
 from .headings import DATE_NAME, MAGNITUDE_NAME, TIME_NAME, order_from_name, split_heading
-from .record import QUANTITIES, Record, check_record
+from .record import Record, check_record
 from .samples import (
     find_repeated_times,
     leave_out_saturated,

@@ -5,12 +5,13 @@ from typing import Self
 
 import numpy as np
 
+from ..arguments import QUANTITIES
 from ..errors import SceneError
 
-QUANTITIES = ("position", "velocity", "acceleration")  # by the order of the derivative
 SYMBOLS = ("x", "v", "a")
 MIN_SAMPLES = 12  # samples
 MAX_VALUE = 1e100  # its square is finite
+MIN_DURATION = 1e-30  # s; the squares of frequencies are finite
 
 
 @dataclass(frozen=True)
@@ -76,6 +77,8 @@ def check_record(record: Record) -> None:
             raise SceneError(f"{record.name}: {name} is not finite in sample {int(np.argmin(np.isfinite(values)))}")
         if np.abs(values).max() > MAX_VALUE:
             raise SceneError(f"{record.name}: {name} is as large as {np.abs(values).max():.3g}, which is not plausible")
+    if np.ptp(record.t) < MIN_DURATION:
+        raise SceneError(f"{record.name} lasts {np.ptp(record.t):.3g} s, which is not plausible: check the times")
     not_increasing = np.flatnonzero(np.diff(record.t) <= 0)
     if len(not_increasing):
         time = float(record.t[not_increasing[0]])

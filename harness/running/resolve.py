@@ -8,8 +8,10 @@ from ..results.provenance import load_verified_provenance
 from ..scenes.fmu_files import check_built, find_fmu, list_models
 from ..scenes.run_spec import DEFAULT_EQUAL_STEPS, RunSpec
 from ..scenes.scene import load_scene, scene_from_provenance, shipped_scenes
+from .fmu_archive import exposes_solver_steps, read_description
 
 FMU_SUFFIXES = (".fmu", ".py")
+METHOD, RTOL = "solver.method", "solver.rtol"
 
 
 def resolve(source: str | Path, options: RunSpec | None = None, scenes_first: bool = False) -> RunSpec:
@@ -58,3 +60,10 @@ def read_stored_run(folder: Path) -> RunSpec:
         return RunSpec.from_json(provenance.get("run") or scene)
     except SceneError as error:
         raise SceneError(f"{folder} does not hold the result of one run ({error}): name another folder") from None
+
+
+def set_rtol(spec: RunSpec, rtol: float) -> RunSpec:
+    """Return a run with a relative tolerance: of the solver, or of the step refinement of an external FMU."""
+    if spec.exchange or not exposes_solver_steps(read_description(spec.fmu, spec.lenient)):
+        return replace(spec, tolerance=rtol)
+    return replace(spec, values={**spec.values, RTOL: rtol})

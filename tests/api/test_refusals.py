@@ -17,8 +17,11 @@ SIMULATE = [  # changes of harness.simulate("smd"), and words of the sentence
     ({"stop": -1.0}, "stop = -1.0 s is not after start"),
     ({"interval": 0.0}, "interval = 0.0 must be a finite number above 0"),
     ({"times": [0.0, 2.0, 1.0]}, "times must increase"),
-    ({"times": [0.0, float("nan")]}, "times holds nan at index 1: give finite numbers"),
-    ({"times": ["soon"]}, "times must be a row of numbers"),
+    ({"times": [0.0, float("nan")]}, "times: nan at index 1 is not a finite number"),
+    ({"times": ["soon"]}, "times = ['soon'] must be a row of finite numbers"),
+    ({"times": []}, "times = [] must be a row of finite numbers, at least one"),
+    ({"times": [[0.0, 1.0], [2.0, 3.0]]}, "must be a row of finite numbers"),
+    ({"outputs": []}, "outputs = [] must be"),
     ({"times": [-1.0, 1.0]}, "times has -1.0 s, outside the run from 0.0 s to 1.0 s"),
     ({"times": [1.0, 2.0], "stop": 1.5}, "times has 2.0 s, outside the run from 0.0 s to 1.5 s"),
     ({"times": [1.0, 2.0], "interval": 0.5}, "times and interval exclude each other"),
@@ -35,13 +38,28 @@ SIMULATE = [  # changes of harness.simulate("smd"), and words of the sentence
     ({"inputs": {"time": [0.0], "F_ext": [float("nan")]}}, "inputs: F_ext holds nan at index 0"),
     ({"inputs": [1.0, 2.0]}, "inputs must be a mapping or a DataFrame"),
 ]
+DECAY = np.linspace(0.0, 10.0, 101), np.exp(-0.1 * np.linspace(0.0, 10.0, 101)) * np.cos(6.0 * np.linspace(0, 10, 101))
+COMPARE = [  # changes of harness.compare("smd.fmu", "smd.fmu")
+    ({"rtol": 0.0}, "rtol = 0.0 must be a finite number above 0"),
+    ({"a": 3}, "a = 3 must be a Trajectory, a name or a path"),
+]
 IDENTIFY_DECAY = [
     ({"record": [0.0, 1.0]}, "x is missing"),
     ({"record": [0.0, 1.0], "x": [1.0, 2.0]}, "unit is missing"),
     ({"record": [0.0, 1.0], "x": [1.0], "unit": "m"}, "rows of the same length"),
     ({"record": "nowhere.csv"}, "cannot read nowhere.csv"),
     ({"record": np.arange(20.0), "x": np.arange(20.0), "unit": "m", "k": 1.0, "m": 1.0}, "leave one out"),
-    ({"record": "nowhere.csv", "rate": 0.0}, "rate is 0.0: it must be a positive number"),
+    ({"record": "nowhere.csv", "rate": 0.0}, "rate = 0.0 must be a finite number above 0"),
+    *(
+        (
+            {"record": DECAY[0], "x": DECAY[1], "unit": "m", name: value},
+            f"{name} = {value!r} must be a finite number above",
+        )
+        for name, value in (("m", -1), ("k", -3), ("m", 0), ("m", float("nan")), ("k", float("inf")), ("k", True))
+    ),
+    ({"record": DECAY[0], "x": DECAY[1], "unit": "m", "column": "x"}, "column = 'x' has no effect on arrays"),
+    ({"record": "nowhere.csv", "x": DECAY[1]}, "x has no effect, because the record has columns"),
+    ({"record": "nowhere.csv", "begin": 2.0, "end": 1.0}, "begin = 2.0 s must be before end = 1.0 s"),
 ]
 SWEEP = [  # changes of harness.sweep("smd", {"k": [1.0]})
     ({"grid": {}}, "grid is empty"),
@@ -49,6 +67,10 @@ SWEEP = [  # changes of harness.sweep("smd", {"k": [1.0]})
     ({"grid": {"k": ["stiff"]}}, "must be numbers"),
     ({"grid": {"kk": [1.0]}}, "'kk' (nearest: 'k')"),
     ({"grid": {"k": [1.0, 2.0, 3.0]}, "samples": 4}, "its lower and its upper bound"),
+    ({"workers": 0}, "workers = 0 must be a whole number from 1 to 1024"),
+    ({"workers": -1}, "workers = -1 must be a whole number"),
+    ({"grid": {"k": [[1.0, 2.0], [3.0, 4.0]]}}, "grid: k = [[1.0, 2.0], [3.0, 4.0]] must be numbers, one or a row"),
+    ({"values": {"k": 2.0}}, "k is varied by grid and has a value for all runs: remove one"),
 ]
 FIT = [  # changes of a fit of mu_s of the sled to its position
     ({"free": ["mu_z"]}, "unknown parameter 'mu_z' (nearest: 'mu_s')"),
@@ -64,7 +86,7 @@ FIT = [  # changes of a fit of mu_s of the sled to its position
     ({"fixed": {"m": -1.0}}, "m = -1.0 is outside its range"),
     ({"start": {"m": 1.0}}, "unknown free parameter 'm'; allowed: mu_s"),
     ({"free": {"mu_s": (0.1, 2.0)}, "start": {"mu_s": 99.0}}, "the start value 99.0 of mu_s is outside its range"),
-    ({"sigma": {"x": 0.0}}, "sigma of x is 0.0"),
+    ({"sigma": {"x": 0.0}}, "sigma: x = 0.0 must be a finite number above 0"),
     ({"free": {"delay(x)": (0.0, 20.0)}}, "delay(x) = 0.0:20.0 reaches beyond the record, which lasts 16 s"),
     ({"free": ["delay(x)"], "start": {"delay(x)": 5.0}}, "the start value 5.0 of delay(x) is outside its range"),
     ({"free": ["delay(y)"]}, "unknown parameter 'delay(y)' (nearest: 'delay(x)')"),
@@ -85,6 +107,7 @@ FIT = [  # changes of a fit of mu_s of the sled to its position
 ]
 CALLS = [
     *((harness.simulate, {"source": "smd"}, *row) for row in SIMULATE),
+    *((harness.compare, {"a": "fmus/smd.fmu", "b": "fmus/smd.fmu"}, *row) for row in COMPARE),
     *((harness.identify_decay, {}, *row) for row in IDENTIFY_DECAY),
     *((harness.sweep, {"source": "smd", "grid": {"k": [1.0]}}, *row) for row in SWEEP),
     *((harness.fit, {"source": "stickslip", "free": ["mu_s"], "observe": "x"}, *row) for row in FIT),

@@ -171,3 +171,26 @@ def test_an_interval_records_every_multiple_once(in_workspace):
     """The first internal step of pendulum takes 3.6 microseconds, a rounding of a long interval."""
     run = harness.simulate("pendulum", stop=2e4, interval=1e4, outputs=["theta"])
     assert run.time.tolist() == [0.0, 1e4, 2e4]
+
+
+@pytest.mark.parametrize("method", ["ode23", "ode45", "dop853", "rodas", "radau9"])
+def test_a_tolerance_acts_on_every_method(in_workspace, method):
+    """In a run, in a sweep and on both sides of a comparison: a smaller tolerance takes more steps."""
+    pytest.importorskip("xarray")
+    steps = []
+    for rtol in (1e-2, 1e-9):
+        run = harness.simulate("pacejka", {"x_m": 0.1}, stop=2.0, method=method, rtol=rtol)
+        grid, values = {"x_m": [0.1]}, {"solver.method": method}
+        swept = harness.sweep("pacejka", grid, values=values, measures=["steps"], stop=2.0, rtol=rtol)
+        assert float(swept["steps"][0]) == run.statistics.steps
+        steps.append(run.statistics.steps)
+    assert steps[0] < steps[1]
+
+
+def test_the_tolerance_of_a_comparison_acts_on_fmus_and_scenes(in_workspace):
+    recorded = harness.simulate("pacejka", stop=1.0)
+    for source in ("fmus/pacejka.fmu", "pacejka"):
+        loose, tight = (harness.compare(source, recorded, stop=1.0, rtol=rtol).one for rtol in (1e-2, 1e-9))
+        assert loose.statistics.steps < tight.statistics.steps
+    both = harness.compare("fmus/smd.fmu", "fmus/pacejka.fmu", stop=1.0, rtol=1e-9)
+    assert both.two.parameters["solver.rtol"] == 1e-9

@@ -24,7 +24,7 @@ def frame(columns, units):
 def driven_record(lost=()):
     """Return a record of coulomb, pushed by pulses with pauses at exactly 0; x lacks the samples `lost`."""
     force = np.where(T % 2 < 0.6, np.round(20 * np.sin(np.pi * (T % 2) / 0.6) ** 2, 3), 0.0)
-    run = harness.simulate("coulomb", times=T, inputs={"time": T, "F_ext": force}, rtol=1e-10)
+    run = harness.simulate("coulomb", times=T, inputs={"time": T, "F_ext": force})
     x = run["x"] + 1e-5 * np.random.default_rng(1).normal(size=len(T))
     x[[*lost]] = np.nan
     return frame({"t": T, "x": x, "force": force}, {"t": "s", "x": "m", "force": "N"})

@@ -1,6 +1,6 @@
 """The two trajectories of a comparison, from result folders, files, or runs of FMUs and scenes."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from os.path import abspath
 from pathlib import Path
@@ -21,19 +21,28 @@ RUN_SUFFIXES = (*FMU_SUFFIXES, ".toml")  # sources that are run
 
 
 def load_both(
-    sources: Sequence[str | Trajectory], options: RunSpec, report: ProgressCallback
+    sources: Sequence[str | Trajectory],
+    options: RunSpec,
+    report: ProgressCallback,
+    adjust: Callable[[list[RunSpec]], list[RunSpec]] = lambda runs: runs,
 ) -> tuple[Trajectory, Trajectory]:
     """Load the trajectories of two folders, files, FMUs or scenes; return given trajectories unchanged.
 
     Both sides share one time grid: FMUs and scenes are run with the communication step of the other side, if it has
     one, or else with the fixed internal step that one of them declares, and to the same stop time. `options` holds
-    their other settings.
+    the other settings of FMUs, and `adjust` may change those of all runs.
     """
     recordings = [source if isinstance(source, Trajectory) else read_recorded(source) for source in sources]
-    runs = [
-        None if item else resolve(str(source), options, scenes_first=True)
-        for item, source in zip(recordings, sources, strict=True)
-    ]
+    adjusted = iter(
+        adjust(
+            [
+                resolve(str(source), options, scenes_first=True)
+                for item, source in zip(recordings, sources, strict=True)
+                if not item
+            ]
+        )
+    )
+    runs = [None if item else next(adjusted) for item in recordings]
     grids = [grid_spacing(item.time) for item in recordings if item] + [item.grid for item in runs if item]
     grids += [fixed_grid(item) for item in runs if item]
     grid = next(filter(None, grids), None)

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from ...arguments import MAX_RUNS
 from ...errors import MAX_VALUE_LENGTH, SceneError, format_value
 
-MAX_RUNS = 10_000_000  # runs
 VARY_HELP = "as in m=1:2:11, k=10:1000:31:log, mu=0.1,0.2,0.4 or, with --random, m=1:2"
 
 
@@ -55,9 +55,12 @@ def parse_axis(text: str, random: bool) -> SweepAxis:
 def axis_from_numbers(name: str, column: Any, random: bool) -> SweepAxis:
     """Return the axis of a parameter from an array of its values; SceneError if it is invalid."""
     try:
-        values = tuple(np.ravel(np.asarray(column, dtype=float)).tolist())
-    except (TypeError, ValueError):
-        raise SceneError(f"grid: {name} = {format_value(column)} must be numbers") from None
+        numbers = np.atleast_1d(np.asarray(column))
+    except ValueError:  # nested sequences of different lengths
+        numbers = np.zeros((0, 0))
+    if numbers.ndim != 1 or (len(numbers) and numbers.dtype.kind not in "fiu"):
+        raise SceneError(f"grid: {name} = {format_value(column)} must be numbers, one or a row")
+    values = tuple(numbers.astype(float).tolist())
     if not values:
         raise SceneError(f"grid: {name} has no values: give at least one")
     if not all(map(isfinite, values)):

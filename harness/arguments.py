@@ -1,0 +1,305 @@
+"""Rules of arguments: what a value must be, stated once for the Python API and for the command line.
+
+A function of the API names the rule of each argument in `check_arguments`; an option of a command has the type
+`RuleType`, which reads a text and applies the same rule. This module does not import numpy, which `--help` does not
+need.
+"""
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from functools import wraps
+from inspect import signature
+from math import inf, isfinite
+from operator import index
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
+
+from .errors import SceneError, format_value, unknown_name_message
+
+if TYPE_CHECKING:
+    import numpy as np
+
+MAX_NAME_BYTES = 255  # of a part of a path, on common file systems
+MAX_WORKERS = 1024  # processes of a sweep
+MAX_RUNS = 10_000_000  # of a sweep
+INTERFACES = ("CoSimulation", "ModelExchange")
+QUANTITIES = ("position", "velocity", "acceleration")  # by the order of the derivative
+
+Progress = Callable[[float], None]  # takes the finished share, from 0 to 1
+P = ParamSpec("P")
+R = TypeVar("R")
+
+
+class UnknownNameError(SceneError):
+    """A value is none of the allowed names. The text says of what."""
+
+
+@dataclass(frozen=True)
+class Rule:
+    """What a value must be.
+
+    Attributes
+    ----------
+    text : str
+        Description, as in "a finite number above 0".
+    convert : callable
+        Returns a value in its own type; raises TypeError, ValueError, OverflowError or SceneError if it is not valid.
+    parse : callable
+        Reads the value from a text on the command line.
+    span : str
+        Range of numbers x for the help, as in "x>0"; empty without limits.
+    """
+
+    text: str
+    convert: Callable[[Any], Any]
+    parse: Callable[[str], Any] = str
+    span: str = ""
+
+    def check(self, name: str, value: Any) -> Any:
+        """Return a value in its own type; raise SceneError, which names the argument, if it is not valid."""
+        try:
+            return self.convert(value)
+        except (AttributeError, OverflowError, RecursionError, TypeError, ValueError):
+            raise SceneError(f"{name} = {format_value(value)} must be {self.text}") from None
+        except UnknownNameError:
+            raise
+        except SceneError as error:  # of a part of the value
+            raise SceneError(f"{name}: {error}") from None
+
+
+def check_arguments(**rules: Rule) -> Callable[[Callable[P, R]], Callable[P, R]]:
+    """Decorate a function so that it checks and converts its arguments by these rules.
+
+    An argument whose default is None may be None.
+    """
+
+    def decorate(function: Callable[P, R]) -> Callable[P, R]:
+        declared = signature(function)
+        assert set(rules) <= set(declared.parameters), f"{function.__name__} has no argument of a rule"
+        optional = {name for name, parameter in declared.parameters.items() if parameter.default is None}
+
+        @wraps(function)
+        def checked(*arguments: P.args, **options: P.kwargs) -> R:
+            call = declared.bind(*arguments, **options)
+            for name, value in call.arguments.items():
+                if name in rules and not (value is None and name in optional):
+                    call.arguments[name] = rules[name].check(name, value)
+            return function(*call.args, **call.kwargs)
+
+        return checked
+
+    return decorate
+
+
+def is_array(value: Any) -> bool:
+    """Return whether a value is an array with at least one dimension; those of numpy without any are numbers."""
+    return bool(getattr(value, "ndim", False))
+
+
+def is_boolean(value: Any) -> bool:
+    """Return whether a value is True or False, of Python or of numpy, which names its type bool since version 2."""
+    return type(value).__name__ in ("bool", "bool_")
+
+
+def real(value: Any) -> float:
+    """Return a finite number as a float; a Boolean, a text or an array is none."""
+    if isinstance(value, str | bytes | bytearray) or is_boolean(value) or is_array(value):
+        raise TypeError
+    number = float(value)
+    if not isfinite(number):
+        raise ValueError
+    return number
+
+
+def above_zero(value: Any) -> float:
+    """Return a finite number above 0."""
+    if not (number := real(value)) > 0:
+        raise ValueError
+    return number
+
+
+def at_least_zero(value: Any) -> float:
+    """Return a finite number of at least 0."""
+    if not (number := real(value)) >= 0:
+        raise ValueError
+    return number
+
+
+def whole(low: int, high: float = inf) -> Rule:
+    """Return the rule of a whole number from `low` to `high`."""
+
+    def convert(value: Any) -> int:
+        if is_boolean(value) or not low <= (number := index(value)) <= high:
+            raise ValueError
+        return number
+
+    if high == inf:
+        return Rule(f"a whole number of at least {low}", convert, int, f"x>={low}")
+    return Rule(f"a whole number from {low} to {high}", convert, int, f"{low}<=x<={high}")
+
+
+def choice(category: str, names: Iterable[str]) -> Rule:
+    """Return the rule of one of several names."""
+    allowed = tuple(names)
+
+    def convert(value: Any) -> str:
+        if not isinstance(value, str) or value not in allowed:
+            raise UnknownNameError(unknown_name_message(category, value, allowed))
+        return value
+
+    return Rule(f"one of {', '.join(allowed)}", convert)
+
+
+def flag(value: Any) -> bool:
+    """Return True or False, also of numpy."""
+    if not is_boolean(value):
+        raise TypeError
+    return bool(value)
+
+
+def text(value: Any) -> str:
+    """Return a text that is not empty and can be encoded."""
+    if not isinstance(value, str) or not value or "\0" in value:
+        raise TypeError
+    value.encode()  # raises ValueError for a lone surrogate
+    return value
+
+
+def path(value: Any) -> str | Path:
+    """Return a name, or a path."""
+    name = text(str(value) if isinstance(value, Path) else value)
+    if any(len(part.encode()) > MAX_NAME_BYTES for part in Path(name).parts):
+        raise ValueError
+    return value
+
+
+def items(value: Any) -> list[Any]:
+    """Return the items of a sequence or another iterable, or a single text or path as the only one."""
+    if isinstance(value, str | Path):
+        return [value]
+    if isinstance(value, bytes | bytearray | Mapping) or hasattr(value, "columns"):
+        raise TypeError
+    return list(value)
+
+
+def names(value: Any) -> tuple[str, ...]:
+    """Return one name, or several, each once."""
+    return tuple(dict.fromkeys(map(text, items(value))))
+
+
+def some_names(value: Any) -> tuple[str, ...]:
+    """Return at least one name."""
+    if not (result := names(value)):
+        raise ValueError
+    return result
+
+
+def paths(value: Any) -> list[str | Path]:
+    """Return one path, or several."""
+    return [path(item) for item in items(value)]
+
+
+def mapping(item: Rule, values: str) -> Rule:
+    """Return the rule of a mapping from names to values that follow a rule; `values` describes them."""
+
+    def convert(value: Any) -> dict[str, Any]:
+        if not isinstance(value, Mapping):
+            raise TypeError
+        return {text(name): item.check(name, entry) for name, entry in value.items()}
+
+    return Rule(f"a mapping from names to {values}", convert)
+
+
+def names_with(entry: Rule, values: str, default: Callable[[str], Any]) -> Rule:
+    """Return the rule of names, or of a mapping from names to values; without a value, a name has the default."""
+    of_mapping = mapping(entry, values)
+
+    def convert(value: Any) -> dict[str, Any]:
+        if isinstance(value, Mapping):
+            return dict(of_mapping.convert(value))
+        return {name: default(name) for name in names(value)}
+
+    return Rule(f"a name, a sequence of names, or {of_mapping.text}", convert)
+
+
+def row(value: Any) -> "np.ndarray":
+    """Return a row (n,) of at least one number as floats; NaN is a missing number."""
+    import numpy as np
+
+    numbers = np.asarray(value)
+    if numbers.ndim != 1 or numbers.dtype.kind not in "fiu" or not len(numbers):
+        raise TypeError
+    return numbers.astype(float)
+
+
+def finite_row(value: Any) -> "np.ndarray":
+    """Return a row (n,) of at least one finite number as floats."""
+    import numpy as np
+
+    numbers = row(value)
+    if not np.isfinite(numbers).all():
+        i = int(np.argmin(np.isfinite(numbers)))
+        raise SceneError(f"{numbers[i]} at index {i} is not a finite number")
+    return numbers
+
+
+def setting(value: Any) -> Any:
+    """Return a value of a variable: a finite number, a Boolean, a text, or a list of these for an array."""
+    if isinstance(value, str):
+        return text(value)
+    if isinstance(value, list | tuple) or is_array(value):
+        return [setting(item) for item in value]
+    if is_boolean(value):
+        return bool(value)
+    try:
+        return index(value)  # an integer keeps its digits
+    except TypeError:
+        return real(value)
+
+
+def limits(value: Any) -> tuple[float, float] | None:
+    """Return a range, or None for that of the function."""
+    if value is None:
+        return None
+    low, high = map(real, items(value))
+    return low, high
+
+
+def method(value: Any) -> str | int:
+    """Return the name or the number of an integration method."""
+    if is_boolean(value):
+        raise TypeError
+    return text(value) if isinstance(value, str) else index(value)
+
+
+def progress(value: Any) -> Progress:
+    """Return a function."""
+    if not callable(value):
+        raise TypeError
+    result: Progress = value
+    return result
+
+
+FINITE = Rule("a finite number", real, float)
+POSITIVE = Rule("a finite number above 0", above_zero, float, "x>0")
+NONNEGATIVE = Rule("a finite number of at least 0", at_least_zero, float, "x>=0")
+COUNT, NATURAL = whole(1), whole(0)
+WORKERS, RUNS = whole(1, MAX_WORKERS), whole(1, MAX_RUNS)
+FLAG = Rule("True or False", flag)
+TEXT = Rule("a text that is not empty", text)
+NAMES = Rule("a name, or a sequence of names", names)
+SOME_NAMES = Rule("a name, or a sequence of names that is not empty", some_names)
+ROW = Rule("a row of finite numbers, at least one", finite_row)
+PATH = Rule("a name or a path", path)
+PATHS = Rule("a name, a path, or a sequence of these", paths)
+SETTINGS = mapping(Rule("a finite number or a text", setting), "numbers or texts")
+NUMBERS = mapping(FINITE, "finite numbers")
+POSITIVES = mapping(POSITIVE, "finite numbers above 0")
+RANGES = names_with(
+    Rule("a pair of finite numbers or None", limits), "pairs of finite numbers or None", lambda name: None
+)
+HEADINGS = names_with(TEXT, "headings", lambda name: name)
+INTERFACE = choice("interface", INTERFACES)
+QUANTITY = choice("quantity", QUANTITIES)
+METHOD = Rule("a name or a number", method)
+PROGRESS = Rule("a function of one number", progress)

@@ -1,0 +1,98 @@
+"""Every argument of every public function is used, or refused in one sentence."""
+
+import inspect
+import json
+from collections import defaultdict
+
+import argument_values
+import commands
+import pytest
+
+import harness
+
+pytest.importorskip("pandas")
+pytest.importorskip("xarray")
+
+ABOVE_ZERO = {"0.5", "1e300", "0-d array"}
+FINITE = {"0", "-1", *ABOVE_ZERO}
+FLAG = {"True", "np.bool"}
+NOTHING = {"[]", "{}"}  # of names
+ACCEPTED = {  # arguments by function, and the values that they may have; None as well if it is the default
+    "simulate": {
+        "values": {"{}"},
+        "stop": ABOVE_ZERO,
+        "interval": ABOVE_ZERO,
+        "inputs": {"{}"},
+        "timeout": ABOVE_ZERO,
+        "progress": {"type"},
+    },
+    "compare": {"stop": ABOVE_ZERO, "rtol": ABOVE_ZERO, "timeout": ABOVE_ZERO, "progress": {"type"}},
+    "identify_decay": {
+        "unit": {"'x'", "'8'", "long text"},  # a unit that is not known is that of a sensor
+        "k": ABOVE_ZERO,
+        "m": ABOVE_ZERO,
+        "pendulum": FLAG,
+        "drag": FLAG,
+        "drift": FLAG,
+        "begin": FINITE,
+        "end": ABOVE_ZERO,
+        "rate": ABOVE_ZERO,
+        "progress": {"type"},
+    },
+    "fit": {
+        "observe": {"'x'", *NOTHING},
+        "inputs": NOTHING,
+        "fixed": {"{}"},
+        "sigma": {"{}", "{'x': 5}"},
+        "start": {"{}"},
+        "each": {"[]"},
+        "against": {"[]"},
+        "validate": {"[]"},
+        "robust": FLAG,
+        "rate": ABOVE_ZERO,
+        "begin": FINITE,
+        "end": ABOVE_ZERO,
+        "timeout": ABOVE_ZERO,
+        "progress": {"type", "function"},
+    },
+    "sweep": {
+        "values": {"{}"},
+        "seed": {"0", "10**400"},
+        "measures": {"[]"},
+        "stop": ABOVE_ZERO,
+        "timeout": ABOVE_ZERO,
+        "folder": {"'x'", "'8'", "Path"},
+        "progress": {"type"},
+    },
+    "load_result": {},
+}
+
+
+def test_all_functions_are_called():
+    functions = {name for name in harness.__all__ if inspect.isfunction(getattr(harness, name))}
+    assert functions == set(ACCEPTED) == set(argument_values.CALLS)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("function", ACCEPTED)
+def test_a_value_is_used_or_refused_in_one_sentence(fmus, tmp_path, function):
+    """A refusal is a HarnessError within the time limit; nothing else is raised, and no process dies."""
+    (tmp_path / "fmus").symlink_to(fmus)
+    done = commands.run_python(tmp_path, commands.SUPPORT / "argument_values.py", tmp_path, function)
+    assert done.returncode == 0, done.stderr
+    accepted, failures = defaultdict(set), []
+    parameters = inspect.signature(getattr(harness, function)).parameters
+    results = [json.loads(line) for line in done.stdout.splitlines()]
+    assert len(results) == len(parameters) * len(argument_values.VALUES)
+    for _, argument, value, outcome in results:
+        raised_by_user = (argument, value) == ("progress", "function") and outcome.startswith(
+            "TypeError: object of type"
+        )
+        if outcome == "accepted":
+            accepted[argument].add(value)
+        elif not raised_by_user and (not outcome.startswith("refused: ") or "\n" in outcome):
+            failures.append((argument, value, outcome))
+    assert failures == []
+    for argument, parameter in parameters.items():
+        optional = {"None"} if parameter.default is None else set()
+        assert accepted[argument] <= ACCEPTED[function].get(argument, set()) | optional, argument
