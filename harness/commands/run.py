@@ -12,6 +12,7 @@ from click.core import ParameterSource
 from ..errors import HarnessError
 from .terminal import Terminal, build_arguments, refuse_ignored_options, result_options, run_options
 
+UNUSED_SWEEP_OPTIONS = ("name", "scheduler")  # of a recorded call
 FOLDER_DEPTHS = {  # commands whose results can be repeated, and the levels from the result folder up to --out
     "run": 1,
     "compare": 2,
@@ -70,6 +71,7 @@ def run(
         return
     if scene is None or fmu is not None or values or options["stop"] is not None:
         raise click.UsageError("give one SCENE, or --fmu PATH; --set and --stop require an FMU")
+    from ..results.folder import REPEATED
     from ..results.provenance import PYTHON_API, load_verified_provenance
     from ..studies.run import study
     from ..studies.run.table import results_table
@@ -84,7 +86,11 @@ def run(
             return
         selected_scene = scene_from_provenance(provenance)
         if context.get_parameter_source("out") is not ParameterSource.COMMANDLINE:
+            if folder_path.name in ("", ".."):
+                folder_path = folder_path.resolve()
+            selected_scene = replace(selected_scene, name=folder_path.name)
             terminal = replace(terminal, out=folder_path.parent)
+            REPEATED.set(folder_path)
     else:
         selected_scene = load_scene(scene)
     with terminal.progress(1) as report:
@@ -97,18 +103,31 @@ def run(
 
 
 def repeat_call(context: click.Context, folder: Path, provenance: dict[str, Any], terminal: Terminal) -> None:
-    """Repeat the recorded call of a command; the recorded command text is only displayed, never run."""
+    """Repeat the recorded call of a command; the recorded command text is only displayed, never run.
+
+    The result is written to the same folder, or below the --out of this command line. A recorded name of the folder or
+    address of a cluster is not used: a folder from elsewhere chooses neither where to write nor where to connect.
+    """
+    from ..results.folder import REPEATED
+
     root, call = context.find_root(), provenance.get("call")
     if call is None or call["name"] not in FOLDER_DEPTHS:
         raise HarnessError(
             f"{folder} does not hold the run of one scene or FMU; its command was `{provenance['command']}`"
         )
     command = root.command.commands[call["name"]]  # type: ignore[attr-defined]
-    out = folder.absolute().parents[FOLDER_DEPTHS[call["name"]] - 1]
+    folder = folder.resolve() if folder.name in ("", "..") else folder.absolute()
+    out = folder.parents[FOLDER_DEPTHS[call["name"]] - 1]
     if context.get_parameter_source("out") is ParameterSource.COMMANDLINE:
         out = terminal.out
+    else:
+        REPEATED.set(folder)
     output = [f"--out={out}", *["--quiet"] * terminal.quiet, *["--json"] * terminal.as_json]
-    arguments = [*output, *build_arguments(command, call["options"])]
+    options = dict(call["options"])
+    if call["name"] == "sweep":
+        output.append(f"--name={folder.name}")
+        options = {name: value for name, value in options.items() if name not in UNUSED_SWEEP_OPTIONS}
+    arguments = [*output, *build_arguments(command, options)]
     sys.argv[1:] = [call["name"], *arguments]  # recorded as the command
     with command.make_context(call["name"], arguments, parent=root) as new_context:
         command.invoke(new_context)

@@ -17,7 +17,7 @@ from fmpy import read_model_description
 from models import MODELS
 
 from harness import load_result
-from harness.commands.run import run
+from harness.commands.run import FOLDER_DEPTHS, run
 from harness.commands.terminal import build_arguments
 from harness.errors import HarnessError
 from harness.results.folder import replace_folder
@@ -376,3 +376,77 @@ def test_the_text_of_a_command_is_never_run(workspace):
     done = harness(workspace, "run", "results/smd")
     assert done.returncode == 1
     assert "its command was `python -m harness build mine.py`" in done.stderr
+
+
+REPEATED = {  # a call of each command whose result can be repeated, and the folder below --out
+    "run": ({"fmu": "fmus/smd.fmu", "stop": 0.5}, "smd"),
+    "compare": ({"first": "fmus/smd.fmu", "second": "fmus/coulomb.fmu", "stop": 0.1}, "compare/smd-coulomb"),
+    "couple": ({"scene": "two-masses"}, "coupled/two-masses"),
+    "decay": ({"source": "swing.csv", "m": 1.0}, "decay/swing"),
+    "stability": ({"models": ["smd"]}, "stability"),
+    "sweep": ({"model": "smd", "vary": ["k=1,2"], "stop": 0.1}, "sweep/smd-k"),
+}
+
+
+def snapshot(folder):
+    """Return the content of all files below a folder, by path."""
+    return {path: path.read_bytes() for path in folder.rglob("*") if path.is_file() and not path.is_symlink()}
+
+
+@pytest.mark.parametrize("name", REPEATED)
+def test_an_edited_provenance_file_chooses_no_folder_to_write(workspace, name):
+    """The folder of a stranger names a place to write, or the result of another folder, which is kept."""
+    assert set(FOLDER_DEPTHS) == set(REPEATED)
+    t = np.linspace(0, 10, 200)
+    table = "".join(f"{a:.3f},{b:.6f}\n" for a, b in zip(t, np.exp(-0.1 * t) * np.cos(6 * t), strict=True))
+    (workspace / "swing.csv").write_text("t [s],x [m]\n" + table)
+    options, place = REPEATED[name]
+    call = {"command": "harness", "date": "2026-11-27", "files": {}, "parameters": {}, "scene": None}
+    folder, victim = workspace / "theirs" / place, workspace / "mine" / place
+    for path in (folder, victim):
+        path.mkdir(parents=True)
+        (path / "provenance.json").write_text(json.dumps(call | {"call": {"name": name, "options": options}}))
+    renamed = folder.with_name("renamed")  # its call is that of the folder of another name
+    shutil.copytree(folder, renamed)
+    before = snapshot(workspace)
+    edits = [{"out": str(workspace / "mine")}, {"overwrite": True}, {"quiet": True}, {"as_json": True}]
+    edits += [{"name": f"../../../mine/{place}"}, {"folder": str(victim)}] if name != "sweep" else []
+    for edit in edits:
+        edited = call | {"call": {"name": name, "options": options | edit}}
+        (folder / "provenance.json").write_text(json.dumps(edited))
+        done = harness(workspace, "run", folder.relative_to(workspace))
+        assert done.returncode == 2
+        assert f"unknown option of {name} in provenance.json '{min(edit)}'" in done.stderr
+    (folder / "provenance.json").write_bytes(before[folder / "provenance.json"])
+    if name != "sweep":
+        done = harness(workspace, "run", renamed.relative_to(workspace))
+        assert done.returncode == 1
+        assert "names the result of another folder" in done.stderr
+    assert snapshot(workspace) == before
+
+
+def test_a_sweep_is_repeated_in_its_folder_whatever_it_names(workspace):
+    pytest.importorskip("xarray")
+    done = harness(workspace, "sweep", "smd", "--vary", "k=1,2", "--stop", 0.1, "--workers", 1, "--name", "mine")
+    assert done.returncode == 0
+    theirs = shutil.copytree(workspace / "results/sweep/mine", workspace / "theirs/sweep/theirs")
+    provenance = read_provenance(theirs)
+    for name, value in (("name", "../../results/sweep/mine"), ("scheduler", "tcp://127.0.0.1:1")):
+        provenance["call"]["options"][name] = value
+    (theirs / "provenance.json").write_text(json.dumps(provenance))
+    before = snapshot(workspace / "results")
+    done = harness(workspace, "run", "theirs/sweep/theirs")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert snapshot(workspace / "results") == before
+    assert (theirs / "sweep.nc").exists()
+
+
+def test_a_scene_is_repeated_in_its_folder_whatever_it_names(workspace):
+    (workspace / "mine.toml").write_text(MINE)
+    assert harness(workspace, "run", "mine.toml").returncode == 0
+    shutil.copytree(workspace / "results/mine", workspace / "results/theirs")
+    before = snapshot(workspace / "results/mine")
+    done = harness(workspace, "run", "results/theirs")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert snapshot(workspace / "results/mine") == before
+    assert "Results in results/theirs" in done.stdout
