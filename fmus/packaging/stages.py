@@ -9,9 +9,11 @@
 """
 
 from collections.abc import Iterator, Sequence
+from itertools import count
 from pathlib import Path
 
-from .equations.algebra import differentiate
+from .equations.algebra import differentiate, operands_first
+from .equations.dimensions import term_operands
 from .equations.expression_printer import ExpressionPrinter
 from .equations.expressions import Operand, Term
 from .equations.model_analysis import ModelAnalysis
@@ -20,6 +22,8 @@ from .equations.model_file import ModelFile
 from .equations.model_roles import TIME
 from .lowering import lowered_files, lowered_model, select_features
 from .native.sources import collect_sources
+
+MAX_LENGTH = 3000  # characters of an expression inside of another one
 
 
 def write_stages(source: ModelFile, folder: Path, methods: Sequence[str] = (), laws: Sequence[str] = ()) -> Path:
@@ -51,27 +55,42 @@ def write_stages(source: ModelFile, folder: Path, methods: Sequence[str] = (), l
 
 
 def expression_lines(analysis: ModelAnalysis) -> Iterator[str]:
-    """Yield the expressions of outputs and friction forces, with operators in front of their operands."""
-    for e in analysis.outputs:
-        yield f"{e.name} = {prefix_form(e.expression)}"
+    """Yield the expressions of outputs and friction forces, with operators in front of their operands.
+
+    A part that is longer than a line has a line of its own, because a model may use it many times.
+    """
+    targets = [(e.name, e.expression) for e in analysis.outputs]
     for c in analysis.contacts:
-        parts = {"slip": c.slip, "slide": c.slide, "hold": c.hold}
-        for label, part in parts.items():
-            if part is not None:
-                yield f"{c.name}.{label} = {prefix_form(part)}"
-
-
-def prefix_form(e: Operand) -> str:
-    """Return an expression with each operator in front of its operands; variables stand for their expressions."""
-    if isinstance(e, Term):
-        return f"{e.op}({', '.join(map(prefix_form, e.args))})"
-    return e.name if isinstance(e, Variable) else repr(e)
+        targets += [(f"{c.name}.{part}", getattr(c, part)) for part in ("slip", "slide", "hold")]
+    forms: dict[int, str] = {}
+    numbers = count(1)
+    for name, target in targets:
+        if target is None:
+            continue
+        for e in operands_first(target, operands_of=lambda part: () if id(part) in forms else term_operands(part)):
+            if id(e) in forms:
+                continue
+            forms[id(e)] = e.name if isinstance(e, Variable) else repr(e)
+            if isinstance(e, Term):
+                form = f"{e.op}({', '.join(forms[id(operand)] for operand in e.args)})"
+                if len(form) > MAX_LENGTH and e is not target:
+                    forms[id(e)] = f"[{next(numbers)}]"
+                    yield f"{forms[id(e)]} = {form}"
+                else:
+                    forms[id(e)] = form
+        yield f"{name} = {forms[id(target)]}"
 
 
 def analysis_lines(analysis: ModelAnalysis) -> Iterator[str]:
     """Yield the roles of the variables and the derived expressions."""
     names = {e: e.name for e in (TIME, *analysis.declared) if not isinstance(e, Output)}
-    text = ExpressionPrinter(names, (), (), 0).text
+    printer = ExpressionPrinter(names, (), (), 0)
+
+    def text(e: Operand) -> str:
+        result = printer.text(e)
+        statements, printer.lines = printer.lines, []
+        return "; ".join([*statements, result])
+
     yield f"states: {', '.join(e.name for e in analysis.states)}"
     for state, rate in analysis.rate.items():
         yield f"d{state.name}/dt = {text(rate)}"

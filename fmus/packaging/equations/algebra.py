@@ -1,10 +1,13 @@
 """Algebra on expressions: substitution, differentiation, solving for a variable, rounding scales.
 
 Terms are simplified only where the result keeps its bits: zeros, ones and signs.
+
+Equations share subexpressions and may be thousands of terms deep.  So every function visits a subexpression once, and
+none recurses: it follows `operands_first`.
 """
 
 import math
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from contextlib import suppress
 
 from .expressions import COMPARISONS, FUNCTIONS, Expression, ModelError, Operand, Term
@@ -24,6 +27,39 @@ def operands(e: Operand) -> tuple[Operand, ...]:
     return e.args if isinstance(e, Term) else (e.expression,) if isinstance(e, Output) else ()
 
 
+def operands_first(*roots: Operand, operands_of: Callable[[Operand], Iterable[Operand]] = operands) -> list[Operand]:
+    """Return all distinct subexpressions by identity, each after its operands.
+
+    Parameters
+    ----------
+    *roots
+        Expressions.
+    operands_of
+        Returns the operands of a subexpression that are visited.
+    """
+    result: list[Operand] = []
+    visited: set[int] = set()
+    stack = [(e, False) for e in reversed(roots)]
+    while stack:
+        e, is_complete = stack.pop()
+        if is_complete:
+            result.append(e)
+        elif id(e) not in visited:
+            visited.add(id(e))
+            stack.append((e, True))
+            stack.extend((operand, False) for operand in reversed((*operands_of(e),)))
+    return result
+
+
+def dependents(roots: Iterable[Operand], variables: Iterable[Expression]) -> set[int]:
+    """Return the identities of the variables and of all subexpressions that contain one of them."""
+    result = {id(e) for e in variables}
+    for e in operands_first(*roots):
+        if any(id(operand) in result for operand in operands(e)):
+            result.add(id(e))
+    return result
+
+
 def depends_on(e: Operand, variables: Collection[Expression]) -> bool:
     """Return whether an expression contains one of the variables."""
     return not subexpressions(e).keys().isdisjoint(map(id, variables))
@@ -31,17 +67,19 @@ def depends_on(e: Operand, variables: Collection[Expression]) -> bool:
 
 def has_condition_on(e: Operand, variables: Collection[Expression]) -> bool:
     """Return whether a condition in an expression depends on the variables; derivatives do not show this."""
-    conditions = (term for term in subexpressions(e).values() if isinstance(term, Term) and term.op in COMPARISONS)
-    return any(depends_on(term, variables) for term in conditions)
+    conditions = [term for term in subexpressions(e).values() if isinstance(term, Term) and term.op in COMPARISONS]
+    return not dependents(conditions, variables).isdisjoint(map(id, conditions))
 
 
 def subexpressions(e: Operand, result: Memo | None = None) -> Memo:
     """Return all distinct subexpressions by identity, in the order of the source text."""
     result = {} if result is None else result
-    if id(e) not in result:
-        result[id(e)] = e
-        for operand in operands(e):
-            subexpressions(operand, result)
+    stack = [e]
+    while stack:
+        part = stack.pop()
+        if id(part) not in result:
+            result[id(part)] = part
+            stack.extend(reversed(operands(part)))
     return result
 
 
@@ -55,10 +93,24 @@ def variables_in(e: Operand) -> list[Expression]:
 
 
 def factors(e: Operand) -> list[Operand]:
-    """Return the factors of a product; e is 0 if one of them is 0."""
-    if isinstance(e, Term) and e.op == "*":
-        return [factor for part in e.args for factor in factors(part)]
-    return factors(e.args[0]) if isinstance(e, Term) and e.op in ("neg", "/", "fabs", "sqrt") else [e]
+    """Return the distinct factors of a product; e is 0 if one of them is 0."""
+
+    def parts(part: Operand) -> tuple[Operand, ...]:
+        if not isinstance(part, Term):
+            return ()
+        return part.args if part.op == "*" else part.args[:1] if part.op in ("neg", "/", "fabs", "sqrt") else ()
+
+    return [part for part in operands_first(e, operands_of=parts) if not parts(part)]
+
+
+def unconditional_operands(e: Operand) -> tuple[Operand, ...]:
+    """Return the operands that every evaluation of an expression calculates: of choose() the condition only."""
+    return operands(e)[:1] if isinstance(e, Term) and e.op == "choose" else operands(e)
+
+
+def value_operands(e: Operand) -> tuple[Operand, ...]:
+    """Return the operands that are numbers: of choose() the cases only."""
+    return operands(e)[1:] if isinstance(e, Term) and e.op == "choose" else operands(e)
 
 
 def unconditional_quotients(targets: Collection[Operand]) -> list[Term]:
@@ -70,41 +122,50 @@ def unconditional_quotients(targets: Collection[Operand]) -> list[Term]:
         e = stack.pop()
         if id(e) not in visited:
             visited[id(e)] = e
-            is_choose = isinstance(e, Term) and e.op == "choose"
-            stack += operands(e)[:1] if is_choose else operands(e)
+            stack += unconditional_operands(e)
             if isinstance(e, Term) and e.op == "/":
                 result.append(e)
     return result
 
 
-def count_occurrences(e: Operand, leaf: Expression) -> int:
-    """Return how often a variable occurs in an expression."""
-    return 1 if e is leaf else sum(count_occurrences(operand, leaf) for operand in operands(e))
-
-
 def is_same_expression(a: Operand, b: Operand) -> bool:
     """Return whether two expressions have the same structure."""
-    if isinstance(a, Term) and isinstance(b, Term):
-        return a is b or (a.op == b.op and len(a.args) == len(b.args) and all(map(is_same_expression, a.args, b.args)))
-    return a is b or (not isinstance(a, Expression) and not isinstance(b, Expression) and a == b)
+    stack, compared = [(a, b)], set()
+    while stack:
+        a, b = stack.pop()
+        if a is b or (id(a), id(b)) in compared:
+            continue
+        compared.add((id(a), id(b)))
+        if isinstance(a, Term) and isinstance(b, Term):
+            if a.structure_hash != b.structure_hash or a.op != b.op or len(a.args) != len(b.args):
+                return False
+            stack.extend(zip(a.args, b.args, strict=True))
+        elif isinstance(a, Expression) or isinstance(b, Expression) or a != b:
+            return False
+    return True
 
 
-def substitute(e: Operand, values: Mapping[Expression, Operand], memo: Memo | None = None) -> Operand:
+def substitute(e: Operand, values: Mapping[Expression, Operand]) -> Operand:
     """Replace variables or subexpressions by values; unchanged parts are shared."""
-    memo = {} if memo is None else memo
-    if id(e) in memo:
-        return memo[id(e)]
-    new = e
-    if isinstance(e, Expression) and e in values:
-        new = values[e]
-    elif isinstance(e, Output):
-        new = substitute(e.expression, values, memo)
-        new = e if new is e.expression else new
-    elif isinstance(e, Term):
-        args = [substitute(argument, values, memo) for argument in e.args]
-        new = e if all(a is b for a, b in zip(args, e.args, strict=True)) else build_term(e.op, *args)
-    memo[id(e)] = new
-    return new
+
+    def is_replaced(part: Operand) -> bool:
+        return isinstance(part, Expression) and part in values
+
+    result: Memo = {}
+    for part in operands_first(e, operands_of=lambda part: () if is_replaced(part) else operands(part)):
+        result[id(part)] = values[part] if is_replaced(part) else with_operands(part, result)
+    return result[id(e)]
+
+
+def with_operands(e: Operand, new_operands: Memo) -> Operand:
+    """Return an expression with other operands, given by the identities of its own; itself if none changes."""
+    if isinstance(e, Output):
+        new = new_operands[id(e.expression)]
+        return e if new is e.expression else new
+    if not isinstance(e, Term):
+        return e
+    args = [new_operands[id(argument)] for argument in e.args]
+    return e if all(a is b for a, b in zip(args, e.args, strict=True)) else build_term(e.op, *args)
 
 
 def is_constant(e: Operand, value: float) -> bool:
@@ -172,36 +233,32 @@ def negate(e: Operand) -> Operand:
     return Term("neg", e)
 
 
-def differentiate(
-    e: Operand,
-    by: Mapping[Expression, Operand],
-    names: dict[Expression, str] | None = None,
-    memo: Memo | None = None,
-) -> Operand:
+def differentiate(e: Operand, by: Mapping[Expression, Operand], names: dict[Expression, str] | None = None) -> Operand:
     """Return the derivative of e, where `by` gives the derivatives of the variables.
 
     New terms that are derivatives of named terms are added to `names`.
     """
     names = {} if names is None else names
-    memo = {} if memo is None else memo
-    if id(e) in memo:
-        return memo[id(e)]
-    if not isinstance(e, Expression) or e in by or not depends_on(e, by):
-        return by.get(e, 0.0)
+    existing, moving, result = subexpressions(e), dependents([e], by), Memo()
 
-    def slope(operand: Operand) -> Operand:
-        return differentiate(operand, by, names, memo)
+    def moving_operands(part: Operand) -> tuple[Operand, ...]:
+        if id(part) not in moving or part in by or getattr(part, "op", "") == "copysign":
+            return ()
+        return value_operands(part)
 
-    if isinstance(e, Output):
-        new = slope(e.expression)
-    else:
-        assert isinstance(e, Term)
-        new = _differentiate_term(e, slope)
-    name = e.name or names.get(e, "")
-    if name and isinstance(new, Term) and not (new.name or new in names) and id(new) not in subexpressions(e):
-        names[new] = f"d{name}_d{next(iter(by)).name}"
-    memo[id(e)] = new
-    return new
+    for part in operands_first(e, operands_of=moving_operands):
+        if id(part) not in moving or part in by:
+            new = by.get(part, 0.0)
+        elif isinstance(part, Output):
+            new = result[id(part.expression)]
+        else:
+            assert isinstance(part, Term)
+            new = _differentiate_term(part, lambda operand: result[id(operand)])
+        result[id(part)] = new
+        name = (part.name or names.get(part, "")) if isinstance(part, (Term, Output)) and part not in by else ""
+        if name and isinstance(new, Term) and not (new.name or new in names) and id(new) not in existing:
+            names[new] = f"d{name}_d{next(iter(by)).name}"
+    return result[id(e)]
 
 
 def _differentiate_term(e: Term, slope: Callable[[Operand], Operand]) -> Operand:
@@ -235,89 +292,116 @@ def _apply_chain_rule(outer: Operand, inner: Operand) -> Operand:
     return build_term("*", outer, inner)
 
 
+def path_to(e: Operand, leaf: Expression) -> list[tuple[Expression, int]] | None:
+    """Return the terms around the only occurrence of a variable, each with the index of the operand that contains it.
+
+    The outermost term comes first.  None if the variable does not occur, or occurs several times.
+    """
+    counts: dict[int, int] = {id(leaf): 1}
+    for part in operands_first(e, operands_of=lambda part: () if part is leaf else operands(part)):
+        if part is not leaf:  # 2 stands for several: the exact number may double with each shared term
+            counts[id(part)] = min(2, sum(counts[id(operand)] for operand in operands(part)))
+    if counts[id(e)] != 1:
+        return None
+    result = []
+    while e is not leaf:
+        index = next(i for i, operand in enumerate(operands(e)) if counts[id(operand)])
+        result.append((e, index))
+        e = operands(e)[index]
+    return result
+
+
 def solve_for(e: Operand, leaf: Expression) -> Operand:
     """Solve e = 0 for a variable that occurs once in e, by inverting the operations from the outside."""
     right: Operand = 0.0
-    while e is not leaf:
-        if isinstance(e, Output):
-            e = e.expression
+    path = path_to(e, leaf)
+    assert path is not None
+    for term, index in path:
+        if not isinstance(term, Term):  # an Output
             continue
-        a, b = e.args[0], e.args[-1]
-        is_in_first = count_occurrences(a, leaf) > 0
-        match e.op:
+        a, b = term.args[0], term.args[-1]
+        is_in_first = index == 0
+        match term.op:
             case "+":
-                e, right = (a, build_term("-", right, b)) if is_in_first else (b, build_term("-", right, a))
+                right = build_term("-", right, b if is_in_first else a)
             case "-":
-                e, right = (a, build_term("+", right, b)) if is_in_first else (b, build_term("-", a, right))
+                right = build_term("+", right, b) if is_in_first else build_term("-", a, right)
             case "neg":
-                e, right = a, build_term("neg", right)
+                right = build_term("neg", right)
             case "*":
-                e, right = (a, build_term("/", right, b)) if is_in_first else (b, build_term("/", right, a))
+                right = build_term("/", right, b if is_in_first else a)
             case "/" if is_in_first:
-                e, right = a, build_term("*", right, b)
+                right = build_term("*", right, b)
             case _:
-                raise ModelError(f"{leaf.name} must enter the rates linearly, not through {e.op}", e.location)
+                raise ModelError(f"{leaf.name} must enter the rates linearly, not through {term.op}", term.location)
     return right
 
 
 def is_summand(e: Operand, leaf: Expression) -> bool:
     """Return whether the variable is a summand of the expression."""
-    if not isinstance(e, Term):
-        return e is leaf or any(is_summand(operand, leaf) for operand in operands(e))
-    return (
-        count_occurrences(e, leaf) == 1
-        and e.op in ("+", "-", "neg")
-        and any(is_summand(operand, leaf) for operand in e.args)
-    )
+    path = path_to(e, leaf)
+    return path is not None and all(term.op in ("+", "-", "neg") for term, _ in path if isinstance(term, Term))
 
 
 def is_factor(e: Operand, leaf: Expression) -> bool:
     """Return whether the expression is a product of the variable and other factors that do not contain it."""
-    if not isinstance(e, Term):
-        return e is leaf or any(is_factor(operand, leaf) for operand in operands(e))
-    if count_occurrences(e, leaf) != 1 or e.op not in ("*", "/", "neg"):
-        return False
-    return any(is_factor(operand, leaf) for operand in (e.args[:1] if e.op == "/" else e.args))
+    path = path_to(e, leaf)
+    return path is not None and all(
+        term.op in ("*", "neg") or (term.op == "/" and index == 0) for term, index in path if isinstance(term, Term)
+    )
 
 
 def rounding_scale(e: Operand) -> Operand:
     """Return a bound on the magnitude of the terms of e; rounding errors of e are relative to it."""
-    if not isinstance(e, Expression):
-        return abs(e)
-    if isinstance(e, Output):
-        return rounding_scale(e.expression)
-    if isinstance(e, Parameter) and (e.low >= 0.0 or e.above >= 0.0):
-        return e
-    if not isinstance(e, Term):
-        return Term("fabs", e)
-    result = _term_rounding_scale(e)
-    return e if is_same_expression(result, e) else result
+    return rounding_scales([e])[0]
 
 
-def _term_rounding_scale(e: Term) -> Operand:
+def rounding_scales(expressions: Sequence[Operand]) -> list[Operand]:
+    """Return the rounding scales of expressions."""
+    result: Memo = {}
+    for part in operands_first(*expressions, operands_of=value_operands):
+        if not isinstance(part, Expression):
+            scale = abs(part)
+        elif isinstance(part, Output):
+            scale = result[id(part.expression)]
+        elif isinstance(part, Parameter) and (part.low >= 0.0 or part.above >= 0.0):
+            scale = part
+        elif isinstance(part, Term):
+            scale = _term_rounding_scale(part, result)
+            scale = part if is_same_expression(scale, part) else scale
+        else:
+            scale = Term("fabs", part)
+        result[id(part)] = scale
+    return [result[id(e)] for e in expressions]
+
+
+def _term_rounding_scale(e: Term, scales: Memo) -> Operand:
     a, b = e.args[0], e.args[-1]
     match e.op:
-        case "+" | "-":
-            return build_term("+", rounding_scale(a), rounding_scale(b))
-        case "*":
-            return build_term("*", rounding_scale(a), rounding_scale(b))
+        case "+" | "-" | "*":
+            return build_term("*" if e.op == "*" else "+", scales[id(a)], scales[id(b)])
         case "/":
-            return build_term("/", rounding_scale(a), rounding_scale(b) if not isinstance(b, Term) else Term("fabs", b))
+            return build_term("/", scales[id(a)], scales[id(b)] if not isinstance(b, Term) else Term("fabs", b))
         case "neg" | "fabs" | "sin" | "atan" | "tanh":  # slope at most 1, zero at zero
-            return rounding_scale(a)
+            return scales[id(a)]
         case "choose":
-            return build_term("choose", a, rounding_scale(e.args[1]), rounding_scale(b))
-    slope = build_term("*", Term("fabs", FUNCTIONS[e.op](a, e)), rounding_scale(a)) if e.op in FUNCTIONS else 0.0
+            return build_term("choose", a, scales[id(e.args[1])], scales[id(b)])
+    slope = build_term("*", Term("fabs", FUNCTIONS[e.op](a, e)), scales[id(a)]) if e.op in FUNCTIONS else 0.0
     return build_term("+", Term("fabs", e), slope)
 
 
-def growth_exponent(e: Operand, moving: Collection[Expression]) -> float:
-    """Return the exponent with which an expression grows with the moving variables."""
-    if not depends_on(e, moving):
-        return 0.0
-    if not isinstance(e, (Term, Output)):
+def growth_exponents(expressions: Sequence[Operand], moving: Collection[Expression]) -> list[float]:
+    """Return the exponents with which expressions grow with the moving variables."""
+    varying, result = dependents(expressions, moving), dict[int, float]()
+    for part in operands_first(*expressions):
+        exponents = [result[id(operand)] for operand in operands(part)]
+        result[id(part)] = _growth_exponent(part, exponents) if id(part) in varying else 0.0
+    return [result[id(e)] for e in expressions]
+
+
+def _growth_exponent(e: Operand, exponents: list[float]) -> float:
+    if not exponents:
         return 1.0
-    exponents = [growth_exponent(operand, moving) for operand in operands(e)]
     match getattr(e, "op", "neg"):
         case "+" | "-" | "neg" | "fabs" | "choose":
             return max(exponents)

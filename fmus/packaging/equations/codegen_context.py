@@ -2,7 +2,17 @@
 
 from collections.abc import Collection, Sequence
 
-from .algebra import depends_on, operands, subexpressions, substitute
+from .algebra import (
+    Memo,
+    dependents,
+    depends_on,
+    operands,
+    operands_first,
+    subexpressions,
+    substitute,
+    unconditional_operands,
+    unconditional_quotients,
+)
 from .conditions import LIMITED_DOMAIN
 from .expression_printer import INDENT, ExpressionPrinter
 from .expressions import Expression, Operand, Term
@@ -11,6 +21,7 @@ from .model_declaration import Contact
 from .model_roles import TIME
 
 MAX_RETURN_LENGTH = 100  # characters
+MAX_CHOICE_TESTS = 5  # for which a method has blocks: each test doubles their number
 OVERFLOWING = ("exp", "sinh", "cosh")  # functions that raise an error for large arguments
 
 
@@ -51,41 +62,49 @@ class CodegenContext:
 
         Those in cases of choose() may be undefined where the case is not used; they are computed if they cannot fail.
         """
-        analysis, result = self.analysis, {}
-        case_roots: list[Operand] = []
-        safe_divisors: set[int] = set()  # other equations divide by them
-
-        def walk(e: Operand, in_case: bool) -> None:
-            is_constant = (
-                isinstance(e, Term)
-                and self.name_of(e)
-                and not depends_on(e, (*analysis.time_varying, *analysis.inputs))
-            )
-            if is_constant and not (in_case and can_fail(e, safe_divisors)):
-                result[id(e)] = e
-                return
-            if isinstance(e, Term) and e.op == "choose" and not in_case:
-                case_roots.extend(e.args[1:])
-                walk(e.args[0], in_case)
-                return
-            if isinstance(e, Term) and e.op == "/" and not in_case:
-                safe_divisors.add(id(e.args[1]))
-            for operand in operands(e):
-                walk(operand, in_case)
-
+        analysis = self.analysis
+        result: dict[int, Term] = {}
+        roots: list[Operand] = []
         for c in analysis.contacts:
-            for e in (
-                c.slide,
-                analysis.holding_limit[c],
-                c.eps,
-                *(analysis.A[c, d] for d in analysis.contacts if not analysis.rests_when_stuck),
-            ):
-                walk(e, in_case=False)
-        for e in analysis.outputs:
-            walk(e, in_case=False)
-        for e in case_roots:
-            walk(e, in_case=True)
+            roots += [c.slide, analysis.holding_limit[c], c.eps]
+            roots += [] if analysis.rests_when_stuck else [analysis.A[c, d] for d in analysis.contacts]
+        roots += analysis.outputs
+        moving = dependents(roots, (*analysis.time_varying, *analysis.inputs))
+        can_fail = self._expressions_that_can_fail(roots)
+        case_roots: list[Operand] = []
+
+        def find_constants(targets: Sequence[Operand], in_case: bool) -> None:
+            stack, visited = [*reversed(targets)], set()
+            while stack:
+                e = stack.pop()
+                if id(e) in visited:
+                    continue
+                visited.add(id(e))
+                is_constant = isinstance(e, Term) and self.name_of(e) and id(e) not in moving
+                if is_constant and not (in_case and id(e) in can_fail):
+                    result[id(e)] = e
+                elif in_case:
+                    stack.extend(reversed(operands(e)))
+                else:
+                    stack.extend(reversed(unconditional_operands(e)))
+                    case_roots.extend(operands(e)[len(unconditional_operands(e)) :])
+
+        find_constants(roots, in_case=False)
+        find_constants(case_roots, in_case=True)
         return list(result.values())
+
+    def _expressions_that_can_fail(self, roots: Sequence[Operand]) -> set[int]:
+        """Return the identities of expressions with an operation that may raise an error for some parameters.
+
+        A division outside of the cases of choose() cannot fail, because a rule refuses divisors that are zero.
+        """
+        safe_divisors = {id(quotient.args[1]) for quotient in unconditional_quotients(roots)}
+        result: set[int] = set()
+        for e in operands_first(*roots):
+            is_limited = isinstance(e, Term) and e.op in LIMITED_DOMAIN and id(e.args[-1]) not in safe_divisors
+            if is_limited or getattr(e, "op", "") in OVERFLOWING or any(id(part) in result for part in operands(e)):
+                result.add(id(e))
+        return result
 
     def printer(self, depth: int = 2, on_trial: Collection[Expression] = ()) -> ExpressionPrinter:
         """Create a printer for a method, or for a block in it; see `ExpressionPrinter` for `on_trial`."""
@@ -135,12 +154,16 @@ class CodegenContext:
                 printer.emit(f"{c.mode.name} = sign({printer.text(c.slip)})")
 
     def return_lines(self, printer: ExpressionPrinter, targets: Sequence[Operand]) -> list[str]:
-        """Return the lines that return the targets, with one block for each item of a choice that they use."""
-        test = next((result for e in targets if (result := find_choice_test(e)) is not None), None)
-        if test is None:
+        """Return the lines that return the targets.
+
+        They have one block for each item of a choice that the targets use, unless there would be too many blocks.
+        """
+        tests = choice_tests(targets)
+        if not 0 < len(tests) <= MAX_CHOICE_TESTS:
             self.emit_driver(printer, targets)
             printer.count_uses(*targets)
             return emit_return(printer, targets)
+        test = tests[0]
         with printer.block(f"if {printer.text(test)}:"):
             printer.lines += self.return_lines(
                 self.printer(printer.depth, printer.on_trial), [substitute(e, {test: True}) for e in targets]
@@ -195,15 +218,9 @@ def rule_status(n: int) -> str:
     return f"MODEL_RULE + {n}" if n else "MODEL_RULE"
 
 
-def can_fail(e: Operand, safe_divisors: Collection[int]) -> bool:
-    """Return whether an operation in the expression may raise an error for some values of the parameters."""
-    return any(
-        isinstance(term, Term)
-        and (term.op in OVERFLOWING or (term.op in LIMITED_DOMAIN and id(term.args[-1]) not in safe_divisors))
-        for term in subexpressions(e).values()
-    )
-
-
-def find_choice_test(e: Operand) -> Term | None:
-    """Return a comparison with a choice in the expression, or None."""
-    return next((term for term in subexpressions(e).values() if isinstance(term, Term) and term.op == "=="), None)
+def choice_tests(targets: Sequence[Operand]) -> list[Term]:
+    """Return the comparisons with choices in the targets, in the order of the source text."""
+    parts: Memo = {}
+    for e in targets:
+        subexpressions(e, parts)
+    return [term for term in parts.values() if isinstance(term, Term) and term.op == "=="]

@@ -4,12 +4,23 @@ A condition of choose() that depends on states or time keeps its value during a 
 equations are smooth in every step.  Limits must hold during the whole run.
 """
 
-from collections.abc import Collection, Iterable
+from collections import defaultdict
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass
 
-from .algebra import depends_on, is_constant, is_same_expression, operands, subexpressions, substitute, variables_in
+from .algebra import (
+    Memo,
+    dependents,
+    is_constant,
+    is_same_expression,
+    operands,
+    operands_first,
+    subexpressions,
+    variables_in,
+    with_operands,
+)
 from .expressions import COMPARISONS, Expression, Operand, Term, is_among
-from .model_declaration import Contact, Model, Output, SettableVariable, State
+from .model_declaration import Contact, Model, Output, SettableVariable, State, Variable
 
 LIMITED_DOMAIN = ("sqrt", "log", "asin", "acos", "/")  # operations that fail for some operands
 HOLD_TOLERANCE = 1e-9  # the sliding force may exceed the holding force by rounding errors
@@ -28,53 +39,82 @@ class Condition:
 
 def find_conditions(targets: Iterable[Operand], varying: Iterable[Expression]) -> list[Condition]:
     """Find the conditions of choose() in some equations that depend on `varying`; equal ones are one condition."""
-    varying = tuple(varying)
+    varying, targets = tuple(varying), tuple(targets)
+    moving = dependents(targets, varying)
     terms = [e for target in targets for e in subexpressions(target).values() if isinstance(e, Term)]
     terms = list({id(e): e for e in terms}.values())
     groups: list[list[Term]] = []
+    group_by_hash: defaultdict[int, list[list[Term]]] = defaultdict(list)
+
+    def find_group(e: Term) -> list[Term] | None:
+        return next((group for group in group_by_hash[e.structure_hash] if is_same_expression(group[0], e)), None)
+
+    def find_side(kink: Term) -> Term | None:
+        group = find_group(Term(">", kink.args[0], 0.0))
+        return group[0] if group else None
+
+    def add_group(e: Term) -> None:
+        groups.append([e])
+        group_by_hash[e.structure_hash].append(groups[-1])
+
     for e in terms:
-        if e.op in COMPARISONS and depends_on(e, varying):
-            group = next((candidate for candidate in groups if is_same_expression(candidate[0], e)), None)
-            if group is None:
-                groups.append([e])
+        if e.op in COMPARISONS and id(e) in moving:
+            if (group := find_group(e)) is None:
+                add_group(e)
             else:
                 group.append(e)
+    visited: set[int] = set()
+    margins = []
     for group in groups:  # grows: a kink may lie within another one
-        for e in kinks(comparison_margin(group[0])):
+        margins.append(comparison_margin(group[0]))
+        for e in kinks(margins[-1], visited):
             side = Term(">", e.args[0], 0.0)
             side.location = e.location
-            if depends_on(e, varying) and not any(is_same_expression(other[0], side) for other in groups):
-                groups.append([side])
-    protecting = {id(comparison) for e in terms for comparison in protected_comparisons(e, varying)}
+            if id(e) in moving and find_group(side) is None:
+                add_group(side)
+    protecting = protected_comparisons(targets, varying)
+    # A search on a polynomial would pass the narrow dip of fabs(u) - b without a zero; u itself has none.
+    margins = replace_absolute_values(margins, lambda kink, _: find_side(kink))
     return [
-        Condition(
-            without_kinks(comparison_margin(group[0]), groups),
-            group[0].args,
-            tuple(group),
-            not any(id(e) in protecting for e in group),
-        )
-        for group in groups
+        Condition(margin, group[0].args, tuple(group), protecting.isdisjoint(map(id, group)))
+        for group, margin in zip(groups, margins, strict=True)
     ]
 
 
-def kinks(e: Operand) -> list[Term]:
-    """Return the absolute values in an expression, those of terms that contain others last."""
-    return [term for term in reversed(subexpressions(e).values()) if isinstance(term, Term) and term.op == "fabs"]
+def kinks(e: Operand, visited: set[int]) -> list[Term]:
+    """Return the absolute values in an expression that were not visited yet; those inside of others come first."""
+    parts = operands_first(e, operands_of=lambda part: () if id(part) in visited else operands(part))
+    result = [term for term in parts if isinstance(term, Term) and term.op == "fabs" and id(term) not in visited]
+    visited.update(map(id, parts))
+    return result
 
 
-def without_kinks(e: Operand, groups: list[list[Term]]) -> Operand:
-    """Return an expression with its absolute values as cases of the comparisons u > 0 among the groups.
+def replace_absolute_values(
+    expressions: Sequence[Operand],
+    comparison: Callable[[Term, Operand], Term | None],
+    unchanged: Collection[Expression] = (),
+) -> list[Operand]:
+    """Return expressions with choose() in place of absolute values.
 
-    A search on a polynomial would pass the narrow dip of fabs(u) - b without a zero; u itself has none.
+    Parameters
+    ----------
+    expressions
+        Expressions, which are not changed.
+    comparison
+        Gets an absolute value and its new operand u; returns the condition u > 0, or None to keep the absolute value.
+    unchanged
+        Outputs that expressions continue to contain.
     """
-    values: dict[Expression, Operand] = {}
-    for kink in kinks(e):
-        (u,) = kink.args
-        for comparison, *_ in groups:
-            if comparison.op == ">" and is_same_expression(comparison, Term(">", u, 0.0)):
-                smooth = substitute(u, values)
-                values[kink] = Term("choose", comparison, smooth, Term("neg", smooth))
-    return substitute(e, values)
+    result: Memo = {}
+    for part in operands_first(*expressions):
+        new = with_operands(part, result)
+        if isinstance(part, Term) and part.op == "fabs":
+            u = result[id(part.args[0])]
+            if (condition := comparison(part, u)) is not None:
+                new = Term("choose", condition, u, Term("neg", u))
+                new.location = part.location
+        result[id(part)] = part if isinstance(part, Output) and part in unchanged else new
+    return [result[id(e)] for e in expressions]
 
 
 def locate_kinks(model: type[Model]) -> None:
@@ -92,30 +132,34 @@ def locate_kinks(model: type[Model]) -> None:
         for s in variables_in(c.slip)
         if isinstance(s, State) and s.constant_rate is None and not is_among(s, positions)
     ]
-    for e in declared if contacts else ():  # an output before the outputs that use it
-        if isinstance(e, Output):
-            e.expression = without_absolute_values(e.expression, speeds)
-        elif isinstance(e, Contact):
-            e.slide = without_absolute_values(e.slide, speeds)
-            e.hold = None if e.hold is None else without_absolute_values(e.hold, speeds)
+    if not contacts:
+        return
+    outputs = {e for e in declared if isinstance(e, Output)}
+    slots: list[tuple[Variable, str]] = [(e, "expression") for e in declared if isinstance(e, Output)]
+    slots += [(c, name) for c in contacts for name in ("slide", "hold")]
+    expressions = [getattr(e, name) for e, name in slots]
+    leaves = [e for e in operands_first(*expressions) if isinstance(e, Variable) and not isinstance(e, Output)]
+    changing, fast = dependents(expressions, leaves), dependents(expressions, speeds)
 
+    def comparison(kink: Term, u: Operand) -> Term | None:
+        if id(kink) not in changing or id(kink) in fast:
+            return None
+        condition = Term(">", u, 0.0)
+        condition.location = kink.location
+        return condition
 
-def without_absolute_values(e: Operand, speeds: Collection[Expression]) -> Operand:
-    """Return an expression with choose() in place of the absolute values that do not depend on the speeds."""
-    values: dict[Expression, Operand] = {}
-    for kink in kinks(e):
-        if variables_in(kink) and not depends_on(kink, speeds):
-            u = substitute(kink.args[0], values)
-            comparison = Term(">", u, 0.0)
-            values[kink] = Term("choose", comparison, u, Term("neg", u))
-            comparison.location = values[kink].location = kink.location
-    return substitute(e, values)
+    for (e, name), new in zip(slots, replace_absolute_values(expressions, comparison, outputs), strict=True):
+        setattr(e, name, new)
 
 
 def is_absolute_value(e: Term) -> bool:
     """Return whether a term is choose(u > 0, u, -u)."""
     condition, this, that = e.args
-    return is_positive_part(condition, this) and is_same_expression(that, Term("neg", this))
+    return (
+        is_lower_bound(condition, this)
+        and is_constant(condition.args[1], 0.0)
+        and is_same_expression(that, Term("neg", this))
+    )
 
 
 def comparison_margin(e: Term) -> Operand:
@@ -127,102 +171,135 @@ def comparison_margin(e: Term) -> Operand:
     return Term("+", margin, 1e-300) if e.op in ("<=", ">=") else margin
 
 
-def protected_comparisons(e: Term, varying: tuple[Expression, ...]) -> list[Term]:
-    """Return the comparisons that keep an operation inside its domain; they must be evaluated where it is.
+def protected_comparisons(targets: Collection[Operand], varying: Collection[Expression]) -> set[int]:
+    """Return the identities of the comparisons that keep an operation inside its domain.
 
-    These are the conditions around the operation and those inside its operand, if they depend on what the operand
-    depends on.
+    They must be evaluated where the operation is.  These are the conditions around the operation and those inside its
+    operand, if they depend on what the operand depends on.
     """
-    if e.op == "choose":
-        condition, *cases = e.args
-        inside = [term for case in cases for term in subexpressions(case).values()]
-        related = [one for one in variables_in(condition) if is_among(one, varying)]
-        return [condition] if any(has_limited_domain(term, related) for term in inside) else []
-    if has_limited_domain(e, varying):
-        return [term for term in subexpressions(e).values() if isinstance(term, Term) and term.op in COMPARISONS]
-    return []
+    moving = dependents(targets, varying)
+    order = operands_first(*targets)
+    bits = {id(e): 1 << n for n, e in enumerate(varying)}
+    related: dict[int, int] = {}  # bits of the variables on which an expression depends
+    needed: dict[int, int] = {}  # bits of the variables that decide whether its operations have a value
+    for e in order:
+        related[id(e)], needed[id(e)] = bits.get(id(e), 0), 0
+        for operand in operands(e):
+            related[id(e)] |= related[id(operand)]
+            needed[id(e)] |= needed[id(operand)]
+        if isinstance(e, Term) and e.op in LIMITED_DOMAIN:
+            needed[id(e)] |= related[id(e.args[-1])]
+    chooses = [e for e in order if isinstance(e, Term) and e.op == "choose"]
+    around = [
+        e.args[0]
+        for e in chooses
+        if any(related[id(e.args[0])] & needed[id(case)] for case in e.args[1:]) and isinstance(e.args[0], Term)
+    ]
+    operations = [e for e in order if isinstance(e, Term) and e.op in LIMITED_DOMAIN and id(e.args[-1]) in moving]
+    inside = [e for e in operands_first(*operations) if isinstance(e, Term) and e.op in COMPARISONS]
+    return {id(e) for e in (*around, *inside)}
 
 
-def has_limited_domain(e: Operand, varying: Collection[Expression]) -> bool:
-    """Return whether an operation fails for some values of the variables."""
-    return isinstance(e, Term) and e.op in LIMITED_DOMAIN and depends_on(e.args[-1], varying)
+class Signs:
+    """Finds expressions whose form shows that they are never negative, or never positive; visits each one once."""
 
+    def __init__(self) -> None:
+        self._nonnegative: dict[int, bool] = {}
+        self._nonpositive: dict[int, bool] = {}
+        self._visited: list[Operand] = []  # keeps id() unique
 
-def is_in_domain(e: Term) -> bool:
-    """Return whether the form of the operand of a function shows that the function has a finite value there."""
-    (u,) = e.args
-    return (e.op == "sqrt" and is_nonnegative(u)) or (e.op == "exp" and (is_nonpositive(u) or is_decay(e)))
+    def is_nonnegative(self, e: Operand) -> bool:
+        """Return whether the form of an expression shows that it is never negative."""
+        self._visit(e)
+        return self._nonnegative[id(e)]
+
+    def is_in_domain(self, e: Term) -> bool:
+        """Return whether the form of the operand of a function shows that the function has a finite value there."""
+        (u,) = e.args
+        self._visit(u)
+        return (e.op == "sqrt" and self._nonnegative[id(u)]) or (
+            e.op == "exp" and (self._nonpositive[id(u)] or self._is_decay(e))
+        )
+
+    def _visit(self, e: Operand) -> None:
+        for part in operands_first(e, operands_of=lambda part: () if id(part) in self._nonnegative else operands(part)):
+            if id(part) not in self._nonnegative:
+                self._visited.append(part)
+                self._nonpositive[id(part)] = self._has_nonpositive_form(part)
+                self._nonnegative[id(part)] = self._has_nonnegative_form(part)
+
+    def _has_nonnegative_form(self, e: Operand) -> bool:
+        if not isinstance(e, Expression):
+            return e >= 0.0
+        if isinstance(e, SettableVariable):
+            return e.low >= 0.0 or e.above >= 0.0
+        signs = [self._nonnegative[id(operand)] for operand in operands(e)]
+        if not isinstance(e, Term):
+            return bool(signs) and all(signs)
+        match e.op:
+            case "fabs" | "sqrt" | "exp" | "cosh":
+                return True
+            case "*" if is_same_expression(e.args[0], e.args[1]):
+                return True
+            case "+" if self._is_weighted_mean(*e.args):
+                return True
+            case "+" | "*" | "/":
+                return all(signs)
+            case "-":
+                return signs[0] and self._nonpositive[id(e.args[1])]
+            case "choose":
+                return is_absolute_value(e) or all(
+                    self._nonnegative[id(case)] or self._is_positive_part(e.args[0], case) for case in e.args[1:]
+                )
+        return False
+
+    def _has_nonpositive_form(self, e: Operand) -> bool:
+        if not isinstance(e, Term):
+            return not isinstance(e, Expression) and e <= 0.0
+        a, b = id(e.args[0]), id(e.args[-1])
+        nonnegative, nonpositive = self._nonnegative, self._nonpositive
+        match e.op:
+            case "neg":
+                return nonnegative[a]
+            case "*" | "/":
+                return (nonpositive[a] and nonnegative[b]) or (nonnegative[a] and nonpositive[b])
+        return False
+
+    def _is_weighted_mean(self, a: Operand, difference: Operand) -> bool:
+        """Return whether a + difference is a + (b - a) * w with nonnegative a and b and a weight w between 0 and 1."""
+        if not (isinstance(difference, Term) and difference.op == "*" and isinstance(difference.args[0], Term)):
+            return False
+        b_minus_a, weight = difference.args
+        return (
+            b_minus_a.op == "-"
+            and is_same_expression(b_minus_a.args[1], a)
+            and self._nonnegative[id(a)]
+            and self._nonnegative[id(b_minus_a.args[0])]
+            and self._is_decay(weight)
+        )
+
+    def _is_decay(self, e: Operand) -> bool:
+        """Return whether an expression is exp(-x) with a nonnegative x."""
+        if not (isinstance(e, Term) and e.op == "exp" and isinstance(e.args[0], Term)):
+            return False
+        exponent = e.args[0]
+        first = exponent.args[0]
+        if exponent.op in ("*", "/") and isinstance(first, Term) and first.op == "neg":  # -x * x is (-x) * x
+            x, other = first.args[0], exponent.args[1]
+            is_square = exponent.op == "*" and is_same_expression(x, other)
+            return is_square or (self._nonnegative[id(x)] and self._nonnegative[id(other)])
+        return exponent.op == "neg" and self._nonnegative[id(first)]
+
+    def _is_positive_part(self, condition: Operand, case: Operand) -> bool:
+        """Return whether a case is chosen only where it is positive, as in choose(x > 0, x, 0)."""
+        return is_lower_bound(condition, case) and self._nonnegative[id(condition.args[1])]
 
 
 def is_nonnegative(e: Operand) -> bool:
     """Return whether the form of an expression shows that it is never negative."""
-    if not isinstance(e, Expression):
-        return e >= 0.0
-    if isinstance(e, SettableVariable):
-        return e.low >= 0.0 or e.above >= 0.0
-    if not isinstance(e, Term):
-        return bool(operands(e)) and all(map(is_nonnegative, operands(e)))
-    match e.op:
-        case "fabs" | "sqrt" | "exp" | "cosh":
-            return True
-        case "*" if is_same_expression(e.args[0], e.args[1]):
-            return True
-        case "+" if is_weighted_mean(*e.args):
-            return True
-        case "+" | "*" | "/":
-            return all(map(is_nonnegative, e.args))
-        case "-":
-            return is_nonnegative(e.args[0]) and is_nonpositive(e.args[1])
-        case "choose":
-            return is_absolute_value(e) or all(
-                is_nonnegative(case) or is_positive_part(e.args[0], case) for case in e.args[1:]
-            )
-    return False
+    return Signs().is_nonnegative(e)
 
 
-def is_nonpositive(e: Operand) -> bool:
-    """Return whether the form of an expression shows that it is never positive."""
-    if not isinstance(e, Term):
-        return not isinstance(e, Expression) and e <= 0.0
-    a, b = e.args[0], e.args[-1]
-    match e.op:
-        case "neg":
-            return is_nonnegative(a)
-        case "*" | "/":
-            return (is_nonpositive(a) and is_nonnegative(b)) or (is_nonnegative(a) and is_nonpositive(b))
-    return False
-
-
-def is_weighted_mean(a: Operand, difference: Operand) -> bool:
-    """Return whether a + difference is a + (b - a) * w with nonnegative a and b and a weight w between 0 and 1."""
-    if not (isinstance(difference, Term) and difference.op == "*" and isinstance(difference.args[0], Term)):
-        return False
-    b_minus_a, weight = difference.args
-    return (
-        b_minus_a.op == "-"
-        and is_same_expression(b_minus_a.args[1], a)
-        and is_nonnegative(a)
-        and is_nonnegative(b_minus_a.args[0])
-        and is_decay(weight)
-    )
-
-
-def is_decay(e: Operand) -> bool:
-    """Return whether an expression is exp(-x) with a nonnegative x."""
-    if not (isinstance(e, Term) and e.op == "exp" and isinstance(e.args[0], Term)):
-        return False
-    exponent = e.args[0]
-    first = exponent.args[0]
-    if exponent.op in ("*", "/") and isinstance(first, Term) and first.op == "neg":  # -x * x is (-x) * x
-        return is_nonnegative(Term(exponent.op, first.args[0], exponent.args[1]))
-    return exponent.op == "neg" and is_nonnegative(first)
-
-
-def is_positive_part(condition: Operand, case: Operand) -> bool:
-    """Return whether a case is chosen only where it is positive, as in choose(x > 0, x, 0)."""
-    return (
-        isinstance(condition, Term)
-        and condition.op in (">", ">=")
-        and is_nonnegative(condition.args[1])
-        and is_same_expression(condition.args[0], case)
-    )
+def is_lower_bound(condition: Operand, e: Operand) -> bool:
+    """Return whether a condition is e > bound or e >= bound."""
+    return isinstance(condition, Term) and condition.op in (">", ">=") and is_same_expression(condition.args[0], e)

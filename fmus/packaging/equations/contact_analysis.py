@@ -7,13 +7,13 @@ from functools import cached_property
 
 from .algebra import (
     build_term,
-    count_occurrences,
     depends_on,
     has_condition_on,
     is_factor,
     is_same_expression,
     is_summand,
     negate,
+    path_to,
     solve_for,
     substitute,
     variables_in,
@@ -71,7 +71,7 @@ class ContactAnalysis(ModelRoles):
                 e = substitute(self.slip_rate[c], {d: 0.0 for d in self.contacts if d is not c})
                 load = (
                     solve_for(e, c)
-                    if count_occurrences(e, c) == 1 and not is_among(c, self.variable_lever_contacts)
+                    if path_to(e, c) is not None and not is_among(c, self.variable_lever_contacts)
                     else build_term("/", substitute(e, {c: 0.0}), self.divisor(c))
                 )
                 self.load[c] = substitute(load, {c.mode: 0.0} | (at_rest if isinstance(c.slip, State) else {}))

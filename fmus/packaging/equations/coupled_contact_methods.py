@@ -8,7 +8,7 @@ derivatives and impulses of the forces satisfy systems with the same matrix.
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from .algebra import build_term, is_same_expression, rounding_scale, substitute
+from .algebra import build_term, is_same_expression, rounding_scales, substitute
 from .codegen_context import CodegenContext, emit_return, emit_scales, method_source
 from .contact_analysis import SMALLEST_DIVISOR
 from .expression_printer import ExpressionPrinter
@@ -190,7 +190,7 @@ def emit_friction_forces(context: CodegenContext, printer: ExpressionPrinter) ->
 def slip_scale_method(context: CodegenContext) -> str:
     """Rounding scales of the slips."""
     printer = context.printer()
-    sizes = emit_scales(context, printer, [rounding_scale(c.slip) for c in context.analysis.contacts])
+    sizes = emit_scales(context, printer, rounding_scales([c.slip for c in context.analysis.contacts]))
     context.emit_driver(printer, sizes)
     return method_source("slip_magnitudes", ["t", *context.states], emit_return(printer, sizes))
 
@@ -198,11 +198,10 @@ def slip_scale_method(context: CodegenContext) -> str:
 def forces_method(context: CodegenContext) -> str:
     """Forces, limits and rounding scales of the forces."""
     analysis, printer, forces = context.analysis, context.printer(), force_unknown(context)
+    scales = rounding_scales([analysis.load.get(c, analysis.slip_rate[c]) for c in analysis.contacts])
     sizes = [
-        rounding_scale(analysis.load[c])
-        if c in analysis.load
-        else build_term("/", rounding_scale(analysis.slip_rate[c]), analysis.divisor(c))
-        for c in analysis.contacts
+        scale if c in analysis.load else build_term("/", scale, analysis.divisor(c))
+        for c, scale in zip(analysis.contacts, scales, strict=True)
     ]
     limits = [analysis.holding_limit[c] for c in analysis.contacts]
     context.emit_driver(printer, [*forces.terms, *limits])

@@ -5,7 +5,7 @@ from sys import float_info
 from typing import Any
 
 from ...runtime.active_method import EXACT_ITEM, METHOD_ITEMS
-from .algebra import depends_on, subexpressions, variables_in
+from .algebra import depends_on, operands, operands_first, subexpressions
 from .expressions import (
     NO_EQUALITY,
     Expression,
@@ -17,7 +17,7 @@ from .expressions import (
     is_comparison,
     is_number,
 )
-from .model_declaration import Choice, Contact, Model, Rule, SettableVariable, Variable
+from .model_declaration import Choice, Contact, Model, Output, Rule, SettableVariable, Variable
 from .model_roles import ModelRoles
 from .reserved_names import RESERVED
 
@@ -28,9 +28,16 @@ METHODS = [label for label, _, _ in (EXACT_ITEM, *METHOD_ITEMS)]
 def check_declarations(analysis: ModelRoles) -> None:
     """Check that all variables are declared in this class, and that modes, starts and rules are valid."""
     known, location = set(analysis.declared), analysis.model.location
+
+    def operands_in_declaration(e: Operand) -> tuple[Operand, ...]:
+        return () if isinstance(e, Output) and e in known else operands(e)
+
     for e in analysis.declared:
         for part in analysis.declared_expressions(e):
-            for leaf in variables_in(part):
+            parts = operands_first(part, operands_of=operands_in_declaration)
+            for leaf in parts:
+                if not isinstance(leaf, Expression) or isinstance(leaf, (Term, Output)):
+                    continue
                 if not leaf.name:
                     raise ModelError(
                         f"{e.name} uses a variable without a name: assign the variable to a name in the class first",
@@ -38,7 +45,7 @@ def check_declarations(analysis: ModelRoles) -> None:
                     )
                 if leaf not in known:
                     raise ModelError(f"{e.name} uses {leaf.name}, which is not declared in {analysis.name}", e.location)
-            _check_choices(e, part)
+            _check_choices(e, parts)
         _check_variable(analysis, e)
         _check_alias(analysis, e)
     for mode in analysis.modes:
@@ -94,11 +101,10 @@ def check_declarations(analysis: ModelRoles) -> None:
     _check_printable(analysis.name, location, analysis.model.__doc__.replace("\n", " "))
 
 
-def _check_choices(e: Variable, part: Operand) -> None:
-    """Check that an expression does not calculate with the number of a Choice."""
-    for term in subexpressions(part).values():
-        parts = term.args if isinstance(term, Term) and term.op != "==" else ()
-        for choice in (*parts, part):
+def _check_choices(e: Variable, parts: list[Operand]) -> None:
+    """Check that an expression, given by its parts, does not calculate with the number of a Choice."""
+    for term in parts:
+        for choice in (*(term.args if isinstance(term, Term) and term.op != "==" else ()), parts[-1]):
             if isinstance(choice, Choice):
                 cases = ", ".join(f"{label}=..." for label, _, _ in choice.items)
                 raise ModelError(

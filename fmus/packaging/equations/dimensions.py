@@ -1,12 +1,13 @@
 """Checks that the units of expressions agree with the declared units."""
 
 import re
+from collections.abc import Iterable
 from fractions import Fraction
 from typing import Any
 
 from .. import BuildError
 from ..units import SYMBOLS, parse_unit, unit_of
-from .algebra import operands, subexpressions
+from .algebra import operands_first
 from .conditions import is_absolute_value
 from .expression_printer import COMPARISON_OPERATORS
 from .expressions import Expression, ModelError, Operand, Term
@@ -18,6 +19,7 @@ BASE_UNITS = ("kg", "m", "s")  # angles are dimensionless
 DIMENSIONLESS: Dimensions = (Fraction(0), Fraction(0), Fraction(0))
 SECOND: Dimensions = (Fraction(0), Fraction(0), Fraction(1))
 UNIT_SPELLINGS = {symbol.lower(): symbol for symbol in SYMBOLS} | {"sec": "s", "nm": "N.m", "ns": "N.s"}
+MAX_OPERATIONS = 50  # of an expression in a message
 PRECEDENCE = {"+": 1, "-": 1, "*": 2, "/": 2, "neg": 3} | dict.fromkeys(COMPARISON_OPERATORS, 0)
 
 
@@ -60,19 +62,29 @@ def check_dimensions(
 
 def check_frequencies(analysis: ModelAnalysis) -> None:
     """Check that no frequency in Hz is used as an angular velocity; both have the dimension 1/s."""
+    uses: list[tuple[Expression, str, Operand]] = []  # owner, use and value
     for e in analysis.declared:
-        uses: list[tuple[Variable, Operand]] = [(e, e.expression)] if isinstance(e, Output) else []
+        values: list[tuple[Variable, Operand]] = [(e, e.expression)] if isinstance(e, Output) else []
         if isinstance(e, (State, Output)) and e.integrates is not None:
-            uses.append((e.integrates, e))
+            values.append((e.integrates, e))
         if isinstance(e, State) and e.constant_rate is not None:
-            uses.append((e, e.constant_rate))
-        for variable, value in uses:
-            if angle_exponent(variable) > 0 and is_in_hertz(value):
-                raise frequency_error(value, f"{variable.name} is in {variable.unit}", e)
+            values.append((e, e.constant_rate))
+        uses += [(e, f"{one.name} is in {one.unit}", value) for one, value in values if angle_exponent(one) > 0]
         for part in analysis.declared_expressions(e):
-            for term in subexpressions(part).values():
-                if isinstance(term, Term) and term.op in ("sin", "cos", "tan") and is_in_hertz(term.args[0]):
-                    raise frequency_error(term.args[0], f"the argument of {term.op} is an angle in rad", term)
+            uses += [
+                (term, f"the argument of {term.op} is an angle in rad", term.args[0])
+                for term in operands_first(part, operands_of=term_operands)
+                if isinstance(term, Term) and term.op in ("sin", "cos", "tan")
+            ]
+    in_hertz = expressions_in_hertz([value for _, _, value in uses])
+    for owner, use, value in uses:
+        if id(value) in in_hertz:
+            raise frequency_error(value, use, owner)
+
+
+def term_operands(e: Operand) -> tuple[Operand, ...]:
+    """Return the operands of a term; a variable has none, because it declares its unit."""
+    return e.args if isinstance(e, Term) else ()
 
 
 def frequency_error(e: Operand, use: str, owner: Expression) -> ModelError:
@@ -83,26 +95,30 @@ def frequency_error(e: Operand, use: str, owner: Expression) -> ModelError:
     )
 
 
-def is_in_hertz(e: Operand) -> bool:
-    """Return whether an expression counts revolutions: it has a factor in Hz, and none that may convert it."""
-    if isinstance(e, Variable):
-        return "Hz" in e.unit
-    if not isinstance(e, Term):
-        return False
-    match e.op:
-        case "+" | "-" | "neg" | "fabs" | "choose":
-            return any(map(is_in_hertz, e.args))
-        case "*" | "/":
-            others = [one for one in e.args if not is_in_hertz(one)]
-            return len(others) < len(e.args) and not any(map(may_convert_hertz, others))
-    return False
+def expressions_in_hertz(roots: Iterable[Operand]) -> set[int]:
+    """Return the identities of the expressions that count revolutions.
 
-
-def may_convert_hertz(e: Operand) -> bool:
-    """Return whether a factor of a frequency may turn revolutions into an angle: numbers, ratios and angles."""
-    if isinstance(e, Variable):
-        return declared_dimensions(e) == DIMENSIONLESS or angle_exponent(e) != 0
-    return not isinstance(e, Expression) or any(map(may_convert_hertz, operands(e)))
+    They have a factor in Hz and none that may turn revolutions into an angle: numbers, ratios and angles.
+    """
+    in_hertz: set[int] = set()
+    may_convert: set[int] = set()
+    for e in operands_first(*roots, operands_of=term_operands):
+        parts = term_operands(e)
+        counts = [id(part) in in_hertz for part in parts]
+        if isinstance(e, Variable):
+            is_counted = "Hz" in e.unit
+            converts = declared_dimensions(e) == DIMENSIONLESS or angle_exponent(e) != 0
+        else:
+            converts = not isinstance(e, Expression) or any(id(part) in may_convert for part in parts)
+            is_counted = any(counts)
+            if is_counted and e.op in "*/":
+                others = [part for part, is_in_hertz in zip(parts, counts, strict=True) if not is_in_hertz]
+                is_counted = not any(id(part) in may_convert for part in others)
+            elif is_counted:
+                is_counted = e.op in ("+", "-", "neg", "fabs", "choose")
+        in_hertz |= {id(e)} if is_counted else set()
+        may_convert |= {id(e)} if converts else set()
+    return in_hertz
 
 
 def angle_exponent(e: Variable) -> int:
@@ -153,14 +169,17 @@ def dimensions_of(e: Operand, memo: dict[int, Dimensions | None]) -> Dimensions 
     """Return the exponents of an expression; None for zero, which has any unit."""
     if not isinstance(e, Expression):
         return DIMENSIONLESS if e else None
-    if id(e) not in memo:
-        memo[id(e)] = declared_dimensions(e) if isinstance(e, Variable) else _term_dimensions(e, memo)
+    for part in operands_first(e, operands_of=lambda part: () if id(part) in memo else term_operands(part)):
+        if isinstance(part, Expression) and id(part) not in memo:
+            memo[id(part)] = declared_dimensions(part) if isinstance(part, Variable) else _term_dimensions(part, memo)
     return memo[id(e)]
 
 
 def _term_dimensions(e: Expression, memo: dict[int, Dimensions | None]) -> Dimensions | None:
     assert isinstance(e, Term)
-    dimensions = [dimensions_of(argument, memo) for argument in e.args]
+    dimensions = [
+        memo[id(argument)] if isinstance(argument, Expression) else dimensions_of(argument, memo) for argument in e.args
+    ]
     a, b = dimensions[0], dimensions[-1]
     match e.op:
         case "==":
@@ -196,19 +215,28 @@ def _term_dimensions(e: Expression, memo: dict[int, Dimensions | None]) -> Dimen
 
 
 def expression_text(e: Operand, level: int = 0) -> str:
-    """Format an expression for messages; named subexpressions appear by name."""
-    if not isinstance(e, Expression):
-        return f"{e:g}"
-    if e.name and (level or not isinstance(e, Term)):
-        return e.name
-    assert isinstance(e, Term)
-    own = PRECEDENCE.get(e.op, 4)
-    if e.op == "choose" and is_absolute_value(e):
-        text = f"fabs({expression_text(e.args[1])})"
-    elif e.op == "neg":
-        text = f"-{expression_text(e.args[0], 3)}"
-    elif e.op in PRECEDENCE:
-        text = f"{expression_text(e.args[0], own)} {e.op} {expression_text(e.args[1], own + (e.op in '-/'))}"
-    else:
-        text = f"{e.op}({', '.join(map(expression_text, e.args))})"
-    return f"({text})" if own < level else text
+    """Format an expression for messages; named subexpressions appear by name, parts of a long one as an ellipsis."""
+    n_left = MAX_OPERATIONS
+
+    def text(e: Operand, level: int) -> str:
+        nonlocal n_left
+        if not isinstance(e, Expression):
+            return f"{e:g}"
+        if e.name and (level or not isinstance(e, Term)):
+            return e.name
+        assert isinstance(e, Term)
+        if n_left == 0:
+            return "..."
+        n_left -= 1
+        own = PRECEDENCE.get(e.op, 4)
+        if e.op == "choose" and is_absolute_value(e):
+            result = f"fabs({text(e.args[1], 0)})"
+        elif e.op == "neg":
+            result = f"-{text(e.args[0], 3)}"
+        elif e.op in PRECEDENCE:
+            result = f"{text(e.args[0], own)} {e.op} {text(e.args[1], own + (e.op in '-/'))}"
+        else:
+            result = f"{e.op}({', '.join(text(argument, 0) for argument in e.args)})"
+        return f"({result})" if own < level else result
+
+    return text(e, level)

@@ -185,10 +185,13 @@ def describe(value: object) -> str:
 class Term(Expression):
     """An operation or function applied to operands."""
 
+    structure_hash: int  # equal for terms of the same structure
+
     def __init__(self, op: str, *args: Operand) -> None:
         self.location = author_location()
         condition = args[:1] if op == "choose" else ()
         self.op, self.args = op, (*condition, *map(as_operand, args[len(condition) :]))
+        self.structure_hash = hash((op, *(e.structure_hash if isinstance(e, Term) else e for e in self.args)))
 
     def __bool__(self) -> Never:
         raise (

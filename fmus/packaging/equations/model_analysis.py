@@ -4,13 +4,14 @@ from functools import cached_property
 
 from ...runtime.method_registry import methods
 from .algebra import (
+    dependents,
     depends_on,
     factors,
-    growth_exponent,
+    growth_exponents,
     has_condition_on,
     is_same_expression,
     negate,
-    subexpressions,
+    operands_first,
     unconditional_quotients,
     variables_in,
 )
@@ -79,10 +80,10 @@ class ModelAnalysis(ContactAnalysis):
     @property
     def checks_event_steps(self) -> bool:
         """Whether a long step may miss how forces vary: by steep friction laws, or conditions inside of it."""
+        laws = [c.slide for c in self.contacts]
+        moving = dependents(laws, self.states)
         steep_laws = any(
-            isinstance(e, Term) and e.op in STEEP_FUNCTIONS and depends_on(e.args[-1], self.states)
-            for c in self.contacts
-            for e in subexpressions(c.slide).values()
+            isinstance(e, Term) and e.op in STEEP_FUNCTIONS and id(e.args[-1]) in moving for e in operands_first(*laws)
         )
         return steep_laws or not all(condition.is_frozen for condition in self.switches)
 
@@ -167,14 +168,18 @@ class ModelAnalysis(ContactAnalysis):
         if isinstance(e, (Contact, Mode)):
             (c,) = (c for c in self.contacts if e is c or e is c.mode)
             return any(depends_on(expression, self.inputs) for expression in (*self.load_expressions(c), c.slide))
-        return depends_on(e, self.inputs) or any(
-            depends_on(e, (c,)) and self.has_direct_feedthrough(c) for c in self.contacts
-        )
+        return id(e) in self._direct_outputs
+
+    @cached_property
+    def _direct_outputs(self) -> set[int]:
+        """The identities of the expressions in outputs that depend directly on an input."""
+        contacts = [c for c in self.contacts if self.has_direct_feedthrough(c)]
+        return dependents(self.outputs, (*self.inputs, *contacts))
 
     @property
     def overflow_indicators(self) -> list[Variable]:
         """Outputs that are finite only if all are: the energy, if it is quadratic and nothing grows faster."""
-        grows = [growth_exponent(e, self.time_varying) for e in (*self.outputs, *(c.slide for c in self.contacts))]
+        grows = growth_exponents([*self.outputs, *(c.slide for c in self.contacts)], self.time_varying)
         energies = [e for e in self.outputs if e.unit == "J" and all(depends_on(e, (s,)) for s in self.states)]
         if energies and max(grows) <= 2.0:
             return energies[:1]

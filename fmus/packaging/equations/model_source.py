@@ -176,7 +176,8 @@ def class_attribute_lines(analysis: ModelAnalysis) -> list[str]:
         numbers = f"{n}, {2 * len(analysis.contacts)}, {len(analysis.switches)}"
         lines.append(f"n_event_functions, first_condition, n_switches = {numbers}")
     if analysis.conditions:
-        units = [condition_unit(analysis, condition) for condition in analysis.conditions]
+        memo: dict[int, Dimensions | None] = {}
+        units = [condition_unit(analysis, condition, memo) for condition in analysis.conditions]
         lines.append(f"condition_texts = ({', '.join(map(string_literal, condition_texts(analysis)))},)")
         lines.append(f"condition_units = ({', '.join(map(string_literal, units))},)")
     if analysis.limits:
@@ -203,12 +204,11 @@ def condition_texts(analysis: ModelAnalysis) -> list[str]:
     return switches + [condition.sentence.partition(" at t =")[0] for condition in analysis.limits]
 
 
-def condition_unit(analysis: ModelAnalysis, condition: Condition) -> str:
+def condition_unit(analysis: ModelAnalysis, condition: Condition, memo: dict[int, Dimensions | None]) -> str:
     """Return the unit of the margin of a condition: that of one side, or of any variable with the same dimensions.
 
     A dimensionless margin has the unit 1 unless one side is a variable, as it can be an angle or a ratio.
     """
-    memo: dict[int, Dimensions | None] = {}
     dimensions = next((d for e in condition.sides if (d := dimensions_of(e, memo)) is not None), DIMENSIONLESS)
     variables = [e for e in condition.sides if isinstance(e, Variable)]
     if dimensions != DIMENSIONLESS:

@@ -1,10 +1,12 @@
 """Generates the methods that evaluate outputs, modes and conditions at a point."""
 
-from .algebra import rounding_scale
+from .algebra import rounding_scales
 from .codegen_context import CodegenContext, emit_return, emit_scales, method_source
 from .coupled_contact_methods import emit_friction_forces, law_mode
 from .expressions import Term
 from .single_contact_methods import emit_friction_force
+
+MAX_SUMMANDS = 50  # in one statement
 
 
 def law_modes_method(context: CodegenContext) -> list[str]:
@@ -40,7 +42,11 @@ def observe_method(context: CodegenContext) -> str:
             printer.local_variable(e)
     for e in (*analysis.input_rates, *analysis.states, *analysis.drivers, *analysis.outputs, *analysis.contacts):
         printer.emit(f"self.{e.name} = {printer.text(e)}")
-    sizes = (printer.text(e) if e.low >= 0.0 else f"fabs({printer.text(e)})" for e in analysis.overflow_indicators)
+    sizes = [printer.text(e) if e.low >= 0.0 else f"fabs({printer.text(e)})" for e in analysis.overflow_indicators]
+    while len(sizes) > MAX_SUMMANDS:
+        total = printer.fresh_name("size")
+        printer.emit(f"{total} = {' + '.join(sizes[:MAX_SUMMANDS])}")
+        sizes = [total, *sizes[MAX_SUMMANDS:]]
     printer.emit(f"return {' + '.join(sizes)} < inf")
     return method_source("compute_outputs", context.arguments, printer.lines)
 
@@ -52,7 +58,7 @@ def condition_methods(context: CodegenContext) -> list[str]:
         return []
     printer = context.printer()
     context.emit_driver(printer, margins)
-    scales = emit_scales(context, printer, [rounding_scale(e) for e in margins])
+    scales = emit_scales(context, printer, rounding_scales(margins))
     context.emit_driver(printer, scales)
     printer.count_uses(*margins, *scales)
     return [method_source("condition_margins", context.arguments, emit_return(printer, [*margins, *scales]))]

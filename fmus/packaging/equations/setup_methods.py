@@ -1,6 +1,8 @@
 """Generates the methods for construction, initial states, derived constants and inputs."""
 
-from .algebra import Memo, subexpressions
+from collections.abc import Collection
+
+from .algebra import subexpressions
 from .codegen_context import CodegenContext, method_source, rule_status
 from .expression_printer import INDENT
 from .expressions import Term
@@ -52,18 +54,17 @@ def initial_method(context: CodegenContext) -> str:
 
 def prepare_method(context: CodegenContext) -> str:
     """Constants and rules; a rule is checked as early as possible, before its values are used as divisors."""
-    printer = context.printer()
-    computed: list[Term] = []
-    printer.constants = computed
+    printer, constants = context.printer(), {id(e): e for e in context.constants}
+    printer.constants = set()
     for e in context.analysis.input_rates:
         printer.emit(f"self.{e.name}_polynomial.set_value(self.{e.name})")
     printer.count_uses(*context.constants, *(rule.broken for rule in context.analysis.rules))
 
-    def calculate(selection: Memo | None = None) -> None:
-        for e in context.constants:
-            if (selection is None or id(e) in selection) and not any(e is constant for constant in computed):
+    def calculate(selection: Collection[int] = constants) -> None:
+        for identity, e in constants.items():
+            if identity in selection and identity not in printer.constants:
                 printer.emit_assignment(f"self.{context.name_of(e)}", e)
-                computed.append(e)
+                printer.constants.add(identity)
 
     for n, rule in enumerate(context.analysis.rules):
         calculate(subexpressions(rule.broken))

@@ -2,10 +2,10 @@
 
 import math
 import operator
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
-from .algebra import ARITHMETIC, has_condition_on, is_same_expression, subexpressions, variables_in
+from .algebra import ARITHMETIC, has_condition_on, is_same_expression, operands, subexpressions, variables_in
 from .dimensions import expression_text
 from .expressions import Expression, ModelError, Operand, Term
 from .model_analysis import ModelAnalysis
@@ -32,13 +32,15 @@ def check_evaluation(analysis: ModelAnalysis) -> None:
 def check_friction_forces(analysis: ModelAnalysis) -> None:
     """Raise ModelError for a sliding or holding force without a value at the start values, or with a direction."""
     values = start_values(analysis)
+    memo: dict[int, float] = {}
+    output_values = {e: evaluate(e, values, memo) for e in analysis.outputs} if analysis.contacts else {}
     for c in analysis.contacts:
         for e in (c.slide, analysis.holding_limit[c]):
             try:
                 evaluate(e, values, {})
             except ModelError as error:
                 raise ModelError(f"{c.name}: {error}", c.location) from error
-        check_symmetry(c, values, values | {e: evaluate(e, values, {}) for e in analysis.outputs})
+        check_symmetry(c, values, values | output_values)
 
 
 def check_symmetry(c: Contact, values: dict[Expression, float], load_values: dict[Expression, float]) -> None:
@@ -113,31 +115,51 @@ def start_values(analysis: ModelAnalysis) -> dict[Expression, float]:
 
 def evaluate(e: Operand, values: dict[Expression, float], memo: dict[int, float]) -> float:
     """Return the value of an expression; raise ModelError where it has none."""
+    stack = [e]
+    while stack:
+        part = stack[-1]
+        missing = [
+            operand for operand in _needed_operands(part, values, memo) if _known_value(operand, values, memo) is None
+        ]
+        if missing:
+            stack += reversed(missing)
+            continue
+        stack.pop()
+        if _known_value(part, values, memo) is None:
+            memo[id(part)] = _value_of(part, values, memo)
+    value = _known_value(e, values, memo)
+    assert value is not None
+    return value
+
+
+def _known_value(e: Operand, values: dict[Expression, float], memo: dict[int, float]) -> float | None:
+    """Return the value of an expression; None if it was not evaluated yet."""
     if not isinstance(e, Expression):
         return float(e)
-    if e in values:
-        return values[e]
-    if id(e) not in memo:
-        if isinstance(e, Output):
-            memo[id(e)] = evaluate(e.expression, values, memo)
-        else:
-            assert isinstance(e, Term)
-            memo[id(e)] = _evaluate_term(e, values, memo)
-    return memo[id(e)]
+    return values[e] if e in values else memo.get(id(e))
 
 
-def _evaluate_term(e: Term, values: dict[Expression, float], memo: dict[int, float]) -> float:
-    if e.op == "choose":
-        condition, this, that = e.args
-        return evaluate(this if evaluate(condition, values, memo) else that, values, memo)
-    args = [evaluate(argument, values, memo) for argument in e.args]
+def _needed_operands(e: Operand, values: dict[Expression, float], memo: dict[int, float]) -> Sequence[Operand]:
+    """Return the operands that decide the value; of choose() the condition, and then the selected case."""
+    if not isinstance(e, Term) or e.op != "choose":
+        return () if _known_value(e, values, memo) is not None else operands(e)
+    condition, this, that = e.args
+    holds = _known_value(condition, values, memo)
+    return (condition,) if holds is None else (condition, this if holds else that)
+
+
+def _value_of(e: Expression, values: dict[Expression, float], memo: dict[int, float]) -> float:
+    args = [_known_value(operand, values, memo) for operand in _needed_operands(e, values, memo)]
+    if isinstance(e, Output) or (isinstance(e, Term) and e.op == "choose"):
+        return args[-1]  # type: ignore[return-value]
+    assert isinstance(e, Term)
     function = OPERATIONS[e.op] if e.op in OPERATIONS else getattr(math, e.op)
     try:
         return float(function(*args))
     except (ArithmeticError, ValueError) as error:
         raise ModelError(
             f"{_short_text(e)} cannot be calculated at the start values, "
-            f"where {_short_text(e.args[-1])} is {args[-1] + 0.0!r}",  # 0.0 instead of -0.0
+            f"where {_short_text(e.args[-1])} is {(args[-1] or 0.0) + 0.0!r}",  # 0.0 instead of -0.0
             e.location,
         ) from error
 
