@@ -26,7 +26,7 @@ from .fmi_variables import (
     has_step_events,
 )
 from .text_output import xml_bytes
-from .units import UNITS, Unit, unit_of
+from .units import BASE_UNITS, UNITS, Unit, unit_of
 
 STEPPING_CAPABILITIES = {
     "needsExecutionTool": "false",
@@ -124,7 +124,7 @@ def add_units(root: Element, declared: Variables) -> None:
     """Add UnitDefinitions for all units in use."""
     definitions = SubElement(root, "UnitDefinitions")
     for symbol, unit in used_units(declared):
-        powers = {base: str(getattr(unit, base)) for base in ("kg", "m", "s", "rad") if getattr(unit, base)}
+        powers = {base: str(getattr(unit, base)) for base in BASE_UNITS if getattr(unit, base)}
         element = SubElement(definitions, "Unit", name=symbol)
         SubElement(element, "BaseUnit", powers)
         if unit.display:

@@ -151,7 +151,8 @@ def test_cases_that_share_branches_are_refused_before_they_multiply(tmp_path, mo
 def test_many_choices_do_not_multiply(tmp_path):
     """Each choice in a rate once doubled the lines of its method."""
     declarations = "".join(
-        f'    c{i} = Choice("choice {i}", one="first", two="second")\n    values.append(c{i}.choose(one=r, two=2.0 * r))\n'
+        f'    c{i} = Choice("choice {i}", one="first", two="second")\n'
+        f"    values.append(c{i}.choose(one=r, two=2.0 * r))\n"
         for i in range(12)
     )
     text = MODEL.format(n=0, step="r", force=TOTAL, slide="f")

@@ -10,6 +10,7 @@ from fractions import Fraction
 
 from fmus.packaging.units import unit_of
 
+BASES = ("kg", "m", "s", "A", "K")
 ANY = (0.0, math.inf)  # zero and infinity match every dimension
 
 
@@ -18,19 +19,19 @@ class DimensionError(AssertionError):
 
 
 class Quantity:
-    """A value in SI units with the exponents of kg, m and s; angles are dimensionless."""
+    """A value in SI units with the exponents of the base units; angles are dimensionless."""
 
     def __init__(self, value, *powers):
-        self.value, self.powers = value, powers
+        self.value, self.powers = value, (*powers, *(0,) * (len(BASES) - len(powers)))
 
     @classmethod
     def of(cls, value, symbol):
         """Return a value in a declared unit."""
         unit = unit_of(symbol, symbol)
-        return cls(value, unit.kg, unit.m, unit.s)
+        return cls(value, *(getattr(unit, base) for base in BASES))
 
     def __repr__(self):
-        return f"{self.value!r} kg^{self.powers[0]} m^{self.powers[1]} s^{self.powers[2]}"
+        return f"{self.value!r} " + " ".join(f"{base}^{power}" for base, power in zip(BASES, self.powers, strict=True))
 
     def __float__(self):
         if any(self.powers):
@@ -60,7 +61,7 @@ def _product(operation, sign):
     def method(self, other):
         if not isinstance(other, Quantity) and other == 0.0:
             return 0.0
-        value, powers = (other.value, other.powers) if isinstance(other, Quantity) else (other, (0, 0, 0))
+        value, powers = (other.value, other.powers) if isinstance(other, Quantity) else (other, (0,) * len(BASES))
         return Quantity(operation(self.value, value), *(p + sign * q for p, q in zip(self.powers, powers, strict=True)))
 
     return method

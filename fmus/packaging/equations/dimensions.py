@@ -6,7 +6,7 @@ from fractions import Fraction
 from typing import Any
 
 from .. import BuildError
-from ..units import SYMBOLS, parse_unit, unit_of
+from ..units import BASE_UNITS, SYMBOLS, parse_unit, unit_of
 from .algebra import operands_first
 from .conditions import is_absolute_value
 from .expression_printer import COMPARISON_OPERATORS
@@ -14,11 +14,15 @@ from .expressions import Expression, ModelError, Operand, Term
 from .model_analysis import ModelAnalysis
 from .model_declaration import Choice, Contact, Mode, Output, State, Variable
 
-Dimensions = tuple[Fraction, Fraction, Fraction]
-BASE_UNITS = ("kg", "m", "s")  # angles are dimensionless
-DIMENSIONLESS: Dimensions = (Fraction(0), Fraction(0), Fraction(0))
-SECOND: Dimensions = (Fraction(0), Fraction(0), Fraction(1))
-UNIT_SPELLINGS = {symbol.lower(): symbol for symbol in SYMBOLS} | {"sec": "s", "nm": "N.m", "ns": "N.s"}
+Dimensions = tuple[Fraction, ...]  # exponents of DIMENSIONS
+DIMENSIONS = tuple(base for base in BASE_UNITS if base != "rad")  # angles are dimensionless
+DIMENSIONLESS: Dimensions = (Fraction(0),) * len(DIMENSIONS)
+SECOND: Dimensions = tuple(Fraction(base == "s") for base in DIMENSIONS)
+AMBIGUOUS_SPELLINGS = ("h", "c")  # hours or henry; a speed, a temperature or coulomb
+UNIT_SPELLINGS = {name.lower(): name for name in SYMBOLS if name.lower() not in AMBIGUOUS_SPELLINGS} | {
+    **{"sec": "s", "nm": "N.m", "ns": "N.s", "nms": "N.m.s", "ws": "W.s", "vs": "V.s"},
+    **{"ohms": "ohm", "volt": "V", "volts": "V", "amp": "A", "amps": "A", "kelvin": "K"},
+}
 MAX_OPERATIONS = 50  # of an expression in a message
 PRECEDENCE = {"+": 1, "-": 1, "*": 2, "/": 2, "neg": 3} | dict.fromkeys(COMPARISON_OPERATORS, 0)
 
@@ -136,7 +140,7 @@ def declared_dimensions(e: Variable) -> Dimensions:
         has_hint = parse_unit(e.unit) is None and (hint := unit_hint(e.unit, e.text))
         sentence = f"{e.name} has the unit {e.unit!r}: {hint}" if has_hint else str(error).rstrip(".")
         raise ModelError(sentence, e.location) from error
-    return Fraction(unit.kg), Fraction(unit.m), Fraction(unit.s)
+    return tuple(Fraction(getattr(unit, base)) for base in DIMENSIONS)
 
 
 def unit_hint(unit: str, text: str) -> str:
@@ -145,6 +149,8 @@ def unit_hint(unit: str, text: str) -> str:
         return "the unit comes before the description, so exchange them"
     if re.search(r"\bdeg(ree)?s?\b", unit):
         return 'use rad instead of deg, and display="deg" to show degrees'
+    if re.search(r"\bdeg\.?C\b|°C|\bcelsius\b", unit, re.IGNORECASE):
+        return "use K for temperatures and for their differences"
     if unit.strip() in ("", "-"):
         return 'a pure number has the unit "1"'
     symbol = unit.strip().replace("**", "").replace("^", "")
@@ -155,12 +161,12 @@ def unit_hint(unit: str, text: str) -> str:
 
 def quotient(a: Dimensions, b: Dimensions) -> Dimensions:
     """Return the exponents of a quotient of units."""
-    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+    return tuple(p - q for p, q in zip(a, b, strict=True))
 
 
 def dimensions_text(dimensions: Dimensions | None) -> str:
     """Format exponents, for example as kg m/s^2."""
-    named = list(zip(BASE_UNITS, dimensions or DIMENSIONLESS, strict=True))
+    named = list(zip(DIMENSIONS, dimensions or DIMENSIONLESS, strict=True))
     above, below = ([n if abs(p) == 1 else f"{n}^{abs(p)}" for n, p in named if sign * p > 0] for sign in (1, -1))
     return " ".join(above or ["1"]) + "".join(f"/{unit}" for unit in below) if above or below else "1"
 
@@ -205,7 +211,7 @@ def _term_dimensions(e: Expression, memo: dict[int, Dimensions | None]) -> Dimen
         case "neg" | "fabs":
             return a
         case "sqrt":
-            return a and (a[0] / 2, a[1] / 2, a[2] / 2)
+            return a and tuple(p / 2 for p in a)
     if a not in (None, DIMENSIONLESS):
         argument = expression_text(e.args[0])
         raise ModelError(

@@ -13,7 +13,7 @@ from ..equations.model_analysis import ModelAnalysis
 from ..equations.model_declaration import Contact, Fixed, Output, Parameter, State
 from ..equations.model_file import ModelFile
 from ..fmi_variables import declared_variables
-from ..units import unit_of
+from ..units import BASE_UNITS, unit_of
 
 FORCES = ("N", "N.m")
 ModelJson = dict[str, Any]  # an object of the JSON data in the page
@@ -46,7 +46,7 @@ def variable_json(name: str, meaning: VariableDeclaration) -> ModelJson:
         "unit": meaning.unit,
         "display_unit": readable_unit(meaning.display or meaning.unit),
         "factor": unit.factor if meaning.display else 1.0,
-        "unit_exponents": [unit.kg, unit.m, unit.s, unit.rad],
+        "unit_exponents": [getattr(unit, base) for base in BASE_UNITS],
         "start": meaning.start,
         "fixed": meaning.variability == "fixed",
         "allowed": readable_unit(meaning.allowed),

@@ -49,7 +49,8 @@ export function typicalSizes(main) {
   const [{ position, speed }] = modelInfo.bodies;
   const firstStart = (unit) => modelInfo.variables.find((variable) => variable.unit === unit && variable.start > 0)?.start ?? 1;
   const length = findVariable(modelInfo, position).unit === "m" ? main.largestMagnitude(position) : firstStart("m");
-  const baseSizes = [firstStart("kg"), length, main.largestMagnitude(position) / main.largestMagnitude(speed), 1];
+  const time = main.largestMagnitude(position) / main.largestMagnitude(speed);
+  const baseSizes = [firstStart("kg"), length, time, firstStart("A"), firstStart("K"), 1];
   return ({ unit, unit_exponents }) => {
     const sameUnit = main.reals.filter((name) => findVariable(modelInfo, name).unit === unit).map((name) => main.largestMagnitude(name));
     const size = Math.max(0, ...sameUnit) || unit_exponents.reduce((product, exponent, i) => product * baseSizes[i] ** exponent, 1);
