@@ -292,7 +292,7 @@ def record_formats() -> str:
 
 
 RECORD_OPTIONS = {
-    "names": "columns",
+    "names": "headings",
     "time_unit": "time-unit",
     "per_count": "per-count",
 }  # by the field of ColumnOptions
@@ -300,7 +300,7 @@ SAMPLES = (
     "run stickslip",
     "run --fmu fmus/pendulum.fmu",
     "decay coulomb",
-    "sweep stickslip --vary mu_d=0.5,0.6 --measure slips,period --workers 1 --name mine",
+    "sweep stickslip --vary mu_d=0.5,0.6 --measures slips,period --workers 1 --name mine",
 )
 
 

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 MAX_NAME_BYTES = 255  # of a part of a path, on common file systems
 MAX_WORKERS = 1024  # processes of a sweep
 MAX_RUNS = 10_000_000  # of a sweep
-INTERFACES = ("CoSimulation", "ModelExchange")
+INTERFACES = CO_SIMULATION, MODEL_EXCHANGE = ("CoSimulation", "ModelExchange")
 QUANTITIES = ("position", "velocity", "acceleration")  # by the order of the derivative
 
 Progress = Callable[[float], None]  # takes the finished share, from 0 to 1

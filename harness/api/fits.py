@@ -58,7 +58,7 @@ RECORDS = Rule("a file, a DataFrame or a trajectory, or a list of these", record
     free=RANGES,
     observe=HEADINGS,
     inputs=HEADINGS,
-    fixed=SETTINGS,
+    values=SETTINGS,
     sigma=POSITIVES,
     start=STARTS,
     each=NAMES,
@@ -71,6 +71,7 @@ RECORDS = Rule("a file, a DataFrame or a trajectory, or a list of these", record
     end=FINITE,
     timeout=POSITIVE,
     progress=PROGRESS,
+    fixed=SETTINGS,
 )
 def fit(
     source: "str | Path",
@@ -79,7 +80,7 @@ def fit(
     *,
     observe: "Sequence[str] | Mapping[str, str]" = (),
     inputs: "Sequence[str] | Mapping[str, str]" = (),
-    fixed: Mapping[str, float | str] | None = None,
+    values: Mapping[str, float | str] | None = None,
     sigma: Mapping[str, float] | None = None,
     start: "Mapping[str, float] | ParameterFit | str | Path | None" = None,
     each: Sequence[str] = (),
@@ -92,6 +93,7 @@ def fit(
     end: float | None = None,
     timeout: float = 10.0,
     progress: Progress | None = None,
+    fixed: Mapping[str, float | str] | None = None,
 ) -> "ParameterFit":
     """Fit parameters of an FMU to measured records.
 
@@ -112,7 +114,7 @@ def fit(
         Measured outputs and driven inputs of the FMU, with the headings of their columns. By default a column
         that is named like an output is taken, of several the position, or else the only column whose unit fits one
         output; ``notes`` states the choice.
-    fixed : mapping, optional
+    values : mapping, optional
         Values of other parameters.
     sigma : mapping, optional
         Known standard deviations of the noise by output, in the units of the FMU. By default they are estimated from
@@ -135,6 +137,8 @@ def fit(
         Seconds of processor time that one run may take.
     progress : callable, optional
         Receives the progress from 0 to 1.
+    fixed : mapping, optional
+        Former name of `values`.
 
     Returns
     -------
@@ -167,6 +171,8 @@ def fit(
     from ..studies.fit.request import FitRequest
 
     check_time_range(time, rate, begin, end)
+    if fixed is not None and values is not None:
+        raise SceneError("values and fixed: give only values")
     fmus = [find_fmu(str(law)) for law in (source, *against)]  # type: ignore[misc] # a list by its rule
     for fmu in fmus:
         check_built(fmu, SceneError)
@@ -175,7 +181,7 @@ def fit(
         earlier = start.values if isinstance(start, ParameterFit) else read_fitted_values(Path(start))
         start = select_starts(earlier, ranges, each)
     request = FitRequest(
-        run=RunSpec(fmus[0], values=dict(fixed or {}), timeout=timeout),
+        run=RunSpec(fmus[0], values=dict(fixed or values or {}), timeout=timeout),
         against=tuple(fmus[1:]),
         free=ranges,
         observe=dict(observe),  # type: ignore[arg-type]

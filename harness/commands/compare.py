@@ -6,16 +6,24 @@ from typing import Any
 
 import click
 
-from .terminal import NONNEGATIVE, Terminal, refuse_ignored_options, refuse_options, result_options, run_options
+from .terminal import (
+    NONNEGATIVE,
+    RenamedOption,
+    Terminal,
+    refuse_ignored_options,
+    refuse_options,
+    result_options,
+    run_options,
+)
 
 
 @click.command()
 @click.argument("first", metavar="A")
 @click.argument("second", metavar="B")
-@run_options
+@run_options("--run-rtol", "Relative tolerance of runs of FMUs that are not of this project.  [default: 1e-6]")
 @click.option(
-    "--rtol",
-    "--within",
+    *("--rtol", "--within", "rtol"),
+    cls=RenamedOption,
     type=NONNEGATIVE,
     help="Allowed difference, relative to the largest value.",
 )
@@ -55,7 +63,8 @@ def compare(
     if all(Path(source).exists() for source in (first, second)) and not {*suffixes} & {*RUN_SUFFIXES}:
         refuse_options(context, "on stored results and files", "stop")
     fmus = [find_fmu(source) for source in (first, second) if Path(source).suffix in FMU_SUFFIXES]
-    refuse_ignored_options(context, fmus)
+    refuse_ignored_options(context, fmus, tolerance_is_ignored=True)
+    options = {name: value for name, value in options.items() if name != "tolerance" or value is not None}
     with terminal.progress(1) as report:
         spec = RunSpec(Path(), **options)
         comparison, folder = study.run_comparison((first, second), spec, terminal.out, partial(report, "compare"))

@@ -5,7 +5,7 @@ from typing import Any
 
 import click
 
-from .terminal import POSITIVE, Terminal, refuse_options, result_options
+from .terminal import HEADINGS_OPTION, POSITIVE, RenamedOption, Terminal, refuse_options, result_options
 
 COLUMN_OPTIONS = (  # of records
     "time",
@@ -23,8 +23,12 @@ COLUMN_OPTIONS = (  # of records
 @click.command()
 @click.argument("source", metavar="FILE|SCENE|-")
 @click.option("--time", help="Heading of the time column. Default: t, time, ..., or the first column.")
-@click.option("--position", help="Heading of the column to fit. Default: x, theta, ...")
-@click.option("--velocity", help="Heading of the column to fit if it is a velocity.")
+@click.option(
+    *("--column", "--position", "position"),
+    cls=RenamedOption,
+    help="Heading of the column to fit. Default: x, theta, ...",
+)
+@click.option("--velocity", hidden=True)  # former name of --column with --quantity velocity
 @click.option(
     "--quantity",
     type=click.Choice(("position", "velocity", "acceleration")),
@@ -33,7 +37,7 @@ COLUMN_OPTIONS = (  # of records
 @click.option("--unit", help="Unit of the column, if the heading has none: mm, deg/s, g, ...")
 @click.option("--per-count", metavar="SIZE", help="Size of one count: 0.36deg, 0.001mm, ...")
 @click.option("--time-unit", help="Unit of time, if the heading has none: ms, or 0.01s for sample numbers. Default: s.")
-@click.option("--columns", "names", metavar="NAMES", help="Headings, if the file has none: 't [s],x [mm]'.")
+@HEADINGS_OPTION
 @click.option("--rate", type=POSITIVE, metavar="HZ", help="Sampling rate in Hz, which replaces the times in the file.")
 @click.option("--from", "begin", type=click.FLOAT, default=float("-inf"), help="Ignore samples before this time in s.")
 @click.option("--until", "end", type=click.FLOAT, default=float("inf"), help="Ignore samples after this time in s.")
@@ -69,8 +73,8 @@ def decay(
     \b
     Examples:
       a phone on a spring:    friction-fmus decay "Raw Data.csv" --m 0.35
-      a spreadsheet:          friction-fmus decay swing.xlsx --position "laser (mm)" --k 157.9
-      a pendulum's encoder:   friction-fmus decay swing.txt --pendulum --per-count 0.36deg --columns t,count
+      a spreadsheet:          friction-fmus decay swing.xlsx --column "laser (mm)" --k 157.9
+      a pendulum's encoder:   friction-fmus decay swing.txt --pendulum --per-count 0.36deg --headings t,count
       standard input:         zcat swing.gz | friction-fmus decay - --unit mm --from 2.5
       a scene:                friction-fmus decay coulomb
     """
@@ -85,7 +89,7 @@ def decay(
         raise click.UsageError("--k and --m: give only one of them; the other follows from the frequency")
     if velocity is not None:
         if columns["position"] is not None or columns["quantity"] not in (None, "velocity"):
-            raise click.UsageError("--velocity: only one column is fitted; omit --position and --quantity")
+            raise click.UsageError("--velocity: only one column is fitted; omit --column and --quantity")
         columns |= {"position": velocity, "quantity": "velocity"}
     if columns["rate"] is not None and (columns["time"] is not None or columns["time_unit"] is not None):
         raise click.UsageError("--rate replaces the times in the file: omit --time and --time-unit")

@@ -4,14 +4,20 @@ from typing import Any
 
 import click
 
-from .terminal import POSITIVE, Terminal, result_options
+from .terminal import HEADINGS_OPTION, POSITIVE, RenamedOption, Terminal, result_options
 
 
 @click.command()
 @click.argument("model", metavar="MODEL|FMU")
 @click.argument("records", metavar="FILE...", nargs=-1, required=True)
 @click.option("--free", multiple=True, metavar="NAME[=LOW:HIGH],...", help="Parameters to fit, and ranges to search.")
-@click.option("--fixed", multiple=True, metavar="NAME=VALUE,...", help="Values of other parameters.")
+@click.option(
+    *("--set", "--fixed", "fixed"),
+    cls=RenamedOption,
+    multiple=True,
+    metavar="NAME=VALUE,...",
+    help="Values of other parameters.",
+)
 @click.option(
     "--observe",
     multiple=True,
@@ -32,7 +38,7 @@ from .terminal import POSITIVE, Terminal, result_options
 @click.option("--robust", is_flag=True, help="Limit the effect of outliers.")
 @click.option("--time", help="Heading of the time column. Default: t, time, ..., or the first column.")
 @click.option("--time-unit", help="Unit of time, if the heading has none. Default: s.")
-@click.option("--columns", "names", metavar="NAMES", help="Headings, if the file has none: 't [s],x [mm]'.")
+@HEADINGS_OPTION
 @click.option("--rate", type=POSITIVE, metavar="HZ", help="Sampling rate in Hz, which replaces the times in the file.")
 @click.option("--from", "begin", type=click.FLOAT, default=float("-inf"), help="Ignore samples before this time in s.")
 @click.option("--until", "end", type=click.FLOAT, default=float("inf"), help="Ignore samples after this time in s.")
@@ -73,7 +79,7 @@ def fit(
     \b
     Examples:
       friction-fmus fit stickslip pull.csv --free mu_s,mu_d,k --observe x=laser
-      friction-fmus fit coulomb shaker.csv --free m,k,f,c=0:5 --fixed x0=0
+      friction-fmus fit coulomb shaker.csv --free m,k,f,c=0:5 --set x0=0
           --observe x=pos --input F_ext=force
       friction-fmus fit stickslip pull.csv --against sled.fmu
           --free k,mu_s,mu_d,f_s,f_d,v_s --observe x=laser
@@ -93,7 +99,7 @@ def fit(
     ranges = options.parse_ranges(free)
     per_record = tuple(options.split_list([each or ""]))
     request = FitRequest(
-        run=RunSpec(fmu, values=options.parse_values("--fixed", fixed), timeout=timeout),
+        run=RunSpec(fmu, values=options.parse_values("--set", fixed), timeout=timeout),
         against=tuple(others),
         free=ranges,
         observe=options.parse_columns("--observe", observe),

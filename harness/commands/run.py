@@ -27,7 +27,7 @@ FOLDER_DEPTHS = {  # commands whose results can be repeated, and the levels from
 @click.argument("scene", required=False)
 @click.option("--fmu", type=click.Path(path_type=Path), help="Run this FMU instead of a scene.")
 @click.option("--set", "values", multiple=True, metavar="NAME=VALUE", help="Start value; only with an FMU. Repeatable.")
-@run_options
+@run_options()
 @result_options
 @click.pass_context
 def run(
@@ -51,7 +51,7 @@ def run(
       friction-fmus run pendulum
       friction-fmus run ./my-scene.toml --out elsewhere
       friction-fmus run results/pendulum
-      friction-fmus run --fmu other.fmu --set mass=2 --stop 10 --tolerance 1e-4
+      friction-fmus run --fmu other.fmu --set mass=2 --stop 10 --rtol 1e-4
     """
     from ..scenes.fmu_files import find_fmu, list_models
     from ..scenes.scene import load_scene, scene_from_provenance, shipped_scenes
@@ -136,13 +136,17 @@ def repeat_call(context: click.Context, folder: Path, provenance: dict[str, Any]
 def run_fmu_file(path: Path, values: tuple[str, ...], options: dict[str, Any], terminal: Terminal) -> None:
     """Run one FMU and print the first, last, smallest and largest value of each output."""
     from ..results.summary import make_terminal_table
+    from ..running.resolve import set_rtol
     from ..running.trajectory import SPAN, span_of
     from ..scenes.assignments import parse_assignment
     from ..scenes.run_spec import DEFAULT_EQUAL_STEPS, RunSpec
     from ..studies.run.study import run_fmu
 
+    rtol = options.pop("tolerance")
     with terminal.progress(1) as report:
         spec = RunSpec(path, values=dict(map(parse_assignment, values)), equal_steps=DEFAULT_EQUAL_STEPS, **options)
+        if rtol is not None:
+            spec = set_rtol(spec, rtol)
         trajectory, folder = run_fmu(spec, terminal.out, partial(report, path.stem))
     spans = {name: dict(zip(SPAN, span_of(column), strict=True)) for name, column in trajectory.columns.items()}
     data = {

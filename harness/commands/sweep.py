@@ -11,7 +11,15 @@ import click
 
 from ..arguments import NATURAL, RUNS, WORKERS
 from ..errors import MAX_VALUE_LENGTH, HarnessError, install_command
-from .terminal import RuleType, Terminal, refuse_ignored_options, refuse_options, result_options, run_options
+from .terminal import (
+    RenamedOption,
+    RuleType,
+    Terminal,
+    refuse_ignored_options,
+    refuse_options,
+    result_options,
+    run_options,
+)
 
 if TYPE_CHECKING:
     from ..studies.sweep.result_files import SweepResult
@@ -30,16 +38,23 @@ MAX_FAILURE_KINDS = 10  # kinds of failures printed
 )
 @click.option("--set", "values", multiple=True, metavar="NAME=VALUE", help="Value set in every run.")
 @click.option(
-    "--random", type=RuleType(RUNS), help="Number of points of a Latin hypercube; requires --vary NAME=LO:HI."
+    *("--samples", "--random", "random"),
+    cls=RenamedOption,
+    type=RuleType(RUNS),
+    help="Number of points of a Latin hypercube; requires --vary NAME=LO:HI.",
 )
 @click.option("--seed", type=RuleType(NATURAL), default=1, show_default=True, help="Seed of the Latin hypercube.")
-@click.option("--measure", help="Measures, separated by commas. Default: final, and events if the FMU counts them.")
+@click.option(
+    *("--measures", "--measure", "measure"),
+    cls=RenamedOption,
+    help="Measures, separated by commas. Default: final, and events if the FMU counts them.",
+)
 @click.option(
     "--workers", type=RuleType(WORKERS), default=lambda: os.cpu_count() or 1, help="Processes on this machine."
 )
 @click.option("--scheduler", metavar="ADDRESS", help="Scheduler of a running Dask cluster: tcp://host:8786.")
 @click.option("--name", help="Name of the result folder.")
-@run_options
+@run_options()
 @result_options
 @click.pass_context
 def sweep(
@@ -64,22 +79,23 @@ def sweep(
 
     \b
     Examples:
-      friction-fmus sweep stickslip --vary mu_d=0.3:0.9:60 --vary v_driver=0.01:0.5:60 --measure slips,period
-      friction-fmus sweep pacejka --vary x_m=0.001:0.1:40:log --measure unsteady,steps
-      friction-fmus sweep other.fmu --vary mu=0,0.1,0.2 --measure final,largest
-      friction-fmus sweep coulomb --vary f=0.1:2 --vary k=50:500 --random 1000 --scheduler tcp://host:8786
+      friction-fmus sweep stickslip --vary mu_d=0.3:0.9:60 --vary v_driver=0.01:0.5:60 --measures slips,period
+      friction-fmus sweep pacejka --vary x_m=0.001:0.1:40:log --measures unsteady,steps
+      friction-fmus sweep other.fmu --vary mu=0,0.1,0.2 --measures final,largest
+      friction-fmus sweep coulomb --vary f=0.1:2 --vary k=50:500 --samples 1000 --scheduler tcp://host:8786
     """
     if name is not None and (name.startswith(".") or Path(name).name != name):
         raise click.UsageError(
             f"--name {name[:MAX_VALUE_LENGTH]}: must be a single folder name that does not start with a dot"
         )
     if random is None:
-        refuse_options(context, "without --random", "seed")
+        refuse_options(context, "without --samples", "seed")
     if scheduler is not None:
         refuse_options(context, "with --scheduler: the cluster has its own workers", "workers")
     for package in ("xarray", "dask", "netCDF4"):  # checked before the runs: they write the results
         if find_spec(package) is None:
             raise HarnessError(f"a sweep needs {package}: {install_command('sweep')}")
+    from ..running.resolve import set_rtol
     from ..scenes.assignments import parse_assignment
     from ..scenes.fmu_files import find_fmu
     from ..scenes.run_spec import RunSpec
@@ -89,7 +105,9 @@ def sweep(
 
     refuse_ignored_options(context, [find_fmu(model)])
     measures = tuple(dict.fromkeys(word.strip() for word in measure.split(","))) if measure is not None else ()
+    rtol = options.pop("tolerance")
     run = RunSpec(find_fmu(model), values=dict(map(parse_assignment, values)), follow=False, **options)
+    run = run if rtol is None else set_rtol(run, rtol)
     points = SweepPoints(tuple(parse_axis(text, random is not None) for text in vary), random, seed)
     with terminal.progress(1) as report:
         spec, progress = SweepSpec(run, points.names, measures), partial(report, model)

@@ -18,16 +18,24 @@ import click
 from click.core import ParameterSource
 
 from .. import arguments
-from ..arguments import Rule
+from ..arguments import INTERFACES, MODEL_EXCHANGE, Rule
 from ..errors import HarnessError, check_names, format_value
 from ..process.interrupt import check_interrupt
 from ..process.temporary_directory import temporary_root
 
-FORMER_TIMEOUT = "--patience"
+FORMER_TIMEOUT, FORMER_TOLERANCE = "--patience", "--tolerance"
+TOLERANCE_HELP = (
+    "Relative tolerance: of the solver of an FMU of this project; of the result of any other FMU.  [default: that of "
+    "the FMU; 1e-6 for any other]"
+)
+Command = Callable[..., Any]
 
 
 class RenamedOption(click.Option):
-    """Option that was renamed: the help shows its first name only; its former names still work."""
+    """Option that was renamed: the help shows its first name only; its former names still work.
+
+    The name of its value is the former one, so that stored calls of earlier versions can be repeated.
+    """
 
     def get_help_record(self, ctx: click.Context) -> Any:
         names, self.opts = self.opts, self.opts[:1]
@@ -64,6 +72,7 @@ overwrite_option = click.option(
 )
 
 
+EXACT = "exact"  # method of FMUs of this project
 COMMON_OPTIONS = ("out", "quiet", "as_json", "overwrite")  # not recorded: they do not change a result
 
 
@@ -135,10 +144,21 @@ class RuleType(click.FloatRange):
 
 
 FINITE, POSITIVE, NONNEGATIVE = map(RuleType, (arguments.FINITE, arguments.POSITIVE, arguments.NONNEGATIVE))
+HEADINGS_OPTION = click.option(
+    *("--headings", "--columns", "names"),
+    cls=RenamedOption,
+    metavar="NAMES",
+    help="Headings, if the file has none: 't [s],x [mm]'.",
+)
 STOP_OPTION = click.option("--stop", type=FINITE, help="Stop time in s. Default: that of the FMU.")
-EXTERNAL_FMU_OPTIONS = (  # for FMUs that do not expose their solver steps
-    click.option("--tolerance", type=POSITIVE, default=1e-6, show_default=True, help="Relative tolerance of the run."),
-    click.option("--exchange", is_flag=True, help="Use model exchange if the FMU offers both interfaces."),
+RUN_OPTIONS = (
+    click.option(
+        "--interface",
+        type=click.Choice(INTERFACES, case_sensitive=False),
+        metavar="|".join(INTERFACES),
+        help="Interface to use if the FMU offers both.  [default: CoSimulation]",
+    ),
+    click.option("--exchange", is_flag=True, hidden=True),  # former name of --interface ModelExchange
     click.option("--lenient", is_flag=True, help="Run the FMU even if it violates the FMI standard."),
     click.option(
         *("--timeout", FORMER_TIMEOUT, "timeout"),
@@ -163,7 +183,7 @@ def refuse_options(context: click.Context, reason: str, *options: str) -> None:
             raise click.UsageError(f"{parameter.opts[0]} has no effect {reason}")
 
 
-def refuse_ignored_options(context: click.Context, fmus: Iterable[Path]) -> None:
+def refuse_ignored_options(context: click.Context, fmus: Iterable[Path], tolerance_is_ignored: bool = False) -> None:
     """Raise UsageError for an option on the command line that has no effect on any of the FMUs.
 
     Parameters
@@ -172,26 +192,61 @@ def refuse_ignored_options(context: click.Context, fmus: Iterable[Path]) -> None
         Context of the command.
     fmus : iterable of pathlib.Path
         FMUs that are run with the options of the command line; scenes have their own options.
+    tolerance_is_ignored : bool
+        Whether the command sets no tolerance of the solver of FMUs of this project.
     """
     from ..running.fmu_archive import exposes_solver_steps, read_description
 
-    files = list(fmus)
+    files, uses_exchange = list(fmus), context.params["exchange"] or context.params["interface"] == MODEL_EXCHANGE
     if not files:
-        refuse_options(
-            context, "without an FMU; a scene sets it in its file", "tolerance", "exchange", "lenient", "timeout"
+        options = ("tolerance", "interface", "exchange", "lenient", "timeout")
+        refuse_options(context, "without an FMU; a scene sets it in its file", *options)
+    elif (is_given(context, "tolerance") or is_given(context, "timeout")) and not uses_exchange:
+        descriptions = [read_description(file, context.params["lenient"]) for file in files]
+        if all(map(exposes_solver_steps, descriptions)):
+            reason = f"on {files[0].name}, which runs at the steps of its own solver"
+            refuse_options(context, reason, "timeout", *(["tolerance"] if tolerance_is_ignored else []))
+            if all(uses_closed_form(description, context.params.get("values", ())) for description in descriptions):
+                reason = f"on {files[0].name} with the method {EXACT}, a closed form: set solver.method as well"
+                refuse_options(context, reason, "tolerance")
+
+
+def uses_closed_form(description: Any, assignments: Iterable[str]) -> bool:
+    """Return whether an FMU of this project is run by its closed form, which has no tolerance."""
+    method = next(variable for variable in description.modelVariables if variable.name == "solver.method")
+    labels = {str(item.value): item.name for item in method.declaredType.items}
+    values = dict(text.partition("=")[::2] for text in assignments)
+    number = values.get("solver.method", str(method.start)).strip()
+    return labels.get(number, number) == EXACT
+
+
+def run_options(tolerance: str = "--rtol", text: str = TOLERANCE_HELP) -> Callable[[Command], Command]:
+    """Return a decorator that adds the options of commands that run FMUs.
+
+    The command receives fields of RunSpec, and `tolerance`, which is None unless it is given.
+
+    Parameters
+    ----------
+    tolerance, text : str
+        Name and help of the option for the relative tolerance.
+    """
+
+    def decorate(command: Command) -> Command:
+        @wraps(command)
+        def wrapper(interface: str | None, exchange: bool, **others: Any) -> Any:
+            if exchange and interface is not None:
+                raise click.UsageError("--interface and --exchange: give only --interface")
+            return command(exchange=exchange or interface == MODEL_EXCHANGE, **others)
+
+        tolerance_option = click.option(
+            *(tolerance, FORMER_TOLERANCE, "tolerance"), cls=RenamedOption, type=POSITIVE, help=text
         )
-    elif (is_given(context, "tolerance") or is_given(context, "timeout")) and not context.params["exchange"]:
-        lenient = context.params["lenient"]
-        if all(exposes_solver_steps(read_description(file, lenient)) for file in files):
-            reason = f"on {files[0].name}, which runs at the steps of its own solver (solver.rtol)"
-            refuse_options(context, reason, "tolerance", "timeout")
+        result: Command = wrapper
+        for option in reversed((STOP_OPTION, tolerance_option, *RUN_OPTIONS)):
+            result = option(result)
+        return result
 
-
-def run_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add the options of commands that run FMUs; they are fields of RunSpec."""
-    for option in reversed((STOP_OPTION, *EXTERNAL_FMU_OPTIONS)):
-        command = option(command)
-    return command
+    return decorate
 
 
 def prepare_process() -> None:

@@ -122,7 +122,7 @@ def parse_record(table: Table, columns: ColumnOptions, name: str) -> Record:
     notes += choice
     if not any(table.column_headings) and len(candidates) > 1:
         times = "" if time_column is None or interval else f"{time_column.heading} is used as time in s and "
-        notes.append(f"The file has no headings: {times}{motion_column.heading} is the signal; --columns names them.")
+        notes.append(f"The file has no headings: {times}{motion_column.heading} is the signal; --headings names them.")
     elif time_column is not None and columns.time is None:
         notes += describe_further_runs(candidates, time_column, motion_column)
     label, unit = motion_column.name or motion_column.heading, columns.unit or motion_column.unit
@@ -130,7 +130,7 @@ def parse_record(table: Table, columns: ColumnOptions, name: str) -> Record:
     others = [column.heading for column in candidates if column not in (time_column, motion_column)]
     if others and columns.position is None and len(np.unique(x[np.isfinite(x)])) == 1:
         raise SceneError(
-            f"{table.name}: {motion_column.heading} does not move; select another column by --position or --velocity: "
+            f"{table.name}: {motion_column.heading} does not move; select another column by --column: "
             f"{', '.join(others)}"
         )
     order, base, size, assumption = resolve_unit(label, unit, columns, table.name)
@@ -206,7 +206,7 @@ def no_time_message(table: Table) -> str:
         )
     if not names:
         return (
-            f"{table.name} has no heading; give the names of its columns, as in --columns 't [s],x [mm]', or the "
+            f"{table.name} has no heading; give the names of its columns, as in --headings 't [s],x [mm]', or the "
             "sampling rate in Hz, as in --rate 100"
         )
     return (
@@ -333,7 +333,7 @@ def find_signal_column(
     deviations = [np.nanstd(parse_numbers(table, part.index, strict=False)) for part in same_unit]
     most_varying = same_unit[int(np.argmax(deviations))]
     names = ", ".join(part.heading for part in same_unit)
-    note = f"Of {names}, {most_varying.heading} is used, because it varies most; --position selects another."
+    note = f"Of {names}, {most_varying.heading} is used, because it varies most; --column selects another."
     return most_varying, [note]
 
 

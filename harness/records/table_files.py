@@ -90,7 +90,7 @@ def load_table(source: str, headings: str | None = None) -> Table:
     names = tuple(part.strip() for part in headings.split(","))
     if len(names) != len(table.columns):
         raise SceneError(
-            f"--columns names {len(names)} columns, and {name} has {len(table.columns)} that are not empty"
+            f"--headings names {len(names)} columns, and {name} has {len(table.columns)} that are not empty"
         )
     return replace(table, column_headings=names)
 

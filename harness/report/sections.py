@@ -97,7 +97,7 @@ USER_SECTIONS = (
         "Sweeps",
         "Parameter sweeps; known boundaries are dashed.",
         "a sweep",
-        "sweep stickslip --vary mu_d=0.3:0.9:60 --vary v_driver=0.01:0.1:60 --measure slips",
+        "sweep stickslip --vary mu_d=0.3:0.9:60 --vary v_driver=0.01:0.1:60 --measures slips",
     ),
     Section(
         "compare",

@@ -390,7 +390,10 @@ SPAN = ("start", "end", "smallest", "largest")  # what `span_of` returns
 def span_of(column: np.ndarray) -> list[Any]:
     """Return the first, the last, the smallest and the largest value of a signal (n,); of texts the first and last."""
     ends = column[[0, -1]].tolist()
-    return [*ends, *(["", ""] if column.dtype.kind == "U" else [np.fmin.reduce(column).item(), np.fmax.reduce(column).item()])]
+    return [
+        *ends,
+        *(["", ""] if column.dtype.kind == "U" else [np.fmin.reduce(column).item(), np.fmax.reduce(column).item()]),
+    ]
 
 
 def format_value(value: object) -> str:

@@ -46,17 +46,17 @@ FIT = ["fit", "stickslip", "line.csv", "--observe", "x"]
 SWEEP = ["sweep", "smd", "--vary", "m=1:2:3"]
 
 OPTIONS_WITHOUT_EFFECT = [
-    (["run", "stickslip", "--exchange", "--tolerance", 0.5], "--tolerance"),
+    (["run", "stickslip", "--interface", "ModelExchange", "--rtol", 0.5], "--rtol"),
     (["run", "stickslip", "--lenient"], "--lenient"),
     (["run", "--fmu", OWN, "--timeout", 5], "--timeout"),
     (["compare", "coulomb", "coulomb-sign", "--exchange"], "--exchange"),
-    (["compare", OWN, "fmus/coulomb.fmu", "--tolerance", 0.5], "--tolerance"),
+    (["compare", OWN, "fmus/coulomb.fmu", "--run-rtol", 0.5], "--run-rtol"),
     (["compare", "line.csv", "line.csv", "--stop", 2], "--stop"),
-    (["sweep", "smd", "--vary", "m=1,2", "--tolerance", 0.5], "--tolerance"),
+    (["sweep", "smd", "--vary", "m=1,2", "--rtol", 0.5], "--rtol"),
     (["sweep", "smd", "--vary", "m=1,2", "--seed", 5], "--seed"),
     (["sweep", "smd", "--vary", "m=1,2", "--scheduler", "tcp://127.0.0.1:1", "--workers", 5], "--workers"),
     (["decay", "coulomb", "--unit", "mm"], "--unit"),
-    (["decay", "coulomb", "--columns", "t,x"], "--columns"),
+    (["decay", "coulomb", "--headings", "t,x"], "--headings"),
     (["decay", "coulomb", "--rate", 100], "--rate"),
 ]
 COMMAND_LINES = [  # arguments, exit status, words of the sentence
@@ -69,10 +69,10 @@ COMMAND_LINES = [  # arguments, exit status, words of the sentence
     (["decay", "stickslip"], 1, "not a free decay of one oscillator"),
     (["decay", "line.csv", "--k", 1, "--m", 1], 2, "--k and --m"),
     (["decay", "line.csv", "--velocity", "v", "--position", "x"], 2, "--velocity: only one column is fitted"),
-    ([*FIT, "--free", "k=3"], 2, "--free k=3: give a range, as in k=0.1:2, or fix it by --fixed k=3"),
+    ([*FIT, "--free", "k=3"], 2, "--free k=3: give a range, as in k=0.1:2, or fix it by --set k=3"),
     ([*FIT, "--free", "k=3:x"], 2, "--free k=3:x: 'x' is not a finite number"),
     ([*FIT, "--free", "k,k"], 2, "--free names k twice: remove one"),
-    ([*FIT, "--free", "k", "--fixed", "m"], 2, "--fixed 'm' is not an assignment; write it as in m=3"),
+    ([*FIT, "--free", "k", "--set", "m"], 2, "--set 'm' is not an assignment; write it as in m=3"),
     ([*FIT, "--free", "k", "--start", "k=3,m=2"], 2, "unknown free parameter 'm'"),
     ([*FIT, "--free", "k", "--start", "fmus"], 2, "fmus holds no result of a fit: name its folder or its fit.json"),
     (["precision", "stikslip"], 2, "unknown model 'stikslip' (nearest: 'stickslip'); allowed: belt, clutch, "),

@@ -1,24 +1,70 @@
-"""Options that were renamed: the former name works, help shows the new one."""
+"""Options that were renamed: the former names work, help shows the new ones."""
 
+from functools import partial
+from itertools import combinations
+
+import commands
+import external_fmus
 import pytest
 
-from harness.commands import commands
-from harness.commands.terminal import FORMER_TIMEOUT
+import harness
+from harness.commands import commands as program
+
+RENAMED = [  # a command with its arguments, an option and its former spellings
+    *((command, "--timeout=2.5", "--patience=2.5") for command in ("run", "compare a b", "sweep m --vary c=1,2")),
+    *((command, "--rtol=1e-3", "--tolerance=1e-3") for command in ("run", "sweep m --vary c=1,2")),
+    ("compare a b", "--run-rtol=1e-3", "--tolerance=1e-3"),
+    ("compare a b", "--rtol=1e-3", "--within=1e-3"),
+    ("sweep m --vary c=1,2", "--samples=7", "--random=7"),
+    ("sweep m --vary c=1,2", "--measures=final", "--measure=final"),
+    ("fit m a.csv", "--set=k=3", "--fixed=k=3"),
+    *((command, "--headings=t,x", "--columns=t,x") for command in ("fit m a.csv", "decay a.csv")),
+    ("decay a.csv", "--column=laser", "--position=laser"),
+]
 
 
-@pytest.mark.parametrize("command", ["run", "compare a b", "sweep m --vary c=1,2"])
-def test_the_former_name_of_timeout_still_works(command):
+def parse(command, option):
+    """Return the parameters of a command line, and its help."""
     name, *arguments = command.split()
-    option, before = commands.commands[name], {}
-    for spelling in ("--timeout", FORMER_TIMEOUT):
-        with option.make_context(name, [*arguments, spelling, "2.5"]) as context:
-            before[spelling] = {key: value for key, value in context.params.items() if value == 2.5}
-    assert len(before["--timeout"]) == 1
-    assert before["--timeout"] == before[FORMER_TIMEOUT]
+    with program.commands[name].make_context(name, [*arguments, option]) as context:
+        return dict(context.params), program.commands[name].get_help(context)
 
 
-def test_help_shows_only_the_new_name():
-    with commands.commands["run"].make_context("run", []) as context:
-        text = commands.commands["run"].get_help(context)
-    assert "--timeout" in text
-    assert FORMER_TIMEOUT not in text
+@pytest.mark.parametrize(("command", "present", "former"), RENAMED)
+def test_a_former_name_has_the_same_effect_and_is_not_in_the_help(command, present, former):
+    (parameters, text), (former_parameters, _) = parse(command, present), parse(command, former)
+    assert parameters == former_parameters
+    assert present.split("=")[0] in text
+    assert f"{former.split('=')[0]} " not in text
+
+
+def test_former_options_with_another_form_still_work(tmp_path):
+    """--exchange is --interface ModelExchange, and --velocity names a column and its quantity."""
+    run = partial(commands.harness, tmp_path, "--json", "--overwrite")
+    results = [
+        run("run", "--fmu", external_fmus.build_external_fmus() / "ModelExchangeOnly.fmu", *words)
+        for words in (["--exchange"], ["--interface", "ModelExchange"], ["--interface", "modelexchange"])
+    ]
+    assert {done.returncode for done in results} == {0}
+    for one, two in combinations(results, 2):
+        assert one.stdout == two.stdout
+    rows = "".join(f"{0.01 * i},{(1 - 0.004 * i) * (-1) ** (i // 25)}\n" for i in range(200))
+    (tmp_path / "record.csv").write_text("t [s],a [m/s]\n" + rows)
+    answers = [run("decay", "record.csv", *words) for words in (["--velocity", "a"], ["--column", "a"])]
+    assert answers[0].stdout == answers[1].stdout
+    assert answers[0].stderr == answers[1].stderr
+    for name in ("--exchange", "--velocity"):
+        assert name not in run("run", "--help").stdout + run("decay", "--help").stdout
+
+
+@pytest.mark.parametrize("words", [["--rtol", "1e-4"], ["--set", "solver.rtol=1e-4"]])
+def test_rtol_sets_the_solver_of_an_fmu_of_this_project(fmus, tmp_path, words):
+    (tmp_path / "fmus").symlink_to(fmus)
+    done = commands.harness(tmp_path, "run", "--fmu", "fmus/coulomb.fmu", "--set", "solver.method=ode45", *words)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert harness.load_result(tmp_path / "results/coulomb").parameters["solver.rtol"] == 1e-4
+
+
+def test_the_values_of_a_fit_are_given_by_one_of_their_names():
+    with pytest.raises(harness.SceneError, match="values and fixed: give only values"):
+        harness.fit("smd", "a.csv", "k", observe="x", values={"m": 1.0}, fixed={"m": 1.0})

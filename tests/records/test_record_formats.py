@@ -309,8 +309,8 @@ UNITS = "\n".join(f"{i} sec,{i % 5} {'cm' if i == 3 else 'mm'}" for i in range(2
             ColumnOptions(),
             "rows have no number",
         ),
-        (ROWS, ColumnOptions(), "--columns 't [s],x [mm]'"),
-        (ROWS, ColumnOptions(names="t"), "--columns names 1 columns, and record.csv has 2"),
+        (ROWS, ColumnOptions(), "--headings 't [s],x [mm]'"),
+        (ROWS, ColumnOptions(names="t"), "--headings names 1 columns, and record.csv has 2"),
         ("", ColumnOptions(), "is empty"),
         ("t [s]\n" + ROWS.replace(",", "."), ColumnOptions(), "only one column that is not empty, t [s]; time and pos"),
         ('{"t": [0.1, 0.2, 0.3], "x": 1}', ColumnOptions(), "only one column that is not empty, t; time and position"),
@@ -357,7 +357,7 @@ def test_a_missing_file_error_names_the_nearest(tmp_path):
 def test_a_first_column_that_does_not_move_is_named_with_the_others(tmp_path):
     path = tmp_path / "record.csv"
     path.write_text("t [s],cart,arm\n" + rows(T, 0 * X, X))
-    with pytest.raises(SceneError, match="cart does not move; select another column by --position or --velocity: arm"):
+    with pytest.raises(SceneError, match="cart does not move; select another column by --column: arm"):
         read_record(str(path), ColumnOptions(), "record")
     assert read_record(str(path), ColumnOptions(position="arm"), "record").x == pytest.approx(X, abs=1e-9)
 

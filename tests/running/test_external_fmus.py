@@ -450,7 +450,7 @@ def test_results_that_never_agree_are_kept_with_their_difference(exchange, value
         spec, SimpleNamespace(coSimulation=SimpleNamespace(fixedInternalStepSize=None), defaultExperiment=None), run
     )
     assert answer.run_number == len(passes) - 1
-    assert "of its largest value, more than the tolerance of 1e-06; raise --tolerance" in answer.failure
+    assert "of its largest value, more than the tolerance of 1e-06; raise rtol" in answer.failure
     assert len(passes) < 20
 
 

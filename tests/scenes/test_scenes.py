@@ -96,7 +96,7 @@ def test_a_scene_without_plots_shows_its_outputs(tmp_path, outputs, plots):
             "[reference] and [parameter] are both",
         ),
         ({"extra": "[parameter]\nf = 1\n" + CITATION}, "[citation] has no effect without [published]"),
-        ({"extra": "[published]\nsource = 'me'\n[citation]\nauthor = 'me'"}, "the key 'citation.title' is missing"),
+        ({"extra": "[published]\nsource = 'me'\n[citation]\nauthor = 'me'"}, "the key 'citation.location' is missing"),
         (
             {"extra": "[published]\nsource = 'me'\n" + CITATION.replace("2020", "'2020'")},
             "citation.year = '2020' is not",

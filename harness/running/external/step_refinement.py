@@ -167,9 +167,7 @@ def refine_steps(spec: RunSpec, run: RunFunction) -> RefinementResult:
 def no_agreement(change: str, current: RefinementRun, difference: float, spec: RunSpec) -> RefinementResult:
     """Select the last run and report that it differs from the previous one."""
     message = f"{change} still changes an output by {difference:.2g} of its largest value"
-    return RefinementResult(
-        current.number, "", f"{message}, more than the tolerance of {spec.tolerance:g}; raise --tolerance"
-    )
+    return RefinementResult(current.number, "", f"{message}, more than the tolerance of {spec.tolerance:g}; raise rtol")
 
 
 def keep_longest_run(previous: RefinementRun | None, current: RefinementRun) -> RefinementResult:

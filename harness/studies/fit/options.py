@@ -24,7 +24,7 @@ def parse_ranges(texts: Iterable[str]) -> dict[str, tuple[float, float] | None]:
             raise SceneError(f"--free names {name} twice: remove one")
         low, colon, high = limits.partition(":")
         if separator and not colon:
-            raise SceneError(f"--free {item}: give a range, as in {name}=0.1:2, or fix it by --fixed {item}")
+            raise SceneError(f"--free {item}: give a range, as in {name}=0.1:2, or fix it by --set {item}")
         ranges[name] = (parse_number("--free", item, low), parse_number("--free", item, high)) if separator else None
     return ranges
 

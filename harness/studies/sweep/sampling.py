@@ -10,7 +10,7 @@ import numpy as np
 from ...arguments import MAX_RUNS
 from ...errors import MAX_VALUE_LENGTH, SceneError, format_value
 
-VARY_HELP = "as in m=1:2:11, k=10:1000:31:log, mu=0.1,0.2,0.4 or, with --random, m=1:2"
+VARY_HELP = "as in m=1:2:11, k=10:1000:31:log, mu=0.1,0.2,0.4 or, with --samples, m=1:2"
 
 
 @dataclass(frozen=True)
