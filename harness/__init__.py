@@ -7,12 +7,13 @@ is printed. An error that a user can cause raises a subclass of `HarnessError`.
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from .api import compare, fit, identify_decay, load_result, simulate, sweep
+from .api import compare, describe, fit, identify_decay, load_result, simulate, sweep
 from .errors import HarnessError, SceneError
 
 if TYPE_CHECKING:
     from .analyses.decay.identification import DecayIdentification
     from .analyses.fit.parameter_fit import ParameterFit
+    from .running.fmu_variables import FmuDescription
     from .running.trajectory import Trajectory
     from .studies.compare.difference import Comparison
 
@@ -22,12 +23,14 @@ if TYPE_CHECKING:
 __all__ = [
     "Comparison",
     "DecayIdentification",
+    "FmuDescription",
     "HarnessError",
     "ParameterFit",
     "SceneError",
     "Trajectory",
     "__version__",
     "compare",
+    "describe",
     "fit",
     "identify_decay",
     "load_result",
@@ -38,6 +41,7 @@ __all__ = [
 # Types of results: loaded on first use, because they import numpy, which `--help` does not need.
 TYPES = {
     "Comparison": "harness.studies.compare.difference",
+    "FmuDescription": "harness.running.fmu_variables",
     "DecayIdentification": "harness.analyses.decay.identification",
     "ParameterFit": "harness.analyses.fit.parameter_fit",
     "Trajectory": "harness.running.trajectory",

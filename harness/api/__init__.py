@@ -4,9 +4,10 @@ Each function imports what it needs when it is called, so that importing `harnes
 """
 
 from .decay import identify_decay
+from .descriptions import describe
 from .fits import fit
 from .results import load_result
 from .runs import compare, simulate
 from .sweeps import sweep
 
-__all__ = ["compare", "fit", "identify_decay", "load_result", "simulate", "sweep"]
+__all__ = ["compare", "describe", "fit", "identify_decay", "load_result", "simulate", "sweep"]

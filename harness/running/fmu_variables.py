@@ -1,0 +1,225 @@
+"""Variables of any FMU as data: units, start values, ranges, friction laws, methods and defaults."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from html import escape
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ..arguments import CO_SIMULATION, MODEL_EXCHANGE
+from ..errors import import_optional
+from .fmu_archive import read_description
+from .variable_values import effective_value, enumeration_labels, find_bound, variable_unit
+
+if TYPE_CHECKING:
+    import pandas
+
+LAW, METHOD = "friction", "solver.method"  # of FMUs of this project
+GROUPS = {  # causality and heading; other variables are internal
+    "parameter": "Parameters",
+    "structuralParameter": "Structural parameters",
+    "calculatedParameter": "Calculated parameters",
+    "input": "Inputs",
+    "output": "Outputs",
+}
+HEADINGS = ("name", "start", "range", "unit", "description")
+
+
+@dataclass(frozen=True)
+class VariableInfo:
+    """Variable of an FMU.
+
+    Attributes
+    ----------
+    name, type, causality, variability, unit, description : str
+        As in the model description; the unit is empty for ratios, counts and modes.
+    start : object
+        Start value: a number, a label or a text; None without one.
+    low, high : float or None
+        Range of a number; None without a bound.
+    choices : tuple of str
+        Labels of an enumeration.
+    """
+
+    name: str
+    type: str
+    causality: str
+    variability: str
+    unit: str
+    description: str
+    start: Any
+    low: float | None
+    high: float | None
+    choices: tuple[str, ...]
+
+    @property
+    def range(self) -> str:
+        """Return the range or the choices as text; empty without any."""
+        if self.choices:
+            return ", ".join(self.choices)
+        if self.low is None or self.high is None:
+            bounds = ((self.low, "from"), (self.high, "to"))
+            return " ".join(f"{word} {bound:g}" for bound, word in bounds if bound is not None)
+        return f"{self.low:g} to {self.high:g}"
+
+    @property
+    def cells(self) -> tuple[str, ...]:
+        """Return the texts of a row: name, start value, range, unit and description."""
+        start = f"{self.start:.7g}" if isinstance(self.start, float) else "" if self.start is None else str(self.start)
+        return self.name, start, self.range, self.unit, self.description
+
+
+@dataclass(frozen=True)
+class FmuDescription:
+    """Description of an FMU; `harness.describe` returns it.
+
+    Attributes
+    ----------
+    name, description, fmi_version : str
+        Name and description of the model, and version of the standard.
+    interfaces : tuple of str
+        "CoSimulation" and "ModelExchange", as far as the FMU has them.
+    start, stop, tolerance : float or None
+        Start and stop in s and relative tolerance of a default run.
+    variables : tuple of VariableInfo
+        All variables, in the order of the model description.
+    """
+
+    name: str
+    description: str
+    fmi_version: str
+    interfaces: tuple[str, ...]
+    start: float | None
+    stop: float | None
+    tolerance: float | None
+    variables: tuple[VariableInfo, ...]
+
+    @property
+    def laws(self) -> tuple[str, ...]:
+        """Return the friction laws of an FMU of this project; empty for any other."""
+        return self._choices(LAW)
+
+    @property
+    def methods(self) -> tuple[str, ...]:
+        """Return the integration methods of an FMU of this project; empty for any other."""
+        return self._choices(METHOD)
+
+    def __getitem__(self, name: str) -> VariableInfo:
+        return next(variable for variable in self.variables if variable.name == name)
+
+    def summary(self) -> str:
+        """Return the description as text: defaults, laws and methods, and a table of the variables of each group."""
+        lines = [*self.sentences()]
+        for title, variables in self.groups():
+            rows = [HEADINGS, *(variable.cells for variable in variables)]
+            widths = [max(len(row[i]) for row in rows) for i in range(len(HEADINGS))]
+            lines += ["", title]
+            lines += [
+                "  ".join(text.ljust(width) for text, width in zip(row, widths, strict=True)).rstrip() for row in rows
+            ]
+        return "\n".join(lines)
+
+    def sentences(self) -> Iterator[str]:
+        """Yield the sentences above the tables."""
+        yield f"{self.name}: {self.description}" if self.description else self.name
+        yield f"FMI {self.fmi_version}, {' and '.join(self.interfaces)}"
+        if self.stop is not None:
+            accuracy = "" if self.tolerance is None else f", relative tolerance {self.tolerance:g}"
+            yield f"Default run: {self.start or 0.0:g} to {self.stop:g} s{accuracy}"
+        for word, name, choices in (("Friction laws", LAW, self.laws), ("Methods", METHOD, self.methods)):
+            if choices:
+                yield f"{word} ({name}): {', '.join(choices)}; default {self[name].start}"
+
+    def groups(self) -> Iterator[tuple[str, list[VariableInfo]]]:
+        """Yield the title and the variables of each group that is not empty; internal variables are the last one."""
+        for causality, title in GROUPS.items():
+            variables = [variable for variable in self.variables if variable.causality == causality]
+            if variables:
+                yield title, variables
+        others = [variable for variable in self.variables if variable.causality not in GROUPS]
+        if others:
+            yield "Internal variables", others
+
+    def to_pandas(self) -> "pandas.DataFrame":
+        """Return a table with a row for each variable, indexed by name.
+
+        Raises
+        ------
+        HarnessError
+            If pandas is not installed.
+        """
+        library = import_optional("pandas", "to_pandas()", "sweep")
+        frame: pandas.DataFrame = library.DataFrame([vars(variable) for variable in self.variables]).set_index("name")
+        return frame
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the description for JSON output."""
+        variables = [vars(variable) for variable in self.variables]
+        return vars(self) | {"laws": self.laws, "methods": self.methods, "variables": variables}
+
+    def __str__(self) -> str:
+        return self.summary()
+
+    def __repr__(self) -> str:
+        counts = ", ".join(f"{title.lower()}: {len(variables)}" for title, variables in self.groups())
+        return f"<FmuDescription {self.name}: FMI {self.fmi_version}, {counts}>"
+
+    def _repr_html_(self) -> str:
+        parts = [f"<p>{'<br>'.join(map(escape, self.sentences()))}</p>"]
+        head = "".join(f"<th>{heading}</th>" for heading in HEADINGS)
+        for title, variables in self.groups():
+            rows = (
+                f"<tr>{''.join(f'<td>{escape(cell)}</td>' for cell in variable.cells)}</tr>" for variable in variables
+            )
+            parts.append(f"<table><caption>{title}</caption><tr>{head}</tr>{''.join(rows)}</table>")
+        return "".join(parts)
+
+    def _choices(self, name: str) -> tuple[str, ...]:
+        return next((variable.choices for variable in self.variables if variable.name == name), ())
+
+
+def describe_fmu(path: Path) -> FmuDescription:
+    """Return the description of an FMU, even if it violates the standard.
+
+    Raises
+    ------
+    HarnessError
+        If the file does not exist or cannot be read.
+    """
+    content = read_description(path, lenient=True)
+    experiment = content.defaultExperiment
+    offered = ((CO_SIMULATION, content.coSimulation), (MODEL_EXCHANGE, content.modelExchange))
+    return FmuDescription(
+        name=content.modelName,
+        description=(content.description or "").rstrip("."),
+        fmi_version=content.fmiVersion,
+        interfaces=tuple(name for name, interface in offered if interface is not None),
+        start=read_number(experiment, "startTime"),
+        stop=read_number(experiment, "stopTime"),
+        tolerance=read_number(experiment, "tolerance"),
+        variables=tuple(map(describe_variable, content.modelVariables)),
+    )
+
+
+def read_number(experiment: Any, name: str) -> float | None:
+    """Return a number of the default experiment, None without it."""
+    text = getattr(experiment, name, None)
+    return None if text is None else float(text)
+
+
+def describe_variable(variable: Any) -> VariableInfo:
+    """Return a variable of a model description."""
+    is_number = variable.type not in ("Boolean", "String", "Binary", "Clock", "Enumeration")
+    low, high = (find_bound(variable, name) if is_number else None for name in ("min", "max"))
+    return VariableInfo(
+        variable.name,
+        variable.type,
+        variable.causality or "local",
+        variable.variability or "",
+        variable_unit(variable),
+        variable.description or "",
+        effective_value(variable, variable.start),
+        low,
+        high,
+        tuple(enumeration_labels(variable).values()),
+    )
