@@ -87,7 +87,7 @@ def apply_changes(run, model, beginning):
     if status == OK:
         solver = run.solver
         if beginning:
-            y = model.initial_state(run.start_time)
+            y = model.initial_state(0.0)
             solver.start(model, run.start_time, y, run.stop_time, run.tolerance)
         elif run.interface != MODEL_EXCHANGE:  # no restart in model exchange: modes change at the next event
             solver.restart(model)
@@ -136,24 +136,28 @@ def do_step(run, model, t, h):
 
 
 def communication_step_end(run, solver, t, h):
-    """Return the end of a communication step of size h from t; NaN if the step is invalid.
+    """Return the end of a communication step of size h from t, in seconds since the start; NaN if it is invalid.
 
     The step must start at the current time and end by the stop time.  Importers add up their times, so that rounding
     errors scale with the largest time of the run and may exceed one ulp of a time near zero.
     """
     step = solver.step
-    start, now, stop, end = run.start_time, solver.t, step.t_end, t + h
-    if 0.0 <= start <= t == now < end < stop and not (1.0 - 1e-14) * step.t1 <= end <= (1.0 + 1e-14) * step.t1:
-        return end  # shortcut for nearly every step; same result as below
+    start = solver.start_time
+    now, stop, t1, end = start + solver.t, start + step.t_end, start + step.t1, t + h
+    elapsed = end - start
+    if 0.0 <= start <= t == now < end < stop and not (1.0 - 1e-14) * t1 <= end <= (1.0 + 1e-14) * t1:
+        return elapsed  # shortcut for nearly every step; same result as below
     size = fabs(start) if fabs(start) > fabs(now) else fabs(now)
     if fabs(end) > size:
         size = fabs(end)
-    if fabs(end - step.t1) <= 1e-15 * size < inf:
-        end = step.t1  # the end of an internal step, except for rounding
+    if fabs(end - t1) <= 1e-15 * size < inf:
+        end, elapsed = t1, step.t1  # the end of an internal step, except for rounding
     elif stop < end < inf and end <= stop + 1e-6 * h + 1e-11 * size:
-        end = stop  # error of a sum of a million steps
+        end, elapsed = stop, step.t_end  # error of a sum of a million steps
+    if elapsed < solver.t and end >= now:
+        elapsed = solver.t  # the step is shorter than the resolution of the time
     starts_now = fabs(t - now) <= 1e-6 * h + 4e-15 * size
-    return end if h > 0.0 and starts_now and now <= end <= stop and end < inf else nan
+    return elapsed if h > 0.0 and starts_now and now <= end <= stop and end < inf else nan
 
 
 # ---- outputs

@@ -91,8 +91,11 @@ def find_frictionless_contacts(model, location, step):
         location.is_frictionless[i] = 1.0 if step.modes0[i] != STUCK and sizes == 0.0 else 0.0
 
 
-def resolve_after_event(model, step, ends: ContactVector, tie_tolerance) -> tuple[StateVector, ContactVector, bool]:
-    """Return states and modes after an event at the end of a step, and whether the modes are consistent."""
+def resolve_after_event(model, step, h, ends: ContactVector, tie_tolerance) -> tuple[StateVector, ContactVector, bool]:
+    """Return states and modes after an event at the end of a step, and whether the modes are consistent.
+
+    The event is `h` seconds after the start of the step; contact i has its first zero after `ends[i]` seconds.
+    """
     t = step.t1
     slips = model.slip_velocities(t, step.y1)
     terms = model.slip_magnitudes(t, step.y1)
@@ -102,11 +105,11 @@ def resolve_after_event(model, step, ends: ContactVector, tie_tolerance) -> tupl
     for i in contact_indices:
         status[i], new_modes[i] = SLIPPING, step.modes0[i]
         if new_modes[i] == STUCK:
-            status[i] = AT_LIMIT if ends[i] <= t else AT_REST
+            status[i] = AT_LIMIT if ends[i] <= h else AT_REST
         elif not (force[i] == 0.0 and limit[i] == 0.0):
             if new_modes[i] * slips[i] < -REVERSED_SHARE * (terms[i] + SLIP_SCALE):
                 new_modes[i] = sign(slips[i])  # it reversed without friction, which has returned
-            elif ends[i] <= t or new_modes[i] * slips[i] <= SIMULTANEITY_MARGIN * terms[i]:
+            elif ends[i] <= h or new_modes[i] * slips[i] <= SIMULTANEITY_MARGIN * terms[i]:
                 depth = inf
                 if fabs(force[i]) >= EQUAL_SHARE * limit[i]:
                     depth = reversal_depth(model, t, y, step.modes0, step.h_max, limit[i], i)

@@ -12,7 +12,7 @@ computed again with a tighter tolerance (phase_repetition.py).
 from math import fabs, inf, pi, sin, sqrt
 
 from . import conditions, contact_lcp, stick_slip
-from .codes import ROUNDOFF_MARGIN
+from .codes import EPSILON, ROUNDOFF_MARGIN
 from .conditions import CONDITION_MARGIN, TINY
 from .interpolant import largest_of, smallest_of
 from .power_series import PowerSeries
@@ -46,7 +46,8 @@ class EventLocation:
         self.values, self.scales = [0.0] * n, [0.0] * n
         self.near_middle = [0.0] * n  # values after 0.4 of the step
         self.cubic_errors = [0.0] * n  # differences from a cubic polynomial, as shares of the range in the step
-        # Bernstein coefficients of the cubic Hermite polynomial; largest scale since the last event; first zero
+        # Bernstein coefficients of the cubic Hermite polynomial; largest scale since the last event; first zero, in
+        # seconds after the start of the step: a resolution that does not depend on the time
         self.start, self.early, self.late, self.end = [0.0] * n, [0.0] * n, [0.0] * n, [0.0] * n
         self.peaks, self.times = [0.0] * n, [inf] * n
         # conditions: left minus right side, sum of absolute terms; 1.0 if true else -1.0, before and after t1
@@ -62,7 +63,7 @@ class EventLocation:
             root = sin(0.5 * pi * k / DEGREE)
             self.nodes[k] = root * root
         # start of the motion since the last event; factor of the tolerance since then
-        self.phase_t = self.phase_y = self.phase_f = self.phase_h = 0.0
+        self.phase_t = self.phase_roundoff = self.phase_y = self.phase_f = self.phase_h = 0.0
         self.tolerance_factor, self.tolerance = 1.0, 0.0  # now; tolerance of the run, if the factor is less
         self.t_doubt = 0.0  # end of the step that was in doubt
         self.in_doubt = self.must_repeat = self.must_shorten = False
@@ -91,14 +92,14 @@ def update_event_functions(model, location, t, y: StateVector, modes: ContactVec
             )
 
 
-def event_function(model, step, t, j):
-    """Return the value of one event function inside the step."""
-    y = step.state_at(model, t)
+def event_function(model, step, elapsed, j):
+    """Return the value of one event function `elapsed` seconds after the start of the step."""
+    y = step.state_after(model, elapsed)
     if model.has_dry_friction and not model.is_coupled and not model.has_conditions:
         for i in contact_indices:
             return step.modes0[i] * y[slip_index[i]]
     location = step.event_location
-    update_event_functions(model, location, t, y, step.modes0)
+    update_event_functions(model, location, step.t0 + elapsed, y, step.modes0)
     return location.values[j]
 
 
@@ -111,7 +112,7 @@ def locate_events(model, step):
     Returns
     -------
     float
-        Time of the first event; inf if there is none.
+        Seconds from the start of the step to the first event; inf if there is none.
     """
     location = step.event_location
     location.in_doubt = False
@@ -122,7 +123,7 @@ def locate_events(model, step):
         location.times[j] = inf
         found = examine_cubic(location, step, j)
         if found == ONE_ZERO:
-            location.times[j] = find_root(model, step, step.t0, step.t1, location.start[j], location.end[j], j)
+            location.times[j] = find_root(model, step, step.h_full, location.start[j], location.end[j], j)
         elif found == UNKNOWN:
             location.times[j] = search_polynomial(model, step, j)
         if location.times[j] < first:
@@ -133,7 +134,7 @@ def locate_events(model, step):
 def evaluate_on_cubic(model, step):
     """Compute the Bernstein coefficients of all event functions on the cubic Hermite polynomial of the step."""
     location = step.event_location
-    t0, h = step.t0, step.t1 - step.t0
+    t0, h = step.t0, step.h_full
     y2 = (20.0 * step.y0 + 7.0 * step.y1 + h * (4.0 * step.f0 - 2.0 * step.f1)) / 27.0
     y3 = (7.0 * step.y0 + 20.0 * step.y1 + h * (2.0 * step.f0 - 4.0 * step.f1)) / 27.0
     if model.is_coupled:
@@ -201,6 +202,7 @@ def search_polynomial(model, step, j):
     polynomial stays above zero by less than its error, the minimum of the function decides.
     """
     location = step.event_location
+    h = step.h_full
     fit_polynomial(model, step, j)
     polynomial_error = POLYNOMIAL_ERROR * (fabs(location.samples[DEGREE]) + fabs(location.samples[DEGREE - 1]))
     lowest, u_lowest = inf, 0.0
@@ -218,16 +220,16 @@ def search_polynomial(model, step, j):
             slope = value + slope * u
             value = location.polynomial[DEGREE - k] + value * u
         if value <= least:
-            t = step.t0 + u * (step.t1 - step.t0)
+            elapsed = u * h
             if slope < 0.0:
-                t += 2.0 * least / -slope * (step.t1 - step.t0)
-            if t >= step.t1:
+                elapsed += 2.0 * least / -slope * h
+            if elapsed >= h:
                 break
-            g = event_function(model, step, t, j)
+            g = event_function(model, step, elapsed, j)
             if g <= 0.0:
-                return find_root(model, step, step.t0, t, location.start[j], g, j)
+                return find_root(model, step, elapsed, location.start[j], g, j)
             if g <= least:
-                return t  # the function only touches zero
+                return elapsed  # the function only touches zero
             location.polynomial[0] += g - value
         else:
             if value < lowest and slope <= 0.0:
@@ -240,7 +242,7 @@ def search_polynomial(model, step, j):
         if lowest < polynomial_error < location.start[j]:
             return search_minimum(model, step, u_lowest, j)
         return inf
-    return find_root(model, step, step.t0, step.t1, location.start[j], location.end[j], j)
+    return find_root(model, step, h, location.start[j], location.end[j], j)
 
 
 def search_minimum(model, step, u, j):
@@ -249,27 +251,27 @@ def search_minimum(model, step, u, j):
     `u` is the place of the minimum, as a share of the step.
     """
     location = step.event_location
-    h = step.t1 - step.t0
+    h = step.h_full
     low = u - MINIMUM_RANGE if u > MINIMUM_RANGE else 0.0
     high = u + MINIMUM_RANGE if u < 1.0 - MINIMUM_RANGE else 1.0
     left, right = high - GOLDEN_SECTION * (high - low), low + GOLDEN_SECTION * (high - low)
-    g_left = event_function(model, step, step.t0 + left * h, j)
-    g_right = event_function(model, step, step.t0 + right * h, j)
+    g_left = event_function(model, step, left * h, j)
+    g_right = event_function(model, step, right * h, j)
     step.interpolant.n_event_evals += 2
     for _ in range(MAX_SECTIONS):
         if g_left <= 0.0:
-            return find_root(model, step, step.t0, step.t0 + left * h, location.start[j], g_left, j)
+            return find_root(model, step, left * h, location.start[j], g_left, j)
         if g_right <= 0.0:
-            return find_root(model, step, step.t0, step.t0 + right * h, location.start[j], g_right, j)
+            return find_root(model, step, right * h, location.start[j], g_right, j)
         step.interpolant.n_event_evals += 1
         if g_left < g_right:
             high, right, g_right = right, left, g_left
             left = high - GOLDEN_SECTION * (high - low)
-            g_left = event_function(model, step, step.t0 + left * h, j)
+            g_left = event_function(model, step, left * h, j)
         else:
             low, left, g_left = left, right, g_right
             right = low + GOLDEN_SECTION * (high - low)
-            g_right = event_function(model, step, step.t0 + right * h, j)
+            g_right = event_function(model, step, right * h, j)
     return inf
 
 
@@ -295,7 +297,7 @@ def fit_polynomial(model, step, j):
     step.interpolant.n_event_evals += DEGREE
     location.samples[0], location.samples[DEGREE] = location.start[j], location.end[j]
     for k in range(DEGREE - 1):
-        location.samples[k + 1] = event_function(model, step, step.t0 + location.nodes[k + 1] * (step.t1 - step.t0), j)
+        location.samples[k + 1] = event_function(model, step, location.nodes[k + 1] * step.h_full, j)
     for order in range(DEGREE):
         for back in range(DEGREE - order):
             k = DEGREE - back
@@ -312,16 +314,18 @@ def fit_polynomial(model, step, j):
         location.polynomial[0] = location.samples[DEGREE - back] - node * location.polynomial[0]
 
 
-def find_root(model, step, low, high, g_low, g_high, j):
-    """Return the first time at which an event function is not positive, by the Illinois method, then by bisection.
+def find_root(model, step, high, g_low, g_high, j):
+    """Return after how many seconds of the step an event function is no longer positive.
 
-    The function has the value `g_low` > 0 at time `low` and `g_high` <= 0 at time `high`.
+    By the Illinois method, then by bisection, to the resolution of the step size: an absolute time late in a run would
+    be coarser.  The function has the value `g_low` > 0 at the start of the step and `g_high` <= 0 after `high` seconds.
     """
+    low, resolution = 0.0, EPSILON * step.h_full
     kept_end = 0  # end of the bracket that the last iteration kept: 1 high, -1 low
     evaluations = 0
     for k in range(MAX_SECANTS + MAX_BISECTIONS):
         middle = 0.5 * (low + high)
-        if not low < middle < high:
+        if not low < middle < high or high - low <= resolution:
             break
         if k < MAX_SECANTS and g_low > 0.0 and g_high < 0.0:
             secant = low + (high - low) * (g_low / (g_low - g_high))

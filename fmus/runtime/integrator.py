@@ -4,11 +4,11 @@ The integrator owns the internal step that covers the current time t.  Reported 
 ahead of t does not show.
 """
 
-from math import inf, nan
+from math import fabs, inf, nan
 
 from . import conditions, ode23, phase_repetition
 from .active_method import METHOD_ITEMS
-from .codes import DIVERGED, EXACT, HYBRID, HYBRID_LAW_ONLY, NEEDS_REPETITION, OK, STUCK, TOO_MANY_STEPS
+from .codes import DIVERGED, EPSILON, EXACT, HYBRID, HYBRID_LAW_ONLY, NEEDS_REPETITION, OK, STUCK, TOO_MANY_STEPS
 from .linear_closed_form import HIGHER_ORDER_INPUT
 from .step_control import OVERFLOW_LIMIT, InternalStep
 from .variable_declarations import Choice, Count, Fixed, Local, VariableOwner
@@ -56,6 +56,8 @@ class Integrator(VariableOwner):
     def __init__(self, model):
         super().__init__()
         self.step = InternalStep(model)
+        # start of the run; all other times of the solver are seconds since then, so that a motion does not depend on it
+        self.start_time = 0.0
         self.t = self.y = 0.0
         self.modes = STUCK
         self.default_duration = 1.0  # duration of the default run (s)
@@ -92,13 +94,14 @@ class Integrator(VariableOwner):
         duration = t_end - t if t_end < inf else model.stop_time
         step.tolerance = self.rtol if self.rtol > 0.0 else tolerance
         step.h_max = self.h_max if self.h_max > 0.0 else 0.1 * duration
-        step.t_end = t_end
+        step.t_end = t_end - t
+        self.start_time = t
         self.default_duration = model.stop_time
         step.active_method.select(self.method)
         if model.has_dry_friction:
             step.is_hybrid = model.friction == HYBRID
         self.apply_parameters(model)
-        step.begin_run(model, t, y)
+        step.begin_run(model, y)
         self.t_change = nan
         self.move_to_step_end(model)
 
@@ -168,7 +171,7 @@ class Integrator(VariableOwner):
     # ---- current time
 
     def advance(self, model, t):
-        """Advance the current time to t.  Returns a status."""
+        """Advance the current time to t, in seconds since the start.  Returns a status."""
         step = self.step
         if step.t1 < t:
             status = step.compute_next(model)
@@ -184,7 +187,7 @@ class Integrator(VariableOwner):
                 conditions.select_sides(model, step.event_location, False)
             interpolant = step.interpolant
             if interpolant.ready:  # as in step.state_at; saves one call in limit communication steps
-                self.y = interpolant.evaluate(t - step.t0)
+                self.y = interpolant.evaluate(t - step.t0 - step.roundoff.t0)
                 return OK
             self.y = step.state_at(model, t)
             if step.t1 == inf and not sum_of(magnitude(self.y)) < OVERFLOW_LIMIT:
@@ -227,7 +230,10 @@ class Integrator(VariableOwner):
             if status != OK:
                 self.t_next = nan
                 return
-        self.t_next = self.finite_step_end()
+        now = self.start_time + self.t
+        self.t_next = self.start_time + self.finite_step_end()
+        if self.t < step.t1 and self.t_next <= now:
+            self.t_next = now + EPSILON * fabs(now)  # the step is shorter than the resolution of the time
 
     def finite_step_end(self):
         """Return the end of the internal step; if it has none, a default run after the current time."""
@@ -241,7 +247,7 @@ class Integrator(VariableOwner):
         # an event at the current time counts unless it is deferred
         at_event = step.event_at_end and self.t >= step.t1 and all_of(self.modes == step.modes1)
         events.count = counters.n_events + 1 if at_event else counters.n_events
-        events.t_last = step.t1 if at_event else counters.t_event
+        events.t_last = self.start_time + (step.t1 if at_event else counters.t_event)
         if self.t > step.t0:
             self.steps, self.rejected, self.evaluations = step.n_accepted, step.n_rejected, step.n_rhs
             self.h = self.finite_step_end() - step.t0

@@ -3,7 +3,7 @@
 Fields of the templates:
 
     t, h            start (s) and size (s) of the requested communication step
-    now, t0, t_end  current time, start of the current internal step, end of the run (s)
+    now, t0         current time, start of the current internal step (s)
     start, stop     start and stop time of the experiment (s)
     name, value     variable and the value that was set
     text, unit, allowed     description, unit and range that the variable declares
@@ -26,15 +26,15 @@ from .variable_declarations import VariableDeclaration
 RUN_MESSAGES = {
     codes.DIVERGED: "the solution diverges after t = {t0!r} s, or an equation has no finite value there, such as the "
     "square root of a negative number; reduce the excitation or check the parameters",
-    codes.STALLED: "the solver stalls after t = {t0!r} s: its step has shrunk to the resolution of the time; raise "
-    "solver.rtol or choose another solver.method",
+    codes.STALLED: "the solver stalls after t = {t0!r} s: its step has shrunk to 4e-15 of the largest step, which is "
+    "solver.h_max or a tenth of the run; raise solver.rtol or choose another solver.method",
     codes.TOO_MANY_STEPS: f"more than {MAX_STEPS} internal steps or {MAX_EVALUATIONS} right-hand sides within one "
     "communication step after t = {now!r} s; choose another solver.method, raise solver.rtol or take shorter "
     "communication steps",
     codes.CHATTERING: "a condition of choose() changes again and again at t = {t0!r} s, because the motion returns to "
     "it from both sides; declare dry friction as a Contact, or make the transition continuous",
     codes.BAD_STEP: "a communication step of {h!r} s from t = {t!r} s is refused: it must be positive, start at the "
-    "current time, t = {now!r} s, and end by the stop time, t = {t_end!r} s",
+    "current time, t = {now!r} s, and end by the stop time, t = {stop!r} s",
     codes.BAD_START: "start time = {start!r} s is refused: it must be a finite number",
     codes.BAD_STOP: "stop time = {stop!r} s is refused: it must be above the start time, {start!r} s",
     codes.INTERRUPTED: "the run was interrupted after t = {now!r} s; reset the FMU to run again",
@@ -80,10 +80,18 @@ PHASE_NAMES = {
 def run_message(status: int, run: RunState, model: Any, t: float, h: float) -> str:
     """Return the message for a failed run, or for the rule of the model that the values violate."""
     if status not in RUN_MESSAGES:
-        return str(model.rules[status]).format_map(vars(model))
+        return rule_message(status, run, model)
     solver = run.solver
-    times = {"now": solver.t, "t0": solver.step.t0, "t_end": solver.step.t_end}
-    return RUN_MESSAGES[status].format(t=t, h=h, start=run.start_time, stop=run.stop_time, **times)
+    now, t0 = solver.start_time + solver.t, solver.start_time + solver.step.t0
+    return RUN_MESSAGES[status].format(t=t, h=h, now=now, t0=t0, start=run.start_time, stop=run.stop_time)
+
+
+def rule_message(status: int, run: RunState, model: Any) -> str:
+    """Return the message for a rule that the values violate, or that the run has violated."""
+    values = vars(model)
+    if "violation_time" in values:
+        values = {**values, "violation_time": run.solver.start_time + model.violation_time}
+    return str(model.rules[status]).format_map(values)
 
 
 def value_message(reason: int, name: str, declared: VariableDeclaration, value: float) -> str:

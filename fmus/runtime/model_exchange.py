@@ -63,7 +63,8 @@ class ModelExchange:
         self.conditions = [1.0] * (model.n_event_functions - model.first_condition + 1)  # indicators of conditions
         self.driver_rate = self.nominal_velocity = 0.0
         self.states_changed = self.nominals_changed = False
-        self.t_next_event = inf  # time of the next break-away, as far as it is known
+        self.time = 0.0  # as the importer counts it
+        self.t_next_event = inf  # the same of the next break-away, as far as it is known
         # communication step with early return: end, event reached, internal steps and limit of evaluations
         self.step_end = 0.0
         self.event_reached = False
@@ -90,6 +91,7 @@ def begin(run, model):
     start_counters = step.start_counters
     start_counters.n_accepted = start_counters.n_rejected = start_counters.n_rhs = 0
     step.t0, step.t1 = solver.t, nan
+    run.model_exchange.time = solver.start_time + solver.t
     update_nominals(run, model)
 
 
@@ -105,10 +107,11 @@ def prepare(run, model):
 def set_time(run, model, t):
     """Set the time; the states stay."""
     run.outputs_current = False
+    run.model_exchange.time = t
     solver = run.solver
-    solver.t = solver.step.t0 = t
+    solver.t = solver.step.t0 = t - solver.start_time
     if model.has_driver:
-        model.t_base = t
+        model.t_base = solver.t
 
 
 def set_continuous_states(run, model):
@@ -209,9 +212,11 @@ def update_indicators(run, model):
 
 
 def update_variables(run, model):
-    """Update the buffers that are read as variables: indicators and rate of the driver."""
+    """Update the buffers that are read as variables: time, indicators and rate of the driver."""
     exchange = run.model_exchange
     solver = run.solver
+    if run.interface != MODEL_EXCHANGE:
+        exchange.time = solver.start_time + solver.t
     if model.has_dry_friction or model.has_conditions:
         update_indicators(run, model)
         for i in contact_indices:
@@ -257,7 +262,8 @@ def handle_event(run, model):
     if model.has_dry_friction and solver.step.is_hybrid:
         if update_modes(run, model):
             exchange.states_changed = True
-        exchange.t_next_event = next_breakaway(model, solver)
+        elapsed = next_breakaway(model, solver)
+        exchange.t_next_event = solver.start_time + elapsed
     if model.has_other_laws and has_step_event(run, model):
         solver.modes = model.law_modes(solver.t, solver.y)
         solver.step.start_counters.n_events += 1
@@ -321,7 +327,7 @@ def update_modes(run, model):
                     needs_restart = True
                 if not stick_slip.is_grazing(model, step.event_location, solver.t, solver.y, solver.modes, 0.0, i):
                     solver.modes[i] = stick_slip.resolve_mode(model, solver.t, solver.y, tie_tolerance, i)
-                if solver.modes[i] == STUCK and solver.t >= run.model_exchange.t_next_event:
+                if solver.modes[i] == STUCK and run.model_exchange.time >= run.model_exchange.t_next_event:
                     # the load is at the limit, except for rounding errors
                     load, rate, limit = model.stick_load(solver.t, solver.y, i)
                     if load * rate > 0.0 and limit - fabs(load) <= tie_tolerance * limit:
@@ -337,7 +343,7 @@ def update_modes(run, model):
 
 
 def next_breakaway(model, solver):
-    """Return when a contact breaks away if only the driver moves; inf if never."""
+    """Return after how many seconds of the run a contact breaks away if only the driver moves; inf if never."""
     if not (model.rests_when_stuck and all_of(solver.modes == STUCK)):
         return inf
     ends, directions = contact_vector(), contact_vector()

@@ -18,7 +18,7 @@ def begin_phase(model, step):
         limit_first_step(model, step)
     location = step.event_location
     location.phase_t, location.phase_y, location.phase_f = step.t1, step.y1, step.f1
-    location.phase_h = step.h_next
+    location.phase_roundoff, location.phase_h = step.roundoff.t1, step.h_next
     restore_tolerance(step)
     location.in_doubt = location.must_repeat = False
     step.largest_slip = 0.0
@@ -57,7 +57,8 @@ def repeat_phase(step):
     """Go back to the start of the motion, to repeat it with the tighter tolerance."""
     location = step.event_location
     location.must_repeat = False
-    step.t1, step.y1, step.f1, step.modes1 = location.phase_t, location.phase_y, location.phase_f, step.modes0
+    step.t1, step.roundoff.t1 = location.phase_t, location.phase_roundoff
+    step.y1, step.f1, step.modes1 = location.phase_y, location.phase_f, step.modes0
     step.h_next = location.phase_h * location.tolerance_factor**step.active_method.power
 
 

@@ -366,7 +366,8 @@ class Radau9:
         shrink = shrink if shrink < growth else growth
         control.shrink_after_rejection = shrink if shrink < 1.0 else 1.0
         self.z1, self.z2, self.z3, self.z4, self.z5 = z1, z2, z3, z4, z5
-        self.t1, self.f_end, self.h, self.error = t + h, f6, h, error
+        self.t1 = t + (step.roundoff.t0 + h)  # as in step_control
+        self.f_end, self.h, self.error = f6, h, error
         return y6, f6, e
 
     def build_interpolant(self, model, step):

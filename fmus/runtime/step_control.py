@@ -34,6 +34,7 @@ OVERFLOW_LIMIT = 1e100  # larger states are treated as divergence: squares, as i
 MAX_TRIES = 200  # attempts for one step; each one halves the step size
 MAX_REPEATED_STEPS = 1_000_000  # steps of a motion that is repeated
 MAX_STALLED_STEPS = 100  # consecutive steps that hardly advance the time
+SHORTEST_STEP = 16.0 * EPSILON  # share of the largest step; the solver stalls at shorter ones
 INTERPOLATION_ERROR = 10.0  # of a state at an event, relative to the solver tolerance
 TIE_FACTOR = 30.0  # tolerance for ties between stick and slip, relative to the solver tolerance
 
@@ -51,9 +52,9 @@ class StepCounters:
 
 
 class RoundoffCompensation:
-    """Rounding errors of the times t0, t1 and the positions x0, x1 of a step.
+    """Rounding errors of the times t0, t1 and, in closed forms, of the positions x0, x1 of a step.
 
-    Closed forms carry them along, so that rounding errors do not accumulate over events.
+    They are carried along, so that they do not accumulate over steps and events: the step starts at t0 + roundoff.t0.
     """
 
     def __init__(self):
@@ -63,6 +64,16 @@ class RoundoffCompensation:
         """Move the errors at the end of the last step to the start of the next one."""
         self.t0, self.x0 = self.t1, self.x1
         self.t1 = 0.0
+
+    def end_time(self, t0, h):
+        """Return the time h seconds after the start t0 of a step; note its rounding error."""
+        elapsed = h + self.t0
+        t1 = t0 + elapsed
+        if t1 <= t0 and h > 0.0:
+            t1 = t0 * (1.0 + EPSILON)  # two events never have the same time
+        t_step = t1 - t0
+        self.t1 = (t0 - (t1 - t_step)) + (elapsed - t_step)
+        return t1
 
 
 class InternalStep:
@@ -104,24 +115,22 @@ class InternalStep:
         self.start_counters = StepCounters()
         self.roundoff = RoundoffCompensation()
 
-    def begin_run(self, model, t, y: StateVector):
-        """Start a run with an empty step at t."""
+    def begin_run(self, model, y: StateVector):
+        """Start a run with an empty step at 0 s."""
         counters = self.start_counters
         self.n_accepted = self.n_rejected = self.n_rhs = counters.n_events = counters.n_stalled = 0
         self.h_next = counters.h_last = 0.0
-        counters.t_event = t
+        counters.t_event = 0.0
         self.event_at_end = False
         self.modes0 = STUCK
         if model.has_other_laws and not self.is_hybrid:
             self.y1 = y
-            self.modes0 = model.law_modes(t, self.y1)
-        self.start_empty_step(model, t, y, self.modes0, ROUNDOFF_MARGIN)
+            self.modes0 = model.law_modes(0.0, self.y1)
+        self.start_empty_step(model, 0.0, y, self.modes0, ROUNDOFF_MARGIN)
 
     def start_empty_step(self, model, t, y: StateVector, modes: ContactVector, tie_tolerance):
         """Start an empty step at t, given the previous modes; choose a step size unless nothing moves."""
-        if model.is_linear:
-            roundoff = self.roundoff
-            roundoff.t1 = roundoff.x1 = 0.0
+        self.roundoff.t1 = self.roundoff.x1 = 0.0
         self.t1, self.y1 = t, y
         if model.has_conditions:
             conditions.initialize(model, self.event_location, t, self.y1, modes)
@@ -192,8 +201,7 @@ class InternalStep:
             self.update_law_modes(model)
         if model.has_conditions:
             conditions.select_sides(model, self.event_location, False)
-        t = self.t0
-        if self.t1 - t > 16.0 * EPSILON * (t if t > 0.0 else -t):
+        if self.t1 - self.t0 > SHORTEST_STEP * self.h_max:
             counters.n_stalled = 0
         else:
             counters.n_stalled += 1
@@ -239,8 +247,7 @@ class InternalStep:
 
     def advance_stuck(self, model):
         """Stay at rest until a load exceeds the holding limit."""
-        if model.is_linear:
-            self.roundoff.carry()
+        self.roundoff.carry()
         self.is_stuck, self.grazes_at_end = True, False
         self.y1 = self.y0
         for i in contact_indices:
@@ -274,12 +281,9 @@ class InternalStep:
             duration = exact.next_standstill(self.modes0)
         self.t1 = self.t_end if self.t_end - self.t0 <= exact.horizon else self.t0 + exact.horizon
         if model.has_dry_friction:
-            elapsed = duration + roundoff.t0
-            end = self.t0 + elapsed
+            end = self.t0 + (duration + roundoff.t0)
             if end <= self.t1 and end < inf:
-                t_step = end - self.t0
-                roundoff.t1 = (self.t0 - (end - t_step)) + (elapsed - t_step)
-                self.t1 = end
+                self.t1 = roundoff.end_time(self.t0, duration)
                 self.y1, roundoff.x1 = exact.state_at_standstill(duration)
                 return self.end_at_event(model)
         if self.t1 < inf:
@@ -320,15 +324,16 @@ class InternalStep:
         if model.has_other_laws and not self.is_hybrid:
             modes = STUCK * modes  # as force_modes, without a call
         tolerance = self.tolerance
-        # h_min: fabs(t) would take three times as long in every step
-        h_min = 16.0 * EPSILON * (t if t > 0.0 else -t)
+        h_min = SHORTEST_STEP * self.h_max
+        roundoff = self.roundoff
+        roundoff.t0, roundoff.t1 = roundoff.t1, 0.0
         h_new = self.h_next if self.h_next < self.h_max else self.h_max
         if model.has_dry_friction and model.has_nominal_velocity and self.is_hybrid:
             y1 = y + h_new * f
             h_new *= step_limits.narrow_feature_share(model, self, h_new, y1, f)
         if h_new < h_min:
             h_new = h_min
-        remaining = self.t_end - t
+        remaining = self.t_end - t - roundoff.t0
         last = 1.1 * h_new >= remaining
         h = remaining if last else h_new
         scale = magnitude(y)
@@ -367,7 +372,15 @@ class InternalStep:
             h_new = h * method.shrink_after_rejection
         self.h_next = h_new
         self.h_full = h
-        self.t1, self.y1, self.f1 = self.t_end if last else t + h, y1, f1
+        if last:
+            self.t1 = self.t_end
+        else:  # as roundoff.end_time(), without a call
+            elapsed = h + roundoff.t0
+            t1 = t + elapsed
+            t_step = t1 - t
+            roundoff.t1 = (t - (t1 - t_step)) + (elapsed - t_step)
+            self.t1 = t1
+        self.y1, self.f1 = y1, f1
         if model.has_dry_friction and not model.is_coupled and not model.has_conditions:
             # Most steps end here.  The Bernstein coefficients of the cubic Hermite polynomial of the slip velocity are
             # compared with their sum, which bounds the largest.  Without calls: these take a tenth of a step of ode23.
@@ -400,7 +413,7 @@ class InternalStep:
             phase_repetition.decide_repetition(self)
             if self.event_location.must_repeat:
                 return NEEDS_REPETITION
-            if end <= self.t1:
+            if end <= h:
                 if model.checks_event_steps and not self.is_accurate_at(model, end):
                     self.event_location.must_shorten = True
                     return NEEDS_REPETITION
@@ -411,17 +424,16 @@ class InternalStep:
             phase_repetition.end_phase_in_doubt(model, self)
         return OK
 
-    def is_accurate_at(self, model, end):
-        """Return whether a step to an event agrees with the interpolated state there.
+    def is_accurate_at(self, model, h):
+        """Return whether a step to an event after h seconds agrees with the interpolated state there.
 
         Friction that varies within a small range of slip velocities, or a condition that changes, may lie between the
         stages of a long step, whose error estimate does not see it.  A step that ends at the event does.
         """
         method = self.active_method
-        h = end - self.t0
         if h <= step_limits.SHORTEST_STEP * self.h_max:
             return True
-        y_end = self.state_at(model, end)
+        y_end = self.state_after(model, h)
         modes = self.modes0
         if model.has_other_laws:
             modes = self.force_modes(modes)
@@ -437,10 +449,10 @@ class InternalStep:
         self.h_full = h
         return h * max_of(e) <= self.tolerance and max_of(difference) <= INTERPOLATION_ERROR * self.tolerance
 
-    def end_at(self, model, end):
-        """End the step at an event."""
-        self.y1 = self.state_at(model, end)
-        self.t1 = end
+    def end_at(self, model, h):
+        """End the step at an event, h seconds after its start."""
+        self.y1 = self.state_after(model, h)
+        self.t1 = end = self.roundoff.end_time(self.t0, h)
         if model.has_slip_conditions:
             if self.is_hybrid:
                 self.y1 = contact_lcp.stop_slips(model, end, self.y1, self.modes0)
@@ -461,11 +473,11 @@ class InternalStep:
                 )
             elif model.is_coupled:
                 self.y1, self.modes1, self.has_consistent_modes = contact_lcp.resolve_after_event(
-                    model, self, ends, self.tie_tolerance(model)
+                    model, self, h, ends, self.tie_tolerance(model)
                 )
             else:
                 for i in contact_indices:
-                    if ends[i] <= end:
+                    if ends[i] <= h:
                         self.y1[slip_index[i]] = 0.0
         return self.end_at_event(model)
 
@@ -551,4 +563,10 @@ class InternalStep:
             if model.is_linear and self.active_method.method_number == EXACT:
                 return self.active_method.exact.evaluate(t - self.t0 - self.roundoff.t0)
             self.active_method.build_interpolant(model, self)
-        return interpolant.evaluate(t - self.t0)
+        return interpolant.evaluate(t - self.t0 - self.roundoff.t0)
+
+    def state_after(self, model, elapsed) -> StateVector:
+        """Interpolate the state `elapsed` seconds after the start of a step of a method."""
+        if not self.interpolant.ready:
+            self.active_method.build_interpolant(model, self)
+        return self.interpolant.evaluate(elapsed)

@@ -30,7 +30,7 @@ def limit_step(model, step):
     for j in range(model.n_event_functions):
         error = location.cubic_errors[j]
         largest = error if error > largest else largest
-    if largest > MAX_CUBIC_ERROR and step.t1 - step.t0 > SHORTEST_STEP * step.h_max:
+    if largest > MAX_CUBIC_ERROR and step.h_full > SHORTEST_STEP * step.h_max:
         location.must_shorten = True
     elif largest > 0.0:
         h = 0.8 * step.h_full * sqrt(sqrt(MAX_CUBIC_ERROR / largest))  # the error grows with h^4
@@ -75,7 +75,8 @@ def shorten_step(step):
     """Go back to the start of the step, to try half of it."""
     step.event_location.must_shorten = False
     step.h_next = 0.5 * step.h_full
-    step.t1, step.y1, step.f1, step.modes1 = step.t0, step.y0, step.f0, step.modes0
+    step.t1, step.roundoff.t1 = step.t0, step.roundoff.t0
+    step.y1, step.f1, step.modes1 = step.y0, step.f0, step.modes0
     step.n_accepted -= 1
     step.n_rejected += 1
 

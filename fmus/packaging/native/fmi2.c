@@ -136,7 +136,7 @@ fmi2Status fmi2GetRealStatus(fmi2Component component, const fmi2StatusKind s, fm
     REQUIRE_PHASE(component, IN_ANY_PHASE);
     REQUIRE_ADDRESS(value);
     if (s != fmi2LastSuccessfulTime) return fmi2Discard;
-    *value = self->state.run.phase < RUNNING ? NAN : self->state.run.solver.t;
+    *value = self->state.run.phase < RUNNING ? NAN : current_time(&self->state.run);
     return fmi2OK;
 }
 

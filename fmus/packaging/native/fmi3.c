@@ -300,16 +300,17 @@ fmi3Status fmi3EnterStepMode(fmi3Instance instance)
 static void call_intermediate_update(Instance *self, bool finished)
 {
     struct ModelExchange *exchange = &self->state.run.model_exchange;
-    double now = self->state.run.solver.t, return_time = now;
+    double now = current_time(&self->state.run), return_time = now;
     bool return_requested = false;
     if (!self->host.intermediate_update) return;
     self->state.run.phase = INTERMEDIATE;
     self->host.intermediate_update(self->host.environment, now, true, true, finished, self->host.early_return_allowed,
                                    &return_requested, &return_time);
     self->state.run.phase = RUNNING;
-    if (!self->host.early_return_allowed || !return_requested || !(return_time < exchange->step_end)) return;
-    if (return_time > now) exchange->step_end = return_time;
-    else if (finished) exchange->step_end = now;
+    if (!self->host.early_return_allowed || !return_requested) return;
+    const Run *run = &self->state.run; /* its solver counts time from the start of the run */
+    double elapsed = return_time > now ? return_time - run->solver.start_time : run->solver.t;
+    if (elapsed < exchange->step_end && (elapsed > run->solver.t || finished)) exchange->step_end = elapsed;
 }
 
 fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoint, fmi3Float64 communicationStepSize,
@@ -329,7 +330,7 @@ fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoi
     *eventHandlingNeeded = *terminateSimulation = *earlyReturn = false;
     if (!self->host.event_mode_used && !self->host.early_return_allowed && !self->host.intermediate_update) {
         fmi3Status status = do_step(self, t, h);
-        *lastSuccessfulTime = *now;
+        *lastSuccessfulTime = current_time(&state->run);
         return status;
     }
     struct ModelExchange *exchange = &state->run.model_exchange;
@@ -345,7 +346,7 @@ fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoi
         call_intermediate_update(self, true);
         if (exchange->event_reached && self->host.early_return_allowed) break;
     }
-    *lastSuccessfulTime = *now;
+    *lastSuccessfulTime = current_time(&state->run);
     if (status == OK && !fault) {
         *eventHandlingNeeded = self->host.event_mode_used && event_passed;
         *earlyReturn = *now < end;

@@ -79,6 +79,12 @@ enum {{ MEMBERS = {count_of_members} }};
 static const Member members[MEMBERS] = {{
 {members}}};
 
+/* The time as the importer counts it; the solver counts from the start of the run. */
+static double current_time(const Run *run)
+{{
+    return run->solver.start_time + run->solver.t;
+}}
+
 /* Append why the run cannot continue, in a communication step of size h from t. */
 static COLD void append_run_message(TextBuffer *text, int64_t status,
                                     const Run *run, const Model *model, double t, double h)
@@ -111,8 +117,9 @@ static COLD void append_call_message(TextBuffer *text, int64_t reason, const Cal
 FIELD_CODE = {  # field of a message -> C call that appends it
     **{name: f"append_real(text, {name})" for name in ("t", "h")},
     **{name: f"append_real(text, run->{name}_time)" for name in ("start", "stop")},
-    **{"now": "append_real(text, run->solver.t)", "t0": "append_real(text, run->solver.step.t0)"},
-    **{"t_end": "append_real(text, run->solver.step.t_end)", "value": "append_value(text, variable, value)"},
+    **{"now": "append_real(text, current_time(run))"},
+    "t0": "append_real(text, run->solver.start_time + run->solver.step.t0)",
+    "value": "append_value(text, variable, value)",
     **{name: f"append(text, variable->{name})" for name in ("name", "unit", "text", "allowed")},
     **{name: f"append(text, call->{name})" for name in ("function", "word", "phase")},
     "reference": "append_integer(text, call->reference)",
@@ -147,7 +154,7 @@ def render_model_header(model: type[VariableOwner], fmi: str) -> str:
     rule_fields = {
         name: f"{'append_real' if ctype is FLOAT else 'append_integer'}(text, model->{name})"
         for name, ctype in layout.fields[type(instance)].items()
-    }
+    } | {"violation_time": "append_real(text, run->solver.start_time + model->violation_time)"}
     return HEADER.format(
         sentence=c_comment((inspect.getdoc(model) or "").splitlines()[0]),
         name=model.__name__,
@@ -188,7 +195,7 @@ def render_model_header(model: type[VariableOwner], fmi: str) -> str:
 def attribute_path(model: Any, name: str) -> str:
     """Return the path of a variable in State."""
     if name == TIME:
-        return "run.solver.t"
+        return "run.model_exchange.time"
     for indicator in (TO_REST, TO_BREAK_AWAY):
         if name.startswith(indicator):
             mode = name.removeprefix(indicator)[1:]  # none for a single contact
