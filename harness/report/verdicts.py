@@ -45,7 +45,7 @@ def build_verdicts(summaries: Sequence[Summary]) -> list[Verdict]:
     if "precision" in outcomes:
         details = (
             *(f"{title}: {outcome.value}" for title, outcome in outcomes["precision"]),
-            "Checked: the run time of every method of each FMU and its error against a certified reference.",
+            "Checked: the run time of every method of each FMU and its error against a reference.",
         )
         _, outcome = outcomes["precision"][0]
         verdicts.append(Verdict("Fastest methods", outcome.text, details, "use", True))
