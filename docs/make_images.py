@@ -237,6 +237,46 @@ def draw_friction_laws(folder: Path) -> None:
     plt.close(figure)
 
 
+def draw_stability(folder: Path) -> None:
+    """Draw the error of each stiff or extreme case of stickslip as a share of its bound, for each method."""
+    run_command(folder, "harness stability stickslip")
+    with (folder / "results" / "stability" / "stability.csv").open(newline="") as file:
+        cases = list(csv.DictReader(file))
+    finished = [case for case in cases if case["expected"].startswith("finished within ") and case["error [1]"]]
+    methods = list(dict.fromkeys(case["method"] for case in finished))
+    style = {"font.size": 9, "svg.fonttype": "path", "svg.hashsalt": "friction", "axes.titlelocation": "left"}
+    style |= {"axes.titlesize": 9, "axes.grid": True, "grid.color": "#dddddd"}
+    with plt.rc_context(style):
+        figure, axis = plt.subplots(figsize=(5.6, 2.4), layout="constrained")
+        for row, method in enumerate(methods):
+            own = [case for case in finished if case["method"] == method]
+            pairs = [(float(case["error [1]"]), float(case["expected"].rsplit(" ", 1)[1])) for case in own]
+            shares = [error / bound if error else 0.0 for error, bound in pairs]  # where the bound is 0, so is the error
+            axis.semilogx(np.maximum(shares, 1e-6), [row] * len(shares), "o", color="#0072B2", ms=5, alpha=0.5)
+        axis.axvline(1.0, color="#D55E00")
+        refused = sum(not case["expected"].startswith("finished") for case in cases)
+        axis.set(yticks=range(len(methods)), yticklabels=methods, xlim=(5e-7, 20.0), ylim=(len(methods) - 0.5, -0.5))
+        axis.set_xlabel("error / bound (1e-6 and less at the left edge)")
+        axis.set_title(f"stickslip: {len(finished)} stiff and extreme cases; {refused} more are refused")
+        figure.savefig(IMAGES / "stability.svg", metadata={"Date": None})
+    plt.close(figure)
+
+
+def draw_measured(folder: Path) -> None:
+    """Draw the decay of the measured pendulum, whose record is not a part of the project."""
+    sys.path.insert(0, str(DOCS.parent / "tests" / "support"))
+    from measured_records import COMMAND, find_record, write_original
+
+    record = find_record()
+    if record is None:
+        print("measured.svg: skipped, the record is not available")
+        return
+    write_original(record, folder)
+    run_command(folder, f"harness {COMMAND}")
+    (figure,) = folder.glob("results/decay/*/figure.svg")
+    copy_figure(figure, IMAGES / "measured.svg")
+
+
 def draw_live_page(folder: Path) -> None:
     """Save a screenshot of the beginning of the live page."""
     build = [sys.executable, "-m", "build_fmus", "--web", "--out", str(folder / "live")]
@@ -290,6 +330,8 @@ DRAWINGS: dict[str, Callable[[Path], None]] = {
     "stick": draw_stick,
     "laws": draw_laws,
     "friction-laws": draw_friction_laws,
+    "stability": draw_stability,
+    "measured": draw_measured,
     "live": draw_live_page,
     "report": draw_report,
     "notebook": run_notebook,

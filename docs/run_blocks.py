@@ -24,7 +24,7 @@ FENCE = re.compile(
 )
 SKIP = re.compile(r"<!-- not run: ([^>]+) -->\s*\Z")
 RUN = ("sh", "python")
-TIMEOUT = 120.0  # s
+TIMEOUT = 300.0  # s
 
 
 @dataclass(frozen=True)

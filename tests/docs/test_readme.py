@@ -3,24 +3,47 @@
 import re
 import subprocess
 import sys
+from doctest import ELLIPSIS, NORMALIZE_WHITESPACE, OutputChecker
 
+import measured_records
+import numpy as np
 import pytest
+from commands import run_process
 
-from tests.docs.test_docs import DOCS, ENVIRONMENT, ROOT
+from tests.docs.test_docs import DOCS, ENVIRONMENT, ROOT, scripts
 
 README = ROOT / "README.md"
 
 
 def test_readme_is_short():
-    assert len(README.read_text(encoding="utf-8").splitlines()) <= 150
+    assert 60 <= len(README.read_text(encoding="utf-8").splitlines()) <= 160
 
 
 @pytest.mark.slow
 def test_readme_code_blocks_run(workspace):
     (workspace / "docs").symlink_to(DOCS)
     command = [sys.executable, str(DOCS / "run_blocks.py"), str(workspace), str(README)]
-    done = subprocess.run(command, capture_output=True, text=True, env=ENVIRONMENT, timeout=300)
+    done = subprocess.run(command, capture_output=True, text=True, env=ENVIRONMENT, timeout=600)
     assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.slow
+def test_the_measured_pendulum_gives_the_quoted_output(tmp_path):
+    """From the reduced record, written to a file like the original."""
+    record = measured_records.find_record()
+    if record is None:
+        pytest.skip(measured_records.MISSING)
+    measured_records.write_original(record, tmp_path)
+    blocks = scripts.find_blocks(README.read_text(encoding="utf-8"))
+    (place,) = [i for i, block in enumerate(blocks) if measured_records.ORIGINAL in block.text]
+    command, quoted = blocks[place : place + 2]
+    assert command.text.strip() == f"friction-fmus {measured_records.COMMAND}"
+    done = run_process(tmp_path, *measured_records.COMMAND.split())
+    assert done.returncode == 0, done.stderr
+    flags = ELLIPSIS | NORMALIZE_WHITESPACE
+    assert OutputChecker().check_output(quoted.text, done.stdout, flags), done.stdout
+    amplitude = np.abs(np.loadtxt(record, delimiter=",", skiprows=1)[:, 1]).max()
+    assert f"explains {100 * amplitude**2 / 16:.2f} %" in README.read_text(encoding="utf-8")
 
 
 def test_set_up_commands_come_first():

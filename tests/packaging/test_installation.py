@@ -20,7 +20,7 @@ WORK = {  # by command; all run in one folder, in this order
     "run": ["", "run stickslip", "run --fmu fmus/more/belt.fmu"],
     "decay": ["decay docs/records/spring.csv --m 0.35", "decay coulomb"],
     "compare": ["compare smd coulomb"],
-    "fit": ["fit coulomb docs/records/spring.csv --free f=0.01:0.05 --fixed m=0.35,k=17,x0=0.1 --observe x"],
+    "fit": ["fit coulomb docs/records/spring.csv --free f=0.01:0.05 --fixed m=0.35,k=17,x0=0.1 --observe x=laser"],
     "precision": ["precision smd --quick"],
     "stability": ["stability smd"],
     "references": ["references belt.py"],

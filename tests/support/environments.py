@@ -46,6 +46,7 @@ def make_environment(folder, *extras):
 
     Links lead to the packages that are installed here. Any other package that is installed here is missing there.
     """
+    folder.mkdir(exist_ok=True)
     call(sys.executable, "-m", "venv", "--without-pip", folder, cwd=folder)
     libraries = folder / "libraries"
     libraries.mkdir()
