@@ -2,19 +2,29 @@
 
 import sys
 from pathlib import Path
+from typing import Any
 
 if __name__ == "__main__" and Path(sys.path[0]) != Path(__file__).parents[1]:  # a model here may be named math.py
     sys.path += [str(Path(__file__).parents[1]), sys.path.pop(0)]
+
+from harness.__main__ import run_command
+
+if __name__ == "__main__":
+
+    def load_command() -> Any:
+        from benchmarks.__main__ import main  # imported here, where run_command handles signals
+
+        return main
+
+    run_command(load_command, "python -m benchmarks")
+    sys.exit()
 
 import click
 
 from benchmarks.bench.command import bench
 from benchmarks.importers.command import importers
 from benchmarks.rivals.command import rivals
-from harness.__main__ import run_command
 from harness.commands import FullHelpGroup
-
-NAME = "python -m benchmarks"
 
 
 @click.group(cls=FullHelpGroup, context_settings={"help_option_names": ["-h", "--help"]})
@@ -32,6 +42,3 @@ def main() -> None:
 
 for command in (bench, importers, rivals):
     main.add_command(command)
-
-if __name__ == "__main__":
-    run_command(lambda: main, NAME)

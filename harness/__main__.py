@@ -5,15 +5,16 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 if __name__ == "__main__" and Path(sys.path[0]) != Path(__file__).parents[1]:  # a model here may be named math.py
     sys.path += [str(Path(__file__).parents[1]), sys.path.pop(0)]
 
-import click
-from click.shell_completion import shell_complete
-
 from .errors import HarnessError
 from .process.interrupt import interruptible
+
+if TYPE_CHECKING:  # imported below, where signals are handled
+    import click
 
 SCRIPT = "friction-fmus"
 COMMAND_NAME = SCRIPT if Path(sys.argv[0]).stem == SCRIPT else "python -m harness"
@@ -23,7 +24,9 @@ COMPLETION = "_FRICTION_FMUS_COMPLETE"  # the environment variable that click's 
 def main() -> None:
     """Run the command line."""
 
-    def load_commands() -> click.Command:
+    def load_commands() -> "click.Command":
+        from click.shell_completion import shell_complete
+
         from .commands import commands
 
         if instruction := os.environ.get(COMPLETION):
@@ -33,7 +36,7 @@ def main() -> None:
     run_command(load_commands, COMMAND_NAME)
 
 
-def run_command(load: Callable[[], click.Command], name: str) -> None:
+def run_command(load: "Callable[[], click.Command]", name: str) -> None:
     """Run a command with the arguments of this process, and exit with its status.
 
     click's own main() is not used because it handles Ctrl-C differently.
@@ -53,7 +56,7 @@ def run_command(load: Callable[[], click.Command], name: str) -> None:
         run_arguments(command, name, sys.argv[1:])
 
 
-def run_arguments(command: click.Command, name: str, arguments: list[str]) -> None:
+def run_arguments(command: "click.Command", name: str, arguments: list[str]) -> None:
     """Run a command with these arguments; `name` is the one by which the user called it."""
     try:
         with command.make_context(name, arguments) as context:
@@ -66,12 +69,8 @@ def run_arguments(command: click.Command, name: str, arguments: list[str]) -> No
 def exit_on_error() -> Iterator[None]:
     """Print an error that a user can cause in one sentence, and exit with its status."""
     try:
-        yield
-    except click.ClickException as error:
-        error.show()
-        sys.exit(error.exit_code)
-    except click.exceptions.Exit as exit_request:
-        sys.exit(exit_request.exit_code)
+        with exit_on_usage_error():
+            yield
     except HarnessError as error:
         fail(str(error), error.status)
     except MemoryError:
@@ -81,6 +80,20 @@ def exit_on_error() -> Iterator[None]:
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
         prefix = f"{error.filename}: " if error.filename else ""
         fail(f"{prefix}{error.strerror or error}", quiet=isinstance(error, BrokenPipeError))
+
+
+@contextmanager
+def exit_on_usage_error() -> Iterator[None]:
+    """Print an error of the command line and exit; click is imported by then, or raises nothing."""
+    try:
+        yield
+    except Exception as error:
+        click = sys.modules.get("click")
+        if click and isinstance(error, click.ClickException):
+            error.show()
+        elif not (click and isinstance(error, click.exceptions.Exit)):
+            raise
+        sys.exit(error.exit_code)
 
 
 def fail(message: str, status: int = 1, quiet: bool = False) -> None:

@@ -91,7 +91,8 @@ def simulate(
         a time that occurs twice is a jump. In co-simulation an input is constant within a communication step and has
         its value at the middle of the step.
     timeout : float, optional
-        Seconds allowed for one call of an FMU that is not of this project; 60 by default.
+        Seconds allowed for one call of an FMU that is not of this project, or for 1/4096 of the run of an FMU of this
+        project; 60 by default.
     progress : callable, optional
         Receives the progress from 0 to 1.
 

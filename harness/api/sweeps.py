@@ -109,6 +109,7 @@ def sweep(
     from contextlib import nullcontext
 
     from ..process.temporary_directory import temporary_directory
+    from ..process.worker_pool import exit_while_importing_main
     from ..scenes.fmu_files import find_fmu
     from ..scenes.run_spec import RunSpec
     from ..studies.sweep.result_files import run_sweep
@@ -118,6 +119,8 @@ def sweep(
     library, *_ = (import_optional(package, "a sweep", "sweep") for package in ("xarray", "dask", "netCDF4"))
     if not grid:
         raise SceneError("grid is empty: name at least one parameter and its values, as in {'mu_d': [0.3, 0.6]}")
+    if workers is not None:
+        exit_while_importing_main()
     if workers is not None and scheduler is not None:
         raise SceneError("workers has no effect with scheduler, whose cluster has its own workers: leave one out")
     run = RunSpec(find_fmu(str(source)), values=dict(values or {}), follow=False)

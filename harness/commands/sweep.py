@@ -103,7 +103,7 @@ def sweep(
     from ..studies.sweep.runner import SweepSpec
     from ..studies.sweep.sampling import SweepPoints, parse_axis
 
-    refuse_ignored_options(context, [find_fmu(model)])
+    refuse_ignored_options(context, [find_fmu(model)], timeout_is_ignored=True)
     measures = tuple(dict.fromkeys(word.strip() for word in measure.split(","))) if measure is not None else ()
     rtol = options.pop("tolerance")
     run = RunSpec(find_fmu(model), values=dict(map(parse_assignment, values)), follow=False, **options)

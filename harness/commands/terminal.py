@@ -166,7 +166,7 @@ RUN_OPTIONS = (
         type=POSITIVE,
         default=60.0,
         show_default=True,
-        help="Seconds allowed for one FMI call.",
+        help="Seconds allowed for one FMI call, or for 1/4096 of a run of an FMU of this project.",
     ),
 )
 
@@ -183,7 +183,12 @@ def refuse_options(context: click.Context, reason: str, *options: str) -> None:
             raise click.UsageError(f"{parameter.opts[0]} has no effect {reason}")
 
 
-def refuse_ignored_options(context: click.Context, fmus: Iterable[Path], tolerance_is_ignored: bool = False) -> None:
+def refuse_ignored_options(
+    context: click.Context,
+    fmus: Iterable[Path],
+    tolerance_is_ignored: bool = False,
+    timeout_is_ignored: bool = False,
+) -> None:
     """Raise UsageError for an option on the command line that has no effect on any of the FMUs.
 
     Parameters
@@ -194,6 +199,8 @@ def refuse_ignored_options(context: click.Context, fmus: Iterable[Path], toleran
         FMUs that are run with the options of the command line; scenes have their own options.
     tolerance_is_ignored : bool
         Whether the command sets no tolerance of the solver of FMUs of this project.
+    timeout_is_ignored : bool
+        Whether the command limits no time of FMUs of this project.
     """
     from ..running.fmu_archive import exposes_solver_steps, read_description
 
@@ -205,7 +212,7 @@ def refuse_ignored_options(context: click.Context, fmus: Iterable[Path], toleran
         descriptions = [read_description(file, context.params["lenient"]) for file in files]
         if all(map(exposes_solver_steps, descriptions)):
             reason = f"on {files[0].name}, which runs at the steps of its own solver"
-            refuse_options(context, reason, "timeout", *(["tolerance"] if tolerance_is_ignored else []))
+            refuse_options(context, reason, *["tolerance"] * tolerance_is_ignored, *["timeout"] * timeout_is_ignored)
             if all(uses_closed_form(description, context.params.get("values", ())) for description in descriptions):
                 reason = f"on {files[0].name} with the method {EXACT}, a closed form: set solver.method as well"
                 refuse_options(context, reason, "tolerance")

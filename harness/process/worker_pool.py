@@ -3,13 +3,15 @@
 Each worker has its own pipe, so a killed worker cannot deadlock the others.
 """
 
+import atexit
 import multiprocessing
 import os
 import tempfile
 from collections import deque
 from collections.abc import Callable, Collection, Iterator, Sequence
 from concurrent.futures import Future
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
+from functools import cache
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
 from shutil import rmtree
@@ -20,13 +22,43 @@ from typing import Any
 from ..errors import HarnessError
 from .interrupt import ignore_sigint
 from .subprocess_runner import POLL_INTERVAL
+from .temporary_directory import temporary_directory
 
-# bytes; the fork server puts a socket below the temporary directory, and its path is limited to 107 bytes (unix(7))
-MAX_SOCKET_DIRECTORY = 70
+# bytes; a socket of the fork server has 41 more in its path, which macOS limits to 103 bytes and Linux to 107 (unix(7))
+MAX_SOCKET_DIRECTORY = 62
+READY = "ready"  # the first message of a worker
+RESOURCES = ExitStack()  # of this process
+atexit.register(RESOURCES.close)
 
 
 class WorkerDiedError(HarnessError):
     """A worker process crashed."""
+
+
+class WorkerStartError(HarnessError):
+    """No worker process could start."""
+
+    def __init__(self) -> None:
+        super().__init__(
+            "the worker processes end before their first run: a script that starts workers must call sweep below "
+            "`if __name__ == '__main__':`, because each worker imports the script"
+        )
+
+
+def exit_while_importing_main() -> None:
+    """Exit in a process that imports the script which started it. The parent then raises WorkerStartError."""
+    if getattr(multiprocessing.current_process(), "_inheriting", False):  # as multiprocessing itself tests it
+        raise SystemExit(1)
+
+
+@cache
+def use_own_socket_directory() -> None:
+    """Let multiprocessing put its sockets into a directory of this project.
+
+    If this process is killed, the next command removes the directory.
+    """
+    process: Any = multiprocessing.current_process()
+    process._config["tempdir"] = str(RESOURCES.enter_context(temporary_directory("")))
 
 
 def process_context(preload: Sequence[str]) -> Any:
@@ -37,19 +69,27 @@ def process_context(preload: Sequence[str]) -> Any:
     path_is_short = len(os.fsencode(tempfile.gettempdir())) <= MAX_SOCKET_DIRECTORY
     if not path_is_short or "forkserver" not in multiprocessing.get_all_start_methods():
         return multiprocessing.get_context("spawn")
+    use_own_socket_directory()
     context = multiprocessing.get_context("forkserver")
     context.set_forkserver_preload(["__main__", *preload])
     return context
 
 
 class Worker:
-    """A process that runs one task after the other, with its temporary files in `folder`."""
+    """A process that runs one task after the other, with its temporary files in `folder`.
+
+    `is_ready` is whether it has started and waits for tasks or runs one.
+    """
 
     def __init__(self, context: Any, folder: Path) -> None:
+        self.is_ready = False
         self.connection, child_connection = context.Pipe()
         self.process = context.Process(target=run_tasks, args=(child_connection, str(folder)), daemon=True)
-        with ignore_sigint():
-            self.process.start()
+        try:
+            with ignore_sigint():
+                self.process.start()
+        except (EOFError, OSError):  # the fork server ended
+            raise WorkerStartError from None
         child_connection.close()
 
     def send_task(self, function: Callable[..., Any], *arguments: Any) -> None:
@@ -57,8 +97,8 @@ class Worker:
         with self.raise_if_died():
             self.connection.send((Path.cwd(), function, arguments))
 
-    def receive_result(self) -> Any:
-        """Return the result of the function, or the exception that it raised."""
+    def receive(self) -> Any:
+        """Return the next message: READY, the result of the function, or the exception that it raised."""
         with self.raise_if_died():
             return self.connection.recv()
 
@@ -81,13 +121,15 @@ class Worker:
 class WorkerPool:
     """Up to `size` workers, with temporary files in `folder`.
 
-    `death_errors` are the exceptions of a task whose worker died. The pool replaces a dead worker.
+    `death_errors` are the exceptions of a task whose worker died. The pool replaces a dead worker, unless none has been
+    ready before.
     """
 
     death_errors: tuple[type[Exception], ...] = (WorkerDiedError,)
 
     def __init__(self, size: int, folder: Path, preload: Sequence[str]) -> None:
         self.size, self.folder, self.context = size, folder, process_context(preload)
+        self.has_started = False  # whether a worker has been ready
         self.idle: list[Worker] = []
         self.busy: dict[Connection, tuple[Worker, Future[Any]]] = {}
         self.pending: deque[tuple[Future[Any], Callable[..., Any], tuple[Any, ...]]] = deque()
@@ -107,20 +149,28 @@ class WorkerPool:
             try:
                 worker.send_task(function, *arguments)
             except WorkerDiedError as died:
-                future.set_exception(died)
+                future.set_exception(self.death(died))
             else:
                 self.busy[worker.connection] = worker, future
+
+    def death(self, died: WorkerDiedError) -> HarnessError:
+        """Return the exception of a task whose worker died: WorkerStartError if no worker has been ready."""
+        return died if self.has_started else WorkerStartError()
 
     def wait_for_any(self, futures: Collection[Future[Any]]) -> set[Future[Any]]:
         """Return the futures that are done, once one is done or after `POLL_INTERVAL` s."""
         readable = wait([*self.busy], POLL_INTERVAL)
         for connection in [connection for connection in self.busy if connection in readable]:
-            worker, future = self.busy.pop(connection)
+            worker, future = self.busy[connection]
             try:
-                result = worker.receive_result()
+                result = worker.receive()
+                if not worker.is_ready:
+                    worker.is_ready = self.has_started = True
+                    continue
                 self.idle.append(worker)
             except WorkerDiedError as died:
-                result = died
+                result = self.death(died)
+            del self.busy[connection]
             if isinstance(result, BaseException):
                 future.set_exception(result)
             else:
@@ -138,6 +188,7 @@ class WorkerPool:
 def run_tasks(connection: Connection, folder: str) -> None:
     """Run tasks from the connection and send back their results."""
     initialize_worker(folder)
+    connection.send(READY)
     while True:
         try:
             directory, function, arguments = connection.recv()

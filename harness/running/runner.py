@@ -11,7 +11,7 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from math import inf
 from pathlib import Path
-from time import perf_counter
+from time import monotonic, perf_counter
 from typing import Any
 
 import numpy as np
@@ -41,6 +41,7 @@ DEFAULT_COMMUNICATION_STEPS = 512  # of a run without a communication step of it
 MAX_POINTS = 10_000_000  # of a grid
 REPORT_INTERVAL = 4096  # communication points at most, from one report of the progress to the next
 MIN_REPORTS = 50  # of the progress in a run on a grid: a report also checks the time limit
+LEAST_PROGRESS = 1 / 4096  # of a run in its time limit: one of the communication steps that a run has by default
 MAX_CVODE_STEPS = 500  # of model exchange, from point to point: the limit of fmpy's simulate_fmu
 
 
@@ -71,6 +72,37 @@ class RecordedRun:
     time: np.ndarray
     columns: Columns
     evaluations: int
+
+
+class ProgressMonitor:
+    """Reports the progress of a run, and raises HarnessError if it nearly stops.
+
+    Parameters
+    ----------
+    spec : RunSpec
+        Its `timeout` is the time in s in which the run must advance by LEAST_PROGRESS.
+    grid : TimeGrid
+        Communication points of the run.
+    report : callable
+        Receives the progress from 0 to 1.
+    """
+
+    def __init__(self, spec: RunSpec, grid: TimeGrid, report: ProgressCallback) -> None:
+        self.spec, self.grid, self.report = spec, grid, report
+        self.next_share, self.deadline = LEAST_PROGRESS, monotonic() + spec.timeout
+
+    def __call__(self, share: float) -> None:
+        """Report the progress."""
+        self.report(share)
+        now = monotonic()
+        if share >= self.next_share:
+            self.next_share, self.deadline = share + LEAST_PROGRESS, now + self.spec.timeout
+        elif now > self.deadline:
+            t, stop = self.grid.start + share * self.grid.duration, self.grid.stop
+            raise HarnessError(
+                f"{self.spec.fmu.name} is at t = {t:.6g} s of {stop:.6g} s, and advances by less than 1/4096 of the "
+                f"run in {self.spec.timeout:g} s: choose an earlier stop or a longer timeout"
+            )
 
 
 def run(spec: RunSpec, report: ProgressCallback) -> Trajectory:
@@ -260,6 +292,7 @@ def run_repeats(plan: RunPlan, session: FmuSession, report: ProgressCallback) ->
 def record_run(plan: RunPlan, session: FmuSession, report: ProgressCallback) -> RecordedRun:
     """Step from start to stop and record every point."""
     spec, grid, selection, rows = plan.spec, plan.grid, plan.chosen, io.BytesIO()
+    report = ProgressMonitor(spec, grid, report)
     recorder, signals = Recorder(session, selection, rows.write), input_signals(spec.inputs, session)
     if spec.exchange:
         from .model_exchange import ModelExchange  # loads CVode

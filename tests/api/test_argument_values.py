@@ -2,6 +2,9 @@
 
 import inspect
 import json
+import os
+import subprocess
+import sys
 from collections import defaultdict
 
 import argument_values
@@ -22,6 +25,7 @@ ACCEPTED = {  # arguments by function, and the values that they may have; None a
         "values": {"{}"},
         "stop": ABOVE_ZERO,
         "interval": ABOVE_ZERO,
+        "outputs": {"'x'"},
         "inputs": {"{}"},
         "timeout": ABOVE_ZERO,
         "progress": {"type"},
@@ -78,7 +82,9 @@ def test_all_functions_are_called():
 def test_a_value_is_used_or_refused_in_one_sentence(fmus, tmp_path, function):
     """A refusal is a HarnessError within the time limit; nothing else is raised, and no process dies."""
     (tmp_path / "fmus").symlink_to(fmus)
-    done = commands.run_python(tmp_path, commands.SUPPORT / "argument_values.py", tmp_path, function)
+    program = [sys.executable, commands.SUPPORT / "argument_values.py", tmp_path, function]
+    environment = os.environ | {"PYTHONPATH": str(commands.ROOT)}
+    done = subprocess.run(program, env=environment, capture_output=True, text=True, timeout=3600)
     assert done.returncode == 0, done.stderr
     accepted, failures = defaultdict(set), []
     parameters = inspect.signature(getattr(harness, function)).parameters

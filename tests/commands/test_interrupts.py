@@ -325,3 +325,24 @@ def test_progress_reporting_raises_a_swallowed_interrupt(monkeypatch, quiet):
         interrupt.RECEIVED_SIGNALS.append(signal.SIGINT)
         with pytest.raises(KeyboardInterrupt):
             report("one", 1.0)
+
+
+@pytest.mark.parametrize("library", ["click", "numpy"])
+@pytest.mark.parametrize(
+    "arguments", [["-m", "harness", "run", "smd"], ["-m", "benchmarks", "bench"], [str(ROOT / "build_fmus.py"), "smd"]]
+)
+def test_a_signal_while_a_library_is_imported_ends_a_command_like_any_other(tmp_path, arguments, library):
+    """The library of that name interrupts the process that imports it."""
+    (tmp_path / f"{library}.py").write_text(
+        "import os, signal, time\nos.kill(os.getpid(), signal.SIGINT)\ntime.sleep(60)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, *arguments],
+        cwd=tmp_path,
+        env=os.environ | {"PYTHONPATH": f"{tmp_path}{os.pathsep}{ROOT}"},
+        capture_output=True,
+        text=True,
+        timeout=100,
+        preexec_fn=partial(signal.signal, signal.SIGINT, signal.SIG_DFL),
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "Error: interrupted\n")

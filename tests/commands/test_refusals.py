@@ -48,7 +48,7 @@ SWEEP = ["sweep", "smd", "--vary", "m=1:2:3"]
 OPTIONS_WITHOUT_EFFECT = [
     (["run", "stickslip", "--interface", "ModelExchange", "--rtol", 0.5], "--rtol"),
     (["run", "stickslip", "--lenient"], "--lenient"),
-    (["run", "--fmu", OWN, "--timeout", 5], "--timeout"),
+    (["sweep", "smd", "--vary", "m=1,2", "--timeout", 5], "--timeout"),
     (["compare", "coulomb", "coulomb-sign", "--exchange"], "--exchange"),
     (["compare", OWN, "fmus/coulomb.fmu", "--run-rtol", 0.5], "--run-rtol"),
     (["compare", "line.csv", "line.csv", "--stop", 2], "--stop"),
