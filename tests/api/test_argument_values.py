@@ -46,6 +46,7 @@ ACCEPTED = {  # arguments by function, and the values that they may have; None a
     "fit": {
         "observe": {"'x'", *NOTHING},
         "inputs": NOTHING,
+        "values": {"{}"},
         "fixed": {"{}"},
         "sigma": {"{}", "{'x': 5}"},
         "start": {"{}"},
@@ -69,6 +70,7 @@ ACCEPTED = {  # arguments by function, and the values that they may have; None a
         "progress": {"type"},
     },
     "load_result": {},
+    "describe": {},
 }
 
 

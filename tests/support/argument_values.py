@@ -68,9 +68,10 @@ CALLS = {  # valid arguments, in which one is replaced
     "simulate": {"source": "coulomb", "stop": 0.2},
     "compare": {"a": "coulomb", "b": "smd", "stop": 0.2},
     "identify_decay": {"record": T, "x": X, "unit": "m"},
-    "fit": {"source": "smd", "records": RECORD, "free": {"k": (20.0, 60.0)}, "fixed": {"c": 0.2, "x0": 1.0}},
+    "fit": {"source": "smd", "records": RECORD, "free": {"k": (20.0, 60.0)}, "values": {"c": 0.2, "x0": 1.0}},
     "sweep": {"source": "coulomb", "grid": {"f": [0.5, 1.0]}, "stop": 0.2},
     "load_result": {"folder": "result"},
+    "describe": {"source": "coulomb"},
 }
 TIMEOUT = 60.0  # s for one call
 
