@@ -119,7 +119,7 @@ def find_repeated_times(t: np.ndarray) -> tuple[np.ndarray, str]:
 
     There are none if many times are repeated, which a single sentence would not explain.
     """
-    is_repeated = np.append(False, np.diff(t) == 0)
+    is_repeated = np.append(False, np.diff(t) == 0)[: len(t)]  # none of no samples
     times = np.unique(t[is_repeated])
     if not len(times) or is_repeated.sum() > MAX_REPEATED_SHARE * len(t):
         return np.zeros(len(t), bool), ""

@@ -92,6 +92,7 @@ FIT = [  # changes of a fit of mu_s of the sled to its position
     ({"free": ["delay(y)"]}, "unknown parameter 'delay(y)' (nearest: 'delay(x)')"),
     ({"validate": "missing.csv"}, "missing.csv"),
     ({"begin": 15.8}, "at least 12 are required"),
+    ({"begin": 100.0}, "has 0 samples in this interval; at least 12 are required"),
     (
         {"begin": 14.6, "free": ["mu_s", "mu_d", "k", "v_driver", "m", "g"]},
         "6 unknowns need at least 24 samples, and there are",

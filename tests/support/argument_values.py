@@ -1,6 +1,6 @@
 """Call the functions of the public API with arguments that make no sense, in a process with a time limit for each call.
 
-The search of a fit is left out: its arguments are valid if it begins.
+The search of a fit and the native build before it are left out: its arguments are valid if the search begins.
 
 python argument_values.py FOLDER [FUNCTION...]  prints JSON: [function, argument, value, outcome] for each call.
 """
@@ -107,7 +107,7 @@ def answer(folder, connection):
     os.chdir(tempfile.mkdtemp(dir=folder))
     Path("fmus").symlink_to(Path(folder) / "fmus")
     os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
-    study.fit_records = begin_search
+    study.fit_records, study.native_equivalent = begin_search, lambda fmu: fmu
     while True:
         connection.send(call(*connection.recv()))
 
