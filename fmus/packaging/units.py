@@ -87,7 +87,8 @@ def parse_unit(symbol: str) -> Unit | None:
     for sign, part, power in factors:
         for base, exponent in SYMBOLS[part].items():
             exponents[base] += exponent * int(power or "1") * (1 if sign == "." else -1)
-    return Unit(symbol, **exponents)
+    kg, m, s, A, K, rad = exponents.values()
+    return Unit(symbol, kg, m, s, A, K, rad)
 
 
 def unit_of(name: str, symbol: str, display: str = "") -> Unit:

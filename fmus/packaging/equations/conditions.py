@@ -11,11 +11,13 @@ from dataclasses import dataclass
 from .algebra import (
     Memo,
     dependents,
+    depends_on,
     is_constant,
     is_same_expression,
     operands,
     operands_first,
     subexpressions,
+    substitute,
     variables_in,
     with_operands,
 )
@@ -115,6 +117,38 @@ def replace_absolute_values(
                 new.location = part.location
         result[id(part)] = part if isinstance(part, Output) and part in unchanged else new
     return [result[id(e)] for e in expressions]
+
+
+def add_liftoff(model: type[Model]) -> None:
+    """Write the friction of contacts that may lift off by choose(), so that it is zero where it would be negative.
+
+    A sliding force that depends on the direction has a condition for each direction, because a condition keeps its
+    value during a step, and the solver tries several modes at its end.
+    """
+    for c in vars(model).values():
+        if not (isinstance(c, Contact) and c.lifts_off):
+            continue
+        if c.hold is not None and depends_on(c.slide, (c.mode,)):
+            forward, backward = (while_positive(substitute(c.slide, {c.mode: mode}), c) for mode in (1.0, -1.0))
+            c.hold = while_positive(c.hold, c)
+            c.slide = located(Term("choose", located(Term(">", c.mode, 0.0), c), forward, backward), c)
+        else:
+            touches = located(Term(">", c.slide, 0.0), c)
+            c.slide = located(Term("choose", touches, c.slide, 0.0), c)
+            c.hold = None if c.hold is None else located(Term("choose", touches, c.hold, 0.0), c)
+
+
+def while_positive(e: Operand, owner: Expression) -> Operand:
+    """Return an expression where it is positive, else 0."""
+    if not isinstance(e, Expression):
+        return e
+    return located(Term("choose", located(Term(">", e, 0.0), owner), e, 0.0), owner)
+
+
+def located(e: Term, owner: Expression) -> Term:
+    """Give a term the location of a declaration in the model file."""
+    e.location = owner.location
+    return e
 
 
 def locate_kinks(model: type[Model]) -> None:

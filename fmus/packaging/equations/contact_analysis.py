@@ -65,7 +65,8 @@ class ContactAnalysis(ModelRoles):
             at_rest = {c.slip: 0.0} if isinstance(c.slip, Expression) else {}
             self.holding_limit[c] = substitute(c.slide, at_rest) if c.hold is None else c.hold
             if depends_on(self.holding_limit[c], forces):
-                raise ModelError(f"the holding force of {c.name} depends on its direction: pass hold=", c.location)
+                instead = "pass hold=" if c.hold is None else "write a hold= that does not"
+                raise ModelError(f"the holding force of {c.name} depends on its direction: {instead}", c.location)
             if is_among(c, self.independent_contacts):
                 # other forces that occur in the rate cancel
                 e = substitute(self.slip_rate[c], {d: 0.0 for d in self.contacts if d is not c})

@@ -244,7 +244,9 @@ class Contact(Variable, variable_declarations.Output):
         Slip below which the law THRESHOLD holds; required with that law.
     lifts_off
         What a negative sliding force means.  None, the default: an error, which ends the run.  True: the contact has
-        lifted off; its force is zero and it does not stick.  False: it never occurs, by the form of the equations.
+        lifted off; its force is zero and it does not stick.  A sliding force that depends on the direction says nothing
+        about rest: there the contact has lifted off while `hold` is negative.  False: it never occurs, by the form of
+        the equations.
     low, high, above, below, display
         As for Parameter; the range is a property of the solution and is not enforced.
     """
@@ -273,15 +275,12 @@ class Contact(Variable, variable_declarations.Output):
         if not isinstance(slip, Expression) or is_comparison(slip):
             raise ModelError(f"slip of a Contact must be an expression of states, got {describe(slip)}")
         self.mode, self.slide, self.laws, self.eps = mode, as_operand(slide), laws, eps
+        self.slide_while_closed = self.slide
         self.slip: Operand = slip
         self.hold = None if hold is None else as_operand(hold)
         if lifts_off not in (None, True, False):
             raise ModelError(f"lifts_off must be True, False or None, got {describe(lifts_off)}")
         self.lifts_off = lifts_off
-        if lifts_off:
-            touches = Term(">", self.slide, 0.0)
-            self.slide = Term("choose", touches, self.slide, 0.0)
-            self.hold = None if hold is None else Term("choose", touches, self.hold, 0.0)
         if laws not in ((HYBRID,), (HYBRID, SIGN), (HYBRID, THRESHOLD)):
             raise ModelError(f"laws must be (HYBRID,), (HYBRID, SIGN) or (HYBRID, THRESHOLD), got {laws!r}")
         if (eps is not None) != (THRESHOLD in laws):

@@ -20,7 +20,7 @@ from typing import Any
 from ...runtime.codes import MODEL_RULE, OK
 from ...runtime.variable_declarations import VariableOwner
 from .. import BuildError
-from .conditions import locate_kinks
+from .conditions import add_liftoff, locate_kinks
 from .declaration_checks import check_repetition, check_use
 from .dimensions import check_frequencies, check_units
 from .expressions import ModelError
@@ -164,6 +164,7 @@ class ModelFile:
             raise explain(error, ast.parse(self.source), str(self.path)) from error
         for model in vars(module).values():
             if isinstance(model, type) and issubclass(model, Model):
+                add_liftoff(model)
                 locate_kinks(model)
         return module
 

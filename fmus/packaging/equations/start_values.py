@@ -60,7 +60,7 @@ def check_symmetry(c: Contact, values: dict[Expression, float], load_values: dic
             "directs against the slip",
             c.location,
         )
-    if not has_condition_on(force_while_closed(c), variables_in(c.slip)):
+    if not has_condition_on(c.slide_while_closed, variables_in(c.slip)):
         if differ(direct_forward, direct_backward):
             raise ModelError(
                 f"slide of {c.name} is {direct_forward:g} {c.unit} at a slip of 1, but {direct_backward:g} {c.unit} at "
@@ -77,14 +77,9 @@ def check_symmetry(c: Contact, values: dict[Expression, float], load_values: dic
 
 def sliding_force(c: Contact, slip: float, values: dict[Expression, float]) -> float:
     """Return the sliding force at a slip, as if the contact were closed."""
-    slide = force_while_closed(c)
+    slide = c.slide_while_closed
     slips = [e for e in subexpressions(slide).values() if is_same_expression(e, c.slip)]
     return evaluate(slide, values | dict.fromkeys(slips, slip), {})
-
-
-def force_while_closed(c: Contact) -> Operand:
-    """Return the sliding force as the model declares it."""
-    return c.slide.args[1] if c.lifts_off else c.slide
 
 
 def differ(a: float, b: float) -> bool:
