@@ -30,16 +30,17 @@ def output_dependencies(model: type[VariableOwner], declared: Variables, at_star
         **{s: s.start_expression for s in analysis.states},
     }
     values = start if at_start else {}
+    rates = analysis.declared_derivatives()
 
     def among(*terms: Operand) -> set[Expression]:
-        return {leaf for e in terms for leaf in variables_in(substitute(e, values))}
+        return {leaf for e in terms for leaf in variables_in(substitute(substitute(e, values), rates))}
 
     def of_mode(c: Contact) -> set[Expression]:
         contacts = [c] if c in analysis.load else analysis.contacts
         held = [*analysis.load_expressions(c), *(analysis.holding_limit[d] for d in contacts)] if HYBRID in laws else []
-        rates = [differentiate(e, analysis.coasting_derivatives) for e in held]
+        load_rates = [differentiate(e, analysis.coasting_derivatives) for e in held]
         others = [e for d in contacts if d is not c for e in (d.slip, d.slide)]
-        return among(c.slip, *held, *rates, *others, *([c.eps] if THRESHOLD in laws else []))
+        return among(c.slip, *held, *load_rates, *others, *([c.eps] if THRESHOLD in laws else []))
 
     def of_force(c: Contact) -> set[Expression]:
         return of_mode(c) | among(

@@ -75,7 +75,7 @@ def describe(model: Any, name: str, code: str, date: datetime, nominals: Sequenc
     stepping = (
         STEPPING_CAPABILITIES
         | (DIRECTIONAL_DERIVATIVES | OUTPUT_DERIVATIVES if exchanging else {})
-        | (INPUT_INTERPOLATION if model.has_input_derivatives else {})
+        | (INPUT_INTERPOLATION if exchanging and model.has_input_derivatives else {})
     )
     SubElement(root, "CoSimulation", stepping, modelIdentifier=name)
     add_units(root, declared)

@@ -45,6 +45,9 @@ class CoupledFriction(DryFriction):
     def slip_magnitudes(self, t: float, y: StateVector) -> ContactVector:
         """Return the sums of their absolute terms."""
 
+    def slip_deviations(self, t: float, y: StateVector) -> ContactVector:
+        """Return how far new values of inputs move the slips without a jump, because their rates have changed."""
+
     def contact_forces(
         self, t: float, y: StateVector, modes: ContactVector
     ) -> tuple[ContactVector, ContactVector, ContactVector]:
@@ -175,6 +178,19 @@ def have_jumped(model, t, y: StateVector, slips_before: ContactVector):
     for i in contact_indices:
         jumped = jumped or fabs(slips[i] - slips_before[i]) > REVERSED_SHARE * (terms[i] + SLIP_SCALE)
     return jumped
+
+
+def follow_inputs(model, t, y: StateVector, modes: ContactVector, deviations: ContactVector) -> StateVector:
+    """Return the states after new values of prescribed inputs, which stuck contacts follow.
+
+    Slips up to `deviations` are errors of the continued inputs, or of the importer's solver; impulses remove them.
+    """
+    slips = model.slip_velocities(t, y)
+    held_modes = contact_vector()
+    for i in contact_indices:
+        is_error = modes[i] * slips[i] <= 0.0 and fabs(slips[i]) <= deviations[i]
+        held_modes[i] = STUCK if is_error else FORWARD
+    return stop_slips(model, t, y, held_modes)
 
 
 def resolve_at_start(

@@ -12,7 +12,7 @@ from .pythonfmu_workarounds import reraise_later, sanitize, write_to_stderr
 from .run_state import RunState
 from .variable_declarations import VariableDeclaration
 
-ERROR = 3  # status code in all versions of FMI
+WARNING, ERROR = 1, 3  # status codes in all versions of FMI
 CALCULATED_CAUSALITIES = ("output", "local")  # causalities of calculated variables
 
 
@@ -27,6 +27,7 @@ class FailureHandling:
     run: RunState
     attribute_owners: list[tuple[object, str]]  # owner and attribute name of each variable
     invalid_values: dict[str, str]  # name -> message, for rejected values; empty once a step was refused for it
+    has_warned: bool  # about the rate of an input
     pending_exception: object  # weak reference that re-raises an exception of the host
 
     def fail_with_status(self, status: int, t: float = nan, h: float = nan) -> bool:
@@ -61,6 +62,12 @@ class FailureHandling:
         """Write a message to the log and to standard error."""
         self.log(sanitize(message), ERROR)
         write_to_stderr(f"{type(self).__name__} ({self.instance_name}): {message}")
+
+    def warn_of_inconsistent_rate(self) -> None:
+        """Log once that an input jumps against its rate."""
+        if not self.has_warned:
+            self.has_warned = True
+            self.log(sanitize(messages.inconsistent_rate_message(self.run, self.model)), WARNING)
 
     def handle_exception(self, error: BaseException) -> bool:
         """Turn an exception into a failure; exceptions of the host, as an interrupt, are re-raised after the call."""

@@ -67,6 +67,7 @@ class FmuInstance(SavedStateAccess):
         self.instances.add(self)
         self.model = self.Model()
         self.run = RunState(self.model)
+        self.has_warned = False
         self.initialize_access()
 
     @signal_safe
@@ -91,6 +92,8 @@ class FmuInstance(SavedStateAccess):
                     refuses = run.phase >= RUNNING and call_sequence.is_refusal(run, status)
                     report = self.refuse_step if refuses else self.fail_with_status
                     return report(status, current_time, step_size)
+            if self.polynomials and model.inconsistent_input > 0:
+                self.warn_of_inconsistent_rate()
             if outputs_were_read:  # the importer reads outputs at every step: computing them here saves calls
                 call_sequence.set_outputs(run, model)
             return True

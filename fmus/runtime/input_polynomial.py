@@ -1,6 +1,14 @@
-"""Polynomial in time for an input between two settings, given by its derivatives."""
+"""Polynomial in time for an input between two settings, given by its derivatives.
+
+A prescribed motion is an input whose declared rate, another input, continues it.
+"""
+
+from math import fabs
 
 from .codes import MAX_INPUT_ORDER
+
+SAME_VALUE, EXPLAINED_SHARE = 1e-6, 0.5  # relative jumps of a value that do not matter; share of its change
+MAX_JUMPS = 3  # communication points in succession at which a value jumps
 
 
 class InputPolynomial:
@@ -56,3 +64,75 @@ class InputPolynomial:
             for n in range(self.order):
                 self.derivatives[n] = self.derivative_at(s, n)
         return self.derivatives[0]
+
+
+class PrescribedMotion(InputPolynomial):
+    """Input with a declared rate.
+
+    A new value need not be the one to which the rate has led, because the rate itself varies between communication
+    points.  `deviation` bounds the difference that a change of the rate explains; a larger one is a jump.
+    """
+
+    def __init__(self):
+        super().__init__()
+        self.importer_order = 0  # highest order that the importer has set; the rate gives the derivatives above
+        # before the last change: value at the previous change and time since then; the continued value and its rate
+        self.last_value = self.elapsed = self.continued_value = self.continued_rate = 0.0
+        # how far changes of the rate move the value: since it was set, up to now and up to the previous change; until
+        # it was set
+        self.drift = self.earlier_drift = self.last_drift = 0.0
+        self.deviation = 0.0
+        self.was_set = self.has_jumped = False
+        self.n_jumps = 0  # communication points in succession at which the value has jumped
+
+    def begin(self):
+        """Start a run with the present value."""
+        self.last_value = self.continued_value = self.derivatives[0]
+        self.continued_rate = self.derivatives[1]
+        self.elapsed = self.deviation = self.drift = self.earlier_drift = self.last_drift = 0.0
+        self.was_set = self.has_jumped = False
+        self.n_jumps = 0
+
+    def continue_by(self, n, value):
+        """Set the n-th derivative according to the rate, unless the importer sets it."""
+        if n > self.importer_order:
+            self.derivatives[n] = value
+            if n > self.order:
+                self.order = n
+
+    def shift_to(self, s):
+        """Move the origin to s: update all derivatives there and return the value."""
+        if s > 0.0:
+            self.last_value, self.elapsed = self.derivatives[0], s
+            if self.was_set:
+                self.last_drift, self.earlier_drift = self.drift, 0.0
+            else:
+                self.earlier_drift = self.drift
+            self.was_set = self.has_jumped = False
+        if self.order > 0:
+            for n in range(self.order):
+                self.derivatives[n] = self.derivative_at(s, n)
+        if s > 0.0:
+            self.continued_value, self.continued_rate = self.derivatives[0], self.derivatives[1]
+        return self.derivatives[0]
+
+    def set_motion(self, value):
+        """Set the value at s = 0, and note whether it jumps."""
+        self.set_value(value)
+        self.drift = self.earlier_drift + fabs(self.derivatives[1] - self.continued_rate) * self.elapsed
+        # around an extremum of the rate, its values at both ends of a step may be equal
+        self.deviation = self.drift if self.drift > self.last_drift else self.last_drift
+        jump = fabs(value - self.continued_value)
+        if jump != 0.0:
+            self.was_set = True
+        self.has_jumped = (
+            jump > self.deviation
+            and jump > SAME_VALUE * fabs(value)
+            and jump > EXPLAINED_SHARE * fabs(value - self.last_value)
+        )
+
+    def count_jump(self):
+        """Count the communication points in succession at which the value jumps; return whether they are many."""
+        self.n_jumps = self.n_jumps + 1 if self.has_jumped else 0
+        self.has_jumped = False
+        return self.n_jumps >= MAX_JUMPS

@@ -6,7 +6,7 @@ ahead of t does not show.
 
 from math import fabs, inf, nan
 
-from . import conditions, ode23, phase_repetition
+from . import conditions, contact_lcp, ode23, phase_repetition
 from .active_method import METHOD_ITEMS
 from .codes import DIVERGED, EPSILON, EXACT, HYBRID, HYBRID_LAW_ONLY, NEEDS_REPETITION, OK, STUCK, TOO_MANY_STEPS
 from .linear_closed_form import HIGHER_ORDER_INPUT
@@ -143,6 +143,9 @@ class Integrator(VariableOwner):
             for i in contact_indices:
                 if self.modes_before_change[i] * self.y[slip_index[i]] < 0.0:
                     self.y[slip_index[i]] = 0.0  # a velocity against the mode of a slip phase is rounding
+        if model.has_prescribed_slips and step.is_hybrid:
+            deviations = model.slip_deviations(self.t, self.y)
+            self.y = contact_lcp.follow_inputs(model, self.t, self.y, self.modes_before_change, deviations)
         step.start_empty_step(model, self.t, self.y, self.modes_before_change, step.tie_tolerance(model))
         if model.has_dry_friction and any_of(step.modes1 != self.modes_before_change):
             step.count_event()

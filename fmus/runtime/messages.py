@@ -66,6 +66,10 @@ CALL_MESSAGES = {
     "and take shorter communication steps",
     codes.WRONG_LENGTH: "{function} is refused: {word} is wrong",
 }
+INCONSISTENT_RATE = (
+    "{name} jumps at one communication point after another, now at t = {now!r} s, and its rate {rate} does not explain "
+    "it, so that contacts slip at each of them; set {rate} to the time derivative of {name}"
+)
 PHASE_NAMES = {
     codes.INSTANTIATED: "instantiated",
     codes.INITIALISING: "in initialisation mode",
@@ -92,6 +96,12 @@ def rule_message(status: int, run: RunState, model: Any) -> str:
     if "violation_time" in values:
         values = {**values, "violation_time": run.solver.start_time + model.violation_time}
     return str(model.rules[status]).format_map(values)
+
+
+def inconsistent_rate_message(run: RunState, model: Any) -> str:
+    """Return the warning about an input that jumps against its rate."""
+    name, rate = model.prescribed_inputs[model.inconsistent_input - 1]
+    return INCONSISTENT_RATE.format(name=name, rate=rate, now=run.solver.t)
 
 
 def value_message(reason: int, name: str, declared: VariableDeclaration, value: float) -> str:

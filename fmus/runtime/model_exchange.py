@@ -15,7 +15,7 @@ solvers report a zero at the current time as another event.
 from math import fabs, inf, nan
 
 from . import call_sequence, conditions, contact_lcp, event_location, stick_slip
-from .codes import DIVERGED, EPSILON, MODEL_EXCHANGE, NO_CONSISTENT_MODES, OK, ROUNDOFF_MARGIN, RUNNING, STUCK
+from .codes import DIVERGED, EPSILON, EVENT, MODEL_EXCHANGE, NO_CONSISTENT_MODES, OK, ROUNDOFF_MARGIN, RUNNING, STUCK
 from .integrator import DEFAULT_NOMINAL
 from .run_state import RunState
 from .step_control import OVERFLOW_LIMIT, TIE_FACTOR
@@ -48,6 +48,7 @@ class ModelExchange:
 
     to_rest: ContactVector
     to_break_away: ContactVector
+    slip_errors: ContactVector
 
     def __init__(self, model):
         y, modes = state_vector(), contact_vector()
@@ -60,6 +61,7 @@ class ModelExchange:
         self.nominals = [*y, 0.0] if model.has_driver else [*y]
         self.indicators = [1.0] * (model.n_event_functions + 1)  # the last one is unused: C has no empty arrays
         self.to_rest = self.to_break_away = 1.0
+        self.slip_errors = 0.0  # slips of stuck contacts before an event, which are errors of the importer's solver
         self.conditions = [1.0] * (model.n_event_functions - model.first_condition + 1)  # indicators of conditions
         self.driver_rate = self.nominal_velocity = 0.0
         self.states_changed = self.nominals_changed = False
@@ -110,7 +112,7 @@ def set_time(run, model, t):
     run.model_exchange.time = t
     solver = run.solver
     solver.t = solver.step.t0 = t - solver.start_time
-    if model.has_driver:
+    if model.has_driver or model.has_input_derivatives:
         model.t_base = solver.t
 
 
@@ -186,6 +188,9 @@ def update_indicators(run, model):
         if model.is_coupled:
             slips = model.slip_velocities(solver.t, solver.y)
             force, limit, terms = model.contact_forces(solver.t, solver.y, solver.modes)
+            if model.has_prescribed_slips and run.phase != EVENT:
+                for i in contact_indices:
+                    exchange.slip_errors[i] = fabs(slips[i]) if solver.modes[i] == STUCK else 0.0
             for i in contact_indices:
                 if solver.modes[i] != STUCK:
                     if not (force[i] == 0.0 and limit[i] == 0.0):  # without friction, a reversal is no event
@@ -309,12 +314,16 @@ def update_modes(run, model):
     The slip velocity is set to zero where slip ends.  Without a cause nothing changes, so a second call has no effect.
     """
     solver = run.solver
+    exchange = run.model_exchange
     tie_tolerance = TIE_FACTOR * solver.step.tolerance
     needs_restart = changed = False
     step = solver.step
     if model.is_coupled:
+        y = solver.y
+        if model.has_prescribed_slips:
+            y = contact_lcp.follow_inputs(model, solver.t, y, solver.modes, exchange.slip_errors)
         y, modes, step.has_consistent_modes = contact_lcp.resolve_at_start(
-            model, solver.t, solver.y, solver.modes, step.h_max, tie_tolerance, OVERSHOOT_TOLERANCE
+            model, solver.t, y, solver.modes, step.h_max, tie_tolerance, OVERSHOOT_TOLERANCE
         )
         needs_restart, changed = any_of(y != solver.y), any_of(modes != solver.modes)
         solver.y, solver.modes = y, modes

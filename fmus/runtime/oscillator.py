@@ -23,6 +23,7 @@ class Oscillator(VariableOwner):
 
     solver_class: Any  # Integrator with the methods that suit the model
     friction: int  # friction law, of models with contacts
+    inconsistent_input: int  # index, from 1, of a prescribed input that jumps again and again against its rate; or 0
     condition_sides: list[float]  # of each condition: 1.0 where it holds, else -1.0; the solver sets them at events
 
     states: dict[str, str] = {"x": "v", "v": "a"}  # state -> its rate, which may be a state
@@ -37,6 +38,9 @@ class Oscillator(VariableOwner):
     checks_event_steps = False  # steps to events are checked: see InternalStep.is_accurate_at
     has_driver = False  # the driver is at x_base at time t_base and moves at driver_velocity()
     has_input_derivatives = False  # inputs are polynomials around t_base; has_higher_order() if any order exceeds 1
+    has_prescribed_inputs = False  # inputs with declared rates: count_jumps() is defined
+    prescribed_inputs: tuple[tuple[str, str], ...] = ()  # names of each such input and of its rate
+    has_prescribed_slips = False  # some of them are part of a slip: slip_deviations() is defined
     is_linear = False  # piecewise linear (linear_closed_form.py)
     has_conditions = False  # choose() with conditions that change during a step (event_location.py)
     # event functions: number, first of a condition; conditions that switch; status of the first of the others, limits
@@ -80,6 +84,9 @@ class Oscillator(VariableOwner):
 
     def set_input_rates(self, t: float) -> None:
         """Set the rates of inputs with derivatives."""
+
+    def count_jumps(self) -> None:
+        """Note the input that jumps at many communication points in succession, against its rate."""
 
     def has_higher_order(self) -> bool:
         """Return whether the polynomial of an input has an order above 1."""

@@ -61,6 +61,8 @@ class VariableAccess(FailureHandling):
     def initialize_access(self) -> None:
         """Initialize the access to the variables of a new model."""
         self.attribute_owners = [self.locate(name) for name, _ in self.variables]
+        # of inputs that vary between settings: the polynomial by name
+        self.polynomials = {name: getattr(self.model, f"{name}_polynomial") for name, _ in self.model.prescribed_inputs}
         # compiled reader by type and value references; the last one used, by type
         self.readers: dict[tuple[object, ...], Any] = {}
         self.last_readers: dict[str, Any] = dict.fromkeys(
@@ -134,7 +136,7 @@ class VariableAccess(FailureHandling):
         """Set a value; an invalid one is recorded, and the next step reports it."""
         name, declared = self.variables[reference]
         owner, attribute = self.attribute_owners[reference]
-        if value == getattr(owner, attribute) and name not in self.invalid_values:
+        if value == getattr(owner, attribute) and name not in self.invalid_values and not self.is_moving(name):
             return
         calculated, fixed = declared.causality not in SETTABLE_CAUSALITIES, declared.variability == "fixed"
         reason = call_sequence.rejection_reason(self.run, calculated, fixed, declared.accepts(value))
@@ -144,6 +146,10 @@ class VariableAccess(FailureHandling):
             setattr(owner, attribute, value)
         else:
             self.set_invalid(name, messages.value_message(reason, name, declared, value))
+
+    def is_moving(self, name: str) -> bool:
+        """Return whether a variable is an input that varies between settings, so that its attribute may be outdated."""
+        return name in self.polynomials and self.polynomials[name].order > 0
 
     def set_invalid(self, name: str, message: str) -> None:
         """Record the message for an invalid value; an empty message marks the value as valid."""

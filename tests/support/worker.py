@@ -262,15 +262,16 @@ class ModelExchange(CoSimulation):
         """Integrate with scipy as a second importer; return the rows at the times and the number of derivative
         evaluations.
 
-        The instance is at times[0], in continuous-time mode. `ramp` is {name: [value at time 0, rate]} for inputs. An
-        event is handled where an indicator is no longer positive, as in SUNDIALS.
+        The instance is at times[0], in continuous-time mode. `ramp` is {name: [value at time 0, rate, ...]} for inputs:
+        the coefficients of a polynomial in time. An event is handled where an indicator is no longer positive, as in
+        SUNDIALS.
         """
         from scipy.integrate import solve_ivp  # takes 0.3 s, and few processes need it
 
         read, t, rows, evaluations = self._reader(names), times[0], [], 0
 
         def set_point_and_inputs(t, y):
-            self.set({name: value + rate * t for name, (value, rate) in ramp.items()})
+            self.set({name: sum(c * t**n for n, c in enumerate(powers)) for name, powers in ramp.items()})
             self.set_point(t, list(y))
 
         def rates(t, y):

@@ -43,7 +43,7 @@ class CodegenContext:
             if (
                 isinstance(e, Term)
                 and not self.name_of(e)
-                and not depends_on(e, analysis.inputs)
+                and not depends_on(e, analysis.input_symbols)
                 and f"A_{c.name}_{d.name}" not in declared_names
             ):
                 self.names[e] = f"A_{c.name}_{d.name}"
@@ -69,7 +69,7 @@ class CodegenContext:
             roots += [c.slide, analysis.holding_limit[c], c.eps]
             roots += [] if analysis.rests_when_stuck else [analysis.A[c, d] for d in analysis.contacts]
         roots += analysis.outputs
-        moving = dependents(roots, (*analysis.time_varying, *analysis.inputs))
+        moving = dependents(roots, (*analysis.time_varying, *analysis.input_symbols))
         can_fail = self._expressions_that_can_fail(roots)
         case_roots: list[Operand] = []
 
@@ -120,13 +120,13 @@ class CodegenContext:
     def emit_driver(self, printer: ExpressionPrinter, targets: Sequence[Operand]) -> None:
         """Emit the position of the driver and time-dependent inputs, if the targets need them."""
         for e, rate in self.analysis.input_rates.items():
-            polynomial = f"self.{e.name}_polynomial"
-            if e not in printer.bound_names and any(depends_on(target, (e,)) for target in targets):
-                printer.bound_names[e] = e.name
-                printer.emit(f"{e.name} = {polynomial}.value_at(t - self.t_base)")
-            if rate not in printer.bound_names and any(depends_on(target, (rate,)) for target in targets):
-                printer.bound_names[rate] = rate.name
-                printer.emit(f"{rate.name} = {polynomial}.rate_at(t - self.t_base)")
+            calls = {e: "value_at(t - self.t_base)", rate: "rate_at(t - self.t_base)"}
+            if e in self.analysis.input_second_rates:
+                calls[self.analysis.input_second_rates[e]] = "derivative_at(t - self.t_base, 2)"
+            for symbol, call in calls.items():
+                if symbol not in printer.bound_names and any(depends_on(target, (symbol,)) for target in targets):
+                    printer.bound_names[symbol] = symbol.name
+                    printer.emit(f"{symbol.name} = self.{e.name}_polynomial.{call}")
         if self.driver is not None and any(depends_on(e, (self.driver,)) for e in targets):
             printer.bound_names[self.driver] = self.driver.name
             printer.emit(

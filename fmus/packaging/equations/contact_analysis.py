@@ -32,6 +32,8 @@ class ContactAnalysis(ModelRoles):
     def _find_contact_loads(self) -> None:
         """Derive slip rate, holding limit and load of each contact; the load is the force that keeps the slip zero."""
         forces = (*self.contacts, *self.modes)
+        for c in self.contacts:
+            self._check_inputs_in_slip(c)
         self.slip_rate: dict[Contact, Operand] = {
             c: self.derivative(c.slip, self.time_derivatives) for c in self.contacts
         }
@@ -53,7 +55,7 @@ class ContactAnalysis(ModelRoles):
             c for c in self.contacts if all(is_same_expression(self.A[c, d], 0.0) for d in self.contacts if d is not c)
         ]
         self.interacting_contacts = [c for c in self.contacts if not is_among(c, self.independent_contacts)]
-        moving = (*self.time_varying, *self.inputs)
+        moving = (*self.time_varying, *self.input_symbols)
         self.variable_lever_contacts = [
             c
             for c in self.contacts
@@ -76,6 +78,22 @@ class ContactAnalysis(ModelRoles):
                     else build_term("/", substitute(e, {c: 0.0}), self.divisor(c))
                 )
                 self.load[c] = substitute(load, {c.mode: 0.0} | (at_rest if isinstance(c.slip, State) else {}))
+
+    def _check_inputs_in_slip(self, c: Contact) -> None:
+        """Raise ModelError for an input without a rate in a slip: static friction could not follow it."""
+        for e in self.inputs:
+            if e.declared_rate is None and not is_same_expression(self.derivative(c.slip, {e: 1.0}), 0.0):
+                raise ModelError(
+                    f"slip of {c.name} contains the input {e.name}, whose rate static friction needs: declare the rate "
+                    f"as another input and write {e.name} = Input(..., rate=...), or declare {e.name} as a State with "
+                    f"that input as its rate; rate=0.0 means that {e.name} is constant between jumps",
+                    c.location,
+                )
+
+    @property
+    def has_prescribed_slips(self) -> bool:
+        """Whether an input with a declared rate is part of a slip."""
+        return any(depends_on(c.slip, self.prescribed_inputs) for c in self.contacts)
 
     def divisor(self, c: Contact) -> Operand:
         """Return how a contact force acts on its own slip, as a divisor: not zero where its lever vanishes."""
@@ -107,8 +125,15 @@ class ContactAnalysis(ModelRoles):
         if self.dynamic_states[0] is not c.slip:
             return False
         changes = (self.derivative(self.load[c], self.explicit_time_derivatives), self.holding_limit[c])
-        return not any(depends_on(e, by_time) for e in changes) and not any(
-            has_condition_on(e, by_time) for e in (self.load[c], *self._dynamic_expressions())
+        prescribed = self.prescribed_inputs
+        slopes = [self.derivative(self.load[c], {e: 1.0}) for e in prescribed]
+        return (
+            not any(depends_on(e, by_time) for e in changes)
+            and not depends_on(self.holding_limit[c], prescribed)
+            and not any(depends_on(slope, (*by_time, *self.inputs)) for slope in slopes)
+            and not any(
+                has_condition_on(e, (*by_time, *prescribed)) for e in (self.load[c], *self._dynamic_expressions())
+            )
         )
 
     @property
@@ -152,7 +177,7 @@ class ContactAnalysis(ModelRoles):
                 (c.hold, "<", "the holding force is negative", "it is at least 0"),
                 (self.A[c, c], "<=", "the force accelerates its own slip", "it opposes the slip"),
             ):
-                is_constant = isinstance(e, Expression) and not depends_on(e, (*self.time_varying, *self.inputs))
+                is_constant = isinstance(e, Expression) and not depends_on(e, (*self.time_varying, *self.input_symbols))
                 if is_constant and not is_nonnegative(e):
                     values = ", ".join(f"{one.name} = {{{one.name}!r}}" for one in variables_in(e))
                     broken = Term(op, e, 0.0)
@@ -172,7 +197,7 @@ class ContactAnalysis(ModelRoles):
                 sliding & set(variables_in(rule.broken)) and holding & set(variables_in(rule.broken))
                 for rule in self.rules
             )
-            if not has_rule and not depends_on(c.slide - c.hold, (*self.time_varying, *self.inputs)):
+            if not has_rule and not depends_on(c.slide - c.hold, (*self.time_varying, *self.input_symbols)):
                 values = ", ".join(f"{e.name} = {{{e.name}!r}}" for e in self.parameters if e in sliding | holding)
                 sentence = (
                     f"{c.name}: the sliding force exceeds the holding force ({values}): lower slide or raise hold"
@@ -184,7 +209,7 @@ class ContactAnalysis(ModelRoles):
 
     def _find_limits(self) -> list[Condition]:
         """Return the limits of friction forces that vary: not negative, and no sliding above the holding force."""
-        varying = (*self.time_varying, *self.inputs)
+        varying = (*self.time_varying, *self.input_symbols)
         result = []
         for c in self.contacts:
             at = "at t = {violation_time!r} s"

@@ -13,6 +13,7 @@ from .codegen_context import CodegenContext, emit_return, emit_scales, method_so
 from .contact_analysis import SMALLEST_DIVISOR
 from .expression_printer import ExpressionPrinter
 from .expressions import Expression, Operand, Term, is_among
+from .model_analysis import ModelAnalysis
 from .model_declaration import SIGN, THRESHOLD, Contact, State
 
 
@@ -38,6 +39,7 @@ def coupled_contact_methods(context: CodegenContext) -> list[str]:
     return [
         method_source("slip_velocities", ["t", *context.states], context.return_lines(context.printer(), slips)),
         slip_scale_method(context),
+        *slip_deviation_method(context),
         forces_method(context),
         force_rates_method(context),
         impulse_method(context),
@@ -172,6 +174,11 @@ def law_mode(printer: ExpressionPrinter, c: Contact) -> str:
     return f"sign({slip}) if fabs({slip}) >= {printer.text(c.eps)} else 0" if THRESHOLD in c.laws else f"sign({slip})"
 
 
+def slips_of_laws(analysis: ModelAnalysis) -> list[Operand]:
+    """Return the slips that decide on modes under a law without stick and slip."""
+    return [c.slip for c in analysis.contacts if len(c.laws) > 1]
+
+
 def emit_friction_forces(context: CodegenContext, printer: ExpressionPrinter) -> None:
     """Emit the forces and modes under the selected law."""
     contacts = [c for c in context.analysis.contacts if len(c.laws) > 1]
@@ -193,6 +200,26 @@ def slip_scale_method(context: CodegenContext) -> str:
     sizes = emit_scales(context, printer, rounding_scales([c.slip for c in context.analysis.contacts]))
     context.emit_driver(printer, sizes)
     return method_source("slip_magnitudes", ["t", *context.states], emit_return(printer, sizes))
+
+
+def slip_deviation_method(context: CodegenContext) -> list[str]:
+    """Return the source of the method for how far changed rates of inputs move the slips; nothing without them."""
+    analysis, printer = context.analysis, context.printer()
+    if not analysis.has_prescribed_slips:
+        return []
+    deviations: list[Operand] = []
+    for c in analysis.contacts:
+        total: Operand = 0.0
+        for e in analysis.prescribed_inputs:
+            deviation = local_symbol(f"deviation_{e.name}")
+            printer.bound_names[deviation] = f"self.{e.name}_polynomial.deviation"
+            slope = analysis.derivative(c.slip, {e: 1.0})
+            if not is_same_expression(slope, 0.0):
+                size = abs(slope) if not isinstance(slope, Expression) else Term("fabs", slope)
+                total = build_term("+", total, build_term("*", size, deviation))
+        deviations.append(total)
+    context.emit_driver(printer, deviations)
+    return [method_source("slip_deviations", ["t", *context.states], emit_return(printer, deviations))]
 
 
 def forces_method(context: CodegenContext) -> str:

@@ -12,7 +12,7 @@ from .conditions import is_absolute_value
 from .expression_printer import COMPARISON_OPERATORS
 from .expressions import Expression, ModelError, Operand, Term
 from .model_analysis import ModelAnalysis
-from .model_declaration import Choice, Contact, Mode, Output, State, Variable
+from .model_declaration import Choice, Contact, Input, Mode, Output, State, Variable
 
 Dimensions = tuple[Fraction, ...]  # exponents of DIMENSIONS
 DIMENSIONS = tuple(base for base in BASE_UNITS if base != "rad")  # angles are dimensionless
@@ -46,6 +46,8 @@ def check_units(analysis: ModelAnalysis) -> None:
             check_dimensions(e, e.start_expression, own, f"{prefix} its start", memo)
             check_dimensions(e, e.nominal_velocity, own, f"{prefix} its nominal_velocity", memo)
             check_dimensions(e, e.constant_rate, quotient(own, SECOND), f"{prefix} its rate", memo)
+        if isinstance(e, Input) and e.declared_rate is not None:
+            check_dimensions(e, e.declared_rate, quotient(own, SECOND), f"{prefix} its rate", memo)
         if isinstance(e, Contact):
             slip = dimensions_of(e.slip, memo)
             for word, force in ("slide", e.slide), ("hold", e.hold):
@@ -73,6 +75,8 @@ def check_frequencies(analysis: ModelAnalysis) -> None:
             values.append((e.integrates, e))
         if isinstance(e, State) and e.constant_rate is not None:
             values.append((e, e.constant_rate))
+        if isinstance(e, Input) and e.declared_rate is not None:
+            values.append((e, e.declared_rate))
         uses += [(e, f"{one.name} is in {one.unit}", value) for one, value in values if angle_exponent(one) > 0]
         for part in analysis.declared_expressions(e):
             uses += [

@@ -18,7 +18,7 @@ from .algebra import (
 from .conditions import Condition, find_conditions
 from .contact_analysis import ContactAnalysis
 from .declaration_checks import METHODS, check_declarations
-from .expressions import Expression, ModelError, Operand, Term
+from .expressions import Expression, ModelError, Operand, Term, is_among
 from .model_declaration import Contact, Fixed, Input, Mode, Model, Parameter, Rule, Variable
 from .model_roles import TIME
 from .reserved_names import RESERVED_WHERE_COUPLED, check_name
@@ -35,7 +35,11 @@ class ModelAnalysis(ContactAnalysis):
         super().__init__(model, has_input_derivatives)
         check_declarations(self)
         self._find_contact_loads()
-        self.input_rates = {e: rate for e, rate in self.input_rates.items() if self._keeps_closed_form(e)}
+        self.input_rates = {
+            e: rate
+            for e, rate in self.input_rates.items()
+            if is_among(e, self.prescribed_inputs) or self._keeps_closed_form(e)
+        }
         self.rules = (
             *self._division_rules(),
             *self._nominal_velocity_rules(),
@@ -99,9 +103,11 @@ class ModelAnalysis(ContactAnalysis):
             (c,) = self.contacts
             if depends_on(self.holding_limit[c], (e,)) or depends_on(self.derivative(self.load[c], {e: 1.0}), others):
                 return False
-        if not self.closed_form:
-            return True
-        constants = (*self.closed_form, *(c.slide for c in self.contacts))
+        return not self.closed_form or self._has_constant_effect(e, self.closed_form)
+
+    def _has_constant_effect(self, e: Input, closed_form: tuple[Operand, ...]) -> bool:
+        """Return whether an input is a term of the acceleration of a closed form, with a constant factor."""
+        constants = (*closed_form, *(c.slide for c in self.contacts))
         effect = self.derivative(self.rate_outputs[self.dynamic_states[0]].expression, {e: 1.0})
         return not any(depends_on(constant, (e,)) for constant in constants) and not depends_on(
             effect, (*self.time_varying, *self.inputs)
@@ -110,6 +116,15 @@ class ModelAnalysis(ContactAnalysis):
     @cached_property
     def closed_form(self) -> tuple[Operand, Operand, Operand, Operand] | None:
         """Mass, damping, stiffness and speed of the equilibrium point of a linear single-body model, else None."""
+        result = self._linear_coefficients()
+        if result is None:
+            return None
+        is_linear = all(self._has_constant_effect(e, result) for e in self.prescribed_inputs)
+        has_condition = any(has_condition_on(rate, self.prescribed_inputs) for rate in self.rate_outputs.values())
+        return result if is_linear and not has_condition else None
+
+    def _linear_coefficients(self) -> tuple[Operand, Operand, Operand, Operand] | None:
+        """Return the coefficients of the closed form, regardless of inputs."""
         if (
             len(self.states) != 2
             or len(self.dynamic_states) != 1
@@ -167,7 +182,8 @@ class ModelAnalysis(ContactAnalysis):
         """Return whether an output depends directly on an input."""
         if isinstance(e, (Contact, Mode)):
             (c,) = (c for c in self.contacts if e is c or e is c.mode)
-            return any(depends_on(expression, self.inputs) for expression in (*self.load_expressions(c), c.slide))
+            forces = (*self.load_expressions(c), c.slide)
+            return any(depends_on(expression, self.input_symbols) for expression in forces)
         return id(e) in self._direct_outputs
 
     @cached_property

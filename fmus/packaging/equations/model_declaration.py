@@ -112,8 +112,31 @@ class Input(SettableVariable, variable_declarations.Input):
     Parameters
     ----------
     start, unit, text, low, high, above, below, display, alias
-        As for Parameter.
+        As for Parameter.  An input with a rate has no range.
+    rate
+        Derivative of the input by time: another input, or a linear expression of inputs with parameters as
+        coefficients.  It continues the input between communication points.  An input in the slip of a contact needs
+        it; rate=0.0 means constant between jumps.
     """
+
+    def __init__(
+        self,
+        start: float,
+        unit: str,
+        text: str,
+        rate: Operand = None,
+        *,
+        low: float = -inf,
+        high: float = inf,
+        above: float = -inf,
+        below: float = inf,
+        display: str = "",
+        alias: str = "",
+    ) -> None:
+        SettableVariable.__init__(
+            self, start, unit, text, low=low, high=high, above=above, below=below, display=display, alias=alias
+        )
+        self.declared_rate: Operand = None if rate is None else as_operand(rate)
 
 
 class Choice(Variable, variable_declarations.Choice):

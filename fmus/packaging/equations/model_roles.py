@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from math import isfinite
 from typing import Any
 
-from .algebra import differentiate, is_same_expression
+from .algebra import depends_on, differentiate, has_condition_on, is_same_expression, variables_in
 from .expressions import Expression, ModelError, Operand, describe, is_among
 from .model_declaration import Choice, Contact, Fixed, Input, Mode, Model, Output, Parameter, Rule, State, Variable
 from .reserved_names import RESERVED, check_name, is_reserved_in_c
@@ -47,11 +47,18 @@ class ModelRoles:
             raise ModelError("rules must be a Rule or a tuple of Rules", model.location)
         self._find_rates()
         self.time_varying = (TIME, *self.states, *self.drivers, *self.contacts, *self.modes)
-        self.input_rates = (
-            {e: rate for e in self.inputs if (rate := self._input_rate(e)) is not None} if has_input_derivatives else {}
-        )
+        self.prescribed_inputs = [e for e in self.inputs if e.declared_rate is not None]
+        for e in self.prescribed_inputs:
+            self._check_declared_rate(e)
+        # symbols for the first derivatives of inputs, and for the second ones of those with a declared rate
+        self.input_rates = {
+            e: derivative_symbol(e, "rate")
+            for e in self.inputs
+            if is_among(e, self.prescribed_inputs) or (has_input_derivatives and self._accepts_derivatives(e))
+        }
+        self.input_second_rates = {e: derivative_symbol(e, "second_rate") for e in self.prescribed_inputs}
         self.time_derivatives = (
-            {s: self.rate[s] for s in self.states} | self.explicit_time_derivatives | self.input_rates
+            {s: self.rate[s] for s in self.states} | self.explicit_time_derivatives | self.input_derivatives
         )
 
     def derivative(self, e: Operand, by: Mapping[Expression, Operand]) -> Operand:
@@ -114,16 +121,61 @@ class ModelRoles:
                 for expression in (e.start_expression, e.constant_rate, e.nominal_velocity)
                 if expression is not None
             ]
+        if isinstance(e, Input) and e.declared_rate is not None:
+            return [e.declared_rate]
         if isinstance(e, Contact):
             return [expression for expression in (e.mode, e.slip, e.slide, e.hold, e.eps) if expression is not None]
         return []
 
-    def _input_rate(self, e: Input) -> Parameter | None:
-        """Return a symbol for the rate of an input, or None if its names are in use or the input has a range."""
-        rate = Parameter(0.0, f"{e.unit}/s", f"rate of {e.name}")
-        rate.name = f"{e.name}_rate"
-        is_taken = any(variable.name in (rate.name, f"{e.name}_polynomial") for variable in self.declared)
-        return None if is_taken or any(map(isfinite, (e.low, e.high, e.above, e.below))) else rate
+    def _accepts_derivatives(self, e: Input) -> bool:
+        """Return whether the importer may set derivatives of an input: no range, and names that are not in use."""
+        is_taken = any(variable.name in derivative_names(e) for variable in self.declared)
+        return not is_taken and not has_range(e)
+
+    def _check_declared_rate(self, e: Input) -> None:
+        """Raise ModelError for a rate by which an input cannot be continued as a polynomial in time."""
+        if has_range(e):
+            raise ModelError(
+                f"{e.name} has a rate and a range, but its rate may lead out of the range: remove one of them",
+                e.location,
+            )
+        for variable in self.declared:
+            if variable.name in derivative_names(e):
+                raise ModelError(
+                    f"the name {variable.name} is reserved for the derivatives of {e.name}: choose another name",
+                    variable.location,
+                )
+        others = [
+            one for one in variables_in(e.declared_rate) if not isinstance(one, (Input, Parameter, Fixed, Choice))
+        ]
+        if others:
+            raise ModelError(
+                f"rate of {e.name} depends on {others[0].name}: it must be an input, or an expression of inputs and "
+                f"parameters; otherwise declare {e.name} as a State",
+                e.location,
+            )
+        slopes = [differentiate(e.declared_rate, {one: 1.0}) for one in self.inputs]
+        if has_condition_on(e.declared_rate, self.inputs) or any(depends_on(slope, self.inputs) for slope in slopes):
+            raise ModelError(
+                f"rate of {e.name} must be linear in the inputs: declare {e.name} as a State with this rate", e.location
+            )
+
+    @property
+    def input_derivatives(self) -> dict[Expression, Operand]:
+        """Derivatives of inputs, and of the rates of those with a declared rate."""
+        return self.input_rates | {self.input_rates[e]: second for e, second in self.input_second_rates.items()}
+
+    @property
+    def input_symbols(self) -> tuple[Expression, ...]:
+        """Inputs, and the symbols for their derivatives."""
+        return (*self.inputs, *self.input_rates.values(), *self.input_second_rates.values())
+
+    def declared_derivatives(self) -> dict[Expression, Operand]:
+        """Return what the declared rates give for the symbols of derivatives: expressions of inputs and parameters."""
+        rates: dict[Expression, Operand] = {self.input_rates[e]: e.declared_rate for e in self.prescribed_inputs}
+        by = {e: e.declared_rate for e in self.prescribed_inputs}
+        seconds = {symbol: differentiate(e.declared_rate, by) for e, symbol in self.input_second_rates.items()}
+        return rates | seconds
 
     @property
     def explicit_time_derivatives(self) -> dict[Expression, Operand]:
@@ -133,7 +185,7 @@ class ModelRoles:
     @property
     def coasting_derivatives(self) -> dict[Expression, Operand]:
         """Time derivatives without acceleration: also inputs at their rates and positions at their speeds."""
-        return self.explicit_time_derivatives | self.input_rates | {x: self.rate[x] for x in self.positions}
+        return self.explicit_time_derivatives | self.input_derivatives | {x: self.rate[x] for x in self.positions}
 
     @property
     def ordered_outputs(self) -> list[Variable]:
@@ -141,3 +193,20 @@ class ModelRoles:
         rates = [self.rate[s] for s in self.dynamic_states]
         others = [e for e in self.declared if isinstance(e, (Output, Contact)) and not is_among(e, rates)]
         return [*self.states, *rates, *self.drivers, *others, *self.modes]
+
+
+def derivative_names(e: Input) -> tuple[str, ...]:
+    """Return the names of attributes that belong to the derivatives of an input."""
+    return f"{e.name}_rate", f"{e.name}_second_rate", f"{e.name}_polynomial"
+
+
+def derivative_symbol(e: Input, word: str) -> Parameter:
+    """Return a symbol for a derivative of an input."""
+    symbol = Parameter(0.0, f"{e.unit}/s", f"rate of {e.name}")
+    symbol.name = f"{e.name}_{word}"
+    return symbol
+
+
+def has_range(e: Input) -> bool:
+    """Return whether an input has bounds."""
+    return any(map(isfinite, (e.low, e.high, e.above, e.below)))

@@ -8,7 +8,7 @@ from ...runtime.active_method import EXACT_ITEM
 from ...runtime.oscillator import Oscillator
 from ...runtime.variable_declarations import VariableDeclaration
 from ..text_output import string_literal
-from .algebra import has_condition_on
+from .algebra import has_condition_on, variables_in
 from .codegen_context import CodegenContext, rule_status
 from .conditions import Condition
 from .coupled_contact_methods import coupled_contact_methods
@@ -16,7 +16,7 @@ from .dimensions import DIMENSIONLESS, Dimensions, declared_dimensions, dimensio
 from .expression_printer import INDENT
 from .expressions import is_among
 from .model_analysis import ModelAnalysis
-from .model_declaration import Contact, Fixed, Mode, Output, State, Variable
+from .model_declaration import Contact, Fixed, Input, Mode, Output, State, Variable
 from .output_methods import condition_methods, law_modes_method, observe_method
 from .rate_methods import rate_methods
 from .reserved_names import IMPORTS, MATH
@@ -164,6 +164,8 @@ def class_attribute_lines(analysis: ModelAnalysis) -> list[str]:
             ("has_other_laws", analysis.laws[1:]),
             ("has_driver", analysis.drivers),
             ("has_input_derivatives", analysis.input_rates),
+            ("has_prescribed_inputs", analysis.prescribed_inputs),
+            ("has_prescribed_slips", analysis.has_prescribed_slips),
             ("has_conditions", analysis.conditions),
             ("checks_event_steps", analysis.checks_event_steps),
             ("has_nominal_velocity", nominal_velocities),
@@ -175,6 +177,11 @@ def class_attribute_lines(analysis: ModelAnalysis) -> list[str]:
     if n := n_event_functions(analysis):
         numbers = f"{n}, {2 * len(analysis.contacts)}, {len(analysis.switches)}"
         lines.append(f"n_event_functions, first_condition, n_switches = {numbers}")
+    if analysis.prescribed_inputs:
+        pairs = ", ".join(
+            f"({string_literal(e.name)}, {string_literal(rate_names(e))})" for e in analysis.prescribed_inputs
+        )
+        lines.append(f"prescribed_inputs = ({pairs},)")
     if analysis.conditions:
         memo: dict[int, Dimensions | None] = {}
         units = [condition_unit(analysis, condition, memo) for condition in analysis.conditions]
@@ -191,6 +198,12 @@ def class_attribute_lines(analysis: ModelAnalysis) -> list[str]:
         sentences = [f"{INDENT}{rule_status(n)}: {string_lines(message)}," for n, message in enumerate(messages)]
         lines += ["rules = {", *inherited, *sentences, "}"]
     return lines
+
+
+def rate_names(e: Input) -> str:
+    """Return the names of the inputs in the declared rate of an input; the rate itself if there are none."""
+    inputs = [one.name for one in variables_in(e.declared_rate) if isinstance(one, Input)]
+    return " and ".join(inputs) or expression_text(e.declared_rate)
 
 
 def n_event_functions(analysis: ModelAnalysis) -> int:

@@ -30,7 +30,8 @@ def observe_method(context: CodegenContext) -> str:
     if any(len(c.laws) > 1 for c in analysis.contacts):
         with printer.block("if self.friction != HYBRID:"):  # as InternalStep.force_modes
             printer.emit(" = ".join([*(c.mode.name for c in analysis.contacts if len(c.laws) > 1), "0"]))
-    context.emit_driver(printer, [*analysis.drivers, *analysis.input_rates])
+    loads = [load for c in analysis.contacts for load in analysis.load_expressions(c)]
+    context.emit_driver(printer, [*analysis.drivers, *analysis.input_rates, *loads])
     printer.count_uses(*analysis.outputs, *analysis.outputs)
     printer.count_uses(*analysis.load.values(), *analysis.load.values(), *(c.slide for c in analysis.contacts))
     if context.single_contact is not None:

@@ -2,7 +2,13 @@
 
 from .algebra import build_term, depends_on, substitute
 from .codegen_context import CodegenContext, emit_return, method_source
-from .coupled_contact_methods import derivative_unknown, emit_friction_forces, emit_solution, force_unknown
+from .coupled_contact_methods import (
+    derivative_unknown,
+    emit_friction_forces,
+    emit_solution,
+    force_unknown,
+    slips_of_laws,
+)
 from .expression_printer import ExpressionPrinter
 from .expressions import Expression, Operand, Term
 from .model_declaration import THRESHOLD, Contact
@@ -35,7 +41,7 @@ def rates_method(context: CodegenContext) -> str:
         return method_source("rates", context.arguments, emit_return(printer, targets))
     elif analysis.contacts:
         terms = force_unknown(context).terms
-        context.emit_driver(printer, [*targets, *terms])
+        context.emit_driver(printer, [*targets, *terms, *slips_of_laws(analysis)])
         printer.count_uses(*targets, *terms)
         emit_friction_forces(context, printer)
         return method_source("rates", context.arguments, emit_return(printer, targets))
@@ -47,7 +53,7 @@ def jacobian_method(context: CodegenContext) -> str:
     analysis, c = context.analysis, context.single_contact
     printer = context.printer(on_trial=analysis.time_varying)
     directions: list[dict[Expression, Operand]] = [
-        analysis.explicit_time_derivatives | analysis.input_rates,
+        analysis.explicit_time_derivatives | analysis.input_derivatives,
         *({state: 1.0} for state in analysis.states),
     ]
     if c is None and analysis.contacts:
@@ -92,7 +98,7 @@ def coupled_jacobian_lines(
         for by, unknown in zip(directions, forces, strict=True)
     ]
     terms = [e for unknown in (force_unknown(context), *forces) for e in unknown.terms]
-    context.emit_driver(printer, [*terms, *targets])
+    context.emit_driver(printer, [*terms, *targets, *slips_of_laws(context.analysis)])
     printer.count_uses(*terms, *targets)
     emit_friction_forces(context, printer)
     emit_solution(context, printer, forces, by_law=True)

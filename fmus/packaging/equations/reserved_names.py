@@ -14,7 +14,7 @@ IMPORTS = {  # module -> names that generated code may import
     "": tuple(label for label, _, _ in methods),
     "stick_slip": ("HYBRID_LAW", "SIGN_LAW", "THRESHOLD_LAW", "DryFriction", "sign", "threshold"),
     "codes": ("EXACT", "HYBRID", "MODEL_RULE", "OK"),
-    "input_polynomial": ("InputPolynomial",),
+    "input_polynomial": ("InputPolynomial", "PrescribedMotion"),
     "contact_lcp": ("CoupledFriction",),
     "variable_declarations": tuple(kind.__name__ for kind in KINDS),
     "integrator": ("Integrator",),

@@ -2,10 +2,12 @@
 
 from collections.abc import Collection
 
-from .algebra import subexpressions
+from ...runtime.codes import MAX_INPUT_ORDER
+from .algebra import depends_on, differentiate, subexpressions
 from .codegen_context import CodegenContext, method_source, rule_status
-from .expression_printer import INDENT
-from .expressions import Term
+from .expression_printer import INDENT, ExpressionPrinter
+from .expressions import Expression, Operand, Term, is_among
+from .model_declaration import Input
 
 
 def setup_methods(context: CodegenContext) -> list[str]:
@@ -17,6 +19,7 @@ def setup_methods(context: CodegenContext) -> list[str]:
         *nominal_velocity_method(context),
         *driver_method(context),
         *input_polynomial_methods(context),
+        *prescribed_motion_methods(context),
     ]
 
 
@@ -29,8 +32,11 @@ def init_method(context: CodegenContext) -> list[str]:
     if context.driver is not None:
         lines.append("self.t_base = self.x_base = 0.0")
     for e, rate in context.analysis.input_rates.items():
-        lines.append(f"self.{e.name}_polynomial = InputPolynomial()")
+        is_prescribed = is_among(e, context.analysis.prescribed_inputs)
+        lines.append(f"self.{e.name}_polynomial = {'PrescribedMotion' if is_prescribed else 'InputPolynomial'}()")
         lines.append(f"self.t_base = self.{rate.name} = 0.0")
+    if context.analysis.prescribed_inputs:
+        lines.append("self.inconsistent_input = 0")
     if context.constants:
         lines.append(" = ".join(f"self.{context.name_of(e)}" for e in context.constants) + " = 0.0")
     if not lines:
@@ -45,6 +51,8 @@ def initial_method(context: CodegenContext) -> str:
         printer.emit("self.t_base, self.x_base = t, 0.0")
     elif context.analysis.input_rates:
         printer.emit("self.t_base = t")
+    for e in context.analysis.prescribed_inputs:
+        printer.emit(f"self.{e.name}_polynomial.begin()")
     return method_source(
         "initial_state",
         ["t"],
@@ -56,8 +64,7 @@ def prepare_method(context: CodegenContext) -> str:
     """Constants and rules; a rule is checked as early as possible, before its values are used as divisors."""
     printer, constants = context.printer(), {id(e): e for e in context.constants}
     printer.constants = set()
-    for e in context.analysis.input_rates:
-        printer.emit(f"self.{e.name}_polynomial.set_value(self.{e.name})")
+    emit_input_polynomials(context, printer)
     printer.count_uses(*context.constants, *(rule.broken for rule in context.analysis.rules))
 
     def calculate(selection: Collection[int] = constants) -> None:
@@ -73,6 +80,39 @@ def prepare_method(context: CodegenContext) -> str:
     calculate()
     printer.emit("return OK")
     return method_source("prepare", (), printer.lines)
+
+
+def emit_input_polynomials(context: CodegenContext, printer: ExpressionPrinter) -> None:
+    """Emit the polynomials of inputs; a declared rate, which is declared before its input, gives the derivatives."""
+    analysis = context.analysis
+    orders: dict[Expression, int] = {}  # of the polynomial, at most
+    for e in analysis.input_rates:
+        polynomial = f"self.{e.name}_polynomial"
+        if not is_among(e, analysis.prescribed_inputs):
+            orders[e] = MAX_INPUT_ORDER
+            printer.emit(f"{polynomial}.set_value(self.{e.name})")
+            continue
+        inputs = [one for one in orders if depends_on(e.declared_rate, (one,))]
+        orders[e] = min(1 + max((orders[one] for one in inputs), default=0), MAX_INPUT_ORDER)
+        for n in range(orders[e]):
+            value = derivative_of_rate(analysis.names, e, inputs, n, printer)
+            printer.emit(f"{polynomial}.continue_by({n + 1}, {value})")
+        printer.emit(f"{polynomial}.set_motion(self.{e.name})")
+
+
+def derivative_of_rate(
+    names: dict[Expression, str], e: Input, inputs: list[Expression], n: int, printer: ExpressionPrinter
+) -> str:
+    """Return the text of the n-th derivative of the declared rate of an input; its inputs have polynomials."""
+    if n == 0:
+        return printer.text(e.declared_rate)
+    derivatives: dict[Expression, Operand] = {}
+    for one in inputs:
+        symbol = Expression()
+        symbol.name = f"{one.name}_{n}"
+        printer.bound_names[symbol] = f"self.{one.name}_polynomial.derivatives[{n}]"
+        derivatives[one] = symbol
+    return printer.text(differentiate(e.declared_rate, derivatives, names))
 
 
 def nominal_velocity_method(context: CodegenContext) -> list[str]:
@@ -118,3 +158,15 @@ def input_polynomial_methods(context: CodegenContext) -> list[str]:
     return [
         method_source(name, ["t"] * (name != "has_higher_order"), printer.lines) for name, printer in printers.items()
     ]
+
+
+def prescribed_motion_methods(context: CodegenContext) -> list[str]:
+    """For inputs with a declared rate: note the first that jumps against it at many communication points."""
+    inputs = context.analysis.prescribed_inputs
+    if not inputs:
+        return []
+    printer = context.printer()
+    for n in range(len(inputs), 0, -1):
+        with printer.block(f"if self.{inputs[n - 1].name}_polynomial.count_jump():"):
+            printer.emit(f"self.inconsistent_input = {n}")
+    return [method_source("count_jumps", (), printer.lines)]

@@ -143,6 +143,10 @@ class TangentWriter:
                 self.outputs[name] = name
             elif meaning.causality in ("input", "parameter") and name in fields:
                 self.seeds |= dict.fromkeys((name, f"{name}_polynomial"), fields[name])
+        # derivatives of inputs with a declared rate -> the expressions that the rates give for them
+        derivatives = model.analysis.declared_derivatives()
+        texts = {e.name: ExpressionPrinter({}, (), (), 0).text(value) for e, value in derivatives.items()}
+        self.input_derivatives = {name: parse_expression(text) for name, text in texts.items()}
         self.driver_rates = {fields[DERIVATIVE_NAME.format(name)]: d.rate for name, d in declared if d.rate}
         self.with_tangent: set[str] = set()  # local variables with a tangent
         self.temporaries = count(1)
@@ -183,6 +187,9 @@ class TangentWriter:
             match node:
                 case ast.Assign(targets=[ast.Name(id=name)]) if name in self.drivers:  # a state of the importer
                     lines += [self.assignment(f"{PREFIX}{name}", parse_expression(f"{TANGENT}.{name}")), node]
+                    self.with_tangent.add(name)
+                case ast.Assign(targets=[ast.Name(id=name)]) if name in self.input_derivatives:
+                    lines += [*self.assign_tangent(f"{PREFIX}{name}", self.input_derivatives[name]), node]
                     self.with_tangent.add(name)
                 case ast.Assign(targets=[ast.Name(id=name)], value=value) if name not in self.contacts:
                     lines += [*self.assign_tangent(f"{PREFIX}{name}", value), node]
@@ -230,7 +237,7 @@ class TangentWriter:
                 return ast.Name(PREFIX + name)
             case ast.Attribute(attr=name) if name in self.seeds:
                 return ast.parse(f"{TANGENT}.{self.seeds[name]}", mode="eval").body
-            case ast.Call(func=ast.Attribute(value=polynomial)):
+            case ast.Call(func=ast.Attribute(value=polynomial, attr="value_at")):
                 return self.tangent_of(polynomial)
             case ast.UnaryOp(op=ast.USub(), operand=inner):
                 return negate_term(self.tangent_of(inner))

@@ -21,7 +21,7 @@ typedef fmi2FMUstate StateHandle;
 static const FmiType REAL = {"Real", true}, INTEGER = {"Integer", false};
 
 /* The logger interprets the message as a printf format, so escape percent signs. */
-static void log_to_host(const Host *host, const char *name, const char *message)
+static void log_to_host(const Host *host, const char *name, Status status, const char *category, const char *message)
 {
     TextBuffer format = {0};
     if (!host->logger) return;
@@ -29,7 +29,7 @@ static void log_to_host(const Host *host, const char *name, const char *message)
         char escaped[3] = {*c, *c == '%' ? '%' : '\0', '\0'};
         append(&format, escaped);
     }
-    host->logger(host->componentEnvironment, name, fmi2Error, "logStatusError", format.buffer);
+    host->logger(host->componentEnvironment, name, status, category, format.buffer);
 }
 
 /* ---- life cycle */
@@ -172,6 +172,10 @@ fmi2Status fmi2SetRealInputDerivatives(fmi2Component component, const fmi2ValueR
         call_sequence_note_change(&state->run, &state->model, &fault);
         *derivative = value[i];
         if (*highest < order[i]) *highest = order[i];
+        if (variable->importer_order_offset != NO_OFFSET) {
+            int64_t *importer_order = (int64_t *)((char *)state + variable->importer_order_offset);
+            if (*importer_order < order[i]) *importer_order = order[i];
+        }
         state->run.outputs_current = false;
     }
     return finish_call(self, OK, fault, NAN, NAN);

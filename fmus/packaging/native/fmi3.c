@@ -26,10 +26,10 @@ typedef fmi3FMUState StateHandle;
 
 static const FmiType FLOAT64 = {"Float64", true}, INT64 = {"Int64", false};
 
-static void log_to_host(const Host *host, const char *name, const char *message)
+static void log_to_host(const Host *host, const char *name, Status status, const char *category, const char *message)
 {
     (void)name;
-    if (host->log) host->log(host->environment, fmi3Error, "logStatusError", message);
+    if (host->log) host->log(host->environment, status, category, message);
 }
 
 /* ---- life cycle */
@@ -348,6 +348,7 @@ fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoi
     }
     *lastSuccessfulTime = current_time(&state->run);
     if (status == OK && !fault) {
+        warn_of_inconsistent_rate(self);
         *eventHandlingNeeded = self->host.event_mode_used && event_passed;
         *earlyReturn = *now < end;
     }

@@ -17,13 +17,15 @@
 typedef struct {
     State state;
     int possible_phases; /* bits of the phases that its interface has */
-    bool logging;
+    bool logging, logging_warnings;
+    bool has_warned; /* about the rate of an input */
     Host host;
     char name[];
 } Instance;
 
 /* Status codes; FMI 2.0 and 3.0 use the same numbers. */
 #define STATUS_OK ((Status)0)
+#define STATUS_WARNING ((Status)1)
 #define STATUS_DISCARD ((Status)2)
 #define STATUS_ERROR ((Status)3)
 
@@ -47,11 +49,11 @@ enum {
 
 /* ---- error messages */
 
-static void log_to_host(const Host *host, const char *name, const char *message);
+static void log_to_host(const Host *host, const char *name, Status status, const char *category, const char *message);
 
 static COLD void report_error_for(const Host *host, const char *name, bool logging, const TextBuffer *text)
 {
-    if (logging) log_to_host(host, name, text->buffer);
+    if (logging) log_to_host(host, name, STATUS_ERROR, "logStatusError", text->buffer);
     print_to_stderr(name, text->buffer);
 }
 
@@ -137,6 +139,16 @@ static COLD Status fail_run(Instance *self, int64_t status, double t, double h)
 static Status finish_call(Instance *self, int64_t status, bool fault, double t, double h)
 {
     return status == OK && !fault ? STATUS_OK : fail_run(self, fault ? DIVERGED : status, t, h);
+}
+
+/* Log once that an input jumps against its rate at one communication point after another. */
+static void warn_of_inconsistent_rate(Instance *self)
+{
+    TextBuffer text = {0};
+    if (self->has_warned || !inconsistent_input(&self->state.model)) return;
+    self->has_warned = true;
+    append_inconsistent_rate(&text, &self->state.run, &self->state.model);
+    if (self->logging_warnings) log_to_host(&self->host, self->name, STATUS_WARNING, "logStatusWarning", text.buffer);
 }
 
 /* ---- reading and writing */
@@ -274,6 +286,7 @@ static void reset_state(Instance *self)
 {
     bool fault = false;
     memcpy(&self->state, &initial, sizeof initial);
+    self->has_warned = false;
     if (self->possible_phases & 1 << CONTINUOUS) model_exchange_enable(&self->state.run, &fault);
 }
 
@@ -300,19 +313,21 @@ static Instance *instantiate(const char *name, const char *token, const Host *ho
     }
     copy_as_utf8(self->name, name);
     self->host = *host;
-    self->logging = logging;
+    self->logging = self->logging_warnings = logging;
     self->possible_phases = OUTSIDE_SIMULATION | simulation_phases;
     reset_state(self);
     return token && !strcmp(token, MODEL_GUID) ? self : refuse_instance(self, WRONG_TOKEN, function, MODEL_GUID);
 }
 
-/* All messages have the category logStatusError. */
+/* Messages have the category logStatusError or logStatusWarning. */
 static Status set_logging(Instance *self, bool logging, size_t n, const char *const categories[])
 {
-    self->logging = logging && n == 0;
-    for (size_t i = 0; i < n; i++) {
+    self->logging = self->logging_warnings = logging && n == 0;
+    for (size_t i = 0; i < n && logging; i++) {
         const char *category = categories[i] ? categories[i] : "";
-        self->logging |= logging && (!strcmp(category, "logStatusError") || !strcmp(category, "logAll"));
+        bool all = !strcmp(category, "logAll");
+        self->logging |= all || !strcmp(category, "logStatusError");
+        self->logging_warnings |= all || !strcmp(category, "logStatusWarning");
     }
     return STATUS_OK;
 }
@@ -353,6 +368,7 @@ static Status do_step(Instance *self, double t, double h)
 {
     bool fault = false;
     int64_t status = call_sequence_do_step(&self->state.run, &self->state.model, t, h, &fault);
+    if (status == OK && !fault) warn_of_inconsistent_rate(self);
     return finish_call(self, status, fault, t, h);
 }
 

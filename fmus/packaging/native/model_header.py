@@ -1,14 +1,14 @@
 """Generates model.h: the numerics of a model and of its FMI calls, its variables and the messages."""
 
 import inspect
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from string import Formatter
 from typing import Any
 
 from ...runtime import codes
 from ...runtime.codes import INTERRUPTED
 from ...runtime.failure_handling import CALCULATED_CAUSALITIES
-from ...runtime.messages import CALL_MESSAGES, PHASE_NAMES, RUN_MESSAGES, VALUE_MESSAGES
+from ...runtime.messages import CALL_MESSAGES, INCONSISTENT_RATE, PHASE_NAMES, RUN_MESSAGES, VALUE_MESSAGES
 from ...runtime.variable_access import SETTABLE_CAUSALITIES
 from ...runtime.variable_declarations import VariableDeclaration, VariableOwner
 from ..fmi_variables import (
@@ -94,6 +94,21 @@ static COLD void append_run_message(TextBuffer *text, int64_t status,
 {statuses}    }}
 }}
 
+/* Index, from 1, of an input that jumps again and again against its rate; 0 if there is none. */
+static int64_t inconsistent_input(const Model *model)
+{{
+    (void)model; /* where no input has a rate */
+    return {inconsistent_input};
+}}
+
+/* Append the warning about this input. */
+static COLD void append_inconsistent_rate(TextBuffer *text, const Run *run, const Model *model)
+{{
+    (void)text, (void)run;
+    switch (inconsistent_input(model)) {{
+{rates}    }}
+}}
+
 /* Append why a variable cannot be set to a value. */
 static COLD void append_value_message(TextBuffer *text, int64_t reason, const Variable *variable, double value)
 {{
@@ -129,10 +144,11 @@ DERIVATIVE_ATTRIBUTES = (
     "rate",
     "polynomial.order",
     "polynomial.derivatives",
+    "polynomial.importer_order",
 )  # attributes of an input with derivatives
 
 
-def render_model_header(model: type[VariableOwner], fmi: str) -> str:
+def render_model_header(model: Any, fmi: str) -> str:
     """Return the text of model.h for a version of FMI."""
     instance, run = model_exchange_run(model)
     declared = all_variables(model)
@@ -180,16 +196,26 @@ def render_model_header(model: type[VariableOwner], fmi: str) -> str:
                 meaning,
                 attribute_path(model, name),
                 tangent_fields(declared),
-                hasattr(instance, f"{name}_polynomial"),
+                getattr(instance, f"{name}_polynomial", None),
             )
             for name, meaning in declared
         ),
         statuses=_switch_cases(statuses, FIELD_CODE) + _switch_cases(instance.rules, rule_fields),
+        inconsistent_input="model->inconsistent_input" if model.prescribed_inputs else "0",
+        rates=_switch_cases(rate_warnings(model.prescribed_inputs), FIELD_CODE),
         values=_switch_cases(VALUE_MESSAGES, FIELD_CODE),
         calls=_switch_cases(CALL_MESSAGES, FIELD_CODE),
         phases=", ".join(c_string_literal(PHASE_NAMES[phase]) for phase in range(len(PHASE_NAMES))),
         count_of_phases=len(PHASE_NAMES),
     )
+
+
+def rate_warnings(prescribed_inputs: Sequence[tuple[str, str]]) -> dict[int, str]:
+    """Return the warning about each input that may jump against its rate, by its index from 1."""
+    return {
+        n: INCONSISTENT_RATE.replace("{name}", name).replace("{rate}", rate)
+        for n, (name, rate) in enumerate(prescribed_inputs, 1)
+    }
 
 
 def attribute_path(model: Any, name: str) -> str:
@@ -219,7 +245,7 @@ def _items_array_name(name: str) -> str:
 
 
 def _variable_row(
-    name: str, meaning: VariableDeclaration, path: str, tangent_fields: dict[str, str], has_derivatives: bool
+    name: str, meaning: VariableDeclaration, path: str, tangent_fields: dict[str, str], polynomial: object
 ) -> str:
     """Return the table row of a variable."""
     texts = (name, meaning.text, meaning.unit_suffix, meaning.allowed)
@@ -238,13 +264,14 @@ def _variable_row(
         if meaning.items
         else "NULL, NULL"
     )
+    existing_parts = ["rate", *(f"polynomial.{part}" for part in vars(polynomial))] if polynomial else []
     parts = [
         *map(c_string_literal, texts),
         f"offsetof(State, {path})",
         f"offsetof(struct Tangent, {tangent_fields[name]})" if name in tangent_fields else "NO_OFFSET",
         *map(c_literal, flags),
         ", ".join(
-            f"offsetof(State, model.{name}_{part})" if has_derivatives else "NO_OFFSET"
+            f"offsetof(State, model.{name}_{part})" if part in existing_parts else "NO_OFFSET"
             for part in DERIVATIVE_ATTRIBUTES
         ),
         *(c_literal(float(bound)) for bound in bounds),

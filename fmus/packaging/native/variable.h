@@ -22,8 +22,9 @@ typedef struct {
     bool is_state_or_input;
     bool is_real_parameter;        /* others have partial derivatives by it, as by states and inputs */
     /* Of an input that can be interpolated, in State: its time derivative, the order of its polynomial and the
-     * polynomial's derivatives; otherwise NO_OFFSET. */
-    size_t rate_offset, order_offset, derivatives_offset;
+     * polynomial's derivatives, and, if it has a declared rate, the highest order that the importer has set; otherwise
+     * NO_OFFSET. */
+    size_t rate_offset, order_offset, derivatives_offset, importer_order_offset;
     double low, high, above, below;   /* low <= value <= high, above < value < below */
     const int64_t *items, *items_end; /* values of an enumeration */
 } Variable;
