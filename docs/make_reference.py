@@ -69,15 +69,15 @@ COUPLED_TEXTS = {
     "steps": "Communication steps in s. The scene runs once with each; the figure shows the finest.",
     "parts": "One table for each FMU, as in `[parts.left]`.",
     "springs": "Springs and dampers between two parts, as in `[[springs]]`.",
-    "connections": "Outputs that drive the input `F_ext` of another part, as in `[[connections]]`.",
-    "model": "`smd`, `coulomb` or `stickslip`.",
+    "connections": "Outputs that drive an input of another part, as in `[[connections]]`.",
+    "model": "`smd`, `coulomb` or `stickslip`, which have a reference solution; or the path of an FMU.",
     "values": "Parameters of the part, in SI units.",
     "between": "The names of two parts. The spring exerts no force when their positions are equal.",
     "k": "Stiffness in N/m.",
     "c": "Damping constant in N·s/m.",
-    "from": "`part.x`, `part.v` or `part.F_spring`.",
-    "to": "The part that receives the force.",
-    "factor": "Factor from the output to the force; it must be 1 for `F_spring`.",
+    "from": "`part.x`, `part.v` or `part.F_spring`; any output if `to` names an input.",
+    "to": "The part that receives the force at its input `F_ext`; or `part.input`.",
+    "factor": "Factor from the output to the force; it must be 1 for `F_spring` and for a named input.",
 }
 
 

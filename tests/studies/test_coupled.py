@@ -12,8 +12,9 @@ from pathlib import Path
 import commands
 import numpy as np
 import pytest
-from build_cache import cached_folder
+from build_cache import ROOT, cached_folder
 from fmpy.ssp.ssd import read_ssd
+from prescribed_motion import solve_block
 from spec_runs import ignore_progress
 
 from harness.errors import HarnessError, SceneError
@@ -102,6 +103,33 @@ def test_a_connection_with_a_factor_pushes_in_its_direction(couple, tmp_path, fa
     expected = [0.1 * factor / 157.9 * (1.0 - cos(sqrt(157.9) * t)) for t in table[:, 0]]
     assert table[:, 4] == pytest.approx(expected, abs=1e-8)
     assert table[:, 2] == pytest.approx(expected, abs=2e-3)
+
+
+def write_page_files(page, folder):
+    """Write the files of a page of the documentation, and build its models."""
+    for name, text in re.findall(r'```\w+ title="([^"]+)"\n(.*?)```', page.read_text(), re.S):
+        (folder / name).write_text(text)
+    for name in "belt.py", "block.py":
+        assert commands.build(name, folder=folder).returncode == 0
+
+
+def test_a_belt_carries_a_block_of_another_fmu(couple, workspace):
+    """Position, speed and acceleration are connected; the reference is scipy with events."""
+    write_page_files(ROOT / "docs/how-to/coupled.md", workspace)
+    done = couple("carried.toml", "--json")
+    assert (done.returncode, done.stderr) == (0, "")
+    folder = workspace / "results/coupled/carried"
+    times, _, x, *_ = np.loadtxt(folder / "trajectory.csv", delimiter=",", skiprows=1).T
+
+    def belt(t):
+        return 0.3 * (1.0 - np.cos(1.7 * t)), 0.51 * np.sin(1.7 * t), 0.867 * np.cos(1.7 * t)
+
+    events, motion = solve_block(belt, 8.0, k=30.0, hold=12.0, slide=8.0)
+    assert [mode for _, mode in events] == [-1, 0, 1, 0]
+    assert np.abs(x - [motion(t)[0] for t in times]).max() < 3e-4
+    for numbers, why in engines(folder).values():
+        assert why == ""
+        assert numbers[1] == pytest.approx(motion(8.0)[0], abs=3e-4)
 
 
 @pytest.fixture
@@ -201,6 +229,14 @@ def test_an_invalid_archive_is_reported(couple, tmp_path):
             "a connected force needs factor = 1, got 2.0",
         ),
         (PAIR + 'connections = [{ from = "a.x", to = "b", factor = 1.0 }]\n', 2, "part b is driven twice"),
+        (PAIR + 'connections = [{ from = "a.v", to = "b.v_in" }]\n', 1, "part b has no input v_in"),
+        (PAIR + 'connections = [{ from = "a.w", to = "b.F_ext" }]\n', 2, "part b is driven twice"),
+        (
+            PAIR + 'connections = [{ from = "a.v", to = "b.v_in", factor = 2.0 }]\n',
+            2,
+            "a connection to an input needs factor = 1, got 2.0",
+        ),
+        (PAIR + 'parts.c = { model = "nosuch.fmu" }\n', 1, "nosuch.fmu"),
         (PAIR + 'connections = [{ from = "a.mode", to = "b", factor = 1.0 }]\n', 2, "unknown output 'mode'"),
     ],
 )

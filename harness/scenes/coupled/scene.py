@@ -4,7 +4,7 @@
     stop = 4.0                         s
     steps = [0.02, 0.01, 0.005]        communication steps in s; the shortest is plotted
     [parts.left]                       one table per part
-    model = "smd"                      a model with a closed-form solution: smd, coulomb or stickslip
+    model = "smd"                      smd, coulomb or stickslip, which have a reference solution; or an FMU file
     values = {m = 2.0, x0 = 0.1}       parameters in SI units
     [[springs]]                        spring and damper between two parts, without force at equal positions
     between = ["left", "right"]
@@ -14,6 +14,9 @@
     from = "left.x"                    x, v, or F_spring with factor 1
     to = "right"
     factor = 40.0
+    [[connections]]                    an output that drives an input of another part
+    from = "belt.v"
+    to = "block.v_belt"
 
 Every spring and every factor becomes a separate FMU (fmus/more/spring.py), because few tools support factors in
 archives. Its inputs are the velocities of its ends, its outputs are the forces on them. A factor is a spring with one
@@ -34,6 +37,7 @@ from ..schema import NUMBER, POSITIVE, TEXT, TITLE, Constraint, is_names, is_num
 FOLDER = Path(__file__).parent
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 MAX_STEPS = 1_000_000
+MODEL_FILES = (".fmu", ".py")
 SOURCES = ("x", "v", "F_spring")  # outputs that can be connected
 
 
@@ -68,7 +72,7 @@ class ConnectionKeys:
 
     from_: Annotated[str, TEXT]
     to: Annotated[str, TEXT]
-    factor: Annotated[float, NUMBER]
+    factor: Annotated[float, NUMBER] = 1.0
 
 
 @dataclass(frozen=True)
@@ -186,7 +190,7 @@ def build_coupled_scene(path: Path, keys: CoupledKeys, models: Collection[str]) 
             raise SceneError(
                 f"part {format_value(name)}: a name consists of letters, digits and _, and begins with a letter"
             )
-        if part.model not in models:
+        if part.model not in models and Path(part.model).suffix not in MODEL_FILES:
             raise SceneError(f"part {name}: {unknown_name_message('model', part.model, models)}")
     springs, direct = [], []
     for spring in keys.springs:
@@ -194,15 +198,20 @@ def build_coupled_scene(path: Path, keys: CoupledKeys, models: Collection[str]) 
         springs.append(CoupledSpring(first, second, float(spring.k), float(spring.c), (("a", first), ("b", second))))
     for connection in keys.connections:
         source, _, output = connection.from_.partition(".")
+        sink, _, sink_input = connection.to.partition(".")
+        source, sink = check_part(source, keys.parts), check_part(sink, keys.parts)
+        factor = float(connection.factor)
+        if sink_input:
+            if factor != 1.0:
+                raise SceneError(
+                    f"to = {format_value(connection.to)}: a connection to an input needs factor = 1, got {factor!r}"
+                )
+            direct.append(Connection(source, output, sink, sink_input))
+            continue
         if output not in SOURCES:
             raise SceneError(
                 f"from = {format_value(connection.from_)}: {unknown_name_message('output', output, SOURCES)}"
             )
-        source, sink, factor = (
-            check_part(source, keys.parts),
-            check_part(connection.to, keys.parts),
-            float(connection.factor),
-        )
         if output != "F_spring":
             size, end = abs(factor), "b" if factor > 0 else "a"
             k, c = (size, 0.0) if output == "x" else (0.0, size)
@@ -216,8 +225,8 @@ def build_coupled_scene(path: Path, keys: CoupledKeys, models: Collection[str]) 
     scene = CoupledScene(
         path.stem, keys.title, float(keys.stop), check_communication_steps(keys), {}, tuple(springs), tuple(direct)
     )
-    sinks = [connection.sink for connection in scene.connections]
-    repeated = [name for name in keys.parts if sinks.count(name) > 1]
+    ends = [(connection.sink, connection.input) for connection in scene.connections]
+    repeated = [end[0] for end in ends if ends.count(end) > 1]
     if repeated:
         raise SceneError(f"part {repeated[0]} is driven twice; an input accepts one connection")
     parts = {
@@ -226,6 +235,10 @@ def build_coupled_scene(path: Path, keys: CoupledKeys, models: Collection[str]) 
         )
         for name, part in keys.parts.items()
     }
+    fmus = {part.fmu for part in parts.values()}
+    namesakes = [fmu for fmu in sorted(fmus) if [other.name for other in fmus].count(fmu.name) > 1]
+    if namesakes:
+        raise SceneError(f"{namesakes[0]} and {namesakes[1]} have the same file name: rename one of them")
     return replace(scene, parts=parts)
 
 

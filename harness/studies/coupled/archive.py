@@ -20,8 +20,14 @@ ALL_PARAMETERS, SET_NAME = "parameters", "initialValues"
 OMS = "https://raw.githubusercontent.com/OpenModelica/OMSimulator/master/schema/oms.xsd"
 
 
-def write(scene: CoupledScene, values: dict[str, dict[str, float]], fmus: dict[str, Path], path: Path) -> None:
-    """Write the archive with the FMUs and values of the elements, and validate it against the schemas."""
+def write(
+    scene: CoupledScene,
+    values: dict[str, dict[str, float]],
+    fmus: dict[str, Path],
+    recorded: dict[str, list[str]],
+    path: Path,
+) -> None:
+    """Write the archive with the FMUs, values and recorded outputs of the elements; validate it against the schemas."""
     all_values = {
         f"{element}.{name}": value
         for element, element_values in values.items()
@@ -33,7 +39,7 @@ def write(scene: CoupledScene, values: dict[str, dict[str, float]], fmus: dict[s
         for name, element_values in {ALL_PARAMETERS: all_values, **values}.items():
             archive.add_resource(write_parameters(element_values, path.with_name(f"{name}.ssv")))
         with archive.system_structure as structure:
-            fill_structure(structure, scene, values, fmus)
+            fill_structure(structure, scene, values, fmus, recorded)
             structure.__check_compliance__()
         archive.mark_changed()
 
@@ -52,7 +58,11 @@ def write_parameters(values: dict[str, float], path: Path) -> Path:
 
 
 def fill_structure(
-    structure: SSD, scene: CoupledScene, values: dict[str, dict[str, float]], fmus: dict[str, Path]
+    structure: SSD,
+    scene: CoupledScene,
+    values: dict[str, dict[str, float]],
+    fmus: dict[str, Path],
+    recorded: dict[str, list[str]],
 ) -> None:
     """Add the system, its components and connections."""
     structure.name, structure.version = scene.identifier, "1.0"
@@ -64,7 +74,7 @@ def fill_structure(
         connectors = {connection.output: "output" for connection in scene.connections if connection.source == name}
         connectors |= {connection.input: "input" for connection in scene.connections if connection.sink == name}
         connectors |= dict.fromkeys(values.get(name, ()), "parameter")
-        connectors |= {"x": "output"} if name in scene.parts else {}
+        connectors |= dict.fromkeys(recorded.get(name, ()), "output")
         component.connectors = [
             Connector(None, connector, kind, TypeReal(None)) for connector, kind in connectors.items()
         ]

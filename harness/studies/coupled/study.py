@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from shutil import copy
+from typing import Any
 
 import numpy as np
 
@@ -20,6 +21,7 @@ from ...results.provenance import describe_sources, write_provenance
 from ...results.summary import Summary, make_table, write_summary
 from ...running.fmu_archive import read_description
 from ...running.runner import ProgressCallback
+from ...running.variable_values import REAL_TYPES, variable_unit
 from ...scenes.coupled.scene import CoupledScene, load_coupled_scene
 from ...scenes.fmu_files import find_fmu
 from ...scenes.run_spec import RunSpec
@@ -50,16 +52,21 @@ def run_coupled(source: str, out: Path, stop: float | None, report: ProgressCall
             plan, fmus, scene = external_archive.read_archive(Path(source), file, stop), [Path(source)], None
         else:
             scene = load_coupled_scene(source, BODY_MODELS, stop)
-            defaults = {model: start_values(find_fmu(model)) for model in BODY_MODELS}
+            defaults = {part.model: start_values(part.fmu) for part in scene.parts.values()}
             check_values(scene, defaults)
+            check_connections(scene)
             name, file = scene.name, temporary_folder / f"{scene.identifier}.ssp"
             plan, fmus = plan_study(scene), [part.fmu for part in scene.parts.values()]
         folder = out / FOLDER / name
         with replace_folder(folder, (*FILES, file.name), describe_sources(source)) as new_folder:
             if scene:
-                archive.write(scene, element_values(scene, defaults), element_fmus(scene, temporary_folder), file)
+                recorded = {name: [variable] for name, variable, _ in plan.read}
+                archive.write(
+                    scene, element_values(scene, defaults), element_fmus(scene, temporary_folder), recorded, file
+                )
             copy(file, new_folder)
-            result = run_study(plan, file, make_reference_solver(scene, defaults) if scene else None, report)
+            solve_reference = make_reference_solver(scene, defaults) if scene and has_reference(scene) else None
+            result = run_study(plan, file, solve_reference, report)
             save(result, new_folder)
             draw(result, new_folder / "figure.svg")
             settings = {"stop": result.stop} | (vars(scene) if scene else {})
@@ -76,6 +83,34 @@ def check_values(scene: CoupledScene, defaults: Starts) -> None:
         unknown = sorted(set(part.values) - set(defaults[part.model]))
         if unknown:
             raise HarnessError(f"scene {scene.name}: part {name} ({part.model}) has no parameter {unknown[0]}")
+
+
+def check_connections(scene: CoupledScene) -> None:
+    """Raise HarnessError if an output or input that is connected does not exist."""
+    springs = {spring.name for spring in scene.springs}
+    for connection in scene.connections:
+        for name, variable, causality in (
+            (connection.source, connection.output, "output"),
+            (connection.sink, connection.input, "input"),
+        ):
+            if name not in springs and variable not in real_variables(scene.parts[name].fmu, causality):
+                raise HarnessError(f"scene {scene.name}: part {name} has no {causality} {variable}")
+    for spring in scene.springs:
+        for part in filter(None, (spring.a, spring.b)):
+            if "x0" not in real_variables(scene.parts[part].fmu, "parameter"):
+                raise HarnessError(f"scene {scene.name}: part {part} has no parameter x0, which a spring needs")
+
+
+def real_variables(fmu: Path, causality: str) -> list[str]:
+    """Return the names of the Real variables of a causality."""
+    variables = read_description(fmu).modelVariables
+    return [variable.name for variable in variables if variable.causality == causality and variable.type in REAL_TYPES]
+
+
+def has_reference(scene: CoupledScene) -> bool:
+    """Return whether a single model of the whole scene has a known solution: shipped bodies that forces connect."""
+    are_bodies = all(part.model in BODY_MODELS and part.fmu == find_fmu(part.model) for part in scene.parts.values())
+    return are_bodies and all(connection.input == "F_ext" for connection in scene.direct_connections)
 
 
 def start_values(fmu: Path) -> dict[str, float]:
@@ -108,17 +143,22 @@ def element_fmus(scene: CoupledScene, folder: Path) -> dict[str, Path]:
 
 
 def plan_study(scene: CoupledScene) -> Convergence:
-    """Return the study to run, which records the positions of the parts."""
-    read = tuple((name, "x", value_reference(part.fmu, "x")) for name, part in scene.parts.items())
+    """Return the study to run, which records the positions of the parts; of a part without x, its first output."""
+    variables = {name: recorded_variable(part.fmu) for name, part in scene.parts.items()}
+    read = tuple((name, variable.name, int(variable.valueReference)) for name, variable in variables.items())
     labels = tuple(f"{name} ({part.model})" for name, part in scene.parts.items())
-    return Convergence(scene.title, read, labels, ("m",) * len(read), scene.steps, scene.stop, "single-model reference")
+    units = tuple(variable_unit(variable) for variable in variables.values())
+    reference = "single-model reference" if has_reference(scene) else "finest run"
+    return Convergence(scene.title, read, labels, units, scene.steps, scene.stop, reference)
 
 
-def value_reference(fmu: Path, name: str) -> int:
-    """Return the value reference of a variable."""
-    return next(
-        int(variable.valueReference) for variable in read_description(fmu).modelVariables if variable.name == name
-    )
+def recorded_variable(fmu: Path) -> Any:
+    """Return the description of the output that a study records."""
+    names = real_variables(fmu, "output")
+    if not names:
+        raise HarnessError(f"{fmu.name} has no Real output")
+    name = "x" if "x" in names else names[0]
+    return next(variable for variable in read_description(fmu).modelVariables if variable.name == name)
 
 
 def make_reference_solver(scene: CoupledScene, defaults: Starts) -> Callable[[np.ndarray], np.ndarray]:
