@@ -198,7 +198,7 @@ def test_rare_jumps_are_not_warned_of(worker):
     fmu.free()
 
 
-@pytest.mark.parametrize("method", ["DOP853", "Radau"])
+@pytest.mark.parametrize("method", ["RK45", "Radau"])
 def test_model_exchange_follows_a_prescribed_motion(worker, method):
     """scipy as importer; the speed rises linearly and the inputs are set in each evaluation."""
     events, motion = solve_block(belt_rising, 5.0, k=60.0, hold=10.0, slide=6.0)
@@ -211,7 +211,7 @@ def test_model_exchange_follows_a_prescribed_motion(worker, method):
     rows, _ = fmu.solve(times, names, method, 1e-9, ramp)
     x, v, mode, force, a, count = np.array(rows).T
     expected = np.array([motion(t) for t in times])
-    assert np.abs(np.array([x, v]).T - expected).max() < (1e-7 if method == "DOP853" else 1e-6)
+    assert np.abs(np.array([x, v]).T - expected).max() < 1e-8
     assert count[-1] == len(events)
     stuck = mode == 0
     assert np.abs(a[stuck] - 0.1).max() < 1e-14
@@ -263,7 +263,7 @@ def test_errors_of_the_importers_solver_are_no_jump(worker):
     assert fmu.get_states()[1] == 1.0
     fmu.set({"v_belt": 1.5})  # a jump
     fmu.update_discrete_states()
-    assert fmu.get("mode_1", "mode_2") == [-1, -1]
+    assert fmu.get("mode_1", "mode_2") == [-1, 0]
 
 
 TWO = '''\

@@ -236,7 +236,7 @@ def test_an_invalid_archive_is_reported(couple, tmp_path):
             2,
             "a connection to an input needs factor = 1, got 2.0",
         ),
-        (PAIR + 'parts.c = { model = "nosuch.fmu" }\n', 1, "nosuch.fmu"),
+        (PAIR + 'parts.c = { model = "nosuch.fmu" }\n', 2, "there is no nosuch.fmu"),
         (PAIR + 'connections = [{ from = "a.mode", to = "b", factor = 1.0 }]\n', 2, "unknown output 'mode'"),
     ],
 )

@@ -226,7 +226,7 @@ def build_coupled_scene(path: Path, keys: CoupledKeys, models: Collection[str]) 
         path.stem, keys.title, float(keys.stop), check_communication_steps(keys), {}, tuple(springs), tuple(direct)
     )
     ends = [(connection.sink, connection.input) for connection in scene.connections]
-    repeated = [end[0] for end in ends if ends.count(end) > 1]
+    repeated = [name for name, variable in ends if name in keys.parts and ends.count((name, variable)) > 1]
     if repeated:
         raise SceneError(f"part {repeated[0]} is driven twice; an input accepts one connection")
     parts = {
