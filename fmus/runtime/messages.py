@@ -101,7 +101,7 @@ def rule_message(status: int, run: RunState, model: Any) -> str:
 def inconsistent_rate_message(run: RunState, model: Any) -> str:
     """Return the warning about an input that jumps against its rate."""
     name, rate = model.prescribed_inputs[model.inconsistent_input - 1]
-    return INCONSISTENT_RATE.format(name=name, rate=rate, now=run.solver.t)
+    return INCONSISTENT_RATE.format(name=name, rate=rate, now=run.solver.start_time + run.solver.t)
 
 
 def value_message(reason: int, name: str, declared: VariableDeclaration, value: float) -> str:
