@@ -74,8 +74,9 @@ def _add_types(root: Element, declared: Variables) -> None:
         SubElement(types, "Float64Type", quantity, name=quantity["quantity"])
     for name, meaning in declared:
         if meaning.items:
-            attributes = {"name": shared.type_name(name), "description": meaning.text}
-            shared.add_enumeration_items(SubElement(types, "EnumerationType", attributes), meaning)
+            # without its optional description, which fmpy before 0.3.26 cannot read; the variable has the same one
+            element = SubElement(types, "EnumerationType", name=shared.type_name(name))
+            shared.add_enumeration_items(element, meaning)
 
 
 def _add_structure(root: Element, model: Any, declared: Variables, rates: dict[int, int]) -> None:
