@@ -66,6 +66,11 @@ FMUS = HERE / "fmus" if (HERE / "pyproject.toml").is_file() else Path("fmus")
     type=click.Choice(list(LAWS)),
     help="Include only this friction law; repeatable.",
 )
+@click.option(
+    "--real-only",
+    is_flag=True,
+    help="Offer Reals only, with one method and one law, for hosts without other types; into the folder real-only.",
+)
 @click.option("--platform", "platforms", multiple=True, help="Include only this platform, such as linux64; repeatable.")
 @click.option(
     "--out", type=click.Path(path_type=Path), help="Output folder; by default fmus, or the folder of FILE.py."
@@ -89,6 +94,7 @@ def main(
     web: bool,
     methods: tuple[str, ...],
     laws: tuple[str, ...],
+    real_only: bool,
     platforms: tuple[str, ...],
     out: Path | None,
     release: Path | None,
@@ -105,22 +111,35 @@ def main(
       friction-fmus build stickslip --out elsewhere
       friction-fmus build --more
       friction-fmus build cart.py --native --platform linux64
+      friction-fmus build pendulum --real-only
       friction-fmus build --release dist
     """
     click.get_current_context().with_resource(temporary_files())
-    if web and (compiled or platforms or fmi == "3"):
-        raise CommandLineError("--web writes a page, not FMUs: remove --native, --platform and --fmi 3.")
+    if web and (compiled or platforms or real_only or fmi == "3"):
+        raise CommandLineError("--web writes a page, not FMUs: remove --native, --real-only, --platform and --fmi 3.")
     if release is not None:
-        if models or more or compiled or web or methods or laws or platforms or out or stages or fmi == "3":
+        if (
+            models
+            or more
+            or compiled
+            or web
+            or methods
+            or laws
+            or real_only
+            or platforms
+            or out
+            or stages
+            or fmi == "3"
+        ):
             raise CommandLineError("--release builds everything: remove the other options and models.")
         print_summary(release_archive(release))
         return
-    if stages is not None and (compiled or web or platforms or out or fmi == "3"):
+    if stages is not None and (compiled or web or real_only or platforms or out or fmi == "3"):
         raise CommandLineError(
-            "--stages writes texts, not FMUs: remove --native, --web, --platform, --out and --fmi 3."
+            "--stages writes texts, not FMUs: remove --native, --web, --real-only, --platform, --out and --fmi 3."
         )
     compiled = compiled or fmi == "3"
-    subfolder = "native/fmi3" if fmi == "3" else "native" if compiled else ""
+    subfolder = Path("real-only" if real_only else "", "native" if compiled else "", "fmi3" if fmi == "3" else "")
     try:
         names = models if models and not more else (*models, *(more_model_names() if more else model_names()))
         sources = {model: find_model(model) for model in names}
@@ -153,10 +172,10 @@ def main(
                 with show_progress(
                     f"{source.name}: compiling (the first build also compiles the C libraries, half a minute)"
                 ):
-                    path = build_native(source.path, folder, methods, laws, platforms, fmi)
+                    path = build_native(source.path, folder, methods, laws, platforms, fmi, real_only)
                 import_time = ""
             else:
-                path = build(source.path, folder, methods, laws, platforms)
+                path = build(source.path, folder, methods, laws, platforms, real_only)
                 import_time = f"  {1000 * measure_import_time(path):3.0f} ms"
         except BuildError as error:
             raise click.ClickException(str(error)) from error
@@ -184,12 +203,18 @@ def print_summary(path: Path, import_time: str = "") -> None:
 
 
 def build_native(
-    model: Path, folder: Path, methods: tuple[str, ...], laws: tuple[str, ...], platforms: tuple[str, ...], fmi: str
+    model: Path,
+    folder: Path,
+    methods: tuple[str, ...],
+    laws: tuple[str, ...],
+    platforms: tuple[str, ...],
+    fmi: str,
+    real_only: bool,
 ) -> Path:
     """Build the native FMU; the import is in the function because it needs optional packages."""
     from fmus.packaging.native import build
 
-    return build(model, folder, methods, laws, platforms, fmi)
+    return build(model, folder, methods, laws, platforms, fmi, real_only)
 
 
 def release_archive(folder: Path) -> Path:

@@ -61,6 +61,7 @@ def build(
     methods: Sequence[str] = (),
     laws: Sequence[str] = (),
     platforms: Sequence[str] = (),
+    real_only: bool = False,
 ) -> Path:
     """Write the Python FMU of a model into `folder` and return its path.
 
@@ -74,9 +75,11 @@ def build(
         Integration methods and friction laws to include; by default all that the model has.
     platforms
         FMI platform names to include; by default all that pythonfmu provides.
+    real_only
+        Whether all variables are Reals, with one method and one law, for hosts without other types.
     """
     source, date = find_model(model), build_date()
-    name, features = source.name, select_features(source, methods, laws)
+    name, features = source.name, select_features(source, methods, laws, real_only)
     cls, texts = lowered_model(source, features), lowered_files(source, features)
     sources = embedded_files(source, texts)
     code = digest(sources, ENTRY_SCRIPT)

@@ -8,7 +8,7 @@ from typing import Any
 
 from ..runtime.codes import HYBRID
 from ..runtime.run_state import RunState
-from ..runtime.variable_declarations import Local, VariableDeclaration, variables
+from ..runtime.variable_declarations import Local, VariableDeclaration, fmi_variables
 
 TIME, TO_REST, TO_BREAK_AWAY = "time", "events.to_rest", "events.to_break_away"
 CONDITION = "events.condition_{}"  # indicator of a condition of the equations, numbered from 1
@@ -31,7 +31,7 @@ class ContinuousLocal(Local):
 def declared_variables(model: Any) -> Variables:
     """Return name and declaration of the variables of a model class and its solver; a mode names its contact."""
     instance = model()
-    declared = variables(instance) + variables(RunState(instance))
+    declared = fmi_variables(instance, RunState(instance))
     forces = [name for name, meaning in declared if meaning.role == "contact"]
     force_of = dict(zip(model.contacts, forces, strict=True))
     return [

@@ -43,6 +43,10 @@ EXCHANGE_CAPABILITIES = {  # for model exchange: the same without communication 
     **{key: able for key, able in STEPPING_CAPABILITIES.items() if "Communication" not in key},
     **DIRECTIONAL_DERIVATIVES,
 }
+REAL_ONLY_HINT = (  # in the description of every other FMU
+    "For hosts that read or set every variable as a Real, build it with --real-only; for hosts without Python, with "
+    "--native."
+)
 EXPERIMENT_ATTRIBUTES = {"stopTime": "stop_time", "tolerance": "tolerance", "stepSize": "step_size"}
 LOG_CATEGORIES = {
     "logStatusWarning": "Messages with status {fmi}Warning.",
@@ -94,10 +98,11 @@ def describe(model: Any, name: str, code: str, date: datetime, nominals: Sequenc
     return serialize(root, "guid", code, date)
 
 
-def create_root(model: type[VariableOwner], name: str, version: str, key: str) -> Element:
+def create_root(model: Any, name: str, version: str, key: str) -> Element:
     """Create the root element; `serialize` sets the attribute `key` last."""
     root = Element("fmiModelDescription", {"fmiVersion": version, "modelName": name, key: ""})
-    root.set("description", (model.__doc__ or "").strip().splitlines()[0])
+    sentence = (model.__doc__ or "").strip().splitlines()[0]
+    root.set("description", sentence if model.real_only else f"{sentence} {REAL_ONLY_HINT}")
     root.attrib |= {"author": "friction-fmus", "version": __version__, "license": "MIT"}
     root.attrib |= {"generationTool": f"friction-fmus {__version__}", "variableNamingConvention": "structured"}
     return root

@@ -6,6 +6,7 @@ BACKWARD, STUCK, FORWARD = -1, 0, 1  # modes of a contact: direction of sliding,
 
 INSTANTIATED, INITIALISING, RUNNING, TERMINATED = 0, 1, 2, 3  # phases of an instance
 EVENT, CONTINUOUS, INTERMEDIATE = 4, 5, 6  # phases in which the importer handles events
+NO_VALUE = -2147483648  # of an integer without a result: a mode after a failure; it reads NaN as a Real
 CO_SIMULATION, MODEL_EXCHANGE = 1, 2  # interface that the importer uses
 
 # Status codes: of the solver; of a run that has already failed; of the calls of an importer

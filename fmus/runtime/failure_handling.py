@@ -7,13 +7,12 @@ from math import nan
 from typing import Any
 
 from . import messages
-from .codes import BAD_VALUE, DIVERGED, FAILED, INTERRUPTED
+from .codes import BAD_VALUE, DIVERGED, FAILED, INTERRUPTED, NO_VALUE
 from .pythonfmu_workarounds import reraise_later, sanitize, write_to_stderr
 from .run_state import RunState
 from .variable_declarations import VariableDeclaration
 
 WARNING, ERROR = 1, 3  # status codes in all versions of FMI
-CALCULATED_CAUSALITIES = ("output", "local")  # causalities of calculated variables
 
 
 class FailureHandling:
@@ -28,6 +27,7 @@ class FailureHandling:
     attribute_owners: list[tuple[object, str]]  # owner and attribute name of each variable
     invalid_values: dict[str, str]  # name -> message, for rejected values; empty once a step was refused for it
     has_warned: bool  # about the rate of an input
+    last_refusal: tuple[str, float]  # message, and the time that the run had reached
     pending_exception: object  # weak reference that re-raises an exception of the host
 
     def fail_with_status(self, status: int, t: float = nan, h: float = nan) -> bool:
@@ -39,9 +39,13 @@ class FailureHandling:
     def refuse_step(self, status: int, t: float, h: float) -> bool:
         """Report why a communication step is refused; return False.
 
-        The instance stays as it was.  The messages of invalid values become empty, because they were reported.
+        The instance stays as it was.  The messages of invalid values become empty, because they were reported.  A host
+        that ignores refusals and repeats its mistake at every step gets one report: the time has not advanced since.
         """
-        self.report_error(self.status_message(status, t, h))
+        refusal = self.status_message(status, t, h), self.run.solver.t
+        if refusal != self.last_refusal:
+            self.last_refusal = refusal
+            self.report_error(refusal[0])
         self.invalid_values = dict.fromkeys(self.invalid_values, "")
         return False
 
@@ -84,7 +88,12 @@ class FailureHandling:
         return False
 
     def set_outputs_to_nan(self) -> None:
-        """Set every calculated Real to NaN."""
+        """Set every calculated Real to NaN, and every output that is an integer to a value that is no mode."""
         for (_, declared), (owner, name) in zip(self.variables, self.attribute_owners):
-            if declared.type == "Real" and declared.causality in CALCULATED_CAUSALITIES:
-                setattr(owner, name, nan)
+            if lacks_value_after_failure(declared):
+                setattr(owner, name, NO_VALUE if declared.is_integer else nan)
+
+
+def lacks_value_after_failure(declared: VariableDeclaration) -> bool:
+    """Return whether a variable has no value after a failure: calculated Reals and outputs; counters keep theirs."""
+    return declared.causality == "output" or (declared.causality == "local" and declared.type == "Real")

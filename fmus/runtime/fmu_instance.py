@@ -19,7 +19,7 @@ from .codes import BAD_STEP, BAD_VALUE, OK, RUNNING
 from .pythonfmu_workarounds import signal_safe
 from .run_state import RunState
 from .saved_state import SavedStateAccess, attribute_tree
-from .variable_declarations import VariableOwner, variables
+from .variable_declarations import VariableOwner, fmi_variables
 
 
 def make_fmu_class(slave: type[FmuInstance], model: type[VariableOwner]) -> Any:
@@ -32,7 +32,7 @@ def make_fmu_class(slave: type[FmuInstance], model: type[VariableOwner]) -> Any:
     run = RunState(inspected)
     attributes = {
         "Model": model,
-        "variables": variables(inspected) + variables(run),
+        "variables": fmi_variables(inspected, run),
         "model_tree": attribute_tree(inspected),
         "run_tree": attribute_tree(run),
         "__module__": __name__,

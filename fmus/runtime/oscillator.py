@@ -42,6 +42,7 @@ class Oscillator(VariableOwner):
     prescribed_inputs: tuple[tuple[str, str], ...] = ()  # names of each such input and of its rate
     has_prescribed_slips = False  # some of them are part of a slip: slip_deviations() is defined
     is_linear = False  # piecewise linear (linear_closed_form.py)
+    real_only = False  # the FMU offers Reals only, for hosts without other types
     has_conditions = False  # choose() with conditions that change during a step (event_location.py)
     # event functions: number, first of a condition; conditions that switch; status of the first of the others, limits
     n_event_functions = first_condition = n_switches = first_limit_rule = 0

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import nan
 from typing import Any
 
 from . import call_sequence, messages
-from .codes import DIVERGED, OK, UNKNOWN_REFERENCE
+from .codes import DIVERGED, NO_VALUE, OK, UNKNOWN_REFERENCE
 from .failure_handling import FailureHandling
 from .pythonfmu_workarounds import signal_safe
 
@@ -69,6 +70,7 @@ class VariableAccess(FailureHandling):
             ("Real", "Integer", "Boolean", "String"), (None, None, False, False)
         )
         self.invalid_values = {}
+        self.last_refusal = "", nan
 
     def locate(self, name: str) -> tuple[object, str]:
         """Return the object that owns a variable, and the name of the attribute."""
@@ -103,7 +105,13 @@ class VariableAccess(FailureHandling):
         names = [self.variables[reference][0] if known else "" for reference, known in zip(references, is_known)]
         owners = ["run" if "." in name else "model" for name in names]
         terms = [f"{owner}.{name}" if name else "blank" for owner, name in zip(owners, names)]
-        values = eval(f"lambda model, run: [{', '.join(terms)}]", {"blank": blank})  # the fastest way
+        if kind == "Real":
+            integers = [
+                known and self.variables[reference][1].is_integer for reference, known in zip(references, is_known)
+            ]
+            terms = [f"integer_as_real({term})" if integer else term for term, integer in zip(terms, integers)]
+        scope = {"blank": blank, "integer_as_real": integer_as_real}
+        values = eval(f"lambda model, run: [{', '.join(terms)}]", scope)  # the fastest way
         compiled = (
             list(references),
             values,
@@ -159,6 +167,11 @@ class VariableAccess(FailureHandling):
         if message:
             self.invalid_values[name] = message
         run.n_invalid_values = len(self.invalid_values)
+
+
+def integer_as_real(value: int) -> float:
+    """Return an integer as a Real, which is NaN if it has no value."""
+    return nan if value == NO_VALUE else float(value)
 
 
 def unknown_reference_message(kind: str, reference: int) -> str:

@@ -6,6 +6,7 @@ numbers under the same names.  XML, documentation pages and error messages use t
 
 from __future__ import annotations
 
+from copy import copy
 from math import inf, isfinite
 from typing import Any
 
@@ -19,6 +20,7 @@ class VariableDeclaration:
     """Declaration of a variable: unit, description, range; enumerations have `items` (label, value, description)."""
 
     type = "Real"
+    is_integer = False  # its value is stored as an integer, also if its type is Real
     causality = ""
     variability = ""
     initial = ""
@@ -86,7 +88,7 @@ class Fixed(Parameter):
 class Choice(Fixed):
     """Enumeration that is fixed after initialisation; items are (label, value, description)."""
 
-    type = "Enumeration"
+    type, is_integer = "Enumeration", True
 
     def __init__(self, start: int, text: str, items: tuple[tuple[str, int, str], ...]) -> None:
         super().__init__(start, "", text)
@@ -131,7 +133,7 @@ class Contact(Output):
 class Mode(Output):
     """Mode of a contact: -1 sliding backward, 0 stuck, 1 sliding forward."""
 
-    type, variability, start = "Integer", "discrete", 0
+    type, is_integer, variability, start = "Integer", True, "discrete", 0
 
     def __init__(self, text: str) -> None:
         super().__init__("", text, direct=True, low=-1, high=1)
@@ -146,7 +148,7 @@ class Local(VariableDeclaration):
 class Count(Local):
     """Counter."""
 
-    type, start = "Integer", 0
+    type, is_integer, start = "Integer", True, 0
 
     def __init__(self, text: str) -> None:
         super().__init__("", text, low=0)
@@ -168,6 +170,26 @@ def declarations(cls: type) -> list[VariableDeclaration]:
             if isinstance(value, VariableDeclaration):
                 result.setdefault(name, value)
     return list(result.values())
+
+
+def fmi_variables(model: Any, run: object) -> list[tuple[str, VariableDeclaration]]:
+    """Return dotted name and declaration of every variable that an FMU offers: of the model, then of its run.
+
+    An enumeration with one item is no choice and is left out.  An FMU with Reals only offers integers as Reals, and no
+    enumeration: these keep their start values.
+    """
+    declared = [(name, meaning) for name, meaning in variables(model) + variables(run) if len(meaning.items) != 1]
+    if model.real_only:
+        declared = [(name, as_real(meaning)) for name, meaning in declared if not meaning.items]
+    return declared
+
+
+def as_real(declared: VariableDeclaration) -> VariableDeclaration:
+    """Return a declaration with an integer as a dimensionless Real."""
+    real = copy(declared)
+    if real.type == "Integer":
+        real.type, real.unit = "Real", "1"
+    return real
 
 
 def variables(owner: object, prefix: str = "") -> list[tuple[str, VariableDeclaration]]:

@@ -19,10 +19,11 @@ EXACT, HYBRID = EXACT_ITEM[0], HYBRID_LAW[0]
 
 @dataclass(frozen=True)
 class FeatureSelection:
-    """Labels of the methods and laws that an FMU includes."""
+    """Labels of the methods and laws that an FMU includes, and whether its variables are Reals only."""
 
     methods: tuple[str, ...]
     laws: tuple[str, ...]
+    real_only: bool = False
 
     @property
     def choices(self) -> dict[str, tuple[int, ...]]:
@@ -42,9 +43,25 @@ class FeatureSelection:
         return {label: cls.__name__ for label, _, cls in methods if label in self.methods}
 
 
-def select_features(source: ModelFile, methods: Sequence[str] = (), laws: Sequence[str] = ()) -> FeatureSelection:
-    """Select methods and laws, by default all that the model offers; raise BuildError for those that it cannot have."""
+def select_features(
+    source: ModelFile, methods: Sequence[str] = (), laws: Sequence[str] = (), real_only: bool = False
+) -> FeatureSelection:
+    """Select methods and laws, by default all that the model offers; with Reals only, its default method and law.
+
+    Raises
+    ------
+    BuildError
+        If the model cannot have one of them, or there are several and the FMU has Reals only.
+    """
     analysis, selections = source.analysis, []
+    if real_only:
+        laws = laws or analysis.laws[:1]
+        methods = methods or [analysis.method]
+        for option, values in (("--method", methods), ("--law", laws)):
+            if len(values) > 1:
+                raise BuildError(
+                    f"{option} {' and '.join(values)}: an FMU with Reals only has one: give {option} once."
+                )
     for word, default, has, requested in (
         ("method", analysis.methods, analysis.available_methods, methods),
         ("friction law", analysis.laws, analysis.laws, laws),
@@ -57,5 +74,8 @@ def select_features(source: ModelFile, methods: Sequence[str] = (), laws: Sequen
     if ruling and HYBRID not in ruling:  # the closed form requires the hybrid law
         selection = tuple(label for label in selection if label != EXACT)
         if not selection:
-            raise BuildError(f"{source.name}: the method {EXACT!r} needs the law {HYBRID!r}: add --law {HYBRID}.")
-    return FeatureSelection(selection, ruling)
+            raise BuildError(
+                f"{source.name}: the method {EXACT!r} needs the law {HYBRID!r}: add --law {HYBRID}, or give another "
+                "--method."
+            )
+    return FeatureSelection(selection, ruling, real_only)

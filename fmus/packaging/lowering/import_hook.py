@@ -57,6 +57,7 @@ def import_lowered(source: ModelFile, features: FeatureSelection) -> type[Variab
         0, LoweredModuleFinder(package, files, {f"{name}.py": sys.modules[model.__module__].__file__ or "?"})
     )
     result = vars(import_module(f"{package}.{name}"))[model.__name__]
+    result.real_only = features.real_only  # variable_declarations.py is not lowered here
     result.analysis = source.analysis  # used by model description and page
     result.runtime_names = runtime_names(model)
     return result

@@ -8,7 +8,7 @@ from typing import Any
 
 from ...runtime.oscillator import Oscillator
 from ...runtime.run_state import RunState
-from ...runtime.variable_declarations import variables
+from ...runtime.variable_declarations import fmi_variables
 from .. import __version__
 from ..equations.model_file import ModelFile
 from ..syntax_trees import all_nodes, parsed_nodes
@@ -56,6 +56,7 @@ def model_layout(source: ModelFile, features: FeatureSelection) -> ModelLayout:
     model: Any = source.model
     flags = {flag: getattr(model, flag) for flag, default in vars(Oscillator).items() if isinstance(default, bool)}
     flags["is_linear"] = EXACT in features.methods
+    flags["real_only"] = features.real_only
     flags["has_other_laws"] = any(law != "hybrid" for law in features.laws)
     names = runtime_names(model)
     states, contacts = (
@@ -94,7 +95,7 @@ def lower_all(source: ModelFile, features: FeatureSelection) -> SourceFiles:
     declared = runtime_symbols()
     files = {path: SourceEmitter(spec, declared, path, text, path != file).lines for path, text in texts.items()}
     model = source.model()
-    files = remove_dead_code(files, file, [name for name, _ in variables(model) + variables(RunState(model))])
+    files = remove_dead_code(files, file, [name for name, _ in fmi_variables(model, RunState(model))])
     return {path: add_origin_line(path, lines, texts[path], spec) for path, lines in files.items()}
 
 

@@ -47,6 +47,7 @@ def build(
     laws: Sequence[str] = (),
     platforms: Sequence[str] = (),
     fmi: str = "2",
+    real_only: bool = False,
 ) -> Path:
     """Build the native FMU of a model and write it to `folder`, replacing an older one atomically.
 
@@ -62,6 +63,8 @@ def build(
         Platforms to compile for; none: DEFAULT_PLATFORMS.
     fmi
         Version of FMI: "2" or "3".
+    real_only
+        Whether all variables are Reals, with one method and one law, for hosts without other types.
     """
     platforms = platforms or DEFAULT_PLATFORMS
     for platform in platforms:
@@ -69,7 +72,7 @@ def build(
             raise BuildError(f"There is no platform {platform!r}; choose from {', '.join(PLATFORMS)}.")
     date = build_date()
     source = replace(find_model(model), has_input_derivatives=fmi == "2")  # FMI 3.0 cannot set derivatives of inputs
-    name, cls = source.name, lowered_model(source, select_features(source, methods, laws))
+    name, cls = source.name, lowered_model(source, select_features(source, methods, laws, real_only))
     files, description = generate_c_sources(cls, name, date, fmi)
     declared = declared_variables(cls)
     entries = extra_files(cls, source.path, declared, ICON_PATHS[fmi], USAGE_NOTE)

@@ -109,10 +109,13 @@ static COLD Status refuse_reference(const Instance *self, uint32_t reference, co
 
 /* ---- failure */
 
+/* Set every calculated Real to NaN, and every output that is an integer to a value that is no mode. */
 static void set_outputs_to_nan(State *state)
 {
     for (const Variable *variable = variables; variable < variables + VARIABLES; variable++) {
-        if (variable->is_real && variable->is_nan_after_failure) *(double *)variable_address(state, variable) = NAN;
+        if (!variable->lacks_value_after_failure) continue;
+        if (variable->is_integer) *(int64_t *)variable_address(state, variable) = NO_VALUE;
+        else *(double *)variable_address(state, variable) = NAN;
     }
 }
 
@@ -242,14 +245,14 @@ static Status write_value(Instance *self, uint32_t reference, double value)
     state->run.outputs_current = false;
     call_sequence_note_change(&state->run, &state->model, &fault);
     if (fault) return fail_run(self, DIVERGED, NAN, NAN);
-    if (variable->is_real) *(double *)variable_address(state, variable) = value;
-    else *(int64_t *)variable_address(state, variable) = (int64_t)value;
+    if (variable->is_integer) *(int64_t *)variable_address(state, variable) = (int64_t)value;
+    else *(double *)variable_address(state, variable) = value;
     return STATUS_OK;
 }
 
 static double read_real(const Instance *self, uint32_t reference)
 {
-    return *(const double *)((const char *)&self->state + variables[reference].offset);
+    return variable_value(&self->state, &variables[reference]);
 }
 
 static int64_t read_integer(const Instance *self, uint32_t reference)

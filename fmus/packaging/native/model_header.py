@@ -7,7 +7,7 @@ from typing import Any
 
 from ...runtime import codes
 from ...runtime.codes import INTERRUPTED
-from ...runtime.failure_handling import CALCULATED_CAUSALITIES
+from ...runtime.failure_handling import lacks_value_after_failure
 from ...runtime.messages import CALL_MESSAGES, INCONSISTENT_RATE, PHASE_NAMES, RUN_MESSAGES, VALUE_MESSAGES
 from ...runtime.variable_access import SETTABLE_CAUSALITIES
 from ...runtime.variable_declarations import VariableDeclaration, VariableOwner
@@ -251,9 +251,10 @@ def _variable_row(
     texts = (name, meaning.text, meaning.unit_suffix, meaning.allowed)
     flags = (
         meaning.type == "Real",
+        meaning.is_integer,
         meaning.causality not in SETTABLE_CAUSALITIES,
         meaning.variability == "fixed",
-        meaning.causality in CALCULATED_CAUSALITIES,
+        lacks_value_after_failure(meaning),
         "." in name,
         meaning.role == "state" or meaning.causality == "input",
         meaning.type == "Real" and meaning.causality == "parameter",

@@ -27,8 +27,10 @@ static void *variable_address(State *state, const Variable *variable) { return (
 
 static double variable_value(const State *state, const Variable *variable)
 {
-    const void *value = (const char *)state + variable->offset;
-    return variable->is_real ? *(const double *)value : (double)*(const int64_t *)value;
+    const void *address = (const char *)state + variable->offset;
+    if (!variable->is_integer) return *(const double *)address;
+    int64_t value = *(const int64_t *)address;
+    return value == NO_VALUE && variable->is_real ? NAN : (double)value;
 }
 
 static bool is_allowed_value(const Variable *variable, double value)
@@ -86,7 +88,7 @@ static bool are_members_valid(const State *state)
 {
     for (const Member *member = members; member < members + MEMBERS; member++) {
         const void *value = (const char *)state + member->offset;
-        if (member->is_bool ? !is_bool(value) : *(const int64_t *)value < -1 || *(const int64_t *)value > MAX_INTEGER) {
+        if (member->is_bool ? !is_bool(value) : *(const int64_t *)value < NO_VALUE || *(const int64_t *)value > MAX_INTEGER) {
             return false;
         }
     }

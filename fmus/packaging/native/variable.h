@@ -15,9 +15,10 @@ typedef struct {
     const char *unit, *allowed;    /* unit suffix and allowed range, as in messages */
     size_t offset;                 /* in State */
     size_t tangent_offset;         /* in struct Tangent; NO_OFFSET without a derivative */
-    bool is_real;                  /* a double; otherwise an int64_t */
+    bool is_real;                  /* a Real of FMI; otherwise an integer */
+    bool is_integer;               /* stored as an int64_t, in an FMU with Reals only also of a Real; otherwise a double */
     bool is_calculated, is_fixed;
-    bool is_nan_after_failure;     /* reads NaN after the run has failed */
+    bool lacks_value_after_failure; /* after the run has failed, reads NaN or NO_VALUE */
     bool is_updated_on_read;       /* solver and event statistics */
     bool is_state_or_input;
     bool is_real_parameter;        /* others have partial derivatives by it, as by states and inputs */

@@ -1,0 +1,112 @@
+"""FMUs with Reals only, for hosts that read or set every variable as a Real."""
+
+from math import isnan
+
+import build_cache
+import native_fmus
+import pytest
+from commands import build
+from fmpy import read_model_description
+from models import HYBRID, MODELS, declared, outputs
+
+from fmus.runtime.codes import NO_VALUE
+
+OPTIONS = {
+    "python": (),
+    "native": ("--native", "--platform", "linux64"),
+    "FMI 3.0": ("--fmi", "3", "--platform", "linux64"),
+}
+REAL = {"python": "Real", "native": "Real", "FMI 3.0": "Float64"}
+STEP, STEPS = 0.05, 40
+
+
+@pytest.fixture(scope="module", params=OPTIONS)
+def backend(request):
+    return request.param
+
+
+@pytest.fixture(scope="module")
+def folders(backend):
+    """Return the folders with the FMUs that have all variables, and with those that have Reals only."""
+    if backend != "python":
+        native_fmus.require_compiler()
+    name, options = backend.replace(" ", ""), OPTIONS[backend]
+    return tuple(
+        build_cache.build_once(f"{kind}-{name}", *words, *options, timeout=1200)
+        for kind, words in (("all", ()), ("reals", ("--real-only",)))
+    )
+
+
+def motion(fmu, names):
+    """Return the values of variables at each communication point."""
+    fmu.begin()
+    rows = [fmu.get(*names)]
+    for i in range(STEPS):
+        fmu.step(i * STEP, STEP)
+        rows.append(fmu.get(*names))
+    return rows
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_the_variables_are_reals_and_have_the_same_values(folders, backend, worker, name):
+    everything, reals = (folder / f"{name}.fmu" for folder in folders)
+    description = read_model_description(reals)
+    assert {variable.type for variable in description.modelVariables} == {REAL[backend]}
+    assert "--real-only" not in description.description
+    assert "--real-only" in read_model_description(everything).description
+    absent = {variable for variable, meaning in declared(name).items() if meaning.items}
+    present = {variable.name for variable in description.modelVariables}
+    assert present == {variable.name for variable in read_model_description(everything).modelVariables} - absent
+    names = [*outputs(name), "events.count", "solver.steps", "solver.evaluations"]
+    assert motion(worker.instantiate(reals), names) == motion(worker.instantiate(everything), names)
+
+
+def test_a_failed_run_leaves_no_mode_that_could_be_a_result(folders, backend, worker):
+    everything, reals = (worker.instantiate(folder / "coulomb.fmu") for folder in folders)
+    for fmu in everything, reals:
+        fmu.begin({"m": 1e-300, "F_ext": 1e308})
+        with pytest.raises(Exception, match="returned status"):
+            fmu.step(0.0, STEP)
+    assert everything.get("mode") == NO_VALUE
+    assert all(isnan(value) for value in (*everything.get("x", "v"), *reals.get("x", "mode", "solver.h")))
+    worker.read_stderr()
+
+
+def test_a_host_that_repeats_its_mistake_gets_one_message(fmus, worker):
+    """Some hosts set enumerations as Reals at every step, and ignore that the step is refused."""
+    fmu = worker.instantiate(fmus / "coulomb.fmu")
+    fmu.begin()
+    reference = [*declared("coulomb")].index("friction")
+    for i in range(20):
+        fmu.write_one("Real", reference, HYBRID)
+        with pytest.raises(Exception, match="returned status 2"):
+            fmu.step(i * STEP, STEP)
+        assert fmu.get("mode") == NO_VALUE
+    assert len(fmu.messages()) == 1
+    assert worker.read_stderr().count("\n") == 1
+
+
+def test_an_enumeration_with_one_item_is_left_out(tmp_path):
+    done = build("coulomb", "--method", "exact", "--law", "hybrid", "--out", tmp_path)
+    assert done.returncode == 0, done.stderr
+    names = {variable.name for variable in read_model_description(tmp_path / "coulomb.fmu").modelVariables}
+    assert {"friction", "solver.method"} & names == set()
+
+
+@pytest.mark.parametrize(
+    ("options", "sentence"),
+    [
+        (
+            ("--method", "ode23", "--method", "exact"),
+            "--method ode23 and exact: an FMU with Reals only has one: give --",
+        ),
+        (("--law", "hybrid", "--law", "sign"), "--law hybrid and sign: an FMU with Reals only has one: give --"),
+        (("--law", "sign"), "the method 'exact' needs the law 'hybrid'"),
+        (("--web",), "--web writes a page, not FMUs: remove --native, --real-only"),
+    ],
+)
+def test_options_that_contradict_are_refused(tmp_path, options, sentence):
+    done = build("coulomb", "--real-only", *options, "--out", tmp_path)
+    assert done.returncode in (1, 2)
+    assert sentence in done.stderr
+    assert not [*tmp_path.iterdir()]
