@@ -46,10 +46,38 @@ def test_every_module_imports_existing_names_from_earlier_modules_only():
 
 
 def test_only_one_model_is_compiled_before_the_first_picture(page):
-    count = "const { instantiate } = WebAssembly; globalThis.compiled = 0;"
-    count += "WebAssembly.instantiate = (...all) => (compiled++, instantiate(...all))"
+    count = (
+        "const { instantiate } = WebAssembly; globalThis.compiled = 0; globalThis.first = null;"
+        "WebAssembly.instantiate = (...all) => (compiled++, instantiate(...all));"
+        "const look = () => { if (document.body && !document.body.classList.contains('starting')) first ??= compiled;"
+        "requestAnimationFrame(look) }; requestAnimationFrame(look)"
+    )
     script = page.browser.call("Page.addScriptToEvaluateOnNewDocument", source=count)
     page.open(anew=True)
     page.browser.call("Page.removeScriptToEvaluateOnNewDocument", **script)
-    assert page.run("compiled") == 1
+    page.wait("first !== null")
+    assert page.run("first") == 1
     assert page.run("app.plots.get('x').plot.paints") > 0
+
+
+def test_without_scripts_the_page_shows_its_claim_and_a_text(page):
+    page.browser.call("Emulation.setScriptExecutionDisabled", value=True)
+    page.browser.open(page.file.as_uri())
+
+    def is_shown(selector):
+        node = page.browser.call("DOM.querySelector", nodeId=root, selector=selector)["nodeId"]
+        styles = page.browser.call("CSS.getComputedStyleForNode", nodeId=node)["computedStyle"]
+        return {item["name"]: item["value"] for item in styles}["display"] != "none"
+
+    page.browser.call("DOM.enable")
+    page.browser.call("CSS.enable")
+    root = page.browser.call("DOM.getDocument")["root"]["nodeId"]
+    shown = {
+        selector: is_shown(selector)
+        for selector in ("h1", "#no-script", "#lede", ".lane", ".story", "#explore", "main")
+    }
+    page.browser.call("CSS.disable")
+    page.browser.call("DOM.disable")
+    page.browser.call("Emulation.setScriptExecutionDisabled", value=False)
+    page.open(anew=True)
+    assert [selector for selector, value in shown.items() if value] == ["h1", "#no-script"]

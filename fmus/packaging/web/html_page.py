@@ -42,10 +42,10 @@ MODULES = (
         "controls",
     ),
     *("measurement", "legend", "panels", "diagrams", "form", "tables", "export", "sound", "friction_map"),
-    *("animation", "prose", "chart", "adjustable", "story_models", "story_bodies", "opening", "chatter_story", "story"),
-    *("stories", "main"),
+    *("animation", "background", "prose", "chart", "adjustable", "story_models", "story_bodies", "opening"),
+    *("chatter_story", "story", "stories", "main"),
 )
-CLAIM = "Real things stop. Most solvers can\N{RIGHT SINGLE QUOTATION MARK}t."
+CLAIM = "Real things stop. sign(v) never does."
 STORY_MODELS = ("coulomb", "stickslip", "pacejka", "pendulum")
 
 
@@ -111,7 +111,8 @@ def render_page(data: object, with_stories: bool) -> str:
     )
     text = json.dumps(data, ensure_ascii=False, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
     template = Template((HERE / "page.html").read_text(encoding="utf-8"))
-    parts = {"title": title, "heading": heading, "stories": stories if with_stories else ""}
+    stories = Template(stories).substitute(title=title) if with_stories else ""
+    parts = {"title": title, "heading": heading, "stories": stories}
     return template.substitute(policy=policy, style=style, script=code, data=text, **parts)
 
 

@@ -1,10 +1,10 @@
 // The charts of the stories: canvases in the resolution of the screen, and the elements that all of them share.
 
-import { formatPower, ticks } from "./plot.js";
+import { ticks } from "./plot.js";
 import { fixedDigits } from "./prose.js";
 
 export const palette = {};
-const charts = new Set();
+export const charts = new Set(); // all charts of the page
 
 // Read the current colours of the style sheet.
 export function readPalette() {
@@ -14,10 +14,22 @@ export function readPalette() {
   for (const chart of charts) chart.paint();
 }
 
+const CELL = 3; // CSS pixels: resolution in which curves and texts occupy a chart
+const [LABEL_REACH, LABEL_STEP] = [120, 4]; // CSS pixels: how far a label may be moved, and in which steps
+const LABEL_MARGIN = 3; // CSS pixels around a label
+const LABEL_SHIFTS = shiftsByDistance();
+
+// All shifts of a label, in pixels, by their length.
+function shiftsByDistance() {
+  const shifts = [];
+  for (let dx = -LABEL_REACH; dx <= LABEL_REACH; dx += LABEL_STEP) for (let dy = -LABEL_REACH; dy <= LABEL_REACH; dy += LABEL_STEP) shifts.push([dx, dy]);
+  return shifts.sort((a, b) => Math.hypot(...a) - Math.hypot(...b));
+}
+
 export class Chart {
   // `draw(chart)` draws everything; its context has CSS pixels as units.
   constructor(canvas, draw) {
-    Object.assign(this, { canvas, draw, c: canvas.getContext("2d"), w: 0, h: 0 });
+    Object.assign(this, { canvas, draw, c: canvas.getContext("2d"), w: 0, h: 0, labelShifts: new Map() });
     charts.add(this);
     new ResizeObserver(([{ contentRect }]) => this.size(contentRect.width, contentRect.height)).observe(canvas);
   }
@@ -34,13 +46,64 @@ export class Chart {
     this.c.setTransform(this.ratio, 0, 0, this.ratio, 0, 0);
     this.c.clearRect(0, 0, this.w, this.h);
     this.c.lineJoin = "round";
+    this.columns = Math.ceil(this.w / CELL);
+    this.occupied = new Uint8Array(this.columns * Math.ceil(this.h / CELL));
+    this.labels = [];
     this.draw(this);
+    for (const label of this.labels) this.placeLabel(label);
   }
 
-  text(label, x, y, { colour = palette.soft, align = "left", size = 12, base = "middle", weight = 400, halo = true } = {}) {
+  // Draw a text as close to (x, y) as it touches neither a curve nor another text, after everything else; without such a
+  // place there is no text. While a chart moves, the label stays at the same place as long as that is free.
+  label(text, x, y, options = {}) {
+    this.labels.push({ text, x, y, options, key: options.key ?? text });
+  }
+
+  placeLabel({ text, x, y, options, key }) {
+    const isFree = ([dx, dy]) => this.isFree(this.textBox(text, x + dx, y + dy, options));
+    const last = this.labelShifts.get(key);
+    const shift = last && isFree(last) ? last : LABEL_SHIFTS.find(isFree);
+    if (!shift) return;
+    this.labelShifts.set(key, shift);
+    this.text(text, x + shift[0], y + shift[1], options);
+  }
+
+  textBox(text, x, y, { align = "left", size = 12, weight = 400 }) {
+    this.c.font = `${weight} ${size}px ${palette.font}`;
+    const { width } = this.c.measureText(text);
+    const left = x - width * { left: 0, center: 0.5, right: 1 }[align];
+    return [left - LABEL_MARGIN, y - 0.6 * size - LABEL_MARGIN, left + width + LABEL_MARGIN, y + 0.6 * size + LABEL_MARGIN];
+  }
+
+  isFree([left, top, right, bottom]) {
+    if (left < 0 || top < 0 || right > this.w || bottom > this.h) return false;
+    for (let row = Math.floor(top / CELL); row <= bottom / CELL; row++) {
+      for (let column = Math.floor(left / CELL); column <= right / CELL; column++) if (this.occupied[row * this.columns + column]) return false;
+    }
+    return true;
+  }
+
+  occupy(left, top, right, bottom) {
+    const [first, last] = [Math.max(0, Math.floor(left / CELL)), Math.min(this.columns - 1, Math.floor(right / CELL))];
+    for (let row = Math.max(0, Math.floor(top / CELL)); row <= Math.min(bottom, this.h - 1) / CELL; row++) {
+      if (first <= last) this.occupied.fill(1, row * this.columns + first, row * this.columns + last + 1);
+    }
+  }
+
+  occupyLine([x0, y0], [x1, y1]) {
+    const count = Math.min(Math.ceil(Math.hypot(x1 - x0, y1 - y0) / CELL) || 1, 2000);
+    for (let i = 0; i <= count; i++) {
+      const [x, y] = [x0 + ((x1 - x0) * i) / count, y0 + ((y1 - y0) * i) / count];
+      this.occupy(x, y, x, y);
+    }
+  }
+
+  text(label, x, y, options = {}) {
+    const { colour = palette.soft, align = "left", size = 12, weight = 400, halo = true } = options;
     const { c } = this;
+    this.occupy(...this.textBox(label, x, y, options));
     c.font = `${weight} ${size}px ${palette.font}`;
-    [c.textAlign, c.textBaseline] = [align, base];
+    [c.textAlign, c.textBaseline] = [align, "middle"];
     if (halo) {
       [c.strokeStyle, c.lineWidth] = [palette.paper, 4];
       c.strokeText(label, x, y);
@@ -57,6 +120,7 @@ export class Chart {
     c.setLineDash(dash);
     c.stroke();
     c.setLineDash([]);
+    if (colour !== palette.line) for (let i = 1; i < points.length; i++) this.occupyLine(points[i - 1], points[i]); // a curve, no grid line
   }
 
   box(x, y, w, h, colour, alpha = 1) {
@@ -74,6 +138,7 @@ export class Chart {
     [c.fillStyle, c.strokeStyle, c.lineWidth] = [hollow ? palette.paper : colour, hollow ? colour : palette.paper, 2];
     if (!hollow) c.fill();
     c.stroke();
+    this.occupy(x - r, y - r, x + r, y + r);
   }
 
   clipped(x, y, w, h, drawContent) {
@@ -117,9 +182,6 @@ export function gridLines(chart, y, values, left, right, format = (value) => tic
     chart.text(format(value), left - 6, y(value), { align: "right", size: 11, halo: false });
   }
 }
-
-// Powers of ten and their labels, in s.
-export const powersOfTen = (exponents) => [exponents.map((e) => 10 ** e), (value) => (value === 1 ? "1 s" : `${formatPower(Math.round(Math.log10(value)))} s`)];
 
 // A curve in the colours of its modes: at(i) is a point, stuck(i) whether the body holds from there on.
 export function modeCurve(chart, count, point, isStuck, width = 2, dash = []) {

@@ -53,6 +53,8 @@ let stale = { curves: true, cursor: true };
 let lastFrame = 0; // time of the last frame in ms
 let summaryTimer = 0;
 let heardRuns = null; // whose sound has been played
+let announceFirstPicture = null;
+const firstPicture = new Promise((done) => { announceFirstPicture = done; });
 
 // ---- state
 
@@ -259,6 +261,7 @@ function frame(now) {
     stale.cursor = false;
   }
   stale.curves = !main.time.length;
+  if (session.done) announceFirstPicture();
   if (isExploreRequested && $$("stories")) $$("explore").scrollIntoView({ behavior: "instant" });
   isExploreRequested = false;
   if (page.playing || drag.active || !session.done) requestFrame();
@@ -479,5 +482,5 @@ $$("stories")?.addEventListener("click", (event) => { // in a page embedded in a
   event.preventDefault();
   document.querySelector(link.getAttribute("href")).scrollIntoView();
 });
-if ($$("stories")) globalThis.app.stories = startStories(session);
+if ($$("stories")) globalThis.app.stories = startStories(session, firstPicture);
 await followLink(location.hash);

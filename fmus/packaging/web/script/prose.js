@@ -19,6 +19,21 @@ export function fixedDigits(value, decimals) {
   return typographicMinus(value.toFixed(decimals));
 }
 
+const PREFIXES = [[1, ""], [1e-3, "m"], [1e-6, "µ"], [1e-9, "n"]];
+
+// A quantity with a unit that suits its size, as 1.3 mm.
+export function withUnit(value, digits, unit) {
+  if (value === 0) return `0 ${unit}`;
+  const [size, prefix] = PREFIXES.find(([least]) => Math.abs(value) >= 0.9995 * least) ?? PREFIXES.at(-1);
+  return `${significant(value / size, digits)} ${prefix}${unit}`;
+}
+
+// A number and the noun it counts.
+export const countOf = (value, noun) => `${groupDigits(value)} ${noun}${value === 1 ? "" : "s"}`;
+
+// A power of ten, as HTML.
+export const powerOfTen = (exponent) => `10<sup>${typographicMinus(String(exponent))}</sup>`;
+
 // A whole number in groups of three digits.
 export function groupDigits(value) {
   return String(Math.round(value)).replace(/\B(?=(\d{3})+$)/g, NARROW_SPACE);

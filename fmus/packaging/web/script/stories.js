@@ -1,17 +1,16 @@
 // The stories of the page, as specifications for story.js.
 
-import { fixedDigits, groupDigits, significant } from "./prose.js";
-import { modeCurve, palette, readPalette } from "./chart.js";
-import { HYBRID, ODE23 } from "./story_models.js";
+import { becomeIdle } from "./background.js";
+import { countOf, fixedDigits, significant } from "./prose.js";
+import { charts, modeCurve, palette, readPalette } from "./chart.js";
+import { HYBRID, ode23 } from "./story_models.js";
 import { StoryBelt, StoryBlock, StoryPendulum } from "./story_bodies.js";
 import { Story } from "./story.js";
 import { showChatter } from "./chatter_story.js";
 import { showOpening } from "./opening.js";
 
-const START_MARGIN = "300px"; // distance from the view at which a story starts
 const DEGREE = Math.PI / 180;
-const [SLED_MASS, SLED_STIFFNESS, GRAVITY] = [12.5, 742.5, 9.81];
-const PENDULUM = { weight: 0.2086524902 * 9.8044, a: 0.09398, r: 0.00635 };
+const COST_TOLERANCE = 1e-3;
 
 // Draw a friction law that holds any force up to `hold` and slides with `slide`, up to the speed `far`.
 function branches(chart, x, y, { hold, slide, far }) {
@@ -33,6 +32,9 @@ function magicFormula(v, x_m, mu_s, mu_d) {
 const beltLabel = (edge) => `friction can hold the spring: ±${fixedDigits(1000 * edge, 0)} mm`;
 const relative = (run) => ({ at: run.columns.x.map((x, i) => x - run.columns.x_driver[i]), shift: run.columns.x_driver, v: run.columns.v, F: run.columns.F_friction });
 const beltStory = { body: StoryBelt, range: 0.2, step: 0.01, stop: 12, speed: 2, unit: "mm", factor: 1000, y: 220, gridValues: [-200, -100, 0, 100, 200] };
+const weight = ({ m, g }) => m * g;
+const bold = (text) => `<b>${text}</b>`;
+const stopText = (rest, distance) => (rest === 0 ? `stays where it is, ${bold(distance)} off` : `stops after ${bold(`${fixedDigits(rest, 2)} s`)}, ${bold(distance)} off`);
 const cycles = (run) => {
   const slips = run.events.filter(({ row }) => run.columns.mode[row] !== 0).map(({ t }) => t);
   const holds = run.events.filter(({ row }) => run.columns.mode[row] === 0).map(({ t }) => t);
@@ -47,18 +49,20 @@ const specs = {
     formats: { f: (value) => `${fixedDigits(value, 2)} N`, x0: (value) => `${fixedDigits(value, 0)} mm` },
     values: ({ f, x0 }, start) => ({ ...HYBRID, f, x0: start ?? x0 / 1000 }),
     of: (run) => ({ at: run.columns.x, v: run.columns.v, F: run.columns.F_friction }),
-    band: ({ f }) => f / 157.9,
+    band: ({ f }, { k }) => f / k,
     bandLabel: (edge) => `friction can hold the spring: ±${fixedDigits(1000 * edge, 1)} mm`,
-    results: ({ run, rest, edge, values }) => ({
-      loss: `${fixedDigits(4000 * edge, 1)} mm`, band: `±${fixedDigits(1000 * edge, 1)} mm`,
-      rest: rest === undefined ? "after the picture ends" : rest === 0 ? "at once" : `after ${fixedDigits(rest, 2)} s`,
-      off: rest === undefined ? "–" : `${fixedDigits(1000 * Math.abs(run.columns.x.at(-1)), 1)} mm`,
-      swings: groupDigits(run.events.filter(({ t }) => t > 0).length),
-    }),
+    results: ({ run, rest, edge }) => {
+      const turns = run.events.filter(({ t }) => t > 0).length; // the last one is the stop
+      const off = `${fixedDigits(1000 * Math.abs(run.columns.x.at(-1)), 1)} mm`;
+      return {
+        loss: bold(`${fixedDigits(4000 * edge, 1)} mm`), band: bold(`±${fixedDigits(1000 * edge, 1)} mm`),
+        end: rest === undefined ? "still swings when the picture ends" : `${rest > 0 ? `makes ${bold(countOf(turns, "half-swing"))} and ` : ""}${stopText(rest, off)} centre`,
+      };
+    },
     picture: ({ rest }) => `Position over time: the swings shrink along a straight line, and the mass ${rest === undefined ? "still moves at the end" : `stops after ${fixedDigits(rest, 2)} s`}`,
-    extra: (chart, x, y, { run, edge, rest }) => {
+    extra: (chart, x, y, { run, edge, rest, start }) => {
       const begin = 1000 * Math.abs(run.columns.x[0]);
-      const period = 2 * Math.PI / Math.sqrt(157.9);
+      const period = 2 * Math.PI * Math.sqrt(start.m / start.k);
       const end = rest ?? 5;
       for (const sign of [1, -1]) chart.line([[x(0), y(sign * begin)], [x(end), y(sign * (begin - (4000 * edge * end) / period))]], palette.soft, 1, [3, 4]);
     },
@@ -69,19 +73,21 @@ const specs = {
     law: {
       title: "friction in N over slip speed", from: -1.5, to: 1.5, low: -2.3, high: 2.3, gridValues: [-2, -1, 0, 1, 2], speeds: [-1, 0, 1], unit: "m/s", speedFactor: 1, forceFactor: 1,
       draw: (chart, x, y, { values: { f } }) => branches(chart, x, y, { hold: f, slide: f, far: 2 }),
-      label: (chart, x, y, story, { F, stuck }) => chart.text(stuck ? `holds with ${fixedDigits(Math.abs(F), 2)} N` : "slips", x(0) + 12, stuck ? y(F) : y(0) - 2, { colour: stuck ? palette.stick : palette.slip }),
+      label: (chart, x, y, story, { F, stuck }) => chart.label(stuck ? `holds with ${fixedDigits(Math.abs(F), 2)} N` : "slips", x(0) + 12, stuck ? y(F) : y(0) - 2, { colour: stuck ? palette.stick : palette.slip, key: "mode" }),
     },
   },
   squeaks: {
     ...beltStory, model: "stickslip", name: "Sled on a moving floor: drag it, or press the arrow keys and then Enter", title: "position of the sled in mm, zero where the spring is slack",
     formats: { v_driver: (value) => `${fixedDigits(value, 0)} mm/s`, mu_d: (value) => fixedDigits(value, 2) },
     values: ({ v_driver, mu_d }, start = 0) => ({ v_driver: v_driver / 1000, mu_d, x0: start }),
-    of: relative, band: () => (0.9 * SLED_MASS * GRAVITY) / SLED_STIFFNESS, bandLabel: beltLabel,
-    results: ({ run }) => {
+    of: relative, band: (values, start) => (start.mu_s * weight(start)) / start.k, bandLabel: beltLabel,
+    results: ({ run, start, spec }) => {
       const { slips, holds } = cycles(run);
-      const period = slips.length > 1 ? slips.at(-1) - slips.at(-2) : NaN;
       const hold = holds.find((t) => t > slips[0]);
-      return { count: groupDigits(slips.length), period: period ? `${fixedDigits(period, 2)} s` : "longer than the picture", slip: hold ? `${fixedDigits(hold - slips[0], 2)} s` : "–" };
+      const lasts = hold ? `lasting ${bold(`${fixedDigits(hold - slips[0], 2)} s`)}` : "without an end";
+      const cycle = slips.length > 1 ? `${bold(countOf(slips.length, "slip"))} in ${spec.stop} s, one every ${bold(`${fixedDigits(slips.at(-1) - slips.at(-2), 2)} s`)}, each ${lasts}`
+        : slips.length ? `one slip in the first ${spec.stop} s, ${lasts}` : `no slip in the first ${spec.stop} s`;
+      return { mu_s: bold(fixedDigits(start.mu_s, 2)), cycle };
     },
     picture: ({ run }) => `Stretch of the spring over time: a sawtooth with ${cycles(run).slips.length} slips`,
     labels: ({ run }) => {
@@ -90,40 +96,44 @@ const specs = {
     },
     law: {
       title: "friction in N over slip speed", from: -0.12, to: 0.6, low: -125, high: 125, gridValues: [-100, 0, 100], speeds: [0, 0.2, 0.4], unit: "m/s", speedFactor: 1, forceFactor: 1,
-      draw: (chart, x, y, { values: { mu_d } }) => branches(chart, x, y, { hold: 0.9 * SLED_MASS * GRAVITY, slide: mu_d * SLED_MASS * GRAVITY, far: 1 }),
-      label: (chart, x, y, story, { F, stuck }) => chart.text(stuck ? `holds with ${fixedDigits(Math.abs(F), 0)} N` : "slips", x(0.05), stuck ? y(F) + (F > 60 ? 26 : 0) : y(30), { colour: stuck ? palette.stick : palette.slip }),
+      draw: (chart, x, y, { values: { mu_d }, start }) => branches(chart, x, y, { hold: start.mu_s * weight(start), slide: mu_d * weight(start), far: 1 }),
+      label: (chart, x, y, story, { F, stuck }) => chart.label(stuck ? `holds with ${fixedDigits(Math.abs(F), 0)} N` : "slips", x(0.05), stuck ? y(F) + (F > 60 ? 26 : 0) : y(30), { colour: stuck ? palette.stick : palette.slip, key: "mode" }),
     },
   },
   creeps: {
     ...beltStory, model: "pacejka", name: "Sled with a smooth friction curve: drag it, or press the arrow keys and then Enter", title: "distance slipped over the floor, mm", low: -40, y: 520, gridValues: [0, 100, 200, 300, 400, 500],
     formats: { x_m: (value) => `${significant(10 ** value, 2)} mm/s`, v_driver: (value) => `${fixedDigits(value, 0)} mm/s` },
     values: ({ x_m, v_driver }, start = 0) => ({ x_m: 10 ** x_m / 1000, v_driver: v_driver / 1000, x0: start }),
-    costly: ({ x_m, v_driver }, start = 0) => ({ x_m: 10 ** x_m / 1000, v_driver: v_driver / 1000, x0: start, ...ODE23 }),
     of: (run) => ({ ...relative(run), y: run.columns.x.map((x) => x - run.columns.x[0]) }), band: () => 0, bandLabel: () => "no band: this law cannot hold",
     reference: { model: "stickslip", values: ({ v_driver }, start = 0) => ({ v_driver: v_driver / 1000, x0: start }), of: (run) => ({ at: run.columns.x.map((x) => x - run.columns.x[0]), time: run.time, stuck: (i) => run.columns.mode[i] === 0 }) },
-    results: ({ run, values, reference }) => {
+    costs: { // step counts of the same solver
+      steps: { model: "pacejka", values: ({ x_m, v_driver }, start = 0) => ({ x_m: 10 ** x_m / 1000, v_driver: v_driver / 1000, x0: start, ...ode23(COST_TOLERANCE) }) },
+      "true-steps": { model: "stickslip", values: ({ v_driver }, start = 0) => ({ v_driver: v_driver / 1000, x0: start, ...HYBRID, ...ode23(COST_TOLERANCE) }) },
+    },
+    results: ({ run, values, spec }) => {
       const first = run.columns.v.findIndex((v) => v > 10 ** values.x_m / 1000);
-      return { creep: first < 0 ? "–" : `${significant(1000 * (run.columns.x[first] - run.columns.x[0]), 2)} mm`, exact: groupDigits(reference.steps) };
+      const slid = (row) => bold(`${significant(1000 * Math.abs(run.columns.x.at(row) - run.columns.x[0]), 2)} mm`);
+      return { creep: first < 0 ? `has crept ${slid(-1)} in ${spec.stop} s` : first === 0 ? "slips from the start" : `has crept ${slid(first)} before it breaks away, while the true one has not moved` };
     },
     picture: () => "Stretch of the spring over time, beside that of a sled that truly sticks",
     extra: (chart, x, y, { reference }) => reference && modeCurve(chart, reference.time.length, (i) => [x(reference.time[i]), y(1000 * reference.at[i])], reference.stuck, 1.5, [5, 3]),
     labels: ({ run }) => {
       const slip = run.columns.v.findIndex((v) => v > 0.1);
       if (slip < 0 || run.time[slip] < 2) return [];
-      return [{ label: "smooth curve: creeps", t: run.time[slip] * 0.5, at: 45, colour: "slip", always: true }, { label: "true sticking: stands", t: 5.4, at: 84, colour: "stick", align: "left", always: true }];
+      return [{ label: "smooth curve: creeps", t: run.time[slip] * 0.5, at: 45, colour: "slip" }, { label: "true sticking: stands", t: 5.4, at: 84, colour: "stick", align: "left" }];
     },
     law: {
       title: "friction in N over slip speed", from: -12, to: 60, low: -125, high: 125, gridValues: [-100, 0, 100], speeds: [0, 20, 40], unit: "mm/s", speedFactor: 1000, forceFactor: 1,
-      draw: (chart, x, y, { values }) => {
+      draw: (chart, x, y, { values, start }) => {
         const x_m = 10 ** values.x_m / 1000;
         const points = [];
         for (let i = -180; i <= 900; i++) {
           const v = (i * 0.06) / 900;
-          points.push([x(1000 * v), y(magicFormula(v, x_m, 0.9, 0.6) * SLED_MASS * GRAVITY)]);
+          points.push([x(1000 * v), y(magicFormula(v, x_m, start.mu_s, start.mu_d) * weight(start))]);
         }
         chart.line(points, palette.slip, 2);
       },
-      label: (chart, x, y, { values }, { v }) => chart.text(v > 60 ? "slips, far to the right" : v < 10 ** values.x_m ? `creeps at ${significant(v, 2)} mm/s` : "slips", x(58), y(-40), { colour: palette.slip, align: "right" }),
+      label: (chart, x, y, { values }, { v }) => chart.label(v > 60 ? "slips, far to the right" : v < 10 ** values.x_m ? `creeps at ${significant(v, 2)} mm/s` : "slips", x(58), y(-40), { colour: palette.slip, align: "right", key: "mode" }),
     },
   },
   swings: {
@@ -132,38 +142,37 @@ const specs = {
     formats: { mu: (value) => fixedDigits(value, 2), theta0: (value) => `${fixedDigits(value, 0)}°` },
     values: ({ mu, theta0 }, start) => ({ mu, theta0: start ?? theta0 * DEGREE }),
     of: (run) => ({ at: run.columns.theta, v: run.columns.omega, F: run.columns.T_friction }),
-    band: ({ mu }) => Math.asin((mu * PENDULUM.r) / PENDULUM.a), bandLabel: (edge) => `±${fixedDigits(edge / DEGREE, 1)}°`,
+    band: ({ mu }, { r, a }) => Math.asin((mu * r) / a), bandLabel: (edge) => `±${fixedDigits(edge / DEGREE, 1)}°`,
     results: ({ run, rest, edge }) => ({
-      rest: rest === undefined ? "after the picture ends" : rest === 0 ? "at once" : `after ${fixedDigits(rest, 2)} s`, band: `±${fixedDigits(edge / DEGREE, 2)}°`,
-      off: rest === undefined ? "–" : `${fixedDigits(Math.abs(run.columns.theta.at(-1)) / DEGREE, 2)}°`,
+      end: rest === undefined ? "still swings when the picture ends" : `${stopText(rest, `${fixedDigits(Math.abs(run.columns.theta.at(-1)) / DEGREE, 2)}°`)} the vertical`,
+      band: bold(`±${fixedDigits(edge / DEGREE, 2)}°`),
     }),
     picture: ({ rest }) => `Angle over time: the pendulum ${rest === undefined ? "still swings at the end" : `stops after ${fixedDigits(rest, 2)} s`}`,
     labels: ({ run, rest }) => (rest > 0 && rest < 5.4 ? [{ label: "holds", t: rest + 0.4, at: run.columns.theta.at(-1) / DEGREE + 3.2, colour: "stick" }] : []),
     law: {
       title: "friction in mN·m over turning speed", from: -240, to: 240, low: -7.5, high: 7.5, gridValues: [-5, 0, 5], speeds: [-200, 0, 200], unit: "°/s", speedFactor: 1 / DEGREE, forceFactor: 1000,
-      draw: (chart, x, y, { values: { mu } }) => branches(chart, x, y, { hold: 1000 * mu * PENDULUM.r * PENDULUM.weight, slide: 1000 * mu * PENDULUM.r * PENDULUM.weight, far: 400 }),
-      label: (chart, x, y, story, { F, stuck }) => chart.text(stuck ? `holds ${fixedDigits(Math.abs(F), 2)} mN·m` : "slips", x(0) + 10, y(F > 0 ? -3 : 3), { colour: stuck ? palette.stick : palette.slip }),
+      draw: (chart, x, y, { values: { mu }, start }) => {
+        const torque = 1000 * mu * start.r * weight(start); // mN·m
+        branches(chart, x, y, { hold: torque, slide: torque, far: 400 });
+      },
+      label: (chart, x, y, story, { F, stuck }) => chart.label(stuck ? `holds ${fixedDigits(Math.abs(F), 2)} mN·m` : "slips", x(0) + 10, y(F > 0 ? -3 : 3), { colour: stuck ? palette.stick : palette.slip, key: "mode" }),
     },
   },
 };
 
-// Start the opening at once, and each story when it comes near.
-export async function startStories(session) {
+// Start the opening at once, and the stories while the browser is idle.
+export async function startStories(session, firstPicture) {
   readPalette();
   for (const query of ["(prefers-color-scheme: dark)", "(forced-colors: active)"]) matchMedia(query).addEventListener("change", readPalette);
+  for (const event of ["beforeprint", "afterprint"]) addEventListener(event, readPalette); // prints are white
   const opening = await showOpening(session);
+  await firstPicture;
   const stories = {};
-  const starts = Object.entries(specs).map(([name, spec]) => [name, async (section) => {
-    stories[name] = new Story(section, session, spec);
-    await stories[name].start();
-  }]);
-  for (const [name, start] of [...starts, ["chatters", (section) => showChatter(section, session)]]) {
-    const section = document.getElementById(name);
-    new IntersectionObserver(([{ isIntersecting }], observer) => {
-      if (!isIntersecting) return;
-      observer.disconnect();
-      start(section);
-    }, { rootMargin: START_MARGIN }).observe(section);
+  for (const [name, spec] of Object.entries(specs)) {
+    await becomeIdle();
+    stories[name] = new Story(document.getElementById(name), session, spec);
+    await stories[name].begin();
   }
-  return { opening, stories };
+  await showChatter(document.getElementById("chatters"), session);
+  return { opening, stories, charts };
 }

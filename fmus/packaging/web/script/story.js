@@ -1,20 +1,22 @@
 // A story: a picture of one motion that follows the numbers in its text.
 
 import { animate, reducedMotion, stopAnimation } from "./animation.js";
-import { createFmu, simulate } from "./story_models.js";
+import { runInBackground } from "./background.js";
+import { createFmu, simulate, startValues, SteppedRun } from "./story_models.js";
 import { Chart, gridLines, linearScale, modeCurve, palette, tickLabel, timeAxis } from "./chart.js";
 import { makeAdjustable } from "./adjustable.js";
-import { Run } from "./run.js";
 import { groupDigits, significant } from "./prose.js";
 
 const STORY_POINTS = 900; // grid steps
+const STEPS_PER_LOOK = 500; // steps between two looks at the clock
 
 // `spec` describes a story: the model, its body (a class), the range and the step by which it can be moved, the stop time in
 // s, the speed of playback, the unit and factor of the position, y (half the height of the chart), and functions of the
-// adjusted values: values() for the run, band() that friction can hold, results() for the text.
+// adjusted values: values() for the run, band() that friction can hold, results() for the text; `costs` are runs of which the
+// text states the number of solver steps.
 export class Story {
   constructor(section, session, spec) {
-    Object.assign(this, { section, session, spec, t: 0, startPosition: undefined });
+    Object.assign(this, { section, session, spec, t: 0, startPosition: undefined, start: startValues(session, spec.model) });
     const find = (name) => section.querySelector(`.${name}`);
     this.outputs = new Map([...section.querySelectorAll("output")].map((output) => [output.dataset.out, output]));
     this.adjustables = {};
@@ -42,13 +44,18 @@ export class Story {
     this.advanceFrame = this.advanceFrame.bind(this);
   }
 
-  // Create the instances of the models and show the first picture.
-  async start() {
+  // Create the instances of the models and show the first picture. The section is pending until its text is complete.
+  async begin() {
     this.fmu = await createFmu(this.session, this.spec.model);
     this.referenceFmu = this.spec.reference && (await createFmu(this.session, this.spec.reference.model));
-    this.costlyFmu = this.spec.costly && (await createFmu(this.session, this.spec.model));
+    this.costs = await Promise.all(Object.entries(this.spec.costs ?? {}).map(async ([output, { model, values }]) => ({ output, values, fmu: await createFmu(this.session, model) })));
     this.compute();
     this.showTime(reducedMotion.matches ? this.spec.stop : 0);
+    if (!this.costs.length) this.section.classList.remove("pending");
+    addEventListener("beforeprint", () => {
+      this.playing = false;
+      this.showTime(this.spec.stop);
+    });
     this.button.disabled = false;
     const text = this.section.querySelector(".prose p");
     let width = 0;
@@ -76,25 +83,32 @@ export class Story {
     this.run = simulate(this.fmu, values, spec.stop, STORY_POINTS);
     this.shown = spec.of(this.run);
     const reference = this.referenceFmu && simulate(this.referenceFmu, spec.reference.values(this.values, this.startPosition), spec.stop, STORY_POINTS);
-    this.reference = reference && { ...spec.reference.of(reference), steps: reference.counts["solver.steps"] };
+    this.reference = reference && spec.reference.of(reference);
     this.stuck = this.run.columns.mode ? (i) => this.run.columns.mode[i] === 0 : () => false;
     this.rest = this.run.columns.mode && this.run.restTime();
-    this.edge = spec.band(this.values);
+    this.edge = spec.band(this.values, this.start);
     this.body.showBand(this.edge, spec.bandLabel(this.edge));
-    for (const [key, text] of Object.entries(spec.results(this))) this.outputs.get(key).textContent = text;
-    if (this.costlyFmu) this.countCost();
+    for (const [key, text] of Object.entries(spec.results(this))) this.outputs.get(key).innerHTML = text; // HTML from the stories
+    if (this.costs.length) this.countCosts();
     this.section.querySelector(".course").setAttribute("aria-label", spec.picture(this));
   }
 
-  // What the same motion costs an ordinary solver, counted in a slice of every frame.
-  countCost() {
-    const { spec } = this;
-    this.costlyRun = new Run(this.costlyFmu, { values: spec.costly(this.values, this.startPosition), stop: spec.stop, points: 0, changes: [] });
-    animate(this.continueCost ??= () => {
-      const { costlyRun } = this;
-      const done = costlyRun.advance(performance.now() + 4);
-      this.outputs.get("steps").textContent = groupDigits(costlyRun.ends.length - 1);
-      return !done;
+  // Count the solver steps of the runs in `costs`, one after the other.
+  countCosts() {
+    const waiting = [...this.costs];
+    let run = null;
+    runInBackground(this.section.id, (deadline) => {
+      const { output, values, fmu } = waiting[0];
+      run ??= new SteppedRun(fmu, values(this.values, this.startPosition), this.spec.stop);
+      for (let n = 1; !run.done; n++) {
+        run.step();
+        if (n % STEPS_PER_LOOK === 0 && performance.now() > deadline) return false;
+      }
+      this.outputs.get(output).textContent = groupDigits(run.steps);
+      run = null;
+      waiting.shift();
+      if (!waiting.length) this.section.classList.remove("pending");
+      return !waiting.length;
     });
   }
 
@@ -187,7 +201,7 @@ export class Story {
       spec.extra?.(chart, x, y, this);
       modeCurve(chart, run.time.length, (i) => [x(run.time[i]), y(f * curve[i])], this.stuck, 2);
     });
-    for (const { label, t, at, colour, align = "center", always } of spec.labels(this)) if (always || chart.w > 430) chart.text(label, x(t), y(at), { colour: palette[colour], align, halo: this.edge < 0.01 });
+    for (const { label, t, at, colour, align = "center" } of spec.labels(this)) chart.label(label, x(t), y(at), { colour: palette[colour], align, halo: this.edge < 0.01 });
     const place = bottom + 8;
     ribbon(chart, run, this.stuck, x, place, 16);
     timeAxis(chart, x, 0, spec.stop, place + 16);
@@ -222,6 +236,7 @@ function ribbon(chart, run, stuck, x, y, height) {
     while (i + 1 < run.time.length && stuck(i) === held) i++;
     chart.box(x(run.time[from]), y, Math.max(x(run.time[i]) - x(run.time[from]), 0.5), height, held ? palette.stick : palette.slip);
     const wide = x(run.time[i]) - x(run.time[from]);
+    chart.occupy(x(run.time[from]), y, x(run.time[i]), y + height);
     if (wide > 44) chart.text(held ? "holds" : "slips", x(run.time[from]) + wide / 2, y + height / 2 + 0.5, { align: "center", size: 11, weight: 600, colour: palette.paper, halo: false });
   }
 }

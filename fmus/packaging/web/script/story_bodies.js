@@ -32,7 +32,7 @@ class StoryBody {
     this.handle.setAttribute("aria-valuemax", range);
     this.handle.setAttribute("class", "grip");
     new ResizeObserver(([{ contentRect: { width, height } }]) => {
-      if (width && height && !this.held) this.layOut(width, height); // prints hide the stories
+      if (width && height && !this.held) this.layOut(width, height); // no size before the first picture
     }).observe(host);
     this.listen();
   }
@@ -134,7 +134,7 @@ export class StoryBlock extends StoryBody {
     const [edge, middle] = [wide / 2 + (belt ? -wide - 6 : 6), ground - tall / 2];
     this.hint.setAttribute("d", belt ? `M${edge} ${middle - 7}l-6 7l6 7` : `M${edge} ${middle - 7}l6 7l-6 7`);
     this.showBand(this.edge, this.bandLabel);
-    this.moveTo(this.value, this.wasStuck);
+    this.moveTo(this.value, this.stuck);
   }
 
   // Where friction can hold the spring: within +-edge.
@@ -155,8 +155,7 @@ export class StoryBlock extends StoryBody {
 
   // Put the block; `shift` in m is how far the floor has moved to the left.
   moveTo(value, stuck, shift = this.shift) {
-    this.value = value;
-    this.shift = shift;
+    Object.assign(this, { value, stuck, shift });
     if (!this.w) return;
     const x = this.origin + this.k * value;
     this.handle.setAttribute("transform", `translate(${x.toFixed(2)} 0)`);
@@ -203,7 +202,7 @@ export class StoryPendulum extends StoryBody {
     this.pin.setAttribute("cx", x);
     this.pin.setAttribute("cy", y);
     this.showBand(this.edge, this.bandLabel);
-    this.moveTo(this.value, this.wasStuck);
+    this.moveTo(this.value, this.stuck);
   }
 
   showBand(edge, label = "") {
@@ -223,7 +222,7 @@ export class StoryPendulum extends StoryBody {
   }
 
   moveTo(value, stuck) {
-    this.value = value;
+    Object.assign(this, { value, stuck });
     if (!this.w) return;
     this.handle.setAttribute("transform", `translate(${this.x} ${this.y}) rotate(${((-value * 180) / Math.PI).toFixed(3)})`);
     this.announce(Boolean(stuck));

@@ -1,0 +1,141 @@
+"""The numbers in the opening and the stories of the live page, computed by the native FMUs through `harness.simulate`.
+
+The page computes them by the same C code in WebAssembly, with an importer of its own in JavaScript.
+"""
+
+import re
+from functools import cache
+from math import asin, degrees, radians
+
+import native_fmus
+import numpy as np
+
+import harness
+
+SCENE_STOP, CLOSE_UP_FROM, CREEP_FROM = 4.3, 4.1, 4.1  # s
+BELT_STOP, SWING_STOP = 12.0, 6.0  # s
+UNITS = {"": 1.0, "m": 1.0, "m/s": 1.0, "N": 1.0, "s": 1.0, "°": 1.0, "N·m": 1.0}
+PREFIXES = {"m": 1e-3, "µ": 1e-6, "n": 1e-9}
+UNITS |= {prefix + unit: size for prefix, size in PREFIXES.items() for unit in ("m", "m/s", "s", "N·m")}
+NUMBER = re.compile(
+    r"(±?)(-?\d+(?:\.(\d+))?) ?(" + "|".join(sorted(map(re.escape, UNITS), key=len, reverse=True)) + r")(?![\w·/])"
+)
+
+
+def plain(text):
+    """Return a text with plain minus signs and without the narrow spaces between groups of digits."""
+    return (
+        text.replace("\N{NARROW NO-BREAK SPACE}", "").replace("\N{MINUS SIGN}", "-").replace("\N{NO-BREAK SPACE}", " ")
+    )
+
+
+def read_numbers(text):
+    """Return the numbers with units in a text, as (value in SI units, half a unit of the last digit)."""
+    return [
+        (float(number) * UNITS[unit], 0.5 * 10.0 ** -len(decimals or "") * UNITS[unit])
+        for _, number, decimals, unit in NUMBER.findall(plain(text))
+    ]
+
+
+def shows(text, *values):
+    """Whether a text has exactly these numbers, each rounded to its last digit."""
+    numbers = read_numbers(text)
+    return len(numbers) == len(values) and all(
+        abs(number - value) <= half_digit * (1 + 1e-6)
+        for (number, half_digit), value in zip(numbers, values, strict=True)
+    )
+
+
+def simulate(model, values=None, **options):
+    return harness.simulate(native_fmus.build_native_fmus() / f"{model}.fmu", values or {}, **options)
+
+
+def ode23(model, values, rtol, **options):
+    return simulate(model, values, method="ode23", rtol=rtol, **options)
+
+
+@cache
+def closed_form():
+    """The motion of the opening by the default method."""
+    return simulate("coulomb", stop=SCENE_STOP)
+
+
+@cache
+def opening_run(law, exponent):
+    """A run of the opening under a friction law with the tolerance 10**exponent."""
+    return ode23("coulomb", {"friction": law}, 10.0**exponent, stop=SCENE_STOP)
+
+
+def last_step_before(run, t):
+    """Return the number of steps that end at or before t."""
+    return int(np.count_nonzero(run.steps.t[1:] <= t))
+
+
+def creep(run):
+    """Return the mean speed at the end."""
+    x = run["x"]
+    return abs(x[-1] - np.interp(CREEP_FROM, run.time, x)) / (run.time[-1] - CREEP_FROM)
+
+
+def opening_table(law, exponent):
+    """Return the numbers of the table in the opening by row; a row may have several."""
+    run = opening_run(law, exponent)
+    return {
+        "off": [abs(run["x"][-1] - closed_form()["x"][-1])],
+        "speed": [abs(run["v"][-1])],
+        "spring": [abs(run["F_spring"][-1])],
+        "friction": [abs(run["F_friction"][-1])],
+        "mode": [run.events.t[-1]] if law == "hybrid" else [],
+    }
+
+
+def chatter_numbers(law, exponent):
+    run = opening_run(law, exponent)
+    before = last_step_before(run, closed_form().events.t[-1])
+    return {
+        "before": [before],
+        "after": [run.statistics.steps - before],
+        "rejected": [run.statistics.rejected],
+        "off": [abs(run["x"][-1] - closed_form()["x"][-1])],
+    }
+
+
+def stops_numbers():
+    run = simulate("coulomb", stop=5.0)
+    band = run.parameters["f"] / run.parameters["k"]
+    return {
+        "loss": [4 * band],
+        "band": [band],
+        "end": [np.count_nonzero(run.events.t > 0), run.events.t[-1], abs(run["x"][-1])],
+    }
+
+
+def squeaks_numbers():
+    run = simulate("stickslip", stop=BELT_STOP)
+    (modes,) = run.events.modes.values()
+    slips, holds = run.events.t[modes != 0], run.events.t[modes == 0]
+    return {
+        "mu_s": [run.parameters["mu_s"]],
+        "cycle": [len(slips), BELT_STOP, slips[-1] - slips[-2], holds[holds > slips[0]][0] - slips[0]],
+    }
+
+
+def creeps_numbers(x_m=0.01):
+    run = simulate("pacejka", {"x_m": x_m}, stop=BELT_STOP)
+    row = int(np.argmax(run["v"] > x_m))
+    share = (x_m - run["v"][row - 1]) / (run["v"][row] - run["v"][row - 1])
+    crept = run["x"][row - 1] + share * (run["x"][row] - run["x"][row - 1]) - run["x"][0]
+    return {
+        "creep": [crept],
+        "steps": [ode23("pacejka", {"x_m": x_m}, 1e-3, stop=BELT_STOP).statistics.steps],
+        "true-steps": [ode23("stickslip", {}, 1e-3, stop=BELT_STOP).statistics.steps],
+    }
+
+
+def swings_numbers():
+    run = simulate("pendulum", {"theta0": radians(10)}, stop=SWING_STOP)
+    parameters = run.parameters
+    return {
+        "end": [run.events.t[-1], degrees(abs(run["theta"][-1]))],
+        "band": [degrees(asin(parameters["mu"] * parameters["r"] / parameters["a"]))],
+    }
