@@ -49,8 +49,8 @@ def test_former_options_with_another_form_still_work(tmp_path):
     for one, two in combinations(results, 2):
         assert one.stdout == two.stdout
     rows = "".join(f"{0.01 * i},{(1 - 0.004 * i) * (-1) ** (i // 25)}\n" for i in range(200))
-    (tmp_path / "record.csv").write_text("t [s],a [m/s]\n" + rows)
-    answers = [run("decay", "record.csv", *words) for words in (["--velocity", "a"], ["--column", "a"])]
+    (tmp_path / "record.csv").write_text("t [s],speed [m/s]\n" + rows)
+    answers = [run("decay", "record.csv", *words) for words in (["--velocity", "speed"], ["--column", "speed"])]
     assert answers[0].stdout == answers[1].stdout
     assert answers[0].stderr == answers[1].stderr
     for name in ("--exchange", "--velocity"):
