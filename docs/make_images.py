@@ -251,7 +251,7 @@ def draw_stability(folder: Path) -> None:
         for row, method in enumerate(methods):
             own = [case for case in finished if case["method"] == method]
             pairs = [(float(case["error [1]"]), float(case["expected"].rsplit(" ", 1)[1])) for case in own]
-            shares = [error / bound if error else 0.0 for error, bound in pairs]  # where the bound is 0, so is the error
+            shares = [error / bound if error else 0.0 for error, bound in pairs]  # a bound may be 0
             axis.semilogx(np.maximum(shares, 1e-6), [row] * len(shares), "o", color="#0072B2", ms=5, alpha=0.5)
         axis.axvline(1.0, color="#D55E00")
         refused = sum(not case["expected"].startswith("finished") for case in cases)

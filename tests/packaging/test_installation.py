@@ -17,6 +17,7 @@ pytestmark = pytest.mark.slow
 WORK = {  # by command; all run in one folder, in this order
     "build": ["build", "build --more"],
     "list": ["list"],
+    "info": ["info stickslip"],
     "run": ["", "run stickslip", "run --fmu fmus/more/belt.fmu"],
     "decay": ["decay docs/records/spring.csv --m 0.35", "decay coulomb"],
     "compare": ["compare smd coulomb"],
