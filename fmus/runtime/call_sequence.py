@@ -131,7 +131,7 @@ def do_step(run, model, t, h):
         return BAD_STEP
     if end == solver.t:
         return OK
-    if model.has_prescribed_inputs:
+    if model.counts_jumps:
         model.count_jumps()
     run.outputs_current = False
     return solver.advance(model, end)

@@ -20,7 +20,7 @@ def begin_step(run, model, t, h):
     exchange.step_end = call_sequence.communication_step_end(run, solver, t, h)
     if not exchange.step_end >= solver.t:
         return BAD_STEP
-    if model.has_prescribed_inputs:
+    if model.counts_jumps:
         model.count_jumps()
     exchange.n_internal_steps = 0
     exchange.max_evals = step.n_rhs + step.interpolant.n_event_evals + MAX_EVALUATIONS

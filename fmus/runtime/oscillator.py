@@ -38,8 +38,8 @@ class Oscillator(VariableOwner):
     checks_event_steps = False  # steps to events are checked: see InternalStep.is_accurate_at
     has_driver = False  # the driver is at x_base at time t_base and moves at driver_velocity()
     has_input_derivatives = False  # inputs are polynomials around t_base; has_higher_order() if any order exceeds 1
-    has_prescribed_inputs = False  # inputs with declared rates: count_jumps() is defined
-    prescribed_inputs: tuple[tuple[str, str], ...] = ()  # names of each such input and of its rate
+    prescribed_inputs: tuple[tuple[str, str], ...] = ()  # names of each input with a declared rate, and of its rate
+    counts_jumps = False  # the importer sets some of these rates: count_jumps() is defined
     has_prescribed_slips = False  # some of them are part of a slip: slip_deviations() is defined
     is_linear = False  # piecewise linear (linear_closed_form.py)
     real_only = False  # the FMU offers Reals only, for hosts without other types

@@ -198,6 +198,22 @@ def test_rare_jumps_are_not_warned_of(worker):
     fmu.free()
 
 
+@pytest.mark.parametrize("backend", ["python", "native"])
+def test_a_speed_with_the_rate_zero_is_constant_between_jumps(worker, backend):
+    """A staircase whose steps are too high for friction, without a warning."""
+    text = BLOCK.replace("rate=a_belt", "rate=0.0").replace(
+        '    a_belt = Input(0.0, "m/s2", "acceleration of the belt")\n', ""
+    )
+    fmu = worker.instantiate(build(text, backend)).begin({"k": 0.0}, stop=4.0)
+    for n in range(4):
+        fmu.set({"v_belt": 4.0 * (n + 1)})
+        assert fmu.get("mode", "F_friction") == [-1, -4.0]
+        fmu.step(0.5 * n, 0.5)
+        assert fmu.get("v", "x_belt") == pytest.approx([n + 1.0, (n + 1.0) * (n + 2.0)], abs=1e-12)
+    assert not [message for message in fmu.messages() if message[0]]
+    fmu.free()
+
+
 @pytest.mark.parametrize("method", ["RK45", "Radau"])
 def test_model_exchange_follows_a_prescribed_motion(worker, method):
     """scipy as importer; the speed rises linearly and the inputs are set in each evaluation."""
@@ -250,7 +266,7 @@ def test_errors_of_the_importers_solver_are_no_jump(worker):
     fmu.enter_continuous_time()
     x1, _, x2, _ = fmu.get_states()
     fmu.set_point(0.5, [x1, 1.0, x2, 1.0])  # both blocks ride along
-    assert fmu.get("mode_1", "mode_2") == [-1, -1]
+    assert fmu.get("mode_1", "mode_2") == [-1, 0]
     fmu.enter_event_mode()
     fmu.update_discrete_states()
     fmu.enter_continuous_time()
@@ -445,6 +461,21 @@ def test_results_do_not_depend_on_communication_points_without_changes(worker):
         rows.append(fmu.get("x", "v", "F_friction", "events.count", "events.t_last", "solver.steps"))
         fmu.free()
     assert rows[0] == pytest.approx(rows[1], rel=1e-12)
+
+
+def test_the_motion_does_not_depend_on_the_start_time(worker):
+    rows = []
+    for start in (0.0, 2.0**20):
+        fmu = worker.instantiate(build(BLOCK)).begin(
+            SHAKING | {"v0": 1.02} | dict(zip(INPUTS, belt_shaking(0.0), strict=False)), start=start, stop=start + 3.0
+        )
+        for n in range(24):
+            fmu.set(dict(zip(INPUTS, belt_shaking(0.125 * n), strict=False)))
+            fmu.step(start + 0.125 * n, 0.125)
+        rows.append(fmu.get("x", "v", "F_friction", "mode", "events.count", "solver.steps"))
+        fmu.free()
+    assert rows[0] == rows[1]
+    assert rows[0][4] == 4
 
 
 def test_the_model_description_states_what_depends_on_the_rate():

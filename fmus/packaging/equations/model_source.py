@@ -8,7 +8,7 @@ from ...runtime.active_method import EXACT_ITEM
 from ...runtime.oscillator import Oscillator
 from ...runtime.variable_declarations import VariableDeclaration
 from ..text_output import string_literal
-from .algebra import has_condition_on, variables_in
+from .algebra import depends_on, has_condition_on, variables_in
 from .codegen_context import CodegenContext, rule_status
 from .conditions import Condition
 from .coupled_contact_methods import coupled_contact_methods
@@ -164,7 +164,7 @@ def class_attribute_lines(analysis: ModelAnalysis) -> list[str]:
             ("has_other_laws", analysis.laws[1:]),
             ("has_driver", analysis.drivers),
             ("has_input_derivatives", analysis.input_rates),
-            ("has_prescribed_inputs", analysis.prescribed_inputs),
+            ("counts_jumps", any(depends_on(e.declared_rate, analysis.inputs) for e in analysis.prescribed_inputs)),
             ("has_prescribed_slips", analysis.has_prescribed_slips),
             ("has_conditions", analysis.conditions),
             ("checks_event_steps", analysis.checks_event_steps),

@@ -161,12 +161,12 @@ def input_polynomial_methods(context: CodegenContext) -> list[str]:
 
 
 def prescribed_motion_methods(context: CodegenContext) -> list[str]:
-    """For inputs with a declared rate: note the first that jumps against it at many communication points."""
-    inputs = context.analysis.prescribed_inputs
-    if not inputs:
+    """For inputs whose rate an importer sets: note the first that jumps against it at many communication points."""
+    analysis, printer = context.analysis, context.printer()
+    for n, e in reversed([*enumerate(analysis.prescribed_inputs, 1)]):
+        if depends_on(e.declared_rate, analysis.inputs):
+            with printer.block(f"if self.{e.name}_polynomial.count_jump():"):
+                printer.emit(f"self.inconsistent_input = {n}")
+    if not printer.lines:
         return []
-    printer = context.printer()
-    for n in range(len(inputs), 0, -1):
-        with printer.block(f"if self.{inputs[n - 1].name}_polynomial.count_jump():"):
-            printer.emit(f"self.inconsistent_input = {n}")
     return [method_source("count_jumps", (), printer.lines)]

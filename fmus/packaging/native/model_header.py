@@ -201,7 +201,7 @@ def render_model_header(model: Any, fmi: str) -> str:
             for name, meaning in declared
         ),
         statuses=_switch_cases(statuses, FIELD_CODE) + _switch_cases(instance.rules, rule_fields),
-        inconsistent_input="model->inconsistent_input" if model.prescribed_inputs else "0",
+        inconsistent_input="model->inconsistent_input" if model.counts_jumps else "0",
         rates=_switch_cases(rate_warnings(model.prescribed_inputs), FIELD_CODE),
         values=_switch_cases(VALUE_MESSAGES, FIELD_CODE),
         calls=_switch_cases(CALL_MESSAGES, FIELD_CODE),
