@@ -124,9 +124,11 @@ def creeps_numbers(x_m=0.01):
     run = simulate("pacejka", {"x_m": x_m}, stop=BELT_STOP)
     row = int(np.argmax(run["v"] > x_m))
     share = (x_m - run["v"][row - 1]) / (run["v"][row] - run["v"][row - 1])
-    crept = run["x"][row - 1] + share * (run["x"][row] - run["x"][row - 1]) - run["x"][0]
+    x, t = (column[row - 1] + share * (column[row] - column[row - 1]) for column in (run["x"], run.time))
+    exact = simulate("stickslip", stop=BELT_STOP)
+    (modes,) = exact.events.modes.values()
     return {
-        "creep": [crept],
+        "creep": [x - run["x"][0], t, exact.events.t[modes != 0][0]],
         "steps": [ode23("pacejka", {"x_m": x_m}, 1e-3, stop=BELT_STOP).statistics.steps],
         "true-steps": [ode23("stickslip", {}, 1e-3, stop=BELT_STOP).statistics.steps],
     }

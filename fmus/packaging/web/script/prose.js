@@ -25,7 +25,7 @@ const PREFIXES = [[1, ""], [1e-3, "m"], [1e-6, "µ"], [1e-9, "n"]];
 export function withUnit(value, digits, unit) {
   if (value === 0) return `0 ${unit}`;
   const [size, prefix] = PREFIXES.find(([least]) => Math.abs(value) >= 0.9995 * least) ?? PREFIXES.at(-1);
-  return `${significant(value / size, digits)} ${prefix}${unit}`;
+  return `${significant(value / size, digits)}\u00a0${prefix}${unit}`;
 }
 
 // A number and the noun it counts.

@@ -105,15 +105,22 @@ const specs = {
     formats: { x_m: (value) => `${significant(10 ** value, 2)} mm/s`, v_driver: (value) => `${fixedDigits(value, 0)} mm/s` },
     values: ({ x_m, v_driver }, start = 0) => ({ x_m: 10 ** x_m / 1000, v_driver: v_driver / 1000, x0: start }),
     of: (run) => ({ ...relative(run), y: run.columns.x.map((x) => x - run.columns.x[0]) }), band: () => 0, bandLabel: () => "no band: this law cannot hold",
-    reference: { model: "stickslip", values: ({ v_driver }, start = 0) => ({ v_driver: v_driver / 1000, x0: start }), of: (run) => ({ at: run.columns.x.map((x) => x - run.columns.x[0]), time: run.time, stuck: (i) => run.columns.mode[i] === 0 }) },
+    reference: { model: "stickslip", values: ({ v_driver }, start = 0) => ({ v_driver: v_driver / 1000, x0: start }), of: (run) => ({ at: run.columns.x.map((x) => x - run.columns.x[0]), time: run.time, stuck: (i) => run.columns.mode[i] === 0, breaksAway: run.columns.mode[0] === 0 ? cycles(run).slips[0] : 0 }) },
     costs: { // step counts of the same solver
       steps: { model: "pacejka", values: ({ x_m, v_driver }, start = 0) => ({ x_m: 10 ** x_m / 1000, v_driver: v_driver / 1000, x0: start, ...ode23(COST_TOLERANCE) }) },
       "true-steps": { model: "stickslip", values: ({ v_driver }, start = 0) => ({ v_driver: v_driver / 1000, x0: start, ...HYBRID, ...ode23(COST_TOLERANCE) }) },
     },
-    results: ({ run, values, spec }) => {
-      const first = run.columns.v.findIndex((v) => v > 10 ** values.x_m / 1000);
-      const slid = (row) => bold(`${significant(1000 * Math.abs(run.columns.x.at(row) - run.columns.x[0]), 2)} mm`);
-      return { creep: first < 0 ? `has crept ${slid(-1)} in ${spec.stop} s` : first === 0 ? "slips from the start" : `has crept ${slid(first)} before it breaks away, while the true one has not moved` };
+    results: ({ run, values, spec, reference: { breaksAway } }) => {
+      const { time, columns: { x, v } } = run;
+      const peak = 10 ** values.x_m / 1000;
+      const row = v.findIndex((speed) => speed > peak);
+      const share = row > 0 ? (peak - v[row - 1]) / (v[row] - v[row - 1]) : 1; // of the interval before that row
+      const at = (column) => column.at(row - 1) + share * (column.at(row) - column.at(row - 1));
+      const slid = (position) => bold(`${significant(1000 * Math.abs(position - x[0]), 2)} mm`);
+      const seconds = (t) => bold(`${fixedDigits(t, 2)} s`);
+      const smooth = row < 0 ? `creeps ${slid(x.at(-1))} in ${spec.stop} s` : row === 0 ? "slips from the start" : `creeps ${slid(at(x))} before it breaks away, after ${seconds(at(time))}`;
+      const exact = breaksAway === undefined ? "does not move" : breaksAway === 0 ? "slips from the start" : `does not move for ${seconds(breaksAway)}`;
+      return { creep: `${smooth}; with true sticking, it ${exact}` };
     },
     picture: () => "Stretch of the spring over time, beside that of a sled that truly sticks",
     extra: (chart, x, y, { reference }) => reference && modeCurve(chart, reference.time.length, (i) => [x(reference.time[i]), y(1000 * reference.at[i])], reference.stuck, 1.5, [5, 3]),

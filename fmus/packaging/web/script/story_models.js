@@ -3,7 +3,8 @@
 import { Fmu } from "./fmu.js";
 import { Run } from "./run.js";
 
-export const [HYBRID, SIGN] = [{ friction: 1 }, { friction: 2 }];
+export const HYBRID = { friction: 1 };
+export const SIGN = { friction: 2 };
 const ODE23_METHOD = 2;
 const GRID_COINCIDENCE = 1e-9; // in grid steps: a grid point this close to the end of a solver step coincides with it
 
