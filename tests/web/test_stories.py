@@ -114,7 +114,7 @@ LABELS_AND_CURVES = """app.stories.then(({ charts }) => {
     prototype.fillText = function (text, x, y) {
       const { width, actualBoundingBoxAscent: up, actualBoundingBoxDescent: down } = this.measureText(text);
       const left = x - width * { left: 0, center: 0.5, right: 1 }[this.textAlign];
-      const isTick = /^−?[0-9.]+$/.test(text); // outside the area to which curves are clipped
+      const isTick = /^[^a-z]*$/i.test(text); // outside the area to which curves are clipped
       if (curves.includes(this.fillStyle) && !isTick) labels.push([text, left, y - up, left + width, y + down]);
       return fillText.call(this, text, x, y);
     };
