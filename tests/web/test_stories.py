@@ -120,7 +120,9 @@ LABELS_AND_CURVES = """app.stories.then(({ charts }) => {
     };
     chart.paint();
     for (const [text, left, top, right, bottom] of labels) {
-      const isInside = ([[x0, y0], [x1, y1]]) => Array.from({ length: 201 }, (_, i) => i / 200).some(s => {
+      const count = ([[x0, y0], [x1, y1]]) => Math.min(Math.ceil(Math.hypot(x1 - x0, y1 - y0)), 2000) + 1; // points
+      const isInside = (segment) => Array.from({ length: count(segment) }, (_, i) => i / count(segment)).some(s => {
+        const [[x0, y0], [x1, y1]] = segment;
         const [x, y] = [x0 + s * (x1 - x0), y0 + s * (y1 - y0)];
         return x > left && x < right && y > top && y < bottom;
       });
