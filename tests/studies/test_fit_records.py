@@ -46,7 +46,7 @@ def test_missing_samples_of_a_signal_take_none_of_the_input():
 
 
 def test_a_sample_that_occurs_twice_does_not_shift_the_values():
-    """The times of all samples were spread over the record, and k moved by 40 times its interval."""
+    """The times of all samples were spread over the record, which moved k far outside its interval."""
     x = harness.simulate("smd", times=T)["x"] + 1e-4 * np.random.default_rng(1).normal(size=len(T))
     rows = np.append(0, np.arange(len(T)))
     fits = [harness.fit("smd", frame({"t": T[i], "x": x[i]}, {"t": "s", "x": "m"}), ["k"]) for i in (rows, rows[1:])]
