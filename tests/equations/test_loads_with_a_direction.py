@@ -19,7 +19,7 @@ class Shoe(Model):
 
     m = Parameter(1.0, "kg", "mass", above=0)
     k = Parameter(100.0, "N/m", "stiffness", low=0)
-    mu_s = Parameter(0.5, "1", "coefficient of static friction", low=0)
+    mu_s = Parameter(0.8, "1", "coefficient of static friction", low=0)
     mu_d = Parameter(0.3, "1", "coefficient of sliding friction", low=0)
     P_0 = Parameter(6.0, "N", "mean force on the shoe", low=0)
     P_1 = Parameter({P_1}, "N", "amplitude of the force", low=0)
@@ -40,8 +40,8 @@ STOP = 4.0
 CASES = {  # amplitude of the force, load that changes its sign: both directions lift off, or only one
     "no liftoff": (2.0, 0.0),
     "liftoff in both directions": (9.0, 0.0),
-    "liftoff in one direction": (2.0, 8.5),
-    "liftoff at different times": (5.0, 4.0),
+    "liftoff in one direction": (0.5, 7.5),
+    "liftoff at different times": (2.0, 6.0),
 }
 
 
@@ -55,7 +55,7 @@ def solve(P_1, S):
         return force(t) / (1.0 - 0.4 * 0.3 * mode) + S * mode
 
     def holds(t):
-        return max(0.5 * force(t), 0.0)
+        return max(0.8 * force(t), 0.0)
 
     t, y, mode, changes = 0.0, np.array([0.4, 0.0]), -1, []
     while t < STOP:
@@ -95,7 +95,7 @@ def solve(P_1, S):
         else:
             pull = -100.0 * y[0]
             times = np.linspace(t, STOP, 400_001)
-            released = np.flatnonzero(abs(pull) > np.maximum(0.5 * force(times), 0.0))
+            released = np.flatnonzero(abs(pull) > np.maximum(0.8 * force(times), 0.0))
             if len(released) == 0:
                 return changes, y
             low, high = times[released[0] - 1], times[released[0]]
@@ -121,7 +121,7 @@ def test_a_contact_under_a_load_with_a_direction_agrees_with_scipy(case, method)
     fmu, changes, (x, v) = case
     run = harness.simulate(str(fmu), {"solver.method": method, "solver.rtol": 1e-11}, stop=STOP)
     table = run.to_pandas()
-    assert len(changes) > 4
+    assert len(changes) > 2
     times, modes = run.events.t, [int(table["mode"].asof(t + 1e-7)) for t in run.events.t]
     assert modes[-len(changes) :] == [mode for _, mode in changes]
     assert times[-len(changes) :] == pytest.approx([t for t, _ in changes], abs=1e-8)
