@@ -531,7 +531,11 @@ WRONG = {
         "lifts_off must be True, False or None, got 'no'",
     ),
     "a function without a value": (RATE.replace("F -", "sqrt(-1.0) * F -"), 16, "sqrt(-1.0) has no value"),
-    "degrees Celsius": (RATE + '    q = Parameter(1.0, "degC", "q")\n', 17, "q has the unit 'degC'; allowed units are"),
+    "degrees Celsius": (
+        RATE + '    q = Parameter(1.0, "degC", "q")\n',
+        17,
+        "q has the unit 'degC': use K for temperatures and for their differences",
+    ),
     "friction with a direction": (
         DRY.replace("slide=f", "slide=f * tanh(v / u)") + STUCK,
         17,
