@@ -21,7 +21,10 @@ WORK = {  # by command; all run in one folder, in this order
     "run": ["", "run stickslip", "run --fmu fmus/more/belt.fmu"],
     "decay": ["decay docs/records/spring.csv --m 0.35", "decay coulomb"],
     "compare": ["compare smd coulomb"],
-    "fit": ["fit coulomb docs/records/spring.csv --free f=0.01:0.05 --fixed m=0.35,k=17,x0=0.1 --observe x=laser"],
+    "fit": [
+        "fit stickslip docs/records/pulled_block.csv --free mu_s,mu_d,k=50:1000 --fixed m=1.25,v_driver=0.02"
+        " --observe F_spring=force"
+    ],
     "precision": ["precision smd --quick"],
     "stability": ["stability smd"],
     "references": ["references belt.py"],
