@@ -1,5 +1,7 @@
 """Dispatch to the integration method that the user selects."""
 
+from math import inf
+
 from .codes import EXACT
 from .linear_closed_form import LinearClosedForm
 from .method_registry import methods
@@ -10,12 +12,17 @@ METHOD_ITEMS = tuple((label, file.NUMBER, file.TEXT) for label, file, _ in metho
 
 
 class ActiveMethod:
-    """Method of a run, with the parameters of its step-size control and the scale floor of its error norm."""
+    """Method of a run, with the parameters of its step-size control and the scale floor of its error norm.
+
+    The error of a state is relative to its magnitude, but not below its floor: a share of its largest magnitude so far,
+    or a constant if the user sets the absolute tolerance.
+    """
 
     error_scale_floor: StateVector
 
     def __init__(self):
         self.error_scale_floor = 0.0
+        self.floor_share, self.nominal_velocity = 0.0, inf  # share, 0.0 for a constant floor; limit for velocities
         self.exact = LinearClosedForm()
         for label, _, Method in methods:
             setattr(self, label, Method())

@@ -15,10 +15,18 @@ from math import fabs, inf
 
 from .codes import BACKWARD, EPSILON, FORWARD, HYBRID, ROUNDOFF_MARGIN, STUCK
 from .stick_slip import DryFriction, sign
-from .vectors import ContactIndex, ContactVector, StateVector, any_of, contact_indices, contact_vector, max_of
+from .vectors import (
+    ContactIndex,
+    ContactVector,
+    StateVector,
+    any_of,
+    contact_indices,
+    contact_vector,
+    max_of,
+    select_kinematic,
+)
 
 SIMULTANEITY_MARGIN = 1e-11  # relative; smaller slips come to rest together with one that is zero
-SLIP_SCALE = 1e-3  # m/s or rad/s: scale of slip velocities whose terms are zero
 TIE_SHARE = 1.0 - 1e-9  # contacts within this share of the highest relative load are released together
 MAX_JOINT_ITERATIONS, MAX_ITERATIONS = 60, 200  # pivots of all contacts at once; then of one at a time
 MAX_IMPULSES = 3  # several, since slip velocities may be nonlinear in the positions
@@ -102,6 +110,7 @@ def resolve_after_event(model, step, h, ends: ContactVector, tie_tolerance) -> t
     t = step.t1
     slips = model.slip_velocities(t, step.y1)
     terms = model.slip_magnitudes(t, step.y1)
+    floors = slip_floors(model, step, t, step.y1)
     force, limit, _ = model.contact_forces(t, step.y1, step.modes0)
     status, new_modes = contact_vector(), contact_vector()
     y = step.y1
@@ -110,13 +119,13 @@ def resolve_after_event(model, step, h, ends: ContactVector, tie_tolerance) -> t
         if new_modes[i] == STUCK:
             status[i] = AT_LIMIT if ends[i] <= h else AT_REST
         elif not (force[i] == 0.0 and limit[i] == 0.0):
-            if new_modes[i] * slips[i] < -REVERSED_SHARE * (terms[i] + SLIP_SCALE):
+            if new_modes[i] * slips[i] < -REVERSED_SHARE * (terms[i] + floors[i] + step.event_location.peaks[i]):
                 new_modes[i] = sign(slips[i])  # it reversed without friction, which has returned
             elif ends[i] <= h or new_modes[i] * slips[i] <= SIMULTANEITY_MARGIN * terms[i]:
                 depth = inf
                 if fabs(force[i]) >= EQUAL_SHARE * limit[i]:
                     depth = reversal_depth(model, t, y, step.modes0, step.h_max, limit[i], i)
-                if depth <= tie_tolerance * (terms[i] + start_slip(model, step, i) + SLIP_SCALE):
+                if depth <= tie_tolerance * (terms[i] + start_slip(model, step, i) + floors[i]):
                     y = raise_slip(model, t, y, step.modes0, 2.0 * depth + ROUNDOFF_MARGIN * terms[i], i)
                 else:
                     status[i], new_modes[i] = AT_REST, STUCK
@@ -170,13 +179,21 @@ def raise_slip(model, t, y: StateVector, modes: ContactVector, amount, i: Contac
     return y
 
 
-def have_jumped(model, t, y: StateVector, slips_before: ContactVector):
+def slip_floors(model, step, t, y: StateVector) -> ContactVector:
+    """Return the slip velocities below which errors do not count: those of velocities at their scale floors."""
+    y2 = select_kinematic(y, step.active_method.error_scale_floor)
+    return model.slip_magnitudes(t, y2)
+
+
+def have_jumped(model, step, t, y: StateVector, slips_before: ContactVector):
     """Return whether a slip velocity differs from its value before conditions changed, by more than rounding errors."""
     slips = model.slip_velocities(t, y)
     terms = model.slip_magnitudes(t, y)
+    floors = slip_floors(model, step, t, y)
     jumped = False
     for i in contact_indices:
-        jumped = jumped or fabs(slips[i] - slips_before[i]) > REVERSED_SHARE * (terms[i] + SLIP_SCALE)
+        size = terms[i] + floors[i] + step.event_location.peaks[i]
+        jumped = jumped or fabs(slips[i] - slips_before[i]) > REVERSED_SHARE * size
     return jumped
 
 
@@ -194,7 +211,7 @@ def follow_inputs(model, t, y: StateVector, modes: ContactVector, deviations: Co
 
 
 def resolve_at_start(
-    model, t, y: StateVector, modes: ContactVector, h_max, tie_tolerance, reach
+    model, step, t, y: StateVector, modes: ContactVector, tie_tolerance, reach
 ) -> tuple[StateVector, ContactVector, bool]:
     """Return the same at the start of a run or after a change of values: contacts with a slip velocity slide.
 
@@ -206,26 +223,25 @@ def resolve_at_start(
         States.
     modes
         Previous modes.
-    h_max
-        Largest internal step in s.
     tie_tolerance, reach
         Slip velocities below these shares of their absolute terms count as zero, for contacts that were stuck and
         for contacts that slip against their mode.
     """
     slips = model.slip_velocities(t, y)
     terms = model.slip_magnitudes(t, y)
+    floors = slip_floors(model, step, t, y)
     force, limit, _ = model.contact_forces(t, y, modes)
     status, new_modes = contact_vector(), contact_vector()
     for i in contact_indices:
         zero_level = ROUNDOFF_MARGIN * terms[i]
         if modes[i] * slips[i] <= 0.0:
-            zero_level = (tie_tolerance if modes[i] == STUCK else reach) * (terms[i] + SLIP_SCALE)
+            zero_level = (tie_tolerance if modes[i] == STUCK else reach) * (terms[i] + floors[i])
         status[i], new_modes[i] = SLIPPING, sign(slips[i])
         if modes[i] != STUCK and force[i] == 0.0 and limit[i] == 0.0:
             new_modes[i] = modes[i]
         elif fabs(slips[i]) <= zero_level:
             status[i], new_modes[i] = AT_REST, STUCK
-    return resolve_contacts(model, t, y, modes, new_modes, status, h_max, tie_tolerance)
+    return resolve_contacts(model, t, y, modes, new_modes, status, step.h_max, tie_tolerance)
 
 
 def resolve_contacts(

@@ -21,10 +21,10 @@ from .vectors import (
     magnitude,
     slip_index,
     sum_of,
-    velocity_indices,
 )
 
-DEFAULT_NOMINAL = 1e-3  # nominal position (m, rad) and velocity (m/s, rad/s) by default
+FLOOR_SHARE = 0.03  # of the largest magnitude of a state so far; errors are relative to no less
+SMALLEST_FLOOR = 1e-150  # is a divisor, so not zero; its inverse times an error does not overflow
 # Limits for one communication step, so that an error comes within half a minute, on a slow machine too:
 MAX_BATCHES, BATCH_STEPS = 2000, 1000  # evaluations are checked after each batch
 MAX_STEPS = MAX_BATCHES * BATCH_STEPS  # internal steps
@@ -39,7 +39,7 @@ class Integrator(VariableOwner):
     atol = Fixed(
         0.0,
         "1",
-        "absolute tolerance in SI units; 0 uses 1e-3 of rtol, less where creep matters",
+        "absolute tolerance in SI units; 0 uses 3 % of rtol times the largest value of a state so far, less for creep",
         low=0.0,
     )
     h_max = Fixed(0.0, "s", "largest internal step; 0 uses a tenth of the run", low=0.0)
@@ -98,6 +98,7 @@ class Integrator(VariableOwner):
         self.start_time = t
         self.default_duration = model.stop_time
         step.active_method.select(self.method)
+        step.active_method.error_scale_floor = SMALLEST_FLOOR
         if model.has_dry_friction:
             step.is_hybrid = model.friction == HYBRID
         self.apply_parameters(model)
@@ -154,15 +155,16 @@ class Integrator(VariableOwner):
     def apply_parameters(self, model):
         """Apply parameters: scale floor of the error norm, and constants of the closed form."""
         step = self.step
-        size = self.atol / step.tolerance if self.atol > 0.0 else DEFAULT_NOMINAL
-        size = size if size > 1e-300 else 1e-300  # is a divisor, so not zero
-        step.active_method.error_scale_floor = size
+        method = step.active_method
         nominal_velocity = model.nominal_velocity()
+        nominal_velocity = nominal_velocity if nominal_velocity > 0.0 else inf
         if model.has_dry_friction:
-            step.event_location.feature_width = nominal_velocity if nominal_velocity > 0.0 else inf
-        if self.atol == 0.0 and nominal_velocity > 0.0 and nominal_velocity < size:
-            for i in velocity_indices:
-                step.active_method.error_scale_floor[i] = nominal_velocity
+            step.event_location.feature_width = nominal_velocity
+        method.floor_share, method.nominal_velocity = FLOOR_SHARE, nominal_velocity
+        if self.atol > 0.0:
+            size = self.atol / step.tolerance
+            method.error_scale_floor = size if size > SMALLEST_FLOOR else SMALLEST_FLOOR
+            method.floor_share = 0.0
         if model.is_linear:
             mass, damping, stiffness, drift = model.linear_coefficients()
             step.active_method.exact.prepare(mass, damping, stiffness, drift)

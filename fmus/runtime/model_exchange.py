@@ -16,7 +16,6 @@ from math import fabs, inf, nan
 
 from . import call_sequence, conditions, contact_lcp, event_location, stick_slip
 from .codes import DIVERGED, EPSILON, EVENT, MODEL_EXCHANGE, NO_CONSISTENT_MODES, OK, ROUNDOFF_MARGIN, RUNNING, STUCK
-from .integrator import DEFAULT_NOMINAL
 from .run_state import RunState
 from .step_control import OVERFLOW_LIMIT, TIE_FACTOR
 from .vectors import (
@@ -36,6 +35,7 @@ from .vectors import (
 
 OVERSHOOT_TOLERANCE = 0.1  # slip velocities of the wrong sign up to this share of their terms are overshoot
 INDICATOR_OFFSET, TINY = 4.0 * EPSILON, 1e-300  # offset relative to the limit; absolute offset of velocities and forces
+DEFAULT_NOMINAL = 1e-3  # nominal position (m, rad) and velocity (m/s, rad/s) by default
 DEFAULT_TOLERANCE = 1e-4  # relative tolerance if the importer gives none
 
 
@@ -94,6 +94,7 @@ def begin(run, model):
     start_counters.n_accepted = start_counters.n_rejected = start_counters.n_rhs = 0
     step.t0, step.t1 = solver.t, nan
     run.model_exchange.time = solver.start_time + solver.t
+    step.active_method.error_scale_floor = DEFAULT_NOMINAL  # the importer's solver works with nominal values
     update_nominals(run, model)
 
 
@@ -323,7 +324,7 @@ def update_modes(run, model):
         if model.has_prescribed_slips:
             y = contact_lcp.follow_inputs(model, solver.t, y, solver.modes, exchange.slip_errors)
         y, modes, step.has_consistent_modes = contact_lcp.resolve_at_start(
-            model, solver.t, y, solver.modes, step.h_max, tie_tolerance, OVERSHOOT_TOLERANCE
+            model, step, solver.t, y, solver.modes, tie_tolerance, OVERSHOOT_TOLERANCE
         )
         needs_restart, changed = any_of(y != solver.y), any_of(modes != solver.modes)
         solver.y, solver.modes = y, modes

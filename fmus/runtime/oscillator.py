@@ -63,6 +63,9 @@ class Oscillator(VariableOwner):
         A mode is the direction of sliding, or 0 where the friction law evaluates the velocity itself.
         """
 
+    def rate_magnitudes(self, t: float, y: StateVector, modes: ContactVector) -> RateVector:
+        """Return bounds on the magnitudes of the terms of these rates, to which their rounding errors are relative."""
+
     def jacobian(self, t: float, y: StateVector, modes: ContactVector) -> Derivatives:
         """Return the derivatives of these rates by t and by the states, for implicit methods."""
 

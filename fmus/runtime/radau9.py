@@ -284,6 +284,9 @@ class Radau9:
             z3 = T31 * w1 + T32 * w2 + T33 * w3 + T34 * w4 + T35 * w5
             z4 = T41 * w1 + T42 * w2 + T43 * w3 + T44 * w4 + T45 * w5
             z5 = w1 + w2 + w4
+            if turn == 0:  # a state that starts at zero has no other magnitude
+                change5 = dynamic_part(control.floor_share * magnitude(z5))
+                scale = elementwise_max(scale, change5)
             u1 = dynamic_part(magnitude(u1))
             u2 = dynamic_part(magnitude(u2))
             u3 = dynamic_part(magnitude(u3))

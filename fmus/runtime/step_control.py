@@ -22,17 +22,24 @@ from .vectors import (
     complete_rates,
     contact_indices,
     contact_vector,
+    dynamic_part,
     elementwise_max,
+    kinematic_rates,
     magnitude,
     max_of,
     min_of,
+    select_kinematic,
     slip_index,
     sum_of,
+    velocity_indices,
 )
 
 OVERFLOW_LIMIT = 1e100  # larger states are treated as divergence: squares, as in an energy, would overflow
 MAX_TRIES = 200  # attempts for one step; each one halves the step size
 MAX_REPEATED_STEPS = 1_000_000  # steps of a motion that is repeated
+START_SHARE = 1e-3  # of the largest step: the first step takes what a state moves in this time for its magnitude
+
+ROUGH_ERROR, ROUGH_CHANGE = 0.5, 10.0  # relative error and change of states in a proposal that is roughly right
 MAX_STALLED_STEPS = 100  # consecutive steps that hardly advance the time
 SHORTEST_STEP = 16.0 * EPSILON  # share of the largest step; the solver stalls at shorter ones
 INTERPOLATION_ERROR = 10.0  # of a state at an event, relative to the solver tolerance
@@ -40,14 +47,17 @@ TIE_FACTOR = 30.0  # tolerance for ties between stick and slip, relative to the 
 
 
 class StepCounters:
-    """Counters at the start of the step.
+    """Counters at the start of the step, and the scale floor there if a proposal was rejected since.
 
     `h_next` is the step size to try there, `h_last` the size of the previous step, `n_stalled` the number of
     consecutive steps that hardly advanced the time, `t_event` the time of the last change of mode (or of the start).
     """
 
+    error_scale_floor: StateVector
+
     def __init__(self):
         self.n_accepted = self.n_rejected = self.n_rhs = self.n_events = self.n_stalled = 0
+        self.error_scale_floor = 0.0
         self.h_next = self.h_last = self.t_event = 0.0
 
 
@@ -132,6 +142,7 @@ class InternalStep:
         """Start an empty step at t, given the previous modes; choose a step size unless nothing moves."""
         self.roundoff.t1 = self.roundoff.x1 = 0.0
         self.t1, self.y1 = t, y
+        self.raise_scale_floor(model, self.y1)
         if model.has_conditions:
             conditions.initialize(model, self.event_location, t, self.y1, modes)
         if model.has_dry_friction:
@@ -147,6 +158,16 @@ class InternalStep:
         if model.has_dry_friction or model.has_conditions:
             phase_repetition.begin_phase(model, self)
 
+    def raise_scale_floor(self, model, y: StateVector):
+        """Raise the scale floor of the error norm to a share of the states that have been reached."""
+        method = self.active_method
+        floor = method.floor_share * magnitude(y)
+        method.error_scale_floor = elementwise_max(method.error_scale_floor, floor)
+        if model.has_nominal_velocity and method.floor_share > 0.0:
+            for i in velocity_indices:
+                if method.error_scale_floor[i] > method.nominal_velocity:
+                    method.error_scale_floor[i] = method.nominal_velocity
+
     def save_counters(self):
         """Save the counters at t1, where the next step starts."""
         counters = self.start_counters
@@ -156,6 +177,8 @@ class InternalStep:
     def restore_counters(self):
         """Restore the counters at t0 and discard those of the step."""
         counters = self.start_counters
+        if self.n_rejected > counters.n_rejected:
+            self.active_method.error_scale_floor = counters.error_scale_floor
         self.n_accepted, self.n_rejected = counters.n_accepted, counters.n_rejected
         self.n_rhs, self.h_next = counters.n_rhs, counters.h_next
 
@@ -338,14 +361,24 @@ class InternalStep:
         h = remaining if last else h_new
         scale = magnitude(y)
         method = self.active_method
+        self.raise_scale_floor(model, y)
         scale = elementwise_max(method.error_scale_floor, scale)
         attempts = 0
         while True:
             y1, f1, e = method.propose(model, self, modes, t, y, f, h)
             self.n_rhs += method.stages
             size1 = magnitude(y1)
-            e = magnitude(e) / elementwise_max(size1, scale)
+            size2 = elementwise_max(size1, scale)
+            d = magnitude(e)
+            e = d / size2
             error = h * max_of(e) / tolerance
+            if error > 1.0 and method.floor_share > 0.0:
+                # It may be a rounding error of the rates: of velocities, and of positions by these.
+                terms = model.rate_magnitudes(t + h, y, modes)  # y1 may be unstable
+                rounding = dynamic_part(2.0 * ROUNDOFF_MARGIN * h / tolerance * terms)
+                least = select_kinematic(h * kinematic_rates(rounding), rounding)
+                e = d / elementwise_max(size2, least)
+                error = h * max_of(e) / tolerance
             share = 1.0
             if error <= 1.0 and sum_of(size1, e) < OVERFLOW_LIMIT:  # False for NaN
                 if model.has_dry_friction and model.has_nominal_velocity and self.is_hybrid:
@@ -353,7 +386,16 @@ class InternalStep:
                 if not (model.has_dry_friction and model.has_nominal_velocity) or share == 1.0 or h <= h_min:
                     break
             self.n_rejected += 1
+            if attempts == 0:
+                self.start_counters.error_scale_floor = method.error_scale_floor
             attempts += 1
+            if error * tolerance < ROUGH_ERROR:
+                # The proposal shows how large states become that are zero so far, and whose error is always large
+                # relative to what they reach.  A rate that is large relative to that shows an unstable proposal.
+                d = magnitude(f1) / size2
+                if h * max_of(d) < ROUGH_CHANGE:
+                    self.raise_scale_floor(model, y1)
+                    scale = elementwise_max(method.error_scale_floor, scale)
             if h <= h_min or attempts == MAX_TRIES:
                 return STALLED if error < inf and sum_of(size1) < OVERFLOW_LIMIT else DIVERGED
             shrink = method.safety * error**-method.power if 1.0 < error < inf and attempts == 1 else 0.5
@@ -467,9 +509,9 @@ class InternalStep:
             for i in contact_indices:
                 other = location.times[len(self.modes0) + i]
                 ends[i] = location.times[i] if location.times[i] < other else other
-            if model.has_slip_conditions and contact_lcp.have_jumped(model, end, self.y1, slips):
+            if model.has_slip_conditions and contact_lcp.have_jumped(model, self, end, self.y1, slips):
                 self.y1, self.modes1, self.has_consistent_modes = contact_lcp.resolve_at_start(
-                    model, end, self.y1, self.modes0, self.h_max, ROUNDOFF_MARGIN, self.tie_tolerance(model)
+                    model, self, end, self.y1, self.modes0, ROUNDOFF_MARGIN, self.tie_tolerance(model)
                 )
             elif model.is_coupled:
                 self.y1, self.modes1, self.has_consistent_modes = contact_lcp.resolve_after_event(
@@ -504,7 +546,7 @@ class InternalStep:
         if self.is_hybrid:
             if model.is_coupled:
                 self.y1, self.modes1, self.has_consistent_modes = contact_lcp.resolve_at_start(
-                    model, self.t1, self.y1, modes, self.h_max, tie_tolerance, tie_tolerance
+                    model, self, self.t1, self.y1, modes, tie_tolerance, tie_tolerance
                 )
             else:
                 for i in contact_indices:
@@ -549,7 +591,12 @@ class InternalStep:
     def initial_step_size(self):
         """Estimate the first step h from the slopes at t1."""
         size1 = magnitude(self.y1)
-        relative_rate = magnitude(self.f1) / elementwise_max(size1, self.active_method.error_scale_floor)
+        size1 = elementwise_max(size1, self.active_method.error_scale_floor)
+        rate1 = magnitude(self.f1)
+        if self.active_method.floor_share > 0.0:
+            size2 = START_SHARE * self.h_max * rate1
+            size1 = elementwise_max(size1, size2)
+        relative_rate = rate1 / size1
         rate = max_of(relative_rate)
         h = self.active_method.safety * self.tolerance**self.active_method.power
         return h / rate if h < rate * self.h_max else self.h_max

@@ -30,7 +30,7 @@ position_index: list[int] = []
 is_dynamic: list[bool] = []  # for each state: whether its rate is computed, not a state
 rate_index: list[int] = []  # index of the rate, where it is a state
 
-SMALL = 1e-6  # smallest ratio of a pivot to the entries below it
+SMALL = 1e-6  # smallest ratio of a later pivot to its change by the elimination of another
 
 
 def state_vector() -> StateVector:
@@ -128,7 +128,8 @@ def factorize(g, h, J):
                     entry = entry + w[i, p]
             w[i, j] = 1.0 - g * h * entry if i == j else -g * h * entry
     for n, k in enumerate(computed):
-        if w[k, k] != 0.0 and all(abs(w[k, k]) > SMALL * abs(w[i, k]) for i in computed[n + 1 :]):
+        others = computed[n + 1 :]
+        if w[k, k] != 0.0 and all(abs(w[k, k] * w[i, i]) >= SMALL * abs(w[i, k] * w[k, i]) for i in others):
             inverse[k] = g / w[k, k]
         for i in computed[n + 1 :]:
             w[i, k] = w[i, k] * inverse[k] / g
@@ -176,9 +177,10 @@ def factorize_complex(re, im, J):
             w[i, j] = (re - a, im - b) if i == j else (-a, -b)
     for n, k in enumerate(computed):
         a, b = w[k, k]
-        size = a * a + b * b
-        others = [w[i, k, 0] * w[i, k, 0] + w[i, k, 1] * w[i, k, 1] for i in computed[n + 1 :]]
-        if size != 0.0 and all(size > SMALL * SMALL * other for other in others):
+        size, others = a * a + b * b, computed[n + 1 :]
+        if size != 0.0 and all(
+            size * squared(w[i, i]) >= SMALL * SMALL * (squared(w[i, k]) * squared(w[k, i])) for i in others
+        ):
             inverse[k] = a / size, -b / size
         for i in computed[n + 1 :]:
             w[i, k] = complex_product(w[i, k], inverse[k])
@@ -201,6 +203,11 @@ def solve_complex(system, r, q) -> tuple[StateVector, StateVector]:
             u[i] = u[i] - complex_product(w[i, j], u[j])
         u[i] = complex_product(u[i], inverse[i])
     return u[:, 0], u[:, 1]
+
+
+def squared(a):
+    """Return the squared magnitude of a complex number."""
+    return a[0] * a[0] + a[1] * a[1]
 
 
 def complex_product(a, b):

@@ -90,7 +90,6 @@ def test_unreachable_code_is_removed():
     ):
         assert word not in smooth
         assert word in dry
-    assert "class RoundoffCompensation" not in smooth  # of closed forms
     for word in ("from .contact_lcp", "model.is_coupled"):  # of a contact that is stuck while something moves
         assert word not in dry
 

@@ -1,7 +1,7 @@
 """Generates the methods for integrators: rates, Jacobian, coefficients of the linear closed form."""
 
-from .algebra import build_term, depends_on, substitute
-from .codegen_context import CodegenContext, emit_return, method_source
+from .algebra import build_term, depends_on, rounding_scale, substitute
+from .codegen_context import CodegenContext, emit_return, emit_scales, method_source
 from .coupled_contact_methods import (
     derivative_unknown,
     emit_friction_forces,
@@ -21,16 +21,25 @@ def rate_methods(context: CodegenContext) -> list[str]:
     A stage of a trial step may leave the domain of the equations.  NaN then rejects the step, where an error would end
     the run.
     """
-    return [rates_method(context), jacobian_method(context), *closed_form_methods(context)]
+    return [
+        rates_method(context),
+        rates_method(context, of_terms=True),
+        jacobian_method(context),
+        *closed_form_methods(context),
+    ]
 
 
-def rates_method(context: CodegenContext) -> str:
-    """Rates that are not states, in the order of the states."""
+def rates_method(context: CodegenContext, of_terms: bool = False) -> str:
+    """Rates that are not states, in the order of the states; or bounds on the magnitudes of their terms."""
+    name = "rate_magnitudes" if of_terms else "rates"
     analysis, c = context.analysis, context.single_contact
     printer = context.printer(on_trial=analysis.time_varying)
     targets = [rate.expression for rate in context.rate_outputs]
     if c is not None and THRESHOLD not in c.laws:
         targets = with_sliding_force(c, targets)
+    if of_terms:
+        targets = emit_scales(context, printer, [rounding_scale(e) for e in targets])
+    if c is not None and THRESHOLD not in c.laws:
         context.emit_sign_mode(printer, c, targets)
     elif c is not None:
         context.emit_driver(printer, [*targets, analysis.load[c]])
@@ -38,14 +47,14 @@ def rates_method(context: CodegenContext) -> str:
         sliding = printer.text(Term("*", c.mode, c.slide))
         printer.emit(f"{c.name} = {sliding} if {c.mode.name} != 0 else {threshold_call(context, printer, c)}")
         printer.bound_names[c] = c.name
-        return method_source("rates", context.arguments, emit_return(printer, targets))
+        return method_source(name, context.arguments, emit_return(printer, targets))
     elif analysis.contacts:
         terms = force_unknown(context).terms
         context.emit_driver(printer, [*targets, *terms, *slips_of_laws(analysis)])
         printer.count_uses(*targets, *terms)
         emit_friction_forces(context, printer)
-        return method_source("rates", context.arguments, emit_return(printer, targets))
-    return method_source("rates", context.arguments, context.return_lines(printer, targets))
+        return method_source(name, context.arguments, emit_return(printer, targets))
+    return method_source(name, context.arguments, context.return_lines(printer, targets))
 
 
 def jacobian_method(context: CodegenContext) -> str:

@@ -2,8 +2,8 @@
 (re + i im - J) u = r with complex numbers as pairs of real ones.
 
 A state p whose rate is the state q has k_p = g (r_p + h k_q).  The remaining system is eliminated without pivoting.
-A pivot that is zero, or small compared with the entries below it, gives NaN and rejects the step, because it would
-amplify rounding errors.  A smaller h brings the matrix closer to 1.
+A pivot gives NaN and rejects the step if it is zero or amplifies rounding errors, that is, if its elimination changes a
+later pivot by a large multiple of that, a ratio without units.  A smaller h brings the matrix closer to 1.
 
 Operations with entries that are always zero are left out, which changes no number: in a chain of n bodies, most of n^3.
 """
@@ -12,7 +12,7 @@ from collections.abc import Collection
 
 from .layout import ModelLayout
 
-MIN_PIVOT_RATIO = 1e-6  # smallest ratio of a pivot to the entries below it; same value in vectors.py
+MIN_PIVOT_RATIO = 1e-6  # smallest ratio of a later pivot to its change; same value in vectors.py
 
 
 def nonzero_entries(spec: ModelLayout) -> set[tuple[str, str]]:
@@ -52,7 +52,11 @@ def factorization_lines(w: str, g: str, h: str, spec: ModelLayout) -> list[str]:
     for n, k in enumerate(dynamic):
         below = [i for i in dynamic[n + 1 :] if (i, k) in nonzero]
         right = [j for j in dynamic[n + 1 :] if (k, j) in nonzero]
-        tests = [f"fabs({w}_{k}_{k}) > {MIN_PIVOT_RATIO} * fabs({w}_{i}_{k})" for i in below]
+        tests = [
+            f"fabs({w}_{k}_{k} * {w}_{i}_{i}) >= {MIN_PIVOT_RATIO} * fabs({w}_{i}_{k} * {w}_{k}_{i})"
+            for i in below
+            if (k, i) in nonzero
+        ]
         lines.append(f"{w}_{k} = {g} / {w}_{k}_{k} if {' and '.join([*tests, f'{w}_{k}_{k} != 0.0'])} else nan")
         for i in below:
             lines.append(f"{w}_{i}_{k} = {w}_{i}_{k} * {w}_{k} / {g}")
@@ -109,7 +113,12 @@ def complex_factorization_lines(w: str, re: str, im: str, spec: ModelLayout) -> 
         below = [i for i in dynamic[n + 1 :] if (i, k) in nonzero]
         right = [j for j in dynamic[n + 1 :] if (k, j) in nonzero]
         lines.append(f"{w}_size = {squared(f'{w}_{k}_{k}')}")
-        tests = [f"{w}_size > {MIN_PIVOT_RATIO} * {MIN_PIVOT_RATIO} * ({squared(f'{w}_{i}_{k}')})" for i in below]
+        tests = [
+            f"{w}_size * ({squared(f'{w}_{i}_{i}')}) >= {MIN_PIVOT_RATIO} * {MIN_PIVOT_RATIO} * "
+            f"(({squared(f'{w}_{i}_{k}')}) * ({squared(f'{w}_{k}_{i}')}))"
+            for i in below
+            if (k, i) in nonzero
+        ]
         test = " and ".join([*tests, f"{w}_size != 0.0"])
         lines.append(f"{w}_{k}_re = {w}_{k}_{k}_re / {w}_size if {test} else nan")
         lines.append(f"{w}_{k}_im = -{w}_{k}_{k}_im / {w}_size if {test} else nan")

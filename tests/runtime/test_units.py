@@ -1,0 +1,62 @@
+"""A motion does not depend on the units of length, time and mass."""
+
+import pytest
+from build_cache import build_once
+
+from fmus.packaging.model_lookup import find_model
+from fmus.packaging.units import parse_unit
+from fmus.runtime.variable_declarations import Fixed, Input, Parameter, variables
+
+MORE = ("forced", "joint", "sleds", "stacked")
+ODE23, RODAS = 2, 5
+
+
+def factor(unit, length, time, mass):
+    """Return the number by which a value in a unit is multiplied, given the exponents of two of the base units."""
+    dimension = parse_unit(unit)
+    if dimension is None:  # "1"
+        return 1.0
+    return 2.0 ** (dimension.m * length + dimension.s * time + dimension.kg * mass)
+
+
+def run(worker, fmus, name, method, *exponents):
+    """Return the rows of all internal steps of a run in scaled units, in the units of the model."""
+    model = find_model(name).model()
+    declared = dict(variables(model))
+    values = {
+        variable: meaning.start * factor(meaning.unit, *exponents)
+        for variable, meaning in declared.items()
+        if isinstance(meaning, (Parameter, Fixed, Input)) and meaning.type == "Real"
+    }
+    stop = model.stop_time * factor("s", *exponents)
+    fmu = worker.instantiate(
+        (build_once("more-python", "--more", timeout=600) if name in MORE else fmus) / f"{name}.fmu"
+    )
+    fmu.begin(values | ({"solver.method": method} if method else {}), stop=stop)
+    columns = [*model.states, "events.t_last"]
+    factors = [factor(declared[state].unit, *exponents) for state in model.states] + [factor("s", *exponents)]
+    names = [*columns, *model.contacts, "events.count", "solver.steps", "solver.rejected", "solver.evaluations"]
+    times, rows = fmu.follow(0.0, stop, names)
+    fmu.free()
+    return [
+        [t / factors[-1], *(value / size for value, size in zip(row, factors, strict=False)), *row[len(factors) :]]
+        for t, row in zip(times, rows, strict=True)
+    ]
+
+
+RUNS = [
+    *(("sleds", None, *exponents) for exponents in [(-30, 0, 0), (20, 0, 0), (40, 0, 0), (0, 40, 0), (-40, -20, 40)]),
+    *(("coulomb", method, -30, 0, 0) for method in (None, ODE23, RODAS)),
+    *(("pacejka", method, *exponents) for method in (None, ODE23) for exponents in [(-40, 0, 0), (0, 40, 0)]),
+    *((name, None, *exponents) for name in ("forced", "stacked") for exponents in [(20, 0, 0), (0, -40, 0)]),
+    ("joint", None, 0, -40, 0),
+    ("pendulum", None, -40, 30, -20),
+    ("smd", ODE23, -40, 0, 40),
+    ("stickslip", ODE23, 40, -40, 0),
+]
+
+
+@pytest.mark.parametrize(("name", "method", "length", "time", "mass"), RUNS)
+def test_scaled_units_give_the_same_bits(worker, fmus, name, method, length, time, mass):
+    """All exponents are of two, so that a change of units rounds nothing."""
+    assert run(worker, fmus, name, method, length, time, mass) == run(worker, fmus, name, method, 0, 0, 0)
