@@ -22,6 +22,7 @@ from .codes import (
     OUT_OF_RANGE,
     RUNNING,
 )
+from .integrator import STEP_END_TOLERANCE
 
 # ---- values
 
@@ -152,7 +153,7 @@ def communication_step_end(run, solver, t, h):
     size = fabs(start) if fabs(start) > fabs(now) else fabs(now)
     if fabs(end) > size:
         size = fabs(end)
-    if fabs(end - t1) <= 1e-15 * size < inf:
+    if fabs(end - t1) <= STEP_END_TOLERANCE * size < inf:
         end, elapsed = t1, step.t1  # the end of an internal step, except for rounding
     elif stop < end < inf and end <= stop + 1e-6 * h + 1e-11 * size:
         end, elapsed = stop, step.t_end  # error of a sum of a million steps

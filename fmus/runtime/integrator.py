@@ -8,7 +8,7 @@ from math import fabs, inf, nan
 
 from . import conditions, contact_lcp, ode23, phase_repetition
 from .active_method import METHOD_ITEMS
-from .codes import DIVERGED, EPSILON, EXACT, HYBRID, HYBRID_LAW_ONLY, NEEDS_REPETITION, OK, STUCK, TOO_MANY_STEPS
+from .codes import DIVERGED, EXACT, HYBRID, HYBRID_LAW_ONLY, NEEDS_REPETITION, OK, STUCK, TOO_MANY_STEPS
 from .linear_closed_form import HIGHER_ORDER_INPUT
 from .step_control import OVERFLOW_LIMIT, InternalStep
 from .variable_declarations import Choice, Count, Fixed, Local, VariableOwner
@@ -25,6 +25,7 @@ from .vectors import (
 
 FLOOR_SHARE = 0.03  # of the largest magnitude of a state so far; errors are relative to no less
 SMALLEST_FLOOR = 1e-150  # is a divisor, so not zero; its inverse times an error does not overflow
+STEP_END_TOLERANCE = 1e-15  # relative; communication points this close to the end of an internal step are there
 # Limits for one communication step, so that an error comes within half a minute, on a slow machine too:
 MAX_BATCHES, BATCH_STEPS = 2000, 1000  # evaluations are checked after each batch
 MAX_STEPS = MAX_BATCHES * BATCH_STEPS  # internal steps
@@ -238,7 +239,8 @@ class Integrator(VariableOwner):
         now = self.start_time + self.t
         self.t_next = self.start_time + self.finite_step_end()
         if self.t < step.t1 and self.t_next <= now:
-            self.t_next = now + EPSILON * fabs(now)  # the step is shorter than the resolution of the time
+            # the step is shorter than the resolution of the time: lead beyond what counts as its end
+            self.t_next = now + 2.0 * STEP_END_TOLERANCE * fabs(now)
 
     def finite_step_end(self):
         """Return the end of the internal step; if it has none, a default run after the current time."""
