@@ -37,7 +37,7 @@ from .vectors import (
 OVERFLOW_LIMIT = 1e100  # larger states are treated as divergence: squares, as in an energy, would overflow
 MAX_TRIES = 200  # attempts for one step; each one halves the step size
 MAX_REPEATED_STEPS = 1_000_000  # steps of a motion that is repeated
-START_SHARE = 1e-3  # of the largest step: the first step takes what a state moves in this time for its magnitude
+START_SHARE = 1e-4  # of the largest step: the first step takes what a state moves in this time for its magnitude
 
 ROUGH_ERROR, ROUGH_CHANGE = 0.5, 10.0  # relative error and change of states in a proposal that is roughly right
 MAX_STALLED_STEPS = 100  # consecutive steps that hardly advance the time
@@ -153,6 +153,8 @@ class InternalStep:
         if not (model.rests_when_stuck and self.is_hybrid and all_of(self.modes1 == STUCK)):
             if self.h_next == 0.0 and self.active_method.method_number != EXACT:
                 self.h_next = self.initial_step_size()
+                size = START_SHARE * self.h_max * magnitude(self.f1)
+                self.raise_scale_floor(model, size)
         self.t0 = t
         self.save_counters()
         if model.has_dry_friction or model.has_conditions:
