@@ -24,12 +24,13 @@ import click
 from benchmarks.bench.command import bench
 from benchmarks.importers.command import importers
 from benchmarks.rivals.command import rivals
+from benchmarks.symmetry.command import symmetry
 from harness.commands import FullHelpGroup
 
 
 @click.group(cls=FullHelpGroup, context_settings={"help_option_names": ["-h", "--help"]})
 def main() -> None:
-    """Measure this project: speed and accuracy, the same scenes in other engines, the FMUs in other tools.
+    """Measure this project: speed and accuracy, symmetry, the same scenes in other engines, the FMUs in other tools.
 
     These commands need a checkout of the project and are not a part of the installed package.
 
@@ -40,5 +41,5 @@ def main() -> None:
     """
 
 
-for command in (bench, importers, rivals):
+for command in (bench, importers, rivals, symmetry):
     main.add_command(command)

@@ -1,0 +1,146 @@
+"""What is changed in a run, and what the motion must then be."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from .motion import FmuRuns, Motion
+
+START_TIMES = (1.0, 1e3, 1e5, 1e6, -1e3)  # s
+SCALES = (  # exponents of 2 of the units of mass, length and time
+    (0, -10, 0),
+    (0, -40, 0),
+    (0, 40, 0),
+    (0, 0, -40),
+    (0, 0, 40),
+    (-40, 0, 0),
+    (40, 20, 10),
+    (-30, -30, -20),
+)
+TIME, UNITS, MIRROR, ORDER, FRAME, LONG = "start time", "units", "mirror", "order", "frame", "long run"
+KINDS = (TIME, UNITS, MIRROR, ORDER, FRAME, LONG)
+
+
+@dataclass(frozen=True)
+class Change:
+    """A change of a run that must not change its motion, apart from factors.
+
+    Attributes
+    ----------
+    kind, text : str
+        Symmetry to which it belongs, and the change itself.
+    values : mapping
+        Values to set.
+    start, duration : float
+        Times of the run in s.
+    time_factor : float
+        Duration relative to that of the original run.
+    factors : mapping
+        Factors of the columns; 0 for an unknown sign.
+    mode_sign : int
+        Factor of the modes.
+    is_exact : bool
+        Whether the bits must be equal, apart from the factors.
+    slack : float
+        Tolerance relative to that of the method.
+    moving : mapping
+        Name of the column in the changed run, and speed in 1/s of its reference frame, for columns of another frame.
+    """
+
+    kind: str
+    text: str
+    values: Mapping[str, Any]
+    start: float
+    duration: float
+    time_factor: float = 1.0
+    factors: Mapping[str, float] = field(default_factory=dict)
+    mode_sign: int = 1
+    is_exact: bool = False
+    slack: float = 1.0
+    moving: Mapping[str, tuple[str, float, float]] = field(default_factory=dict)
+
+    @property
+    def stop(self) -> float:
+        return self.start + self.duration
+
+    def map_time(self, time: np.ndarray) -> np.ndarray:
+        """Return what times in s of the original run, which starts at 0 s, become."""
+        return self.start + time * self.time_factor
+
+    def map_column(self, name: str, base: "Motion") -> np.ndarray:
+        """Return what a column of the original run becomes."""
+        column: np.ndarray = base.columns[name] * (self.factors.get(name, 1.0) or 1.0)
+        return column
+
+    def restore_column(self, name: str, changed: "Motion") -> np.ndarray:
+        """Return a column of the changed run in the frame of the original one."""
+        if name not in self.moving:
+            return changed.columns[name]
+        other, offset, speed = self.moving[name]
+        column: np.ndarray = changed.columns[other] + (offset + speed * (changed.time - changed.time[0]))
+        return column
+
+    def differ(self, name: str, expected: np.ndarray, found: np.ndarray) -> np.ndarray:
+        """Return where values (n,) of a column are not those expected; of an unknown sign, if neither sign fits."""
+        plain = expected != found
+        if self.factors.get(name, 1.0) != 0.0:
+            return plain
+        inverted = -expected != found
+        return plain if plain.sum() <= inverted.sum() else inverted
+
+
+def shift_start(values: Mapping[str, Any], duration: float) -> list[Change]:
+    """Return changes of the start time."""
+    return [Change(TIME, f"start {start:g} s", values, start, duration, slack=10.0) for start in START_TIMES]
+
+
+def scale_values(
+    runs: "FmuRuns", values: Mapping[str, Any], scale: tuple[int, int, int]
+) -> tuple[dict[str, Any], dict[str, float]]:
+    """Return the values of a run and the factors of its variables after a change of units.
+
+    Parameters
+    ----------
+    runs : FmuRuns
+    values : mapping
+        Values that are set in the original run.
+    scale : tuple of int
+        Exponents of 2 of mass, length and time.
+    """
+    factors = {
+        name: 2.0 ** sum(a * b for a, b in zip(exponents, scale, strict=True))
+        for name, exponents in runs.exponents.items()
+    }
+    scaled = {
+        name: values.get(name, runs.start_value(name)) * factors[name]
+        for name, variable in runs.variables.items()
+        if variable.causality in ("parameter", "input") and name in factors
+    }
+    return {**values, **scaled}, factors
+
+
+def scale_units(
+    runs: "FmuRuns", values: Mapping[str, Any], duration: float, scales: tuple[tuple[int, int, int], ...] = SCALES
+) -> list[Change]:
+    """Return changes of the units of mass, length and time."""
+    changes = []
+    for scale in scales:
+        scaled, factors = scale_values(runs, values, scale)
+        text = "kg 2^{} m 2^{} s 2^{}".format(*scale)
+        seconds = 2.0 ** scale[2]
+        changes.append(
+            Change(UNITS, text, scaled, 0.0, duration * seconds, seconds, factors, is_exact=True),
+        )
+    return changes
+
+
+def invert_signs(
+    runs: "FmuRuns", values: Mapping[str, Any], duration: float, odd: list[str], signs: Mapping[str, int]
+) -> Change:
+    """Return the change of all signs: those of the odd parameters, inputs and states."""
+    inverted = {name: -values.get(name, runs.start_value(name)) for name in odd}
+    factors = {name: float(signs.get(name, -1 if name in runs.modes else 0)) for name in runs.outputs}
+    return Change(MIRROR, "signs inverted", {**values, **inverted}, 0.0, duration, 1.0, factors, -1, is_exact=True)

@@ -1,0 +1,169 @@
+"""symmetry: what a change of time, unit, sign or order changes."""
+
+import os
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import click
+
+from harness.commands.terminal import Terminal, json_option, quiet_option
+from harness.errors import HarnessError
+from harness.process.worker_pool import WorkerPool
+
+from .builds import BACKENDS, NATIVE, ROOT, all_models, find_source
+from .changes import KINDS
+from .study import MAX_STEPS, Outcome, run_model
+
+TITLE = "What a change of time, unit, sign or order changes"
+SOURCES = (".py", ".fmu")
+
+
+@click.command()
+@click.argument("models", metavar="[MODEL | FILE.py | FMU]...", nargs=-1)
+@click.option(
+    *("--backend", "backends"),
+    multiple=True,
+    type=click.Choice(BACKENDS),
+    default=[NATIVE],
+    show_default=True,
+    help="FMUs to build: Python or native (FMI 2.0), or native FMI 3.0; repeatable.",
+)
+@click.option("--method", "methods", multiple=True, help="Integration method; repeatable. Default: all.")
+@click.option("--change", "kinds", multiple=True, type=click.Choice(KINDS), help="Symmetry; repeatable. Default: all.")
+@click.option("--by-method", is_flag=True, help="Print one row for each model and method.")
+@click.option("--max-steps", default=MAX_STEPS, show_default=True, help="Steps after which a run is shortened.")
+@click.option(
+    "--builds",
+    type=click.Path(file_okay=False, path_type=Path),
+    default=ROOT / "build" / "symmetry",
+    help="Folder that keeps the built FMUs.  Default: build/symmetry of the checkout.",
+)
+@click.option("--workers", type=click.IntRange(1), default=os.cpu_count() or 1, help="Processes. Default: all cores.")
+@quiet_option
+@json_option
+def symmetry(
+    models: tuple[str, ...],
+    backends: tuple[str, ...],
+    methods: tuple[str, ...],
+    kinds: tuple[str, ...],
+    by_method: bool,
+    max_steps: int,
+    builds: Path,
+    workers: int,
+    quiet: bool,
+    as_json: bool,
+) -> None:
+    """Run models under a change of the start time, of the units, of all signs, of the order of declarations, and of the
+    frame of reference.  None of these may change a motion.  Without arguments, run all models of the project.
+
+    The table has the number of runs that differ and the number of runs.  The list below it has the first difference of
+    each run.
+
+    \b
+    Examples:
+      python -m benchmarks symmetry
+      python -m benchmarks symmetry sleds --change units --by-method
+      python -m benchmarks symmetry cart.py --backend python --backend native
+    """
+    sources = [Path(model) if model.endswith(".fmu") else find_source(model) for model in models] or all_models()
+    for source in sources:
+        if not source.is_file():
+            raise HarnessError(f"there is no file {source}: give a model name, a model file or an FMU")
+    terminal = Terminal(quiet, as_json)
+    tasks = [(source, backend) for source in sources for backend in (backends if source.suffix == ".py" else ("fmu",))]
+    outcomes: list[Outcome] = []
+    with terminal.progress(len(tasks)) as report:
+        pool = WorkerPool(workers, builds, [__name__])
+        builds.mkdir(parents=True, exist_ok=True)
+        try:
+            futures = {
+                pool.submit(run_task, source, backend, builds, kinds or KINDS, methods, max_steps): source.stem
+                for source, backend in tasks
+            }
+            waiting = set(futures)
+            while waiting:
+                for future in pool.wait_for_any(waiting) & waiting:
+                    waiting.discard(future)
+                    report(futures[future], 1.0)
+                    outcomes += future.result()
+                report("", 0.0)
+        finally:
+            pool.kill()
+    failed = [describe(outcome) for outcome in outcomes if outcome.difference]
+    terminal.print_result(as_data(outcomes), make_table(outcomes, by_method))
+    if not (quiet or as_json):
+        click.echo("\n".join([*list_reasons(outcomes), *failed]))
+    if failed:
+        raise HarnessError(f"{len(failed)} of {len([o for o in outcomes if not o.reason])} runs differ")
+
+
+def run_task(*arguments: Any) -> list[Outcome]:
+    """Run one model for one backend."""
+    return list(run_model(*arguments))
+
+
+def row_name(outcome: Outcome, by_method: bool) -> str:
+    """Return the name of the row of the table that counts an outcome."""
+    return f"{outcome.model} {outcome.method}" if by_method else outcome.model
+
+
+def count_differences(outcomes: Sequence[Outcome], by_method: bool = False) -> dict[str, dict[str, tuple[int, int]]]:
+    """Return the number of runs that differ and of all runs, by row and symmetry."""
+    rows: dict[str, dict[str, tuple[int, int]]] = {}
+    differing, total = Counter[tuple[str, str]](), Counter[tuple[str, str]]()
+    for outcome in outcomes:
+        row = rows.setdefault(row_name(outcome, by_method), {})
+        if outcome.kind and not outcome.reason:
+            key = row_name(outcome, by_method), outcome.kind
+            differing[key] += bool(outcome.difference)
+            total[key] += 1
+            row[outcome.kind] = differing[key], total[key]
+    return rows
+
+
+def make_table(outcomes: Sequence[Outcome], by_method: bool) -> Any:
+    """Return the table of all rows and symmetries."""
+    from rich.table import Table
+
+    rows = count_differences(outcomes, by_method)
+    kinds = [kind for kind in KINDS if any(kind in row for row in rows.values())]
+    table = Table("model", *kinds, title=f"{TITLE}: runs that differ, of all", title_justify="left")
+    for name, row in sorted(rows.items()):
+        table.add_row(name, *("{} of {}".format(*row[kind]) if kind in row else "-" for kind in kinds))
+    sums = [[row[kind] for row in rows.values() if kind in row] for kind in kinds]
+    table.add_row("all", *("{} of {}".format(*map(sum, zip(*column, strict=True))) for column in sums))
+    return table
+
+
+def list_reasons(outcomes: Sequence[Outcome]) -> list[str]:
+    """Return one sentence for each change that does not apply to a model."""
+    reasons: dict[tuple[str, str, str], list[str]] = {}
+    for outcome in outcomes:
+        if outcome.reason:
+            key = outcome.model, outcome.kind, outcome.reason
+            run = f"{outcome.method} {outcome.law}".strip()
+            runs = reasons.setdefault(key, [])
+            if run not in runs:
+                runs.append(run)
+    return [
+        f"{model}: {kind or 'no run'} left out, {reason} ({'; '.join(runs)})"
+        for (model, kind, reason), runs in reasons.items()
+    ]
+
+
+def describe(outcome: Outcome) -> str:
+    """Return one line with the first difference of a run."""
+    run = ", ".join(filter(None, (outcome.model, outcome.method, outcome.law, outcome.backend)))
+    return f"{run}; {outcome.text}: {outcome.difference}"
+
+
+def as_data(outcomes: Sequence[Outcome]) -> dict[str, Any]:
+    """Return the outcomes for JSON."""
+    counts = {
+        name: {kind: {"differing": differing, "runs": runs} for kind, (differing, runs) in row.items()}
+        for name, row in count_differences(outcomes).items()
+    }
+    return {"table": counts, "runs": [asdict(outcome) for outcome in outcomes]}
