@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from .model_text import SPEED, MovingFrame
+
 if TYPE_CHECKING:
     from .motion import FmuRuns, Motion
 
@@ -22,6 +24,9 @@ SCALES = (  # exponents of 2 of the units of mass, length and time
 )
 TIME, UNITS, MIRROR, ORDER, FRAME, LONG = "start time", "units", "mirror", "order", "frame", "long run"
 KINDS = (TIME, UNITS, MIRROR, ORDER, FRAME, LONG)
+
+# tolerances relative to that of the method: another order changes roundings, another frame the error of each step
+START_SLACK, ORDER_SLACK, FRAME_SLACK = 10.0, 100.0, 1000.0
 
 
 @dataclass(frozen=True)
@@ -47,7 +52,8 @@ class Change:
     slack : float
         Tolerance relative to that of the method.
     moving : mapping
-        Name of the column in the changed run, and speed in 1/s of its reference frame, for columns of another frame.
+        For columns in another frame of reference: the column in the changed run, and what is added to it to get the
+        original one: a number and a rate in 1/s.
     """
 
     kind: str
@@ -94,7 +100,26 @@ class Change:
 
 def shift_start(values: Mapping[str, Any], duration: float) -> list[Change]:
     """Return changes of the start time."""
-    return [Change(TIME, f"start {start:g} s", values, start, duration, slack=10.0) for start in START_TIMES]
+    return [Change(TIME, f"start {start:g} s", values, start, duration, slack=START_SLACK) for start in START_TIMES]
+
+
+def move_to_frame(
+    runs: "FmuRuns", frame: MovingFrame, base: "Motion", values: Mapping[str, Any], duration: float
+) -> Change:
+    """Return the change to a moving frame, whose speed is about the largest velocity; `runs` are those in the frame."""
+    speed = float(f"{0.7 * max(np.abs(base.columns[name]).max() for name in frame.velocities):.3g}") or 1.0
+    starts = {setter: float(base.columns[name][0]) - speed for name, setter in frame.start_values.items()}
+    moving = {name: (other, speed, 0.0) for name, other in frame.velocities.items()}
+    moving |= {name: (other, 0.0, speed) for name, other in frame.positions.items()}
+    return Change(
+        FRAME,
+        f"frame at {speed:g} {runs.variables[SPEED].unit}",
+        {**values, **starts, SPEED: speed},
+        0.0,
+        duration,
+        slack=FRAME_SLACK,
+        moving=moving,
+    )
 
 
 def scale_values(

@@ -80,7 +80,7 @@ def symmetry(
         builds.mkdir(parents=True, exist_ok=True)
         try:
             futures = {
-                pool.submit(run_task, source, backend, builds, kinds or KINDS, methods, max_steps): source.stem
+                pool.submit(run_model, source, backend, builds, kinds or KINDS, methods, max_steps): source.stem
                 for source, backend in tasks
             }
             waiting = set(futures)
@@ -98,11 +98,6 @@ def symmetry(
         click.echo("\n".join([*list_reasons(outcomes), *failed]))
     if failed:
         raise HarnessError(f"{len(failed)} of {len([o for o in outcomes if not o.reason])} runs differ")
-
-
-def run_task(*arguments: Any) -> list[Outcome]:
-    """Run one model for one backend."""
-    return list(run_model(*arguments))
 
 
 def row_name(outcome: Outcome, by_method: bool) -> str:

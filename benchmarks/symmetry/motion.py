@@ -11,10 +11,11 @@ from typing import Any, Self
 import numpy as np
 
 from harness.errors import HarnessError
-from harness.running.fmu_archive import read_description
+from harness.running.fmu_archive import read_description, unpack
 from harness.running.fmu_session import CALL_FAILURES, FmuSession
 from harness.running.recorder import default_outputs
-from harness.running.runner import build_trajectory, open_session, plan_run, record_run
+from harness.running.runner import build_trajectory, plan_run, record_run
+from harness.running.variable_values import enumeration_labels
 from harness.scenes.run_spec import RunSpec
 
 from .changes import Change
@@ -87,10 +88,12 @@ class FmuRuns:
         self.stack.close()
         self.session = None
 
-    def open(self, spec: RunSpec) -> FmuSession:
+    def open(self) -> FmuSession:
         """Return an instance that is not initialized."""
         if self.session is None:
-            self.session = self.stack.enter_context(open_session(spec))
+            folder = self.stack.enter_context(unpack(self.fmu))
+            self.session = FmuSession(self.description, folder)
+            self.stack.callback(self.session.close)
         else:
             self.session.reset()
         return self.session
@@ -103,6 +106,11 @@ class FmuRuns:
     def start_value(self, name: str) -> float:
         """Return the start value of a parameter or an input."""
         return float(self.variables[name].start)
+
+    @property
+    def methods(self) -> list[str]:
+        """Return the integration methods."""
+        return list(enumeration_labels(self.variables["solver.method"]).values())
 
     def run(self, values: Mapping[str, Any], start: float, stop: float, max_steps: int) -> Motion:
         """Run with these values from start to stop in s.
@@ -130,8 +138,7 @@ class FmuRuns:
             grid=(stop - start) / N_SAMPLES,
         )
         try:
-            session = self.open(spec)
-            plan = plan_run(spec, self.description)
+            session, plan = self.open(), plan_run(spec, self.description)
             session.initialize(plan.settings, start, stop)
             trajectory = build_trajectory(plan, session, record_run(plan, session, count_steps), 0.0)
         except (HarnessError, *CALL_FAILURES) as error:

@@ -1,6 +1,7 @@
 """All runs of a model under all changes."""
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import partial
 from itertools import product
@@ -11,14 +12,28 @@ from typing import Any
 from fmus.packaging import BuildError
 from fmus.packaging.model_lookup import MORE, model_names, more_model_names
 from harness.errors import HarnessError
+from harness.running.fmu_session import capture_stderr
 from harness.running.variable_values import enumeration_labels
 
 from .builds import PYTHON, build
-from .changes import MIRROR, ORDER, TIME, UNITS, Change, invert_signs, scale_units, shift_start
+from .changes import (
+    FRAME,
+    LONG,
+    ORDER,
+    ORDER_SLACK,
+    TIME,
+    UNITS,
+    Change,
+    invert_signs,
+    move_to_frame,
+    scale_units,
+    shift_start,
+)
 from .equations import Equations
-from .model_text import reverse_declarations
+from .model_text import move_frame, reverse_declarations
 from .motion import FmuRuns, Motion, TooManyStepsError, find_difference
 
+HYBRID = "hybrid"  # law of friction
 MAX_STEPS = 4000  # of a run; longer ones are shortened
 ROUNDING = 1e-12  # relative tolerance of the closed form
 
@@ -56,7 +71,7 @@ def model_label(source: Path) -> str:
     return f"{source.parent.name}/{name}" if not is_shipped and name in model_names() + more_model_names() else name
 
 
-def list_choices(runs: FmuRuns, methods: Iterable[str] = ()) -> list[dict[str, str]]:
+def list_choices(runs: FmuRuns, methods: Sequence[str] = ()) -> list[dict[str, str]]:
     """Return all combinations of the enumerations of an FMU, by label; only these methods if any are given."""
     labels = {
         name: list(enumeration_labels(variable).values())
@@ -92,10 +107,10 @@ def run_model(
     source: Path,
     backend: str,
     folder: Path,
-    kinds: Iterable[str],
-    methods: Iterable[str] = (),
+    kinds: Sequence[str],
+    methods: Sequence[str] = (),
     max_steps: int = MAX_STEPS,
-) -> Iterator[Outcome]:
+) -> list[Outcome]:
     """Run one model under all changes, for each combination of its choices.
 
     Parameters
@@ -106,74 +121,105 @@ def run_model(
         One of BACKENDS.
     folder : path
         Folder of the built FMUs.
-    kinds : iterable of str
+    kinds : sequence of str
         Symmetries to examine.
-    methods : iterable of str
+    methods : sequence of str
         Integration methods; empty for all.
     max_steps : int
         Steps after which a run is shortened.
     """
-    kinds = [*kinds]
-    if source.suffix == ".fmu":
-        fmu = python_fmu = source
-        other: Path | str = "needs the model file"
-    else:
-        fmu, python_fmu = build(source, backend, folder), build(source, PYTHON, folder)
-        other = build_variant(source, backend, folder) if ORDER in kinds else ""
-    try:
-        equations: Equations | str = Equations(python_fmu)
-    except HarnessError as error:
-        equations = str(error)
-    with FmuRuns(fmu) as runs:
-        for values in list_choices(runs, methods):
-            law = ", ".join(value for name, value in values.items() if name != "solver.method")
-            outcome = partial(Outcome, model_label(source), backend, values["solver.method"], law)
-            base, duration = run_shortened(runs, values, max_steps)
-            if base.failure:
-                yield outcome("", "", reason=base.failure)
+    with ExitStack() as stack:
+        stack.enter_context(capture_stderr())
+        model = Model(source, backend, folder, kinds, max_steps, stack)
+        return [outcome for values in list_choices(model.runs, methods) for outcome in model.examine(values)]
+
+
+class Model:
+    """The FMUs of a model: as it is, with declarations in another order, and in a moving frame.
+
+    Parameters
+    ----------
+    source, backend, folder, kinds, max_steps
+        As in `run_model`.
+    stack : contextlib.ExitStack
+        Closes the FMUs.
+    """
+
+    def __init__(
+        self, source: Path, backend: str, folder: Path, kinds: Sequence[str], max_steps: int, stack: ExitStack
+    ) -> None:
+        self.label, self.backend, self.kinds, self.max_steps = model_label(source), backend, kinds, max_steps
+        is_source = source.suffix == ".py"
+        self.runs = stack.enter_context(FmuRuns(build(source, backend, folder) if is_source else source))
+        self.equations: Equations | str
+        try:
+            self.equations = Equations(build(source, PYTHON, folder) if is_source else source)
+        except HarnessError as error:
+            self.equations = str(error)
+        text = source.read_text() if is_source else ""
+        self.frame = move_frame(text) if is_source else None
+        texts = {ORDER: reverse_declarations(text) if is_source else "", FRAME: self.frame.text if self.frame else ""}
+        self.others: dict[str, FmuRuns | str] = {}
+        for kind in (kind for kind in texts if kind in kinds):
+            if not texts[kind]:
+                self.others[kind] = "no state is a velocity" if is_source else f"{source.name} is no model file"
                 continue
-            changes: list[Change] = shift_start(values, duration) if TIME in kinds else []
-            if UNITS in kinds:
-                hidden = equations if isinstance(equations, str) else equations.find_hidden_unit(runs, values)
-                if hidden:
-                    yield outcome(UNITS, "", reason=f"not scalable: {hidden}")
-                else:
-                    changes += scale_units(runs, values, duration)
-            if MIRROR in kinds:
-                odd = equations if isinstance(equations, str) else equations.find_odd_variables(runs, values)
-                if isinstance(odd, str):
-                    yield outcome(MIRROR, "", reason=f"no mirror image: {odd}")
-                else:
-                    changes.append(invert_signs(runs, values, duration, *odd))
-            states = [name for name in ([] if isinstance(equations, str) else equations.states) if name in runs.outputs]
-            compare = partial(compare_motions, base=base, states=states, rtol=effective_rtol(runs, values))
-            for change in changes:
-                yield outcome(change.kind, change.text, compare(runs, change, max_steps=4 * max_steps))
-            if ORDER in kinds:
-                if isinstance(other, str):
-                    yield outcome(ORDER, "", reason=other)
-                    continue
-                change = Change(ORDER, "declarations reversed", values, 0.0, duration, slack=100.0)
-                with FmuRuns(other) as other_runs:
-                    yield outcome(ORDER, change.text, compare(other_runs, change, max_steps=4 * max_steps))
+            variant = folder / "variants" / f"{kind}-{source.parent.name}" / source.name
+            variant.parent.mkdir(parents=True, exist_ok=True)
+            variant.write_text(texts[kind])
+            try:
+                self.others[kind] = stack.enter_context(FmuRuns(build(variant, backend, folder)))
+            except BuildError as error:
+                self.others[kind] = str(error)
 
+    def examine(self, values: Mapping[str, str]) -> Iterator[Outcome]:
+        """Run with one combination of choices under all changes."""
+        law = ", ".join(value for name, value in values.items() if name != "solver.method")
+        outcome = partial(Outcome, self.label, self.backend, values["solver.method"], law)
+        base, duration = run_shortened(self.runs, values, self.max_steps)
+        if base.failure:
+            yield outcome("", "", reason=base.failure)
+            return
+        states = [] if isinstance(self.equations, str) else self.equations.states
+        rtol = effective_rtol(self.runs, values)
+        for kind in self.kinds:
+            changes = self.list_changes(kind, values, base, duration)
+            if isinstance(changes, str):
+                yield outcome(kind, "", reason=changes)
+                continue
+            for runs, change in changes:
+                try:
+                    changed = runs.run(change.values, change.start, change.stop, 4 * self.max_steps)
+                    difference = find_difference(base, changed, change, states, rtol)
+                except TooManyStepsError as error:
+                    difference = f"stalls: {error}"
+                yield outcome(kind, change.text, difference)
 
-def compare_motions(runs: FmuRuns, change: Change, base: Motion, states: list[str], rtol: float, max_steps: int) -> str:
-    """Return the first difference between a motion and what it must be after a change; empty if there is none."""
-    try:
-        changed = runs.run(change.values, change.start, change.stop, max_steps)
-    except TooManyStepsError as error:
-        return f"stalls: {error}"
-    return find_difference(base, changed, change, states, rtol)
-
-
-def build_variant(source: Path, backend: str, folder: Path) -> Path | str:
-    """Return the FMU of a model whose declarations are in another order, or why there is none."""
-    text = reverse_declarations(source.read_text())
-    variant = folder / "reversed" / source.parent.name / source.name
-    variant.parent.mkdir(parents=True, exist_ok=True)
-    variant.write_text(text)
-    try:
-        return build(variant, backend, folder)
-    except BuildError as error:
-        return f"no other order: {error}"
+    def list_changes(
+        self, kind: str, values: Mapping[str, str], base: Motion, duration: float
+    ) -> list[tuple[FmuRuns, Change]] | str:
+        """Return the changes of a run, each with the FMU that is run; or why there are none."""
+        runs, law = self.runs, values.get("friction", HYBRID)
+        if kind == TIME:
+            return [(runs, change) for change in shift_start(values, duration)]
+        if kind == LONG:
+            return "not examined here"
+        if kind in self.others:
+            other = self.others[kind]
+            if isinstance(other, str):
+                return other
+            if values["solver.method"] not in other.methods:
+                return f"the changed model has no method {values['solver.method']}"
+            if kind == ORDER:
+                return [(other, Change(ORDER, "declarations reversed", values, 0.0, duration, slack=ORDER_SLACK))]
+            assert self.frame
+            if law != HYBRID:
+                return f"the law {law} chatters"
+            return [(other, move_to_frame(other, self.frame, base, values, duration))]
+        if isinstance(self.equations, str):
+            return self.equations
+        if kind == UNITS:
+            hidden = self.equations.find_hidden_unit(runs, values)
+            return f"not scalable: {hidden}" if hidden else [(runs, c) for c in scale_units(runs, values, duration)]
+        odd = self.equations.find_odd_variables(runs, values)
+        return odd if isinstance(odd, str) else [(runs, invert_signs(runs, values, duration, *odd))]
