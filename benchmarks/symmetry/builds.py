@@ -23,10 +23,18 @@ def all_models() -> list[Path]:
     return [*shipped, *more, *sorted(EXAMPLES.rglob("*.py"))]
 
 
+def model_label(source: Path) -> str:
+    """Return the name of a model; with its folder, if a shipped model has the same name."""
+    name = source.stem
+    is_shipped = source.suffix == ".fmu" or source.parent in (MORE, MORE.parent)
+    return f"{source.parent.name}/{name}" if not is_shipped and name in model_names() + more_model_names() else name
+
+
 def find_source(model: str) -> Path:
-    """Return the file of a model, given by its name or its path; raise HarnessError if there is none."""
+    """Return the file of a model, given by its label or its path; raise HarnessError if there is none."""
+    labels = {model_label(path): path for path in all_models()}
     try:
-        return find_model(model).path
+        return labels[model] if model in labels else find_model(model).path
     except BuildError as error:
         raise HarnessError(str(error)) from None
 

@@ -106,8 +106,9 @@ def shift_start(values: Mapping[str, Any], duration: float) -> list[Change]:
 def move_to_frame(
     runs: "FmuRuns", frame: MovingFrame, base: "Motion", values: Mapping[str, Any], duration: float
 ) -> Change:
-    """Return the change to a moving frame, whose speed is about the largest velocity; `runs` are those in the frame."""
-    speed = float(f"{0.7 * max(np.abs(base.columns[name]).max() for name in frame.velocities):.3g}") or 1.0
+    """Return the change to a frame with a speed of the size of the velocities; `runs` are those in the frame."""
+    speeds = np.abs([base.columns[name] for name in frame.velocities])
+    speed = float(f"{np.median(speeds[speeds > 0.0]):.3g}") if speeds.any() else 1.0
     starts = {setter: float(base.columns[name][0]) - speed for name, setter in frame.start_values.items()}
     moving = {name: (other, speed, 0.0) for name, other in frame.velocities.items()}
     moving |= {name: (other, 0.0, speed) for name, other in frame.positions.items()}

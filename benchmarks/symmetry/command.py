@@ -9,12 +9,13 @@ from typing import Any
 
 import click
 
-from harness.commands.terminal import Terminal, json_option, quiet_option
+from harness.commands.terminal import POSITIVE, Terminal, json_option, quiet_option
 from harness.errors import HarnessError
 from harness.process.worker_pool import WorkerPool
 
 from .builds import BACKENDS, NATIVE, ROOT, all_models, find_source
 from .changes import KINDS
+from .long_run import DURATION
 from .study import MAX_STEPS, Outcome, run_model
 
 TITLE = "What a change of time, unit, sign or order changes"
@@ -35,6 +36,7 @@ SOURCES = (".py", ".fmu")
 @click.option("--change", "kinds", multiple=True, type=click.Choice(KINDS), help="Symmetry; repeatable. Default: all.")
 @click.option("--by-method", is_flag=True, help="Print one row for each model and method.")
 @click.option("--max-steps", default=MAX_STEPS, show_default=True, help="Steps after which a run is shortened.")
+@click.option("--long-run", type=POSITIVE, default=DURATION, show_default=True, help="Duration of the long run in s.")
 @click.option(
     "--builds",
     type=click.Path(file_okay=False, path_type=Path),
@@ -51,6 +53,7 @@ def symmetry(
     kinds: tuple[str, ...],
     by_method: bool,
     max_steps: int,
+    long_run: float,
     builds: Path,
     workers: int,
     quiet: bool,
@@ -80,7 +83,9 @@ def symmetry(
         builds.mkdir(parents=True, exist_ok=True)
         try:
             futures = {
-                pool.submit(run_model, source, backend, builds, kinds or KINDS, methods, max_steps): source.stem
+                pool.submit(
+                    run_model, source, backend, builds, kinds or KINDS, methods, max_steps, long_run
+                ): source.stem
                 for source, backend in tasks
             }
             waiting = set(futures)

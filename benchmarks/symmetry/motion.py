@@ -112,6 +112,12 @@ class FmuRuns:
         """Return the integration methods."""
         return list(enumeration_labels(self.variables["solver.method"]).values())
 
+    @property
+    def default_method(self) -> str:
+        """Return the integration method that the model chooses."""
+        variable = self.variables["solver.method"]
+        return enumeration_labels(variable)[int(variable.start)]
+
     def run(self, values: Mapping[str, Any], start: float, stop: float, max_steps: int) -> Motion:
         """Run with these values from start to stop in s.
 

@@ -1,6 +1,6 @@
 """All runs of a model under all changes."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import partial
@@ -10,12 +10,11 @@ from pathlib import Path
 from typing import Any
 
 from fmus.packaging import BuildError
-from fmus.packaging.model_lookup import MORE, model_names, more_model_names
 from harness.errors import HarnessError
 from harness.running.fmu_session import capture_stderr
 from harness.running.variable_values import enumeration_labels
 
-from .builds import PYTHON, build
+from .builds import PYTHON, build, model_label
 from .changes import (
     FRAME,
     LONG,
@@ -30,10 +29,12 @@ from .changes import (
     shift_start,
 )
 from .equations import Equations
+from .long_run import DURATION, find_irregular_period, record_events
 from .model_text import move_frame, reverse_declarations
 from .motion import FmuRuns, Motion, TooManyStepsError, find_difference
 
 HYBRID = "hybrid"  # law of friction
+STIFF = ("rodas", "radau9")  # methods for stiff problems
 MAX_STEPS = 4000  # of a run; longer ones are shortened
 ROUNDING = 1e-12  # relative tolerance of the closed form
 
@@ -62,13 +63,6 @@ class Outcome:
     text: str
     difference: str = ""
     reason: str = ""
-
-
-def model_label(source: Path) -> str:
-    """Return the name of a model; with its folder, if a shipped model has the same name."""
-    name = source.stem
-    is_shipped = source.suffix == ".fmu" or source.parent in (MORE, MORE.parent)
-    return f"{source.parent.name}/{name}" if not is_shipped and name in model_names() + more_model_names() else name
 
 
 def list_choices(runs: FmuRuns, methods: Sequence[str] = ()) -> list[dict[str, str]]:
@@ -110,6 +104,7 @@ def run_model(
     kinds: Sequence[str],
     methods: Sequence[str] = (),
     max_steps: int = MAX_STEPS,
+    long_run: float = DURATION,
 ) -> list[Outcome]:
     """Run one model under all changes, for each combination of its choices.
 
@@ -127,10 +122,12 @@ def run_model(
         Integration methods; empty for all.
     max_steps : int
         Steps after which a run is shortened.
+    long_run : float
+        Duration of the long run in s.
     """
     with ExitStack() as stack:
         stack.enter_context(capture_stderr())
-        model = Model(source, backend, folder, kinds, max_steps, stack)
+        model = Model(source, backend, folder, kinds, max_steps, long_run, stack)
         return [outcome for values in list_choices(model.runs, methods) for outcome in model.examine(values)]
 
 
@@ -139,15 +136,23 @@ class Model:
 
     Parameters
     ----------
-    source, backend, folder, kinds, max_steps
+    source, backend, folder, kinds, max_steps, long_run
         As in `run_model`.
     stack : contextlib.ExitStack
         Closes the FMUs.
     """
 
     def __init__(
-        self, source: Path, backend: str, folder: Path, kinds: Sequence[str], max_steps: int, stack: ExitStack
+        self,
+        source: Path,
+        backend: str,
+        folder: Path,
+        kinds: Sequence[str],
+        max_steps: int,
+        long_run: float,
+        stack: ExitStack,
     ) -> None:
+        self.long_run = long_run
         self.label, self.backend, self.kinds, self.max_steps = model_label(source), backend, kinds, max_steps
         is_source = source.suffix == ".py"
         self.runs = stack.enter_context(FmuRuns(build(source, backend, folder) if is_source else source))
@@ -183,6 +188,9 @@ class Model:
         states = [] if isinstance(self.equations, str) else self.equations.states
         rtol = effective_rtol(self.runs, values)
         for kind in self.kinds:
+            if kind == LONG:
+                yield self.examine_long_run(outcome, values, rtol)
+                continue
             changes = self.list_changes(kind, values, base, duration)
             if isinstance(changes, str):
                 yield outcome(kind, "", reason=changes)
@@ -195,6 +203,24 @@ class Model:
                     difference = f"stalls: {error}"
                 yield outcome(kind, change.text, difference)
 
+    def examine_long_run(self, outcome: Callable[..., Outcome], values: Mapping[str, str], rtol: float) -> Outcome:
+        """Run for a long time; only with the method of the model, because others need more steps."""
+        reason = ""
+        if not self.runs.modes or values.get("friction", HYBRID) != HYBRID:
+            reason = "there are no events"
+        elif values["solver.method"] != self.runs.default_method:
+            reason = f"only by the method of the model, {self.runs.default_method}"
+        if reason:
+            return outcome(LONG, "", reason=reason)
+        try:
+            times, modes = record_events(self.runs, values, self.long_run)
+        except HarnessError as error:
+            return outcome(LONG, f"{self.long_run:g} s", f"fails: {error}")
+        difference, has_period = find_irregular_period(times, modes, self.long_run, rtol)
+        if not has_period:
+            return outcome(LONG, "", reason="the motion has no period")
+        return outcome(LONG, f"{self.long_run:g} s", difference)
+
     def list_changes(
         self, kind: str, values: Mapping[str, str], base: Motion, duration: float
     ) -> list[tuple[FmuRuns, Change]] | str:
@@ -202,8 +228,6 @@ class Model:
         runs, law = self.runs, values.get("friction", HYBRID)
         if kind == TIME:
             return [(runs, change) for change in shift_start(values, duration)]
-        if kind == LONG:
-            return "not examined here"
         if kind in self.others:
             other = self.others[kind]
             if isinstance(other, str):
@@ -215,6 +239,8 @@ class Model:
             assert self.frame
             if law != HYBRID:
                 return f"the law {law} chatters"
+            if other.default_method in STIFF and values["solver.method"] not in STIFF:
+                return "a method for problems that are not stiff takes steps at the limit of its stability"
             return [(other, move_to_frame(other, self.frame, base, values, duration))]
         if isinstance(self.equations, str):
             return self.equations
