@@ -88,7 +88,7 @@ def find_irregular_period(times: np.ndarray, modes: np.ndarray, duration: float,
             return f"event {k} at {times[k]:.9g} s: another mode than a period before", True
         if abs(gap - usual) > tolerance * usual + 8 * ulp(times[k]):
             return (
-                f"event {k} at {times[k]:.9g} s: {gap:.9g} s after the same event of the period before, not {usual:.9g} s",
+                f"event {k} at {times[k]:.9g} s: {gap:.9g} s after that of the period before, not {usual:.9g} s",
                 True,
             )
     if duration - times[-1] > usual + tolerance * usual:
