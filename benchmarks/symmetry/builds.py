@@ -1,6 +1,7 @@
 """The FMUs of a model, built once for the present sources."""
 
 import sys
+from functools import cache
 from hashlib import sha256
 from pathlib import Path
 
@@ -39,6 +40,7 @@ def find_source(model: str) -> Path:
         raise HarnessError(str(error)) from None
 
 
+@cache
 def digest_sources() -> str:
     """Return a digest of all files that determine a build, besides the model."""
     digest = sha256()
@@ -48,7 +50,7 @@ def digest_sources() -> str:
     return digest.hexdigest()[:12]
 
 
-def build(source: Path, backend: str, folder: Path) -> Path:
+def build_fmu(folder: Path, source: Path, backend: str) -> Path:
     """Return the FMU of a model file for one backend; build it if `folder` does not have it.
 
     Raises

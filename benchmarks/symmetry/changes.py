@@ -1,6 +1,6 @@
 """What is changed in a run, and what the motion must then be."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -98,9 +98,9 @@ class Change:
         return plain if plain.sum() <= inverted.sum() else inverted
 
 
-def shift_start(values: Mapping[str, Any], duration: float) -> list[Change]:
+def shift_start(values: Mapping[str, Any], duration: float, starts: Sequence[float] = START_TIMES) -> list[Change]:
     """Return changes of the start time."""
-    return [Change(TIME, f"start {start:g} s", values, start, duration, slack=START_SLACK) for start in START_TIMES]
+    return [Change(TIME, f"start {start:g} s", values, start, duration, slack=START_SLACK) for start in starts]
 
 
 def move_to_frame(
@@ -148,19 +148,12 @@ def scale_values(
     return {**values, **scaled}, factors
 
 
-def scale_units(
-    runs: "FmuRuns", values: Mapping[str, Any], duration: float, scales: tuple[tuple[int, int, int], ...] = SCALES
-) -> list[Change]:
-    """Return changes of the units of mass, length and time."""
-    changes = []
-    for scale in scales:
-        scaled, factors = scale_values(runs, values, scale)
-        text = "kg 2^{} m 2^{} s 2^{}".format(*scale)
-        seconds = 2.0 ** scale[2]
-        changes.append(
-            Change(UNITS, text, scaled, 0.0, duration * seconds, seconds, factors, is_exact=True),
-        )
-    return changes
+def scale_units(runs: "FmuRuns", values: Mapping[str, Any], duration: float, scale: tuple[int, int, int]) -> Change:
+    """Return the change of the units of mass, length and time by powers of 2."""
+    scaled, factors = scale_values(runs, values, scale)
+    seconds = 2.0 ** scale[2]
+    text = "kg 2^{} m 2^{} s 2^{}".format(*scale)
+    return Change(UNITS, text, scaled, 0.0, duration * seconds, seconds, factors, is_exact=True)
 
 
 def invert_signs(

@@ -4,6 +4,7 @@ import os
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -13,10 +14,9 @@ from harness.commands.terminal import POSITIVE, Terminal, json_option, quiet_opt
 from harness.errors import HarnessError
 from harness.process.worker_pool import WorkerPool
 
-from .builds import BACKENDS, NATIVE, ROOT, all_models, find_source
+from .builds import BACKENDS, NATIVE, ROOT, all_models, build_fmu, find_source
 from .changes import KINDS
-from .long_run import DURATION
-from .study import MAX_STEPS, Outcome, run_model
+from .study import DEFAULT_OPTIONS, Options, Outcome, run_model
 
 TITLE = "What a change of time, unit, sign or order changes"
 SOURCES = (".py", ".fmu")
@@ -35,8 +35,16 @@ SOURCES = (".py", ".fmu")
 @click.option("--method", "methods", multiple=True, help="Integration method; repeatable. Default: all.")
 @click.option("--change", "kinds", multiple=True, type=click.Choice(KINDS), help="Symmetry; repeatable. Default: all.")
 @click.option("--by-method", is_flag=True, help="Print one row for each model and method.")
-@click.option("--max-steps", default=MAX_STEPS, show_default=True, help="Steps after which a run is shortened.")
-@click.option("--long-run", type=POSITIVE, default=DURATION, show_default=True, help="Duration of the long run in s.")
+@click.option(
+    "--max-steps", default=DEFAULT_OPTIONS.max_steps, show_default=True, help="Steps after which a run is shortened."
+)
+@click.option(
+    "--long-run",
+    type=POSITIVE,
+    default=DEFAULT_OPTIONS.long_run,
+    show_default=True,
+    help="Duration of the long run in s.",
+)
 @click.option(
     "--builds",
     type=click.Path(file_okay=False, path_type=Path),
@@ -77,17 +85,14 @@ def symmetry(
             raise HarnessError(f"there is no file {source}: give a model name, a model file or an FMU")
     terminal = Terminal(quiet, as_json)
     tasks = [(source, backend) for source in sources for backend in (backends if source.suffix == ".py" else ("fmu",))]
+    options = Options(max_steps=max_steps, long_run=long_run)
     outcomes: list[Outcome] = []
     with terminal.progress(len(tasks)) as report:
         pool = WorkerPool(workers, builds, [__name__])
         builds.mkdir(parents=True, exist_ok=True)
         try:
-            futures = {
-                pool.submit(
-                    run_model, source, backend, builds, kinds or KINDS, methods, max_steps, long_run
-                ): source.stem
-                for source, backend in tasks
-            }
+            arguments = partial(build_fmu, builds), kinds or KINDS, methods, options
+            futures = {pool.submit(run_model, *task, *arguments): task[0].stem for task in tasks}
             waiting = set(futures)
             while waiting:
                 for future in pool.wait_for_any(waiting) & waiting:

@@ -1,7 +1,7 @@
 """Events of a long run from 0 s: in a periodic motion, each period must have the events of the one before."""
 
 from collections.abc import Mapping
-from math import ulp
+from math import isfinite, ulp
 from typing import Any
 
 import numpy as np
@@ -40,7 +40,7 @@ def record_events(runs: FmuRuns, values: Mapping[str, Any], duration: float) -> 
         recorder.record(t)
         last = t_last.value
         while t < duration:
-            end = min(t_next.value, duration)
+            end = min(t_next.value, duration) if isfinite(t_next.value) else duration  # where the next step fails
             session.step(t, end - t)
             t = end
             recorder.record(t)

@@ -11,15 +11,18 @@ from typing import Any
 
 from fmus.packaging import BuildError
 from harness.errors import HarnessError
+from harness.process.temporary_directory import temporary_directory
 from harness.running.fmu_session import capture_stderr
 from harness.running.variable_values import enumeration_labels
 
-from .builds import PYTHON, build, model_label
+from .builds import PYTHON, model_label
 from .changes import (
     FRAME,
     LONG,
     ORDER,
     ORDER_SLACK,
+    SCALES,
+    START_TIMES,
     TIME,
     UNITS,
     Change,
@@ -35,7 +38,6 @@ from .motion import FmuRuns, Motion, TooManyStepsError, find_difference
 
 HYBRID = "hybrid"  # law of friction
 STIFF = ("rodas", "radau9")  # methods for stiff problems
-MAX_STEPS = 4000  # of a run; longer ones are shortened
 ROUNDING = 1e-12  # relative tolerance of the closed form
 
 
@@ -63,6 +65,23 @@ class Outcome:
     text: str
     difference: str = ""
     reason: str = ""
+
+
+@dataclass(frozen=True)
+class Options:
+    """What is run: steps after which a run is shortened, changes of start and units, and the length of a long run.
+
+    `starts` are in s, `scales` the exponents of 2 of mass, length and time, `long_run` in s.
+    """
+
+    max_steps: int = 4000
+    starts: Sequence[float] = START_TIMES
+    scales: Sequence[tuple[int, int, int]] = SCALES
+    long_run: float = DURATION
+
+
+DEFAULT_OPTIONS = Options()
+BuildFunction = Callable[[Path, str], Path]
 
 
 def list_choices(runs: FmuRuns, methods: Sequence[str] = ()) -> list[dict[str, str]]:
@@ -100,11 +119,10 @@ def effective_rtol(runs: FmuRuns, values: Mapping[str, Any]) -> float:
 def run_model(
     source: Path,
     backend: str,
-    folder: Path,
+    build: BuildFunction,
     kinds: Sequence[str],
     methods: Sequence[str] = (),
-    max_steps: int = MAX_STEPS,
-    long_run: float = DURATION,
+    options: Options = DEFAULT_OPTIONS,
 ) -> list[Outcome]:
     """Run one model under all changes, for each combination of its choices.
 
@@ -114,20 +132,17 @@ def run_model(
         Model file, or an FMU.
     backend : str
         One of BACKENDS.
-    folder : path
-        Folder of the built FMUs.
+    build : callable
+        Returns the FMU of a model file for a backend.
     kinds : sequence of str
         Symmetries to examine.
     methods : sequence of str
         Integration methods; empty for all.
-    max_steps : int
-        Steps after which a run is shortened.
-    long_run : float
-        Duration of the long run in s.
+    options : Options
     """
     with ExitStack() as stack:
         stack.enter_context(capture_stderr())
-        model = Model(source, backend, folder, kinds, max_steps, long_run, stack)
+        model = Model(source, backend, build, kinds, options, stack)
         return [outcome for values in list_choices(model.runs, methods) for outcome in model.examine(values)]
 
 
@@ -136,7 +151,7 @@ class Model:
 
     Parameters
     ----------
-    source, backend, folder, kinds, max_steps, long_run
+    source, backend, build, kinds, options
         As in `run_model`.
     stack : contextlib.ExitStack
         Closes the FMUs.
@@ -146,34 +161,33 @@ class Model:
         self,
         source: Path,
         backend: str,
-        folder: Path,
+        build: BuildFunction,
         kinds: Sequence[str],
-        max_steps: int,
-        long_run: float,
+        options: Options,
         stack: ExitStack,
     ) -> None:
-        self.long_run = long_run
-        self.label, self.backend, self.kinds, self.max_steps = model_label(source), backend, kinds, max_steps
+        self.label, self.backend, self.kinds, self.options = model_label(source), backend, kinds, options
         is_source = source.suffix == ".py"
-        self.runs = stack.enter_context(FmuRuns(build(source, backend, folder) if is_source else source))
+        self.runs = stack.enter_context(FmuRuns(build(source, backend) if is_source else source))
         self.equations: Equations | str
         try:
-            self.equations = Equations(build(source, PYTHON, folder) if is_source else source)
+            self.equations = Equations(build(source, PYTHON) if is_source else source)
         except HarnessError as error:
             self.equations = str(error)
         text = source.read_text() if is_source else ""
         self.frame = move_frame(text) if is_source else None
         texts = {ORDER: reverse_declarations(text) if is_source else "", FRAME: self.frame.text if self.frame else ""}
+        folder = stack.enter_context(temporary_directory("symmetry-"))
         self.others: dict[str, FmuRuns | str] = {}
         for kind in (kind for kind in texts if kind in kinds):
             if not texts[kind]:
                 self.others[kind] = "no state is a velocity" if is_source else f"{source.name} is no model file"
                 continue
-            variant = folder / "variants" / f"{kind}-{source.parent.name}" / source.name
-            variant.parent.mkdir(parents=True, exist_ok=True)
+            variant = folder / kind / source.name
+            variant.parent.mkdir()
             variant.write_text(texts[kind])
             try:
-                self.others[kind] = stack.enter_context(FmuRuns(build(variant, backend, folder)))
+                self.others[kind] = stack.enter_context(FmuRuns(build(variant, backend)))
             except BuildError as error:
                 self.others[kind] = str(error)
 
@@ -181,7 +195,7 @@ class Model:
         """Run with one combination of choices under all changes."""
         law = ", ".join(value for name, value in values.items() if name != "solver.method")
         outcome = partial(Outcome, self.label, self.backend, values["solver.method"], law)
-        base, duration = run_shortened(self.runs, values, self.max_steps)
+        base, duration = run_shortened(self.runs, values, self.options.max_steps)
         if base.failure:
             yield outcome("", "", reason=base.failure)
             return
@@ -197,7 +211,7 @@ class Model:
                 continue
             for runs, change in changes:
                 try:
-                    changed = runs.run(change.values, change.start, change.stop, 4 * self.max_steps)
+                    changed = runs.run(change.values, change.start, change.stop, 4 * self.options.max_steps)
                     difference = find_difference(base, changed, change, states, rtol)
                 except TooManyStepsError as error:
                     difference = f"stalls: {error}"
@@ -213,13 +227,15 @@ class Model:
         if reason:
             return outcome(LONG, "", reason=reason)
         try:
-            times, modes = record_events(self.runs, values, self.long_run)
+            times, modes = record_events(self.runs, values, self.options.long_run)
         except HarnessError as error:
-            return outcome(LONG, f"{self.long_run:g} s", f"fails: {error}")
-        difference, has_period = find_irregular_period(times, modes, self.long_run, rtol)
+            if "diverges" in str(error):
+                return outcome(LONG, "", reason="the motion diverges")
+            return outcome(LONG, f"{self.options.long_run:g} s", f"fails: {error}")
+        difference, has_period = find_irregular_period(times, modes, self.options.long_run, rtol)
         if not has_period:
             return outcome(LONG, "", reason="the motion has no period")
-        return outcome(LONG, f"{self.long_run:g} s", difference)
+        return outcome(LONG, f"{self.options.long_run:g} s", difference)
 
     def list_changes(
         self, kind: str, values: Mapping[str, str], base: Motion, duration: float
@@ -227,7 +243,7 @@ class Model:
         """Return the changes of a run, each with the FMU that is run; or why there are none."""
         runs, law = self.runs, values.get("friction", HYBRID)
         if kind == TIME:
-            return [(runs, change) for change in shift_start(values, duration)]
+            return [(runs, change) for change in shift_start(values, duration, self.options.starts)]
         if kind in self.others:
             other = self.others[kind]
             if isinstance(other, str):
@@ -246,6 +262,8 @@ class Model:
             return self.equations
         if kind == UNITS:
             hidden = self.equations.find_hidden_unit(runs, values)
-            return f"not scalable: {hidden}" if hidden else [(runs, c) for c in scale_units(runs, values, duration)]
+            if hidden:
+                return f"not scalable: {hidden}"
+            return [(runs, scale_units(runs, values, duration, scale)) for scale in self.options.scales]
         odd = self.equations.find_odd_variables(runs, values)
         return odd if isinstance(odd, str) else [(runs, invert_signs(runs, values, duration, *odd))]
