@@ -16,7 +16,7 @@ from harness.process.worker_pool import WorkerPool
 
 from .builds import BACKENDS, NATIVE, ROOT, all_models, build_fmu, find_source
 from .changes import KINDS
-from .study import DEFAULT_OPTIONS, Options, Outcome, run_model
+from .study import DEFAULT, Options, Outcome, run_model
 
 TITLE = "What a change of time, unit, sign or order changes"
 SOURCES = (".py", ".fmu")
@@ -35,15 +35,13 @@ SOURCES = (".py", ".fmu")
 @click.option("--method", "methods", multiple=True, help="Integration method; repeatable. Default: all.")
 @click.option("--change", "kinds", multiple=True, type=click.Choice(KINDS), help="Symmetry; repeatable. Default: all.")
 @click.option("--by-method", is_flag=True, help="Print one row for each model and method.")
-@click.option(
-    "--max-steps", default=DEFAULT_OPTIONS.max_steps, show_default=True, help="Steps after which a run is shortened."
-)
+@click.option("--max-steps", default=DEFAULT.max_steps, show_default=True, help="Steps after which a run is shortened.")
 @click.option(
     "--long-run",
     type=POSITIVE,
-    default=DEFAULT_OPTIONS.long_run,
+    default=DEFAULT.long_run,
     show_default=True,
-    help="Duration of the long run in s.",
+    help="Duration of the long run in s, which is done by the method of the model only.",
 )
 @click.option(
     "--builds",

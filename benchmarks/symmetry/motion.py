@@ -48,6 +48,11 @@ class Motion:
     counts: dict[str, int]
     failure: str = ""
 
+    @classmethod
+    def failed(cls, message: str) -> Self:
+        """Return a motion without points."""
+        return cls(np.zeros(0), {}, np.zeros(0), np.zeros((0, 0)), {}, message)
+
 
 class FmuRuns:
     """Runs of one FMU in one instance, which is reset before each run and replaced after a failure.
@@ -150,7 +155,7 @@ class FmuRuns:
         except (HarnessError, *CALL_FAILURES) as error:
             message = self.session.log.error_message if self.session else ""
             self.close()
-            return Motion(np.zeros(0), {}, np.zeros(0), np.zeros((0, 0)), {}, message or str(error))
+            return Motion.failed(message or str(error))
         except TooManyStepsError:
             self.close()
             raise
