@@ -2,7 +2,7 @@
 
 import os
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
@@ -12,6 +12,7 @@ import click
 
 from harness.commands.terminal import POSITIVE, Terminal, json_option, quiet_option
 from harness.errors import HarnessError
+from harness.process.temporary_directory import temporary_directory
 from harness.process.worker_pool import WorkerPool
 
 from .builds import BACKENDS, NATIVE, ROOT, all_models, build_fmu, find_source
@@ -83,29 +84,35 @@ def symmetry(
             raise HarnessError(f"there is no file {source}: give a model name, a model file or an FMU")
     terminal = Terminal(quiet, as_json)
     tasks = [(source, backend) for source in sources for backend in (backends if source.suffix == ".py" else ("fmu",))]
-    options = Options(max_steps=max_steps, long_run=long_run)
-    outcomes: list[Outcome] = []
+    arguments = partial(build_fmu, builds), kinds or KINDS, methods, Options(max_steps=max_steps, long_run=long_run)
     with terminal.progress(len(tasks)) as report:
-        pool = WorkerPool(workers, builds, [__name__])
-        builds.mkdir(parents=True, exist_ok=True)
-        try:
-            arguments = partial(build_fmu, builds), kinds or KINDS, methods, options
-            futures = {pool.submit(run_model, *task, *arguments): task[0].stem for task in tasks}
-            waiting = set(futures)
-            while waiting:
-                for future in pool.wait_for_any(waiting) & waiting:
-                    waiting.discard(future)
-                    report(futures[future], 1.0)
-                    outcomes += future.result()
-                report("", 0.0)
-        finally:
-            pool.kill()
+        outcomes = [outcome for found in run_tasks(tasks, arguments, workers, report) for outcome in found]
     failed = [describe(outcome) for outcome in outcomes if outcome.difference]
-    terminal.print_result(as_data(outcomes), make_table(outcomes, by_method))
+    terminal.print_result(as_data(outcomes), f"{TITLE}: runs that differ, of all", make_table(outcomes, by_method))
     if not (quiet or as_json):
         click.echo("\n".join([*list_reasons(outcomes), *failed]))
     if failed:
         raise HarnessError(f"{len(failed)} of {len([o for o in outcomes if not o.reason])} runs differ")
+
+
+def run_tasks(
+    tasks: Sequence[tuple[Path, str]], arguments: tuple[Any, ...], workers: int, report: Callable[[str, float], None]
+) -> Iterator[list[Outcome]]:
+    """Yield the outcomes of each model and backend; a single one runs in this process."""
+    if len(tasks) == 1:
+        yield run_model(*tasks[0], *arguments)
+        return
+    with temporary_directory("symmetry-") as folder:
+        pool = WorkerPool(min(workers, len(tasks)), folder, [__name__])
+        try:
+            futures = {pool.submit(run_model, *task, *arguments): task[0].stem for task in tasks}
+            while futures:
+                report(next(iter(futures.values())), 0.0)  # raises after Ctrl-C
+                for future in pool.wait_for_any([*futures]):
+                    report(futures.pop(future), 1.0)
+                    yield future.result()
+        finally:
+            pool.kill()
 
 
 def row_name(outcome: Outcome, by_method: bool) -> str:
@@ -133,7 +140,7 @@ def make_table(outcomes: Sequence[Outcome], by_method: bool) -> Any:
 
     rows = count_differences(outcomes, by_method)
     kinds = [kind for kind in KINDS if any(kind in row for row in rows.values())]
-    table = Table("model", *kinds, title=f"{TITLE}: runs that differ, of all", title_justify="left")
+    table = Table("model", *kinds)
     for name, row in sorted(rows.items()):
         table.add_row(name, *("{} of {}".format(*row[kind]) if kind in row else "-" for kind in kinds))
     sums = [[row[kind] for row in rows.values() if kind in row] for kind in kinds]

@@ -191,9 +191,9 @@ class Model:
             except BuildError as error:
                 self.others[kind] = str(error)
 
-    def examine(self, values: Mapping[str, str]) -> Iterator[Outcome]:
+    def examine(self, values: Mapping[str, Any]) -> Iterator[Outcome]:
         """Run with one combination of choices under all changes."""
-        law = ", ".join(value for name, value in values.items() if name != "solver.method")
+        law = ", ".join(str(value) for name, value in values.items() if name != "solver.method")
         outcome = partial(Outcome, self.label, self.backend, values["solver.method"], law)
         base, duration = run_shortened(self.runs, values, self.options.max_steps)
         if base.failure:
@@ -218,7 +218,7 @@ class Model:
                     difference = f"stalls: {error}"
                 yield outcome(kind, change.text, difference)
 
-    def examine_long_run(self, outcome: Callable[..., Outcome], values: Mapping[str, str], rtol: float) -> Outcome:
+    def examine_long_run(self, outcome: Callable[..., Outcome], values: Mapping[str, Any], rtol: float) -> Outcome:
         """Run for a long time and compare the periods."""
         if not self.runs.modes or values.get("friction", HYBRID) != HYBRID:
             return outcome(LONG, "", reason="there are no events")
@@ -234,7 +234,7 @@ class Model:
         return outcome(LONG, f"{self.options.long_run:g} s", difference)
 
     def list_changes(
-        self, kind: str, values: Mapping[str, str], base: Motion, duration: float
+        self, kind: str, values: Mapping[str, Any], base: Motion, duration: float
     ) -> list[tuple[FmuRuns, Change]] | str:
         """Return the changes of a run, each with the FMU that is run; or why there are none."""
         runs, law = self.runs, values.get("friction", HYBRID)

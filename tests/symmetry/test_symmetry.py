@@ -1,0 +1,107 @@
+"""A motion does not depend on its start time, the units, a mirror, the order of declarations and the frame."""
+
+import random
+from contextlib import redirect_stderr
+from io import StringIO
+
+import pytest
+from hypothesis import Phase, assume, given, settings
+from hypothesis import strategies as st
+from symmetry_models import KINDS, LABELS, examine, open_model
+
+from benchmarks.symmetry.builds import FMI3, NATIVE
+from benchmarks.symmetry.changes import FRAME, LONG, MIRROR, TIME, UNITS
+from benchmarks.symmetry.command import describe
+from benchmarks.symmetry.study import Options, list_choices
+
+FEW = {"max_steps": 400, "starts": (1e6, -1e3), "scales": ((0, -40, 0), (40, 20, 10))}
+MORE = {
+    "max_steps": 1000,
+    "starts": (1.0, 1e3, 1e6, -1e3),
+    "scales": ((0, -40, 0), (0, 40, 0), (0, 0, 40), (40, 20, 10)),
+}
+FEW_MODELS = {
+    "coulomb": ("exact", "ode45"),
+    "stickslip": ("exact", "ode23"),
+    "pendulum": ("dop853",),
+    "pacejka": ("radau9",),
+    "sleds": ("dop853",),
+    "belt": ("rodas",),
+}
+PERIODIC = {"stickslip": 1e5, "joint": 700.0, "forced": 300.0, "sleds": 500.0}  # duration in s
+HAVE_NONE = {  # no mirror image: a constant of one sign, or a number as start value; no frame: no state is a velocity
+    MIRROR: ("bumper", "clutch", "forced", "joint", "lift", "viscous_pendulum"),
+    FRAME: ("spring",),
+}
+
+
+@pytest.mark.parametrize("label", FEW_MODELS)
+def test_a_motion_depends_on_no_time_unit_sign_order_or_frame(label):
+    examined, differences = examine(label, methods=FEW_MODELS[label], **FEW)
+    assert examined == {*KINDS}
+    assert not differences
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("label", LABELS)
+def test_no_motion_of_any_method_and_law_depends_on_them(label):
+    examined, differences = examine(label, **MORE)
+    assert examined == {kind for kind in KINDS if label not in HAVE_NONE.get(kind, ())}
+    assert not differences
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("backend", [NATIVE, FMI3])
+@pytest.mark.parametrize("label", FEW_MODELS)
+def test_native_motions_depend_on_no_time_unit_or_sign(label, backend):
+    kinds = (TIME, UNITS, MIRROR)
+    examined, differences = examine(label, backend, kinds, FEW_MODELS[label], **MORE)
+    assert examined == {*kinds}
+    assert not differences
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("label", PERIODIC)
+def test_every_period_of_a_long_run_has_the_same_events(label):
+    examined, differences = examine(
+        label, NATIVE if label == "stickslip" else "python", (LONG,), long_run=PERIODIC[label]
+    )
+    assert examined == {LONG}
+    assert not differences
+
+
+def check_random_run(label, method, seed, start, scale):
+    """Check a run with parameters that differ from the defaults by random factors, and with random inputs."""
+    model, rng = open_model(label), random.Random(seed)
+    values = rng.choice(list_choices(model.runs, [method]))
+    for name, variable in model.runs.variables.items():
+        if variable.causality in ("parameter", "input") and name in model.runs.exponents and "." not in name:
+            values[name] = model.runs.start_value(name) * rng.uniform(0.8, 1.25)
+    model.options = Options(max_steps=400, starts=(start,), scales=(scale,))
+    with redirect_stderr(StringIO()):
+        outcomes = list(model.examine(values))
+    assume({TIME, UNITS} <= {outcome.kind for outcome in outcomes if not outcome.reason})  # else a rule refuses values
+    assert not [describe(outcome) for outcome in outcomes if outcome.difference]
+
+
+EXPONENTS = st.integers(-40, 40)
+PHASES = (Phase.explicit, Phase.generate)  # shrinking takes minutes and does not help
+ARGUMENTS = {
+    "case": st.sampled_from([(label, method) for label, methods in FEW_MODELS.items() for method in methods]),
+    "seed": st.integers(0, 1_000_000),
+    "start": st.floats(-1e6, 1e6),
+    "scale": st.tuples(EXPONENTS, EXPONENTS, EXPONENTS),
+}
+
+
+@settings(max_examples=4, deadline=None, derandomize=True, phases=PHASES)
+@given(**ARGUMENTS)
+def test_random_motions_depend_on_none_of_them(case, seed, start, scale):
+    check_random_run(*case, seed, start, scale)
+
+
+@pytest.mark.slow
+@settings(max_examples=60, deadline=None, phases=PHASES)
+@given(**ARGUMENTS)
+def test_many_random_motions_depend_on_none_of_them(case, seed, start, scale):
+    check_random_run(*case, seed, start, scale)
