@@ -1,7 +1,6 @@
 """symmetry: what a change of time, unit, sign or order changes."""
 
 import os
-from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict
 from functools import partial
@@ -36,6 +35,7 @@ SOURCES = (".py", ".fmu")
 @click.option("--method", "methods", multiple=True, help="Integration method; repeatable. Default: all.")
 @click.option("--change", "kinds", multiple=True, type=click.Choice(KINDS), help="Symmetry; repeatable. Default: all.")
 @click.option("--by-method", is_flag=True, help="Print one row for each model and method.")
+@click.option("--markdown", is_flag=True, help="Print the table in Markdown.")
 @click.option("--max-steps", default=DEFAULT.max_steps, show_default=True, help="Steps after which a run is shortened.")
 @click.option(
     "--long-run",
@@ -59,6 +59,7 @@ def symmetry(
     methods: tuple[str, ...],
     kinds: tuple[str, ...],
     by_method: bool,
+    markdown: bool,
     max_steps: int,
     long_run: float,
     builds: Path,
@@ -87,8 +88,14 @@ def symmetry(
     arguments = partial(build_fmu, builds), kinds or KINDS, methods, Options(max_steps=max_steps, long_run=long_run)
     with terminal.progress(len(tasks)) as report:
         outcomes = [outcome for found in run_tasks(tasks, arguments, workers, report) for outcome in found]
+    if missing := {*methods} - {outcome.method for outcome in outcomes}:
+        raise HarnessError(
+            f"no model has the method {min(missing)}: give a label of solver.method, as in --method dop853"
+        )
     failed = [describe(outcome) for outcome in outcomes if outcome.difference]
-    terminal.print_result(as_data(outcomes), f"{TITLE}: runs that differ, of all", make_table(outcomes, by_method))
+    cells = list_cells(count_differences(outcomes, by_method))
+    table = make_markdown(cells) if markdown else make_table(cells)
+    terminal.print_result(as_data(outcomes), f"{TITLE}: runs that differ, of all", table)
     if not (quiet or as_json):
         click.echo("\n".join([*list_reasons(outcomes), *failed]))
     if failed:
@@ -115,37 +122,48 @@ def run_tasks(
             pool.kill()
 
 
-def row_name(outcome: Outcome, by_method: bool) -> str:
-    """Return the name of the row of the table that counts an outcome."""
-    return f"{outcome.model} {outcome.method}" if by_method else outcome.model
+Counts = dict[str, dict[str, tuple[int, int]]]  # runs that differ, and all runs, by row and symmetry
 
 
-def count_differences(outcomes: Sequence[Outcome], by_method: bool = False) -> dict[str, dict[str, tuple[int, int]]]:
-    """Return the number of runs that differ and of all runs, by row and symmetry."""
-    rows: dict[str, dict[str, tuple[int, int]]] = {}
-    differing, total = Counter[tuple[str, str]](), Counter[tuple[str, str]]()
+def count_differences(outcomes: Sequence[Outcome], by_method: bool = False) -> Counts:
+    """Return the number of runs that differ and of all runs, by model, or by model and method, and by symmetry."""
+    rows: Counts = {}
     for outcome in outcomes:
-        row = rows.setdefault(row_name(outcome, by_method), {})
-        if outcome.kind and not outcome.reason:
-            key = row_name(outcome, by_method), outcome.kind
-            differing[key] += bool(outcome.difference)
-            total[key] += 1
-            row[outcome.kind] = differing[key], total[key]
-    return rows
+        row = rows.setdefault(f"{outcome.model} {outcome.method}" if by_method else outcome.model, {})
+        if not outcome.reason:
+            differing, runs = row.get(outcome.kind, (0, 0))
+            row[outcome.kind] = differing + bool(outcome.difference), runs + 1
+    return dict(sorted(rows.items()))
 
 
-def make_table(outcomes: Sequence[Outcome], by_method: bool) -> Any:
-    """Return the table of all rows and symmetries."""
+def list_cells(rows: Counts) -> list[list[str]]:
+    """Return the cells of the table: the heading, a row for each model, and the sums."""
+    kinds = [kind for kind in KINDS if any(kind in row for row in rows.values())]
+    sums: dict[str, tuple[int, int]] = {}
+    for kind in kinds:
+        counts = [row[kind] for row in rows.values() if kind in row]
+        sums[kind] = sum(differing for differing, _ in counts), sum(runs for _, runs in counts)
+    cells = [
+        [name, *("{} of {}".format(*row[kind]) if kind in row else "-" for kind in kinds)]
+        for name, row in (*rows.items(), ("all", sums))
+    ]
+    return [["model", *kinds], *cells]
+
+
+def make_table(cells: list[list[str]]) -> Any:
+    """Return the table for a terminal."""
     from rich.table import Table
 
-    rows = count_differences(outcomes, by_method)
-    kinds = [kind for kind in KINDS if any(kind in row for row in rows.values())]
-    table = Table("model", *kinds)
-    for name, row in sorted(rows.items()):
-        table.add_row(name, *("{} of {}".format(*row[kind]) if kind in row else "-" for kind in kinds))
-    sums = [[row[kind] for row in rows.values() if kind in row] for kind in kinds]
-    table.add_row("all", *("{} of {}".format(*map(sum, zip(*column, strict=True))) for column in sums))
+    table = Table(*cells[0])
+    for row in cells[1:]:
+        table.add_row(*row)
     return table
+
+
+def make_markdown(cells: list[list[str]]) -> str:
+    """Return the table for a page of the documentation."""
+    head, *rows = [f"| {' | '.join(row)} |" for row in cells]
+    return "\n".join([head, "|---" * len(cells[0]) + "|", *rows])
 
 
 def list_reasons(outcomes: Sequence[Outcome]) -> list[str]:

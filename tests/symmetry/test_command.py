@@ -69,6 +69,12 @@ def test_a_model_that_does_not_exist_is_refused(tmp_path, name, message):
     assert done.stderr.startswith(f"Error: {message}")
 
 
+def test_a_method_that_does_not_exist_is_refused(tmp_path, fmus):
+    done = run_command(tmp_path, fmus / "smd.fmu", "--method", "heun")
+    assert done.returncode == 1
+    assert done.stderr.startswith("Error: no model has the method heun")
+
+
 def test_an_fmu_without_its_model_file_is_examined(tmp_path, fmus):
     done = run_command(tmp_path, fmus / "smd.fmu", "--method", "exact")
     assert done.returncode == 0, done.stdout
