@@ -42,7 +42,7 @@ def harness(folder, *arguments, text="", blank=False, **environment):
     It reads `text` from standard input. With `blank`, its figures are empty files, because drawing takes most of a run.
     """
     with blank_figures() if blank else nullcontext():
-        return run_here(HARNESS, folder, arguments, text, environment)
+        return _run_here(HARNESS, folder, arguments, text, environment)
 
 
 def benchmarks(folder, *arguments, text="", **environment):
@@ -52,7 +52,7 @@ def benchmarks(folder, *arguments, text="", **environment):
 
 def build(*arguments, folder=ROOT, **environment):
     """Run `python build_fmus.py` in this process, in a folder, and return its exit status and output."""
-    return run_here(BUILD, folder, arguments, "", environment)
+    return _run_here(BUILD, folder, arguments, "", environment)
 
 
 def blank_figures():
@@ -60,8 +60,7 @@ def blank_figures():
     return patch("harness.results.style.save_figure", lambda figure, path: path.write_text(BLANK))
 
 
-def run_here(program, folder, arguments, text="", environment=None):
-    """Run a Program in this process, in a folder, and return its exit status and output."""
+def _run_here(program, folder, arguments, text, environment):
     runner = CliRunner(env=environment, catch_exceptions=False, capture="fd")
     words = to_words(arguments)
     with chdir(folder), patch("sys.argv", [program.name, *words]):

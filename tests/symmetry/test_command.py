@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from symmetry_models import build, examine
 
-from benchmarks.__main__ import main
 from benchmarks.symmetry.builds import PYTHON, all_models, find_source
 from benchmarks.symmetry.changes import FRAME, KINDS, MIRROR, ORDER, TIME, UNITS, Change
 from benchmarks.symmetry.equations import Equations
@@ -33,9 +32,6 @@ class Cart(Model):
 """
 
 
-BENCHMARKS = commands.Program(main, "python -m benchmarks")
-
-
 RATE = "the rate of y contains a number with a unit"
 
 
@@ -46,7 +42,7 @@ def write_cart(folder, start="", more="", term=""):
 
 
 def run_command(folder, *arguments):
-    return commands.run_here(BENCHMARKS, folder, ("symmetry", *arguments, "--builds", folder / "builds"))
+    return commands.benchmarks(folder, "symmetry", *arguments, "--builds", folder / "builds")
 
 
 def test_the_command_prints_counts_and_data(tmp_path):
