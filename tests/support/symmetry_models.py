@@ -37,9 +37,12 @@ def build(source, backend):
 
 
 def examine(label, backend=PYTHON, kinds=KINDS, methods=(), **options):
-    """Return the symmetries that were examined, and the first difference of each run that differs."""
+    """Return the runs, as (method, law), that were examined by symmetry, and the first differences."""
     outcomes = run_model(find_source(label), backend, build, kinds, methods, Options(**options))
-    examined = {outcome.kind for outcome in outcomes if outcome.kind and not outcome.reason}
+    examined = {}
+    for outcome in outcomes:
+        if not outcome.reason:
+            examined.setdefault(outcome.kind, set()).add((outcome.method, outcome.law))
     return examined, [describe(outcome) for outcome in outcomes if outcome.difference]
 
 
@@ -47,3 +50,12 @@ def examine(label, backend=PYTHON, kinds=KINDS, methods=(), **options):
 def open_model(label):
     """Return the Python FMUs of a model, open until the process ends."""
     return Model(find_source(label), PYTHON, build, KINDS, Options(), ExitStack())
+
+
+def table_of_the_page():
+    """Return the table of docs/explanation/accuracy.md: cells by model and symmetry."""
+    page = (build_cache.ROOT / "docs" / "explanation" / "accuracy.md").read_text()
+    _, _, text = page.partition("## What a change of time, unit, sign or order changes")
+    lines = [line.strip("| ").split(" | ") for line in text.splitlines() if line.startswith("| ")]
+    rows = lines[1 : [row[0] for row in lines].index("all") + 1]
+    return {row[0]: dict(zip(lines[0][1:], row[1:], strict=True)) for row in rows}
