@@ -139,10 +139,18 @@ def run_model(
     methods : sequence of str
         Integration methods; empty for all.
     options : Options
+
+    Raises
+    ------
+    HarnessError
+        If the model cannot be built.
     """
     with ExitStack() as stack:
         stack.enter_context(capture_stderr())
-        model = Model(source, backend, build, kinds, options, stack)
+        try:
+            model = Model(source, backend, build, kinds, options, stack)
+        except BuildError as error:
+            raise HarnessError(str(error)) from None
         return [outcome for values in list_choices(model.runs, methods) for outcome in model.examine(values)]
 
 

@@ -90,6 +90,13 @@ def test_a_number_with_a_unit_is_no_silent_pass(tmp_path, number, reason):
     assert done.stdout.splitlines()[-1].startswith(f"cart: units left out, not scalable: {reason} (")
 
 
+def test_a_model_that_does_not_build_is_refused(tmp_path):
+    done = run_command(tmp_path, write_cart(tmp_path, term="+ k"), "--backend", "python")
+    assert done.returncode == 1
+    assert done.stderr.startswith(f"Error: {tmp_path / 'cart.py'}, line ")
+    assert "Traceback" not in done.stderr
+
+
 def test_odd_variables_are_found():
     found = {}
     for label in ("stickslip", "belt", "rotor_brake"):
