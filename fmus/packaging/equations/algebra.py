@@ -11,7 +11,7 @@ from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from contextlib import suppress
 
 from .expressions import COMPARISONS, FUNCTIONS, Expression, ModelError, Operand, Term
-from .model_declaration import Output, Parameter
+from .model_declaration import Mode, Output, Parameter
 
 Memo = dict[int, Operand]
 ARITHMETIC: dict[str, Callable[[float, float], float]] = {
@@ -362,6 +362,8 @@ def rounding_scales(expressions: Sequence[Operand]) -> list[Operand]:
     for part in operands_first(*expressions, operands_of=value_operands):
         if not isinstance(part, Expression):
             scale = abs(part)
+        elif isinstance(part, Mode):
+            scale = 1.0
         elif isinstance(part, Output):
             scale = result[id(part.expression)]
         elif isinstance(part, Parameter) and (part.low >= 0.0 or part.above >= 0.0):

@@ -1,6 +1,6 @@
 """Generates the methods for integrators: rates, Jacobian, coefficients of the linear closed form."""
 
-from .algebra import build_term, depends_on, rounding_scale, substitute
+from .algebra import build_term, depends_on, rounding_scales, substitute
 from .codegen_context import CodegenContext, emit_return, emit_scales, method_source
 from .coupled_contact_methods import (
     derivative_unknown,
@@ -38,7 +38,7 @@ def rates_method(context: CodegenContext, of_terms: bool = False) -> str:
     if c is not None and THRESHOLD not in c.laws:
         targets = with_sliding_force(c, targets)
     if of_terms:
-        targets = emit_scales(context, printer, [rounding_scale(e) for e in targets])
+        targets = emit_scales(context, printer, rounding_scales(targets))
     if c is not None and THRESHOLD not in c.laws:
         context.emit_sign_mode(printer, c, targets)
     elif c is not None:
