@@ -13,6 +13,7 @@ from .algebra import (
     is_same_expression,
     is_summand,
     negate,
+    operands_first,
     path_to,
     solve_for,
     substitute,
@@ -112,9 +113,16 @@ class ContactAnalysis(ModelRoles):
 
     def derivative_while_sliding(self, e: Operand, by: dict[Expression, Operand]) -> Operand:
         """Return the derivative of an expression while all contacts slide."""
-        return self.derivative(
-            e, by | {c: build_term("*", c.mode, self.derivative(c.slide, by)) for c in self.contacts}
-        )
+        return self.derivative(e, by | {c: self.sliding_force_derivative(c, by) for c in self.contacts})
+
+    def sliding_force_derivative(self, c: Contact, by: dict[Expression, Operand]) -> Operand:
+        """Return the derivative of the friction force of a sliding contact.
+
+        At zero slip, where |slip| has a kink, it is the one on the side to which the contact slides.
+        """
+        derivative, sign_of_slip = self.derivative(c.slide, by), Term("copysign", 1.0, c.slip)
+        direction = {e: c.mode for e in operands_first(derivative) if is_same_expression(e, sign_of_slip)}
+        return build_term("*", c.mode, substitute(derivative, direction))
 
     @cached_property
     def rests_when_stuck(self) -> bool:

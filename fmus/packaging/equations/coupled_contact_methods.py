@@ -65,7 +65,7 @@ def force_unknown(context: CodegenContext) -> ContactUnknown:
 def derivative_unknown(context: CodegenContext, name: str, by: dict[Expression, Operand]) -> ContactUnknown:
     """Return the derivatives of the forces along `by` as unknowns."""
     analysis, fixed = context.analysis, by | dict.fromkeys(context.analysis.contacts, 0.0)
-    sliding_values = {c: build_term("*", c.mode, analysis.derivative(c.slide, by)) for c in analysis.contacts}
+    sliding_values = {c: analysis.sliding_force_derivative(c, by) for c in analysis.contacts}
     stuck_values = {
         c: analysis.derivative(analysis.load[c], by)
         if c in analysis.load
