@@ -65,12 +65,12 @@ def test_the_threshold_law_chatters_and_shows_the_published_slips(launch):
 def test_the_steps_of_the_threshold_law_depend_on_the_last_digits_of_a_parameter(launch):
     """This is why they differ from the published 10972, as the scene says."""
     counts = []
-    for ulps in (0, 3, 10, 1e3, 1e4):
+    for ulps in (0, 1, 2, 10, 3e4):
         choice = {"friction": THRESHOLD, "k": 742.5 * (1.0 + ulps * 2.0**-52)}
         times, _ = follow(launch, "stickslip", choice, 16.0, ("v",))
         counts.append(len(times))
     assert min(counts) == pytest.approx(7900, rel=0.05)
-    assert max(counts) == pytest.approx(11400, rel=0.05)
+    assert max(counts) == pytest.approx(11500, rel=0.05)
 
 
 @pytest.mark.parametrize(("name", "values"), [("smd", {}), ("coulomb", {}), ("coulomb", {"c": 2.0}), ("stickslip", {})])
