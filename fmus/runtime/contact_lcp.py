@@ -382,14 +382,19 @@ def predict_slips(model, t, y: StateVector, modes: ContactVector, h_max) -> Cont
     return model.slip_velocities(t + 2.0 * delta, y3)
 
 
-def contact_rates_ahead(
+def contact_balance_ahead(
     model, t, y: StateVector, modes: ContactVector, h_max
-) -> tuple[ContactVector, ContactVector, ContactVector, ContactVector]:
-    """Return the rates a short time ahead, which decide a tie where the rates at t are zero."""
+) -> tuple[ContactVector, ContactVector, ContactVector, ContactVector, ContactVector, ContactVector]:
+    """Return forces, holding limits and the terms of forces a short time ahead; rates of forces, limits and residuals.
+
+    They decide a tie where the rates at t are zero, or where the load touches the limit.
+    """
     delta = PREDICTION_SHARE * h_max
     f = model.rates(t, y, modes)
     y2 = y + delta * f
-    return model.contact_rates(t + delta, y2, modes)
+    force, limit, terms = model.contact_forces(t + delta, y2, modes)
+    force_rate, limit_rate, _residual_force, residual_force_rate = model.contact_rates(t + delta, y2, modes)
+    return force, limit, terms, force_rate, limit_rate, residual_force_rate
 
 
 def relock(
@@ -465,18 +470,28 @@ def violations(
     """Return how far each contact at rest violates the conditions of its mode (0: not at all), and its next mode.
 
     The next derivative decides ties, unless the contact was locked again.  Loads have the rounding errors of their
-    terms and, if they decrease, the relative error `tie_tolerance`.
+    terms and, if they decrease, the relative error `tie_tolerance`.  A contact also sticks where its load only touches
+    the limit: it does not exceed the limit now, nor a short time ahead, where it does not approach the limit either.
     """
     force, limit, terms = model.contact_forces(t, y, modes)
     force_rate, limit_rate, residual_force, residual_force_rate = model.contact_rates(t, y, modes)
-    later_force_rate, later_limit_rate, _, later_residual_rate = contact_rates_ahead(model, t, y, modes, h_max)
+    later_force, later_limit, later_terms, later_force_rate, later_limit_rate, later_residual_rate = (
+        contact_balance_ahead(model, t, y, modes, h_max)
+    )
     delta = PREDICTION_SHARE * h_max
     violation, next_modes = contact_vector(), contact_vector()
     for i in contact_indices:
         violation[i], next_modes[i] = 0.0, STUCK
         slack = ROUNDOFF_MARGIN * (terms[i] + limit[i])
         # without a lever, a load is unknown, except for no load at all
-        can_hold = limit[i] > 0.0 and not (model.has_variable_levers and ROUNDOFF_MARGIN * terms[i] > limit[i])
+        has_lever = not (model.has_variable_levers and ROUNDOFF_MARGIN * terms[i] > limit[i])
+        can_hold = limit[i] > 0.0 and has_lever
+        later_slack = ROUNDOFF_MARGIN * (later_terms[i] + later_limit[i])
+        approach = sign(later_force[i]) * later_force_rate[i] - later_limit_rate[i]
+        holds_later = later_limit[i] > 0.0 and fabs(later_force[i]) <= later_limit[i] + later_slack
+        holds_later = holds_later and approach * delta <= later_slack
+        is_within = fabs(force[i]) < limit[i] + slack or (force[i] == 0.0 and limit[i] == 0.0)
+        only_touches = has_lever and is_within and holds_later
         if status[i] != SLIPPING and modes[i] == STUCK:
             next_modes[i] = sign(force[i]) if fabs(force[i]) > slack else sign(force_rate[i])
             outward = next_modes[i] * force_rate[i] - limit_rate[i]
@@ -487,7 +502,9 @@ def violations(
                 slack = -slack
             elif outward < 0.0:
                 slack += tie_tolerance * limit[i]
-            if not can_hold:
+            if only_touches:
+                next_modes[i] = STUCK
+            elif not can_hold:
                 violation[i] = inf
                 if next_modes[i] == STUCK:
                     next_modes[i] = FORWARD
