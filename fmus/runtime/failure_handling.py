@@ -40,12 +40,12 @@ class FailureHandling:
         """Report why a communication step is refused; return False.
 
         The instance stays as it was.  The messages of invalid values become empty, because they were reported.  A host
-        that ignores refusals and repeats its mistake at every step gets one report: the time has not advanced since.
+        that sets the same invalid value at every step and ignores refusals gets one report: the time stays the same.
         """
         refusal = self.status_message(status, t, h), self.run.solver.t
-        if refusal != self.last_refusal:
-            self.last_refusal = refusal
+        if status != BAD_VALUE or refusal != self.last_refusal:
             self.report_error(refusal[0])
+        self.last_refusal = refusal
         self.invalid_values = dict.fromkeys(self.invalid_values, "")
         return False
 

@@ -175,10 +175,9 @@ def declarations(cls: type) -> list[VariableDeclaration]:
 def fmi_variables(model: Any, run: object) -> list[tuple[str, VariableDeclaration]]:
     """Return dotted name and declaration of every variable that an FMU offers: of the model, then of its run.
 
-    An enumeration with one item is no choice and is left out.  An FMU with Reals only offers integers as Reals, and no
-    enumeration: these keep their start values.
+    An FMU with Reals only offers integers as Reals, and no enumeration: these keep their start values.
     """
-    declared = [(name, meaning) for name, meaning in variables(model) + variables(run) if len(meaning.items) != 1]
+    declared = variables(model) + variables(run)
     if model.real_only:
         declared = [(name, as_real(meaning)) for name, meaning in declared if not meaning.items]
     return declared

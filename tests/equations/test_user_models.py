@@ -17,6 +17,7 @@ from worker_client import FmiError
 
 from fmus.packaging import BuildError
 from fmus.packaging.archive import build
+from fmus.packaging.model_description import REAL_ONLY_HINT
 from fmus.packaging.model_lookup import find_model
 
 EVERY_FILE = pytest.mark.parametrize("path", EXAMPLE_MODELS, ids=lambda path: path.stem)
@@ -396,7 +397,7 @@ def test_any_printable_text_survives_in_every_backend(kind, tmp_path, worker):
     described = read_model_description(tmp_path / kind / "texts.fmu")
     names = ("m", "k", "k_max", "f", "x", "v", "mode", "F_friction", "a")
     texts = {v.name: v.description for v in described.modelVariables if v.name in names}
-    assert described.description == SPECIAL
+    assert described.description == f"{SPECIAL} {REAL_ONLY_HINT}"
     assert texts == dict.fromkeys(names, SPECIAL) | {"mode": f"mode of F_friction: {SPECIAL}"}
     if kind == "native/fmi3":
         return  # its messages are those of the other native FMU

@@ -25,7 +25,7 @@ from fmus.packaging import BuildError
 from fmus.packaging.archive import write, zip_entries
 from fmus.packaging.embedded_modules import embedded_files, installed_package
 from fmus.packaging.fmi_variables import declared_variables
-from fmus.packaging.model_description import describe
+from fmus.packaging.model_description import REAL_ONLY_HINT, describe
 from fmus.packaging.model_lookup import find_model, model_names, more_model_names
 from fmus.runtime.integrator import Integrator
 from fmus.runtime.oscillator import Oscillator
@@ -383,7 +383,7 @@ def test_start_values_survive_the_xml_bit_for_bit():
     root = ElementTree.parse(BytesIO(text.encode())).getroot()
     assert root.find("ModelVariables/ScalarVariable/Real").get("start") == "0.30000000000000004"
     assert root.find("ModelVariables/ScalarVariable").get("description") == "A sum <&> 'more'."
-    assert root.get("description") == "A model that only has a description."
+    assert root.get("description") == f"A model that only has a description. {REAL_ONLY_HINT}"
 
 
 def test_the_guid_follows_the_content():

@@ -86,13 +86,6 @@ def test_a_host_that_repeats_its_mistake_gets_one_message(fmus, worker):
     assert worker.read_stderr().count("\n") == 1
 
 
-def test_an_enumeration_with_one_item_is_left_out(tmp_path):
-    done = build("coulomb", "--method", "exact", "--law", "hybrid", "--out", tmp_path)
-    assert done.returncode == 0, done.stderr
-    names = {variable.name for variable in read_model_description(tmp_path / "coulomb.fmu").modelVariables}
-    assert {"friction", "solver.method"} & names == set()
-
-
 @pytest.mark.parametrize(
     ("options", "sentence"),
     [

@@ -22,7 +22,7 @@ def test_five_models_take_less_than_600_kb_and_load_nothing(page):
 
 def test_a_model_unsuitable_for_the_page_is_reported_in_one_sentence(tmp_path):
     for words, sentence in (
-        (("--web", "--native"), "--web writes a page, not FMUs: remove --native, --platform and --fmi 3."),
+        (("--web", "--native"), "--web writes a page, not FMUs: remove --native, --real-only, --platform and --fmi 3."),
         (("--web", "nobody"), "There is no model 'nobody'"),
         (("--web", "smd", "--law", "sign"), "smd has no friction law 'sign'"),
     ):
