@@ -152,6 +152,7 @@ class VariableAccess(FailureHandling):
             self.set_invalid(name, "")
             call_sequence.note_change(self.run, self.model)
             setattr(owner, attribute, value)
+            self.last_refusal = "", nan  # the next refusal is one of other values
         else:
             self.set_invalid(name, messages.value_message(reason, name, declared, value))
 
