@@ -46,10 +46,10 @@ def test_an_inapplicable_column_states_the_reason():
 
 
 def test_two_peaks_of_a_mixed_law_report_the_assumed_loss():
-    assert "The two-peak values attribute the whole loss to one mechanism" in remarks_text(
+    assert "The values from two peaks are rough checks: each attributes the whole loss to one mechanism" in remarks_text(
         fit_decay(decay_record(0.02, 0.003, noise=1e-4), KnownParameters())
     )
-    assert "two-peak values" not in remarks_text(fit_decay(decay_record(0.02, noise=1e-4), KnownParameters()))
+    assert "two peaks" not in remarks_text(fit_decay(decay_record(0.02, noise=1e-4), KnownParameters()))
 
 
 def test_of_equal_extremes_the_first_is_the_reversal():

@@ -23,7 +23,7 @@ WHOLE = Summary(
     ("A sentence.",),
     (SummaryTable(("", "x [m]"), (("first", "1"), ("last", "2"))), SummaryTable(("a",), (("b",),), "folded")),
     "the figure in words",
-    Outcome("+2 %", "period differs by +2 %", True, 2.0),
+    Outcome("+2 %", "period differs by +2 %", True, 2.0, "published", "a book"),
     (Sketch("motion", "0.0,1.0 2.0,3.0", ("2.0,3.0 4.0,5.0",), 75.0), Sketch("phase", "0.0,1.0", (), None)),
     (MissingResult("another", "a command"),),
 )
