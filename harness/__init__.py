@@ -4,6 +4,14 @@ The functions of this module do what the commands of ``friction-fmus`` do, and r
 is printed. An error that a user can cause raises a subclass of `HarnessError`.
 """
 
+import os
+import sys
+
+if sys.argv[:1] == ["-m"]:  # of `python -m harness`, not yet replaced: a model in the working folder may be named math.py
+    HERE = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
+    if sys.path[0] != HERE:
+        sys.path += [HERE, sys.path.pop(0)]
+
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 

@@ -7,9 +7,6 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-if __name__ == "__main__" and Path(sys.path[0]) != Path(__file__).parents[1]:  # a model here may be named math.py
-    sys.path += [str(Path(__file__).parents[1]), sys.path.pop(0)]
-
 from .errors import HarnessError
 from .process.interrupt import interruptible
 
