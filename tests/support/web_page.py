@@ -92,7 +92,7 @@ class Page:
     def table(self, caption):
         """Return row heading -> cells of the table with this caption."""
         rows = "[...t.tBodies[0].rows].map(r => [...r.cells].map(c => c.textContent))"
-        find = f"[...document.querySelectorAll('table')].find(t => t.caption.textContent === {json.dumps(caption)})"
+        find = f"[...document.querySelectorAll('table')].find(t => t.caption?.textContent === {json.dumps(caption)})"
         return {head: cells for head, *cells in self.run(f"(t => {rows})({find})")}
 
     def wait(self, condition):
