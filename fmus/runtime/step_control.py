@@ -394,8 +394,14 @@ class InternalStep:
             if error * tolerance < ROUGH_ERROR:
                 # The proposal shows how large states become that are zero so far, and whose error is always large
                 # relative to what they reach.  A rate that is large relative to that shows an unstable proposal.
-                d = magnitude(f1) / size2
-                if h * max_of(d) < ROUGH_CHANGE:
+                # So does a change that the rates at neither end explain.
+                rate0, rate1 = magnitude(f), magnitude(f1)
+                change = y1 - y
+                change = magnitude(change)
+                most = elementwise_max(rate0, rate1)
+                excess = change - ROUGH_CHANGE * h * most
+                d = rate1 / size2
+                if h * max_of(d) < ROUGH_CHANGE and max_of(excess) <= 0.0:
                     self.raise_scale_floor(model, y1)
                     scale = elementwise_max(method.error_scale_floor, scale)
             if h <= h_min or attempts == MAX_TRIES:
