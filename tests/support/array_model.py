@@ -83,7 +83,7 @@ def call_with_scalars(cls, name, types):
     def call(self, t, *arguments):
         arguments = arguments[:-1] if ContactIndex in types.values() else arguments
         result = getattr(cls, name)(self, t, *numbers(arguments))
-        if name == "rates":
+        if name in ("rates", "rate_magnitudes"):
             y, result = arguments[0], iter(result if isinstance(result, tuple) else (result,))
             return np.array([next(result) if is_dynamic[i] else y[rate_index[i]] for i in state_indices])
         if name == "jacobian":
