@@ -116,6 +116,6 @@ function roundUp(value) {
 
 // Whether the default method of a model is the closed form.
 function isExact(modelInfo) {
-  const { items, start } = findVariable(modelInfo, "solver.method");
+  const { items = [], start } = findVariable(modelInfo, "solver.method") ?? {}; // no variable with a single method
   return items.some(({ label, value }) => label === "exact" && value === start);
 }
