@@ -69,7 +69,7 @@ def test_a_model_with_conditions_counts_them_too(worker, tmp_path):
     text = text.replace("k * (turn - phi))", "k * choose(turn > phi, turn - phi, 2 * (turn - phi)))")
     (tmp_path / "rotor_brake.py").write_text(text, encoding="utf-8")
     fmu = worker.instantiate(build_user_model(tmp_path / "rotor_brake.py") / "rotor_brake.fmu")
-    fmu.begin({"friction": THRESHOLD, "solver.rtol": RTOL, "omega_turn": 2.0, "c": 0.05, "omega0": -3.0}, stop=6.0)
+    fmu.begin({"friction": THRESHOLD, "solver.rtol": RTOL, "omega_turn": 2.0, "c": 0.05, "omega0": -12.0}, stop=6.0)
     t, rows = 0.0, [(0.0, fmu.get("grip"))]
     while t < 6.0:
         end = min(fmu.get("solver.t_next"), 6.0)
