@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import wraps
 from inspect import signature
+from math import inf, isfinite
 from operator import index
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
@@ -18,7 +19,6 @@ from .errors import SceneError, format_value, unknown_name_message
 if TYPE_CHECKING:
     import numpy as np
 
-INFINITY = float("inf")  # without math: `python -m harness` may start in a folder with a model math.py
 MAX_NAME_BYTES = 255  # of a part of a path, on common file systems
 MAX_WORKERS = 1024  # processes of a sweep
 MAX_RUNS = 10_000_000  # of a sweep
@@ -106,7 +106,7 @@ def real(value: Any) -> float:
     if isinstance(value, str | bytes | bytearray) or is_boolean(value) or is_array(value):
         raise TypeError
     number = float(value)
-    if not -INFINITY < number < INFINITY:
+    if not isfinite(number):
         raise ValueError
     return number
 
@@ -125,7 +125,7 @@ def at_least_zero(value: Any) -> float:
     return number
 
 
-def whole(low: int, high: float = INFINITY) -> Rule:
+def whole(low: int, high: float = inf) -> Rule:
     """Return the rule of a whole number from `low` to `high`."""
 
     def convert(value: Any) -> int:
@@ -133,7 +133,7 @@ def whole(low: int, high: float = INFINITY) -> Rule:
             raise ValueError
         return number
 
-    if high == INFINITY:
+    if high == inf:
         return Rule(f"a whole number of at least {low}", convert, int, f"x>={low}")
     return Rule(f"a whole number from {low} to {high}", convert, int, f"{low}<=x<={high}")
 
