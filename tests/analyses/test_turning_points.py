@@ -46,8 +46,9 @@ def test_an_inapplicable_column_states_the_reason():
 
 
 def test_two_peaks_of_a_mixed_law_report_the_assumed_loss():
-    assert "The values from two peaks are rough checks: each attributes the whole loss to one mechanism" in remarks_text(
-        fit_decay(decay_record(0.02, 0.003, noise=1e-4), KnownParameters())
+    assert (
+        "The values from two peaks are rough checks: each attributes the whole loss to one mechanism"
+        in remarks_text(fit_decay(decay_record(0.02, 0.003, noise=1e-4), KnownParameters()))
     )
     assert "two peaks" not in remarks_text(fit_decay(decay_record(0.02, noise=1e-4), KnownParameters()))
 

@@ -3,6 +3,7 @@
 import csv
 import json
 import os
+import re
 from math import cos, exp, sin, sqrt
 from pathlib import Path
 from types import SimpleNamespace
@@ -111,7 +112,7 @@ def test_booleans_integers_and_strings_are_recorded_drawn_and_set(run, tmp_path)
     assert {*rows["on"]} == {0, 1}
     assert rows["switched"][-1] == 3
     assert {*rows["says"]} == {"cold", "007 cold", "007 warm"}
-    assert "says: from cold to 007 " in done.stdout
+    assert re.search(r"^says +cold +007 ", done.stdout, re.M)
     done, rows = run("Switching", "--set", "enabled=FALSE", "--set", "most=3.0")
     assert_succeeded(done)
     assert not rows["on"][-1]
@@ -421,7 +422,7 @@ def test_unicode_names_and_missing_units_are_supported(run, external_fmu_folder,
     )
     done, _ = run("\u03c9.fmu", "--tolerance", "1e-3", blank=True)
     assert_succeeded(done)
-    assert "\u03c6, \u3042: from 1 to 0.99" in done.stdout
+    assert re.search("^\u03c6, \u3042 +1 +0.99", done.stdout, re.M)
 
 
 def test_a_file_that_would_fill_the_disk_is_not_unpacked(run, external_fmu_folder, tmp_path):
