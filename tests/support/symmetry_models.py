@@ -50,12 +50,3 @@ def examine(label, backend=PYTHON, kinds=KINDS, methods=(), **options):
 def open_model(label):
     """Return the Python FMUs of a model, open until the process ends."""
     return Model(find_source(label), PYTHON, build, KINDS, Options(), ExitStack())
-
-
-def table_of_the_page():
-    """Return the table of docs/explanation/accuracy.md: cells by model and symmetry."""
-    page = (build_cache.ROOT / "docs" / "explanation" / "accuracy.md").read_text()
-    _, _, text = page.partition("## What a change of time, unit, sign or order changes")
-    lines = [line.strip("| ").split(" | ") for line in text.splitlines() if line.startswith("| ")]
-    rows = lines[1 : [row[0] for row in lines].index("all") + 1]
-    return {row[0]: dict(zip(lines[0][1:], row[1:], strict=True)) for row in rows}
