@@ -7,10 +7,10 @@ from dataclasses import replace
 import commands
 import numpy as np
 import pytest
-from symmetry_models import KINDS, LABELS, build, examine, table_of_the_page
+from symmetry_models import build, examine
 
 from benchmarks.symmetry.builds import PYTHON, all_models, find_source
-from benchmarks.symmetry.changes import FRAME, LONG, MIRROR, ORDER, TIME, UNITS, Change
+from benchmarks.symmetry.changes import FRAME, MIRROR, ORDER, TIME, UNITS, Change
 from benchmarks.symmetry.equations import Equations
 from benchmarks.symmetry.long_run import find_irregular_period
 from benchmarks.symmetry.model_text import move_frame, reverse_declarations
@@ -212,9 +212,3 @@ def test_a_wrong_model_in_another_order_or_frame_is_found(tmp_path, monkeypatch)
     )
     _, differences = examine("sleds", kinds=(ORDER, FRAME), methods=("ode45",), max_steps=300)
     assert len(differences) == 2
-
-
-def test_the_page_has_a_row_for_every_model():
-    table = table_of_the_page()
-    assert [*table] == [*sorted(LABELS), "all"]
-    assert all({*row} <= {*KINDS, LONG} for row in table.values())
