@@ -53,7 +53,7 @@ PROGRAM = {  # additional source of a program, and options; no libraries of the 
     "aarch64-linux": ([], ["-rtlib=none"]),
 }
 CLOSE = dict.fromkeys(MODELS, 1e-11) | {
-    "pacejka": 1e-4  # acceleration: last digits of the C library decide on one step more or less
+    "pacejka": 1e-4  # acceleration; 1e-9 before the error scales followed the magnitudes, the cause is not examined
 }  # relative to the largest value of an output; breakaways amplify
 
 

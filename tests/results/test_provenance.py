@@ -402,7 +402,7 @@ def test_an_edited_provenance_file_chooses_no_folder_to_write(workspace, name):
     (workspace / "swing.csv").write_text("t [s],x [m]\n" + table)
     options, place = REPEATED[name]
     call = {"command": "harness", "date": "2026-11-27", "files": {}, "parameters": {}, "scene": None}
-    folder, victim = workspace / "theirs" / place, workspace / "mine" / place
+    folder, victim = workspace / "stranger" / place, workspace / "mine" / place
     for path in (folder, victim):
         path.mkdir(parents=True)
         (path / "provenance.json").write_text(json.dumps(call | {"call": {"name": name, "options": options}}))
@@ -429,24 +429,24 @@ def test_a_sweep_is_repeated_in_its_folder_whatever_it_names(workspace):
     pytest.importorskip("xarray")
     done = harness(workspace, "sweep", "smd", "--vary", "k=1,2", "--stop", 0.1, "--workers", 1, "--name", "mine")
     assert done.returncode == 0
-    theirs = shutil.copytree(workspace / "results/sweep/mine", workspace / "theirs/sweep/theirs")
-    provenance = read_provenance(theirs)
+    stranger = shutil.copytree(workspace / "results/sweep/mine", workspace / "stranger/sweep/stranger")
+    provenance = read_provenance(stranger)
     for name, value in (("name", "../../results/sweep/mine"), ("scheduler", "tcp://127.0.0.1:1")):
         provenance["call"]["options"][name] = value
-    (theirs / "provenance.json").write_text(json.dumps(provenance))
+    (stranger / "provenance.json").write_text(json.dumps(provenance))
     before = snapshot(workspace / "results")
-    done = harness(workspace, "run", "theirs/sweep/theirs")
+    done = harness(workspace, "run", "stranger/sweep/stranger")
     assert (done.returncode, done.stderr) == (0, "")
     assert snapshot(workspace / "results") == before
-    assert (theirs / "sweep.nc").exists()
+    assert (stranger / "sweep.nc").exists()
 
 
 def test_a_scene_is_repeated_in_its_folder_whatever_it_names(workspace):
     (workspace / "mine.toml").write_text(MINE)
     assert harness(workspace, "run", "mine.toml").returncode == 0
-    shutil.copytree(workspace / "results/mine", workspace / "results/theirs")
+    shutil.copytree(workspace / "results/mine", workspace / "results/stranger")
     before = snapshot(workspace / "results/mine")
-    done = harness(workspace, "run", "results/theirs")
+    done = harness(workspace, "run", "results/stranger")
     assert (done.returncode, done.stderr) == (0, "")
     assert snapshot(workspace / "results/mine") == before
-    assert "Results in results/theirs" in done.stdout
+    assert "Results in results/stranger" in done.stdout
