@@ -95,5 +95,5 @@ class FailureHandling:
 
 
 def lacks_value_after_failure(declared: VariableDeclaration) -> bool:
-    """Return whether a variable has no value after a failure: calculated Reals and outputs; counters keep their value."""
+    """Return whether a variable has no value after a failure: calculated Reals and outputs, but no counter."""
     return declared.causality == "output" or (declared.causality == "local" and declared.type == "Real")

@@ -190,15 +190,15 @@ def test_an_archive_avoids_factors_inline_values_and_unusual_names(run, scene):
 @pytest.mark.slow
 def test_an_external_archive_is_compared_with_its_finest_run(run, user_folder):
     done = commands.harness(
-        user_folder, "couple", run("driven") / "driven.ssp", "--stop", "0.5", "--out", "stranger", "--json", blank=True
+        user_folder, "couple", run("driven") / "driven.ssp", "--stop", "0.5", "--out", "theirs", "--json", blank=True
     )
     assert (done.returncode, done.stderr) == (0, "")
     result = json.loads(done.stdout)
     assert result["order"] > 0.8
     assert {name: item["failure"] for name, item in result["engines"].items()} == dict.fromkeys(ENGINES, "")
-    table = np.loadtxt(user_folder / "stranger/coupled/driven/trajectory.csv", delimiter=",", skiprows=1)
+    table = np.loadtxt(user_folder / "theirs/coupled/driven/trajectory.csv", delimiter=",", skiprows=1)
     expected = np.loadtxt(run("driven") / "trajectory.csv", delimiter=",", skiprows=1)
-    heads = (user_folder / "stranger/coupled/driven/trajectory.csv").read_text().splitlines()[0].split(",")
+    heads = (user_folder / "theirs/coupled/driven/trajectory.csv").read_text().splitlines()[0].split(",")
     column = heads.index("shaken.x [m]")
     assert table[-1, column] == pytest.approx(np.interp(0.5, expected[:, 0], expected[:, 4]), abs=1e-3)
 
