@@ -59,7 +59,7 @@ class CoupledFriction(DryFriction):
     def contact_forces(
         self, t: float, y: StateVector, modes: ContactVector
     ) -> tuple[ContactVector, ContactVector, ContactVector]:
-        """Return forces, holding limits, and the sums of the absolute terms of the forces."""
+        """Return forces, holding limits, and the sums of the absolute terms of both."""
 
     def contact_rates(
         self, t: float, y: StateVector, modes: ContactVector
@@ -87,8 +87,8 @@ def update_contact_event_functions(model, location, t, y: StateVector, modes: Co
         force, limit, terms = model.contact_forces(t, y, modes)
         for i in contact_indices:
             if modes[i] == STUCK:
-                limit_with_margin = limit[i] + ROUNDOFF_MARGIN * (terms[i] + limit[i])
-                location.scales[i] = location.scales[len(modes) + i] = terms[i] + limit[i]
+                limit_with_margin = limit[i] + ROUNDOFF_MARGIN * terms[i]
+                location.scales[i] = location.scales[len(modes) + i] = terms[i]
                 location.values[i] = limit_with_margin - force[i]
                 location.values[len(modes) + i] = limit_with_margin + force[i]
 
@@ -482,11 +482,11 @@ def violations(
     violation, next_modes = contact_vector(), contact_vector()
     for i in contact_indices:
         violation[i], next_modes[i] = 0.0, STUCK
-        slack = ROUNDOFF_MARGIN * (terms[i] + limit[i])
+        slack = ROUNDOFF_MARGIN * terms[i]
         # without a lever, a load is unknown, except for no load at all
         has_lever = not (model.has_variable_levers and ROUNDOFF_MARGIN * terms[i] > limit[i])
         can_hold = limit[i] > 0.0 and has_lever
-        later_slack = ROUNDOFF_MARGIN * (later_terms[i] + later_limit[i])
+        later_slack = ROUNDOFF_MARGIN * later_terms[i]
         approach = sign(later_force[i]) * later_force_rate[i] - later_limit_rate[i]
         holds_later = later_limit[i] > 0.0 and fabs(later_force[i]) <= later_limit[i] + later_slack
         holds_later = holds_later and approach * delta <= later_slack

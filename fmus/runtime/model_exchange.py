@@ -197,7 +197,7 @@ def update_indicators(run, model):
                     if not (force[i] == 0.0 and limit[i] == 0.0):  # without friction, a reversal is no event
                         to_rest[i] = solver.modes[i] * slips[i] + TINY
                 else:
-                    slack = ROUNDOFF_MARGIN * (terms[i] + limit[i])
+                    slack = ROUNDOFF_MARGIN * terms[i]
                     to_break_away[i] = limit[i] + slack + INDICATOR_OFFSET * limit[i] + TINY - fabs(force[i])
         else:
             for i in contact_indices:

@@ -34,7 +34,7 @@ class Chain(CoupledFriction):
         return np.linalg.solve(np.where(slides[:, None], np.eye(self.n), self.A), np.where(slides, modes * slide, b))
 
     def contact_forces(self, t, y, modes):
-        return self.solved(modes, self.b, self.slide), self.limit, np.abs(self.b)
+        return self.solved(modes, self.b, self.slide), self.limit, np.abs(self.b) + self.limit
 
     def contact_rates(self, t, y, modes):
         force, rate = self.solved(modes, self.b, self.slide), self.solved(modes, self.b_rate, 0.0)

@@ -223,14 +223,15 @@ def slip_deviation_method(context: CodegenContext) -> list[str]:
 
 
 def forces_method(context: CodegenContext) -> str:
-    """Forces, limits and rounding scales of the forces."""
+    """Forces, limits, and rounding scales of both together."""
     analysis, printer, forces = context.analysis, context.printer(), force_unknown(context)
     scales = rounding_scales([analysis.load.get(c, analysis.slip_rate[c]) for c in analysis.contacts])
-    sizes = [
-        scale if c in analysis.load else build_term("/", scale, analysis.divisor(c))
-        for c, scale in zip(analysis.contacts, scales, strict=True)
-    ]
     limits = [analysis.holding_limit[c] for c in analysis.contacts]
+    limit_scales = rounding_scales(limits)  # larger than the limits where terms of these cancel
+    sizes = [
+        build_term("+", scale if c in analysis.load else build_term("/", scale, analysis.divisor(c)), limit_scale)
+        for c, scale, limit_scale in zip(analysis.contacts, scales, limit_scales, strict=True)
+    ]
     context.emit_driver(printer, [*forces.terms, *limits])
     printer.count_uses(*forces.terms, *limits, *sizes)
     emit_solution(context, printer, [forces])
