@@ -52,9 +52,10 @@ PROGRAM = {  # additional source of a program, and options; no libraries of the 
     ),
     "aarch64-linux": ([], ["-rtlib=none"]),
 }
-CLOSE = dict.fromkeys(MODELS, 1e-11) | {
-    "pacejka": 1e-4  # acceleration; 1e-9 before the error scales followed the magnitudes, the cause is not examined
-}  # relative to the largest value of an output; breakaways amplify
+# Relative to the largest value of an output; breakaways amplify.  At rtol 1e-5, one last digit of k changes whether
+# radau9 rejects a step: the acceleration moves by up to 3e-5, a third of the error of the method.
+CLOSE = dict.fromkeys(MODELS, 1e-11) | {"pacejka": 1e-8}
+CLOSE_BY_RADAU9 = 1e-4
 
 
 def is_steady(case):
@@ -164,7 +165,8 @@ def test_results_agree_with_linux_on_x86(machine, name):
     cases = [case for case in STEADY if case[0] == name]
     for case, table, other in zip(cases, expected, actual, strict=True):
         print(f"{machine[0]} {label(case)}: largest difference {relative_difference(table, other):.1e}")
-        assert relative_difference(table, other) <= CLOSE[name]
+        bound = CLOSE_BY_RADAU9 if case[1]["solver.method"] == RADAU9 else CLOSE[name]
+        assert relative_difference(table, other) <= bound
 
 
 def relative_difference(table, other):
