@@ -7,9 +7,7 @@ is printed. An error that a user can cause raises a subclass of `HarnessError`.
 import os
 import sys
 
-if sys.argv[:1] == [
-    "-m"
-]:  # of `python -m harness`, not yet replaced: a model in the working folder may be named math.py
+if sys.argv[:1] == ["-m"]:  # python -m harness: no file of the working folder, such as a model math.py, is imported
     HERE = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
     if sys.path[0] != HERE:
         sys.path += [HERE, sys.path.pop(0)]

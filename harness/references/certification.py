@@ -22,7 +22,9 @@ from .models import CASES
 from .reference_trajectory import CommunicationGrid
 from .segments import ParameterSpan, ParameterValues
 
-METHODS = {"dop853": 2e-13, "rodas": 1e-12}  # an explicit and a stiff method, with their relative tolerances
+# An explicit and a stiff method, with their relative tolerances.  A step across a kink may pass the error estimate of a
+# method by chance (error 6e-9 at 1e-13 in one law with |slip|); then the methods disagree, and nothing is certified.
+METHODS = {"dop853": 2e-13, "rodas": 1e-12}
 AGREEMENT_TOLERANCE = 1e-9
 TIMEOUT = 120.0  # s, for each method
 
