@@ -132,6 +132,41 @@ def test_the_rounding_scale_of_loads_and_rates_bounds_them_and_their_rounding_er
                 assert abs(exact.of(e) - floats.of(e)) <= 16 * 2.0**-52 * scale
 
 
+GUIDED = """
+from fmus import Choice, Model, Output, Parameter, State, cos
+
+class Guided(Model):
+    'A body pulled by a guide.'
+
+    m = Parameter(2.0, "kg", "mass", above=0.0)
+    k = Parameter(3.0, "N/m", "stiffness", low=0.0)
+    wave = Parameter(0.7, "1/m", "wave number", low=0.0)
+    u = Parameter(0.2, "m/s", "speed of the guide")
+    guide = State("m", "position of the guide", rate=u)
+    law = Choice("law", plain="a spring", wavy="a spring with ripples")
+    x = State("m", "position")
+    v = State("m/s", "speed", rate_of=x)
+    pull = k * (guide - x)
+    a = Output("m/s2", "acceleration", law.choose(plain=pull, wavy=pull + pull * cos(wave * guide)) / m, rate_of=v)
+    stop_time = 1.0
+"""
+
+
+def test_magnitudes_of_rates_depend_on_a_choice_and_on_a_driver(tmp_path):
+    """They have the driver's own magnitude, and its position where a function takes it."""
+    file = tmp_path / "guided.py"
+    file.write_text(GUIDED)
+    analysis, model = find_model(file).analysis, find_model(file).model()
+    for values, t, at, _ in situations(analysis, model, 20):
+        guide = driver_positions(analysis, model, t)["guide"]
+        size = abs(model.x_base) + abs(model.u) * (abs(t) + abs(model.t_base))
+        pull, phase = model.k * (size + abs(at["x"])), model.wave * guide
+        factor = 1.0 + abs(math.cos(phase)) + abs(math.sin(phase)) * model.wave * size
+        factors = dict(zip(("plain", "wavy"), (1.0, factor), strict=True))
+        (label,) = (label for label, number, *_ in analysis.choices[0].items if number == values["law"])
+        assert model.rate_magnitudes(t, *at.values()) == pytest.approx(pull * factors[label] / model.m, rel=1e-12)
+
+
 @EVERY_SOURCE
 def test_jacobians_agree_with_differences_in_fifty_digits(source):
     """By time and by each state, sliding either way, from direct evaluation of the equations."""

@@ -166,11 +166,18 @@ class CodegenContext:
         test = tests[0]
         with printer.block(f"if {printer.text(test)}:"):
             printer.lines += self.return_lines(
-                self.printer(printer.depth, printer.on_trial), [substitute(e, {test: True}) for e in targets]
+                self.block_printer(printer), [substitute(e, {test: True}) for e in targets]
             )
         return printer.lines + self.return_lines(
-            self.printer(printer.depth, printer.on_trial), [substitute(e, {test: False}) for e in targets]
+            self.block_printer(printer), [substitute(e, {test: False}) for e in targets]
         )
+
+    def block_printer(self, outer: ExpressionPrinter) -> ExpressionPrinter:
+        """Create a printer for a block that knows the names of the lines before it."""
+        printer = self.printer(outer.depth, outer.on_trial)
+        printer.bound_names.update(outer.bound_names)
+        printer.used_names.update(outer.used_names)
+        return printer
 
 
 def emit_return(printer: ExpressionPrinter, targets: Sequence[Operand]) -> list[str]:
@@ -192,7 +199,7 @@ def emit_scales(context: CodegenContext, printer: ExpressionPrinter, sizes: list
     if driver is None or not any(depends_on(e, (driver,)) for e in sizes):
         return sizes
     scale = Expression()
-    scale.name = driver.name if driver not in printer.bound_names else printer.fresh_name(f"scale_of_{driver.name}")
+    scale.name = printer.fresh_name(f"scale_of_{driver.name}")
     printer.emit(
         f"{scale.name} = fabs(self.x_base) + fabs(self.{driver.constant_rate.name}) * (fabs(t) + fabs(self.t_base))"
     )

@@ -8,8 +8,8 @@ export const SIGN = { friction: 2 };
 const ODE23_METHOD = 2;
 const GRID_COINCIDENCE = 1e-9; // in grid steps: a grid point this close to the end of a solver step coincides with it
 
-// The solver ode23 with a relative tolerance.
-export const ode23 = (rtol) => ({ "solver.method": ODE23_METHOD, "solver.rtol": rtol });
+// The solver ode23 with a relative tolerance, and the absolute one in the ratio of MATLAB's defaults (1e-3 and 1e-6).
+export const ode23 = (rtol) => ({ "solver.method": ODE23_METHOD, "solver.rtol": rtol, "solver.atol": rtol / 1000 });
 
 // Return an instance of a model of its own, so that stories do not disturb each other.
 export async function createFmu(session, name) {
