@@ -27,7 +27,7 @@ WORK = {  # by command; all run in one folder, in this order
     ],
     "precision": ["precision smd --quick"],
     "stability": ["stability smd"],
-    "references": ["references belt.py"],
+    "references": ["build belt.py", "references belt.py"],
     "report": ["report"],
 }
 EXTRAS = {"sweep smd --vary c=1,2": "sweep", "couple two-masses": "coupled", "build --native smd": "native"}
