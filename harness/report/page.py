@@ -105,7 +105,7 @@ def render_page(
         "live": LIVE_PAGE.as_posix() if LIVE_PAGE.is_file() else "",
         "made": f"{date.today()} by {HARNESS} {package_version(HARNESS)}",
     }
-    size_without_files = len(render(content, sections, studies, Budget(0)).encode())
+    size_without_files = len(render(content, sections, studies, Budget(0)).encode(errors="replace"))
     return render(content, sections, studies, Budget(MAX_PAGE_BYTES - size_without_files))
 
 
