@@ -28,7 +28,7 @@ FEW_MODELS = {
     "sleds": ("dop853",),
     "belt": ("rodas",),
 }
-PERIODIC = {"stickslip": 1e5, "joint": 700.0, "forced": 300.0, "sleds": 500.0}  # duration in s
+PERIODIC = {"stickslip": 1e5, "joint": 700.0, "forced": 300.0, "sleds": 1000.0}  # duration in s
 HAVE_NONE = {  # no mirror image: a constant of one sign, or a number as start value; no frame: no state is a velocity
     MIRROR: ("bumper", "clutch", "forced", "joint", "lift", "viscous_pendulum"),
     FRAME: ("spring",),
