@@ -35,7 +35,7 @@ def child_nodes(node: ast.AST) -> list[ast.AST]:
     for name in CHILD_FIELDS[type(node)]:
         value = getattr(node, name, None)
         if isinstance(value, list):
-            result += [node_type for node_type in value if isinstance(node_type, ast.AST)]
+            result += [child for child in value if isinstance(child, ast.AST)]
         elif isinstance(value, ast.AST):
             result.append(value)
     return result
@@ -43,7 +43,7 @@ def child_nodes(node: ast.AST) -> list[ast.AST]:
 
 def child_statements(node: ast.AST) -> list[ast.stmt | ast.ExceptHandler]:
     """Return the statements directly inside a statement or a module; those of an exception handler are inside it."""
-    return [node_type for name in STATEMENT_FIELDS for node_type in getattr(node, name, ())]
+    return [statement for name in STATEMENT_FIELDS for statement in getattr(node, name, ())]
 
 
 def nested_statements(node: ast.AST) -> Iterator[ast.stmt | ast.ExceptHandler]:
@@ -72,9 +72,7 @@ class TreeTransformer:
         for name in CHILD_FIELDS[type(node)]:
             value = getattr(node, name, None)
             if isinstance(value, list):
-                result[name] = [
-                    self.visit(node_type) if isinstance(node_type, ast.AST) else node_type for node_type in value
-                ]
+                result[name] = [self.visit(child) if isinstance(child, ast.AST) else child for child in value]
             elif isinstance(value, ast.AST):
                 result[name] = self.visit(value)
         return replace_fields(node, **result) if result else node

@@ -222,8 +222,8 @@ class ExpressionTranslator(ast.NodeVisitor):
             return CExpression(BOOL, "!" + self.boolean(node.operand).as_operand(PRIMARY), UNARY)
         value = self.visit(node.operand)
         if isinstance(value.ctype, CompileTimeValue) and scalar_type_of(value.ctype.value) in (FLOAT, INT):
-            value_type: Any = value.ctype.value
-            return CExpression(CompileTimeValue(-value_type if isinstance(node.op, ast.USub) else value_type))
+            number: Any = value.ctype.value
+            return CExpression(CompileTimeValue(-number if isinstance(node.op, ast.USub) else number))
         if not isinstance(node.op, ast.USub):
             raise self.unsupported(node, "has an operator that cannot be translated to C", "remove the operator")
         return CExpression(self.arithmetic_operand(node.operand, value).ctype, "-" + value.as_operand(PRIMARY), UNARY)
