@@ -136,7 +136,7 @@ def time_many_runs(model_class: type) -> Benchmark:
         solver.start(model, 0.0, *model.initial_state(0.0), model.stop_time, model.tolerance)
         solver.advance(model, model.stop_time)
         solver.report(run.events)
-        return solver.x, solver.v, run.events.count
+        return solver.y_x, solver.y_v, run.events.count
 
     seconds = time_call(lambda: [run_to_stop(0.02 + 3e-6 * i) for i in range(RUNS)])
     problem = StickslipProblem()

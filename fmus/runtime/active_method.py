@@ -20,10 +20,11 @@ class ActiveMethod:
 
     error_scale_floor: StateVector
 
-    def __init__(self):
+    def __init__(self, model):
         self.error_scale_floor = 0.0
         self.floor_share, self.nominal_velocity = 0.0, inf  # share, 0.0 for a constant floor; limit for velocities
-        self.exact = LinearClosedForm()
+        if model.is_linear:
+            self.exact = LinearClosedForm(model.has_input_derivatives)
         for label, _, Method in methods:
             setattr(self, label, Method())
         self.method_number = self.stages = self.extra = 0

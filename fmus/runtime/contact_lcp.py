@@ -87,10 +87,10 @@ def update_contact_event_functions(model, location, t, y: StateVector, modes: Co
         force, limit, terms = model.contact_forces(t, y, modes)
         for i in contact_indices:
             if modes[i] == STUCK:
-                limit_with_margin = limit[i] + ROUNDOFF_MARGIN * terms[i]
+                widened_limit = limit[i] + ROUNDOFF_MARGIN * terms[i]
                 location.scales[i] = location.scales[len(modes) + i] = terms[i]
-                location.values[i] = limit_with_margin - force[i]
-                location.values[len(modes) + i] = limit_with_margin + force[i]
+                location.values[i] = widened_limit - force[i]
+                location.values[len(modes) + i] = widened_limit + force[i]
 
 
 def find_frictionless_contacts(model, location, step):

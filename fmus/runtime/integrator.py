@@ -52,7 +52,7 @@ class Integrator(VariableOwner):
 
     y: StateVector
     modes: ContactVector
-    modes_before_change: ContactVector
+    previous_modes: ContactVector
 
     def __init__(self, model):
         super().__init__()
@@ -65,7 +65,7 @@ class Integrator(VariableOwner):
         # time of the last change of values, and the counters and modes just before it
         self.t_change = nan
         self.n_rhs_before_change = self.n_events_before_change = 0
-        self.modes_before_change = STUCK
+        self.previous_modes = STUCK
         self.h_next_before_change = 0.0
         self.t_event_before_change = nan
 
@@ -137,19 +137,19 @@ class Integrator(VariableOwner):
                 counters.n_events,
                 step.h_next,
             )
-            self.t_event_before_change, self.modes_before_change = counters.t_event, self.modes
+            self.t_event_before_change, self.previous_modes = counters.t_event, self.modes
         if model.has_dry_friction or model.has_conditions:
             phase_repetition.restore_tolerance(step)
         self.apply_parameters(model)
         if model.has_dry_friction and step.is_hybrid and not model.is_coupled:
             for i in contact_indices:
-                if self.modes_before_change[i] * self.y[slip_index[i]] < 0.0:
+                if self.previous_modes[i] * self.y[slip_index[i]] < 0.0:
                     self.y[slip_index[i]] = 0.0  # a velocity against the mode of a slip phase is rounding
         if model.has_prescribed_slips and step.is_hybrid:
             deviations = model.slip_deviations(self.t, self.y)
-            self.y = contact_lcp.follow_inputs(model, self.t, self.y, self.modes_before_change, deviations)
-        step.start_empty_step(model, self.t, self.y, self.modes_before_change, step.tie_tolerance(model))
-        if model.has_dry_friction and any_of(step.modes1 != self.modes_before_change):
+            self.y = contact_lcp.follow_inputs(model, self.t, self.y, self.previous_modes, deviations)
+        step.start_empty_step(model, self.t, self.y, self.previous_modes, step.tie_tolerance(model))
+        if model.has_dry_friction and any_of(step.modes1 != self.previous_modes):
             step.count_event()
         self.move_to_step_end(model)
 

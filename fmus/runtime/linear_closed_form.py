@@ -29,9 +29,9 @@ MAX_LOG_GROWTH = 30.0  # of a growing motion in one segment, so that a divergenc
 class LinearClosedForm:
     """Constants of the oscillator, and the current segment, which starts at x0, v0 with the acceleration a0."""
 
-    def __init__(self):
+    def __init__(self, has_input_derivatives):
         self.regime = UNDAMPED
-        self.has_input_derivatives = True  # code generation inserts the flag of the model
+        self.has_input_derivatives = has_input_derivatives
         self.z = self.n2 = self.drift = self.q = 0.0
         self.w = self.upper_root = self.lower_root = 0.0
         self.oscillates = self.is_steady = False
@@ -39,7 +39,8 @@ class LinearClosedForm:
         self.max_duration = self.horizon = inf  # of a segment that grows, and of the current one
         self.may_end_early = False  # the next segment need not reach a standstill
         self.x0 = self.v0 = self.a0 = self.p = self.net = self.x_roundoff = 0.0
-        self.velocity_series = PowerSeries()  # of the velocity, for inputs of higher order
+        if self.has_input_derivatives:
+            self.velocity_series = PowerSeries()  # of the velocity, for inputs of higher order
 
     def prepare(self, m, c, k, drift):
         """Set the coefficients.

@@ -10,7 +10,7 @@ E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, IV.5 and IV.8;
 differential equations solved by Radau methods, J. Comp. Appl. Math. 111 (1999) 93-111 (iteration, error estimate).
 """
 
-from math import fabs, nan  # noqa: F401  fabs: used by the unrolled elimination
+from math import nan
 
 from .vectors import (
     ContactVector,

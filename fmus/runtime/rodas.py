@@ -11,8 +11,6 @@ E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, IV.7; G. Stein
 method RODASP, in: Progress in Differential-Algebraic Equations II, Springer 2020, 165-184 (coefficients).
 """
 
-from math import fabs, nan  # noqa: F401  used by the unrolled elimination for singular systems
-
 from .vectors import ContactVector, RateVector, StateVector, factorize, select_kinematic, solve_factored
 
 NUMBER, TEXT = 5, "Rosenbrock 4(3), L-stable; for stiff friction curves"

@@ -101,7 +101,7 @@ class InternalStep:
     modes1: ContactVector
 
     def __init__(self, model):
-        self.active_method = ActiveMethod()
+        self.active_method = ActiveMethod(model)
         if model.has_dry_friction or model.has_conditions:
             self.event_location = EventLocation(model.n_event_functions)
         # run: relative tolerance, largest step; stop time (inf if unknown); hybrid law

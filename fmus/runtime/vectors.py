@@ -10,6 +10,8 @@ from functools import wraps
 import numpy as np
 import numpy.typing as npt
 
+from . import linear_solver
+
 # Annotations that declare vectors over states, contacts or conditions, and the index of a contact.  A RateVector holds
 # the rates at the StateVector that is declared last before it, among the attributes of a class, the parameters of a
 # function and its results.  Scalars are not stored twice: those of its rates that are states are read from there.
@@ -29,8 +31,6 @@ slip_index: list[int] = []
 position_index: list[int] = []
 is_dynamic: list[bool] = []  # for each state: whether its rate is computed, not a state
 rate_index: list[int] = []  # index of the rate, where it is a state
-
-SMALL = 1e-6  # smallest ratio of a later pivot to its change by the elimination of another
 
 
 def state_vector() -> StateVector:
@@ -113,103 +113,52 @@ def elementwise(function):
 
 
 def factorize(g, h, J):
-    """Factorize 1 - g h J; packaging/lowering/elimination.py generates the same operations in scalars, without those on
-    entries that are always zero."""
-    w, inverse = np.zeros(J.shape), np.full(len(J), np.nan)
-    computed = [i for i in state_indices if is_dynamic[i]]
-    for i in computed:
-        for p in state_indices:
-            if not is_dynamic[p]:
-                w[i, p] = g * h * J[i, p]
-        for j in computed:
-            entry = J[i, j]
-            for p in state_indices:
-                if not is_dynamic[p] and rate_index[p] == j:
-                    entry = entry + w[i, p]
-            w[i, j] = 1.0 - g * h * entry if i == j else -g * h * entry
-    for n, k in enumerate(computed):
-        others = computed[n + 1 :]
-        if w[k, k] != 0.0 and all(abs(w[k, k] * w[i, i]) >= SMALL * abs(w[i, k] * w[k, i]) for i in others):
-            inverse[k] = g / w[k, k]
-        for i in computed[n + 1 :]:
-            w[i, k] = w[i, k] * inverse[k] / g
-            for j in computed[n + 1 :]:
-                w[i, j] = w[i, j] - w[i, k] * w[k, j]
-        for j in computed[n + 1 :]:
-            w[k, j] = w[k, j] / g
-    return g, h, w, inverse
+    """Factorize 1 - g h J."""
+    w = linear_solver.Entries()
+    with np.errstate(all="ignore"):
+        linear_solver.factorize(w, g, h, matrix_entries(J), computed_states(), kinematic_states())
+    return g, h, w
 
 
 def solve_factored(system, r) -> StateVector:
     """Solve (1 - g h J) k = g r for k."""
-    g, h, w, inverse = system
-    computed, k = [i for i in state_indices if is_dynamic[i]], np.zeros(len(r))
-    for n, i in enumerate(computed):
-        k[i] = r[i]
-        for p in state_indices:
-            if not is_dynamic[p]:
-                k[i] = k[i] + w[i, p] * r[p]
-        for j in computed[:n]:
-            k[i] = k[i] - w[i, j] * k[j]
-    for n, i in reversed(list(enumerate(computed))):
-        for j in computed[n + 1 :]:
-            k[i] = k[i] - w[i, j] * k[j]
-        k[i] = k[i] * inverse[i]
-    for p in state_indices:
-        if not is_dynamic[p]:
-            k[p] = g * (r[p] + h * k[rate_index[p]])
-    return k
+    g, h, w = system
+    k = linear_solver.Entries()
+    with np.errstate(all="ignore"):
+        linear_solver.solve(k, w, g, h, dict(enumerate(r)), computed_states(), kinematic_states())
+    return np.array([k[i] for i in state_indices])
 
 
 def factorize_complex(re, im, J):
-    """Factorize re + i im - J, after the elimination of states whose rate is a state; see elimination.py."""
-    n = len(J)
-    w, inverse = np.zeros((n, n, 2)), np.full((n, 2), np.nan)
-    computed = [i for i in state_indices if is_dynamic[i]]
-    g_re = 1.0 / (re + im * (im / re))  # reciprocal of the shift
-    g_im = -(im / re) * g_re
-    for i in computed:
-        for j in computed:
-            a, b = J[i, j], 0.0
-            for p in state_indices:
-                if not is_dynamic[p] and rate_index[p] == j:
-                    a, b = a + g_re * J[i, p], b + g_im * J[i, p]
-            w[i, j] = (re - a, im - b) if i == j else (-a, -b)
-    for n, k in enumerate(computed):
-        a, b = w[k, k]
-        size, others = a * a + b * b, computed[n + 1 :]
-        if size != 0.0 and all(
-            size * squared(w[i, i]) >= SMALL * SMALL * (squared(w[i, k]) * squared(w[k, i])) for i in others
-        ):
-            inverse[k] = a / size, -b / size
-        for i in computed[n + 1 :]:
-            w[i, k] = complex_product(w[i, k], inverse[k])
-            for j in computed[n + 1 :]:
-                w[i, j] = w[i, j] - complex_product(w[i, k], w[k, j])
-    return w, inverse
+    """Factorize re + i im - J, after the elimination of states whose rate is a state."""
+    w = linear_solver.Entries()
+    with np.errstate(all="ignore"):
+        linear_solver.factorize_complex(w, re, im, matrix_entries(J), computed_states(), kinematic_states())
+    return w
 
 
-def solve_complex(system, r, q) -> tuple[StateVector, StateVector]:
+def solve_complex(w, r, q) -> tuple[StateVector, StateVector]:
     """Solve for a right-hand side r + i q that is zero for states whose rate is a state; return both parts of the
     solution, for the other states only."""
-    w, inverse = system
-    computed, u = [i for i in state_indices if is_dynamic[i]], np.zeros((len(r), 2))
-    for n, i in enumerate(computed):
-        u[i] = r[i], q[i]
-        for j in computed[:n]:
-            u[i] = u[i] - complex_product(w[i, j], u[j])
-    for n, i in reversed(list(enumerate(computed))):
-        for j in computed[n + 1 :]:
-            u[i] = u[i] - complex_product(w[i, j], u[j])
-        u[i] = complex_product(u[i], inverse[i])
-    return u[:, 0], u[:, 1]
+    u, (re, im) = linear_solver.Entries(), np.zeros((2, len(r)))
+    right = {i: linear_solver.Complex(r[i], q[i]) for i in computed_states()}
+    with np.errstate(all="ignore"):
+        linear_solver.solve_complex(u, w, right, computed_states())
+    for i, value in u.items():
+        re[i], im[i] = value.re, value.im
+    return re, im
 
 
-def squared(a):
-    """Return the squared magnitude of a complex number."""
-    return a[0] * a[0] + a[1] * a[1]
+def computed_states():
+    """Return the indices of states whose rate is computed."""
+    return [i for i in state_indices if is_dynamic[i]]
 
 
-def complex_product(a, b):
-    """Multiply two complex numbers, each a pair of numbers."""
-    return np.array([a[0] * b[0] - a[1] * b[1], a[0] * b[1] + a[1] * b[0]])
+def kinematic_states():
+    """Return the index of the rate of each state whose rate is a state."""
+    return {i: rate_index[i] for i in state_indices if not is_dynamic[i]}
+
+
+def matrix_entries(J):
+    """Return the entries of the computed rates by row and column."""
+    return {(i, j): J[i, j] for i in computed_states() for j in state_indices}

@@ -60,6 +60,11 @@ def create_run(model: Any) -> Any:
     return import_module(f"{package}.runtime.run_state").RunState(model)
 
 
+def component_name(vector: str, name: str) -> str:
+    """Return the attribute of the solver for a state or mode, such as y_x."""
+    return f"{vector}_{name.replace('_', '__')}"
+
+
 @dataclass
 class EmbeddedModel:
     """Model with values, and its run from 0 s on; all in SI units."""
@@ -110,14 +115,8 @@ class EmbeddedModel:
     @property
     def state_reader(self) -> Callable[[Any], tuple[float, ...]]:
         """Return a function that reads the states at the current point of the solver."""
-        names = [self.solver_attribute(name) for name in self.model.states]
+        names = [component_name("y", name) for name in self.model.states]
         return attrgetter(*names) if len(names) > 1 else lambda solver: (getattr(solver, names[0]),)
-
-    def solver_attribute(self, name: str) -> str:
-        """Return the solver's attribute for a state or mode: h_ if h means something else to the solver."""
-        others = {*self.model.states, *self.model.contacts} - {name}
-        candidates = (f"{prefix}{name}{'_' * n}" for prefix in ("own_", "") for n in (3, 2, 1, 0))
-        return next(name for name in candidates if hasattr(self.run.solver, name) and name not in others)
 
     def compute_states(self, times: list[float], timeout: float | None = None) -> list[tuple[float, ...]]:
         """Return the states at the times, starting at 0 s.
@@ -162,7 +161,7 @@ class EmbeddedModel:
     def find_modes(self, stop: float) -> list[tuple[float, int]]:
         """Return the mode at the start, followed by the changes of mode up to the stop."""
         model, solver, events = self.model, self.run.solver, self.run.events
-        (mode,) = map(self.solver_attribute, model.contacts)
+        (mode,) = (component_name("modes", name) for name in model.contacts)
         self.start_run(stop)
         changes: list[tuple[float, int]] = [(0.0, getattr(solver, mode))]
         while solver.t < stop:

@@ -1,16 +1,12 @@
 """The linear systems of rodas and radau9, solved without pivoting, or refused; alike on arrays and in scalars."""
 
+import ast
 from math import fabs, nan
 
 import numpy as np
 import pytest
 
-from fmus.packaging.lowering.elimination import (
-    complex_factorization_lines,
-    complex_solution_lines,
-    factorization_lines,
-    solution_lines,
-)
+from fmus.packaging.lowering.elimination import LoweredSystem
 from fmus.packaging.lowering.layout import ModelLayout
 from fmus.runtime import vectors
 
@@ -21,17 +17,27 @@ BODIES = {
 }
 
 
-def in_scalars(spec, g, h, J, r):
+def generate(spec, arguments, results, right):
+    """Return the code that factorizes a system and solves it for one right-hand side."""
+    is_complex = len(results) == 2
+    system = LoweredSystem("s", spec, [ast.Name(name) for name in (*arguments, "J")], is_complex)
+    module = ast.Module([*system.factorize(), *system.solve(results, right)], [])
+    return compile(ast.unparse(ast.fix_missing_locations(module)), "system", "exec")
+
+
+def generate_real(spec):
+    """Return the code that solves a real system."""
+    return generate(spec, "gh", "k", "r")
+
+
+def in_scalars(spec, code, g, h, J, r):
     """Return the result of the lowered code for a system."""
-    names, rates = list(spec.states), list(spec.states.values())
+    names = list(spec.states)
     namespace = {"g": g, "h": h, "nan": nan, "fabs": fabs} | {
         f"r_{name}": value for name, value in zip(names, r, strict=True)
     }
-    namespace |= {f"{rates[i]}_{name}": J[i, n] for i in spec.dynamic_states for n, name in enumerate(names)}
-    exec(
-        "\n".join([*factorization_lines("s", "g", "h", spec), *solution_lines("k", "s", "r", "g", "h", spec)]),
-        namespace,
-    )
+    namespace |= {spec.entry_name("J", i, n): J[i, n] for i in spec.dynamic_states for n in range(len(names))}
+    exec(code, namespace)
     return [namespace[f"k_{name}"] for name in names]
 
 
@@ -54,7 +60,7 @@ def test_a_system_is_solved_or_refused_but_never_half_solved(bodies):
     """Also if a pivot nearly vanishes, as for a motion that grows within one step; the residual is small relative to
     the terms."""
     spec, draw, refused = ModelLayout(BODIES[bodies], {}), np.random.default_rng(4), 0
-    n, g = len(spec.states), 0.25
+    n, g, code = len(spec.states), 0.25, generate_real(spec)
     M = np.eye(n)
     for turn in range(600):
         h = 10.0 ** draw.uniform(-4.0, 1.0)
@@ -68,7 +74,7 @@ def test_a_system_is_solved_or_refused_but_never_half_solved(bodies):
             if i not in spec.dynamic_states:
                 J[i] = M[list(spec.states).index(list(spec.states.values())[i])]
         r = draw.normal(0.0, 1.0, n)
-        k = np.array(in_scalars(spec, g, h, J, r))
+        k = np.array(in_scalars(spec, code, g, h, J, r))
         assert np.array_equal(k, on_arrays(spec, g, h, J, r), equal_nan=True)
         if not np.isfinite(k).all():
             refused += 1
@@ -87,13 +93,14 @@ def test_entries_that_are_always_zero_are_left_out_and_change_no_number(order):
     spec = ModelLayout(
         states, {}, zeros=frozenset(zip(*(indices.tolist() for indices in np.nonzero(~joined)), strict=True))
     )
-    assert len(factorization_lines("s", "g", "h", spec)) < 0.7 * len(factorization_lines("s", "g", "h", dense))
+    sparse_code, dense_code = generate_real(spec), generate_real(dense)
+    assert len(sparse_code.co_code) < 0.7 * len(dense_code.co_code)
     for _ in range(100):
         h, r = 10.0 ** draw.uniform(-4.0, 1.0), draw.normal(0.0, 1.0, len(names))
         J = np.where(joined, draw.normal(0.0, 1.0, joined.shape), 0.0)
-        k = in_scalars(spec, 0.25, h, J, r)
+        k = in_scalars(spec, sparse_code, 0.25, h, J, r)
         assert np.isfinite(k).all()
-        assert k == in_scalars(dense, 0.25, h, J, r)
+        assert k == in_scalars(dense, dense_code, 0.25, h, J, r)
         assert np.array_equal(k, on_arrays(spec, 0.25, h, J, r))
 
 
@@ -106,10 +113,7 @@ def test_a_complex_system_is_solved_alike_on_arrays_and_in_scalars(bodies, undam
         spec = ModelLayout(BODIES[bodies], {}, zeros=frozenset((i, i) for i in spec.dynamic_states))
     names, rates, n = list(spec.states), list(spec.states.values()), len(spec.states)
     dynamic = spec.dynamic_states
-    lines = [
-        *complex_factorization_lines("s", "re", "im", spec),
-        *complex_solution_lines("k", "m", "s", "r", "q", spec),
-    ]
+    code = generate(spec, ["re", "im"], ["k", "m"], ["r", "q"])
     for _ in range(300):
         h, J = 10.0 ** draw.uniform(-4.0, 0.0), draw.normal(0.0, 1.0, (n, n)) * 10.0 ** draw.uniform(-3.0, 3.0, (n, 1))
         for i in set(range(n)) - {*dynamic}:
@@ -120,8 +124,8 @@ def test_a_complex_system_is_solved_alike_on_arrays_and_in_scalars(bodies, undam
         r[dynamic], q[dynamic] = draw.normal(size=len(dynamic)), draw.normal(size=len(dynamic))
         namespace = {"re": re, "im": im, "nan": nan}
         namespace |= {f"{a}_{name}": b[i] for a, b in (("r", r), ("q", q)) for i, name in enumerate(names)}
-        namespace |= {f"{rates[i]}_{name}": J[i, j] for i in dynamic for j, name in enumerate(names)}
-        exec("\n".join(lines), namespace)
+        namespace |= {spec.entry_name("J", i, j): J[i, j] for i in dynamic for j in range(n)}
+        exec(code, namespace)
         scalars = np.array([complex(namespace[f"k_{names[i]}"], namespace[f"m_{names[i]}"]) for i in dynamic])
         set_layout(spec)
         k, m = vectors.solve_complex(vectors.factorize_complex(re, im, J), r, q)

@@ -4,6 +4,7 @@ import ast
 import re
 import traceback
 from inspect import isfunction, signature
+from itertools import product
 from pathlib import Path
 
 import pytest
@@ -12,12 +13,14 @@ from models import CASES, LARGER_MODELS, MODELS, ROOT, label, model_class
 
 from fmus.packaging import BuildError
 from fmus.packaging.lowering import LoweringError, function_tree, lowered_files, lowered_model, select_features
-from fmus.packaging.lowering.emit_source import SourceEmitter
-from fmus.packaging.lowering.layout import ModelLayout
-from fmus.packaging.lowering.lowered_sources import lower_all, runtime_symbols
+from fmus.packaging.lowering.emit_source import FileLowerer
+from fmus.packaging.lowering.layout import ModelLayout, component_name
+from fmus.packaging.lowering.lowered_sources import lower_all
 from fmus.packaging.lowering.scalarize import fold_zero
 from fmus.packaging.lowering.source_symbols import SourceSymbols
+from fmus.packaging.lowering.unused_code import remove_unused_code
 from fmus.packaging.model_lookup import find_model
+from fmus.packaging.syntax_trees import nested_statements
 from fmus.runtime import stick_slip
 from fmus.runtime.vectors import ContactIndex, ContactVector, StateVector
 
@@ -52,7 +55,7 @@ def test_the_runtime_declares_each_generated_method_with_its_arguments(path):
 
 
 @EVERY_MODEL
-def test_emitted_code_has_no_vectors_names_its_source_and_keeps_the_line_length(name):
+def test_emitted_code_has_no_vectors_and_names_its_source(name):
     for path, text in lowered_files(name).items():
         tree = ast.parse(text)
         names = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load)}
@@ -64,14 +67,9 @@ def test_emitted_code_has_no_vectors_names_its_source_and_keeps_the_line_length(
             "slip_index",
             "velocity_indices",
         }, path
-        source = ROOT / "fmus" / path
-        if path != f"{name}.py" and source.read_text() != text:
-            states = ", ".join(model_class(name).states)
-            first, *_ = text.splitlines()
-            assert first.startswith(f"# Generated for {states}")
-            assert f" from fmus/{path} of" in first
-        if path != f"{name}.py":
-            assert [line for line in text.splitlines() if len(line) > 120] == [], path
+        first, states = text.splitlines()[0], ", ".join(model_class(name).states)
+        assert first.startswith(f"# Generated for {states}")
+        assert f" from fmus/{path} of" in first
 
 
 def test_unreachable_code_is_removed():
@@ -83,9 +81,8 @@ def test_unreachable_code_is_removed():
     for word in (
         "def update_end_modes",
         "def advance_stuck",
-        ".is_hybrid",
-        ".has_consistent_modes",
-        "mode0",
+        "def resolve_mode",
+        "modes0_",
         "def advance_linear_segment",
     ):
         assert word not in smooth
@@ -126,15 +123,21 @@ BODIES = {
     "y = y + h * f": "changes under f",
     "self.f2 = f": "declare it in its class",
     "modes = contact_vector()": "write modes = 0 * modes",
-    "y2 = y + h * f\n        v2 = t": "uses v2 for a scalar",
+    "y2 = y + h * f\n        y2_end = t": "uses y2_end for a scalar",
 }
+
+
+def lower(text, spec):
+    """Return the lines of a file of the runtime, lowered."""
+    tree = FileLowerer(spec, SourceSymbols([text, DECLARATIONS], VECTORS), "runtime/some.py", text, True).tree
+    return ast.unparse(ast.fix_missing_locations(tree)).split("\n")
 
 
 @pytest.mark.parametrize("body", BODIES)
 def test_an_unsupported_construct_is_refused_with_file_line_and_remedy(body):
     text = HEAD + body + "\n"
     with pytest.raises(LoweringError, match=re.escape(BODIES[body])) as caught:
-        SourceEmitter(SPEC, SourceSymbols([text, DECLARATIONS], VECTORS), "runtime/some.py", text, True)
+        lower(text, SPEC)
     assert re.match(r"runtime/some\.py:[5678]: ", str(caught.value))
 
 
@@ -152,15 +155,13 @@ def test_operations_with_components_that_are_always_zero_are_simplified(text, ex
 
 def test_rates_and_states_may_have_any_names():
     text = HEAD + "z = y + h * f\n        slope = model.rates(t, z, modes)\n        e = slope - f\n        return e\n"
-    lines = SourceEmitter(SPEC, SourceSymbols([text, DECLARATIONS], VECTORS), "runtime/some.py", text, True).lines
-    assert [line.strip() for line in lines[-7:]] == [
-        "z_x = x + h * v",
-        "z_v = v + h * a",
-        "slope_v = model.rates(t, z_x, z_v, mode)",
-        "e_x = z_v - v",  # the rate of the position is the speed
-        "e_v = slope_v - a",
-        "return e_x, e_v",
-        "",
+    assert [line.strip() for line in lower(text, SPEC)[-6:]] == [
+        "z_x = y_x + h * y_v",
+        "z_v = y_v + h * f_v",
+        "slope_v = model.rates(t, z_x, z_v, modes_mode)",
+        "e_x = z_v - y_v",  # the rate of the position is the speed
+        "e_v = slope_v - f_v",
+        "return (e_x, e_v)",
     ]
 
 
@@ -177,40 +178,29 @@ def test_an_attribute_has_one_declared_type(text, message):
         SourceSymbols([text], VECTORS)
 
 
-@pytest.mark.parametrize(
-    ("states", "mode", "separator"),
-    [
-        ({"x": "v", "x1": "v1", "v": "a", "v1": "a1"}, "mode", "_"),
-        ({"x": "v", "x2": "v2", "v": "a", "v2": "b"}, "mode1", "_"),
-        ({"x": "v", "x2": "v2", "v": "a", "v2": "x_2"}, "mode", "__"),
-        ({"x": "v", "x_end": "b", "v": "a"}, "mode", "_"),
-        ({"x1": "v1", "x2": "v2", "v1": "a1", "v2": "a2"}, "mode", ""),
-    ],
-)
-def test_states_keep_their_names_beside_stages_of_other_states(states, mode, separator):
-    symbols, names = runtime_symbols(), {*states, *states.values(), mode}
-    assert symbols.stage_separator(states, [mode]) == separator
-    assert symbols.resolve_names(states, [mode], separator) == {name: name for name in names}
-
-
 def test_a_model_is_lowered_only_once():
     assert lowered_model("smd") is lowered_model("smd")
 
 
 @EVERY_MODEL
-def test_every_compound_statement_keeps_the_number_of_its_source_line(name):
-    """Error messages and comments in C name these lines, also where lowering has rewritten the test."""
+def test_every_statement_keeps_the_number_of_its_source_line(name):
+    """Error messages and comments in C name these lines, also where lowering has rewritten the statement."""
+    words = {
+        ast.If: ("if ", "elif ", "for "),
+        ast.While: ("while ",),
+        ast.ClassDef: ("class ",),
+        ast.Return: ("return",),
+    }
     rewritten = 0
-    for path, lines in lower_all(find_model(name), select_features(find_model(name))).items():
+    for path, tree in lower_all(find_model(name), select_features(find_model(name))).items():
         if not path.startswith("runtime/"):
             continue
         source = (ROOT / "fmus" / path).read_text(encoding="utf-8").split("\n")
-        for line in lines:
-            word = line.split()[0].rstrip(":") if line.strip() else ""
-            if word in ("if", "while", "def", "class") and line.endswith(":"):
-                original = source[line.source - 1].split()[0].rstrip(":")
-                assert {word, original} <= {"if", "elif", "else", "for"} or word == original, (path, line)
-                rewritten += line.strip() != source[line.source - 1].strip()
+        for node in nested_statements(tree):
+            if type(node) in words:
+                line = source[node.lineno - 1].strip()
+                assert line.startswith(words[type(node)]), (path, node.lineno)
+                rewritten += not ast.unparse(ast.fix_missing_locations(node)).startswith(line)
     assert rewritten > 5
 
 
@@ -223,10 +213,10 @@ def test_the_tree_of_a_function_has_the_line_numbers_of_its_file():
         assert source[last.lineno - 1].strip() == ast.unparse(last)
 
 
-def test_an_elif_becomes_an_if_where_the_branch_before_is_removed_and_other_tests_are_copied():
+def test_a_branch_that_a_model_never_takes_is_removed_and_other_tests_stay():
     text = """
 def f(model, x):
-    if x < 1e-3:  # as it is written
+    if x < 1e-3:
         return 0
     if model.has_driver:
         return 1
@@ -235,6 +225,29 @@ def f(model, x):
     return 3
 """
     spec = ModelLayout({"x": "v", "v": "a"}, {"mode": "v"}, {"has_driver": False})
-    lines = SourceEmitter(spec, SourceSymbols([text, DECLARATIONS], VECTORS), "runtime/some.py", text, True).lines
-    assert lines[2:4] == ["    if x < 1e-3:  # as it is written", "        return 0"]
-    assert lines[4:] == ["    if x > 1.0:", "        return 2", "    return 3", ""]
+    assert lower(text, spec)[1:] == [
+        *("    if x < 0.001:", "        return 0"),
+        *("    if x > 1.0:", "        return 2", "    return 3"),
+    ]
+
+
+@pytest.mark.parametrize("name", ["x_end", "end", "e_x", "y_", "_v", "x__v"])
+def test_components_of_two_vectors_never_have_the_same_name(name):
+    vectors = ["y", "y_end", "e", "e_end", "_f_t"]
+    names = [component_name(vector, state) for vector in vectors for state in (name, "x", "v", "x_v", "end_x")]
+    names += [component_name("J", *pair) for pair in product((name, "x", "v", "x_v"), repeat=2)]
+    assert len({*names}) == len(names)
+
+
+def test_functions_and_imports_that_nothing_uses_are_removed():
+    texts = {
+        "runtime/slave.py": "from .a import f\nf(solver.step)\ndef unused():\n    pass\n",
+        "runtime/a.py": "from .b import g, h\ndef f():\n    g.k()\ndef unused():\n    h()\n",
+        "some.py": "class Some(Base):\n    def step(self):\n        pass\n    def other(self):\n        pass\n",
+    }
+    files = remove_unused_code({path: ast.parse(text) for path, text in texts.items()})
+    assert {path: ast.unparse(tree) for path, tree in files.items()} == {
+        "runtime/slave.py": ast.unparse(ast.parse(texts["runtime/slave.py"])),
+        "runtime/a.py": "from .b import g\n\ndef f():\n    g.k()",
+        "some.py": "class Some(Base):\n\n    def step(self):\n        pass",
+    }

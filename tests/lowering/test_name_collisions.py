@@ -8,7 +8,7 @@ from internal_steps import prepared_run, start
 from models import DOP853, LARGER_MODELS, RODAS
 
 from fmus.packaging.fmi_variables import declared_variables
-from fmus.packaging.lowering import LAWS, METHODS, lowered_files, lowered_model, select_features, sibling_module
+from fmus.packaging.lowering import LAWS, METHODS, lowered_model, select_features, sibling_module
 from fmus.packaging.model_lookup import find_model
 from fmus.packaging.native.model_header import render_model_header
 
@@ -37,8 +37,7 @@ NAMES = {
     BELT: [
         ("h", "size", "end", "i"),
         ("OVERFLOW_LIMIT", "d_x", "to", "tie_tolerance"),
-        ("x", "e_x", "u_x", "mode"),  # the last of them components of vectors of the methods
-        ("x", "v", "driver_x", "x_v"),  # an entry of the Jacobian
+        ("x", "_x", "x_", "end_x"),  # underscores, as between a vector and its component
     ],
 }
 NATIVE = ("--native", "--platform", "linux64")
@@ -106,17 +105,6 @@ def test_names_used_by_the_contact_solver_change_nothing(tmp_path):
         assert model.prepare() == 0
         rates.append([model.rates(0.3, 0.1, 0.2, -0.1, 0.1, *modes) for modes in ((0, 0), (0, 1), (1, 0), (1, -1))])
     assert rates[0] == rates[1]
-
-
-def test_states_named_like_stages_of_each_other_keep_their_names_in_python_and_c(tmp_path):
-    """Two blocks with the states x and x2: the second stage of a step is x_2 and x2_2."""
-    (blocks,) = (path for path in LARGER_MODELS if path.stem == "blocks")
-    path = tmp_path / "blocks.py"
-    path.write_text(re.sub(r"\b([xv])1\b", r"\1", blocks.read_text()))
-    python = "\n".join(lowered_files(path).values())
-    for text in (python, render_model_header(lowered_model(path), "2")):
-        assert re.findall(r"\b[xv]2?_\b|\bown_\w+", text) == []
-        assert {"x", "x2", "x_2", "x2_2", "v", "v2", "v_2", "v2_2"} <= {*re.findall(r"\w+", text)}
 
 
 @pytest.mark.slow

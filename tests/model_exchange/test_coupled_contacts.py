@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from contact_references import CONTACT_REFERENCES, integrate_events
-from internal_steps import prepared_run, start
+from internal_steps import components, prepared_run, start
 from models import DOP853, LARGER_MODELS, write_growing_friction_model
 from scipy.integrate import solve_ivp
 
@@ -56,11 +56,11 @@ def integrate_with_indicators(name, stop):
         beyond = 1e-12 * (1.0 + t)  # an importer's solver stops just beyond the root
         t, y = t + beyond, y + beyond * np.array(rates(t, y))
         at(t, y)
-        before = [getattr(solver, mode) for mode in model.contacts]
+        before = components(solver, "modes", model.contacts)
         exchange.update_modes(run, model)
         assert not exchange.update_modes(run, model)
         y = states()
-        modes = [getattr(solver, mode) for mode in model.contacts]
+        modes = components(solver, "modes", model.contacts)
         if modes != before:
             events.append((t, *modes))
 

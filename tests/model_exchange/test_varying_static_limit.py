@@ -1,10 +1,10 @@
 """Static and sliding friction may vary: breakaway is on time, and inconsistent friction is reported."""
 
 import pytest
-from internal_steps import compute_step, prepared_run, start, state_values
+from internal_steps import components, compute_step, prepared_run, start
 from models import DOP853, LARGER_MODELS, MODELS, ODE45, RODAS, declared
 
-from fmus.packaging.lowering import lowered_model, model_exchange_run, sibling_module
+from fmus.packaging.lowering import component_name, lowered_model, model_exchange_run, sibling_module
 from fmus.packaging.model_lookup import find_model
 from fmus.runtime.codes import NO_CONSISTENT_MODES
 
@@ -40,7 +40,7 @@ def test_a_constant_load_breaks_away_when_the_static_limit_drops_to_it(method):
         assert compute_step(model, run) == 0
         assert step.t1 < 16.0
     assert step.t1 == pytest.approx((12.5 * 9.81 - 60.0 / 0.9) / (300.0 * 0.034), rel=1e-9)
-    assert state_values(step, model.contacts) == [1]
+    assert components(step, "modes1", model.contacts) == [1]
 
 
 def externally_integrated(source, values):
@@ -66,13 +66,14 @@ def test_no_contact_sticks_while_its_indicator_requires_breakaway(source):
     entry = next(name for name, d in declared(source).items() if d.causality == "input" and d.unit in ("N", "N.m"))
     n_contacts, n_tried = len(model.contacts), 0
     solver = run.solver
-    start_states, start_modes = ([getattr(solver, n) for n in names] for names in (model.states, model.contacts))
+    names = [component_name("y", state) for state in model.states]
+    names += [component_name("modes", mode) for mode in model.contacts]
+    start_values = [getattr(solver, name) for name in names]
 
     def push(force):
         """Return the indicators before and after the event, with the modes of the start."""
-        for names, numbers in (model.states, start_states), (model.contacts, start_modes):
-            for name, number in zip(names, numbers, strict=True):
-                setattr(solver, name, number)
+        for name, number in zip(names, start_values, strict=True):
+            setattr(solver, name, number)
         setattr(model, entry, force)
         exchange.update_indicators(run, model)
         before = min(run.model_exchange.indicators[n_contacts : 2 * n_contacts])
@@ -113,4 +114,4 @@ def test_sliding_friction_above_static_friction_is_reported_and_stops_the_run(sl
     model, exchange, run = externally_integrated(slider, {"press": 3.9})
     model.F_ext = 4.5
     exchange.update_modes(run, model)
-    assert (run.solver.x, run.solver.v, run.solver.mode) == (0.0, 0.0, 1)
+    assert (run.solver.y_x, run.solver.y_v, run.solver.modes_mode) == (0.0, 0.0, 1)

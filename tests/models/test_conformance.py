@@ -28,6 +28,7 @@ from models import (
 )
 from worker_client import FmiError
 
+from fmus.packaging.lowering import component_name
 from fmus.runtime.variable_declarations import Choice
 
 EVERY_MODEL = pytest.mark.parametrize("name", MODELS)
@@ -205,17 +206,17 @@ def test_the_methods_preserve_dimensions(physics, name):
         assert [assert_dimension(*pair) for pair in ((x1, x), (v1, v), (a1, a), (e_x, x / h), (e_v, v / h))] == [
             True
         ] * 5
-        names = [*model.states, list(model.states.values())[-1]]
+        position, speed = model.states
         for end, values in ("0", (x, v, a)), ("1", (x1, v1, a1)):
-            for parameter, value in zip(names, values, strict=True):
-                setattr(step, parameter + end, value)
-        step.t0, step.mode0, step.h_full = t, 1, h
+            for vector, state, value in zip("yyf", (position, speed, speed), values, strict=True):
+                setattr(step, component_name(vector + end, state), value)
+        step.t0, step.modes0_mode, step.h_full = t, 1, h
         method.build_interpolant(model, step)
         assert [assert_dimension(*pair) for pair in zip(step.interpolant.evaluate(0.3 * h), (x, v), strict=True)] == [
             True
         ] * 2
     if model.is_linear:
-        exact = runtime(name, "linear_closed_form").LinearClosedForm()
+        exact = runtime(name, "linear_closed_form").LinearClosedForm(True)
         exact.prepare(*model.linear_coefficients())
         exact.start_segment(x, v, a, model.applied_acceleration(t, *modes), x)
         assert [assert_dimension(*pair) for pair in zip(exact.evaluate(h), (x, v), strict=True)] == [True] * 2

@@ -86,7 +86,7 @@ def draw_decay(draw):
 
 def begin(start):
     """Return the closed form under test and the independent one at the start of a segment."""
-    closed_form = LinearClosedForm()
+    closed_form = LinearClosedForm(True)
     closed_form.prepare(1.0, start.c, start.k, start.drift)
     closed_form.set_force_rate(start.q)
     net = mpf(start.p) - mpf(start.k) * mpf(start.x)
@@ -159,7 +159,7 @@ def test_the_next_standstill_is_right_to_rounding(draw_motion, seed):
 
 def test_a_force_that_turns_stops_a_body_that_has_hardly_started():
     """Without damping, v = 1e-31 falls at a rate that grows with time: v - 90 t^2/2 is zero."""
-    closed_form = LinearClosedForm()
+    closed_form = LinearClosedForm(True)
     closed_form.prepare(1.0, 0.0, 2.0, 0.0)
     closed_form.set_force_rate(-90.0)
     closed_form.start_segment(0.0, 1e-31, 0.0, 0.0, 0.0)
@@ -169,7 +169,7 @@ def test_a_force_that_turns_stops_a_body_that_has_hardly_started():
 def test_a_body_at_an_unstable_equilibrium_stays_there():
     """Also far from the origin, and at the speed of an equilibrium that moves."""
     for c, k, x, v, p, drift in ((-2.0, -3.0, 0.7, 0.0, -3.0 * 0.7, 0.0), (0.0, -40.0, 0.0, 0.3, 0.0, 0.3)):
-        closed_form = LinearClosedForm()
+        closed_form = LinearClosedForm(True)
         closed_form.prepare(1.0, c, k, drift)
         closed_form.start_segment(x, v, 0.0, p, 0.0)
         assert closed_form.horizon == inf

@@ -75,8 +75,8 @@ class Solver:
         step.active_method.error_scale_floor_x = step.active_method.error_scale_floor_v = 1.0
         new = self.method.propose(model, step, t, x, v, a, h)
         self.evaluations = step.active_method.stages
-        step.t0, step.x0, step.v0, step.a0, step.h_full = t, x, v, a, h
-        step.x1, step.v1, step.a1 = new[:3]
+        step.t0, step.y0_x, step.y0_v, step.f0_v, step.h_full = t, x, v, a, h
+        step.y1_x, step.y1_v, step.f1_v = new[:3]
         self.method.build_interpolant(model, step)
         self.inside = step.interpolant
         return new

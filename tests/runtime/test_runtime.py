@@ -160,7 +160,7 @@ def test_turning_points_are_located_to_the_last_bit(case):
     step, t = instance.run.solver.step, 0.0
     while t < stop:
         (ahead,) = read(instance, "solver.t_next")
-        mode, waiting, event = step.mode0, step.is_stuck, step.event_at_end
+        mode, waiting, event = step.modes0_mode, step.is_stuck, step.event_at_end
         if event and not waiting:
             if values["solver.method"] == EXACT:  # the closed form rounds independently
                 before = step.state_at(instance.model, nextafter(ahead, 0.0))[1]

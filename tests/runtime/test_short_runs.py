@@ -32,7 +32,7 @@ def test_a_pull_from_rest_keeps_its_digits_in_any_short_run(launch, run):
 @pytest.mark.parametrize("zeta", [z for z in DAMPING if z > 0.0])
 def test_a_ramp_from_rest_keeps_its_digits_in_any_short_run(zeta, run):
     """The position grows with the third power of the time."""
-    closed_form, c = LinearClosedForm(), 2.0 * STEADY * zeta
+    closed_form, c = LinearClosedForm(True), 2.0 * STEADY * zeta
     closed_form.prepare(1.0, c, STEADY**2, 0.0)
     closed_form.set_force_rate(3.0)
     closed_form.start_segment(0.0, 0.0, 0.0, 0.0, 0.0)

@@ -5,6 +5,7 @@ import struct
 import numpy as np
 from array_model import to_array_model
 
+from fmus.packaging.lowering import component_name
 from fmus.runtime import vectors
 from fmus.runtime.codes import NEEDS_REPETITION
 from harness.running.embedded_model import create_run
@@ -31,9 +32,9 @@ def bits(numbers):
     return [struct.pack("<d", float(value)) if value == value else b"NaN" for value in numbers]
 
 
-def state_values(step, names):
-    """Return the components of a vector at the end of a step, by their names: x1 for x, x1_1 for x1."""
-    return [getattr(step, name + ("_" if name[-1].isdigit() else "") + "1") for name in names]
+def components(step, vector, names):
+    """Return the components of a vector by their names."""
+    return [getattr(step, component_name(vector, name)) for name in names]
 
 
 def scalar_steps(model, values, stop, most):
@@ -41,10 +42,11 @@ def scalar_steps(model, values, stop, most):
     middle."""
     run = prepared_run(model, values)
     start(model, run, model.initial_state(0.0), stop)
-    rates = [rate for rate in model.states.values() if rate not in model.states]
+    dynamic = [state for state, rate in model.states.items() if rate not in model.states]
 
     def row(step):
-        numbers = state_values(step, [*model.states, *rates, *model.contacts])
+        numbers = components(step, "y1", model.states) + components(step, "f1", dynamic)
+        numbers += components(step, "modes1", model.contacts)
         return [step.t1, *numbers, step.h_next, *counts(step), *step.state_at(model, 0.5 * (step.t0 + step.t1))]
 
     return list(steps(model, run, row, stop, most))

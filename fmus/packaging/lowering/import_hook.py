@@ -17,9 +17,9 @@ from ...runtime.variable_declarations import VariableOwner
 from ..embedded_modules import digest
 from ..equations.model_file import ModelFile
 from ..model_lookup import FMUS, find_model
-from ..syntax_trees import all_nodes
+from ..syntax_trees import child_nodes
 from .feature_selection import FeatureSelection, select_features
-from .lowered_sources import SourceFiles, lower_all, runtime_names
+from .lowered_sources import lower_all, lowered_texts
 
 TREE_NAME = "written_out"  # attribute of lowered modules: the tree with source line numbers
 
@@ -34,7 +34,7 @@ def resolve_features(
 
 def lowered_files(source: str | Path | ModelFile, features: FeatureSelection | None = None) -> dict[str, str]:
     """Return the text of every lowered file of the runtime and the model, by path."""
-    return {path: "\n".join(lines) for path, lines in lower_all(*resolve_features(source, features)).items()}
+    return lowered_texts(*resolve_features(source, features))
 
 
 def lowered_model(source: str | Path | ModelFile, features: FeatureSelection | None = None) -> type[VariableOwner]:
@@ -45,47 +45,53 @@ def lowered_model(source: str | Path | ModelFile, features: FeatureSelection | N
 @cache
 def import_lowered(source: ModelFile, features: FeatureSelection) -> type[VariableOwner]:
     """Import the model class from a package of its lowered files with a unique name."""
-    files, name, model = lower_all(source, features), source.name, source.model
-    package = f"lowered_{name}_{digest(lowered_files(source, features))[:12]}"
+    texts, name, model = lowered_texts(source, features), source.name, source.model
+    package = f"lowered_{name}_{digest(texts)[:12]}"
     for parent in package, f"{package}.runtime":
         sys.modules[parent] = ModuleType(parent)
         sys.modules[parent].__path__ = []
     sys.modules[f"{package}.runtime.variable_declarations"] = (
         variable_declarations  # declarations keep their classes, for isinstance
     )
-    sys.meta_path.insert(
-        0, LoweredModuleFinder(package, files, {f"{name}.py": sys.modules[model.__module__].__file__ or "?"})
-    )
+    file = sys.modules[model.__module__].__file__ or "?"
+    sys.meta_path.insert(0, LoweredModuleFinder(package, texts, lower_all(source, features), {f"{name}.py": file}))
     result = vars(import_module(f"{package}.{name}"))[model.__name__]
     result.real_only = features.real_only  # variable_declarations.py is not lowered here
     result.analysis = source.analysis  # used by model description and page
-    result.runtime_names = runtime_names(model)
     return result
 
 
 class LoweredModuleFinder(MetaPathFinder, Loader):
     """Finds and loads the modules of one lowered package."""
 
-    def __init__(self, package: str, files: SourceFiles, places: dict[str, str]) -> None:
-        self.package, self.files, self.places = package, files, places
+    def __init__(
+        self, package: str, texts: dict[str, str], trees: dict[str, ast.Module], places: dict[str, str]
+    ) -> None:
+        self.package, self.texts, self.trees, self.places = package, texts, trees, places
 
     def find_spec(self, fullname: str, path: object = None, target: object = None) -> ModuleSpec | None:
-        return ModuleSpec(fullname, self) if self.path(fullname) in self.files else None
+        return ModuleSpec(fullname, self) if self.path(fullname) in self.texts else None
 
     def path(self, fullname: str) -> str:
         return fullname.removeprefix(f"{self.package}.").replace(".", "/") + ".py"
 
     def exec_module(self, module: ModuleType) -> None:
         path = self.path(module.__name__)
-        lines = self.files[path]
-        tree = ast.parse("\n".join(lines), path)
-        for node in all_nodes(tree):
-            if isinstance(node, (ast.stmt, ast.expr, ast.excepthandler, ast.arg, ast.keyword, ast.alias)):
-                node.lineno, node.col_offset = lines[node.lineno - 1].source, 0
-                node.end_lineno = node.end_col_offset = None
+        tree = ast.parse(self.texts[path], path)
+        copy_lines(tree, self.trees[path])
         module.__file__ = str(self.places.get(path, FMUS / path))
         vars(module)[TREE_NAME] = tree
         exec(compile(tree, module.__file__, "exec", optimize=0), vars(module))
+
+
+def copy_lines(tree: ast.AST, source: ast.AST, line: int = 1) -> None:
+    """Copy the line numbers of a tree to the tree of its text; nodes without a number get that of their statement."""
+    line = getattr(source, "lineno", line)
+    if isinstance(tree, (ast.stmt, ast.expr, ast.excepthandler, ast.arg, ast.keyword, ast.alias)):
+        tree.lineno, tree.col_offset, tree.end_lineno, tree.end_col_offset = line, 0, None, None
+    parts = child_nodes(source)
+    for n, part in enumerate(child_nodes(tree)):
+        copy_lines(part, parts[n] if n < len(parts) else source, line)
 
 
 def sibling_module(model: type[VariableOwner], path: str) -> Any:
@@ -100,11 +106,6 @@ def model_exchange_run(model: type[VariableOwner]) -> tuple[Any, Any]:
     run = exchange.ModelExchangeRun(instance)
     exchange.update_nominals(run, instance)
     return instance, run
-
-
-def scalar_name(model: Any, name: str) -> str:
-    """Return the name of a state or mode of a model in the lowered runtime."""
-    return model.runtime_names[name]
 
 
 def function_tree(function: FunctionType) -> ast.FunctionDef:

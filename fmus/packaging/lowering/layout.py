@@ -1,18 +1,16 @@
 """Facts fixed by a model and its features, and the names of vector components."""
 
-import re
 from dataclasses import dataclass, field
 
 STATES, CONTACTS, CONDITIONS = "states", "contacts", "conditions"  # what a vector may run over
-# names of vectors whose components are named after the states, rates and modes of the model
-NAMED_VECTOR = re.compile(r"(y|f|modes)(\d*|_\w+)")
 
 
-def stage_name(name: str, suffix: str, separator: str) -> str:
-    """Return the name of a state, rate or mode at a stage of a step: x2, x_end; x1_2 where it ends in a digit."""
-    if suffix.isdigit() and name[-1].isdigit():
-        separator = separator or "_"
-    return f"{name}{separator}{suffix}" if suffix else name
+def component_name(vector: str, *names: str) -> str:
+    """Return the name of a component of a vector, such as y2_x, or of an entry of a matrix, such as J_v_x.
+
+    Underscores in names of the model are doubled, so that the names of two components are never equal.
+    """
+    return "_".join([vector, *(name.replace("_", "__") for name in names)])
 
 
 @dataclass(frozen=True)
@@ -28,7 +26,6 @@ class ModelLayout:
     zeros       entries of the Jacobian (index of a state, index of a state) that are always zero
     n_conditions
                 number of conditions of the equations
-    separator   between the name of a state and the number of a stage
     """
 
     states: dict[str, str]
@@ -39,7 +36,6 @@ class ModelLayout:
     methods: dict[str, str] = field(default_factory=dict)
     zeros: frozenset[tuple[int, int]] = frozenset()
     n_conditions: int = 0
-    separator: str = ""
 
     def component_names(self, kind: str) -> list[str]:
         """Return the names of the states or modes."""
@@ -83,15 +79,10 @@ class ModelLayout:
         return f"_{list(self.contacts)[contact]}" if len(self.contacts) > 1 else ""
 
     def component_name(self, vector: str, kind: str, place: int) -> str:
-        """Return the name of a component: x2 of y2, a2 of f2, mode0 of modes0, e_x of e."""
-        part = self.component_names(kind)[place]
-        match = NAMED_VECTOR.fullmatch(vector)
-        if not match:
-            return vector + (self.contact_suffix(place) if kind == CONTACTS else f"_{part}")
-        stem, suffix = match.groups()
-        part = self.states[part] if stem == "f" else part
-        return stage_name(part, suffix, self.separator)
+        """Return the name of a component of a vector."""
+        return component_name(vector, self.component_names(kind)[place])
 
-    def jacobian_entry(self, rate: int, state: int) -> str:
-        """Return the name of an entry of the Jacobian."""
-        return f"{list(self.states.values())[rate]}_{list(self.states)[state]}"
+    def entry_name(self, matrix: str, row: int, column: int) -> str:
+        """Return the name of an entry of a matrix of states."""
+        states = list(self.states)
+        return component_name(matrix, states[row], states[column])

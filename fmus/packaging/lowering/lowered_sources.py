@@ -7,20 +7,18 @@ from pathlib import Path
 from typing import Any
 
 from ...runtime.oscillator import Oscillator
-from ...runtime.run_state import RunState
-from ...runtime.variable_declarations import fmi_variables
 from .. import __version__
 from ..equations.model_file import ModelFile
 from ..syntax_trees import all_nodes, parsed_nodes
-from .dead_code import remove_dead_code
-from .emit_source import SourceEmitter, SourceLine
+from .emit_source import FileLowerer
 from .feature_selection import EXACT, FeatureSelection
 from .layout import ModelLayout
 from .source_symbols import SourceSymbols
+from .unused_code import remove_unused_code
 
 FMUS_FOLDER = Path(__file__).resolve().parents[2]
-BUILD_TIME_ONLY = ("vectors.py", "method_registry.py")  # never embedded
-SourceFiles = dict[str, list[SourceLine]]
+BUILD_TIME_ONLY = ("vectors.py", "linear_solver.py", "method_registry.py")  # never embedded
+LoweredFiles = dict[str, ast.Module]  # by path; statements have the lines of their sources
 
 
 @cache
@@ -41,16 +39,6 @@ def runtime_symbols() -> SourceSymbols:
     return SourceSymbols(runtime_sources().values(), vectors)
 
 
-def runtime_names(model: Any) -> dict[str, str]:
-    """Return the names of the states, rates and modes of a model class in the runtime."""
-    return runtime_symbols().resolve_names(model.states, model.contacts, stage_separator(model))
-
-
-def stage_separator(model: Any) -> str:
-    """Return what stands between the name of a state and the number of a stage in the runtime."""
-    return runtime_symbols().stage_separator(model.states, model.contacts)
-
-
 def model_layout(source: ModelFile, features: FeatureSelection) -> ModelLayout:
     """Return the layout of a model."""
     model: Any = source.model
@@ -58,15 +46,12 @@ def model_layout(source: ModelFile, features: FeatureSelection) -> ModelLayout:
     flags["is_linear"] = EXACT in features.methods
     flags["real_only"] = features.real_only
     flags["has_other_laws"] = any(law != "hybrid" for law in features.laws)
-    names = runtime_names(model)
-    states, contacts = (
-        {names[name]: other and names[other] for name, other in pairs.items()}
-        for pairs in (model.states, model.contacts)
+    layout = ModelLayout(
+        model.states, model.contacts, flags, features.choices, features.excluded, features.stepping_methods
     )
-    layout = ModelLayout(states, contacts, flags, features.choices, features.excluded, features.stepping_methods)
     zeros = zero_jacobian_entries(source.generated_source, layout)
     n_conditions = model.n_event_functions - model.first_condition
-    return replace(layout, zeros=zeros, n_conditions=n_conditions, separator=stage_separator(model))
+    return replace(layout, zeros=zeros, n_conditions=n_conditions)
 
 
 def zero_jacobian_entries(text: str, spec: ModelLayout) -> frozenset[tuple[int, int]]:
@@ -83,7 +68,7 @@ def zero_jacobian_entries(text: str, spec: ModelLayout) -> frozenset[tuple[int, 
 
 
 @cache
-def lower_all(source: ModelFile, features: FeatureSelection) -> SourceFiles:
+def lower_all(source: ModelFile, features: FeatureSelection) -> LoweredFiles:
     """Lower all runtime files and the file of a model."""
     spec = model_layout(source, features)
     file = f"{source.name}.py"
@@ -93,16 +78,17 @@ def lower_all(source: ModelFile, features: FeatureSelection) -> SourceFiles:
         file: source.generated_source
     }
     declared = runtime_symbols()
-    files = {path: SourceEmitter(spec, declared, path, text, path != file).lines for path, text in texts.items()}
-    model = source.model()
-    files = remove_dead_code(files, file, [name for name, _ in fmi_variables(model, RunState(model))])
-    return {path: add_origin_line(path, lines, texts[path], spec) for path, lines in files.items()}
+    files = {path: FileLowerer(spec, declared, path, text, path != file).tree for path, text in texts.items()}
+    return remove_unused_code(files)
 
 
-def add_origin_line(path: str, lines: list[SourceLine], text: str, spec: ModelLayout) -> list[SourceLine]:
-    """Add a first line that names the source if the file differs from it."""
-    if "\n".join(lines) == text:
-        return lines
-    modes = f"; {', '.join(spec.contacts)}" if spec.contacts else ""
-    origin = f"# Generated for {', '.join(spec.states)}{modes} from fmus/{path} of friction-fmus {__version__}."
-    return [SourceLine.of(origin, 1), *lines]
+@cache
+def lowered_texts(source: ModelFile, features: FeatureSelection) -> dict[str, str]:
+    """Return the text of all lowered files, by path; the first line names the source."""
+    spec = model_layout(source, features)
+    names = ", ".join(spec.states) + (f"; {', '.join(spec.contacts)}" if spec.contacts else "")
+    return {
+        path: f"# Generated for {names} from fmus/{path} of friction-fmus {__version__}.\n"
+        f"{ast.unparse(ast.fix_missing_locations(tree))}\n"
+        for path, tree in lower_all(source, features).items()
+    }

@@ -6,12 +6,7 @@ from collections.abc import Sequence
 from .. import BuildError
 from ..syntax_trees import all_nodes, is_same_tree, replace_fields
 from .constant_folding import ConstantFolder
-from .elimination import (
-    complex_factorization_lines,
-    complex_solution_lines,
-    factorization_lines,
-    solution_lines,
-)
+from .elimination import LoweredSystem, tuple_or_single
 from .layout import CONDITIONS, STATES, ModelLayout
 from .source_symbols import ELEMENTWISE, SELECTIONS, SourceSymbols, annotated_kind
 
@@ -39,9 +34,8 @@ class Scalarizer(ConstantFolder):
         self.allocated_names: set[str] = set()  # of vectors that are filled by component
         self.loop_indices = dict(index or {})  # loop variables -> current value
         self.scalar_names: set[str] = set()  # names of scalars
-        self.component_owner: dict[str, str] = {}  # name of a component -> its vector
         self.known_zeros: set[str] = set()
-        self.systems: dict[str, tuple[str, str]] = {}
+        self.systems: dict[str, LoweredSystem] = {}
         self.jacobians: set[str] = set()  # names of Jacobians
         self.method_bindings: dict[str, ast.expr] = {}  # in a loop over methods: loop variable -> value
 
@@ -102,15 +96,6 @@ class Scalarizer(ConstantFolder):
         """Return the indices of components stored in the vector itself; rates that are states are stored there."""
         return self.spec.dynamic_states if self.states_of(node) else self.all_indices(kind)
 
-    def component_name(self, node: ast.AST, vector: str, kind: str, place: int) -> str:
-        """Return the local name of a component of a vector."""
-        name = self.spec.component_name(vector, kind, place)
-        if self.component_owner.setdefault(name, vector) != vector:
-            raise self.error(
-                node, f"has a component {name}, which is also one of {self.component_owner[name]}; take another name"
-            )
-        return name
-
     def component(self, node: ast.expr, place: int) -> ast.expr:
         """Return one component of a vector expression; scalars are rewritten as they are."""
         kind = self.vector_kind(node)
@@ -122,7 +107,7 @@ class Scalarizer(ConstantFolder):
             case ast.Subscript(value=vector):
                 return ast.Subscript(self.visit(vector), ast.Constant(place), ast.Load())
             case ast.Name(id=vector):
-                name = self.component_name(node, vector, kind, place)
+                name = self.spec.component_name(vector, kind, place)
                 return ast.Constant(0.0) if name in self.known_zeros else ast.Name(name, ast.Load())
             case ast.Attribute(value=owner, attr=vector):
                 return ast.Attribute(self.visit(owner), self.spec.component_name(vector, kind, place), ast.Load())
@@ -188,13 +173,11 @@ class Scalarizer(ConstantFolder):
         match node:
             case ast.Subscript(value=ast.Name(id=name), slice=ast.Name(id=i)) if name in INDEX_LOOKUPS:
                 return ast.Constant(getattr(self.spec, INDEX_LOOKUPS[name])(self.loop_indices[i]))
-            case ast.Subscript(value=ast.Name(id=name), slice=ast.Tuple(elts=[tuple_or_single, column])) if (
-                name in self.jacobians
-            ):
-                entry = self.constant_index(tuple_or_single), self.constant_index(column)
+            case ast.Subscript(value=ast.Name(id=name), slice=ast.Tuple(elts=[row, column])) if name in self.jacobians:
+                entry = self.constant_index(row), self.constant_index(column)
                 if entry in self.spec.zeros:
                     return ast.Constant(0.0)
-                return ast.Name(self.spec.jacobian_entry(*entry), ast.Load())
+                return ast.Name(self.spec.entry_name(name, *entry), ast.Load())
         return (
             self.component(node.value, self.constant_index(node.slice))
             if self.vector_kind(node.value)
@@ -300,31 +283,24 @@ class Scalarizer(ConstantFolder):
                 value=ast.Call(func=ast.Attribute(attr=name)) as call,
             ) if name in self.declared.jacobians:
                 return self.lower_jacobian(f_t, J, call)
-            case ast.Assign(targets=[ast.Name(id=s)], value=ast.Call(func=ast.Name(id="factorize"), args=[g, h, _])):
-                self.systems[s] = ast.unparse(g), ast.unparse(h)
-                return ast.parse("\n".join(factorization_lines(s, *self.systems[s], self.spec))).body
             case ast.Assign(
-                targets=[ast.Name(id=k) as to], value=ast.Call(func=ast.Name(id="solve_factored"), args=[s, r])
+                targets=[ast.Name(id=s)],
+                value=ast.Call(func=ast.Name(id="factorize" | "factorize_complex" as name), args=arguments),
             ):
-                self.record_kinds([to], [STATES])
-                system, right = ast.unparse(s), ast.unparse(r)
-                lines = solution_lines(k, system, right, *self.systems[system], self.spec, self.known_zeros)
-                return ast.parse("\n".join(lines)).body
+                self.systems[s] = LoweredSystem(s, self.spec, arguments, name == "factorize_complex")
+                return self.systems[s].factorize()
             case ast.Assign(
-                targets=[ast.Name(id=s)], value=ast.Call(func=ast.Name(id="factorize_complex"), args=[shift, turn, _])
+                targets=[target],
+                value=ast.Call(func=ast.Name(id="solve_factored" | "solve_complex"), args=[ast.Name(id=s), *right]),
             ):
-                return ast.parse(
-                    "\n".join(complex_factorization_lines(s, ast.unparse(shift), ast.unparse(turn), self.spec))
-                ).body
-            case ast.Assign(
-                targets=[ast.Tuple(elts=[ast.Name(id=k), ast.Name(id=m)] as to)],
-                value=ast.Call(func=ast.Name(id="solve_complex"), args=[s, r, q]),
-            ):
-                self.record_kinds(to, [STATES, STATES])
-                moved = self.spec.kinematic_states
-                self.known_zeros |= {self.spec.component_name(name, STATES, i) for name in (k, m) for i in moved}
-                system, right, other = (ast.unparse(part) for part in (s, r, q))
-                return ast.parse("\n".join(complex_solution_lines(k, m, system, right, other, self.spec))).body
+                results = target.elts if isinstance(target, ast.Tuple) else [target]
+                self.record_kinds(results, [STATES] * len(results))
+                vectors, others = list(map(ast.unparse, results)), list(map(ast.unparse, right))
+                statements = self.systems[s].solve(vectors, others, self.known_zeros)
+                if self.systems[s].is_complex:  # only these states have a solution
+                    moved = self.spec.kinematic_states
+                    self.known_zeros |= {self.spec.component_name(name, STATES, i) for name in vectors for i in moved}
+                return statements
             case ast.Assign():
                 return self.lower_assignment(node)
         return [self.visit(node)]
@@ -397,7 +373,7 @@ class Scalarizer(ConstantFolder):
             for i in self.own_indices(target, kind) if kind else [-1]:
                 number = self.component(value, i) if kind else self.visit(value)
                 if isinstance(target, ast.Name) and kind and isinstance(number, ast.Constant) and number.value == 0.0:
-                    self.known_zeros.add(self.component_name(target, target.id, kind, i))
+                    self.known_zeros.add(self.spec.component_name(target.id, kind, i))
                 else:
                     pairs.append((self.component(target, i) if kind else self.visit(target), number))
         pairs = [(target, number) for target, number in pairs if not is_same_tree(target, number)]
@@ -452,19 +428,14 @@ class Scalarizer(ConstantFolder):
         self.known_zeros |= {name for i, name in named.items() if i not in dynamic}
         names = []
         for i in dynamic:
-            zero = [(i, j) in self.spec.zeros for j in self.all_indices(STATES)]
-            names += [named[i], *("_" if is_zero else self.spec.jacobian_entry(i, j) for j, is_zero in enumerate(zero))]
-        for name in {*names} - {"_"}:
-            if self.component_owner.setdefault(name, J) != J:
-                raise self.error(
-                    call, f"has a Jacobian entry {name}, which is also a component of {self.component_owner[name]}"
-                )
-        self.component_owner.update(dict.fromkeys((named[i] for i in dynamic), f_t))
+            entries = [(i, j) for j in self.all_indices(STATES)]
+            names += [named[i], *("_" if at in self.spec.zeros else self.spec.entry_name(J, *at) for at in entries)]
         return [ast.Assign([tuple_or_single([ast.Name(name) for name in names])], self.visit(call))]
 
     def find_name_clash(self) -> str:
-        """Return a name that is both a scalar and a component of a vector, or ""."""
-        return min(self.scalar_names & self.component_owner.keys(), default="")
+        """Return a scalar whose name is that of a component in some model, or ""."""
+        prefixes = tuple(f"{name}_" for name in (*self.vector_kinds, *self.jacobians, *self.systems))
+        return min((name for name in self.scalar_names if name.startswith(prefixes)), default="")
 
 
 def function_name(call: ast.Call) -> str:
@@ -475,11 +446,6 @@ def function_name(call: ast.Call) -> str:
 def parse_expression(text: str) -> ast.expr:
     """Parse an expression."""
     return ast.parse(text, mode="eval").body
-
-
-def tuple_or_single(terms: list[ast.expr]) -> ast.expr:
-    """Return a tuple, or the only element."""
-    return ast.Tuple(terms, ast.Load()) if len(terms) != 1 else terms[0]
 
 
 def names_used(node: ast.AST) -> set[str]:

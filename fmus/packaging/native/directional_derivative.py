@@ -27,8 +27,8 @@ from typing import Any
 from ..equations.expression_printer import ExpressionPrinter
 from ..equations.expressions import FUNCTIONS, Expression, Term
 from ..fmi_variables import DERIVATIVE_NAME, Variables
-from ..lowering import function_tree
-from ..lowering.import_hook import TREE_NAME, scalar_name
+from ..lowering import component_name, function_tree
+from ..lowering.import_hook import TREE_NAME
 
 # Prefix of tangents, and the parameter that holds the direction and the results. No variable of a model starts with _.
 PREFIX, TANGENT = "_d_", "_tangent"
@@ -59,7 +59,8 @@ def build_tangent_functions(model: Any, declared: Variables) -> tuple[Tangent, d
     )
     read = {node.attr for statement in outputs for node in ast.walk(statement) if isinstance(node, ast.Attribute)}
     constants = [name for name in assigned_attributes(prepare) if name in read]
-    point = {"t": "t"} | {name: scalar_name(model, name) for name in (*model.states, *model.contacts)}
+    point = {"t": "t"} | {name: component_name("y", name) for name in model.states}
+    point |= {name: component_name("modes", name) for name in model.contacts}
     begin = parse_statements(f"{name} = solver.{number}" for name, number in point.items())
     bodies = {
         "propagate_start_tangent": begin + writer.differentiate_start(start),

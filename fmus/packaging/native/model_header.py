@@ -22,7 +22,7 @@ from ..fmi_variables import (
     derivative_indices,
     event_indicator_indices,
 )
-from ..lowering import model_exchange_run, scalar_name, sibling_module
+from ..lowering import component_name, model_exchange_run, sibling_module
 from ..text_output import c_comment, c_string_literal
 from .c_types import BOOL, FLOAT, INT, CType, StructPointer, c_literal
 from .call_graph import CallGraph
@@ -224,9 +224,8 @@ def attribute_path(model: Any, name: str) -> str:
         return "run.model_exchange.time"
     for indicator in (TO_REST, TO_BREAK_AWAY):
         if name.startswith(indicator):
-            mode = name.removeprefix(indicator)[1:]  # none for a single contact
-            path = indicator.replace("events", "run.model_exchange", 1)
-            return f"{path}_{scalar_name(model, mode)}" if mode else path
+            mode = name.removeprefix(indicator)[1:] or next(iter(model.contacts))  # no name for a single contact
+            return component_name(indicator.replace("events", "run.model_exchange", 1), mode)
     if name.startswith(CONDITION[:-2]):
         return f"run.model_exchange.conditions[{int(name.removeprefix(CONDITION[:-2])) - 1}]"
     if name.startswith(DERIVATIVE_NAME[:4]):
