@@ -22,6 +22,7 @@ from .vectors import (
     elementwise_max,
     factorize,
     factorize_complex,
+    inlined,
     kinematic_rates,
     magnitude,
     max_of,
@@ -80,6 +81,29 @@ H31, H32, H33, H34, H35 = -36.19335816765893, 10.611734614705874, -10.0296619253
 H41, H42, H43, H44, H45 = -144.05356518917776, 63.63016294236274, -17.885204671340986, -5.291393081843982, 5.6
 H51, H52, H53, H54, H55 = 199.88739542347736, -127.022853068795, 92.10283313613321, -64.16737549081559, 25.2
 # fmt: on
+
+
+@inlined
+def stage_change(h, f, c, a1, a2, a3, a4, a5, z1, z2, z3, z4, z5, z):
+    """Return the change up to a stage: z; for states whose rate is a state, it follows from the stages of that one."""
+    return select_kinematic(
+        h
+        * (
+            c * f
+            + a1 * kinematic_rates(z1)
+            + a2 * kinematic_rates(z2)
+            + a3 * kinematic_rates(z3)
+            + a4 * kinematic_rates(z4)
+            + a5 * kinematic_rates(z5)
+        ),
+        z,
+    )
+
+
+@inlined
+def continuation(ahead, place, p1, p2, p3, p4, p5):
+    """Return the change that the polynomial of the step before predicts."""
+    return dynamic_part(ahead * (p1 - place * (p2 + place * (p3 - ahead * (p4 + place * p5)))))
 
 
 class Radau9:
@@ -142,47 +166,25 @@ class Radau9:
         ratio = h / self.h_last if self.h_last > 0.0 else 0.0
         ahead = C1 * ratio
         place = 1.0 + ahead
-        z1 = dynamic_part(
-            ahead * (self.p1 - place * (self.p2 + place * (self.p3 - ahead * (self.p4 + place * self.p5))))
-        )
+        z1 = continuation(ahead, place, self.p1, self.p2, self.p3, self.p4, self.p5)
         ahead = C2 * ratio
         place = 1.0 + ahead
-        z2 = dynamic_part(
-            ahead * (self.p1 - place * (self.p2 + place * (self.p3 - ahead * (self.p4 + place * self.p5))))
-        )
+        z2 = continuation(ahead, place, self.p1, self.p2, self.p3, self.p4, self.p5)
         ahead = C3 * ratio
         place = 1.0 + ahead
-        z3 = dynamic_part(
-            ahead * (self.p1 - place * (self.p2 + place * (self.p3 - ahead * (self.p4 + place * self.p5))))
-        )
+        z3 = continuation(ahead, place, self.p1, self.p2, self.p3, self.p4, self.p5)
         ahead = C4 * ratio
         place = 1.0 + ahead
-        z4 = dynamic_part(
-            ahead * (self.p1 - place * (self.p2 + place * (self.p3 - ahead * (self.p4 + place * self.p5))))
-        )
+        z4 = continuation(ahead, place, self.p1, self.p2, self.p3, self.p4, self.p5)
         place = 1.0 + ratio
-        z5 = dynamic_part(
-            ratio * (self.p1 - place * (self.p2 + place * (self.p3 - ratio * (self.p4 + place * self.p5))))
-        )
+        z5 = continuation(ratio, place, self.p1, self.p2, self.p3, self.p4, self.p5)
         w1 = S11 * z1 + S12 * z2 + S13 * z3 + S14 * z4 + S15 * z5
         w2 = S21 * z1 + S22 * z2 + S23 * z3 + S24 * z4 + S25 * z5
         w3 = S31 * z1 + S32 * z2 + S33 * z3 + S34 * z4 + S35 * z5
         w4 = S41 * z1 + S42 * z2 + S43 * z3 + S44 * z4 + S45 * z5
         w5 = S51 * z1 + S52 * z2 + S53 * z3 + S54 * z4 + S55 * z5
 
-        y7 = select_kinematic(
-            y
-            + h
-            * (
-                C4 * f
-                + A41 * kinematic_rates(z1)
-                + A42 * kinematic_rates(z2)
-                + A43 * kinematic_rates(z3)
-                + A44 * kinematic_rates(z4)
-                + A45 * kinematic_rates(z5)
-            ),
-            y + z4,
-        )
+        y7 = y + stage_change(h, f, C4, A41, A42, A43, A44, A45, z1, z2, z3, z4, z5, z4)
         _f_t, J = model.jacobian(t + C4 * h, y7, modes)
         re_1, im_1, re_2, im_2 = ALPHA1 / h, BETA1 / h, ALPHA2 / h, BETA2 / h  # of the complex shifts
         real = factorize(GAMMA, h, J)
@@ -194,75 +196,15 @@ class Radau9:
         tolerance = NEWTON_TOLERANCE * step.tolerance
         has_converged, last_change, quotient, share, iterations = False, 1.0, 1.0, 1.0, 0
         for turn in range(MAX_ITERATIONS):
-            y1 = select_kinematic(
-                y
-                + h
-                * (
-                    C1 * f
-                    + A11 * kinematic_rates(z1)
-                    + A12 * kinematic_rates(z2)
-                    + A13 * kinematic_rates(z3)
-                    + A14 * kinematic_rates(z4)
-                    + A15 * kinematic_rates(z5)
-                ),
-                y + z1,
-            )
+            y1 = y + stage_change(h, f, C1, A11, A12, A13, A14, A15, z1, z2, z3, z4, z5, z1)
             f1 = model.rates(t + C1 * h, y1, modes)
-            y2 = select_kinematic(
-                y
-                + h
-                * (
-                    C2 * f
-                    + A21 * kinematic_rates(z1)
-                    + A22 * kinematic_rates(z2)
-                    + A23 * kinematic_rates(z3)
-                    + A24 * kinematic_rates(z4)
-                    + A25 * kinematic_rates(z5)
-                ),
-                y + z2,
-            )
+            y2 = y + stage_change(h, f, C2, A21, A22, A23, A24, A25, z1, z2, z3, z4, z5, z2)
             f2 = model.rates(t + C2 * h, y2, modes)
-            y3 = select_kinematic(
-                y
-                + h
-                * (
-                    C3 * f
-                    + A31 * kinematic_rates(z1)
-                    + A32 * kinematic_rates(z2)
-                    + A33 * kinematic_rates(z3)
-                    + A34 * kinematic_rates(z4)
-                    + A35 * kinematic_rates(z5)
-                ),
-                y + z3,
-            )
+            y3 = y + stage_change(h, f, C3, A31, A32, A33, A34, A35, z1, z2, z3, z4, z5, z3)
             f3 = model.rates(t + C3 * h, y3, modes)
-            y4 = select_kinematic(
-                y
-                + h
-                * (
-                    C4 * f
-                    + A41 * kinematic_rates(z1)
-                    + A42 * kinematic_rates(z2)
-                    + A43 * kinematic_rates(z3)
-                    + A44 * kinematic_rates(z4)
-                    + A45 * kinematic_rates(z5)
-                ),
-                y + z4,
-            )
+            y4 = y + stage_change(h, f, C4, A41, A42, A43, A44, A45, z1, z2, z3, z4, z5, z4)
             f4 = model.rates(t + C4 * h, y4, modes)
-            y5 = select_kinematic(
-                y
-                + h
-                * (
-                    f
-                    + A51 * kinematic_rates(z1)
-                    + A52 * kinematic_rates(z2)
-                    + A53 * kinematic_rates(z3)
-                    + A54 * kinematic_rates(z4)
-                    + A55 * kinematic_rates(z5)
-                ),
-                y + z5,
-            )
+            y5 = y + stage_change(h, f, 1.0, A51, A52, A53, A54, A55, z1, z2, z3, z4, z5, z5)
             f5 = model.rates(t + h, y5, modes)
             iterations += 1
             r1 = dynamic_part(S11 * f1 + S12 * f2 + S13 * f3 + S14 * f4 + S15 * f5) - shift * w1
@@ -316,19 +258,7 @@ class Radau9:
             return y, f, e
 
         # the end of the step
-        y6 = select_kinematic(
-            y
-            + h
-            * (
-                f
-                + A51 * kinematic_rates(z1)
-                + A52 * kinematic_rates(z2)
-                + A53 * kinematic_rates(z3)
-                + A54 * kinematic_rates(z4)
-                + A55 * kinematic_rates(z5)
-            ),
-            y + z5,
-        )
+        y6 = y + stage_change(h, f, 1.0, A51, A52, A53, A54, A55, z1, z2, z3, z4, z5, z5)
         r = select_kinematic(
             Q1 * kinematic_rates(z1)
             + Q2 * kinematic_rates(z2)
@@ -377,65 +307,12 @@ class Radau9:
         """Build the interpolant: the polynomial through the stages."""
         inside = step.interpolant
         h = step.h_full
-        z1 = select_kinematic(
-            h
-            * (
-                C1 * step.f0
-                + A11 * kinematic_rates(self.z1)
-                + A12 * kinematic_rates(self.z2)
-                + A13 * kinematic_rates(self.z3)
-                + A14 * kinematic_rates(self.z4)
-                + A15 * kinematic_rates(self.z5)
-            ),
-            self.z1,
-        )
-        z2 = select_kinematic(
-            h
-            * (
-                C2 * step.f0
-                + A21 * kinematic_rates(self.z1)
-                + A22 * kinematic_rates(self.z2)
-                + A23 * kinematic_rates(self.z3)
-                + A24 * kinematic_rates(self.z4)
-                + A25 * kinematic_rates(self.z5)
-            ),
-            self.z2,
-        )
-        z3 = select_kinematic(
-            h
-            * (
-                C3 * step.f0
-                + A31 * kinematic_rates(self.z1)
-                + A32 * kinematic_rates(self.z2)
-                + A33 * kinematic_rates(self.z3)
-                + A34 * kinematic_rates(self.z4)
-                + A35 * kinematic_rates(self.z5)
-            ),
-            self.z3,
-        )
-        z4 = select_kinematic(
-            h
-            * (
-                C4 * step.f0
-                + A41 * kinematic_rates(self.z1)
-                + A42 * kinematic_rates(self.z2)
-                + A43 * kinematic_rates(self.z3)
-                + A44 * kinematic_rates(self.z4)
-                + A45 * kinematic_rates(self.z5)
-            ),
-            self.z4,
-        )
-        z5 = select_kinematic(
-            h
-            * (
-                step.f0
-                + A51 * kinematic_rates(self.z1)
-                + A52 * kinematic_rates(self.z2)
-                + A53 * kinematic_rates(self.z3)
-                + A54 * kinematic_rates(self.z4)
-                + A55 * kinematic_rates(self.z5)
-            ),
-            self.z5,
+        z1 = stage_change(h, step.f0, C1, A11, A12, A13, A14, A15, self.z1, self.z2, self.z3, self.z4, self.z5, self.z1)
+        z2 = stage_change(h, step.f0, C2, A21, A22, A23, A24, A25, self.z1, self.z2, self.z3, self.z4, self.z5, self.z2)
+        z3 = stage_change(h, step.f0, C3, A31, A32, A33, A34, A35, self.z1, self.z2, self.z3, self.z4, self.z5, self.z3)
+        z4 = stage_change(h, step.f0, C4, A41, A42, A43, A44, A45, self.z1, self.z2, self.z3, self.z4, self.z5, self.z4)
+        z5 = stage_change(
+            h, step.f0, 1.0, A51, A52, A53, A54, A55, self.z1, self.z2, self.z3, self.z4, self.z5, self.z5
         )
         inside.ready, inside.h, inside.degree = True, h, 7
         inside.c0 = step.y0

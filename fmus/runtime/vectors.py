@@ -112,6 +112,11 @@ def elementwise(function):
     return apply
 
 
+def inlined(function):
+    """Mark a function of vectors that returns one expression; its calls are replaced by it at build time."""
+    return function
+
+
 def factorize(g, h, J):
     """Factorize 1 - g h J."""
     w = linear_solver.Entries()

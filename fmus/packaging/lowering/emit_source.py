@@ -6,7 +6,7 @@ from ..syntax_trees import parsed_module, replace_fields
 from .constant_folding import known_truth
 from .layout import ModelLayout
 from .scalarize import LOOP_RANGES, METHOD_LOOP, Scalarizer
-from .source_symbols import SourceSymbols, annotated_kind, annotated_results, item_label, pair_rates
+from .source_symbols import SourceSymbols, annotated_kind, annotated_results, is_marked, item_label, pair_rates
 
 SOLVER_IMPORTS = ("fabs", "nan")  # names of math in the statements of elimination.py
 
@@ -47,6 +47,8 @@ class FileLowerer:
                 return [replace_fields(node, body=self.lower_block(node.body) or [ast.Pass()])]
             case ast.FunctionDef(body=[ast.Expr(ast.Constant(str()))]):
                 return []  # a declaration
+            case ast.FunctionDef() if is_marked(node, "inlined"):
+                return []
             case ast.FunctionDef():
                 contacts = [argument.arg for argument in node.args.args if is_contact(argument)]
                 indices = range(len(self.spec.contacts)) if contacts else [0]

@@ -4,7 +4,7 @@ import ast
 from collections.abc import Sequence
 
 from .. import BuildError
-from ..syntax_trees import all_nodes, is_same_tree, replace_fields
+from ..syntax_trees import TreeTransformer, all_nodes, is_same_tree, replace_fields
 from .constant_folding import ConstantFolder
 from .elimination import LoweredSystem, tuple_or_single
 from .layout import CONDITIONS, STATES, ModelLayout
@@ -19,6 +19,16 @@ INDEX_LOOKUPS = {"slip_index": "slip", "position_index": "place"}
 
 class LoweringError(BuildError):
     """Raised for source that cannot be lowered: line, problem, and what to write instead."""
+
+
+class Substitution(TreeTransformer):
+    """Replaces names by expressions."""
+
+    def __init__(self, expressions: dict[str, ast.expr]) -> None:
+        self.expressions = expressions
+
+    def visit_Name(self, node: ast.Name) -> ast.expr:
+        return self.expressions.get(node.id, node)
 
 
 class Scalarizer(ConstantFolder):
@@ -70,13 +80,13 @@ class Scalarizer(ConstantFolder):
 
     def is_elementwise(self, node: ast.AST) -> bool:
         """Return whether a call works on vectors component by component."""
-        names = {*ELEMENTWISE, *self.declared.elementwise, *SELECTIONS}
+        names = {*ELEMENTWISE, *self.declared.elementwise, *self.declared.inlined, *SELECTIONS}
         return isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in names
 
     def result_kinds(self, call: ast.Call) -> list[str | None]:
         """Return the kinds of the results of a call."""
         if self.is_elementwise(call):
-            return [self.vector_kind(call.args[0])]
+            return [next(filter(None, map(self.vector_kind, call.args)), None)]
         return self.declared.result_kinds.get(function_name(call), [None])
 
     def all_indices(self, kind: str) -> range:
@@ -117,6 +127,12 @@ class Scalarizer(ConstantFolder):
                 return ast.UnaryOp(op, self.component(operand, place))
             case ast.Compare(left=left, ops=ops, comparators=[right]):
                 return ast.Compare(self.component(left, place), ops, [self.component(right, place)])
+            case ast.Call(func=ast.Name(id=name), args=args) if name in self.declared.inlined:
+                parameters, expression = self.declared.inlined[name]
+                if not all(isinstance(argument, (ast.Name, ast.Attribute, ast.Constant)) for argument in args):
+                    raise self.error(node, "would evaluate its argument twice; assign the argument to a name first")
+                arguments = dict(zip(parameters, args, strict=True))
+                return self.component(Substitution(arguments).visit(expression), place)
             case ast.Call(func=ast.Name(id="select_kinematic"), args=[moved, other]):
                 return self.component(other if place in self.spec.dynamic_states else moved, place)
             case ast.Call(func=ast.Name(id="complete_rates"), args=[states, others]):

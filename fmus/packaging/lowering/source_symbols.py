@@ -26,6 +26,7 @@ class SourceSymbols:
         self.states_of_rates: dict[str, str] = {}  # attribute with rates -> attribute with their states
         self.constants: dict[str, Any] = {}
         self.elementwise: set[str] = set()
+        self.inlined: dict[str, tuple[list[str], ast.expr]] = {}  # parameters and expression
         self.result_kinds: dict[str, list[str | None]] = {}  # of functions that return vectors
         # of functions that return rates: place of the rates -> place of their states; negative places are arguments
         self.states_of_results: dict[str, dict[int, int]] = {}
@@ -60,8 +61,10 @@ class SourceSymbols:
                     raise BuildError(f"{node.name}.{name} is named like a component of a vector; take another name.")
             case ast.FunctionDef(name=name):
                 self.read_results(node)
-                if any(isinstance(mark, ast.Name) and mark.id == "elementwise" for mark in node.decorator_list):
+                if is_marked(node, "elementwise"):
                     self.elementwise.add(name)
+                if is_marked(node, "inlined") and isinstance(node.body[-1], ast.Return) and node.body[-1].value:
+                    self.inlined[name] = [argument.arg for argument in node.args.args], node.body[-1].value
 
     def read_results(self, node: ast.FunctionDef) -> None:
         """Collect the results of a function."""
@@ -85,6 +88,11 @@ class SourceSymbols:
                 for name, constant in pairs:
                     if isinstance(name, ast.Name):
                         self.constants[name.id] = item_label(constant) or getattr(constant, "value", None)
+
+
+def is_marked(node: ast.FunctionDef, word: str) -> bool:
+    """Return whether a function has a decorator."""
+    return any(isinstance(mark, ast.Name) and mark.id == word for mark in node.decorator_list)
 
 
 def is_self_assignment(node: ast.AST) -> TypeGuard[ast.Attribute]:
