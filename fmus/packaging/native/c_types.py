@@ -67,6 +67,16 @@ class BoundMethod:
     cls: type
 
 
+@dataclass(frozen=True)
+class CFunction:
+    """A translated function: C name, result type, whether it has no side effects and whether it can fault."""
+
+    name: str
+    result: "CType | None"
+    is_pure: bool
+    can_fault: bool
+
+
 CType: TypeAlias = Scalar | FloatArray | ScalarTuple | StructPointer | CompileTimeValue | BoundMethod
 
 

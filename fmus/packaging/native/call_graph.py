@@ -1,22 +1,11 @@
 """Functions reachable from the entry points, specialised to the types of their arguments; callees come first."""
 
-from dataclasses import dataclass
 from itertools import count
 from types import FunctionType
 
-from .c_types import CType, ScalarTuple
+from .c_types import CFunction, CType, ScalarTuple
 from .statements import FunctionTranslator
 from .struct_layout import StructLayout
-
-
-@dataclass(frozen=True)
-class CFunction:
-    """A translated function: C name, result type, whether it has no side effects and whether it can fault."""
-
-    name: str
-    result: CType | None
-    is_pure: bool
-    can_fault: bool
 
 
 class CallGraph:
@@ -35,7 +24,7 @@ class CallGraph:
 
     def add_entry_point(self, function: FunctionType, arg_types: list[CType], name: str = "") -> CFunction:
         """Add an entry point. Entry points always have a fault flag."""
-        body = FunctionTranslator(self, function, arg_types)
+        body = FunctionTranslator(self.layout, self.specialise, function, arg_types)
         body.can_fault = True
         compiled = self._functions[(function, *arg_types)] = self._add(body, name or self._unique_name(function))
         return compiled
@@ -45,7 +34,9 @@ class CallGraph:
         key = (function, *arg_types)
         if key not in self._functions:
             self._functions[key] = None
-            self._functions[key] = self._add(FunctionTranslator(self, function, arg_types), self._unique_name(function))
+            self._functions[key] = self._add(
+                FunctionTranslator(self.layout, self.specialise, function, arg_types), self._unique_name(function)
+            )
         return self._functions[key]
 
     def _add(self, body: FunctionTranslator, name: str) -> CFunction:

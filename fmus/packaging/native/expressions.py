@@ -14,13 +14,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import count
 from types import BuiltinFunctionType, FunctionType
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import Any, NoReturn
 
 from .c_types import (
     BOOL,
     FLOAT,
     INT,
     BoundMethod,
+    CFunction,
     CompileTimeValue,
     CType,
     FloatArray,
@@ -33,9 +34,10 @@ from .c_types import (
     scalar_type_of,
     unsupported,
 )
+from .struct_layout import StructLayout
 
-if TYPE_CHECKING:
-    from .call_graph import CallGraph
+# Translates a function for given types of its arguments; None means that it is recursive.
+Specialise = Callable[[FunctionType, list[CType]], CFunction | None]
 
 # Operator precedence of C, lowest first. For arithmetic, Python's is the same.
 CONDITIONAL, OR, AND, EQUALITY, RELATIONAL, ADDITIVE, MULTIPLICATIVE, UNARY, PRIMARY = range(9)
@@ -82,8 +84,8 @@ class CExpression:
 class ExpressionTranslator(ast.NodeVisitor):
     """Translator for the expressions of one function."""
 
-    def __init__(self, call_graph: "CallGraph", function: FunctionType) -> None:
-        self.call_graph, self.function = call_graph, function
+    def __init__(self, layout: StructLayout, specialise: Specialise, function: FunctionType) -> None:
+        self.layout, self.specialise, self.function = layout, specialise, function
         self.local_types: dict[str, CType] = {}
         self.assigned_names: set[str] = set()  # names that are assigned on every path to this statement
         self.lines: list[str] = []
@@ -186,7 +188,7 @@ class ExpressionTranslator(ast.NodeVisitor):
             raise self.unsupported(node, "is an attribute of a number", "use the number itself")
         cls = owner.ctype.cls
         lvalue = f"{owner.text[1:]}.{node.attr}" if owner.text.startswith("&") else f"{owner.text}->{node.attr}"
-        field = self.call_graph.layout.fields[cls].get(node.attr)
+        field = self.layout.fields[cls].get(node.attr)
         if isinstance(field, StructPointer):
             return CExpression(field, "&" + lvalue, UNARY)
         if field:
@@ -363,7 +365,7 @@ class ExpressionTranslator(ast.NodeVisitor):
             raise self.unsupported(
                 node, "passes a tuple or list as one argument", "pass each number, or the object that owns them"
             )
-        compiled = self.call_graph.specialise(function, [value.ctype for value in arguments])
+        compiled = self.specialise(function, [value.ctype for value in arguments])
         if compiled is None:
             raise self.unsupported(node, "is recursive", "write a loop")
         if self.may_fault and not compiled.is_pure:  # after a fault in the arguments, the call must not have effects

@@ -8,7 +8,6 @@ import ast
 import re
 from collections.abc import Callable
 from types import FunctionType
-from typing import TYPE_CHECKING
 
 from ..equations.reserved_names import C_NAMES
 from ..lowering import function_tree
@@ -25,10 +24,8 @@ from .c_types import (
     c_spelling,
     source_location,
 )
-from .expressions import FAULT_CHECK, UNARY, CExpression, ExpressionTranslator, make_tuple
-
-if TYPE_CHECKING:
-    from .call_graph import CallGraph
+from .expressions import FAULT_CHECK, UNARY, CExpression, ExpressionTranslator, Specialise, make_tuple
+from .struct_layout import StructLayout
 
 ASSIGNMENT = re.compile(r" *(const [\w ]+[ *])?(\w+) = (.*);")  # type of a constant, name, value
 CALL, NAME = re.compile(r"\w\("), re.compile(r"(?<![\w.>])[A-Za-z_]\w*")  # not the name of a field
@@ -37,8 +34,10 @@ CALL, NAME = re.compile(r"\w\("), re.compile(r"(?<![\w.>])[A-Za-z_]\w*")  # not 
 class FunctionTranslator(ExpressionTranslator):
     """Translator for one function, specialised to the types of its arguments."""
 
-    def __init__(self, call_graph: "CallGraph", function: FunctionType, arg_types: list[CType]) -> None:
-        super().__init__(call_graph, function)
+    def __init__(
+        self, layout: StructLayout, specialise: Specialise, function: FunctionType, arg_types: list[CType]
+    ) -> None:
+        super().__init__(layout, specialise, function)
         self.result: CType | None = None
         self.has_return = False  # a return was translated, so the result type is known
         self.assigned_at_breaks: list[list[set[str]]] = []  # per enclosing loop: names assigned at each of its breaks
