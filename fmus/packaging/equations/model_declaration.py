@@ -107,7 +107,11 @@ class Fixed(SettableVariable, variable_declarations.Fixed):
 
 
 class Input(SettableVariable, variable_declarations.Input):
-    """An input, set by another FMU or by the importer during the run.
+    """An input, set by another FMU or by the importer during the run. ::
+
+        F_ext = Input(0.0, "N", "external force on the mass")
+        a_belt = Input(0.0, "m/s2", "acceleration of the belt")
+        v_belt = Input(0.2, "m/s", "speed of the belt", rate=a_belt)
 
     Parameters
     ----------
@@ -169,7 +173,14 @@ class Choice(Variable, variable_declarations.Choice):
 
 
 class State(Variable, variable_declarations.Output):
-    """A continuous state.
+    """A continuous state. ::
+
+        x = State("m", "position", start=0.1)
+        v = State("m/s", "speed", rate_of=x)
+        a = Output("m/s2", "acceleration", (-k * x - F_friction) / m, rate_of=v)
+        x_driver = State("m", "position of the driver", rate=v_driver)
+
+    Its rate is the state or output with `rate_of`, or its own constant `rate`.
 
     Parameters
     ----------
@@ -247,7 +258,11 @@ class Mode(Variable, variable_declarations.Mode):
 
 
 class Contact(Variable, variable_declarations.Output):
-    """The force of dry friction in a contact, an unknown of the equations; positive if it opposes a positive slip.
+    """The force of dry friction in a contact, an unknown of the equations; positive if it opposes a positive slip. ::
+
+        mode = Mode()
+        F_friction = Contact("N", "friction force", mode=mode, slip=v, slide=mu_d * m * g, hold=mu_s * m * g)
+        a = Output("m/s2", "acceleration", (F_ext - F_friction) / m, rate_of=v)
 
     Parameters
     ----------
