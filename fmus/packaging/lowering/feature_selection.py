@@ -1,6 +1,6 @@
 """Selects the integration methods and friction laws that an FMU includes.
 
-Code of excluded methods and laws is removed by constant folding and dead-code elimination.
+Code of excluded methods and laws is removed by constant folding, and as unused functions and imports.
 """
 
 from collections.abc import Sequence
