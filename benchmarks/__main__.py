@@ -23,6 +23,8 @@ import click
 
 from benchmarks.bench.command import bench
 from benchmarks.importers.command import importers
+from benchmarks.literature.command import literature
+from benchmarks.references.command import references
 from benchmarks.rivals.command import rivals
 from benchmarks.symmetry.command import symmetry
 from harness.commands import FullHelpGroup
@@ -30,7 +32,8 @@ from harness.commands import FullHelpGroup
 
 @click.group(cls=FullHelpGroup, context_settings={"help_option_names": ["-h", "--help"]})
 def main() -> None:
-    """Measure this project: speed and accuracy, symmetry, the same scenes in other engines, the FMUs in other tools.
+    """Measure this project: speed and accuracy, symmetry, the same scenes in other engines, the FMUs in other tools,
+    problems from the literature; and compute its certified results.
 
     These commands need a checkout of the project and are not a part of the installed package.
 
@@ -41,5 +44,5 @@ def main() -> None:
     """
 
 
-for command in (bench, importers, rivals, symmetry):
+for command in (bench, importers, literature, references, rivals, symmetry):
     main.add_command(command)

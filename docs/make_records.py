@@ -1,6 +1,6 @@
 """Draw the synthetic records docs/records/pulled_block.csv and sled.csv.
 
-The motion is integrated from event to event by scipy (harness/references/event_located.py), which is
+The motion is integrated from event to event by scipy (benchmarks/references/event_located.py), which is
 independent of the FMUs. The sensors have noise, steps and irregular intervals; each record lacks one value.
 
     python docs/make_records.py FOLDER
@@ -14,7 +14,7 @@ from random import Random
 
 import numpy as np
 
-from harness.references.event_located import HybridProblem, StateVector, solve
+from benchmarks.references.event_located import HybridProblem, StateVector, solve
 
 G = 9.81  # m/s2
 RTOL, ATOL = 1e-11, 1e-13

@@ -6,7 +6,8 @@ from functools import cache
 
 import numpy as np
 
-from harness.references import event_located, peer_solvers
+from benchmarks.references import event_located
+from harness.references import peer_solvers
 from harness.references.reference_trajectory import CommunicationGrid, compute_reference
 from harness.running.solution import Solution
 

@@ -27,19 +27,17 @@ def precision(models: tuple[str, ...], terminal: Terminal, quick: bool) -> None:
     from ..studies.precision.study import FULL, QUICK
     from ..studies.precision.survey import FOLDER, run_survey
 
-    with terminal.progress(len(models or MODELS) + 1) as report:
+    with terminal.progress(len(models or MODELS)) as report:
         result = run_survey(models or MODELS, QUICK if quick else FULL, terminal.out, report)
     data = {
         "points": {study.model: study.points for study in result.studies},
         "laws": result.deviations,
-        "literature": result.literature,
         "advice": result.advice,
         "missing": result.missing,
     }
     errors = (
         tables.exchange_table(result.studies),
         tables.deviation_table(result.deviations),
-        tables.literature_table(result.literature),
     )
     output = [
         block

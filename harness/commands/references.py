@@ -17,9 +17,7 @@ def references(files: tuple[Path, ...], quiet: bool, as_json: bool) -> None:
     """Compute the certified result of the model in each FILE.py and write it to FILE.csv.  The FMU must be built.
 
     Two methods that share no formula solve the default run.  If they agree, FILE.csv is written, and for a model that
-    sticks FILE-events.csv with the changes of mode; the next build includes both in the FMU and on its page.  The
-    shipped models use closed forms, power series and independent solvers instead, for each friction law; this takes
-    some minutes.
+    sticks FILE-events.csv with the changes of mode; the next build includes both in the FMU and on its page.
 
     \b
     Example:

@@ -1,8 +1,7 @@
 """Certified results for any model: its default run by two methods that share no formula, if they agree.
 
-Models with an independent implementation in models/ get more accurate results from generation.py, those of fmus/more
-from event_located.py.  A result is written next to the file of the model, under its name, and packaged into the FMU at
-the next build.  A second file has the changes of mode.
+A result is written next to the file of the model, under its name, and packaged into the FMU at the next build.  A second
+file has the changes of mode.  Shipped models get more accurate results from `python -m benchmarks references`.
 """
 
 from dataclasses import dataclass, replace
@@ -17,8 +16,6 @@ from ..running.embedded_model import EmbeddedModel, load_model_class, method_num
 from ..running.solution import Solution
 from ..scenes.fmu_files import find_fmu
 from .certified_reference import ERROR_LABEL, FOLDER, POINTS, max_relative_difference
-from .event_located import PROBLEMS, certify_by_two_routes
-from .models import CASES
 from .reference_trajectory import CommunicationGrid
 from .segments import ParameterSpan, ParameterValues
 
@@ -43,29 +40,24 @@ def certify(file: Path) -> list[CertifiedFile]:
     Raises
     ------
     HarnessError
-        If the FMU is not built, does not offer both methods, or the methods disagree.
+        If the FMU is not built, does not offer both methods, or the methods disagree, or if the model is a shipped one.
     """
+    if file.resolve().parent in (FOLDER, FOLDER / "more"):
+        raise HarnessError(
+            f"{file} is a shipped model, whose certified results are more accurate: compute them by "
+            f"`python -m benchmarks references {file.stem}` in a checkout of the project"
+        )
     fmu = file.with_suffix(".fmu")
     if not fmu.is_file():
         raise HarnessError(f"there is no {fmu}: build it with `friction-fmus build {file}`")
     model = load_model_class(fmu)
-    references = generate_all(file) or {file.stem: certify_default_run(model, file)}
+    return write_references({file.stem: certify_default_run(model, file)}, model, file.parent)
+
+
+def write_references(references: dict[str, Solution], model: type, folder: Path) -> list[CertifiedFile]:
+    """Write references of a model, the class inside its FMU, to a folder, under their names."""
     headings = ["t [s]", *(column_heading(name, unit) for name, unit in list_states(model))]
-    return [
-        write_reference(file.with_name(f"{name}.csv"), headings, reference) for name, reference in references.items()
-    ]
-
-
-def generate_all(file: Path) -> dict[str, Solution]:
-    """Return the references of all laws of a model by name; none if it has no independent implementation."""
-    if file.resolve().parent == FOLDER / "more" and file.stem in PROBLEMS:
-        return {file.stem: certify_by_two_routes(file.stem)}
-    cases = {case.reference_source: case for case in CASES if FOLDER / f"{case.model}.py" == file.resolve()}
-    if not cases:
-        return {}
-    from .generation import generate_reference
-
-    return {str(name): generate_reference(case) for name, case in cases.items()}
+    return [write_reference(folder / f"{name}.csv", headings, reference) for name, reference in references.items()]
 
 
 def write_reference(path: Path, headings: list[str], reference: Solution) -> CertifiedFile:

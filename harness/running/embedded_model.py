@@ -3,6 +3,7 @@
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 from importlib import import_module
 from operator import attrgetter
 from pathlib import Path
@@ -12,6 +13,8 @@ from typing import Any
 import numpy as np
 
 from ..errors import HarnessError
+from ..process.subprocess_runner import run_module
+from ..process.temporary_directory import temporary_directory
 from ..scenes.fmu_files import check_built
 from .fmu_archive import REQUIRED_VARIABLES, SCRIPT_NAME_FILE, cached_by_mtime, read_description, unpack
 from .solution import Solution
@@ -47,6 +50,16 @@ def import_model_class(fmu: Path) -> type:
             return import_module(package).Model
         finally:
             sys.path.remove(str(resources))
+
+
+@cache
+def load_more_model(name: str) -> type:
+    """Build the FMU of a model of fmus/more and return the model class in it."""
+    with temporary_directory(f"{name}-") as folder:
+        build = run_module("build_fmus", name, "--out", str(folder))
+        if build.returncode:
+            raise HarnessError(f"cannot build {name}: {(build.stderr.splitlines() or ['?'])[-1]}")
+        return load_model_class(folder / f"{name}.fmu")
 
 
 def method_numbers(model: Any) -> dict[str, int]:

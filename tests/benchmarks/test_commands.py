@@ -12,6 +12,8 @@ from benchmarks.bench.benchmark import Baseline, Benchmark
 from benchmarks.bench.table import benchmark_table
 from benchmarks.importers import table
 from benchmarks.importers.checks import CHECKS
+from benchmarks.literature.study import LiteratureRun
+from benchmarks.literature.table import literature_table
 from benchmarks.rivals.catalogue import RIVALS
 from benchmarks.rivals.comparison import Comparison, Result
 from benchmarks.rivals.measures import Measures
@@ -37,6 +39,10 @@ TABLES = {  # filled with long words, and a heading
             )
         ],
         "pendulum",
+    ),
+    "literature": (
+        [literature_table([LiteratureRun("block on a belt", "scipy, arctan(1e6 v)", "DOP853", 1e-10, 123456, 1.2e-5)])],
+        "error [SI]",
     ),
     "rivals": (
         [

@@ -24,7 +24,6 @@ from harness.scenes.coupled import scene as coupled
 from harness.scenes.fmu_files import find_fmu
 from harness.scenes.scene import load_scene, shipped_scenes
 from harness.studies.precision import law_deviations, table
-from harness.studies.precision.literature_problems import LiteratureRun
 from harness.studies.precision.study import FMU, ME, Point, Study
 from harness.studies.run.table import round_run_time
 
@@ -79,14 +78,6 @@ TABLES = {  # of slow commands, filled with long words
             )
         ],
         "creep [m/s]",
-    ),
-    "literature": (
-        [
-            table.literature_table(
-                [LiteratureRun("block on a belt", "scipy, arctan(1e6 v)", "DOP853", 1e-10, 123456, 1.2e-5)]
-            )
-        ],
-        "error [SI]",
     ),
 }
 

@@ -13,10 +13,10 @@ from models import DOP853
 from native_fmus import require_compiler
 from row_comparison import assert_identical
 
+from benchmarks.references import event_located
 from fmus.packaging.model_lookup import find_model, more_model_names
 from fmus.runtime.variable_declarations import Output, variables
 from harness.errors import HarnessError
-from harness.references import event_located
 from harness.references.certified_reference import event_time_error, load_reference, relative_errors
 from harness.scenes.fmu_files import check_built
 

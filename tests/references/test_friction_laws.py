@@ -7,9 +7,9 @@ import pytest
 from build_cache import build_once
 from models import DOP853
 
-from harness.references import event_located
-from harness.references.den_hartog import steady_motion_with_stops, steady_motion_without_stops
-from harness.studies.precision.literature_problems import SLIDING, STOPPING
+from benchmarks.literature.study import SLIDING, STOPPING
+from benchmarks.references import event_located
+from benchmarks.references.den_hartog import steady_motion_with_stops, steady_motion_without_stops
 
 pytestmark = pytest.mark.slow  # builds the FMUs of fmus/more
 

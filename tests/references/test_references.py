@@ -9,9 +9,9 @@ import pytest
 from independent_solution import ClosedFormMotion, LinearSegment
 from mpmath import mpf
 
+from benchmarks.literature.problems import BeltBlock, ChatteringOscillatorSign, SmoothedBeltBlock
+from benchmarks.references.generation import CLOSED_FORMS, evaluate_closed_form
 from harness.references.certified_reference import POINTS, compute_errors, event_time_error, load_reference
-from harness.references.generation import CLOSED_FORMS, evaluate_closed_form
-from harness.references.literature_problems import BeltBlock, ChatteringOscillatorSign, SmoothedBeltBlock
 from harness.references.models import CASES
 from harness.references.reference_trajectory import motion_error
 from harness.running.solution import Solution

@@ -16,15 +16,15 @@ from models import EXAMPLE_MODELS
 from precision_points import make_point
 from spec_runs import ignore_progress
 
+from benchmarks.references import event_located
 from harness.errors import HarnessError
-from harness.references import event_located, peer_solvers
+from harness.references import peer_solvers
 from harness.references.certified_reference import compute_errors, load_reference, relative_errors
 from harness.references.models import CASES
 from harness.results.provenance import write_provenance
-from harness.running.embedded_model import EmbeddedModel, load_model_class, method_numbers
+from harness.running.embedded_model import EmbeddedModel, load_model_class, load_more_model, method_numbers
 from harness.studies.precision import advice, law_deviations
 from harness.studies.precision.figure import OTHER, draw
-from harness.studies.precision.literature_problems import load_more_model
 from harness.studies.precision.study import (
     FMI3_TOOLS,
     FMPY,

@@ -191,7 +191,7 @@ def test_the_command_shows_both_interfaces_and_error_against_tolerance(two_studi
 
 def test_json_holds_all_results(two_studies):
     data = json.loads(two_studies[0][1])
-    assert set(data) == {"points", "laws", "literature", "advice", "missing"}
+    assert set(data) == {"points", "laws", "advice", "missing"}
     assert {point["method"] for point in data["points"]["smd"]} >= {"exact", "dop853", "fmpy's CVode"}
     assert data["advice"][0].startswith("smd: use exact")
 
@@ -209,7 +209,7 @@ def test_the_page_shows_error_against_tolerance_or_the_commands_that_produce_it(
 def test_the_command_writes_every_point_and_advice_and_keeps_results_of_other_models(two_studies):
     (output, incomplete), files, _, folder = two_studies
     assert "smd: use exact: " in output
-    assert {path.name for path in folder.iterdir()} == {"smd", "literature", "pendulum"}
+    assert {path.name for path in folder.iterdir()} == {"smd", "pendulum"}
     expected_files = {"points.csv", "figure.svg", "provenance.json", "summary.json"}
     assert {path.name for path in (folder / "smd").iterdir()} == expected_files
     assert (folder / "pendulum/points.csv").read_text() == "older"

@@ -1,1 +1,1 @@
-"""Work-precision studies, errors of friction laws, and problems from the literature."""
+"""Work-precision studies and errors of friction laws."""

@@ -14,13 +14,9 @@ from functools import cache, partial
 import numpy as np
 
 from ...analyses.slip import upward_crossings
-from ...references import event_located
-from ...references.certified_reference import (
-    POINTS,
-    ReferenceCase,
-    compute_errors,
-    load_reference,
-)
+from ...references import peer_solvers
+from ...references.certified_reference import POINTS, ReferenceCase, compute_errors, load_reference
+from ...references.ode_problem import OdeProblem, RhsFunction
 from ...running.embedded_model import EmbeddedModel
 from ...running.solution import Solution
 
@@ -28,6 +24,20 @@ FINE = 16001  # points used to find peaks and slips
 TOLERANCE = 1e-8
 CHATTERING_METHOD = "ode45"  # the closed form covers the hybrid law only
 BRISTLES = {"lugre": "LuGre", "elastoplastic": "elasto-plastic"}  # models of fmus/more and their laws
+
+
+class DryBlock(OdeProblem):
+    """The mass of the models with bristles, pulled through a spring, with Coulomb and viscous friction that sticks."""
+
+    start, stop, has_dry_friction = (0.0, 0.0), 20.0, True
+    k, v_driver, F_c, F_s, sigma_2 = 2.0, 0.1, 1.0, 1.5, 0.4
+
+    def rates(self, mode: int) -> RhsFunction:
+        k, speed, sliding, damping = self.k, self.v_driver, mode * self.F_c, self.sigma_2
+        return lambda t, y: (y[1], k * (speed * t - y[0]) - sliding - damping * y[1])
+
+    def static_load(self, t: float, x: float) -> tuple[float, float, float]:
+        return self.k * (self.v_driver * t - x), self.k * self.v_driver, self.F_s
 
 
 @dataclass(frozen=True)
@@ -120,10 +130,8 @@ def compare_bristles(name: str, law: str, model: type) -> LawDeviation:
 @cache
 def solve_dry_block() -> Solution:
     """Return the motion of the block that sticks, in the default run of the models with bristles."""
-    problem, times = event_located.DryBlock(), np.linspace(0.0, event_located.DryBlock.stop, POINTS)
-    method = "DOP853"
-    states, events = event_located.solve(problem, times.tolist(), method, *event_located.TOLERANCES[method])
-    return Solution(times, states, [(t, mode) for t, (mode,) in events], start_mode=0, method=method)
+    solution = peer_solvers.solve("scipy", "DOP853", DryBlock(), np.linspace(0.0, DryBlock.stop, POINTS), 3e-14, 1e-17)
+    return replace(solution, start_mode=0)
 
 
 def stuck_points(truth: Solution) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Runs work-precision studies, law deviations and literature problems, and writes the results."""
+"""Runs work-precision studies and law deviations, and writes the results."""
 
 import re
 from collections.abc import Callable, Iterable, Sequence
@@ -15,22 +15,21 @@ from ...results.files import column_heading, write_csv_rows
 from ...results.folder import replace_folder
 from ...results.provenance import load_provenance, write_provenance
 from ...results.summary import MissingResult, Summary, SummaryTable, make_table, write_summary
-from ...running.embedded_model import load_model_class
+from ...running.embedded_model import load_model_class, load_more_model
 from ...running.fmu_archive import declared_parameters
 from ...scenes.fmu_files import find_fmu
-from . import law_deviations, literature_problems
+from . import law_deviations
 from .advice import recommend
 from .method_choice import tabulate_choices
 from .study import QUICK, Point, Study, SweepSettings, study_model
 
-FOLDER, LITERATURE = "precision", "literature"
+FOLDER = "precision"
 FILES = ("points.csv", "model-exchange.csv", "laws.csv", "figure.svg")
-LITERATURE_FILE = "final-errors.csv"
 QUICK_RUN = "a quick run"  # does not replace a full run
 UNITS = {  # of columns; SI means m and m/s, or rad and rad/s
     **dict.fromkeys(("rtol", "final", "rms", "largest", "beside_dry", "asymmetry", "integration"), "1"),
     **dict.fromkeys(("seconds", "events", "period"), "s"),
-    **dict.fromkeys(("atol", "error"), "SI"),
+    "atol": "SI",
     "creep": "m/s",
 }
 EXCHANGE_HEADING = "model exchange by fmpy's CVode: largest error at rtol [1]"
@@ -43,7 +42,6 @@ class PrecisionSurvey:
 
     studies: tuple[Study, ...]
     deviations: tuple[law_deviations.LawDeviation, ...]
-    literature: tuple[literature_problems.LiteratureRun, ...]
     advice: tuple[str, ...]
     missing: tuple[str, ...]
 
@@ -65,9 +63,6 @@ def run_survey(
             survey_result.studies, survey_result.advice, files, folders, strict=True
         ):
             write_study(study, survey_result.deviations, sentence, file, folder, extent)
-    if survey_result.literature:
-        with replace_folder(out / FOLDER / LITERATURE, [LITERATURE_FILE]) as folder:
-            write_literature(survey_result.literature, folder)
     return survey_result
 
 
@@ -82,13 +77,9 @@ def run_studies(models: Iterable[str], extent: SweepSettings, report: Callable[[
     ]
     if "stickslip" in models:
         deviations += [
-            law_deviations.compare_bristles(name, law, literature_problems.load_more_model(name))
+            law_deviations.compare_bristles(name, law, load_more_model(name))
             for name, law in law_deviations.BRISTLES.items()
         ]
-    report("literature", 0.0)
-    literature = (
-        tuple(literature_problems.solve_all()) if deviations or any(case.model in models for case in CASES) else ()
-    )
     advice = tuple(
         recommend(item, [law for law in deviations if law.model == item.model], extent.min_ratio) for item in studies
     )
@@ -99,7 +90,6 @@ def run_studies(models: Iterable[str], extent: SweepSettings, report: Callable[[
     return PrecisionSurvey(
         studies,
         tuple(deviations),
-        literature,
         advice,
         (*map(count_failures, studies), *failure_reasons(studies), *missing_peers),
     )
@@ -158,21 +148,6 @@ def write_study(
             missing=(MissingResult(f"{study.model} in model exchange", command),) if is_incomplete else (),
         ),
     )
-
-
-def write_literature(runs: Sequence[literature_problems.LiteratureRun], folder: Path) -> None:
-    """Write the table of the literature problems, its provenance and its summary."""
-    headings = csv_headings(literature_problems.LiteratureRun)
-    write_table(folder / LITERATURE_FILE, headings, map(astuple, runs))
-    write_provenance(folder, [])
-    rows = (
-        [
-            "" if cell is None or cell != cell else f"{cell:.4g}" if isinstance(cell, float) else cell
-            for cell in astuple(run)
-        ]
-        for run in runs
-    )
-    write_summary(folder, Summary("precision", "Problems from the literature", tables=make_table(headings, rows)))
 
 
 def split_clauses(text: str) -> tuple[str, ...]:

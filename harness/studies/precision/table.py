@@ -1,4 +1,4 @@
-"""Tables of work-precision studies, law deviations and literature problems."""
+"""Tables of work-precision studies and law deviations."""
 
 from collections.abc import Iterable
 from math import isnan
@@ -9,7 +9,6 @@ from rich.text import Text
 from ...results.summary import make_terminal_table
 from .advice import TARGETS, fastest_point, format_power
 from .law_deviations import LawDeviation
-from .literature_problems import LiteratureRun
 from .study import Study
 
 
@@ -56,23 +55,6 @@ def deviation_table(deviations: Iterable[LawDeviation]) -> Table:
         table.add_row(
             law.case, *("" if value is None else f"{value:{number_format}}" for value, number_format in figures)
         )
-    return table
-
-
-def literature_table(rows: Iterable[LiteratureRun]) -> Table:
-    """Return the table of literature problems."""
-    table = empty_table("problems from the literature: right-hand side calls and final error", "solver")
-    table.add_column("method")
-    for name in ("rtol", "calls", "error [SI]"):
-        table.add_column(name, justify="right")
-    last = ""
-    for row in rows:
-        if row.problem != last:
-            table.add_section()
-            table.add_row(Text(row.problem, style="bold"))
-        calls = "-" if row.evaluations is None else f"{row.evaluations}"
-        table.add_row(f"  {row.solver}", row.method, format_power(row.rtol), calls, row.failure or f"{row.error:.1e}")
-        last = row.problem
     return table
 
 

@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 from models import model_class
 
-from harness.references import peer_solvers
-from harness.references.literature_problems import (
+from benchmarks.literature import study
+from benchmarks.literature.problems import (
     BeltBlock,
     ChatteringOscillator,
     ChatteringOscillatorSign,
     SmoothedBeltBlock,
 )
-from harness.running.embedded_model import EmbeddedModel, method_numbers
-from harness.studies.precision import literature_problems
+from harness.references import peer_solvers
+from harness.running.embedded_model import EmbeddedModel, load_more_model, method_numbers
 
 pytestmark = pytest.mark.slow
 
@@ -23,7 +23,7 @@ BELT = (-0.2992525, -0.6308870)  # position in m and speed in m/s after 50 s, as
 
 @cache
 def table():
-    return list(literature_problems.solve_all())
+    return list(study.solve_all())
 
 
 @pytest.fixture
@@ -34,26 +34,26 @@ def rows(user_folder, monkeypatch):
 
 
 def test_the_reference_end_of_the_block_is_the_published_one():
-    x, v = literature_problems.BLOCK
+    x, v = study.BLOCK
     assert (round(x, 7), round(v, 7)) == BELT
 
 
 def test_the_reference_end_of_the_block_agrees_with_two_methods():
     for method, rtol in (("DOP853", 3e-14), ("Radau", 1e-11)):
         answer = peer_solvers.solve("scipy", method, BeltBlock(), np.array([0.0, 50.0]), rtol, 1e-3 * rtol)
-        assert answer.states[-1] == pytest.approx(literature_problems.BLOCK_ON_BELT, abs=2e-11)
+        assert answer.states[-1] == pytest.approx(study.BLOCK_ON_BELT, abs=2e-11)
 
 
 @pytest.mark.parametrize("method", ["ode23", "ode45", "dop853", "rodas"])
 def test_every_method_of_the_runtime_reaches_the_end_of_the_block(rows, method):
-    assert method in method_numbers(literature_problems.load_more_model("belt"))
-    row = next(row for row in rows("block on a belt", literature_problems.RUNTIME) if row.method == method)
+    assert method in method_numbers(load_more_model("belt"))
+    row = next(row for row in rows("block on a belt", study.RUNTIME) if row.method == method)
     assert row.error < 200 * row.rtol
     assert row.evaluations < 10_000
 
 
 def test_the_block_sticks_and_slips_in_the_order_of_the_peer():
-    run = EmbeddedModel.create(literature_problems.load_more_model("belt"), {}, "dop853", 1e-11)
+    run = EmbeddedModel.create(load_more_model("belt"), {}, "dop853", 1e-11)
     truth = peer_solvers.solve("scipy", "DOP853", BeltBlock(), np.array([0.0, 50.0]), 1e-12, 1e-15).events
     events = run.find_mode_changes(50.0)
     assert [mode for _, mode in events] == [mode for _, mode in truth] == [0, -1] * 4
@@ -62,14 +62,14 @@ def test_the_block_sticks_and_slips_in_the_order_of_the_peer():
 
 def test_smoothing_loses_four_digits_at_more_cost_than_event_location(rows):
     smooth = next(row for row in rows("block on a belt", "scipy, arctan(1e6 v)") if row.method == "LSODA")
-    located = next(row for row in rows("block on a belt", literature_problems.RUNTIME) if row.method == "ode45")
+    located = next(row for row in rows("block on a belt", study.RUNTIME) if row.method == "ode45")
     assert smooth.error > 1e4 * located.error
     assert smooth.evaluations > located.evaluations
 
 
 @pytest.mark.parametrize("method", method_numbers(model_class("coulomb")))
 def test_every_method_of_the_runtime_stops_the_classic_problem_once_and_for_good(rows, method):
-    row = next(row for row in rows("chattering classic", literature_problems.RUNTIME) if row.method == method)
+    row = next(row for row in rows("chattering classic", study.RUNTIME) if row.method == method)
     assert row.error < 10 * row.rtol
     assert row.evaluations < 200
 
@@ -91,7 +91,7 @@ def test_no_peer_finishes_with_the_plain_sign_law(rows):
     }.items(),
 )
 def test_every_method_of_the_runtime_reaches_the_certified_answer(rows, problem, bound):
-    runs = rows(problem, literature_problems.RUNTIME)
+    runs = rows(problem, study.RUNTIME)
     assert {"ode23", "ode45", "dop853", "rodas"} <= {row.method for row in runs}
     assert all(row.error < bound * row.rtol for row in runs)
 

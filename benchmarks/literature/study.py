@@ -10,30 +10,32 @@
 6. Two sleds in a row, each with stick and slip.
 """
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
-from functools import cache, partial
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import astuple, dataclass, fields
+from functools import partial
 from math import pi, sqrt
+from pathlib import Path
 
 import numpy as np
 
-from ...errors import HarnessError
-from ...process.subprocess_runner import run_module
-from ...process.temporary_directory import temporary_directory
-from ...references import peer_solvers
-from ...references.certified_reference import FOLDER, load_reference
-from ...references.den_hartog import SteadyMotion, steady_motion_with_stops, steady_motion_without_stops
-from ...references.literature_problems import (
-    BeltBlock,
-    ChatteringOscillator,
-    ChatteringOscillatorSign,
-    SmoothedBeltBlock,
-)
-from ...references.ode_problem import OdeProblem
-from ...running.embedded_model import EmbeddedModel, load_model_class, method_numbers
-from ...running.solution import Solution
-from ...scenes.fmu_files import find_fmu
+from benchmarks import command_line
+from benchmarks.references.den_hartog import SteadyMotion, steady_motion_with_stops, steady_motion_without_stops
+from harness.errors import HarnessError
+from harness.references import peer_solvers
+from harness.references.certified_reference import FOLDER, load_reference
+from harness.references.ode_problem import OdeProblem
+from harness.results.files import column_heading, write_csv_rows
+from harness.results.folder import replace_folder
+from harness.results.provenance import write_provenance
+from harness.results.summary import Summary, make_table, write_summary
+from harness.running.embedded_model import EmbeddedModel, load_model_class, load_more_model, method_numbers
+from harness.running.solution import Solution
+from harness.scenes.fmu_files import find_fmu
 
+from .problems import BeltBlock, ChatteringOscillator, ChatteringOscillatorSign, SmoothedBeltBlock
+
+RESULT_FOLDER, FILE = Path("precision") / "literature", "final-errors.csv"  # beside the results of precision
+UNITS = {"rtol": "1", "error": "SI"}  # of columns; SI means m and m/s
 LIMIT = 20_000  # right-hand side evaluations after which a run counts as failed
 RUNTIME, EVENTS = "this runtime", "events"
 
@@ -60,6 +62,27 @@ STOPPING = {"m": 1.0, "k": 100.0, "f": 6.0, "P": 10.0, "Omega": 5.0}  # and with
 PERIODS = 20  # of the forced motion
 CLASSIC = (sqrt(125.0) - 10.0, 0.0)  # x = -10 + 10 cos t + 5 sin t until its first turning point
 TIGHT = {"RK23": 1e-6, "ode23": 1e-6, "DOP853": 1e-10, "dop853": 1e-10}  # 1e-8 for the others
+
+
+def run_literature(out: Path) -> list[LiteratureRun]:
+    """Solve all problems and write the results to out/precision/literature."""
+    with replace_folder(out / RESULT_FOLDER, [FILE]) as folder:
+        runs = list(solve_all())
+        write_literature(runs, folder)
+    return runs
+
+
+def write_literature(runs: Sequence[LiteratureRun], folder: Path) -> None:
+    """Write the table of the literature problems, its provenance and its summary."""
+    headings = [column_heading(field.name, UNITS.get(field.name, "")) for field in fields(LiteratureRun)]
+    cells = [[None if value != value else value for value in astuple(run)] for run in runs]
+    write_csv_rows(folder / FILE, headings, cells)
+    write_provenance(folder, [], command=command_line())
+    rows = (
+        ["" if value is None else f"{value:.4g}" if isinstance(value, float) else value for value in row]
+        for row in cells
+    )
+    write_summary(folder, Summary("precision", "Problems from the literature", tables=make_table(headings, rows)))
 
 
 def solve_all() -> Iterator[LiteratureRun]:
@@ -94,16 +117,6 @@ def forced_runs(name: str, steady: SteadyMotion, values: dict[str, float]) -> It
     """Solve forced motion with every method over some periods, from its largest displacement on."""
     values, stop = values | {"x0": steady.amplitude, "angle0": steady.phase}, 2.0 * PERIODS * pi / values["Omega"]
     yield from runtime_runs(name, load_more_model("forced"), values, stop, (steady.amplitude, 0.0))
-
-
-@cache
-def load_more_model(name: str) -> type:
-    """Build the FMU of a model of fmus/more and return the model class in it."""
-    with temporary_directory(f"{name}-") as folder:
-        build = run_module("build_fmus", name, "--out", str(folder))
-        if build.returncode:
-            raise HarnessError(f"cannot build {name}: {(build.stderr.splitlines() or ['?'])[-1]}")
-        return load_model_class(folder / f"{name}.fmu")
 
 
 def runtime_runs(

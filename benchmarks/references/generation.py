@@ -12,15 +12,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..running.solution import Solution
-from .certified_reference import POINTS, ReferenceCase, event_time_error, max_relative_difference
-from .models import MODEL_MODULES
-from .models.pendulum import PendulumProblem
-from .ode_problem import OdeProblem
-from .peer_solvers import solve
+from harness.references.certified_reference import POINTS, ReferenceCase, event_time_error, max_relative_difference
+from harness.references.models import MODEL_MODULES
+from harness.references.models.pendulum import PendulumProblem
+from harness.references.ode_problem import OdeProblem
+from harness.references.peer_solvers import solve
+from harness.references.reference_trajectory import mode_changes, sample_segments
+from harness.references.segments import Segment
+from harness.running.solution import Solution
+
 from .pendulum_series import solve_pendulum
-from .reference_trajectory import mode_changes, sample_segments
-from .segments import Segment
 
 CLOSED_FORMS: dict[str, Callable[[float], Iterator[Segment]]] = {  # segments up to a stop in s
     name: form for module in MODEL_MODULES.values() for name, form in getattr(module, "CLOSED_FORMS", {}).items()

@@ -5,8 +5,8 @@ from collections.abc import Callable
 import numpy as np
 from mpmath import cos, findroot, mpf, odefun, sign, sin, sqrt, workdps
 
-from ..running.solution import Solution
-from .models.pendulum import PendulumProblem, PendulumReactionProblem
+from harness.references.models.pendulum import PendulumProblem, PendulumReactionProblem
+from harness.running.solution import Solution
 
 DIGITS = 25
 TURNING_POINT_BRACKET = (0.25, 0.45)  # s: around half a period, so that it holds one turning point

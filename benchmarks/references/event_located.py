@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from ..running.solution import Solution
-from .certified_reference import POINTS, relative_errors
+from harness.references.certified_reference import POINTS, relative_errors
+from harness.running.solution import Solution
 
 StateVector = Sequence[float] | np.ndarray
 OVERLOAD = 1e-9  # a load that exceeds its limit by a smaller share is at the limit

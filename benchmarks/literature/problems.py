@@ -2,8 +2,8 @@
 
 from math import atan, copysign, fabs, pi
 
-from .models.coulomb import CoulombProblem
-from .ode_problem import JacobianFunction, OdeProblem, RhsFunction
+from harness.references.models.coulomb import CoulombProblem
+from harness.references.ode_problem import JacobianFunction, OdeProblem, RhsFunction
 
 
 class ChatteringOscillator(CoulombProblem):

@@ -1,0 +1,1 @@
+"""Problems from the literature with known solutions."""

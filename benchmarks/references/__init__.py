@@ -1,0 +1,1 @@
+"""Certified results of the shipped models, by closed forms, power series and independent solvers."""

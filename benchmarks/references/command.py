@@ -1,0 +1,26 @@
+"""references: certified results of the shipped models."""
+
+import click
+
+from harness.commands.terminal import Terminal, json_option, quiet_option
+
+
+@click.command()
+@click.argument("models", metavar="MODEL...", nargs=-1, required=True)
+@quiet_option
+@json_option
+def references(models: tuple[str, ...], quiet: bool, as_json: bool) -> None:
+    """Compute the certified results of each shipped MODEL, for each friction law, and write them next to its file.
+
+    They come from closed forms, power series and independent solvers; this takes some minutes.  Run it in the folder of
+    the project, with the FMU of the model in fmus or fmus/more.  `friction-fmus references` certifies any other model.
+
+    \b
+    Example:
+      python -m benchmarks references stickslip
+    """
+    from .certification import certify_shipped
+
+    results = [result for model in models for result in certify_shipped(model)]
+    output = (f"{result.path}, relative difference {result.difference:.1e}" for result in results)
+    Terminal(quiet, as_json).print_result(results, *output)
