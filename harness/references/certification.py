@@ -1,7 +1,7 @@
 """Certified results for any model: its default run by two methods that share no formula, if they agree.
 
-A result is written next to the file of the model, under its name, and packaged into the FMU at the next build.  A second
-file has the changes of mode.  Shipped models get more accurate results from `python -m benchmarks references`.
+A result is written next to the file of the model, under its name, and packaged into the FMU at the next build.  A
+second file has the changes of mode.  Shipped models get more accurate results from `python -m benchmarks references`.
 """
 
 from dataclasses import dataclass, replace

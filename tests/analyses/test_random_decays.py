@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 from decays import random_record
-from interval_coverage import FAR
 
+from benchmarks.campaigns.interval_coverage import FAR
 from harness.analyses.decay.estimates import KnownParameters
 from harness.analyses.decay.identification import fit_decay
 from harness.analyses.decay.law import LAWS
@@ -25,7 +25,7 @@ def of_each_law(request):
 
 
 def test_no_estimate_is_far_off_without_a_remark(of_each_law):
-    """tests/support/interval_coverage.py checks many more."""
+    """benchmarks/campaigns/interval_coverage.py checks many more."""
     for truth, result in of_each_law:
         by_name = {one.name: one for one in result.estimates}
         off = {name: abs(by_name[name].value - value) / by_name[name].error for name, value in truth.items()}
@@ -34,7 +34,7 @@ def test_no_estimate_is_far_off_without_a_remark(of_each_law):
 
 def test_intervals_cover_the_true_value_at_their_level(of_each_law):
     """Fewer than 28 of 35 intervals at 95 % would cover the true value once in a thousand times
-    (tests/support/interval_coverage.py counts a thousand records of every law)."""
+    (benchmarks/campaigns/interval_coverage.py counts a thousand records of every law)."""
     held = []
     for truth, result in of_each_law:
         by_name = {one.name: one for one in result.estimates}

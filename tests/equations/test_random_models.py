@@ -3,11 +3,12 @@
 import build_cache
 import numpy as np
 import pytest
-import random_campaign
 from contact_references import reference_events
 from independent_contacts import Contact, Spring, System, solve
 from native_fmus import require_compiler
 from random_models import random_structure
+
+from benchmarks.campaigns import random_campaign
 
 GRAVITY = 9.81
 LITERATURE = {

@@ -9,12 +9,12 @@ import build_cache
 import commands
 import numpy as np
 import pytest
-from drawn_records import GROUPS, draw_record
-from fit_campaign import SOURCES
 from native_fmus import build_native_fmus, require_compiler
 from shared_keys import check_shared_keys
 
 import harness
+from benchmarks.campaigns.drawn_records import GROUPS, draw_record
+from benchmarks.campaigns.fit_campaign import SOURCES
 from harness.analyses.fit.law_comparison import compare_laws
 from harness.analyses.fit.measured_record import RecordData
 from harness.analyses.fit.parameter_fit import information_criterion
@@ -84,7 +84,7 @@ LONG_FITS = ("forced", "position, 4 free", "Stribeck", "belt")
     "name", ["force", "pendulum", *(pytest.param(name, marks=pytest.mark.slow) for name in LONG_FITS)]
 )
 def test_the_parameters_of_a_drawn_record_are_found(name):
-    """The seed was drawn once; tests/support/fit_campaign.py fits hundreds of others."""
+    """The seed was drawn once; benchmarks/campaigns/fit_campaign.py fits hundreds of others."""
     record, fit = fit_drawn(name, [20261123, len(name)], max_samples=250)
     assert fit.describes_record
     for parameter, truth in record.truth.items():
@@ -357,7 +357,7 @@ def test_a_record_without_such_a_motion_is_refused():
 
 
 def test_the_campaign_summarizes_its_log(tmp_path, capsys):
-    from fit_campaign import print_summary
+    from benchmarks.campaigns.fit_campaign import print_summary
 
     row = {
         "group": "force",
@@ -442,7 +442,7 @@ def test_the_command_writes_the_compared_laws(tmp_path):
 
 def test_a_peer_that_fails_has_its_reason_in_the_table(capsys):
     pytest.importorskip("pandas")
-    import fit_peers
+    from benchmarks.campaigns import fit_peers
 
     def fail(*arguments):
         raise AttributeError("no such thing")

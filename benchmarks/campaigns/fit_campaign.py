@@ -1,4 +1,6 @@
-"""Fit drawn records and print what was found: python tests/support/fit_campaign.py --seed 7 --records 400 --log FILE
+"""Fit drawn records and print what was found.
+
+    python -m benchmarks.campaigns.fit_campaign --seed 7 --records 400 --log FILE
 
 "Found": all values within five standard errors of the truth, where the record determines them; "partly": it does not
 determine all. "Silent": not found, and without a remark. "Inputs": a remark that the inputs are uncertain between their
@@ -8,16 +10,13 @@ samples. Coverage: share of the finite 95 % intervals that hold the truth, with 
 import argparse
 import json
 import os
-import sys
 from math import isfinite
 from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 ROOT = Path(__file__).parents[2]
-sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "support")]
 
 import numpy as np  # noqa: E402
-from drawn_records import GROUPS, draw_record  # noqa: E402
 from spec_runs import ignore_progress  # noqa: E402
 
 from harness.errors import HarnessError  # noqa: E402
@@ -30,6 +29,8 @@ from harness.running.whole_run import open_simulator  # noqa: E402
 from harness.scenes.run_spec import RunSpec  # noqa: E402
 from harness.studies.fit.request import FitRequest, resolve_request  # noqa: E402
 from harness.studies.fit.study import fit_tables  # noqa: E402
+
+from .drawn_records import GROUPS, draw_record  # noqa: E402
 
 EXAMPLES = ROOT / "tests" / "example_models"
 SOURCES = {

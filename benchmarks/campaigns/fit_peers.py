@@ -1,4 +1,6 @@
-"""Fit ten drawn records with `harness.fit` and with other tools: python tests/support/fit_peers.py [--records 10]
+"""Fit ten drawn records with `harness.fit` and with other tools.
+
+    python -m benchmarks.campaigns.fit_peers [--records 10]
 
 Peers: least squares of lmfit and differential evolution of scipy, both with scipy's solve_ivp and friction smoothed by
 tanh, and ModestPy, which runs the same FMU as `harness.fit`. Each may take ten times the processor time of the fit,
@@ -31,21 +33,20 @@ from multiprocessing import get_context
 from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-ROOT = Path(__file__).parents[2]
-sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "support")]
 
-import fit_modestpy  # noqa: E402
-import numpy as np  # noqa: E402
-import pandas  # noqa: E402
-from drawn_records import GROUPS, draw_record  # noqa: E402
-from fit_campaign import build_fmus, cpu_seconds  # noqa: E402
-from scipy.integrate import solve_ivp  # noqa: E402
-from scipy.optimize import differential_evolution  # noqa: E402
+import numpy as np
+import pandas
+from scipy.integrate import solve_ivp
+from scipy.optimize import differential_evolution
 
-import harness  # noqa: E402
-from harness.process.temporary_directory import temporary_directory  # noqa: E402
-from harness.running.whole_run import open_simulator  # noqa: E402
-from harness.scenes.run_spec import RunSpec  # noqa: E402
+import harness
+from harness.process.temporary_directory import temporary_directory
+from harness.running.whole_run import open_simulator
+from harness.scenes.run_spec import RunSpec
+
+from . import fit_modestpy
+from .drawn_records import GROUPS, draw_record
+from .fit_campaign import build_fmus, cpu_seconds
 
 KINDS = ("position, 3 free", "forced")
 SEED, MAX_SAMPLES = 20261123, 400

@@ -1,10 +1,10 @@
 """Run random models with dry friction and compare them with independent_contacts.py.
 
-    python tests/support/random_campaign.py --structures 40 --values 50
+    python -m benchmarks.campaigns.random_campaign --structures 40 --values 50
 
 prints a table of failures with the seeds that reproduce them, and
 
-    python tests/support/random_campaign.py --show 12 3 --method 4 --rtol 1e-6
+    python -m benchmarks.campaigns.random_campaign --show 12 3 --method 4 --rtol 1e-6
 
 lists the events of one run beside those of the reference.
 
@@ -30,7 +30,9 @@ from math import inf, isnan
 from pathlib import Path
 
 import build_cache
+import independent_contacts
 import numpy as np
+import random_models
 from independent_contacts import solve
 from random_models import STOP, perturb, random_structure, random_values, to_system, write_model
 from worker_client import FmiError, Worker
@@ -205,7 +207,7 @@ def make_expected(solution, changed, times, size, rtol, tied):
 
 def cached_reference(structure, seed, folder):
     """Return the reference of a case; its solutions come from a file if they have been computed before."""
-    sources = [Path(__file__).with_name(f"{name}.py") for name in ("independent_contacts", "random_models")]
+    sources = [Path(module.__file__) for module in (independent_contacts, random_models)]
     text = b"".join(file.read_bytes() for file in sources)
     path = folder / f"solution-{structure.seed}-{seed}-{hashlib.sha256(text).hexdigest()[:8]}.pickle"
     if not path.exists():

@@ -1,4 +1,4 @@
-"""Coverage of the 95 % intervals of identified decays: `python tests/support/interval_coverage.py [RECORDS]`.
+"""Coverage of the 95 % intervals of identified decays: `python -m benchmarks.campaigns.interval_coverage [RECORDS]`.
 
 RECORDS are simulated for each law, for masses and pendulums, with white noise and quantised samples, and for velocities
 and accelerations. Then the records that are wrong by more than five standard errors without a remark are listed; there
@@ -9,12 +9,8 @@ import sys
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import suppress
 from itertools import product
-from pathlib import Path
 
 import numpy as np
-
-sys.path.insert(0, str(Path(__file__).parents[2]))
-
 from decays import random_record
 
 from harness.analyses.decay.estimates import KnownParameters
