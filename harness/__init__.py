@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from .running.fmu_variables import FmuDescription
     from .running.trajectory import Trajectory
     from .studies.compare.difference import Comparison
+    from .studies.decay.result import DecayResult
 
     __version__: str
     """Version of the installed project."""
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
 __all__ = [
     "Comparison",
     "DecayIdentification",
+    "DecayResult",
     "FmuDescription",
     "HarnessError",
     "ParameterFit",
@@ -51,6 +53,7 @@ TYPES = {
     "Comparison": "harness.studies.compare.difference",
     "FmuDescription": "harness.running.fmu_variables",
     "DecayIdentification": "harness.analyses.decay.identification",
+    "DecayResult": "harness.studies.decay.result",
     "ParameterFit": "harness.analyses.fit.parameter_fit",
     "Trajectory": "harness.running.trajectory",
 }

@@ -25,9 +25,9 @@ if TYPE_CHECKING:
     import pandas
     from numpy.typing import ArrayLike
 
-    from ..analyses.decay.identification import DecayIdentification
     from ..records.record import Record
     from ..running.trajectory import Trajectory
+    from ..studies.decay.result import DecayResult
 
 
 def record_source(value: Any) -> Any:
@@ -77,7 +77,7 @@ def identify_decay(
     end: float | None = None,
     rate: float | None = None,
     progress: Progress | None = None,
-) -> "DecayIdentification":
+) -> "DecayResult":
     """Identify viscous damping, dry friction and quadratic drag from a free decay.
 
     Parameters
@@ -109,7 +109,7 @@ def identify_decay(
 
     Returns
     -------
-    DecayIdentification
+    DecayResult
         Estimates with 95 % intervals (`estimates`), the fitted laws and remarks.
 
     Raises
@@ -129,6 +129,7 @@ def identify_decay(
     from ..analyses.decay.identification import fit_decay
     from ..records.columns import ColumnOptions, read_record
     from ..running.trajectory import Trajectory
+    from ..studies.decay.result import DecayResult
 
     if k is not None and m is not None:
         raise SceneError("k and m are both given: leave one out, because the frequency determines it")
@@ -153,7 +154,7 @@ def identify_decay(
         loaded = read_record(source, columns, Path(source).stem)
     else:
         loaded = to_record(record, x, columns)
-    return fit_decay(loaded, KnownParameters(k, m, pendulum), drag, drift, progress or QUIET)
+    return DecayResult(**vars(fit_decay(loaded, KnownParameters(k, m, pendulum), drag, drift, progress or QUIET)))
 
 
 def to_record(source: Any, x: Any, columns: Any) -> "Record":

@@ -9,29 +9,34 @@ from ..errors import SceneError, first_line, import_optional
 if TYPE_CHECKING:
     import xarray
 
+    from ..results.result import Result
     from ..running.trajectory import Trajectory
 
 
 @check_arguments(folder=PATH)
-def load_result(folder: "str | Path") -> "Trajectory | xarray.Dataset | dict[str, Any]":
+def load_result(folder: "str | Path") -> "Result | xarray.Dataset | dict[str, Any]":
     """Read a stored result.
 
     Parameters
     ----------
     folder : path
-        A result folder, as a command or `Trajectory.save` writes it.
+        A result folder, as a command or `save` writes it.
 
     Returns
     -------
-    Trajectory, xarray.Dataset or dict
-        Trajectory of a run, dataset of a sweep, or JSON of a decay, a fit or a comparison.
+    Result
+        The same class as from the function of Python: a `Trajectory`, `DecayResult`, `FitResult`, `Comparison` or
+        `SweepResult`; for other studies the class of their results. A result of an earlier version is a `StoredResult`,
+        which has its numbers and sentences.
 
     Raises
     ------
     SceneError
-        If the folder holds no result.
+        If the folder holds no result, or it is damaged.
     """
     import json
+
+    from ..results.loading import load
 
     path = Path(folder)
     if (path / "sweep.nc").is_file():
@@ -42,7 +47,9 @@ def load_result(folder: "str | Path") -> "Trajectory | xarray.Dataset | dict[str
         except (OSError, ValueError) as error:
             raise SceneError(f"{path / 'sweep.nc'} cannot be read: {first_line(error)}") from None
         return loaded
-    for name in ("decay.json", "fit.json", "compare.json"):
+    if (path / "decay.json").is_file():
+        return load(path)
+    for name in ("fit.json", "compare.json"):
         if (path / name).is_file():
             try:
                 numbers: dict[str, Any] = json.loads((path / name).read_text(encoding="utf-8"))

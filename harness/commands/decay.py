@@ -81,7 +81,6 @@ def decay(
     from ..analyses.decay.estimates import KnownParameters
     from ..records.columns import ColumnOptions
     from ..studies.decay import study as decays
-    from ..studies.decay.table import check_table, decay_table, summary_lines
 
     if not decays.is_record_file(source):
         refuse_options(context, "on a scene, whose FMU declares names and units", *COLUMN_OPTIONS)
@@ -97,6 +96,4 @@ def decay(
     with decays.pause_gc(), terminal.progress(1) as report:
         progress = partial(report, "standard input" if source == "-" else source)
         result, folder = decays.identify_decay(source, columns_spec, parameters, drag, drift, terminal.out, progress)
-    tables = [table for table in (decay_table(result), check_table(result)) if table.row_count]
-    blocks = [block for table in tables for block in (table, "")]
-    terminal.print_result(decays.identification_as_json(result), *blocks, *summary_lines(result), folder=folder)
+    terminal.print_result(result.as_json(), *result.blocks(), folder=folder)

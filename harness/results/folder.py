@@ -24,6 +24,7 @@ from ..errors import HarnessError
 from ..process.interrupt import defer_signals
 from ..process.temporary_directory import create_locked_folder, lock_path
 from .provenance import FILE, load_provenance, note_replaced_result
+from .stored_data import DATA_FILE
 from .summary import SUMMARY_FILE
 
 OVERWRITE = ContextVar("overwrite", default=False)  # whether a result of another source may be replaced
@@ -61,7 +62,7 @@ def replace_folder(folder: Path, own_files: Sequence[str], source: str = "") -> 
             "choose a folder by --out"
         )
     try:
-        own_files = (*own_files, FILE, SUMMARY_FILE)
+        own_files = (*own_files, DATA_FILE, FILE, SUMMARY_FILE)
         check_replaceable(folder, own_files)
         check_same_source(folder, source)
         missing = [parent for parent in folder.absolute().parents if not parent.exists()]

@@ -19,7 +19,7 @@ artist.kwdoc = lambda artist: ""  # skips generating property lists for docstrin
 from matplotlib.axes import Axes as Axes  # noqa: E402
 from matplotlib.axis import Axis  # noqa: E402
 from matplotlib.collections import QuadMesh  # noqa: E402
-from matplotlib.figure import Figure  # noqa: E402
+from matplotlib.figure import Figure as Figure  # noqa: E402
 from matplotlib.lines import Line2D  # noqa: E402
 from matplotlib.text import Text  # noqa: E402
 
@@ -80,6 +80,7 @@ MAX_TEXT_LENGTH = 500  # characters of a text that are drawn
 LINE_BREAKS = re.compile(r"(\s+|(?<=[._\]]))")  # possible line breaks; names of variables have no blanks
 UNWRITABLE = re.compile(r"[^\t\n\r -\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")  # characters that XML does not allow
 WIDTH, HEIGHT = 5.5, 2.3  # inches of one column and of one panel
+DPI = 130
 
 
 @contextmanager
@@ -99,11 +100,26 @@ def open_figure(
     layout : str or None
         Layout engine; None for fixed margins, which saves drawing everything twice.
     """
-    with rc_context(STYLE), warnings.catch_warnings(), np.errstate(all="ignore"):
-        warnings.simplefilter("ignore")
-        figure = Figure(figsize=(width, height), dpi=130, layout=layout)
+    with use_style():
+        figure = Figure(figsize=(width, height), dpi=DPI, layout=layout)
         yield figure
         save_figure(figure, path)
+
+
+@contextmanager
+def use_style() -> Iterator[None]:
+    """Draw in the style of the project, without warnings on glyphs and numbers that cannot be drawn."""
+    with rc_context(STYLE), warnings.catch_warnings(), np.errstate(all="ignore"):
+        warnings.simplefilter("ignore")
+        yield
+
+
+def set_size(
+    figure: Figure, width: float, height: float, layout: Literal["constrained"] | None = "constrained"
+) -> None:
+    """Set the size of a figure in inches, and its layout as in `open_figure`."""
+    figure.set_size_inches(width, height)
+    figure.set_layout_engine(layout or "none")
 
 
 def save_figure(figure: Figure, path: Path) -> None:

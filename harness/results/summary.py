@@ -158,6 +158,16 @@ def make_terminal_table(title: str | None = None) -> "rich.table.Table":
     return Table(title=title, title_justify="left", box=SIMPLE_HEAD, show_edge=False, padding=(0, 1, 0, 0))
 
 
+def to_terminal_table(table: SummaryTable) -> "rich.table.Table":
+    """Return a table of a summary for the terminal."""
+    result = make_terminal_table(table.title or None)
+    for heading in table.headings:
+        result.add_column(heading)
+    for row in table.rows:
+        result.add_row(*row)
+    return result
+
+
 def read_cells(table: "rich.table.Table", title: str = "") -> tuple[SummaryTable, ...]:
     """Return a table of the terminal as the only item; nothing if it has no rows."""
     rows = zip(*(column.cells for column in table.columns), strict=True)

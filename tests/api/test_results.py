@@ -142,6 +142,9 @@ def test_samples_are_reproducible_and_stored():
 def test_results_of_commands_load(tmp_path):
     (tmp_path / "decay").mkdir()
     (tmp_path / "decay" / "decay.json").write_text(json.dumps({"record": "a"}))
-    assert harness.load_result("decay") == {"record": "a"}
+    earlier = harness.load_result("decay")  # of an earlier version
+    assert earlier["record"] == "a"
+    with pytest.raises(harness.HarnessError, match="holds no data to plot: repeat the command"):
+        earlier.plot()
     with pytest.raises(harness.SceneError, match="holds no result"):
         harness.load_result("nowhere")

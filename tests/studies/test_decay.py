@@ -17,7 +17,7 @@ from harness.analyses.decay.identification import fit_decay
 from harness.analyses.decay.law import LAWS
 from harness.analyses.estimation.figure import MAX_POINTS, extremes
 from harness.studies.decay.figure import draw
-from harness.studies.decay.study import identification_as_json
+from harness.studies.decay.result import DecayResult
 from harness.studies.decay.table import decay_table
 
 
@@ -40,7 +40,7 @@ def test_the_table_fits_into_80_columns_and_its_first_values_are_those_to_use(fm
 
 
 def test_the_quantities_keep_their_names():
-    fit = identification_as_json(fit_decay(decay_record(0.02, 0.003, noise=1e-4), KnownParameters()))
+    fit = DecayResult(**vars(fit_decay(decay_record(0.02, 0.003, noise=1e-4), KnownParameters()))).as_json()
     assert {"fit", "remarks", "laws", "sentence", "turning_points", "published"} <= set(fit)
     check_shared_keys(fit)
     assert {item["name"] for item in fit["fit"]} == {"omega", "zeta", "r", "b", "rest"}
@@ -49,15 +49,14 @@ def test_the_quantities_keep_their_names():
     assert set(fit["loss"]["laws"]) == {"+".join(law) for law in LAWS}
 
 
-def test_a_figure_shows_angles_in_degrees_and_marks_only_excluded_samples(tmp_path, monkeypatch):
+def test_a_figure_shows_angles_in_degrees_and_marks_only_excluded_samples():
     """Of a record whose clock counts from 1970."""
-    figures = []
-    monkeypatch.setattr(Figure, "savefig", lambda figure, path, **_: figures.append(figure))
+    figure = Figure()
     t = np.linspace(0.0, 9.0, 3001)
     record = decay_record(0.02, sine=True, a=1.0, turn=0.0, rest=0.0, t=t, noise=1e-3)
     fit = fit_decay(replace(record, t=record.t + 1.7e9), KnownParameters(pendulum=True))
-    draw(fit, tmp_path / "figure.svg")
-    signal, residuals, shares = figures[0].get_axes()
+    draw(fit, figure)
+    signal, residuals, shares = figure.get_axes()
     assert [axes.get_ylabel() for axes in (signal, residuals)] == ["x [deg]", "record - fit [deg]"]
     assert shares.get_xlabel() == "amplitude [deg]"
     curves = {line.get_label(): line.get_data() for line in signal.lines}
@@ -98,7 +97,7 @@ def test_a_scene_writes_quantities_turning_points_fit_and_figure(workspace):
     assert (done.returncode, done.stderr) == (0, "")
     assert "Best described by dry friction" in done.stdout
     folder = workspace / "results/decay/coulomb"
-    files = {"decay.json", "turning-points.csv", "fit.csv", "figure.svg", "provenance.json", "summary.json"}
+    files = {"decay.json", "turning-points.csv", "fit.csv", "figure.svg", "provenance.json", "summary.json", "data.npz"}
     assert {file.name for file in folder.iterdir()} == files
     estimates = {item["name"]: item for item in json.loads((folder / "decay.json").read_text())["fit"]}
     assert estimates["f"]["value"] == pytest.approx(0.5, rel=1e-9)
@@ -123,11 +122,11 @@ from pathlib import Path
 from decays import decay_record
 from harness.analyses.decay.estimates import KnownParameters
 from harness.analyses.decay.identification import fit_decay
-from harness.studies.decay.study import write_results
+from harness.studies.decay.result import DecayResult
 
 draws, draw = [], Figure.draw
 Figure.draw = lambda *arguments: draws.append(draw(*arguments))
-write_results(fit_decay(decay_record(0.02), KnownParameters()), Path.cwd())
+DecayResult(**vars(fit_decay(decay_record(0.02), KnownParameters()))).write(Path.cwd())
 unnecessary = ("fmpy", "cattrs", "scipy.stats", "scipy.signal")
 unnecessary += ("harness.running", "harness.scenes.run_spec", "harness.scenes.scene")
 print(len(draws), [name for name in unnecessary if name in sys.modules])

@@ -34,7 +34,7 @@ from .model_selection import FittedLaw, fit_all_laws, select_reported_law
 from .remarks import check_fit, compare_halves, make_remarks
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class DecayIdentification:
     """The result of the identification of a decay.
 
@@ -72,11 +72,6 @@ class DecayIdentification:
     two_peak_estimates: tuple[Estimate, ...]
     unavailable: dict[str, str]
     remarks: tuple[str, ...]
-
-    def __repr__(self) -> str:
-        """Describe the result in one line; its arrays may be long."""
-        values = ", ".join(f"{estimate.name} = {estimate.value:.4g} {estimate.unit}" for estimate in self.estimates)
-        return f"<DecayIdentification of {self.record.name}: {values}>"
 
     def __getitem__(self, name: str) -> Estimate:
         """Return the estimate of a constant from the whole signal, as ``result["zeta"]``."""

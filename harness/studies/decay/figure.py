@@ -1,6 +1,5 @@
 """Figure of an identified decay: signal and fit, residuals, and energy loss per half cycle."""
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -9,25 +8,25 @@ from ...analyses.decay.identification import DecayIdentification
 from ...analyses.decay.law import Terms
 from ...analyses.estimation.figure import MAX_POINTS, extremes, plot_legend, plot_record, plot_residuals, plot_samples
 from ...results.quantity import display_unit
-from ...results.style import BLUE, GREEN, GREY, HEIGHT, ORANGE, WIDTH, Axes, axis_label, open_figure
+from ...results.style import BLUE, GREEN, GREY, HEIGHT, ORANGE, WIDTH, Axes, Figure, axis_label, set_size
 
 MARGINS = {"left": 0.105, "right": 0.985, "bottom": 0.055, "top": 0.97, "hspace": 0.35}
 COLOURS: dict[Terms, str] = {("zeta",): GREEN, ("r",): BLUE, ("b",): "#CC79A7"}  # colours of the laws with one term
 
 
-def draw(identification: DecayIdentification, path: Path) -> None:
-    """Save the figure."""
-    with open_figure(path, 1.8 * WIDTH, 3.4 * HEIGHT, layout=None) as figure:
-        grid = figure.add_gridspec(3, 1, height_ratios=(3, 1.2, 2.2), **MARGINS)
-        signal_axes = figure.add_subplot(grid[0])
-        residual_axes = figure.add_subplot(grid[1], sharex=signal_axes)
-        plot_signal(signal_axes, identification)
-        unit, size = display_unit(identification.record.unit)
-        residuals = (identification.x - identification.fit_values) / size
-        noise = identification.problem.noise * identification.problem.scale / size
-        plot_residuals(residual_axes, identification.t, residuals, noise, "", unit)
-        residual_axes.set_xlabel("t [s]")
-        plot_energy_loss(figure.add_subplot(grid[2]), identification)
+def draw(identification: DecayIdentification, figure: Figure) -> None:
+    """Draw the figure."""
+    set_size(figure, 1.8 * WIDTH, 3.4 * HEIGHT, layout=None)
+    grid = figure.add_gridspec(3, 1, height_ratios=(3, 1.2, 2.2), **MARGINS)
+    signal_axes = figure.add_subplot(grid[0])
+    residual_axes = figure.add_subplot(grid[1], sharex=signal_axes)
+    plot_signal(signal_axes, identification)
+    unit, size = display_unit(identification.record.unit)
+    residuals = (identification.x - identification.fit_values) / size
+    noise = identification.problem.noise * identification.problem.scale / size
+    plot_residuals(residual_axes, identification.t, residuals, noise, "", unit)
+    residual_axes.set_xlabel("t [s]")
+    plot_energy_loss(figure.add_subplot(grid[2]), identification)
 
 
 def plot_signal(axes: Axes, identification: DecayIdentification) -> None:

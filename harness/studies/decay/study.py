@@ -3,29 +3,22 @@
 import gc
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import asdict
 from os.path import exists
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from ...analyses.decay.estimates import KnownParameters
-from ...analyses.decay.identification import DecayIdentification, fit_decay
-from ...analyses.decay.law import AMPLITUDE, T0
-from ...analyses.estimation.estimate import ColumnResiduals, UsedSamples, shared_json
+from ...analyses.decay.identification import fit_decay
 from ...errors import HarnessError, SceneError, format_value
 from ...records.columns import ColumnOptions, read_record
 from ...records.record import Record, check_record
 from ...results import provenance
-from ...results.files import column_heading, to_json, write_csv
 from ...results.folder import replace_folder
+from ...results.registry import find_study
 from ...results.summary import write_summary
-from .table import summarize_decay
+from .result import DecayResult
 
-FOLDER = "decay"
-FILES = ("decay.json", "turning-points.csv", "fit.csv", "figure.svg")
-
+STUDY = find_study("decay")
 
 LoadedRecord = tuple[Record, KnownParameters, dict[str, Any]]  # with provenance: files, parameters, run
 
@@ -38,19 +31,19 @@ def identify_decay(
     drift: bool,
     out: Path,
     report: Callable[[float], None],
-) -> tuple[DecayIdentification, Path]:
+) -> tuple[DecayResult, Path]:
     """Identify the decay of a record file or a scene, and write the results to out/decay/<name>."""
     record, properties, provenance_data = load_record(source, columns, parameters, report)
     options = vars(columns) | vars(parameters) | {"drag": drag, "drift": drift}
-    folder = out / FOLDER / record.name
+    folder = out / STUDY.name / record.name
     source_text = provenance.describe_sources(source)
     # opened before the fit, so that conflicts are reported at once
-    with replace_folder(folder, FILES, source_text) as new_folder:
-        identification = fit_decay(record, properties, drag, drift, report)
-        write_results(identification, new_folder)
+    with replace_folder(folder, STUDY.files, source_text) as new_folder:
+        result = DecayResult(**vars(fit_decay(record, properties, drag, drift, report)))
+        result.write(new_folder)
         provenance.write_provenance(new_folder, **provenance_data, scene=options, source=source_text)
-        write_summary(new_folder, summarize_decay(identification))
-    return identification, folder
+        write_summary(new_folder, result.summary())
+    return result, folder
 
 
 @contextmanager
@@ -121,74 +114,3 @@ def record_of_scene(
                 k=stiffness(run, unit == "rad", "the decay of a scene"), pendulum=unit == "rad"
             )
     return record, parameters, provenance_data
-
-
-def write_results(identification: DecayIdentification, folder: Path) -> None:
-    """Write decay.json, turning points, fit and figure."""
-    from .figure import draw
-
-    unit = identification.record.unit
-    (folder / "decay.json").write_text(to_json(identification_as_json(identification)) + "\n", encoding="utf-8")
-    write_csv(
-        folder / "turning-points.csv",
-        ["t [s]", column_heading("x", identification.record.base)],
-        [identification.extrema.t, identification.extrema.x],
-    )
-    name = identification.record.symbol
-    headings = ["t [s]", column_heading(name, unit), column_heading("fit", unit), column_heading("residual", unit)]
-    columns = [
-        identification.t,
-        identification.x,
-        identification.fit_values,
-        identification.x - identification.fit_values,
-    ]
-    write_csv(folder / "fit.csv", headings, columns)
-    draw(identification, folder / "figure.svg")
-
-
-def identification_as_json(identification: DecayIdentification) -> dict[str, Any]:
-    """Return the identified decay for JSON output."""
-    problem, record, best = identification.problem, identification.record, identification.best
-    loss = identification.energy_loss
-    samples = UsedSamples(record.name, identification.t, len(record.t))
-    column = ColumnResiduals(
-        record.name,
-        record.symbol,
-        record.unit,
-        identification.rms,
-        problem.noise * problem.scale,
-        float(np.ptp(identification.x)),
-    )
-    return {
-        **shared_json([samples], [column], identification.estimates, identification.remarks),
-        "quantity": record.quantity,
-        "unit": record.unit,
-        "sentence": identification.sentence,
-        "noise": identification.extrema.noise,
-        "residual": identification.rms,
-        "turning points": len(identification.extrema.t),
-        "used": samples.as_json(),
-        "release": {
-            "time": float(best.p[T0]) + problem.time_origin,
-            "amplitude": float(best.p[AMPLITUDE]) * problem.scale,
-            "unit": record.base,
-        },
-        "turning_points": [asdict(estimate) for estimate in identification.extrema_estimates],
-        "published": [asdict(estimate) for estimate in identification.two_peak_estimates],
-        "why_empty": {name: reason for name, reason in identification.unavailable.items() if reason},
-        "laws": [
-            {
-                "terms": list(law.terms),
-                "bic": law.bic,
-                "residual": float(np.sqrt(law.sum_of_squares / len(identification.t))) * problem.scale,
-            }
-            for law in identification.laws
-        ],
-        "loss": {
-            "unit": record.base,
-            "amplitude": loss.amplitude.tolist(),
-            "share_of_energy": loss.fraction.tolist(),
-            "laws": {"+".join(law.terms): loss.curves[law.terms][1].tolist() for law in identification.laws},
-            "laws_amplitude": {"+".join(law.terms): loss.curves[law.terms][0].tolist() for law in identification.laws},
-        },
-    }

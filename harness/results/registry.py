@@ -1,0 +1,94 @@
+"""All studies, each stated once: for `load_result`, `friction-fmus run FOLDER`, result folders and the report.
+
+A new study is a package in `harness/studies` with a class of results, a file in `harness/commands`, and an entry here.
+Classes are named by strings, because this module imports no study.
+"""
+
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ..errors import SceneError, format_value, unknown_name_message
+
+if TYPE_CHECKING:
+    from .result import Result
+
+PICTURE = "figure.svg"
+
+
+@dataclass(frozen=True)
+class Study:
+    """A study.
+
+    Attributes
+    ----------
+    name : str
+        Name in summaries, and of the folder of its results.
+    command : str
+        Name of its command.
+    result : str
+        Class of its results, as "module:class" below `harness`.
+    files : tuple of str
+        Files that a result may contain; the first one is compared when a result replaces another.
+    title, intro : str
+        Title and introduction of its section in the report.
+    example : tuple of str
+        What the report lists as missing while there is no result, and the arguments that compute it; empty for nothing.
+    depth : int
+        Levels from the folder of a result up to --out.
+    verifies : bool
+        Whether the study verifies the project, so that the report shows it below the results of the user.
+    """
+
+    name: str
+    command: str
+    result: str
+    files: tuple[str, ...]
+    title: str
+    intro: str
+    example: tuple[str, ...] = ()
+    depth: int = 2
+    verifies: bool = False
+
+    def result_class(self) -> "type[Result]":
+        """Import the class of the results."""
+        module, _, name = self.result.partition(":")
+        kind: type[Result] = getattr(import_module(f"harness.{module}"), name)
+        return kind
+
+
+STUDIES = (
+    Study(
+        "decay",
+        "decay",
+        "studies.decay.result:DecayResult",
+        ("decay.json", "turning-points.csv", "fit.csv", PICTURE),
+        "Decay",
+        "Damping, dry friction and drag from the whole signal and from its turning points, with 95 % intervals.",
+        ("a decay", "decay coulomb"),
+    ),
+)
+
+
+def find_study(name: str) -> Study:
+    """Return the study of a name; SceneError if there is none."""
+    by_name = {study.name: study for study in STUDIES}
+    if name not in by_name:
+        raise SceneError(unknown_name_message("study", name, by_name))
+    return by_name[name]
+
+
+def study_of_folder(folder: Path) -> Study:
+    """Return the study whose main file is in a folder.
+
+    Raises
+    ------
+    SceneError
+        If there is none.
+    """
+    study = next((study for study in STUDIES if (folder / study.files[0]).is_file()), None)
+    if study is None:
+        files = ", ".join(dict.fromkeys(study.files[0] for study in STUDIES))
+        raise SceneError(f"{format_value(str(folder))} holds no result: name a folder with one of {files}")
+    return study
