@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from .running.fmu_variables import FmuDescription
     from .running.trajectory import Trajectory
     from .studies.compare.difference import Comparison
+    from .studies.compare.result import ComparisonResult
     from .studies.decay.result import DecayResult
 
     __version__: str
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Comparison",
+    "ComparisonResult",
     "DecayIdentification",
     "DecayResult",
     "FmuDescription",
@@ -51,6 +53,7 @@ __all__ = [
 # Types of results: loaded on first use, because they import numpy, which `--help` does not need.
 TYPES = {
     "Comparison": "harness.studies.compare.difference",
+    "ComparisonResult": "harness.studies.compare.result",
     "FmuDescription": "harness.running.fmu_variables",
     "DecayIdentification": "harness.analyses.decay.identification",
     "DecayResult": "harness.studies.decay.result",

@@ -47,9 +47,9 @@ def load_result(folder: "str | Path") -> "Result | xarray.Dataset | dict[str, An
         except (OSError, ValueError) as error:
             raise SceneError(f"{path / 'sweep.nc'} cannot be read: {first_line(error)}") from None
         return loaded
-    if (path / "decay.json").is_file():
+    if (path / "decay.json").is_file() or (path / "compare.json").is_file():
         return load(path)
-    for name in ("fit.json", "compare.json"):
+    for name in ("fit.json",):
         if (path / name).is_file():
             try:
                 numbers: dict[str, Any] = json.loads((path / name).read_text(encoding="utf-8"))

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
     from ..running.trajectory import Trajectory
     from ..scenes.run_spec import RunSpec
-    from ..studies.compare.difference import Comparison
+    from ..studies.compare.result import ComparisonResult
 
 
 @check_arguments(
@@ -142,7 +142,7 @@ def compare(
     interface: str | None = None,
     timeout: float | None = None,
     progress: Progress | None = None,
-) -> "Comparison":
+) -> "ComparisonResult":
     """Compare two trajectories variable by variable and event by event.
 
     Parameters
@@ -157,7 +157,7 @@ def compare(
 
     Returns
     -------
-    Comparison
+    ComparisonResult
         The largest and root-mean-square difference of each variable, and the matched events.
 
     Raises
@@ -168,6 +168,7 @@ def compare(
     from ..running.trajectory import Trajectory
     from ..scenes.run_spec import RunSpec
     from ..studies.compare.difference import compare as difference
+    from ..studies.compare.result import ComparisonResult
     from ..studies.compare.trajectory_sources import display_names, load_both
 
     options = {"stop": stop, "interface": interface, "timeout": timeout, "rtol": rtol}
@@ -183,7 +184,7 @@ def compare(
         first, second = replace(first, label=one), replace(second, label=two)
     elif first.name == second.name:
         first, second = replace(first, label=f"{first.name} (a)"), replace(second, label=f"{second.name} (b)")
-    return difference(first, second)
+    return ComparisonResult(**vars(difference(first, second)))
 
 
 def adjust_runs(options: dict[str, Any], runs: "list[RunSpec]") -> "list[RunSpec]":

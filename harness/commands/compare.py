@@ -71,5 +71,4 @@ def compare(
     failed = [side.failure for side in (comparison.one, comparison.two) if side.failure]
     if rtol is not None or atol is not None:
         failed += comparison.violations(rtol or 0.0, atol or 0.0)
-    output = (study.difference_table(comparison), "", *study.summary_lines(comparison))
-    terminal.print_result(study.comparison_as_json(comparison), *output, folder=folder, failed=failed)
+    terminal.print_result(comparison.as_json(), *comparison.blocks(), folder=folder, failed=failed)

@@ -68,6 +68,15 @@ STUDIES = (
         "Damping, dry friction and drag from the whole signal and from its turning points, with 95 % intervals.",
         ("a decay", "decay coulomb"),
     ),
+    Study(
+        "compare",
+        "compare",
+        "studies.compare.result:ComparisonResult",
+        ("compare.json", PICTURE),
+        "Comparisons",
+        "Differences between two results or FMUs.",
+        ("a comparison", "compare results/coulomb results/coulomb-sign"),
+    ),
 )
 
 

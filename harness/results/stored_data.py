@@ -15,7 +15,7 @@ import numpy as np
 from ..errors import SceneError, first_line
 
 DATA_FILE = "data.npz"
-CONTENT = "content"  # name of the JSON in the file
+CONTENT, ARRAY = "content", "array "  # name of the JSON in the file, and of the index of an array in the JSON
 T = TypeVar("T")
 
 
@@ -55,7 +55,7 @@ def simplify(value: Any, arrays: list[np.ndarray]) -> Any:
         return [simplify(item, arrays) for item in value]
     if isinstance(value, np.ndarray):
         arrays.append(value)
-        return len(arrays) - 1
+        return {ARRAY: len(arrays) - 1}
     if isinstance(value, Path):
         return str(value)
     return value.item() if isinstance(value, np.generic) else value
@@ -63,6 +63,8 @@ def simplify(value: Any, arrays: list[np.ndarray]) -> Any:
 
 def rebuild(kind: Any, value: Any, arrays: Any) -> Any:
     """Return the value of a type from its JSON."""
+    if isinstance(value, dict) and ARRAY in value:
+        return arrays[str(value[ARRAY])]
     origin, parameters = get_origin(kind), get_args(kind)
     if origin is Annotated:
         return rebuild(parameters[0], value, arrays)
@@ -70,8 +72,6 @@ def rebuild(kind: Any, value: Any, arrays: Any) -> Any:
         if value is None and NoneType in parameters:
             return None
         return rebuild(next(item for item in parameters if item is not NoneType), value, arrays)
-    if kind is np.ndarray:
-        return arrays[str(value)]
     if is_dataclass(kind):
         types = get_type_hints(kind, include_extras=True)
         names = [field.name for field in fields(kind) if field.init]

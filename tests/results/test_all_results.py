@@ -32,7 +32,11 @@ def identified_decay():
     return harness.identify_decay(record.t, record.x, unit="m", k=157.9)
 
 
-MAKERS = {"decay": identified_decay}
+def compared_runs():
+    return harness.compare(harness.simulate("coulomb"), harness.simulate("coulomb", {"f": 0.6}))
+
+
+MAKERS = {"decay": identified_decay, "compare": compared_runs}
 result_of = cache(lambda study: MAKERS[study]())
 every_study = pytest.mark.parametrize("study", MAKERS)
 

@@ -17,7 +17,7 @@ from harness.errors import HarnessError
 from harness.running.trajectory import ModeChanges, Trajectory
 from harness.scenes.run_spec import RunSpec
 from harness.studies.compare.difference import compare
-from harness.studies.compare.study import comparison_as_json
+from harness.studies.compare.result import ComparisonResult
 from harness.studies.compare.trajectory_files import read_trajectory
 
 DECLARED_STEP = '<CoSimulation fixedInternalStepSize="0.1" '
@@ -66,7 +66,8 @@ def test_two_fmus_differ_as_their_closed_forms_do(harness, external_fmu_folder, 
     assert x["largest"] == pytest.approx(off.max(), rel=1e-2)
     assert x["rms"] == pytest.approx(np.sqrt(np.mean(off * off)), rel=1e-2)
     folder = tmp_path / "results/compare/Midpoint-Other"
-    assert {file.name for file in folder.iterdir()} == {"compare.json", "figure.svg", "provenance.json", "summary.json"}
+    files = {"compare.json", "data.npz", "figure.svg", "provenance.json", "summary.json"}
+    assert {file.name for file in folder.iterdir()} == files
 
 
 @pytest.mark.parametrize("stop", [10, pytest.param(9.95, marks=pytest.mark.slow)])
@@ -296,7 +297,7 @@ def test_events_of_several_contacts_are_matched_per_contact_and_named():
     assert comparison.events == (
         "2 changes of mode in both, at most 0.75 s apart; only in one: F_lower to 0 at t = 3 s"
     )
-    assert comparison_as_json(comparison)["only_one"] == [[3.0, 0.0, "F_lower"]]
+    assert ComparisonResult(**vars(comparison)).as_json()["only_one"] == [[3.0, 0.0, "F_lower"]]
 
 
 def test_a_distant_event_match_hides_no_difference():

@@ -50,7 +50,7 @@ class Difference:
     right: np.ndarray
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Comparison:
     """Comparison of two trajectories.
 
@@ -77,13 +77,6 @@ class Comparison:
     differences: tuple[Difference, ...]
     left_out: tuple[str, ...]
     pairs: EventPairs | None
-
-    def __repr__(self) -> str:
-        """Describe the comparison in one line; its arrays may be long."""
-        names = ", ".join(variable.name for variable in self.differences)
-        return (
-            f"<Comparison of {self.one.name} and {self.two.name}: {names}; worst relative difference {self.worst:.3g}>"
-        )
 
     @property
     def worst(self) -> float:
