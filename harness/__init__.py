@@ -26,6 +26,8 @@ if TYPE_CHECKING:
     from .studies.compare.difference import Comparison
     from .studies.compare.result import ComparisonResult
     from .studies.decay.result import DecayResult
+    from .studies.fit.result import FitResult
+    from .studies.sweep.result import SweepResult
 
     __version__: str
     """Version of the installed project."""
@@ -35,10 +37,12 @@ __all__ = [
     "ComparisonResult",
     "DecayIdentification",
     "DecayResult",
+    "FitResult",
     "FmuDescription",
     "HarnessError",
     "ParameterFit",
     "SceneError",
+    "SweepResult",
     "Trajectory",
     "__version__",
     "compare",
@@ -54,10 +58,12 @@ __all__ = [
 TYPES = {
     "Comparison": "harness.studies.compare.difference",
     "ComparisonResult": "harness.studies.compare.result",
+    "FitResult": "harness.studies.fit.result",
     "FmuDescription": "harness.running.fmu_variables",
     "DecayIdentification": "harness.analyses.decay.identification",
     "DecayResult": "harness.studies.decay.result",
     "ParameterFit": "harness.analyses.fit.parameter_fit",
+    "SweepResult": "harness.studies.sweep.result",
     "Trajectory": "harness.running.trajectory",
 }
 

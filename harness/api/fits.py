@@ -29,6 +29,7 @@ from .tables import convert_to_table
 if TYPE_CHECKING:
     from ..analyses.fit.parameter_fit import ParameterFit
     from ..records.table_files import Table
+    from ..studies.fit.result import FitResult
 
 
 def starts(value: Any) -> Any:
@@ -94,7 +95,7 @@ def fit(
     timeout: float = 10.0,
     progress: Progress | None = None,
     fixed: Mapping[str, float | str] | None = None,
-) -> "ParameterFit":
+) -> "FitResult":
     """Fit parameters of an FMU to measured records.
 
     The first sample of a record is the start of the run: the start values of the FMU apply there, and can be free.
@@ -142,7 +143,7 @@ def fit(
 
     Returns
     -------
-    ParameterFit
+    FitResult
         Values with 95 % intervals by profile likelihood, combinations of parameters that the records determine although
         they do not determine each parameter, residuals and remarks; with `against`, the other fits and the comparison.
 

@@ -1,20 +1,18 @@
 """Stored results for Python: `load_result`."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from ..arguments import PATH, check_arguments
-from ..errors import SceneError, first_line, import_optional
+from ..errors import SceneError
 
 if TYPE_CHECKING:
-    import xarray
-
     from ..results.result import Result
     from ..running.trajectory import Trajectory
 
 
 @check_arguments(folder=PATH)
-def load_result(folder: "str | Path") -> "Result | xarray.Dataset | dict[str, Any]":
+def load_result(folder: "str | Path") -> "Result | Trajectory":
     """Read a stored result.
 
     Parameters
@@ -34,28 +32,11 @@ def load_result(folder: "str | Path") -> "Result | xarray.Dataset | dict[str, An
     SceneError
         If the folder holds no result, or it is damaged.
     """
-    import json
-
     from ..results.loading import load
 
     path = Path(folder)
-    if (path / "sweep.nc").is_file():
-        library = import_optional("xarray", "to read a sweep", "sweep")
-        try:
-            with library.open_dataset(path / "sweep.nc") as data:
-                loaded: xarray.Dataset = data.load()
-        except (OSError, ValueError) as error:
-            raise SceneError(f"{path / 'sweep.nc'} cannot be read: {first_line(error)}") from None
-        return loaded
-    if (path / "decay.json").is_file() or (path / "compare.json").is_file():
+    if any((path / name).is_file() for name in ("sweep.nc", "decay.json", "fit.json", "compare.json")):
         return load(path)
-    for name in ("fit.json",):
-        if (path / name).is_file():
-            try:
-                numbers: dict[str, Any] = json.loads((path / name).read_text(encoding="utf-8"))
-            except (OSError, ValueError) as error:
-                raise SceneError(f"{path / name} cannot be read: {first_line(error)}") from None
-            return numbers
     if not (path / "trajectory.csv").is_file():
         raise SceneError(
             f"{folder} holds no result: name a folder with trajectory.csv, sweep.nc, decay.json, fit.json or "

@@ -25,8 +25,9 @@ from ..errors import SceneError, import_optional
 from .options import QUIET, apply_options
 
 if TYPE_CHECKING:
-    import xarray
     from numpy.typing import ArrayLike
+
+    from ..studies.sweep.result import SweepResult
 
 
 GRID = mapping(Rule("numbers", lambda values: values), "numbers")  # the axes check their values
@@ -64,7 +65,7 @@ def sweep(
     scheduler: str | None = None,
     folder: "str | Path | None" = None,
     progress: Progress | None = None,
-) -> "xarray.Dataset":
+) -> "SweepResult":
     """Run a model or an FMU at many points of its parameters.
 
     Parameters
@@ -97,9 +98,9 @@ def sweep(
 
     Returns
     -------
-    xarray.Dataset
-        A dimension for each varied parameter (``run`` for samples), a variable for each measure, and ``error``, the
-        error message of a failed run, otherwise empty.
+    SweepResult
+        Its `data` is an xarray.Dataset: a dimension for each varied parameter (``run`` for samples), a variable for
+        each measure, and ``error``, the error message of a failed run, otherwise empty.
 
     Raises
     ------
@@ -116,7 +117,8 @@ def sweep(
     from ..studies.sweep.runner import SweepSpec
     from ..studies.sweep.sampling import SweepPoints, axis_from_numbers
 
-    library, *_ = (import_optional(package, "a sweep", "sweep") for package in ("xarray", "dask", "netCDF4"))
+    for package in ("xarray", "dask", "netCDF4"):
+        import_optional(package, "a sweep", "sweep")
     if not grid:
         raise SceneError("grid is empty: name at least one parameter and its values, as in {'mu_d': [0.3, 0.6]}")
     if workers is not None:
@@ -132,6 +134,7 @@ def sweep(
     spec = SweepSpec(run, points.names, tuple(measures))
     with temporary_directory("sweep-") if folder is None else nullcontext(Path(folder)) as directory:
         result = run_sweep(spec, points, None, directory, scheduler, workers, progress or QUIET)
-        with library.open_dataset(result.folder / "sweep.nc") as data:
-            loaded: xarray.Dataset = data.load()
-    return loaded
+        result.data  # noqa: B018 - loads it before a temporary folder is removed
+    if folder is None:
+        result.folder = None
+    return result

@@ -91,7 +91,6 @@ def fit(
     from ..scenes.run_spec import RunSpec
     from ..studies.fit import options, study
     from ..studies.fit.request import FitRequest
-    from ..studies.fit.table import result_parts
 
     fmu, *others = map(find_fmu, (model, *against))
     for path in (fmu, *others):
@@ -114,4 +113,4 @@ def fit(
         result, folder = study.fit_files(
             request, records, validate, terminal.out, lambda share: report(records[0], share)
         )
-    terminal.print_result(study.fit_as_json(result), *result_parts(result), folder=folder)
+    terminal.print_result(result.as_json(), *result.blocks(), folder=folder)

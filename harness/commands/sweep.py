@@ -1,11 +1,10 @@
 """sweep: parameter sweeps."""
 
 import os
-from collections.abc import Iterator
 from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
@@ -20,11 +19,6 @@ from .terminal import (
     result_options,
     run_options,
 )
-
-if TYPE_CHECKING:
-    from ..studies.sweep.result_files import SweepResult
-
-MAX_FAILURE_KINDS = 10  # kinds of failures printed
 
 
 @click.command()
@@ -112,22 +106,5 @@ def sweep(
     with terminal.progress(1) as report:
         spec, progress = SweepSpec(run, points.names, measures), partial(report, model)
         result = run_sweep(spec, points, name, terminal.out, scheduler, workers, progress)
-    n_new = result.runs - result.n_resumed
-    output = [f"{result.runs} runs, {result.n_resumed} of them resumed, {result.failed} failed"]
-    if result.damaged:
-        output.append("the checkpoint of an interrupted sweep was damaged; its runs were repeated")
-    if n_new:
-        output.append(f"{n_new} runs in {result.seconds:.3g} s: {n_new / result.seconds:.4g} runs/s")
-    terminal.print_result(
-        result, *output, folder=result.folder, failed=describe_failures(result) if result.failed else ()
-    )
-
-
-def describe_failures(result: "SweepResult") -> Iterator[str]:
-    """Yield one sentence for each kind of failure."""
-    yield f"{result.failed} of {result.runs} runs failed; see the error column of {result.folder / 'sweep.csv'}"
-    for failure in result.failures[:MAX_FAILURE_KINDS]:
-        point = ", ".join(f"{name} = {value!r}" for name, value in failure.where.items())
-        yield f"{failure.runs} run{'s' * (failure.runs > 1)}, such as {point}: {failure.sentence}"
-    if len(result.failures) > MAX_FAILURE_KINDS:
-        yield f"and {len(result.failures) - MAX_FAILURE_KINDS} other kinds of failures"
+    failed = [*result.describe_failures()]
+    terminal.print_result(result.as_json(), *result.blocks(), folder=result.folder, failed=failed)

@@ -69,6 +69,26 @@ STUDIES = (
         ("a decay", "decay coulomb"),
     ),
     Study(
+        "fit",
+        "fit",
+        "studies.fit.result:FitResult",
+        ("fit.json", "fit.csv", "validation.csv", PICTURE),
+        "Fits",
+        "Parameters of FMUs from measured records, with 95 % intervals.",
+    ),
+    Study(
+        "sweep",
+        "sweep",
+        "studies.sweep.result:SweepResult",
+        ("sweep.nc", "sweep.csv", PICTURE),
+        "Sweeps",
+        "Parameter sweeps; known boundaries are dashed.",
+        (
+            "a sweep",
+            "sweep stickslip --vary mu_d=0.3:0.9:60 --vary v_driver=0.01:0.1:60 --measures slips",
+        ),
+    ),
+    Study(
         "compare",
         "compare",
         "studies.compare.result:ComparisonResult",

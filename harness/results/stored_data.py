@@ -23,9 +23,9 @@ def write_data(result: Any, file: Path) -> None:
     """Write a dataclass of numbers, texts, paths, arrays, and containers and dataclasses of these."""
     arrays: list[np.ndarray] = []
     content = json.dumps(simplify(result, arrays))
+    named: dict[str, Any] = {CONTENT: np.array(content)} | {str(i): array for i, array in enumerate(arrays)}
     with file.open("wb") as stream:
-        named: dict[str, Any] = {str(i): array for i, array in enumerate(arrays)}
-        np.savez(stream, **named, **{CONTENT: np.array(content)})
+        np.savez(stream, **named)
 
 
 def read_data(kind: type[T], file: Path) -> T:

@@ -134,9 +134,9 @@ def test_samples_are_reproducible_and_stored():
     pytest.importorskip("xarray")
     first = harness.sweep("smd", {"k": (100.0, 200.0), "c": (0.0, 3.0)}, samples=8, seed=3, folder="kept")
     repeated = harness.sweep("smd", {"k": (100.0, 200.0), "c": (0.0, 3.0)}, samples=8, seed=3)
-    assert first.equals(repeated)
+    assert first.equals(repeated.data)
     (folder,) = (path for path in Path("kept/sweep").iterdir() if not path.name.startswith("."))
-    assert harness.load_result(folder).equals(first)
+    assert harness.load_result(folder).equals(first.data)
 
 
 def test_results_of_commands_load(tmp_path):

@@ -19,6 +19,7 @@ from harness.analyses.fit.law_comparison import compare_laws
 from harness.analyses.fit.measured_record import RecordData
 from harness.analyses.fit.parameter_fit import information_criterion
 from harness.errors import HarnessError, SceneError
+from harness.results.files import to_json
 from harness.running.fmu_archive import read_description
 from harness.running.variable_values import enumeration_labels
 from harness.running.whole_run import open_simulator
@@ -294,6 +295,7 @@ def test_the_command_writes_what_it_prints(tmp_path):
     stored = json.loads((folder / "fit.json").read_text())
     assert stored == printed
     assert {file.name for file in folder.iterdir()} == {
+        "data.npz",
         "fit.json",
         "fit.csv",
         "figure.svg",
@@ -304,7 +306,7 @@ def test_the_command_writes_what_it_prints(tmp_path):
     check_shared_keys(stored)
     assert estimates["k"]["low"] < 900.0 < estimates["k"]["high"]
     assert estimates["mu_s"]["low"] < 0.8 < estimates["mu_s"]["high"]
-    assert harness.load_result(folder) == stored
+    assert json.loads(to_json(harness.load_result(folder).as_json())) == stored
 
 
 @pytest.mark.parametrize(

@@ -59,7 +59,7 @@ def describe_fit(
         n_runs=n_runs,
         seconds=seconds,
         log=tuple(raw_fit.log),
-        records=problem.records,
+        records=tuple(record.fitted for record in problem.records),
         predictions=tuple(predictions),
     )
 

@@ -9,6 +9,7 @@ from scipy.interpolate import CubicSpline
 from ...running.stepping import merge_points
 from ...running.whole_run import Run, Simulator
 from .noise import bin_means, estimate_noise
+from .parameter_fit import FittedRecord
 
 MAX_SAMPLES = 2500  # twice as many are averaged to this number of means of neighbours
 MAX_AVERAGING_ERROR = 0.3  # of a mean of neighbouring samples, in units of the noise
@@ -103,6 +104,11 @@ class MeasuredRecord:
         self.all = np.arange(len(self.t))
         self.parts: dict[int, RecordPart] = {}
         self.subdivide(1)
+
+    @property
+    def fitted(self) -> FittedRecord:
+        """Return the samples for the result, without the runs."""
+        return FittedRecord(self.name, self.t, self.y, self.noise, self.sampled_t, self.width)
 
     def subdivide(self, parts: int, every: int = 1) -> None:
         """Divide the intervals between samples; there, inputs are splines through each `every`-th sample."""

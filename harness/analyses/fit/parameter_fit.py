@@ -5,8 +5,8 @@ from math import isfinite, log
 
 import numpy as np
 
+from ...errors import check_names
 from ..estimation.estimate import ColumnResiduals, Estimate
-from .measured_record import MeasuredRecord
 
 CLEAR_DIFFERENCE = 6.0  # of two BIC, which is strong evidence
 SMALLEST_MEAN_SQUARE = 1e-12  # in units of the noise
@@ -33,6 +33,34 @@ class Profile:
 
 
 @dataclass(frozen=True)
+class FittedRecord:
+    """Samples of a record, as they were fitted.
+
+    Attributes
+    ----------
+    name : str
+        Name of the record.
+    t : numpy.ndarray
+        Times (n,) in s.
+    y : numpy.ndarray
+        Observed columns (n, columns).
+    noise : numpy.ndarray
+        Standard deviation (columns,) of the noise.
+    sampled_t : numpy.ndarray
+        Times (m,) in s of the samples of the record.
+    width : int
+        Number of samples whose mean each row of `y` is.
+    """
+
+    name: str
+    t: np.ndarray
+    y: np.ndarray
+    noise: np.ndarray
+    sampled_t: np.ndarray
+    width: int
+
+
+@dataclass(frozen=True)
 class Validation:
     """Prediction of records that were not fitted.
 
@@ -40,7 +68,7 @@ class Validation:
     ----------
     columns : tuple of ColumnResiduals
         Residuals of each observed column.
-    records : tuple of MeasuredRecord
+    records : tuple of FittedRecord
         The records.
     predictions : tuple of numpy.ndarray
         Predicted signals (n, columns) of each record at its times.
@@ -49,7 +77,7 @@ class Validation:
     """
 
     columns: tuple[ColumnResiduals, ...]
-    records: tuple[MeasuredRecord, ...]
+    records: tuple[FittedRecord, ...]
     predictions: tuple[np.ndarray, ...]
     remarks: tuple[str, ...]
 
@@ -124,7 +152,7 @@ def information_criterion(squares: float, n: int, n_unknowns: int, n_independent
     return n_independent * log(max(squares / n, SMALLEST_MEAN_SQUARE)) + n_unknowns * log(n_independent)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class ParameterFit:
     """Parameters of an FMU that were fitted to measured records.
 
@@ -158,7 +186,7 @@ class ParameterFit:
         Processor time.
     log : tuple of str
         A line for each search.
-    records : tuple of MeasuredRecord
+    records : tuple of FittedRecord
         The fitted records.
     predictions : tuple of numpy.ndarray
         Fitted signals (n, columns) of each record at its times.
@@ -185,7 +213,7 @@ class ParameterFit:
     n_runs: int
     seconds: float
     log: tuple[str, ...]
-    records: tuple[MeasuredRecord, ...]
+    records: tuple[FittedRecord, ...]
     predictions: tuple[np.ndarray, ...]
     validation: Validation | None = None
     against: "tuple[ParameterFit, ...]" = ()
@@ -208,7 +236,9 @@ class ParameterFit:
 
     def __getitem__(self, name: str) -> Estimate:
         """Return the estimate of an unknown or of a combination."""
-        return next(estimate for estimate in (*self.estimates, *self.combinations) if estimate.name == name)
+        estimates = {estimate.name: estimate for estimate in (*self.combinations, *self.estimates)}
+        check_names("estimate", [name], estimates)
+        return estimates[name]
 
     @property
     def undetermined(self) -> tuple[str, ...]:

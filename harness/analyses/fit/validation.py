@@ -43,9 +43,8 @@ def validate(problem: FitProblem, raw_fit: RawFit, data: Sequence[RecordData]) -
         (prediction - record.y) / record.noise for record, prediction in zip(records, predictions, strict=True)
     ]
     columns = column_residuals(records, residuals, problem.outputs)
-    return Validation(
-        columns, tuple(records), tuple(predictions), tuple(validation_remarks(problem, raw_fit, columns, residuals))
-    )
+    remarks = tuple(validation_remarks(problem, raw_fit, columns, residuals))
+    return Validation(columns, tuple(record.fitted for record in records), tuple(predictions), remarks)
 
 
 def validation_remarks(

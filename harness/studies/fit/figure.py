@@ -3,17 +3,15 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import isfinite
-from pathlib import Path
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
 from ...analyses.estimation.estimate import ColumnResiduals, Estimate
 from ...analyses.estimation.figure import plot_legend, plot_record, plot_residuals
-from ...analyses.fit.measured_record import MeasuredRecord
-from ...analyses.fit.parameter_fit import ParameterFit, Profile
+from ...analyses.fit.parameter_fit import FittedRecord, ParameterFit, Profile
 from ...results.quantity import display_unit
-from ...results.style import GREEN, GREY, HEIGHT, ORANGE, WIDTH, Axes, axis_label, open_figure
+from ...results.style import GREEN, GREY, HEIGHT, ORANGE, WIDTH, Axes, Figure, axis_label, set_size
 
 MAX_COLUMNS, MAX_PROFILES = 6, 12  # drawn at most
 COLOURS = (ORANGE, GREEN, "#CC79A7", "#56B4E9")  # of the laws
@@ -27,14 +25,14 @@ class FittedColumn:
     """A column of a record, the prediction of each law for it, and the title of its panel."""
 
     column: ColumnResiduals
-    record: MeasuredRecord
+    record: FittedRecord
     position: int
     signals: tuple[np.ndarray, ...]
     title: str
 
 
-def draw(fit: ParameterFit, path: Path) -> None:
-    """Save the figure."""
+def draw(fit: ParameterFit, figure: Figure) -> None:
+    """Draw the figure."""
     laws = (fit, *fit.against)
     columns = fitted_columns(laws)[:MAX_COLUMNS]
     profiles = [(n, profile) for n, law in enumerate(laws) for profile in law.profiles][:MAX_PROFILES]
@@ -42,22 +40,22 @@ def draw(fit: ParameterFit, path: Path) -> None:
     rows = -(-len(profiles) // PROFILES_IN_ROW)
     heights = [RECORD, *[RESIDUALS] * len(laws)] * len(columns)
     signal_height, profile_height = sum(heights), PROFILES * rows
-    with open_figure(path, 1.8 * WIDTH, 0.53 * HEIGHT * (signal_height + profile_height)) as figure:
-        grid = figure.add_gridspec(2, 1, height_ratios=(signal_height, max(profile_height, 1e-6)))
-        upper = figure.add_subfigure(grid[0]) if rows else figure
-        axes = upper.subplots(len(heights), 1, height_ratios=heights, squeeze=False)[:, 0]
-        for n, column in enumerate(columns):
-            plot_column(axes[n * (len(laws) + 1) :][: len(laws) + 1], laws, column)
-        axes[-1].set_xlabel("t [s]")
-        if rows:
-            panels = figure.add_subfigure(grid[1]).subplots(rows, in_row, sharey=True, squeeze=False)
-            for panel, (n, profile) in zip(panels.flat, profiles, strict=False):
-                plot_profile(panel, profile, laws[n][profile.name], COLOURS[n % len(COLOURS)])
-                panel.set_title(f"profile: {laws[n].fmu}" if len(laws) > 1 else "profile")
-            for panel in panels.flat[len(profiles) :]:
-                panel.set_axis_off()
-            for panel in panels[:, 0]:
-                panel.set_ylabel("rise of squares\n(1: 95 %)")
+    set_size(figure, 1.8 * WIDTH, 0.53 * HEIGHT * (signal_height + profile_height))
+    grid = figure.add_gridspec(2, 1, height_ratios=(signal_height, max(profile_height, 1e-6)))
+    upper = figure.add_subfigure(grid[0]) if rows else figure
+    axes = upper.subplots(len(heights), 1, height_ratios=heights, squeeze=False)[:, 0]
+    for n, column in enumerate(columns):
+        plot_column(axes[n * (len(laws) + 1) :][: len(laws) + 1], laws, column)
+    axes[-1].set_xlabel("t [s]")
+    if rows:
+        panels = figure.add_subfigure(grid[1]).subplots(rows, in_row, sharey=True, squeeze=False)
+        for panel, (n, profile) in zip(panels.flat, profiles, strict=False):
+            plot_profile(panel, profile, laws[n][profile.name], COLOURS[n % len(COLOURS)])
+            panel.set_title(f"profile: {laws[n].fmu}" if len(laws) > 1 else "profile")
+        for panel in panels.flat[len(profiles) :]:
+            panel.set_axis_off()
+        for panel in panels[:, 0]:
+            panel.set_ylabel("rise of squares\n(1: 95 %)")
 
 
 def fitted_columns(laws: Sequence[ParameterFit]) -> list[FittedColumn]:
@@ -77,19 +75,28 @@ def fitted_columns(laws: Sequence[ParameterFit]) -> list[FittedColumn]:
 
 def plot_column(panels: np.ndarray, laws: Sequence[ParameterFit], fitted: FittedColumn) -> None:
     """Plot a column of a record with the fits, and below it the residuals of each law."""
+    plot_fits(panels[0], laws, fitted)
     record, j = fitted.record, fitted.position
     unit, size = display_unit(fitted.column.unit)
     samples = record.y[:, j] / size
-    plot_record(panels[0], record.t, samples, fitted.title, axis_label(fitted.column.name, unit))
-    for n, (law, signal, axes) in enumerate(zip(laws, fitted.signals, panels[1:], strict=True)):
-        label, name = f"fit: {law.fmu}", f" of {law.fmu}" if len(laws) > 1 else ""
-        panels[0].plot(record.t, signal / size, color=COLOURS[n % len(COLOURS)], linewidth=0.9, label=label)
+    for law, signal, axes in zip(laws, fitted.signals, panels[1:], strict=True):
+        name = f" of {law.fmu}" if len(laws) > 1 else ""
         plot_residuals(axes, record.t, samples - signal / size, float(record.noise[j]) / size, name, unit)
         axes.sharex(panels[0])
     limits = [axes.get_ylim() for axes in panels[1:]]
     for axes in panels[1:]:
         axes.set_ylim(min(low for low, _ in limits), max(high for _, high in limits))
-    plot_legend(panels[0])
+
+
+def plot_fits(axes: Axes, laws: Sequence[ParameterFit], fitted: FittedColumn) -> None:
+    """Plot a column of a record with the fits."""
+    unit, size = display_unit(fitted.column.unit)
+    samples = fitted.record.y[:, fitted.position] / size
+    plot_record(axes, fitted.record.t, samples, fitted.title, axis_label(fitted.column.name, unit))
+    for n, (law, signal) in enumerate(zip(laws, fitted.signals, strict=True)):
+        colour = COLOURS[n % len(COLOURS)]
+        axes.plot(fitted.record.t, signal / size, color=colour, linewidth=0.9, label=f"fit: {law.fmu}")
+    plot_legend(axes)
 
 
 def plot_profile(axes: Axes, profile: Profile, estimate: Estimate, colour: str) -> None:

@@ -5,14 +5,13 @@ An axis is logarithmic if its values are spaced logarithmically or span decades.
 
 import json
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 import xarray
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 
-from ...results.style import BLUE, GREEN, HEIGHT, ORANGE, WIDTH, axis_label, open_figure
+from ...results.style import BLUE, GREEN, HEIGHT, ORANGE, WIDTH, Figure, axis_label, set_size
 from .boundaries import Boundary
 
 FAILED_COLOUR = "#bbbbbb"
@@ -24,34 +23,51 @@ MAX_CELLS = 300  # cells along each side of a map
 FINE_POINTS = 401  # points along an axis at which boundaries are evaluated
 
 
-def draw(file: Path, path: Path, boundaries: Sequence[Boundary], failed: int) -> None:
-    """Save the figure of a netCDF file: one panel per measure, or per measure and parameter in scatter plots."""
-    with xarray.open_dataset(file, engine="scipy", drop_variables="error") as dataset:
-        n_axes = len(dataset.dims)
-        limit = MAX_CELLS if n_axes == 2 else int(MAX_POINTS ** (1 / n_axes))
-        data = dataset.isel({name: slice(None, None, -(-size // limit)) for name, size in dataset.sizes.items()}).load()
+def thin_out(dataset: xarray.Dataset) -> xarray.Dataset:
+    """Return the measures of at most as many runs as are drawn."""
+    measures = dataset.drop_vars("error", errors="ignore")
+    n_axes = len(measures.dims)
+    limit = MAX_CELLS if n_axes == 2 else int(MAX_POINTS ** (1 / n_axes))
+    return measures.isel({name: slice(None, None, -(-size // limit)) for name, size in measures.sizes.items()}).load()
+
+
+def draw(data: xarray.Dataset, figure: Figure, boundaries: Sequence[Boundary], failed: int) -> None:
+    """Draw the figure: one panel per measure, or per measure and parameter in scatter plots."""
     measures, varied = [str(name) for name in data.data_vars], [str(name) for name in data.coords]
-    scattered = "run" in data.dims or len(varied) > 2
+    scattered = is_scattered(data)
     n_columns = len(varied) if scattered else min(len(measures), 2)
     n_rows = len(measures) if scattered else -(-len(measures) // 2)
     height = HEIGHT * (1.2 if scattered or len(varied) == 1 else 1.7)
-    with open_figure(path, max(1.2, n_columns) * WIDTH, height * n_rows + 0.6) as figure:
-        figure.suptitle(f"{data.attrs['title']}{f' ({failed} runs failed)' if failed else ''}", fontsize=11)
-        panels = figure.subplots(n_rows, n_columns, squeeze=False)
-        if scattered:
-            for row, measure in zip(panels, measures, strict=True):
-                for axes, name in zip(row, varied, strict=True):
-                    plot_scatter(axes, data, measure, name)
-        else:
-            for axes, measure in zip(panels.flat, measures, strict=False):
-                (plot_curve if len(varied) == 1 else draw_map)(axes, data, measure, boundaries)
-            for axes in panels.flat[len(measures) :]:
-                axes.remove()
-        legend: dict[str, Artist] = {}
-        for axes in figure.axes:
-            legend |= {text: artist for artist, text in zip(*axes.get_legend_handles_labels(), strict=True)}
-        if legend:
-            figure.legend(handles=list(legend.values()), labels=list(legend), loc="outside lower center", ncols=2)
+    set_size(figure, max(1.2, n_columns) * WIDTH, height * n_rows + 0.6)
+    figure.suptitle(f"{data.attrs['title']}{f' ({failed} runs failed)' if failed else ''}", fontsize=11)
+    panels = figure.subplots(n_rows, n_columns, squeeze=False)
+    if scattered:
+        for row, measure in zip(panels, measures, strict=True):
+            for axes, name in zip(row, varied, strict=True):
+                plot_scatter(axes, data, measure, name)
+    else:
+        for axes, measure in zip(panels.flat, measures, strict=False):
+            draw_measure(axes, data, measure, boundaries)
+        for axes in panels.flat[len(measures) :]:
+            axes.remove()
+    legend: dict[str, Artist] = {}
+    for axes in figure.axes:
+        legend |= {text: artist for artist, text in zip(*axes.get_legend_handles_labels(), strict=True)}
+    if legend:
+        figure.legend(handles=list(legend.values()), labels=list(legend), loc="outside lower center", ncols=2)
+
+
+def is_scattered(data: xarray.Dataset) -> bool:
+    """Return whether a sweep is drawn as points: a sample, or a grid of more than two parameters."""
+    return "run" in data.dims or len(data.coords) > 2
+
+
+def draw_measure(axes: Axes, data: xarray.Dataset, measure: str, boundaries: Sequence[Boundary]) -> None:
+    """Draw one measure over the first parameter, or over both."""
+    if is_scattered(data):
+        plot_scatter(axes, data, measure, str(next(iter(data.coords))))
+    else:
+        (plot_curve if len(data.coords) == 1 else draw_map)(axes, data, measure, boundaries)
 
 
 def label_axes(axes: Axes, data: xarray.Dataset, x_name: str, y_name: str) -> None:

@@ -27,13 +27,14 @@ from ...errors import HarnessError, SceneError, check_names
 from ...results.files import column_heading
 from ...results.folder import replace_folder
 from ...results.provenance import describe_sources, write_provenance
-from ...results.summary import Summary, write_summary
+from ...results.summary import write_summary
 from ...running.fmu_archive import read_description
 from ...running.variable_values import REAL_TYPES, variable_unit
 from ...scenes.fmu_files import check_built
 from .boundaries import Boundary, read_boundaries
 from .checkpoint import Checkpoint, RunBlock
 from .measures import MeasureColumn
+from .result import DATASET_FILE, STUDY, TABLE_FILE, FailureGroup, SweepResult
 from .runner import SweepSpec, open_runner
 from .sampling import SweepPoints
 from .study import Sweep, run_pending
@@ -42,62 +43,9 @@ if TYPE_CHECKING:
     import dask.array
     import xarray
 
-FOLDER = "sweep"
 CHUNK_SIZE = "8 MiB"  # of the values read and written at a time
-FILES = ("sweep.nc", "sweep.csv", "figure.svg")
 NOT_NUMBERS = ("String", "Binary", "Clock")
 NUMBER = re.compile(r"-?\b\d+\.?\d*(e[-+]?\d+)?")
-
-
-@dataclass(frozen=True)
-class FailureGroup:
-    """Runs that failed with the same error message, except for numbers in it.
-
-    Attributes
-    ----------
-    runs : int
-        Number of runs.
-    sentence : str
-        Error message of the first run.
-    where : dict
-        Varied values of the first run.
-    """
-
-    runs: int
-    sentence: str
-    where: dict[str, float]
-
-
-@dataclass(frozen=True)
-class SweepResult:
-    """A finished sweep.
-
-    Attributes
-    ----------
-    runs : int
-        Number of runs.
-    folder : pathlib.Path
-        Folder of the results.
-    n_resumed : int
-        Number of runs taken from the checkpoint of an interrupted sweep.
-    damaged : bool
-        Whether that checkpoint was damaged and not used.
-    failures : tuple of FailureGroup
-        Failed runs by kind, most frequent first.
-    seconds : float
-        Run time of the new runs in s.
-    """
-
-    runs: int
-    folder: Path
-    n_resumed: int
-    damaged: bool
-    failures: tuple[FailureGroup, ...]
-    seconds: float
-
-    @property
-    def failed(self) -> int:
-        return sum(failure.runs for failure in self.failures)
 
 
 @dataclass(frozen=True)
@@ -139,9 +87,9 @@ def run_sweep(
     check_built(file)
     about = describe(runs, points)
     sweep = Sweep(runs, points, file.read_bytes(), len(about.columns))
-    checkpoint = sweep.checkpoint(out / FOLDER)
+    checkpoint = sweep.checkpoint(out / STUDY.name)
     n_resumed = checkpoint.n_done
-    folder = out / FOLDER / (name or "-".join((runs.run.model, *runs.varied, sweep.key[:8])))
+    folder = out / STUDY.name / (name or "-".join((runs.run.model, *runs.varied, sweep.key[:8])))
     source = describe_sources(str(file))
     options = runs.run.options | {
         "vary": {axis.name: str(axis) for axis in points.axes},
@@ -150,17 +98,29 @@ def run_sweep(
         "measures": runs.measures,
     }
     # opened before the runs, so that conflicts are reported at once
-    with replace_folder(folder, FILES, source) as new_folder:
+    with replace_folder(folder, STUDY.files, source) as new_folder:
         seconds = run_pending(sweep, checkpoint, scheduler, workers, report)
         failures = write_files(sweep, checkpoint, about, new_folder)
-        write_provenance(new_folder, [file], about.constants, options, source=source)
         units = {name: unit for name, (unit, _) in about.varied.items()}
         units |= {column.name: column.unit for column in about.columns}
         columns = ", ".join(column_heading(name, "" if unit == "1" else unit) for name, unit in units.items())
-        text = f"{len(points)} runs, {sum(item.runs for item in failures)} failed. Columns: {columns}."
-        write_summary(new_folder, Summary("sweep", folder.name, (text,), picture=f"Sweep {folder.name}. {text}"))
+        result = SweepResult(
+            folder.name,
+            len(points),
+            new_folder,
+            n_resumed,
+            checkpoint.damaged,
+            failures,
+            seconds,
+            about.boundaries,
+            columns,
+        )
+        result.write(new_folder)
+        write_provenance(new_folder, [file], about.constants, options, source=source)
+        write_summary(new_folder, result.summary())
     checkpoint.delete()
-    return SweepResult(len(points), folder, n_resumed, checkpoint.damaged, failures, seconds)
+    result.folder = folder
+    return result
 
 
 def describe(runs: SweepSpec, points: SweepPoints) -> SweepDescription:
@@ -201,23 +161,20 @@ def is_settable(variable: Any) -> bool:
 def write_files(
     sweep: Sweep, checkpoint: Checkpoint, about: SweepDescription, folder: Path
 ) -> tuple[FailureGroup, ...]:
-    """Write the netCDF file, the table and the figure; return the failures."""
+    """Write the netCDF file and the table; return the failures."""
     import dask
-
-    from .figure import draw
 
     failures, longest = group_failures(sweep, checkpoint)
     with dask.config.set({"scheduler": "synchronous", "array.chunk-size": CHUNK_SIZE}):
         dataset = build_dataset(sweep, checkpoint, about, longest)
-        dataset.to_netcdf(folder / "sweep.nc", engine="netcdf4", format="NETCDF3_64BIT")
-    with (folder / "sweep.csv").open("w", encoding="utf-8", newline="") as text:
+        dataset.to_netcdf(folder / DATASET_FILE, engine="netcdf4", format="NETCDF3_64BIT")
+    with (folder / TABLE_FILE).open("w", encoding="utf-8", newline="") as text:
         table = csv.writer(text, lineterminator="\n")
         units = {name: str(variable.attrs.get("units", "1")) for name, variable in dataset.variables.items()}
         names = [*sweep.runs.varied, *(column.name for column in about.columns), "error"]
         table.writerow([column_heading(name, "" if units[name] == "1" else units[name]) for name in names])
         for block in checkpoint.blocks():
             table.writerows(csv_rows(sweep.points.coordinates(block.first, block.last), block))
-    draw(folder / "sweep.nc", folder / "figure.svg", about.boundaries, sum(item.runs for item in failures))
     return failures
 
 

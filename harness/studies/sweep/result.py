@@ -1,0 +1,244 @@
+"""A finished sweep with its data, its figure and what the command prints."""
+
+import csv
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from shutil import copy
+from typing import TYPE_CHECKING, Any, Self
+
+from ...errors import HarnessError, SceneError, check_names, first_line, import_optional
+from ...results.files import column_heading
+from ...results.provenance import load_provenance
+from ...results.registry import find_study
+from ...results.result import Result
+from ...results.stored_data import DATA_FILE
+from ...results.summary import Summary
+from .boundaries import Boundary
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+STUDY = find_study("sweep")
+DATASET_FILE, TABLE_FILE, *_ = STUDY.files
+MAX_FAILURE_KINDS = 10  # kinds of failures printed
+
+
+@dataclass(frozen=True)
+class FailureGroup:
+    """Runs that failed with the same error message, except for numbers in it.
+
+    Attributes
+    ----------
+    runs : int
+        Number of runs.
+    sentence : str
+        Error message of the first run.
+    where : dict
+        Varied values of the first run.
+    """
+
+    runs: int
+    sentence: str
+    where: dict[str, float]
+
+
+@dataclass(repr=False, eq=False)
+class SweepResult(Result):
+    """A finished sweep, as `sweep` returns it and `load_result` reads it.
+
+    ``result["period"]`` is the xarray.DataArray of a measure, a varied parameter or ``error``. Methods and attributes
+    of an xarray.Dataset, such as ``result.sel(mu_d=0.3)``, are those of `data`.
+
+    Attributes
+    ----------
+    name : str
+        Name of the sweep.
+    runs : int
+        Number of runs.
+    folder : pathlib.Path or None
+        Folder of the results; None if they were not stored.
+    n_resumed : int
+        Number of runs taken from the checkpoint of an interrupted sweep.
+    damaged : bool
+        Whether that checkpoint was damaged and not used.
+    failures : tuple of FailureGroup
+        Failed runs by kind, most frequent first.
+    seconds : float
+        Run time of the new runs in s.
+    boundaries : tuple of Boundary
+        Known boundaries in the parameter space.
+    columns : str
+        The varied parameters and the measures, with their units.
+    """
+
+    study, function = "sweep", "sweep"
+
+    name: str
+    runs: int
+    folder: Path | None
+    n_resumed: int
+    damaged: bool
+    failures: tuple[FailureGroup, ...]
+    seconds: float
+    boundaries: tuple[Boundary, ...] = ()
+    columns: str = ""
+    dataset: Any = field(default=None, init=False)
+
+    @classmethod
+    def is_stored(cls, folder: Path) -> bool:
+        return (folder / DATASET_FILE).is_file()
+
+    @classmethod
+    def load(cls, folder: Path) -> Self:
+        if (folder / DATA_FILE).is_file():
+            result = super().load(folder)
+            result.folder = folder
+            result.data  # noqa: B018 - reports a damaged file
+            return result
+        result = cls(folder.name, 0, folder, 0, False, (), 0.0)  # of an earlier version
+        messages = result.data["error"].to_numpy().ravel()
+        failed = [message for message in messages.tolist() if message]
+        result.runs = len(messages)
+        result.failures = (FailureGroup(len(failed), failed[0], {}),) if failed else ()
+        return result
+
+    @property
+    def data(self) -> "xarray.Dataset":
+        """The values: a dimension for each varied parameter (``run`` for samples) and a variable for each measure."""
+        if self.dataset is None:
+            with self.open() as stored:
+                self.dataset = stored.load()
+        dataset: xarray.Dataset = self.dataset
+        return dataset
+
+    @contextmanager
+    def open(self, **options: Any) -> "Iterator[xarray.Dataset]":
+        """Open the values, whose parts are read when they are needed."""
+        library = import_optional("xarray", "to read a sweep", "sweep")
+        if self.dataset is not None:
+            yield self.dataset
+            return
+        assert self.folder is not None  # set as long as there is no dataset
+        file = self.folder / DATASET_FILE
+        try:
+            dataset = library.open_dataset(file, **options)
+        except (OSError, ValueError) as error:
+            raise SceneError(f"{file} cannot be read: {first_line(error)}") from None
+        with dataset:
+            yield dataset
+
+    @property
+    def title(self) -> str:
+        return self.name
+
+    @property
+    def headline(self) -> str:
+        return f"{self.runs} runs, {self.failed} failed"
+
+    @property
+    def failed(self) -> int:
+        """Number of failed runs."""
+        return sum(failure.runs for failure in self.failures)
+
+    def __getitem__(self, name: Any) -> Any:
+        """Return a measure or a parameter as xarray.DataArray, or a part of the result by its key in the JSON."""
+        if isinstance(name, str):
+            content = self.as_json()
+            if name in content:
+                return content[name]
+            check_names("measure or parameter", [name], [str(known) for known in self.data.variables])
+        return self.data[name]
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.data
+
+    def __iter__(self) -> Iterator[Any]:
+        return iter(self.data)
+
+    def __len__(self) -> int:
+        return len(self.data)
+
+    def __getattr__(self, name: str) -> Any:
+        """Return an attribute of the dataset."""
+        if name.startswith("_"):
+            raise AttributeError(name)
+        return getattr(self.data, name)
+
+    def summary(self) -> Summary:
+        text = f"{self.runs} runs, {self.failed} failed. Columns: {self.columns}."
+        return Summary("sweep", self.name, (text,), picture=f"Sweep {self.name}. {text}")
+
+    def as_json(self) -> dict[str, Any]:
+        names = ("runs", "folder", "n_resumed", "damaged", "failures", "seconds")
+        return {name: getattr(self, name) for name in names}
+
+    def blocks(self) -> list[Any]:
+        n_new = self.runs - self.n_resumed
+        output = [f"{self.runs} runs, {self.n_resumed} of them resumed, {self.failed} failed"]
+        if self.damaged:
+            output.append("the checkpoint of an interrupted sweep was damaged; its runs were repeated")
+        if n_new and self.seconds:
+            output.append(f"{n_new} runs in {self.seconds:.3g} s: {n_new / self.seconds:.4g} runs/s")
+        return output
+
+    def describe_failures(self) -> Iterator[str]:
+        """Yield one sentence for each kind of failure; none if no run failed."""
+        if self.failures and self.folder:
+            yield f"{self.failed} of {self.runs} runs failed; see the error column of {self.folder / TABLE_FILE}"
+        for failure in self.failures[:MAX_FAILURE_KINDS]:
+            point = ", ".join(f"{name} = {value!r}" for name, value in failure.where.items())
+            yield f"{failure.runs} run{'s' * (failure.runs > 1)}, such as {point}: {failure.sentence}"
+        if len(self.failures) > MAX_FAILURE_KINDS:
+            yield f"and {len(self.failures) - MAX_FAILURE_KINDS} other kinds of failures"
+
+    def rows(self) -> tuple[list[Mapping[str, Any]], str]:
+        frame = self.data.to_dataframe().reset_index()
+        return frame.to_dict("records"), str(frame.columns[0])
+
+    def to_pandas(self) -> "pandas.DataFrame":
+        """Convert to a DataFrame with a row for each run, indexed by the varied parameters or the number of the run."""
+        frame: pandas.DataFrame = self.data.to_dataframe()
+        frame.attrs["units"] = {str(name): item.attrs.get("units", "") for name, item in self.data.variables.items()}
+        return frame
+
+    def origin(self) -> dict[str, Any]:
+        old = load_provenance(self.folder) if self.folder else {}
+        return {"files": (), "scene": old.get("scene"), "source": self.name}
+
+    def write_tables(self, folder: Path) -> None:
+        """Write, or copy, the values for xarray and as CSV."""
+        if self.folder is not None and all((self.folder / name).is_file() for name in (DATASET_FILE, TABLE_FILE)):
+            if self.folder != folder:
+                for name in (DATASET_FILE, TABLE_FILE):
+                    copy(self.folder / name, folder)
+            return
+        data = self.data
+        data.to_netcdf(folder / DATASET_FILE, engine="netcdf4", format="NETCDF3_64BIT")
+        units = {str(name): str(variable.attrs.get("units", "1")) for name, variable in data.variables.items()}
+        names = [*map(str, data.coords), *map(str, data.data_vars)]
+        values = data.to_dataframe().reset_index()[names].astype(object)
+        with (folder / TABLE_FILE).open("w", encoding="utf-8", newline="") as text:
+            table = csv.writer(text, lineterminator="\n")
+            table.writerow([column_heading(name, "" if units[name] == "1" else units[name]) for name in names])
+            table.writerows([None if cell != cell else cell for cell in row] for row in values.to_numpy())
+
+    def draw(self, figure: "Figure") -> None:
+        from .figure import draw, thin_out
+
+        with self.open(engine="scipy", drop_variables="error") as dataset:
+            data = thin_out(dataset)
+        if not data.data_vars:
+            raise HarnessError(f"{self.name} has no measures to draw")
+        draw(data, figure, self.boundaries, self.failed)
+
+    def draw_panel(self, axes: "Axes") -> None:
+        from .figure import draw_measure, thin_out
+
+        with self.open(engine="scipy", drop_variables="error") as dataset:
+            data = thin_out(dataset)
+        draw_measure(axes, data, str(next(iter(data.data_vars))), self.boundaries)
