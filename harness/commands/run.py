@@ -13,14 +13,6 @@ from ..errors import HarnessError
 from .terminal import Terminal, build_arguments, refuse_ignored_options, result_options, run_options
 
 UNUSED_SWEEP_OPTIONS = ("name", "scheduler")  # of a recorded call
-FOLDER_DEPTHS = {  # commands whose results can be repeated, and the levels from the result folder up to --out
-    "run": 1,
-    "compare": 2,
-    "couple": 2,
-    "decay": 2,
-    "stability": 1,
-    "sweep": 2,
-}
 
 
 @click.command()
@@ -79,7 +71,7 @@ def run(
     folder_path = Path(scene)
     if folder_path.is_dir() and scene not in scenes:
         provenance = load_verified_provenance(folder_path)
-        if not (folder_path / study.FILES[0]).is_file() or "title" not in (provenance["scene"] or {}):
+        if not (folder_path / study.STUDY.files[0]).is_file() or "title" not in (provenance["scene"] or {}):
             if provenance["command"] == PYTHON_API:
                 raise HarnessError(f"{scene} was written from Python: repeat its run by harness.simulate('{scene}')")
             repeat_call(context, folder_path, provenance, terminal)
@@ -109,15 +101,17 @@ def repeat_call(context: click.Context, folder: Path, provenance: dict[str, Any]
     address of a cluster is not used: a folder from elsewhere chooses neither where to write nor where to connect.
     """
     from ..results.folder import REPEATED
+    from ..results.registry import STUDIES
 
     root, call = context.find_root(), provenance.get("call")
-    if call is None or call["name"] not in FOLDER_DEPTHS:
+    depths = {study.command: study.depth for study in STUDIES if study.depth}
+    if call is None or call["name"] not in depths:
         raise HarnessError(
             f"{folder} does not hold the run of one scene or FMU; its command was `{provenance['command']}`"
         )
     command = root.command.commands[call["name"]]  # type: ignore[attr-defined]
     folder = folder.resolve() if folder.name in ("", "..") else folder.absolute()
-    out = folder.parents[FOLDER_DEPTHS[call["name"]] - 1]
+    out = folder.parents[depths[call["name"]] - 1]
     if context.get_parameter_source("out") is ParameterSource.COMMANDLINE:
         out = terminal.out
     else:
@@ -135,9 +129,7 @@ def repeat_call(context: click.Context, folder: Path, provenance: dict[str, Any]
 
 def run_fmu_file(path: Path, values: tuple[str, ...], options: dict[str, Any], terminal: Terminal) -> None:
     """Run one FMU and print the first, last, smallest and largest value of each output."""
-    from ..results.summary import make_terminal_table
     from ..running.resolve import set_rtol
-    from ..running.trajectory import SPAN, span_of
     from ..scenes.assignments import parse_assignment
     from ..scenes.run_spec import DEFAULT_EQUAL_STEPS, RunSpec
     from ..studies.run.study import run_fmu
@@ -148,44 +140,13 @@ def run_fmu_file(path: Path, values: tuple[str, ...], options: dict[str, Any], t
         if rtol is not None:
             spec = set_rtol(spec, rtol)
         trajectory, folder = run_fmu(spec, terminal.out, partial(report, path.stem))
-    spans = {name: dict(zip(SPAN, span_of(column), strict=True)) for name, column in trajectory.columns.items()}
-    data = {
-        "fmu": trajectory.name,
-        "note": trajectory.accuracy,
-        "failed": trajectory.failure,
-        "final": {name: span["end"] for name, span in spans.items()},
-        "outputs": {name: {"unit": trajectory.units[name]} | span for name, span in spans.items()},
-        "folder": folder,
-    }
-    table = make_terminal_table()
-    table.add_column("output")
-    for heading in SPAN:
-        table.add_column(heading, justify="right")
-    table.add_column("unit")
-    for name, span in spans.items():
-        unit = trajectory.units[name]
-        table.add_row(name, *map(format_value, span.values()), "" if unit == "1" else unit)
-    lines: list[str] = []
-    if trajectory.events:
-        stuck = {contact: sum(end - begin for begin, end in rests) for contact, rests in trajectory.sticking.items()}
-        changes = {contact: len(trajectory.events.changes(contact)[0]) - 1 for contact in stuck}
-        data["contacts"] = {contact: {"changes": changes[contact], "stuck": stuck[contact]} for contact in stuck}
-        lines += [
-            f"{contact}: {changes[contact]} change{'s' * (changes[contact] != 1)} of mode, sticks for {duration:.6g} s"
-            for contact, duration in stuck.items()
-        ]
     failed = failure_message(trajectory.failure, folder)
-    terminal.print_result(data, table, "", *lines, *filter(None, [trajectory.accuracy]), folder=folder, failed=failed)
+    terminal.print_result(trajectory.as_json() | {"folder": folder}, *trajectory.blocks(), folder=folder, failed=failed)
 
 
 def failure_message(message: str | None, folder: Path) -> list[str]:
     """Return the error message of an incomplete run in a list, which is empty if the run finished."""
     return [f"{message}; the results up to that time are in {folder}"] if message else []
-
-
-def format_value(value: float | str) -> str:
-    """Format a value with six significant digits."""
-    return value if isinstance(value, str) else f"{value:.6g}"
 
 
 def outcome_as_json(outcome: Any, out: Path) -> dict[str, object]:

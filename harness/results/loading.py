@@ -21,7 +21,7 @@ def load(folder: Path) -> Result:
         return StoredResult(folder, summary, {})
     kind = study.result_class()
     if kind.is_stored(folder):
-        return kind.load(folder)
+        return study.read(folder)
     return StoredResult(folder, summary or Summary(study.name, folder.name), load_numbers(folder / study.files[0]))
 
 

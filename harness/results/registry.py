@@ -7,7 +7,7 @@ Classes are named by strings, because this module imports no study.
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ..errors import SceneError, format_value, unknown_name_message
 
@@ -36,7 +36,9 @@ class Study:
     example : tuple of str
         What the report lists as missing while there is no result, and the arguments that compute it; empty for nothing.
     depth : int
-        Levels from the folder of a result up to --out.
+        Levels from the folder of a result up to --out; 0 if `friction-fmus run FOLDER` cannot repeat its command.
+    reader : str
+        Function that reads a result folder, as "module:function"; by default `load` of the class.
     verifies : bool
         Whether the study verifies the project, so that the report shows it below the results of the user.
     """
@@ -49,16 +51,37 @@ class Study:
     intro: str
     example: tuple[str, ...] = ()
     depth: int = 2
+    reader: str = ""
     verifies: bool = False
 
     def result_class(self) -> "type[Result]":
         """Import the class of the results."""
-        module, _, name = self.result.partition(":")
-        kind: type[Result] = getattr(import_module(f"harness.{module}"), name)
+        kind: type[Result] = import_item(self.result)
         return kind
+
+    def read(self, folder: Path) -> "Result":
+        """Read a result folder; SceneError if it is damaged."""
+        result: Result = import_item(self.reader)(folder) if self.reader else self.result_class().load(folder)
+        return result
+
+
+def import_item(text: str) -> Any:
+    """Return what "module:name" names, below `harness`."""
+    module, _, name = text.partition(":")
+    return getattr(import_module(f"harness.{module}"), name)
 
 
 STUDIES = (
+    Study(
+        "run",
+        "run",
+        "running.trajectory:Trajectory",
+        ("trajectory.csv", "steps.csv", "events.csv", "quantities.csv", PICTURE, "figures.csv"),  # of earlier versions
+        "Runs",
+        "Scenes, models and FMUs that you ran.",
+        depth=1,
+        reader="studies.compare.trajectory_files:read_run",
+    ),
     Study(
         "decay",
         "decay",
@@ -75,6 +98,7 @@ STUDIES = (
         ("fit.json", "fit.csv", "validation.csv", PICTURE),
         "Fits",
         "Parameters of FMUs from measured records, with 95 % intervals.",
+        depth=0,
     ),
     Study(
         "sweep",

@@ -2,6 +2,7 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
+from dataclasses import replace
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Self
@@ -57,9 +58,12 @@ class Result(ABC):
     def blocks(self) -> list[Any]:
         """Return the tables of rich and the sentences that the command prints."""
 
-    @abstractmethod
     def rows(self) -> "tuple[list[Mapping[str, Any]], str]":
-        """Return the rows of the main table as numbers, and the name of the column that is their index."""
+        """Return the rows of the main table, if possible as numbers, and the name of the column that is their index."""
+        if not (tables := self.summary().tables):
+            raise HarnessError(f"the result {self.title} has no table")
+        headings = tables[0].headings
+        return [dict(zip(headings, row, strict=True)) for row in tables[0].rows], headings[0]
 
     @abstractmethod
     def write_tables(self, folder: Path) -> None:
@@ -91,7 +95,7 @@ class Result(ABC):
         frame: pandas.DataFrame = library.DataFrame(rows).set_index(index)
         return frame
 
-    def plot(self, ax: "Axes | None" = None) -> "np.ndarray":
+    def plot(self, *, ax: "Axes | None" = None) -> "np.ndarray":
         """Plot the result with pyplot, so that notebooks show it: the same figure that the command saves.
 
         Parameters
@@ -142,7 +146,7 @@ class Result(ABC):
             with replace_folder(Path(folder), find_study(self.study).files, origin["source"]) as new_folder:
                 self.write(new_folder)
                 write_provenance(new_folder, **origin, command=f"harness.{self.function}")
-                write_summary(new_folder, self.summary())
+                write_summary(new_folder, replace(self.summary(), title=Path(folder).name))
         finally:
             OVERWRITE.reset(allowed)
 
@@ -245,12 +249,6 @@ class StoredResult(Result):
         from .summary import to_terminal_table
 
         return [*map(to_terminal_table, self.stored_summary.tables), *self.stored_summary.sentences]
-
-    def rows(self) -> "tuple[list[Mapping[str, Any]], str]":
-        if not self.stored_summary.tables:
-            raise HarnessError(f"{self.folder} has no table: repeat the command that wrote it")
-        table = self.stored_summary.tables[0]
-        return [dict(zip(table.headings, row, strict=True)) for row in table.rows], table.headings[0]
 
     def write_tables(self, folder: Path) -> None:
         raise HarnessError(f"{self.folder} holds no data of this version: copy the folder, or repeat its command")

@@ -1,4 +1,4 @@
-"""Plots of a trajectory for interactive work; the studies draw the figures of result folders."""
+"""Plots of a trajectory for interactive work; the command `run` draws the panels that a scene names."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -13,36 +13,34 @@ PANEL = (7.0, 1.7)  # inches, width and height
 BAR = 0.7  # height of the bars of one contact, whose rows are 1 high
 
 
-def plot(run: Any, names: Sequence[str], inputs: Sequence[str]) -> np.ndarray:
-    """Plot outputs and input signals over time with pyplot, so that notebooks show the figure.
+def draw_panels(figure: Any, run: Any, names: Sequence[str], inputs: Sequence[str], x: str | None = None) -> np.ndarray:
+    """Draw outputs and input signals over time, or over another output.
 
     Parameters
     ----------
+    figure : matplotlib.figure.Figure
+        An empty figure.
     run : Trajectory
         The run, whose module imports this one; with several contacts, a further panel shows when each of them sticks.
     names, inputs : sequence of str
         Recorded outputs, and columns of the table of input signals.
+    x : str, optional
+        Output of the horizontal axis instead of time.
 
     Returns
     -------
     ndarray
         The axes, one for each panel.
     """
-    import matplotlib.pyplot as plt
-
     width, height = PANEL
-    has_contacts = len(run.contacts) > 1
+    has_contacts = len(run.contacts) > 1 and x is None
     count = len(names) + len(inputs) + has_contacts
-    figure, axes = plt.subplots(
-        count, sharex=True, squeeze=False, figsize=(width, height * count + 0.5), layout="constrained"
-    )
-    panels: np.ndarray = axes[:, 0]
+    figure.set_size_inches(width, height * (count if x is None else 2 * count) + 0.5)
+    figure.set_layout_engine("constrained")
+    panels: np.ndarray = figure.subplots(count, sharex=True, squeeze=False)[:, 0]
     for panel, name in zip(panels, names, strict=False):
-        values = run.columns[name]
-        panel.plot(run.time, values, drawstyle="steps-post" if values.dtype.kind in "iu" else "default")
-        panel.set_ylabel(column_heading(name, run.units[name]))
-        for begin, end in run.sticking.get(run.contact_of(name), ()):
-            panel.axvspan(begin, end, color="0.5", alpha=0.15, linewidth=0)
+        plot_output(panel, run, name, x)
+        panel.set_xlabel("")
     for panel, name in zip(panels[len(names) :], inputs, strict=False):
         unit = next(variable_unit(variable) for variable in declared_variables(run) if variable.name == name)
         panel.plot(run.spec.inputs["time"], run.spec.inputs[name])
@@ -50,10 +48,21 @@ def plot(run: Any, names: Sequence[str], inputs: Sequence[str]) -> np.ndarray:
     if has_contacts:
         draw_sticking(panels[-1], run, "0.5")
         panels[-1].set_ylabel("sticking")
-    panels[-1].set_xlabel("time [s]")
-    panels[-1].set_xlim(run.time[0], run.time[-1])
+    panels[-1].set_xlabel("time [s]" if x is None else column_heading(x, run.units[x]))
+    if x is None:
+        panels[-1].set_xlim(run.time[0], run.time[-1])
     figure.suptitle(run.spec.model)
     return panels
+
+
+def plot_output(axes: Any, run: Any, name: str, x: str | None = None) -> None:
+    """Plot an output over time, with its times of sticking, or over another output."""
+    values, across = run.columns[name], run.time if x is None else run.columns[x]
+    axes.plot(across, values, drawstyle="steps-post" if values.dtype.kind in "iu" and x is None else "default")
+    axes.set_ylabel(column_heading(name, run.units[name]))
+    axes.set_xlabel("time [s]" if x is None else column_heading(x, run.units[x]))
+    for begin, end in run.sticking.get(run.contact_of(name), ()) if x is None else ():
+        axes.axvspan(begin, end, color="0.5", alpha=0.15, linewidth=0)
 
 
 def declared_variables(run: Any) -> Any:

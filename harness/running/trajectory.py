@@ -4,7 +4,7 @@ A contact of an FMU of this project has a friction force and a mode. Its name is
 """
 
 import re
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, ItemsView, Iterator, KeysView, Mapping, Sequence, ValuesView
 from dataclasses import dataclass
 from itertools import pairwise
 from math import nan
@@ -15,15 +15,18 @@ import numpy as np
 
 from ..errors import HarnessError, check_names, import_optional
 from ..results.files import column_heading, write_csv, write_signals
+from ..results.provenance import describe_sources
 from ..results.quantity import Quantity, format_number, step_size_quantities
-from ..results.summary import STEPS_TABLE, Summary, SummaryTable, make_table, write_summary
+from ..results.result import Result
+from ..results.summary import PICTURE_FILE, STEPS_TABLE, Summary, SummaryTable, make_table, make_terminal_table
 from ..scenes.run_spec import RunSpec
 
 if TYPE_CHECKING:
     import pandas
     import xarray
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
-FILES = ("trajectory.csv", "steps.csv", "events.csv")
 MAX_PANELS = 8  # of a plot without named outputs
 MIN_SAMPLES = 8  # in a half cycle or a slip: a parabola through the top samples is then accurate to 1e-4
 MODE_TEXT = re.compile(r"mode of (\w+): ")  # how the description of a mode begins; it names the force of the contact
@@ -131,9 +134,11 @@ class Statistics:
         )
 
 
-@dataclass(frozen=True)
-class Trajectory:
+@dataclass(frozen=True, repr=False)
+class Trajectory(Result):
     """Result of one run, or signals over time that were read from a file.
+
+    It is a mapping from the names of the recorded outputs to their values: ``run["x"]``, ``"x" in run``, ``dict(run)``.
 
     Attributes
     ----------
@@ -158,6 +163,8 @@ class Trajectory:
     label : str
         Name for display; empty for that of the model.
     """
+
+    study, function = "run", "simulate"
 
     spec: RunSpec
     time: np.ndarray
@@ -195,15 +202,43 @@ class Trajectory:
         """Return value and unit of every parameter, by name."""
         return {name: (value, self.units[name]) for name, value in self.parameters.items()}
 
-    def __repr__(self) -> str:
-        """Describe the run in one line; its arrays may be long."""
-        span = f"{len(self.time)} points from {self.time[0]:g} to {self.time[-1]:g} s"
-        return f"<{type(self).__name__} of {self.spec.model}: {', '.join(self.columns)}; {span}>"
+    @property
+    def title(self) -> str:
+        return self.name
+
+    @property
+    def headline(self) -> str:
+        return f"{', '.join(self.columns)}; {len(self.time)} points from {self.time[0]:g} to {self.time[-1]:g} s"
 
     def __getitem__(self, name: str) -> np.ndarray:
         """Return the values (n,) of an output by its name."""
         check_names("column", [name], self.columns)
         return self.columns[name]
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.columns
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.columns)
+
+    def __len__(self) -> int:
+        """Return the number of outputs."""
+        return len(self.columns)
+
+    def __bool__(self) -> bool:
+        return True  # also without outputs
+
+    def keys(self) -> KeysView[str]:
+        """Return the names of the outputs."""
+        return self.columns.keys()
+
+    def values(self) -> ValuesView[np.ndarray]:
+        """Return the values (n,) of each output."""
+        return self.columns.values()
+
+    def items(self) -> ItemsView[str, np.ndarray]:
+        """Return name and values (n,) of each output."""
+        return self.columns.items()
 
     def to_pandas(self) -> "pandas.DataFrame":
         """Convert to a DataFrame with the time in s as its index.
@@ -247,7 +282,7 @@ class Trajectory:
         dataset: xarray.Dataset = library.Dataset(variables, {"time": time}, attributes)
         return dataset
 
-    def plot(self, *names: str) -> "np.ndarray":
+    def plot(self, *names: str, x: str | None = None, ax: "Axes | None" = None) -> "np.ndarray":
         """Plot outputs over time, one panel each, and input signals; shade the times when the contact sticks.
 
         With several contacts, the panel of a friction force is shaded, and a further panel shows when each contact
@@ -257,21 +292,51 @@ class Trajectory:
         ----------
         *names : str
             The outputs to plot; by default the first that are numbers and all friction forces, eight in all.
+        x : str, optional
+            Output of the horizontal axis instead of time, as in ``run.plot("v", x="x")`` for a phase plane.
+        ax : matplotlib.axes.Axes, optional
+            Axes in which to plot a single output; by default the first.
 
         Returns
         -------
         numpy.ndarray
             The matplotlib axes (n,), one for each panel.
         """
-        from .plot import plot
+        import matplotlib.pyplot as plt
 
-        check_names("column", names, self.columns)
-        numeric = [name for name, column in self.columns.items() if column.dtype.kind != "U"]
-        texts = [name for name in names if name not in numeric]
+        from .plot import draw_panels, plot_output
+
+        check_names("column", (*names, *filter(None, [x])), self.columns)
+        texts = [name for name in (*names, *filter(None, [x])) if self.columns[name].dtype.kind == "U"]
         if texts:
             raise HarnessError(f"{texts[0]} is a text, which has no curve: name other outputs")
-        inputs = [] if names else [name for name in self.spec.inputs if name != "time" and name not in self.columns]
-        return plot(self, names or choose_outputs(numeric, self.contacts, MAX_PANELS), inputs)
+        if ax is not None:
+            if len(names) > 1:
+                raise HarnessError(f"ax has room for one output, and {len(names)} are named: name one")
+            plot_output(ax, self, (*names, *self.plotted)[0], x)
+            return np.array([ax])
+        figure = plt.figure()
+        return draw_panels(figure, self, names or self.plotted, [] if names or x else self.plotted_inputs, x)
+
+    @property
+    def plotted(self) -> tuple[str, ...]:
+        """The outputs that are plotted if none is named."""
+        numeric = [name for name, column in self.columns.items() if column.dtype.kind != "U"]
+        return choose_outputs(numeric, self.contacts, MAX_PANELS)
+
+    @property
+    def plotted_inputs(self) -> list[str]:
+        """The input signals that are plotted."""
+        return [name for name in self.spec.inputs if name != "time" and name not in self.columns]
+
+    def draw(self, figure: "Figure") -> None:
+        from .plot import draw_panels
+
+        if self.plotted:
+            draw_panels(figure, self, self.plotted, self.plotted_inputs)
+
+    def draw_panel(self, axes: "Axes") -> None:
+        self.plot(ax=axes)
 
     @property
     def contacts(self) -> tuple[str, ...]:
@@ -295,36 +360,58 @@ class Trajectory:
         candidates = (name, contact_of_mode(self.descriptions.get(name)))
         return next((contact for contact in candidates if contact in self.contacts), "")
 
-    def save(self, folder: str | Path) -> None:
-        """Write the trajectory, its events, its steps, its provenance and its summary into a result folder.
+    def summary(self) -> Summary:
+        return summarize_run(self, self.name)
 
-        `load_result` reads the folder, and `simulate` repeats the run from it.
+    def as_json(self) -> dict[str, Any]:
+        spans = {name: dict(zip(SPAN, span_of(column), strict=True)) for name, column in self.columns.items()}
+        stuck = {name: {"changes": changes, "stuck": duration} for name, changes, duration in self.rests()}
+        return {
+            "fmu": self.name,
+            "note": self.accuracy,
+            "failed": self.failure,
+            "final": {name: span["end"] for name, span in spans.items()},
+            "outputs": {name: {"unit": self.units[name]} | span for name, span in spans.items()},
+            **({"contacts": stuck} if self.events else {}),
+        }
 
-        Parameters
-        ----------
-        folder : path
-            A new folder, or one that holds a result of the same FMU.
+    def rests(self) -> list[tuple[str, int, float]]:
+        """Return for each contact its name, its number of changes of mode, and the time in s for which it sticks."""
+        if self.events is None:
+            return []
+        return [
+            (name, len(self.events.changes(name)[0]) - 1, sum(end - begin for begin, end in rests))
+            for name, rests in self.sticking.items()
+        ]
 
-        Raises
-        ------
-        HarnessError
-            If the folder holds other files or the result of another FMU.
-        """
-        from ..results.folder import replace_folder
-        from ..results.provenance import PYTHON_API, describe_sources, write_provenance
+    def blocks(self) -> list[Any]:
+        table = make_terminal_table()
+        table.add_column("output")
+        for heading in SPAN:
+            table.add_column(heading, justify="right")
+        table.add_column("unit")
+        for name, column in self.columns.items():
+            cells = (value if isinstance(value, str) else f"{value:.6g}" for value in span_of(column))
+            table.add_row(name, *cells, "" if self.units[name] == "1" else self.units[name])
+        contacts = (
+            f"{name}: {changes} change{'s' * (changes != 1)} of mode, sticks for {duration:.6g} s"
+            for name, changes, duration in self.rests()
+        )
+        return [table, "", *contacts, *filter(None, [self.accuracy])]
 
+    def origin(self) -> dict[str, Any]:
         fmu = self.spec.fmu
-        with replace_folder(Path(folder), FILES, describe_sources(str(fmu))) as new_folder:
-            self.write_tables(new_folder)
-            write_provenance(
-                new_folder,
-                [fmu],
-                self.effective_parameters,
-                source=describe_sources(str(fmu)),
-                command=PYTHON_API,
-                run=self.spec,
-            )
-            write_summary(new_folder, summarize_run(self, Path(folder).name))
+        parameters = self.effective_parameters
+        return {"files": [fmu], "parameters": parameters, "source": describe_sources(str(fmu)), "run": self.spec}
+
+    def write(self, folder: Path) -> None:
+        """Write tables and figure; the tables hold all data."""
+        self.write_tables(folder)
+        self.write_figure(folder / PICTURE_FILE)
+
+    @classmethod
+    def is_stored(cls, folder: Path) -> bool:
+        return (folder / "trajectory.csv").is_file()
 
     def sample_at(self, times: np.ndarray, names: Sequence[str]) -> np.ndarray:
         """Return the named outputs, (n, names), at the recorded times nearest to `times` (n,) in s."""

@@ -45,7 +45,12 @@ def swept_parameters():
     return harness.sweep("smd", {"c": [0.0, 1.0, 2.0], "k": [100.0, 200.0]}, measures=["final", "largest"])
 
 
+def pulled_sled():
+    return harness.simulate("stickslip", stop=6.0)
+
+
 MAKERS = {
+    "run": pulled_sled,
     "decay": identified_decay,
     "fit": fitted_parameters,
     "sweep": swept_parameters,
@@ -144,3 +149,23 @@ def test_damaged_data_are_reported(study):
         data.write_bytes(content)
         with pytest.raises(harness.SceneError, match=r"data\.npz cannot be read .*: repeat the command"):
             harness.load_result("kept")
+
+
+def test_a_run_is_a_mapping_from_its_outputs():
+    run = result_of("run")
+    assert list(run) == list(run.keys()) == list(run.columns)
+    assert len(run) == len(run.columns)
+    assert ("x" in run, "y" in run) == (True, False)
+    assert all(values is run[name] for name, values in run.items())
+    assert {name: len(values) for name, values in dict(run).items()} == dict.fromkeys(run, len(run.time))
+
+
+def test_a_phase_plane_has_an_output_on_each_axis():
+    run = result_of("run")
+    (axes,) = run.plot("v", x="x")
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("x [m]", "v [m/s]")
+    np.testing.assert_array_equal(axes.lines[0].get_xydata().T, [run["x"], run["v"]])
+    with pytest.raises(harness.SceneError, match="unknown column 'y'"):
+        run.plot("v", x="y")
+    with pytest.raises(harness.HarnessError, match="name one"):
+        run.plot("v", "x", ax=axes)

@@ -24,7 +24,7 @@ from harness.results.folder import replace_folder
 from harness.results.summary import read_summary
 from harness.running.resolve import resolve
 from harness.scenes.scene import shipped_scenes
-from harness.studies.run.study import FILES
+from harness.studies.run.study import STUDY
 
 COMMANDS = {  # that take seconds, and the folders of their results
     "run": (("run", "coulomb"), "coulomb"),
@@ -334,7 +334,7 @@ def test_a_new_result_never_depends_on_the_provenance_of_an_old_one(tmp_path, fi
         for read in (load_result, resolve, read_summary):
             with suppress(HarnessError):
                 read(old)
-        with replace_folder(old, FILES, read_source(text)) as folder:
+        with replace_folder(old, STUDY.files, read_source(text)) as folder:
             for file in new.iterdir():
                 shutil.copy(file, folder)
         assert read_provenance(old)["files"] == read_provenance(new)["files"]

@@ -16,8 +16,9 @@ from ...records.columns import read_numeric
 from ...records.headings import split_heading
 from ...records.table_files import read_content
 from ...records.units import TIMES
+from ...results.provenance import load_provenance
 from ...running.recorder import element_names
-from ...running.trajectory import ModeChanges, Trajectory
+from ...running.trajectory import ModeChanges, SolverSteps, Trajectory
 from ...scenes.run_spec import RunSpec
 
 MAX_TIME = 1e100  # s; largest absolute time
@@ -173,3 +174,20 @@ def read_modelica(file: Path) -> Columns | None:
 
 def characters_to_text(letters: np.ndarray) -> str:
     return "".join(letters).rstrip("\0 ")
+
+
+def read_run(folder: Path) -> Trajectory:
+    """Read the run in a result folder, with its steps, parameters and settings."""
+    signals, origin = read_trajectory(folder), load_provenance(folder)
+    parameters = {name: parameter["value"] for name, parameter in origin.get("parameters", {}).items()}
+    units = signals.units | {name: parameter["unit"] for name, parameter in origin.get("parameters", {}).items()}
+    try:
+        spec = RunSpec.from_json(origin.get("run") or {})
+    except SceneError:  # of an earlier version, or of another tool
+        spec = RunSpec(Path(f"{folder.name}.fmu"), outputs=tuple(signals.columns))
+    steps = None
+    if (folder / "steps.csv").is_file():
+        ends, sizes, rejected = read_numeric(folder / "steps.csv")[1].T
+        steps = SolverSteps(np.append(signals.time[0], ends), sizes, rejected.astype(int))
+    names = {name: name for name in signals.columns}
+    return Trajectory(spec, signals.time, signals.columns, units, names, parameters, steps, signals.events)

@@ -14,6 +14,7 @@ from ...process.interrupt import check_interrupt
 from ...results.folder import replace_folder
 from ...results.provenance import describe_sources, write_provenance
 from ...results.quantity import Quantity
+from ...results.registry import find_study
 from ...results.summary import write_summary
 from ...running import runner
 from ...running.trajectory import Trajectory, choose_outputs, summarize_run
@@ -22,14 +23,7 @@ from ...scenes.run_spec import RunSpec
 from ...scenes.scene import MAX_DEFAULT_PLOTS, Scene, default_plots, is_panel, load_scene, shipped_scenes
 from .table import SceneOutcome, summarize_quantities, write_quantities
 
-FILES = (  # of a result folder; earlier versions wrote figures.csv
-    "trajectory.csv",
-    "steps.csv",
-    "events.csv",
-    "quantities.csv",
-    "figure.svg",
-    "figures.csv",
-)
+STUDY = find_study("run")
 
 
 def decay(run: Trajectory, scene: Scene) -> Any:
@@ -62,7 +56,7 @@ def run_scene(scene: Scene, out: Path, report: Callable[[float], None]) -> Scene
         If the run or an analysis fails; previous results are kept.
     """
     try:
-        with replace_folder(out / scene.name, FILES, scene.source) as folder:
+        with replace_folder(out / scene.name, STUDY.files, scene.source) as folder:
             return run_and_write(scene, folder, report)
     except HarnessError as error:
         raise type(error)(f"scene {scene.name}: {error}") from None
@@ -173,7 +167,7 @@ def run_fmu(spec: RunSpec, out: Path, report: Callable[[float], None]) -> tuple[
     from .figure import draw
 
     folder, source = out / spec.model, describe_sources(str(spec.fmu))
-    with replace_folder(folder, FILES, source) as new_folder:
+    with replace_folder(folder, STUDY.files, source) as new_folder:
         trajectory = runner.run(spec, report)
         trajectory.write_tables(new_folder)
         draw(spec.fmu.name, choose_plots(trajectory), trajectory, {}, new_folder / "figure.svg")

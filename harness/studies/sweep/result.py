@@ -1,7 +1,7 @@
 """A finished sweep with its data, its figure and what the command prints."""
 
 import csv
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -195,10 +195,6 @@ class SweepResult(Result):
             yield f"{failure.runs} run{'s' * (failure.runs > 1)}, such as {point}: {failure.sentence}"
         if len(self.failures) > MAX_FAILURE_KINDS:
             yield f"and {len(self.failures) - MAX_FAILURE_KINDS} other kinds of failures"
-
-    def rows(self) -> tuple[list[Mapping[str, Any]], str]:
-        frame = self.data.to_dataframe().reset_index()
-        return frame.to_dict("records"), str(frame.columns[0])
 
     def to_pandas(self) -> "pandas.DataFrame":
         """Convert to a DataFrame with a row for each run, indexed by the varied parameters or the number of the run."""
