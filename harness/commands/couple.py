@@ -28,16 +28,5 @@ def couple(scene: str, stop: float | None, terminal: Terminal) -> None:
     from ..studies.coupled.study import run_coupled
 
     with terminal.progress(1) as report:
-        study, folder = run_coupled(scene, terminal.out, stop, partial(report, scene))
-    engines = {name: {"largest error": error, "failure": reason} for name, (_, error, reason) in study.engines.items()}
-    result = {"steps": study.steps, "errors": study.errors, "order": study.order, "engines": engines, "folder": folder}
-    output = [
-        f"communication step [s]   largest error{f' [{study.unit}]' if study.unit else ''}",
-        *(f"{step:<24g} {error:.3e}" for step, error in zip(study.steps, study.errors, strict=False)),
-        f"Order of convergence: {study.order:.2f}.",
-        *(
-            f"{name:<24} {reason or f'{error:.3e} at the smallest step'}"
-            for name, (_, error, reason) in study.engines.items()
-        ),
-    ]
-    terminal.print_result(result, *output, folder=folder)
+        result, folder = run_coupled(scene, terminal.out, stop, partial(report, scene))
+    terminal.print_result(result.as_json() | {"folder": folder}, *result.blocks(), folder=folder)

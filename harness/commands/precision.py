@@ -25,7 +25,7 @@ def precision(models: tuple[str, ...], terminal: Terminal, quick: bool) -> None:
     from ..references.models import MODELS
     from ..studies.precision import table as tables
     from ..studies.precision.study import FULL, QUICK
-    from ..studies.precision.survey import FOLDER, run_survey
+    from ..studies.precision.survey import STUDY, run_survey
 
     with terminal.progress(len(models or MODELS)) as report:
         result = run_survey(models or MODELS, QUICK if quick else FULL, terminal.out, report)
@@ -45,4 +45,4 @@ def precision(models: tuple[str, ...], terminal: Terminal, quick: bool) -> None:
         if table.rows
         for block in (table, "")
     ]
-    terminal.print_result(data, *output, *result.advice, *result.missing, folder=terminal.out / FOLDER)
+    terminal.print_result(data, *output, *result.advice, *result.missing, folder=terminal.out / STUDY.name)

@@ -22,13 +22,10 @@ def stability(models: tuple[str, ...], terminal: Terminal) -> None:
       friction-fmus stability stickslip path/to/belt.py
     """
     from ..results.provenance import describe_sources
-    from ..studies.stability import table as tables
-    from ..studies.stability.study import FOLDER, grouped_cases, run_stability
+    from ..studies.stability.study import STUDY, grouped_cases, run_stability
 
     groups = grouped_cases(models=models)
     with terminal.progress(sum(map(len, groups))) as report:
-        rows, regions = run_stability(terminal.out, report, groups, describe_sources(*models))
-    results = [{"scene": row.case.label, "passed": row.has_passed, "ended": row.ended} for row in rows]
-    output = (tables.error_table(rows), "", tables.refusal_table(rows), "", tables.summary(rows, regions))
-    failures = (f"{row.case.label}: {row.text}" for row in rows if not row.has_passed)
-    terminal.print_result(results, *output, folder=terminal.out / FOLDER, failed=failures)
+        result = run_stability(terminal.out, report, groups, describe_sources(*models))
+    folder = terminal.out / STUDY.name
+    terminal.print_result(result.as_json(), *result.blocks(), folder=folder, failed=result.describe_failures())

@@ -7,6 +7,7 @@ from pathlib import Path
 from ..errors import HarnessError
 from ..results.provenance import FILE as PROVENANCE_FILE
 from ..results.provenance import load_provenance
+from ..results.registry import STUDIES
 from ..results.summary import (
     METHODS_TABLE,
     PICTURE_FILE,
@@ -82,38 +83,16 @@ class Section:
 
 
 RUNS, STEPS = "run", "steps"
-USER_SECTIONS = (
-    Section(RUNS, "Runs", "Scenes, models and FMUs that you ran."),
-    Section(
-        "decay",
-        "Decay",
-        "Damping, dry friction and drag from the whole signal and from its turning points, with 95 % intervals.",
-        "a decay",
-        "decay coulomb",
-    ),
-    Section("fit", "Fits", "Parameters of FMUs from measured records, with 95 % intervals."),
-    Section(
-        "sweep",
-        "Sweeps",
-        "Parameter sweeps; known boundaries are dashed.",
-        "a sweep",
-        "sweep stickslip --vary mu_d=0.3:0.9:60 --vary v_driver=0.01:0.1:60 --measures slips",
-    ),
-    Section(
-        "compare",
-        "Comparisons",
-        "Differences between two results or FMUs.",
-        "a comparison",
-        "compare results/coulomb results/coulomb-sign",
-    ),
-    Section(
-        "coupled",
-        "Coupled",
-        "Coupled FMUs, run by existing engines and compared with one model of the whole system.",
-        "a coupled scene",
-        "couple two-masses",
-    ),
-)
+
+
+def make_sections(verifies: bool) -> tuple[Section, ...]:
+    """Return the sections of the studies that verify the project, or of the others."""
+    return tuple(
+        Section(study.name, study.title, study.intro, *study.example) for study in STUDIES if study.verifies == verifies
+    )
+
+
+USER_SECTIONS = make_sections(verifies=False)
 OWN_SECTIONS = (
     Section(
         PUBLISHED,
@@ -133,19 +112,7 @@ OWN_SECTIONS = (
         "Internal steps, read from solver.t_next, independent of the communication step. If friction jumps without an "
         "event, the steps collapse at every reversal; with stick and slip as modes they do not.",
     ),
-    Section(
-        "precision",
-        "Error against run time",
-        "Error against run time and right-hand side evaluations; lower left is better. References are certified. FMU "
-        "is the code of the FMU in this process; scipy and cvode solve the same equations.",
-    ),
-    Section(
-        "stability",
-        "Stability",
-        "Every case either finishes within its error bound or is rejected with an error message; none hangs.",
-        "stability",
-        "stability",
-    ),
+    *make_sections(verifies=True),
     Section(
         "importers",
         "Importers",
@@ -206,8 +173,10 @@ def build_sections(items: Sequence[ResultItem], scenes: Sequence[ComparedScene])
         return position, item.summary.outcome is None
 
     items = sorted(items, key=rank)
+    known = [section.study for section in SECTIONS]
+    others = dict.fromkeys(item.summary.study for item in items if find_section(item, scenes) not in known)
     sections = []
-    for section in SECTIONS:
+    for section in (*SECTIONS, *(Section(study, study, "") for study in others)):  # no result is left out
         selected = tuple(item for item in items if find_section(item, scenes) == section.study)
         if section.study == STEPS:
             selected = tuple(steps_item(table) for table in collect_tables(items, STEPS_TABLE))

@@ -33,7 +33,7 @@ class Study:
         Files that a result may contain; the first one is compared when a result replaces another.
     title, intro : str
         Title and introduction of its section in the report.
-    example : tuple of str
+    example : tuple of (str, str)
         What the report lists as missing while there is no result, and the arguments that compute it; empty for nothing.
     depth : int
         Levels from the folder of a result up to --out; 0 if `friction-fmus run FOLDER` cannot repeat its command.
@@ -49,7 +49,7 @@ class Study:
     files: tuple[str, ...]
     title: str
     intro: str
-    example: tuple[str, ...] = ()
+    example: tuple[str, str] = ("", "")
     depth: int = 2
     reader: str = ""
     verifies: bool = False
@@ -121,6 +121,37 @@ STUDIES = (
         "Differences between two results or FMUs.",
         ("a comparison", "compare results/coulomb results/coulomb-sign"),
     ),
+    Study(
+        "coupled",
+        "couple",
+        "studies.coupled.result:CoupledResult",
+        ("error.csv", "trajectory.csv", "engines.csv", PICTURE),
+        "Coupled",
+        "Coupled FMUs, run by existing engines and compared with one model of the whole system.",
+        ("a coupled scene", "couple two-masses"),
+    ),
+    Study(
+        "precision",
+        "precision",
+        "studies.precision.result:PrecisionResult",
+        ("points.csv", "model-exchange.csv", "laws.csv", PICTURE),
+        "Error against run time",
+        "Error against run time and right-hand side evaluations; lower left is better. References are certified. FMU "
+        "is the code of the FMU in this process; scipy and cvode solve the same equations.",
+        depth=0,
+        verifies=True,
+    ),
+    Study(
+        "stability",
+        "stability",
+        "studies.stability.result:StabilityResult",
+        ("stability.csv", PICTURE, "region.svg"),  # earlier versions wrote region.svg
+        "Stability",
+        "Every case either finishes within its error bound or is rejected with an error message; none hangs.",
+        ("stability", "stability"),
+        depth=1,
+        verifies=True,
+    ),
 )
 
 
@@ -140,7 +171,8 @@ def study_of_folder(folder: Path) -> Study:
     SceneError
         If there is none.
     """
-    study = next((study for study in STUDIES if (folder / study.files[0]).is_file()), None)
+    candidates = [study for study in STUDIES if (folder / study.files[0]).is_file()]
+    study = max(candidates, key=lambda study: study.depth, default=None)  # a coupled run has a trajectory, too
     if study is None:
         files = ", ".join(dict.fromkeys(study.files[0] for study in STUDIES))
         raise SceneError(f"{format_value(str(folder))} holds no result: name a folder with one of {files}")

@@ -41,7 +41,7 @@ def test_a_certified_result_has_all_states_and_precision_accepts_it(tmp_path):
     done = commands.harness(tmp_path, "precision", "lugre.py", "--quick", blank=True)
     assert (done.returncode, done.stderr) == (0, "")
     assert [file.name for file in (tmp_path / "results/precision").iterdir()] == ["lugre"]
-    expected_files = {"points.csv", "figure.svg", "provenance.json", "summary.json"}
+    expected_files = {"data.npz", "points.csv", "figure.svg", "provenance.json", "summary.json"}
     assert {file.name for file in (tmp_path / "results/precision/lugre").iterdir()} == expected_files
 
 

@@ -17,10 +17,11 @@ from fmpy import read_model_description
 from models import MODELS
 
 from harness import load_result
-from harness.commands.run import FOLDER_DEPTHS, run
+from harness.commands.run import run
 from harness.commands.terminal import build_arguments
 from harness.errors import HarnessError
 from harness.results.folder import replace_folder
+from harness.results.registry import STUDIES
 from harness.results.summary import read_summary
 from harness.running.resolve import resolve
 from harness.scenes.scene import shipped_scenes
@@ -396,7 +397,7 @@ def snapshot(folder):
 @pytest.mark.parametrize("name", REPEATED)
 def test_an_edited_provenance_file_chooses_no_folder_to_write(workspace, name):
     """The folder of a stranger names a place to write, or the result of another folder, which is kept."""
-    assert set(FOLDER_DEPTHS) == set(REPEATED)
+    assert {study.command for study in STUDIES if study.depth} == set(REPEATED)
     t = np.linspace(0, 10, 200)
     table = "".join(f"{a:.3f},{b:.6f}\n" for a, b in zip(t, np.exp(-0.1 * t) * np.cos(6 * t), strict=True))
     (workspace / "swing.csv").write_text("t [s],x [m]\n" + table)

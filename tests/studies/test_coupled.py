@@ -79,7 +79,16 @@ def test_two_equal_coupled_masses_agree_with_their_closed_form(couple, tmp_path)
     assert json.loads(done.stdout)["order"] == pytest.approx(1.0, abs=0.1)
     folder = tmp_path / "results/coupled/mine"
     assert {file.name for file in folder.iterdir()} == {
-        *("mine.ssp", "trajectory.csv", "error.csv", "engines.csv", "figure.svg", "provenance.json", "summary.json")
+        *(
+            "mine.ssp",
+            "data.npz",
+            "trajectory.csv",
+            "error.csv",
+            "engines.csv",
+            "figure.svg",
+            "provenance.json",
+            "summary.json",
+        )
     }
     values = json.loads((folder / "provenance.json").read_text())["parameters"]
     values_used = {name: values[name]["value"] for name in ("a.c", "a.x0", "b.x0", "spring_a_b.k")}

@@ -210,7 +210,7 @@ def test_the_command_writes_every_point_and_advice_and_keeps_results_of_other_mo
     (output, incomplete), files, _, folder = two_studies
     assert "smd: use exact: " in output
     assert {path.name for path in folder.iterdir()} == {"smd", "pendulum"}
-    expected_files = {"points.csv", "figure.svg", "provenance.json", "summary.json"}
+    expected_files = {"data.npz", "points.csv", "figure.svg", "provenance.json", "summary.json"}
     assert {path.name for path in (folder / "smd").iterdir()} == expected_files
     assert (folder / "pendulum/points.csv").read_text() == "older"
     texts = files["points.csv"], (folder / "smd/points.csv").read_text()

@@ -241,7 +241,8 @@ def test_a_scene_is_expanded_over_models_and_values():
 
 def test_a_part_of_the_table_ends_as_expected(user_folder, tmp_path, monkeypatch):
     monkeypatch.chdir(user_folder)
-    rows, regions = run_stability(tmp_path, ignore_progress, grouped_cases(is_sampled()))
+    result = run_stability(tmp_path, ignore_progress, grouped_cases(is_sampled()))
+    rows, regions = result.outcomes, result.regions
     assert [f"{row.case.label}: {row.text}" for row in rows if not row.has_passed] == []
     assert {row.case.method for row in rows} == {"exact", "ode23", "ode45", "dop853", "rodas", "radau9"}
     assert {row.case.model for row in rows} == set(MODELS)
@@ -268,7 +269,7 @@ def test_a_user_model_passes_the_standard_scenes(tmp_path, name):
     file = build_user_model(path) / f"{name}.fmu"
     titles = ("as it comes", "rtol = 1e-09", "NaN", "T_d = 3", "J = 0.002", "m1 = 125")
     groups = [[case for case in group if case.title.startswith(titles)] for group in grouped_cases(models=[str(file)])]
-    rows, _ = run_stability(tmp_path, ignore_progress, [group for group in groups if group])
+    rows = run_stability(tmp_path, ignore_progress, [group for group in groups if group]).outcomes
     assert {row.case.name for row in rows} == {name}
     assert {row.case.title for row in rows} >= {"as it comes", "rtol = 1e-09"}
     assert [f"{row.case.label}: {row.text}" for row in rows if not row.has_passed] == []

@@ -120,6 +120,7 @@ def test_a_map_is_labelled_for_xarray_and_pandas_for_any_number_of_workers(harne
     assert {file.name for file in four.iterdir()} == {
         "sweep.nc",
         "sweep.csv",
+        "data.npz",
         "figure.svg",
         "provenance.json",
         "summary.json",

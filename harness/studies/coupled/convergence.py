@@ -11,7 +11,7 @@ class Convergence:
 
     Attributes
     ----------
-    title : str
+    caption : str
         Title of the scene.
     read : tuple of (str, str, int)
         Recorded variables: element, variable, value reference.
@@ -37,7 +37,7 @@ class Convergence:
         For each engine: last row, largest error at the smallest step, and the reason if it failed.
     """
 
-    title: str
+    caption: str
     read: tuple[tuple[str, str, int], ...]
     labels: tuple[str, ...]
     units: tuple[str, ...]

@@ -45,7 +45,7 @@ def read_archive(source: Path, file: Path, stop: float | None) -> Convergence:
     if not variables:
         raise HarnessError(f"{source.name} has no component with a Real output")
     return Convergence(
-        title=str(system.name),
+        caption=str(system.name),
         read=tuple((name, variable.name, int(variable.valueReference)) for name, variable in variables),
         labels=tuple(f"{name}.{variable.name}" for name, variable in variables),
         units=tuple(variable_unit(variable) for _, variable in variables),

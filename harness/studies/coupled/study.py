@@ -15,10 +15,10 @@ from ...errors import HarnessError, install_command
 from ...process.subprocess_runner import PROJECT_ROOT, run_module
 from ...process.temporary_directory import temporary_directory
 from ...references.single_model_reference import BODY_MODELS, build_bodies, solve_bodies
-from ...results.files import column_heading, write_csv, write_csv_rows
 from ...results.folder import replace_folder
 from ...results.provenance import describe_sources, write_provenance
-from ...results.summary import Summary, make_table, write_summary
+from ...results.registry import find_study
+from ...results.summary import write_summary
 from ...running.fmu_archive import read_description
 from ...running.runner import ProgressCallback
 from ...running.variable_values import REAL_TYPES, variable_unit
@@ -27,15 +27,15 @@ from ...scenes.fmu_files import find_fmu
 from ...scenes.run_spec import RunSpec
 from .convergence import Convergence
 from .engine import ENGINES, EXTRA, MAIN_ENGINE, run_engine
+from .result import CoupledResult
 
-FOLDER = "coupled"
-FILES = ("trajectory.csv", "error.csv", "engines.csv", "figure.svg")
+STUDY = find_study("coupled")
 SPRING = PROJECT_ROOT / "fmus" / "more" / "spring.py"
 
 Starts = dict[str, dict[str, float]]  # start values of the Real parameters of each model
 
 
-def run_coupled(source: str, out: Path, stop: float | None, report: ProgressCallback) -> tuple[Convergence, Path]:
+def run_coupled(source: str, out: Path, stop: float | None, report: ProgressCallback) -> tuple[CoupledResult, Path]:
     """Run a coupled scene or an archive at each communication step, and write the results to out/coupled/<name>.
 
     A `stop` time in s overrides that of the scene.
@@ -44,7 +44,6 @@ def run_coupled(source: str, out: Path, stop: float | None, report: ProgressCall
         from . import archive, external_archive
     except ImportError as error:
         raise HarnessError(f"a coupled scene needs {error.name}: {install_command(EXTRA)}") from None
-    from .figure import draw
 
     with temporary_directory("ssp-") as temporary_folder:
         if source.endswith(".ssp"):
@@ -57,8 +56,8 @@ def run_coupled(source: str, out: Path, stop: float | None, report: ProgressCall
             check_connections(scene)
             name, file = scene.name, temporary_folder / f"{scene.identifier}.ssp"
             plan, fmus = plan_study(scene), [part.fmu for part in scene.parts.values()]
-        folder = out / FOLDER / name
-        with replace_folder(folder, (*FILES, file.name), describe_sources(source)) as new_folder:
+        folder = out / STUDY.name / name
+        with replace_folder(folder, (*STUDY.files, file.name), describe_sources(source)) as new_folder:
             if scene:
                 recorded = {name: [variable] for name, variable, _ in plan.read}
                 archive.write(
@@ -66,14 +65,13 @@ def run_coupled(source: str, out: Path, stop: float | None, report: ProgressCall
                 )
             copy(file, new_folder)
             solve_reference = make_reference_solver(scene, defaults) if scene and has_reference(scene) else None
-            result = run_study(plan, file, solve_reference, report)
-            save(result, new_folder)
-            draw(result, new_folder / "figure.svg")
+            result = CoupledResult(**vars(run_study(plan, file, solve_reference, report)), name=name)
+            result.write(new_folder)
             settings = {"stop": result.stop} | (vars(scene) if scene else {})
             write_provenance(
                 new_folder, fmus, external_archive.effective_parameters(file), settings, source=describe_sources(source)
             )
-            write_summary(new_folder, summarize_convergence(result, name))
+            write_summary(new_folder, result.summary())
     return result, folder
 
 
@@ -204,36 +202,3 @@ def run_step(engine: str, plan: Convergence, archive: Path, step: float) -> np.n
     """Return the rows (m, n) of a run of an archive with a communication step in s."""
     run = RunSpec(archive, plan.names, stop=plan.stop, grid=step, follow=False)
     return np.array(run_engine(engine, run, plan.read, plan.values))
-
-
-def save(result: Convergence, folder: Path) -> None:
-    """Write trajectory.csv, error.csv and engines.csv."""
-    headings, reference_headings, final_headings = (
-        [column_heading(name + suffix, size) for name, size in zip(result.names, result.units, strict=True)]
-        for suffix in ("", " reference", " at the stop")
-    )
-    write_csv(
-        folder / "trajectory.csv",
-        ["t [s]", *headings, *reference_headings],
-        [result.time, *result.x.T, *result.truth.T],
-    )
-    columns = [np.array(result.steps[: len(result.errors)]), np.array(result.errors)]
-    write_csv(folder / "error.csv", ["communication step [s]", column_heading("largest error", result.unit)], columns)
-    table = [
-        [engine, *(end or [None] * len(result.names)), error, reason]
-        for engine, (end, error, reason) in result.engines.items()
-    ]
-    table.append([result.reference, *result.truth[-1].tolist(), 0.0, ""])
-    write_csv_rows(
-        folder / "engines.csv",
-        ["engine", *final_headings, column_heading("largest error", result.unit), "failure"],
-        table,
-    )
-
-
-def summarize_convergence(result: Convergence, name: str) -> Summary:
-    """Return the summary: error over the communication step."""
-    headings = "communication step [s]", column_heading("largest error", result.unit)
-    rows = ((f"{step:g}", f"{error:.4g}") for step, error in zip(result.steps, result.errors, strict=False))
-    text = f"Coupled scene {name}: positions with the {result.reference}, and error over the communication step"
-    return Summary("coupled", name, tables=make_table(headings, rows), picture=text)

@@ -4,9 +4,8 @@ from collections.abc import Iterable
 from itertools import groupby
 from math import isnan
 
-from ...references.certified_reference import ReferenceCase
 from .law_deviations import LawDeviation
-from .study import FMI3_TOOLS, FMPY, FMU, Point, Study
+from .study import FMI3_TOOLS, FMPY, FMU, Point, StudiedCase, Study
 
 TARGET = 1e-6
 TARGETS = (1e-3, TARGET, 1e-9)
@@ -20,7 +19,7 @@ def fastest_point(curve: Iterable[Point], target: float, beside_dry: bool = Fals
     return min(sufficient, key=lambda point: point.seconds, default=None)
 
 
-def rank_solvers(study: Study, case: ReferenceCase, target: float, beside_dry: bool = False) -> list[Point]:
+def rank_solvers(study: Study, case: StudiedCase, target: float, beside_dry: bool = False) -> list[Point]:
     """Return the fastest point of every solver that meets the target, fastest first; runs through fmpy are excluded."""
     curves = [study.curve(case, *solver) for solver in study.solvers(case) if solver[0] not in (FMPY, *FMI3_TOOLS)]
     points = [point for curve in curves if (point := fastest_point(curve, target, beside_dry))]
@@ -30,7 +29,7 @@ def rank_solvers(study: Study, case: ReferenceCase, target: float, beside_dry: b
 def recommend(study: Study, laws: Iterable[LawDeviation], min_ratio: float = 0.0) -> str:
     """Return a sentence with the recommendation for a model; run times must differ by the factor `min_ratio`."""
     best = [(case, rank_solvers(study, case, TARGET)) for case in study.cases if not case.is_chattering]
-    no_method = QUICK_RUN_UNCLEAR.format(study.cases[0].model) if min_ratio else NONE_REACHES
+    no_method = QUICK_RUN_UNCLEAR.format(study.model) if min_ratio else NONE_REACHES
     parts = []
     for method, cases in groupby(best, key=lambda pair: best_method(pair[1], min_ratio)):
         parts.append(f"use {method}: " + join_words([describe_cost(*item) for item in cases]) if method else no_method)
@@ -56,7 +55,7 @@ def best_method(ranks: list[Point], min_ratio: float) -> str:
     return best.method
 
 
-def describe_cost(case: ReferenceCase, ranks: list[Point]) -> str:
+def describe_cost(case: StudiedCase, ranks: list[Point]) -> str:
     """Describe the run time of the best method, and relative run times of the second best and of the best peer."""
     own_points = [point for point in ranks if point.tool == FMU]
     peers = [point for point in ranks if point.tool != FMU]
@@ -70,7 +69,7 @@ def describe_cost(case: ReferenceCase, ranks: list[Point]) -> str:
     return text + (f"; relative run time at error {format_power(TARGET)}: {', '.join(relative)})" if relative else ")")
 
 
-def describe_shortcut(study: Study, case: ReferenceCase) -> str:
+def describe_shortcut(study: Study, case: StudiedCase) -> str:
     """Describe the run time of a law that chatters, relative to the first law of the model."""
     solvers = [solver for solver in study.solvers(case) if solver[0] == FMU]
     points = [point for solver in solvers for point in study.curve(case, *solver)]

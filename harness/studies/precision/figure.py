@@ -5,17 +5,15 @@ the error TARGET.  All others are grey; the CSV file of the study has the number
 """
 
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 
-from ...references.certified_reference import ReferenceCase
-from ...results.style import BLUE, GREEN, GREY, LEGEND_ABOVE, ORANGE, WIDTH, open_figure
+from ...results.style import BLUE, GREEN, GREY, LEGEND_ABOVE, ORANGE, WIDTH, Figure, set_size
 from .advice import TARGET, format_power, rank_solvers
 from .law_deviations import LawDeviation
-from .study import CS, FMPY, FMU, ME, Study
+from .study import CS, FMPY, FMU, ME, StudiedCase, Study
 
 Solver = tuple[str, str]  # tool and method
 
@@ -30,34 +28,42 @@ CAPTION = "labelled: the two fastest methods of the FMU and the fastest other so
 FLOOR = 2.0**-53  # smaller errors are drawn at this value
 
 
-def draw(study: Study, laws: Sequence[LawDeviation], path: Path) -> None:
-    """Save the figure of a study, with one row per law.
+def draw(study: Study, laws: Sequence[LawDeviation], figure: Figure) -> None:
+    """Draw the figure of a study, with one row per law.
 
     Laws that chatter are drawn in the first row, with their error against true stick and slip.
     """
     cases = [case for case in study.cases if not case.is_chattering]
     shortcuts = [case for case in study.cases if case.is_chattering]
-    with open_figure(path, 2 * WIDTH, 0.7 + 3.4 * len(cases)) as figure:
-        figure.suptitle(f"{study.model}: cost over error, lower left is better\n{CAPTION.format(format_power(TARGET))}")
-        panels = figure.subplots(len(cases), 2, squeeze=False, sharex=True, sharey="col")
-        for case, row in zip(cases, panels, strict=True):
-            row_cases = [case, *(shortcuts if case is cases[0] else [])]
-            for axes, (cost, name) in zip(row, COSTS.items(), strict=True):
-                for row_case in row_cases:
-                    plot_curves(axes, study, row_case, cost)
-                for law in laws:
-                    if law.largest and law.case in [row_case.name for row_case in row_cases]:
-                        name_of_law = "the law" if law.case == case.name else f"the law '{law.law}'"
-                        mark_error(axes, law.largest, f"error of {name_of_law} ")
-                axes.set_ylabel(name)
-                axes.tick_params(labelbottom=True)
-            row[0].set_title(case.law)
-            add_legend(row[1])
-        for axes in panels[-1]:
-            axes.set_xlabel("largest error, relative to the largest value")
+    set_size(figure, 2 * WIDTH, 0.7 + 3.4 * len(cases))
+    figure.suptitle(f"{study.model}: cost over error, lower left is better\n{CAPTION.format(format_power(TARGET))}")
+    panels = figure.subplots(len(cases), 2, squeeze=False, sharex=True, sharey="col")
+    for case, row in zip(cases, panels, strict=True):
+        row_cases = [case, *(shortcuts if case is cases[0] else [])]
+        for axes, (cost, name) in zip(row, COSTS.items(), strict=True):
+            for row_case in row_cases:
+                plot_curves(axes, study, row_case, cost)
+            for law in laws:
+                if law.largest and law.case in [row_case.name for row_case in row_cases]:
+                    name_of_law = "the law" if law.case == case.name else f"the law '{law.law}'"
+                    mark_error(axes, law.largest, f"error of {name_of_law} ")
+            axes.set_ylabel(name)
+            axes.tick_params(labelbottom=True)
+        row[0].set_title(case.law)
+        add_legend(row[1])
+    for axes in panels[-1]:
+        axes.set_xlabel("largest error, relative to the largest value")
 
 
-def choose_labelled(study: Study, case: ReferenceCase) -> list[Solver]:
+def draw_case(axes: Axes, study: Study, case: StudiedCase) -> None:
+    """Plot run time over error of a case."""
+    plot_curves(axes, study, case, "seconds")
+    axes.set_ylabel(COSTS["seconds"])
+    axes.set_xlabel("largest error, relative to the largest value")
+    add_legend(axes)
+
+
+def choose_labelled(study: Study, case: StudiedCase) -> list[Solver]:
     """Return the solvers to label, fastest first; those with the smallest error fill up if few reach TARGET."""
     if case.is_chattering:
         return []
@@ -70,7 +76,7 @@ def choose_labelled(study: Study, case: ReferenceCase) -> list[Solver]:
     return list(dict.fromkeys([*own_solvers[:2], *peers[:1], *ranks, *rest]))[: len(LABELLED)]
 
 
-def plot_curves(axes: Axes, study: Study, case: ReferenceCase, cost: str) -> None:
+def plot_curves(axes: Axes, study: Study, case: StudiedCase, cost: str) -> None:
     """Plot every solver of a case, log-log; failed runs are gaps."""
     labelled = choose_labelled(study, case)
     for tool, method in study.solvers(case):

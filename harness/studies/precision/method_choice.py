@@ -1,9 +1,8 @@
 """Fastest method of an FMU for each case and accuracy, for the report."""
 
-from ...references.certified_reference import ReferenceCase
 from ...results.summary import METHODS_TABLE, Outcome, SummaryTable, make_table
 from .advice import TARGET, TARGETS, format_power, format_ratio, rank_solvers
-from .study import FMU, Point, Study
+from .study import FMU, Point, StudiedCase, Study
 
 NONE_REACHES = "none of the measured methods"  # reaches the accuracy
 NOT_MEASURED = "no method has been measured successfully"
@@ -24,7 +23,7 @@ def tabulate_choices(study: Study, min_ratio: float) -> tuple[tuple[SummaryTable
     return make_table(headings, rows, METHODS_TABLE), Outcome(methods, f"for an error of {format_power(TARGET)}", True)
 
 
-def choose_method(study: Study, case: ReferenceCase, accuracy: float, min_ratio: float = 0.0) -> tuple[str, ...]:
+def choose_method(study: Study, case: StudiedCase, accuracy: float, min_ratio: float = 0.0) -> tuple[str, ...]:
     """Return the fastest method of the FMU whose error is at most `accuracy`, its run time, and the runner-up.
 
     The method is empty if there is none. The error of a law that chatters is that against true stick and slip. Run
@@ -39,7 +38,7 @@ def choose_method(study: Study, case: ReferenceCase, accuracy: float, min_ratio:
     return best.method, format_time(best.seconds), comparison
 
 
-def smallest_error(study: Study, case: ReferenceCase) -> tuple[str, ...]:
+def smallest_error(study: Study, case: StudiedCase) -> tuple[str, ...]:
     """Return sentences on the smallest error that the methods of the FMU reach."""
     curves = [study.curve(case, *solver) for solver in study.solvers(case) if solver[0] == FMU]
     errors = [(point.error(case.is_chattering), point.method) for curve in curves for point in curve]

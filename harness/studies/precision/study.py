@@ -130,19 +130,29 @@ class SolverJob:
 
 
 @dataclass(frozen=True)
+class StudiedCase:
+    """Name and friction law of a case, the values that its runs set, and whether the law chatters."""
+
+    name: str
+    law: str
+    values: dict[str, Any]
+    is_chattering: bool = False
+
+
+@dataclass(frozen=True)
 class Study:
     """All points of one model."""
 
     model: str
-    cases: tuple[ReferenceCase, ...]
+    cases: tuple[StudiedCase, ...]
     points: tuple[Point, ...]
 
-    def curve(self, case: ReferenceCase, tool: str, method: str) -> list[Point]:
+    def curve(self, case: StudiedCase, tool: str, method: str) -> list[Point]:
         """Return the successful points of one solver, in the order of tolerances."""
         key = (case.name, tool, method)
         return [p for p in self.points if (p.case, p.tool, p.method) == key and not p.failure]
 
-    def solvers(self, case: ReferenceCase) -> list[tuple[str, str]]:
+    def solvers(self, case: StudiedCase) -> list[tuple[str, str]]:
         """Return tool and method of every solver of a case."""
         return list(dict.fromkeys((point.tool, point.method) for point in self.points if point.case == case.name))
 
@@ -165,7 +175,8 @@ def study_model(model: str, settings: SweepSettings, report: Callable[[float], N
     for index, (case, job) in enumerate(tasks):
         points += sweep_tolerances(case, job, settings)
         report((index + 1) / len(tasks))
-    return Study(file.stem, cases, tuple(points))
+    studied = tuple(StudiedCase(case.name, case.law, dict(case.run.values), case.is_chattering) for case in cases)
+    return Study(file.stem, studied, tuple(points))
 
 
 def default_case(model: str, file: Path, model_class: Any) -> ReferenceCase:

@@ -19,9 +19,9 @@ from ...errors import HarnessError
 from ...process.child_process import ChildProcess, ask_once
 from ...process.interruptible_wait import map_in_threads
 from ...references.reference_trajectory import max_or_nan, motion_error
-from ...results.files import write_csv_rows
 from ...results.folder import replace_folder
 from ...results.provenance import prefix_parameters, write_provenance
+from ...results.registry import find_study
 from ...results.summary import write_summary
 from ...running.fmu_archive import declared_parameters
 from ...running.fmu_info import FmuInfo, read_info
@@ -31,32 +31,35 @@ from ...running.trajectory import Statistics, Trajectory
 from ...scenes.fmu_files import check_built, find_fmu
 from .cases import StabilityCase, generic_scenes, load_scenes, scene_cases
 from .outcomes import FINISHED, REFUSED, WRONG, CaseOutcome, StabilityRegion
-from .table import summarize_outcomes
+from .result import StabilityResult
 
 WORKERS = 2
 LIMIT = 120.0  # s; time limit of a run and of a reference
 CASE_PROCESS = f"{__package__}.case_process"
-FOLDER, FILES = "stability", ("stability.csv", "figure.svg", "region.svg")  # earlier versions wrote region.svg
+STUDY = find_study("stability")
 REFUSED_STEP = "a communication step of"  # a refused step changes nothing
 
 
 def run_stability(
     out: Path, report: Callable[[str, float], None], groups: list[list[StabilityCase]], source: str = ""
-) -> tuple[list[CaseOutcome], list[StabilityRegion]]:
+) -> StabilityResult:
     """Run groups of cases and write the results to out/stability; `source` names the models if not all are run."""
-    from .figure import draw
-
-    with replace_folder(out / FOLDER, FILES, source) as folder:
+    with replace_folder(out / STUDY.name, STUDY.files, source) as folder:
         outcomes = run_cases(report, groups)
-        regions = stability_regions(outcomes)
-        write_table(outcomes, folder / "stability.csv")
-        if regions:
-            draw(regions, folder / "figure.svg")
+        result = StabilityResult(tuple(map(without_arrays, outcomes)), tuple(stability_regions(outcomes)))
+        result.write(folder)
         fmus = {row.case.name: find_fmu(row.case.model) for row in outcomes}
         values = prefix_parameters({name: declared_parameters(fmu) for name, fmu in fmus.items()})
         write_provenance(folder, fmus.values(), values, source=source)
-        write_summary(folder, summarize_outcomes(outcomes))
-    return outcomes, regions
+        write_summary(folder, result.summary())
+    return result
+
+
+def without_arrays(outcome: CaseOutcome) -> CaseOutcome:
+    """Return an outcome without the signals of its run, which are judged already."""
+    if outcome.motion is None:
+        return outcome
+    return replace(outcome, motion=replace(outcome.motion, time=np.zeros(0), columns={}))
 
 
 def run_cases(report: Callable[[str, float], None], groups: list[list[StabilityCase]]) -> list[CaseOutcome]:
@@ -211,20 +214,3 @@ def stability_regions(rows: Iterable[CaseOutcome]) -> list[StabilityRegion]:
         slope = np.diff(np.log(steps[-2:])) / np.diff(np.log(stiff[-2:])) if len(steps) > 1 else [math.nan]
         regions.append(StabilityRegion(method, stiff, steps, float(slope[0])))
     return regions
-
-
-def write_table(rows: list[CaseOutcome], path: Path) -> None:
-    """Write stability.csv with one line per case."""
-    headings = ["model", "scene", "method", "expected", "ended", "error [1]", "energy rise [1]"]
-    headings += ["events", "steps", "rejected", "evaluations", "run time [s]", "sentence"]
-    write_csv_rows(path, headings, map(table_line, rows))
-
-
-def table_line(row: CaseOutcome) -> list[Any]:
-    """Return the cells of one case in stability.csv."""
-    case, motion = row.case, row.motion
-    counts: tuple[Any, ...] = ("", "", "", "", math.nan)
-    if motion and motion.statistics:
-        statistics = motion.statistics
-        counts = (statistics.events, statistics.steps, statistics.rejected, statistics.evaluations, statistics.seconds)
-    return [case.name, case.title, case.method, row.expected, row.ended, row.error, row.energy_rise, *counts, row.text]
