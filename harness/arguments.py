@@ -272,12 +272,11 @@ def method(value: Any) -> str | int:
     return text(value) if isinstance(value, str) else index(value)
 
 
-def progress(value: Any) -> Progress:
-    """Return a function."""
-    if not callable(value):
+def progress(value: Any) -> Any:
+    """Return a function, or False for no progress bar."""
+    if value is not False and not callable(value):
         raise TypeError
-    result: Progress = value
-    return result
+    return value
 
 
 FINITE = Rule("a finite number", real, float)
@@ -302,4 +301,4 @@ HEADINGS = names_with(TEXT, "headings", lambda name: name)
 INTERFACE = choice("interface", INTERFACES)
 QUANTITY = choice("quantity", QUANTITIES)
 METHOD = Rule("a name or a number", method)
-PROGRESS = Rule("a function of one number", progress)
+PROGRESS = Rule("a function of one number, or False", progress)

@@ -1,5 +1,6 @@
 """Identification of a decay from Python: `identify_decay`."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -7,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 from ..arguments import (
     FINITE,
     FLAG,
-    PATH,
     POSITIVE,
     PROGRESS,
     QUANTITY,
@@ -18,28 +18,19 @@ from ..arguments import (
     row,
 )
 from ..errors import SceneError
-from .options import QUIET, check_time_range
-from .tables import build_table, convert_to_table
+from .options import check_time_range, reporter, with_progress_bar
+from .tables import RECORD, SIGNAL, convert_to_table, has_columns, is_trajectory
 
 if TYPE_CHECKING:
     import pandas
     from numpy.typing import ArrayLike
 
+    from ..records.columns import ColumnOptions
     from ..records.record import Record
     from ..running.trajectory import Trajectory
     from ..studies.decay.result import DecayResult
 
 
-def record_source(value: Any) -> Any:
-    """Return a file, a table, a trajectory, or times as a row of numbers."""
-    from ..running.trajectory import Trajectory
-
-    if isinstance(value, str | Path):
-        return PATH.convert(value)
-    return value if isinstance(value, Trajectory) or hasattr(value, "columns") else row(value)
-
-
-RECORD = Rule("a file, a DataFrame, a trajectory, or a row of times in s", record_source)
 SAMPLES = Rule("a row of numbers", row)
 
 
@@ -60,8 +51,9 @@ SAMPLES = Rule("a row of numbers", row)
     rate=POSITIVE,
     progress=PROGRESS,
 )
+@with_progress_bar
 def identify_decay(
-    record: "str | Path | pandas.DataFrame | Trajectory | ArrayLike",
+    record: "str | Path | pandas.DataFrame | pandas.Series | Mapping[str, ArrayLike] | Trajectory | ArrayLike",
     x: "ArrayLike | None" = None,
     *,
     unit: str | None = None,
@@ -76,16 +68,17 @@ def identify_decay(
     begin: float | None = None,
     end: float | None = None,
     rate: float | None = None,
-    progress: Progress | None = None,
+    progress: Progress | bool | None = None,
 ) -> "DecayResult":
     """Identify viscous damping, dry friction and quadratic drag from a free decay.
 
     Parameters
     ----------
-    record : str, path, DataFrame, Trajectory or array_like
-        A file with columns, a table, a trajectory, or the times (n,) in s of the samples `x`.
+    record : str, path, DataFrame, Series, mapping, Trajectory, tuple or array_like
+        A file with columns; a table, as a DataFrame or a mapping; a Series over time in s or time deltas; a trajectory;
+        times and samples, as in ``(t, x)``; or the samples (n,), with their `rate`.
     x : array_like, optional
-        The samples (n,), if `record` holds their times.
+        The samples (n,), if `record` holds their times (n,) in s.
     unit : str, optional
         Unit of the samples, as ``"mm"``, ``"deg/s"`` or ``"g"``; required for arrays, otherwise that of the heading.
     quantity : {"position", "velocity", "acceleration"}, optional
@@ -103,9 +96,10 @@ def identify_decay(
     begin, end : float, optional
         Start and end in s of the part of the record to use.
     rate : float, optional
-        Sampling rate in Hz, which replaces the times of a file or table.
-    progress : callable, optional
-        Receives the progress from 0 to 1.
+        Sampling rate in Hz, which replaces the times of a file or table, and is required for samples without times.
+    progress : callable or False, optional
+        Receives the progress from 0 to 1. By default a terminal or a notebook shows a bar after two seconds; False
+        switches it off.
 
     Returns
     -------
@@ -123,12 +117,9 @@ def identify_decay(
     ----------
     J. W. Liang, B. F. Feeny, Nonlinear Dynamics 16 (1998) 337-347.
     """
-    from math import inf
-
     from ..analyses.decay.estimates import KnownParameters
     from ..analyses.decay.identification import fit_decay
     from ..records.columns import ColumnOptions, read_record
-    from ..running.trajectory import Trajectory
     from ..studies.decay.result import DecayResult
 
     if k is not None and m is not None:
@@ -140,43 +131,47 @@ def identify_decay(
         quantity=quantity,
         unit=unit,
         rate=rate,
-        begin=-inf if begin is None else begin,
-        end=inf if end is None else end,
+        begin=begin,
+        end=end,
     )
-    is_table = isinstance(record, str | Path | Trajectory) or hasattr(record, "columns")
-    if is_table and x is not None:
-        raise SceneError("x has no effect, because the record has columns: leave it out, or name one by `column`")
-    for name, heading in (("time", time), ("column", column)) if not is_table else ():
+    if x is not None:
+        if has_columns(record):
+            raise SceneError("x has no effect, because the record has columns: leave it out, or name one by `column`")
+        if isinstance(record, tuple):
+            raise SceneError("x has no effect, because the record holds times and samples: leave it out")
+        record = (record, x)
+    for name, heading in (("time", time), ("column", column)) if not has_columns(record) else ():
         if heading is not None:
             raise SceneError(f"{name} = {heading!r} has no effect on arrays, which have no headings: leave it out")
     if isinstance(record, str | Path):
         source = str(record)
         loaded = read_record(source, columns, Path(source).stem)
     else:
-        loaded = to_record(record, x, columns)
-    return DecayResult(**vars(fit_decay(loaded, KnownParameters(k, m, pendulum), drag, drift, progress or QUIET)))
+        loaded = to_record(record, columns)
+    return DecayResult(**vars(fit_decay(loaded, KnownParameters(k, m, pendulum), drag, drift, reporter(progress))))
 
 
-def to_record(source: Any, x: Any, columns: Any) -> "Record":
-    """Return the record in a DataFrame, a trajectory or two arrays."""
-    import numpy as np
-
+def to_record(source: Any, columns: "ColumnOptions") -> "Record":
+    """Return the record in columns or rows of numbers."""
     from ..records.columns import parse_record
-    from ..running.trajectory import Trajectory
 
-    name, table = "the record", convert_to_table(source)
-    if isinstance(source, Trajectory):
+    name = "the record"
+    if not has_columns(source):
+        if not isinstance(source, tuple) and columns.rate is None:
+            raise SceneError(
+                "x is missing: identify_decay takes a file, a table, times and samples, as in (t, x), or samples with "
+                "their rate in Hz"
+            )
+        if columns.unit is None:
+            raise SceneError("unit is missing: name the unit of the samples, as in unit='mm'")
+        table = convert_to_table(source, SIGNAL, columns.rate)
+        columns = replace(columns, position=SIGNAL, rate=columns.rate if isinstance(source, tuple) else None)
+    else:
+        table = convert_to_table(source)
+    if is_trajectory(source):
         name = source.spec.model
         if columns.position is None and columns.quantity is None:
             if "position" not in source.spec.motion_outputs:
                 raise SceneError(f"{name} records no position: add it to the outputs, or name a column")
             columns = replace(columns, position=source.spec.motion_outputs["position"])
-    elif table is None:
-        if x is None:
-            raise SceneError("x is missing: identify_decay takes a file, a table, or times and samples, as in (t, x)")
-        if columns.unit is None:
-            raise SceneError("unit is missing: name the unit of the samples, as in unit='mm'")
-        table = build_table({"t": np.asarray(source), "signal": np.asarray(x)}, {"t": "s"})
-        columns = replace(columns, position="signal")
-    assert table is not None
     return parse_record(replace(table, name=name), columns, name)

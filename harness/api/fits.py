@@ -22,13 +22,12 @@ from ..arguments import (
     Rule,
     check_arguments,
 )
-from ..errors import SceneError, format_value
-from .options import QUIET, check_time_range
-from .tables import convert_to_table
+from ..errors import SceneError
+from .options import check_time_range, reporter, with_progress_bar
+from .tables import RECORDS, SIGNAL, convert_to_table
 
 if TYPE_CHECKING:
     from ..analyses.fit.parameter_fit import ParameterFit
-    from ..records.table_files import Table
     from ..studies.fit.result import FitResult
 
 
@@ -41,16 +40,7 @@ def starts(value: Any) -> Any:
     return NUMBERS.convert(value) if isinstance(value, Mapping) else PATH.convert(value)
 
 
-def record_sources(value: Any) -> list[Any]:
-    """Return records: files, DataFrames or trajectories, one or several."""
-    return [
-        PATH.convert(source) if isinstance(source, str | Path) else source
-        for source in (value if isinstance(value, list | tuple) else [value])
-    ]
-
-
 STARTS = Rule("a mapping from names to numbers, an earlier fit or the folder of its result", starts)
-RECORDS = Rule("a file, a DataFrame or a trajectory, or a list of these", record_sources)
 
 
 @check_arguments(
@@ -74,6 +64,7 @@ RECORDS = Rule("a file, a DataFrame or a trajectory, or a list of these", record
     progress=PROGRESS,
     fixed=SETTINGS,
 )
+@with_progress_bar
 def fit(
     source: "str | Path",
     records: Any,
@@ -93,7 +84,7 @@ def fit(
     begin: float | None = None,
     end: float | None = None,
     timeout: float = 10.0,
-    progress: Progress | None = None,
+    progress: Progress | bool | None = None,
     fixed: Mapping[str, float | str] | None = None,
 ) -> "FitResult":
     """Fit parameters of an FMU to measured records.
@@ -104,9 +95,11 @@ def fit(
     ----------
     source : str or path
         The name of a model or the path of an FMU for co-simulation, FMI 2.0 or 3.0.
-    records : path, DataFrame, Trajectory or sequence of these
-        Measured records. Units in headings, as in ``x [mm]``, are converted to those of the FMU; a DataFrame may have
-        them in ``attrs["units"]``.
+    records : path, DataFrame, Series, mapping, Trajectory, tuple, array or sequence of these
+        Measured records: files, tables, Series over time, trajectories, times and values as in ``(t, x)``, or values
+        with their `rate`. Values without a name are those of the observed output. Units in headings,
+        as in ``x [mm]``, are converted to those of the FMU; a DataFrame or a Series may have them in
+        ``attrs["units"]``.
     free : sequence or mapping
         Parameters to fit, with the range to search, or None for a factor of 4 about the start value of the FMU.
         ``offset(x)``, ``gain(x)`` and ``delay(x)`` are unknowns of the sensor of the output ``x``: its signal is gain
@@ -136,8 +129,9 @@ def fit(
         Time column, sampling rate in Hz that replaces it, and the time range in s.
     timeout : float
         Seconds of processor time that one run may take.
-    progress : callable, optional
-        Receives the progress from 0 to 1.
+    progress : callable or False, optional
+        Receives the progress from 0 to 1. By default a terminal or a notebook shows a bar after two seconds; False
+        switches it off.
     fixed : mapping, optional
         Former name of `values`.
 
@@ -159,8 +153,6 @@ def fit(
     >>> result = fit("stickslip", "pull.csv", ["mu_s", "mu_d", "k"], observe={"x": "laser"})  # doctest: +SKIP
     >>> result["mu_s"].low, result["mu_s"].value, result["mu_s"].high  # doctest: +SKIP
     """
-    from math import inf
-
     from ..analyses.fit.parameter_fit import ParameterFit
     from ..records.columns import ColumnOptions
     from ..scenes.fmu_files import check_built, find_fmu
@@ -191,17 +183,17 @@ def fit(
         start=start or {},
         each=tuple(each),
         robust=robust,
-        columns=ColumnOptions(
-            time=time, rate=rate, begin=-inf if begin is None else begin, end=inf if end is None else end
-        ),
+        columns=ColumnOptions(time=time, rate=rate, begin=begin, end=end),
     )
+
+    heading = next(iter(request.observe.values()), SIGNAL) if len(request.observe) == 1 else SIGNAL
 
     def load(argument: Any, name: str) -> list[study.RecordTable]:
         names = [name] if len(argument) == 1 else [f"{name} {i + 1}" for i in range(len(argument))]
         return [
             study.load_record(str(source), request)
             if isinstance(source, str | Path)
-            else study.RecordTable(record_name, to_signal_table(source))
+            else study.RecordTable(record_name, convert_to_table(source, heading, rate))
             for source, record_name in zip(argument, names, strict=True)
         ]
 
@@ -209,12 +201,4 @@ def fit(
     if not fitted:
         raise SceneError("records is empty: give at least one record")
     request, choice = choose_observed(request, fitted[0].table)
-    return study.fit_laws(resolve_laws(request).with_note(choice), fitted, predicted, progress or QUIET)
-
-
-def to_signal_table(source: Any) -> "Table":
-    """Return the table of a trajectory or a DataFrame."""
-    table = convert_to_table(source)
-    if table is None:
-        raise SceneError(f"records must be files, DataFrames or trajectories, not {format_value(source)}")
-    return table
+    return study.fit_laws(resolve_laws(request).with_note(choice), fitted, predicted, reporter(progress))

@@ -1,26 +1,38 @@
 """Options that functions of the Python API share."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from functools import wraps
+from typing import TYPE_CHECKING, ParamSpec, TypeVar
 
-from ..arguments import PATH, Progress, Rule
+from ..arguments import Progress
 from ..errors import SceneError
+from ..process.progress_bar import show_progress
 
 if TYPE_CHECKING:
     from ..scenes.run_spec import RunSpec
 
 QUIET: Progress = lambda share: None  # noqa: E731 - a function without effect needs no def
+P = ParamSpec("P")
+R = TypeVar("R")
 
 
-def trajectory_or_path(value: Any) -> Any:
-    """Return a Trajectory, a name or a path."""
-    from ..running.trajectory import Trajectory
+def with_progress_bar(function: Callable[P, R]) -> Callable[P, R]:
+    """Decorate a function so that it shows its progress, unless its argument `progress` is a function or False."""
 
-    return value if isinstance(value, Trajectory) else PATH.convert(value)
+    @wraps(function)
+    def shown(*arguments: P.args, **options: P.kwargs) -> R:
+        if options.get("progress") is not None:
+            return function(*arguments, **options)
+        with show_progress(function.__name__) as report:
+            return function(*arguments, **(options | {"progress": report}))  # type: ignore[arg-type]
+
+    return shown
 
 
-SIDE = Rule("a Trajectory, a name or a path", trajectory_or_path)
+def reporter(progress: Progress | bool | None) -> Progress:
+    """Return a function that takes the finished share; without effect if there is none."""
+    return progress if callable(progress) else QUIET
 
 
 def check_time_range(time: str | None, rate: float | None, begin: float | None, end: float | None) -> None:

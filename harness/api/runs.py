@@ -20,7 +20,8 @@ from ..arguments import (
     check_arguments,
 )
 from ..errors import HarnessError, SceneError, format_value
-from .options import QUIET, SIDE, apply_options
+from .options import apply_options, reporter, with_progress_bar
+from .tables import SIDE, convert_to_trajectory
 
 if TYPE_CHECKING:
     import numpy as np
@@ -35,6 +36,7 @@ if TYPE_CHECKING:
 @check_arguments(
     source=PATH,
     values=SETTINGS,
+    start=FINITE,
     stop=FINITE,
     interval=POSITIVE,
     times=ROW,
@@ -45,10 +47,12 @@ if TYPE_CHECKING:
     timeout=POSITIVE,
     progress=PROGRESS,
 )
+@with_progress_bar
 def simulate(
     source: "str | Path",
     values: Mapping[str, float | str] | None = None,
     *,
+    start: float | None = None,
     stop: float | None = None,
     interval: float | None = None,
     times: "ArrayLike | None" = None,
@@ -58,7 +62,7 @@ def simulate(
     interface: str | None = None,
     inputs: "Mapping[str, ArrayLike] | pandas.DataFrame | None" = None,
     timeout: float | None = None,
-    progress: Progress | None = None,
+    progress: Progress | bool | None = None,
 ) -> "Trajectory":
     """Run a model, a scene, an FMU or a stored result once.
 
@@ -69,8 +73,8 @@ def simulate(
         or the folder of a stored result, whose run is repeated.
     values : mapping, optional
         Parameters and start values by name, in the units of the FMU; enumerations by label or number.
-    stop : float, optional
-        Stop time in s; by default that of the source.
+    start, stop : float, optional
+        Start and stop time in s; by default those of the source.
     interval : float, optional
         Time between two recorded points in s. By default 4096 intervals and every step and event of the solver are
         recorded.
@@ -93,8 +97,9 @@ def simulate(
     timeout : float, optional
         Seconds allowed for one call of an FMU that is not of this project, or for 1/4096 of the run of an FMU of this
         project; 60 by default.
-    progress : callable, optional
-        Receives the progress from 0 to 1.
+    progress : callable or False, optional
+        Receives the progress from 0 to 1. By default a terminal or a notebook shows a bar after two seconds; False
+        switches it off.
 
     Returns
     -------
@@ -121,39 +126,44 @@ def simulate(
         spec = replace(spec, values={**spec.values, **values})
     if inputs is not None:
         spec = replace(spec, inputs={str(name): column for name, column in read_input_columns(inputs).items()})
+    if start is not None:
+        spec = replace(spec, start=start)
     if times is not None:
         spec = replace(spec, times=tuple(times.tolist()))  # type: ignore[union-attr] # a row by its rule
     spec = apply_options(spec, stop, interval, outputs, method, rtol, interface, timeout)
     if interval is not None and spec.inputs:
         spec = replace(spec, grid=choose_fine_step(spec, interval))
-    trajectory = runner.run(spec, progress or QUIET)
+    trajectory = runner.run(spec, reporter(progress))
     if trajectory.failure:
         raise HarnessError(trajectory.failure)
     return trajectory
 
 
 @check_arguments(a=SIDE, b=SIDE, stop=FINITE, rtol=POSITIVE, interface=INTERFACE, timeout=POSITIVE, progress=PROGRESS)
+@with_progress_bar
 def compare(
-    a: "str | Path | Trajectory",
-    b: "str | Path | Trajectory",
+    a: "str | Path | Trajectory | pandas.DataFrame | pandas.Series | Mapping[str, ArrayLike]",
+    b: "str | Path | Trajectory | pandas.DataFrame | pandas.Series | Mapping[str, ArrayLike]",
     *,
     stop: float | None = None,
     rtol: float | None = None,
     interface: str | None = None,
     timeout: float | None = None,
-    progress: Progress | None = None,
+    progress: Progress | bool | None = None,
 ) -> "ComparisonResult":
     """Compare two trajectories variable by variable and event by event.
 
     Parameters
     ----------
-    a, b : Trajectory, str or path
-        Trajectories, result folders, files (fmpy, OpenModelica, Dymola, any table with the time in its first column),
-        FMUs or scenes. FMUs and scenes are run at the times of the other side.
+    a, b : Trajectory, str, path, DataFrame, Series or mapping
+        Trajectories, tables whose columns have the names of outputs, result folders, files (fmpy, OpenModelica, Dymola,
+        any table with the time in its first column), FMUs or scenes. FMUs and scenes are run at the times of the other
+        side.
     stop, rtol, interface, timeout
         Options for FMUs and scenes that have to be run, as in `simulate`; refused if both sides are recorded.
-    progress : callable, optional
-        Receives the progress from 0 to 1.
+    progress : callable or False, optional
+        Receives the progress from 0 to 1. By default a terminal or a notebook shows a bar after two seconds; False
+        switches it off.
 
     Returns
     -------
@@ -165,7 +175,6 @@ def compare(
     HarnessError
         If the two sides have no variable or no time in common.
     """
-    from ..running.trajectory import Trajectory
     from ..scenes.run_spec import RunSpec
     from ..studies.compare.difference import compare as difference
     from ..studies.compare.result import ComparisonResult
@@ -173,12 +182,12 @@ def compare(
 
     options = {"stop": stop, "interface": interface, "timeout": timeout, "rtol": rtol}
     first, second = load_both(
-        tuple(side if isinstance(side, Trajectory) else str(side) for side in (a, b)),
+        tuple(str(side) if isinstance(side, str | Path) else convert_to_trajectory(side) for side in (a, b)),
         RunSpec(Path(), stop=stop),
-        progress or QUIET,
+        reporter(progress),
         partial(adjust_runs, {name: value for name, value in options.items() if value is not None}),
     )
-    paths = [side for side in (a, b) if not isinstance(side, Trajectory)]
+    paths = [side for side in (a, b) if isinstance(side, str | Path)]
     if len(paths) == 2:
         one, two = display_names((str(a), str(b)))
         first, second = replace(first, label=one), replace(second, label=two)

@@ -22,7 +22,7 @@ from ..arguments import (
     mapping,
 )
 from ..errors import SceneError, import_optional
-from .options import QUIET, apply_options
+from .options import apply_options, reporter, with_progress_bar
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -49,6 +49,7 @@ GRID = mapping(Rule("numbers", lambda values: values), "numbers")  # the axes ch
     folder=PATH,
     progress=PROGRESS,
 )
+@with_progress_bar
 def sweep(
     source: "str | Path",
     grid: "Mapping[str, ArrayLike]",
@@ -64,7 +65,7 @@ def sweep(
     workers: int | None = None,
     scheduler: str | None = None,
     folder: "str | Path | None" = None,
-    progress: Progress | None = None,
+    progress: Progress | bool | None = None,
 ) -> "SweepResult":
     """Run a model or an FMU at many points of its parameters.
 
@@ -93,8 +94,9 @@ def sweep(
         Address of a Dask cluster, as ``"tcp://host:8786"``.
     folder : path, optional
         Folder for the files of the sweep; an interrupted sweep is resumed from it.
-    progress : callable, optional
-        Receives the progress from 0 to 1.
+    progress : callable or False, optional
+        Receives the progress from 0 to 1. By default a terminal or a notebook shows a bar after two seconds; False
+        switches it off.
 
     Returns
     -------
@@ -133,7 +135,7 @@ def sweep(
     points = SweepPoints(axes, samples, seed)
     spec = SweepSpec(run, points.names, tuple(measures))
     with temporary_directory("sweep-") if folder is None else nullcontext(Path(folder)) as directory:
-        result = run_sweep(spec, points, None, directory, scheduler, workers, progress or QUIET)
+        result = run_sweep(spec, points, None, directory, scheduler, workers, reporter(progress))
         result.data  # noqa: B018 - loads it before a temporary folder is removed
     if folder is None:
         result.folder = None

@@ -1,19 +1,87 @@
-"""Conversion of DataFrames, trajectories and arrays to the tables that records are read from."""
+"""Records from Python: DataFrames, Series, mappings, arrays and trajectories as tables, which records are read from."""
 
+from collections.abc import Mapping
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..errors import SceneError
+from ..arguments import PATH, Rule, row
+from ..errors import SceneError, format_value
 
 if TYPE_CHECKING:
     import numpy as np
 
     from ..records.table_files import Table
+    from ..running.trajectory import Trajectory
+
+KINDS = "a file, a DataFrame, a Series, a mapping of columns, a trajectory, or times and values as in (t, x)"
+SIGNAL = "signal"  # heading of values without a name
 
 
-def convert_to_table(source: Any) -> "Table | None":
-    """Return the table in a trajectory or a DataFrame, with units in its headings; None for any other source.
+def is_frame(value: Any) -> bool:
+    """Return whether a value is a DataFrame."""
+    return hasattr(value, "columns") and hasattr(value, "index") and not is_trajectory(value)
 
-    A DataFrame has its units in ``attrs["units"]``. A named index is a column.
+
+def is_series(value: Any) -> bool:
+    """Return whether a value is a Series."""
+    return hasattr(value, "to_frame") and hasattr(value, "index")
+
+
+def is_trajectory(value: Any) -> bool:
+    """Return whether a value is a Trajectory."""
+    from ..running.trajectory import Trajectory
+
+    return isinstance(value, Trajectory)
+
+
+def is_pair(value: Any) -> bool:
+    """Return whether a value is a tuple of times and values, not of two records."""
+    return isinstance(value, tuple) and len(value) == 2 and not any(map(has_columns, value))
+
+
+def has_columns(value: Any) -> bool:
+    """Return whether a value is a record by itself: a file, or a table whose columns have names."""
+    return isinstance(value, str | Path | Mapping) or is_frame(value) or is_series(value) or is_trajectory(value)
+
+
+def record_source(value: Any) -> Any:
+    """Return a record: a file by its path, columns as they are, and times and values as rows of numbers."""
+    if isinstance(value, str | Path):
+        return PATH.convert(value)
+    if has_columns(value):
+        return value
+    return tuple(map(row, value)) if is_pair(value) else row(value)
+
+
+def record_sources(value: Any) -> list[Any]:
+    """Return records, one or several."""
+    if is_pair(value) or has_columns(value) or not isinstance(value, list | tuple):
+        value = [value]
+    return [record_source(item) for item in value]
+
+
+def side(value: Any) -> Any:
+    """Return a side of a comparison: a record, or the name or path of what is run or read."""
+    return record_source(value)
+
+
+RECORD = Rule(f"{KINDS}, or a row of values with their rate", record_source)
+RECORDS = Rule(f"{KINDS}, or a list of these", record_sources)
+SIDE = Rule(f"a name, or {KINDS}", side)
+
+
+def convert_to_table(source: Any, heading: str = SIGNAL, rate: float | None = None) -> "Table":
+    """Return the table in a record that is not a file, with units in its headings.
+
+    Parameters
+    ----------
+    source : DataFrame, Series, mapping, Trajectory, tuple or numpy.ndarray
+        A DataFrame or a Series has units in ``attrs["units"]``. A named index is a column; an index of time deltas is
+        the time in s, and so is the index of a Series.
+    heading : str
+        Heading of values without a name.
+    rate : float, optional
+        Sampling rate in Hz of a row of values.
 
     Raises
     ------
@@ -22,17 +90,56 @@ def convert_to_table(source: Any) -> "Table | None":
     """
     import numpy as np
 
-    from ..results.files import column_heading
-    from ..running.trajectory import Trajectory
-
-    if isinstance(source, Trajectory):
+    if is_trajectory(source):
         return build_table({"t": source.time, **source.columns}, {"t": "s", **source.units})
-    if hasattr(source, "columns"):
-        frame = source if source.index.name is None else source.reset_index()
-        units = {str(name): str(unit) for name, unit in frame.attrs.get("units", {}).items()}
-        columns = {str(name): np.asarray(frame[name]) for name in frame.columns}
-        return build_table({column_heading(name, units.get(name, "")): column for name, column in columns.items()}, {})
-    return None
+    if is_series(source):
+        name = heading if source.name is None else str(source.name)
+        units = {"t": "s", name: unit_of(source, name)}
+        return build_table({"t": index_times(source.index), name: np.asarray(source)}, units)
+    if is_frame(source):
+        columns = {str(name): np.asarray(source[name]) for name in source.columns}
+        units = {name: unit_of(source, name) for name in columns}
+        if is_time_delta(source.index):
+            columns, units = {"t": index_times(source.index), **columns}, {"t": "s", **units}
+        elif source.index.name is not None:
+            index = str(source.index.name)
+            columns, units = {index: np.asarray(source.index), **columns}, {index: unit_of(source, index), **units}
+        return build_table(columns, units)
+    if isinstance(source, Mapping):
+        return build_table({str(name): to_column(str(name), column) for name, column in source.items()}, {})
+    if isinstance(source, tuple):
+        return build_table(dict(zip(("t", heading), source, strict=True)), {"t": "s"})
+    if rate is None:
+        raise SceneError("the record is a row of values without times: give their rate in Hz, or (t, x)")
+    return build_table({"t": np.arange(len(source)) / rate, heading: source}, {"t": "s"})
+
+
+def unit_of(source: Any, name: str) -> str:
+    """Return the unit of a column of pandas; empty without one."""
+    units = source.attrs.get("units", {})
+    return str(units.get(name, "")) if isinstance(units, Mapping) else str(units)
+
+
+def is_time_delta(index: Any) -> bool:
+    """Return whether an index of pandas holds time deltas."""
+    return bool(getattr(index, "dtype", None) is not None and index.dtype.kind == "m")
+
+
+def index_times(index: Any) -> "np.ndarray":
+    """Return the times (n,) in s of an index of pandas."""
+    import numpy as np
+
+    return np.asarray(index.total_seconds()) if is_time_delta(index) else np.asarray(index)
+
+
+def to_column(name: str, values: Any) -> "np.ndarray":
+    """Return a column (n,); SceneError if the values are none."""
+    import numpy as np
+
+    try:
+        return np.asarray(values)
+    except (TypeError, ValueError):
+        raise SceneError(f"{name} = {format_value(values)} must be a row of numbers") from None
 
 
 def build_table(columns: "dict[str, np.ndarray]", units: dict[str, str]) -> "Table":
@@ -40,9 +147,44 @@ def build_table(columns: "dict[str, np.ndarray]", units: dict[str, str]) -> "Tab
     from ..records.table_files import Table
     from ..results.files import column_heading
 
+    if not columns:
+        raise SceneError("the record has no columns")
     cells = []
     for name, column in columns.items():
         if column.ndim != 1 or len(column) != len(next(iter(columns.values()))):
             raise SceneError(f"{name} has the shape {column.shape}: times and samples must be rows of the same length")
         cells.append(column.astype(float) if column.dtype.kind in "fiub" else [str(cell) for cell in column])
     return Table("the record", tuple(column_heading(name, units.get(name, "")) for name in columns), tuple(cells))
+
+
+def convert_to_trajectory(source: Any) -> "Trajectory":
+    """Return the signals in a record that is not a file.
+
+    Raises
+    ------
+    SceneError
+        If a column is not a row of numbers, or the times do not rise.
+    """
+    import numpy as np
+
+    from ..records.headings import TIME_NAME, split_heading
+    from ..records.units import TIMES
+    from ..running.trajectory import Trajectory
+    from ..scenes.run_spec import RunSpec
+
+    if is_trajectory(source):
+        trajectory: Trajectory = source
+        return trajectory
+    table = convert_to_table(source)
+    headings = [split_heading(heading) for heading in table.column_headings]
+    numbers = [np.asarray(cells) for cells in table.columns]
+    at = next((i for i, (name, _) in enumerate(headings) if TIME_NAME.search(name)), 0)
+    unit = headings[at][1] or "s"
+    if unit not in TIMES or any(column.dtype.kind not in "fiub" for column in numbers):
+        raise SceneError(f"the record must have a time in {', '.join(TIMES)} and columns of numbers")
+    time = numbers[at] * TIMES[unit]
+    if len(time) < 2 or not (np.isfinite(time).all() and (np.diff(time) >= 0).all()):
+        raise SceneError("the times of the record must be at least two finite numbers that do not fall")
+    columns = {name: column for (name, _), column in zip(headings, numbers, strict=True) if column is not numbers[at]}
+    units = {name: unit or "" for name, unit in headings}
+    return Trajectory(RunSpec(Path("record"), tuple(columns)), time, columns, units, {}, {}, label="the record")

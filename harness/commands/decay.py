@@ -5,7 +5,17 @@ from typing import Any
 
 import click
 
-from .terminal import HEADINGS_OPTION, POSITIVE, RenamedOption, Terminal, refuse_options, result_options
+from ..arguments import QUANTITIES
+from .terminal import (
+    BEGIN_OPTION,
+    END_OPTION,
+    HEADINGS_OPTION,
+    POSITIVE,
+    RenamedOption,
+    Terminal,
+    refuse_options,
+    result_options,
+)
 
 COLUMN_OPTIONS = (  # of records
     "time",
@@ -31,7 +41,7 @@ COLUMN_OPTIONS = (  # of records
 @click.option("--velocity", hidden=True)  # former name of --column with --quantity velocity
 @click.option(
     "--quantity",
-    type=click.Choice(("position", "velocity", "acceleration")),
+    type=click.Choice(QUANTITIES),
     help="Measured quantity, if it does not follow from the unit (an angle is a position).",
 )
 @click.option("--unit", help="Unit of the column, if the heading has none: mm, deg/s, g, ...")
@@ -39,8 +49,8 @@ COLUMN_OPTIONS = (  # of records
 @click.option("--time-unit", help="Unit of time, if the heading has none: ms, or 0.01s for sample numbers. Default: s.")
 @HEADINGS_OPTION
 @click.option("--rate", type=POSITIVE, metavar="HZ", help="Sampling rate in Hz, which replaces the times in the file.")
-@click.option("--from", "begin", type=click.FLOAT, default=float("-inf"), help="Ignore samples before this time in s.")
-@click.option("--until", "end", type=click.FLOAT, default=float("inf"), help="Ignore samples after this time in s.")
+@BEGIN_OPTION
+@END_OPTION
 @click.option("--k", type=POSITIVE, help="Stiffness in N/m or N.m/rad; required for the friction force.")
 @click.option("--m", type=POSITIVE, help="Mass in kg, or moment of inertia in kg.m2; an alternative to --k.")
 @click.option("--pendulum", is_flag=True, help="Fit a pendulum: the restoring torque is k sin(theta), with k = m g a.")

@@ -4,7 +4,7 @@ from typing import Any
 
 import click
 
-from .terminal import HEADINGS_OPTION, POSITIVE, RenamedOption, Terminal, result_options
+from .terminal import BEGIN_OPTION, END_OPTION, HEADINGS_OPTION, POSITIVE, RenamedOption, Terminal, result_options
 
 
 @click.command()
@@ -40,8 +40,8 @@ from .terminal import HEADINGS_OPTION, POSITIVE, RenamedOption, Terminal, result
 @click.option("--time-unit", help="Unit of time, if the heading has none. Default: s.")
 @HEADINGS_OPTION
 @click.option("--rate", type=POSITIVE, metavar="HZ", help="Sampling rate in Hz, which replaces the times in the file.")
-@click.option("--from", "begin", type=click.FLOAT, default=float("-inf"), help="Ignore samples before this time in s.")
-@click.option("--until", "end", type=click.FLOAT, default=float("inf"), help="Ignore samples after this time in s.")
+@BEGIN_OPTION
+@END_OPTION
 @click.option(
     "--timeout", type=POSITIVE, default=10.0, show_default=True, help="Seconds of processor time for one run."
 )

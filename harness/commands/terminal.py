@@ -150,6 +150,8 @@ HEADINGS_OPTION = click.option(
     metavar="NAMES",
     help="Headings, if the file has none: 't [s],x [mm]'.",
 )
+BEGIN_OPTION = click.option("--from", "begin", type=FINITE, help="Ignore samples before this time in s.")
+END_OPTION = click.option("--until", "end", type=FINITE, help="Ignore samples after this time in s.")
 STOP_OPTION = click.option("--stop", type=FINITE, help="Stop time in s. Default: that of the FMU.")
 RUN_OPTIONS = (
     click.option(

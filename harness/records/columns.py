@@ -54,8 +54,8 @@ class ColumnOptions:
         Headings, separated by commas, for a file without headings.
     rate : float or None
         Sampling rate in Hz, which replaces the times in the file.
-    begin, end : float
-        Time interval in s.
+    begin, end : float or None
+        Time interval in s; None for the start and the end of the record.
     """
 
     time: str | None = None
@@ -66,8 +66,13 @@ class ColumnOptions:
     per_count: str | None = None
     names: str | None = None
     rate: float | None = None
-    begin: float = -np.inf
-    end: float = np.inf
+    begin: float | None = None
+    end: float | None = None
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Return the time interval in s, with infinite ends where there is none."""
+        return -np.inf if self.begin is None else self.begin, np.inf if self.end is None else self.end
 
 
 @dataclass(frozen=True)
@@ -147,9 +152,7 @@ def parse_record(table: Table, columns: ColumnOptions, name: str) -> Record:
     is_repeated, repetition = find_repeated_times(t)
     notes += filter(None, [repetition])
     t, x = t[~is_repeated], x[~is_repeated]
-    record = Record(name, t, x, base + RATE_SUFFIXES[order], order, base, tuple(notes)).select(
-        columns.begin, columns.end
-    )
+    record = Record(name, t, x, base + RATE_SUFFIXES[order], order, base, tuple(notes)).select(*columns.interval)
     record = leave_out_saturated(record)
     check_record(record)
     return record

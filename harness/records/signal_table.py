@@ -190,7 +190,8 @@ def select_rows(
     t, rounding = undo_time_rounding(t[:length])
     if empty_tail:
         notes.append(f"The last {empty_tail} rows have a time and no signal; they are left out.")
-    in_range = (t >= options.begin) & (t <= options.end)
+    begin, end = options.interval
+    in_range = (t >= begin) & (t <= end)
     complete = in_range & np.all([np.isfinite(x[:length]) for x in outputs], axis=0)
     missing = int(in_range.sum() - complete.sum())
     if missing > MAX_MISSING_SHARE * max(int(in_range.sum()), 1):

@@ -83,6 +83,35 @@ def test_compare_takes_runs_folders_and_fmus():
         harness.compare(harness.simulate("smd", outputs=["F_damper"]), run)
 
 
+def test_a_fit_and_a_comparison_take_any_record():
+    pandas = pytest.importorskip("pandas")
+    run = harness.simulate("coulomb", stop=2.0, interval=0.01, outputs=["x"])
+    deltas = pandas.to_timedelta(run.time, unit="s")
+    named = {
+        "run": run,
+        "frame": run.to_pandas(),
+        "mapping": {"t": run.time, "x": run["x"]},
+        "series": pandas.Series(run["x"], run.time, name="x"),
+        "deltas": pandas.Series(1000 * run["x"], deltas, name="x [mm]"),
+    }
+    for name, record in named.items():
+        comparison = harness.compare(run, record)
+        assert comparison.worst < 1e-12, name
+        assert comparison.differences[0].name == "x", name
+    unnamed = {"pair": {"records": (run.time, run["x"])}, "samples": {"records": run["x"], "rate": 100.0}}
+    calls = {name: {"records": record} for name, record in named.items()} | unnamed
+    for name, arguments in calls.items():
+        result = harness.fit("coulomb", free=["f"], observe="x", **arguments)
+        assert result["f"].value == pytest.approx(0.5, rel=1e-3), name
+    both = harness.fit("coulomb", [(run.time, run["x"]), named["series"]], ["f"], observe="x")
+    assert len(both.records) == 2
+
+
+def test_a_run_starts_at_a_given_time():
+    run = harness.simulate("coulomb", start=1.0, stop=2.0)
+    assert (run.time[0], run.time[-1]) == (1.0, 2.0)
+
+
 def test_a_decay_is_identified_from_any_source(tmp_path):
     pandas = pytest.importorskip("pandas")
     run = harness.simulate("coulomb", stop=3.0, interval=0.005, outputs=["x"])
@@ -95,6 +124,12 @@ def test_a_decay_is_identified_from_any_source(tmp_path):
         "columns": {"record": pandas.DataFrame({"t [s]": run.time, "x [m]": run["x"]})},
         "positions": {"record": pandas.DataFrame({"x [m]": run["x"]}), "rate": 200.0},
         "arrays": {"record": run.time, "x": run["x"], "unit": "m"},
+        "pair": {"record": (run.time, run["x"]), "unit": "m"},
+        "samples": {"record": run["x"], "unit": "m", "rate": 200.0},
+        "mapping": {"record": {"t [s]": run.time, "x [mm]": 1000 * run["x"]}},
+        "series": {"record": pandas.Series(run["x"], run.time, name="x [m]")},
+        "deltas": {"record": pandas.Series(run["x"], pandas.to_timedelta(run.time, unit="s"), name="x [m]")},
+        "frame of deltas": {"record": pandas.DataFrame({"x [m]": run["x"]}, pandas.to_timedelta(run.time, unit="s"))},
         "millimetres": {"record": run.time, "x": 1000 * run["x"], "unit": "mm"},
     }
     for name, arguments in sources.items():

@@ -5,20 +5,22 @@ import csv
 import io
 import re
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ...errors import SceneError, first_line, format_value
+from ...errors import HarnessError, SceneError, first_line, format_value
 from ...records.child_reader import read_in_child
 from ...records.columns import read_numeric
 from ...records.headings import split_heading
 from ...records.table_files import read_content
 from ...records.units import TIMES
 from ...results.provenance import load_provenance
+from ...running.fmu_archive import read_description
 from ...running.recorder import element_names
-from ...running.trajectory import ModeChanges, SolverSteps, Trajectory
+from ...running.trajectory import ModeChanges, SolverSteps, Trajectory, find_contacts
 from ...scenes.run_spec import RunSpec
 
 MAX_TIME = 1e100  # s; largest absolute time
@@ -189,5 +191,12 @@ def read_run(folder: Path) -> Trajectory:
     if (folder / "steps.csv").is_file():
         ends, sizes, rejected = read_numeric(folder / "steps.csv")[1].T
         steps = SolverSteps(np.append(signals.time[0], ends), sizes, rejected.astype(int))
-    names = {name: name for name in signals.columns}
-    return Trajectory(spec, signals.time, signals.columns, units, names, parameters, steps, signals.events)
+    names, events = {name: name for name in signals.columns}, signals.events
+    if spec.fmu.is_file():  # it describes the variables, and names the contact of a column `mode`
+        with suppress(HarnessError):
+            variables = {item.name: item for item in read_description(spec.fmu, lenient=True).modelVariables}
+            names |= {name: variables[name].description or name for name in names if name in variables}
+            contacts = [*find_contacts(variables)]
+            if events and len(events.modes) == len(contacts) == 1:
+                events = ModeChanges(events.t, {contacts[0]: events.mode})
+    return Trajectory(spec, signals.time, signals.columns, units, names, parameters, steps, events)

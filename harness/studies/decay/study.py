@@ -103,9 +103,7 @@ def record_of_scene(
             f"scene {scene.name}: {position} has no unit in {run.spec.fmu.name}: run the scene, and identify the decay "
             "in its trajectory.csv with --unit"
         )
-    record = Record(scene.name, run.time, run.column_of_role("position"), unit, 0, unit).select(
-        columns.begin, columns.end
-    )
+    record = Record(scene.name, run.time, run.column_of_role("position"), unit, 0, unit).select(*columns.interval)
     check_record(record)
     provenance_data = {"files": (run.spec.fmu,), "parameters": run.effective_parameters, "run": run.spec}
     if parameters.k is None and parameters.m is None:

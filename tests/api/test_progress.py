@@ -1,0 +1,46 @@
+"""Progress bars of functions: in a terminal, for what takes longer than two seconds, unless switched off."""
+
+import sys
+
+import commands
+import pytest
+
+from harness.process import progress_bar
+
+SCRIPT = """
+import sys, time
+import harness
+from harness.process import progress_bar
+
+progress_bar.DELAY = {delay}
+sys.stderr.isatty = lambda: {terminal}
+harness.simulate("coulomb", stop=2.0{options})
+"""
+
+
+@pytest.mark.parametrize(
+    ("terminal", "delay", "options", "is_shown"),
+    [(True, 0.0, "", True), (True, 1e3, "", False), (False, 0.0, "", False), (True, 0.0, ", progress=False", False)],
+    ids=["terminal", "short", "no terminal", "switched off"],
+)
+def test_a_bar_is_shown_in_a_terminal_for_long_calls(workspace, terminal, delay, options, is_shown):
+    script = SCRIPT.format(terminal=terminal, delay=delay, options=options)
+    done = commands.run_python(workspace, "-c", script, TERM="xterm", COLUMNS="80")
+    assert (done.returncode, done.stdout) == (0, "")
+    assert ("simulate" in done.stderr) == is_shown
+    assert is_shown or done.stderr == ""
+
+
+def test_a_bar_ends_with_its_call(monkeypatch, capfd):
+    monkeypatch.setattr(progress_bar, "DELAY", 0.0)
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True, raising=False)
+    monkeypatch.setenv("TERM", "xterm")
+
+    def fail():
+        with progress_bar.show_progress("call") as report:
+            report(0.5)
+            raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        fail()
+    assert "call" in capfd.readouterr().err
