@@ -74,7 +74,8 @@ def sweep(
     source : str or path
         The name of a model or the path of an FMU.
     grid : mapping
-        Values of each varied parameter; every combination is run. With `samples`, the lower and the upper bound of
+        Values of each varied parameter, numbers or labels of an enumeration, as in ``{"friction": ["hybrid",
+        "threshold"]}``; every combination is run. With `samples`, the lower and the upper bound of
         each parameter.
     values : mapping, optional
         Parameters that all runs share.
@@ -115,6 +116,7 @@ def sweep(
     from ..process.worker_pool import exit_while_importing_main
     from ..scenes.fmu_files import find_fmu
     from ..scenes.run_spec import RunSpec
+    from ..studies.sweep.labels import read_labels, replace_labels
     from ..studies.sweep.result_files import run_sweep
     from ..studies.sweep.runner import SweepSpec
     from ..studies.sweep.sampling import SweepPoints, axis_from_numbers
@@ -131,7 +133,9 @@ def sweep(
     run = apply_options(run, stop=stop, rtol=rtol, interface=interface, timeout=timeout)
     if twice := set(grid) & set(run.values):
         raise SceneError(f"{min(twice)} is varied by grid and has a value for all runs: remove one")
-    axes = tuple(axis_from_numbers(name, column, samples is not None) for name, column in grid.items())
+    labels = read_labels(run) if any(isinstance(column, str | list | tuple) for column in grid.values()) else {}
+    columns = {name: replace_labels(name, column, labels) for name, column in grid.items()}
+    axes = tuple(axis_from_numbers(name, column, samples is not None) for name, column in columns.items())
     points = SweepPoints(axes, samples, seed)
     spec = SweepSpec(run, points.names, tuple(measures))
     with temporary_directory("sweep-") if folder is None else nullcontext(Path(folder)) as directory:

@@ -28,7 +28,7 @@ from .terminal import (
     multiple=True,
     required=True,
     metavar="NAME=LO:HI:N",
-    help="Parameter to vary; append :log for logarithmic spacing, or list the values: a,b,c.",
+    help="Parameter to vary; append :log for logarithmic spacing, or list values or labels: a,b,c.",
 )
 @click.option("--set", "values", multiple=True, metavar="NAME=VALUE", help="Value set in every run.")
 @click.option(
@@ -91,8 +91,9 @@ def sweep(
             raise HarnessError(f"a sweep needs {package}: {install_command('sweep')}")
     from ..running.resolve import set_rtol
     from ..scenes.assignments import parse_assignment
-    from ..scenes.fmu_files import find_fmu
+    from ..scenes.fmu_files import check_built, find_fmu
     from ..scenes.run_spec import RunSpec
+    from ..studies.sweep.labels import read_labels, replace_labels_in_text
     from ..studies.sweep.result_files import run_sweep
     from ..studies.sweep.runner import SweepSpec
     from ..studies.sweep.sampling import SweepPoints, parse_axis
@@ -102,7 +103,10 @@ def sweep(
     rtol = options.pop("tolerance")
     run = RunSpec(find_fmu(model), values=dict(map(parse_assignment, values)), follow=False, **options)
     run = run if rtol is None else set_rtol(run, rtol)
-    points = SweepPoints(tuple(parse_axis(text, random is not None) for text in vary), random, seed)
+    check_built(run.fmu)
+    labels = read_labels(run)
+    axes = tuple(parse_axis(replace_labels_in_text(text, labels), random is not None) for text in vary)
+    points = SweepPoints(axes, random, seed)
     with terminal.progress(1) as report:
         spec, progress = SweepSpec(run, points.names, measures), partial(report, model)
         result = run_sweep(spec, points, name, terminal.out, scheduler, workers, progress)

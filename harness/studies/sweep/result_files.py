@@ -33,6 +33,7 @@ from ...running.variable_values import REAL_TYPES, variable_unit
 from ...scenes.fmu_files import check_built
 from .boundaries import Boundary, read_boundaries
 from .checkpoint import Checkpoint, RunBlock
+from .labels import describe_labels
 from .measures import MeasureColumn
 from .result import DATASET_FILE, STUDY, TABLE_FILE, FailureGroup, SweepResult
 from .runner import SweepSpec, open_runner
@@ -136,7 +137,7 @@ def describe(runs: SweepSpec, points: SweepPoints) -> SweepDescription:
         if axis.name in runs.run.values:
             raise SceneError(f"{axis.name} is both varied and set; remove one of them")
         if variables[axis.name].type not in REAL_TYPES and any(value % 1 for value in axis.values):
-            raise SceneError(f"{axis.name} is an enumeration; vary it over integers, as in {axis.name}=1,2")
+            raise SceneError(f"{axis.name} is an enumeration; vary it over integers or labels, as in {axis.name}=1,2")
     with open_runner(runs) as runner:
         for number in (len(points) - 1, len(points) // 2, 0):
             (point,) = points.coordinates(number, number + 1).tolist()
@@ -146,7 +147,10 @@ def describe(runs: SweepSpec, points: SweepPoints) -> SweepDescription:
         else:
             raise HarnessError(f"three test runs of the sweep failed: {measures}")
         constants = {name: value for name, value in runner.constants().items() if name not in runs.varied}
-        varied = {name: (variable_unit(variables[name]), variables[name].description or name) for name in runs.varied}
+        texts = {
+            name: f"{variables[name].description or name}{describe_labels(variables[name])}" for name in runs.varied
+        }
+        varied = {name: (variable_unit(variables[name]), text) for name, text in texts.items()}
         numbers = {name: value for name, (value, _) in constants.items() if isinstance(value, float)}
         return SweepDescription(
             varied, runner.columns, constants, runner.stop, read_boundaries(runs.run.fmu, runs.varied, numbers)
