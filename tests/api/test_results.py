@@ -159,15 +159,25 @@ def test_a_sweep_measures_what_single_runs_measure(values):
 
 def test_a_sweep_takes_enumerations_by_label(in_workspace):
     pytest.importorskip("xarray")
-    sweep = harness.sweep("stickslip", {"friction": ["hybrid", "threshold"]}, measures=["final"], stop=2.0)
+    method, laws = {"solver.method": "ode23"}, {"friction": ["hybrid", "threshold"]}
+    sweep = harness.sweep("stickslip", laws, values=method, measures=["final"], stop=2.0)
     for number, label in ((1, "hybrid"), (3, "threshold")):
-        run = harness.simulate("stickslip", {"friction": label}, stop=2.0)
+        run = harness.simulate("stickslip", method | {"friction": label}, stop=2.0)
         assert float(sweep.sel(friction=number)["final_x"]) == run["x"][-1]
     assert "1 = hybrid, 3 = threshold" in sweep["friction"].attrs["long_name"]
     with pytest.raises(harness.SceneError, match=r"unknown label of friction 'hybird' \(nearest: 'hybrid'\)"):
         harness.sweep("stickslip", {"friction": ["hybird"]})
-    options = ("--vary", "friction=hybrid,threshold", "--measures", "final", "--stop", "2", "--name", "laws")
-    done = harness_command(in_workspace, "sweep", "stickslip", *options, "--workers", "1")
+    options = (
+        "--vary",
+        "friction=hybrid,threshold",
+        "--set",
+        "solver.method=ode23",
+        "--measures",
+        "final",
+        "--stop",
+        "2",
+    )
+    done = harness_command(in_workspace, "sweep", "stickslip", *options, "--name", "laws", "--workers", "1")
     assert (done.returncode, done.stderr) == (0, "")
     stored = harness.load_result("results/sweep/laws")
     assert stored["final_x"].values.tolist() == sweep["final_x"].values.tolist()
