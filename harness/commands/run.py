@@ -36,7 +36,8 @@ def run(
     the name or path of a model without a scene.
 
     An FMU that does not expose its solver steps is run with successively halved communication steps, until halving
-    changes no output by more than the tolerance.
+    changes no output by more than the tolerance, or cannot reach it. The achieved error is stated. A run that misses
+    the tolerance fails only if --rtol is given.
 
     \b
     Examples:

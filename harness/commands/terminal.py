@@ -276,7 +276,10 @@ def prepare_process() -> None:
 
 @contextmanager
 def progress(quiet: bool, total: int) -> Iterator[Callable[[str, float], None]]:
-    """Show a progress bar on standard error; yield a callback that receives the scene and its finished share."""
+    """Show a progress bar on standard error; yield a callback that receives the scene and its finished share.
+
+    A share of an external FMU has a note: the accuracy that the run has reached.
+    """
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
@@ -289,14 +292,15 @@ def progress(quiet: bool, total: int) -> Iterator[Callable[[str, float], None]]:
         os.fdopen(os.dup(sys.stderr.fileno()), "w", errors="replace") as console.file,  # runs redirect standard error
         Progress(*columns, console=console, transient=True, redirect_stderr=False) as bar,
     ):
-        task = bar.add_task("", total=total)
+        task = bar.add_task("reading", total=total)
         started: list[str] = []
 
         def report(name: str, share: float) -> None:
             check_interrupt()
             if name not in started:
                 started.append(name)
-            bar.update(task, description=name, completed=len(started) - 1 + share)
+            description = ": ".join(filter(None, (name, getattr(share, "note", ""))))
+            bar.update(task, description=description, completed=len(started) - 1 + share)
 
         yield report
 

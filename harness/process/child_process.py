@@ -33,6 +33,17 @@ MAX_OUTPUT_BYTES = 1_000_000  # captured output of a process; checked when it re
 ORPHAN_INTERVAL = 0.5  # s between two checks of a child process for its parent
 
 
+class Progress(float):
+    """Progress from 0 to 1, with a note on the state of the work; empty if there is none."""
+
+    note: str
+
+    def __new__(cls, share: float, note: str = "") -> "Progress":
+        progress = super().__new__(cls, share)
+        progress.note = note
+        return progress
+
+
 class ChildError(HarnessError):
     """The process did not answer and has ended or was killed. `messages` is its captured output."""
 
@@ -82,7 +93,7 @@ class ChildProcess:
         timeout : float
             Time limit in s, also between two progress reports.
         report : callable
-            Receives the progress from 0 to 1.
+            Receives a Progress.
 
         Raises
         ------
@@ -100,7 +111,7 @@ class ChildProcess:
             while kind == PROGRESS:
                 kind, content = self.receive(timeout)
                 if kind == PROGRESS:
-                    report(content)
+                    report(Progress(*content))
             self.messages = self.read_messages()
         except BaseException:
             self.kill()
@@ -252,13 +263,13 @@ class RequestServer:
             except HarnessError as error:
                 self.send(ERROR, str(error))
 
-    def report(self, progress: float) -> None:
-        """Report a progress from 0 to 1, which renews the time limit of the request."""
+    def report(self, progress: float, note: str = "") -> None:
+        """Report a progress from 0 to 1 with a note, which renews the time limit of the request."""
         now = monotonic()
         if now < self.next_report:
             return
         self.next_report = now + REPORT_INTERVAL
-        self.send(PROGRESS, progress)
+        self.send(PROGRESS, (progress, note))
         if os.fstat(2).st_size > MAX_OUTPUT_BYTES:
             os.ftruncate(2, 0)
 

@@ -297,7 +297,7 @@ def record_run(plan: RunPlan, session: FmuSession, report: ProgressCallback) -> 
     if spec.exchange:
         from .model_exchange import ModelExchange  # loads CVode
 
-        exchange = ModelExchange(session, grid, spec.tolerance, check_interrupt, signals, MAX_CVODE_STEPS)
+        exchange = ModelExchange(session, grid, spec.rtol, check_interrupt, signals, MAX_CVODE_STEPS)
         step_to_stop(exchange, grid, recorder.record, report)
         return RecordedRun(*read_rows(rows.getbuffer(), selection, session.is_fmi2), exchange.solver.n_rhs)
     next_step = recorder.cell("solver.t_next") if spec.follow else None

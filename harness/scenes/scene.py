@@ -13,8 +13,9 @@
     follow = true             step to the ends of internal steps as well; without a grid: to these only
                               default without follow and grid: 4096 equal steps and the internal steps
     repeat = 3                run several times and report the shortest run time
-    tolerance = 1e-6          tolerance of the step refinement for FMUs that do not expose their solver's steps; for
-                              such FMUs also:
+    tolerance = 1e-6          tolerance of the step refinement for FMUs that do not expose their solver's steps, which
+                              the run must meet; without it, the run states the error that it achieves;
+                              for such FMUs also:
     exchange, lenient = true  use model exchange; run an FMU that violates the standard
     timeout = 60              time limit of one FMI call in s
     analyses = ["decay"]      decay, slip, steps

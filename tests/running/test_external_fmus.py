@@ -435,24 +435,52 @@ def test_a_file_that_would_fill_the_disk_is_not_unpacked(run, external_fmu_folde
     assert_refused(done, 1, "huge.fmu", "do not fit into the temporary directory")
 
 
-@pytest.mark.parametrize("values", [(1.0, 2.0), (1e308, -1e308)])
-@pytest.mark.parametrize("exchange", [False, True])
-def test_results_that_never_agree_are_kept_with_their_difference(exchange, values):
-    """A synthetic FMU with a different output in every second run."""
-    passes = []
+WITHOUT_DECLARED_STEP = SimpleNamespace(
+    coSimulation=SimpleNamespace(fixedInternalStepSize=None), defaultExperiment=None
+)
+
+
+def refine_synthetic(final_value, **options):
+    """Refine a synthetic FMU whose output ends at final_value(number of the run, step in s); return also all steps."""
+    steps = []
 
     def run(h, tolerance):
+        steps.append(h)
         time = np.linspace(0.0, 1.0, 65)
-        passes.append(RefinementRun(len(passes), time, {"x": np.full(65, values[len(passes) % 2])}))
-        return passes[-1]
+        return RefinementRun(len(steps) - 1, time, {"x": final_value(len(steps), h) * time})
 
-    spec = RunSpec(Path("any.fmu"), start=0.0, stop=1.0, exchange=exchange)
-    answer = refine(
-        spec, SimpleNamespace(coSimulation=SimpleNamespace(fixedInternalStepSize=None), defaultExperiment=None), run
-    )
-    assert answer.run_number == len(passes) - 1
-    assert "of its largest value, more than the tolerance of 1e-06; raise rtol" in answer.failure
-    assert len(passes) < 20
+    spec = RunSpec(Path("any.fmu"), start=0.0, stop=1.0, **options)
+    return refine(spec, WITHOUT_DECLARED_STEP, run), steps
+
+
+@pytest.mark.parametrize("values", [(1.0, 2.0), (1e308, -1e308)])
+@pytest.mark.parametrize("exchange", [False, True])
+def test_results_that_never_agree_are_a_failure_only_if_the_tolerance_is_demanded(exchange, values):
+    for tolerance in None, 1e-6:
+        answer, steps = refine_synthetic(lambda i, h: values[i % 2], exchange=exchange, tolerance=tolerance)
+        assert answer.run_number == len(steps) - 1
+        assert len(steps) < 10
+        assert re.search(r"(error about|changes an output by) (inf|1|0\.5|2) of (the|its) largest", answer.note)
+        assert answer.failure == (f"the rtol of 1e-06 is not reached: {answer.note}; raise rtol" if tolerance else "")
+
+
+@pytest.mark.parametrize("order", [0.8, 1.0, 2.0, 4.0])
+@pytest.mark.parametrize("floor", [0.0, 1e-4])
+def test_the_achieved_error_is_stated_and_refinement_ends_when_it_cannot_help(order, floor):
+    """The error of x is known: (8 h)^order, and a floor that jumps from run to run, as with steps that do not align."""
+
+    def error(i, h):
+        return (8.0 * h) ** order + floor * sin(17.0 * i)
+
+    answer, steps = refine_synthetic(lambda i, h: 1.0 + error(i, h))
+    achieved = abs(error(len(steps), steps[-1]))
+    stated = float(re.search(r"(?:error about|by more than) ([0-9.e-]+)", answer.note)[1])
+    assert answer.failure == ""
+    assert achieved <= 2.0 * stated
+    assert stated <= max(1.1 * 2.0**order * achieved, 3.0 * floor)
+    assert round(1.0 / steps[-1]) <= 2**14
+    if not floor:
+        assert float(re.search(r"order ([0-9.]+)", answer.note)[1]) == pytest.approx(order, abs=0.1)
 
 
 def test_an_array_has_the_size_of_its_structural_parameters():

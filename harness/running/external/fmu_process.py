@@ -49,17 +49,18 @@ class ExternalFmu:
     directory : pathlib.Path
         Directory for results.
     report : callable
-        Receives the progress from 0 to 1. The parent kills this process if one FMI call takes longer than its timeout.
+        Receives the progress from 0 to 1 and a note. The parent kills this process if one FMI call takes longer than
+        its timeout.
     """
 
-    def __init__(self, spec: RunSpec, folder: str, directory: Path, report: Callable[[float], None]) -> None:
+    def __init__(self, spec: RunSpec, folder: str, directory: Path, report: Callable[[float, str], None]) -> None:
         self.spec, self.folder, self.directory = spec, folder, directory
         self.description = fmpy.read_model_description(folder, validate=False)
         variables = {variable.name: variable for variable in self.description.modelVariables}
         self.settings = [(variables[name], value) for name, value in spec.values.items()]
         self.selection = select_variables(spec, variables, spec.values)
         self.strings, self.report = StringTable(directory / STRINGS_FILE), report
-        self.n_runs, self.progress = 0, 0.0
+        self.n_runs, self.progress, self.note = 0, 0.0, ""
 
     def report_progress(self, progress: float | None = None) -> None:
         """Report the progress of the current run, from 0 to 1, or that the process works.
@@ -67,7 +68,11 @@ class ExternalFmu:
         The number of runs is not known in advance, so each run takes a fixed share of the rest of the progress bar.
         """
         self.progress = self.progress if progress is None else progress
-        self.report(1 - REMAINING_SHARE ** (self.n_runs + self.progress))
+        self.report(1 - REMAINING_SHARE ** (self.n_runs + self.progress), self.note)
+
+    def show(self, note: str) -> None:
+        """Show the current accuracy beside the progress."""
+        self.note = note
 
     def run(self, h: float, tolerance: float) -> RefinementRun:
         """Run the FMU with a communication step in s and a tolerance."""
@@ -119,11 +124,13 @@ class ExternalFmu:
         session.close()
 
 
-def run_request(run: dict[str, Any], folder: str, directory: str, report: Callable[[float], None]) -> RefinementResult:
+def run_request(
+    run: dict[str, Any], folder: str, directory: str, report: Callable[[float, str], None]
+) -> RefinementResult:
     """Run an unpacked FMU and write rows into a directory."""
     try:
         fmu = ExternalFmu(RunSpec.from_json(run), folder, Path(directory), report)
-        return refine(fmu.spec, fmu.description, fmu.run)
+        return refine(fmu.spec, fmu.description, fmu.run, fmu.show)
     except Exception as error:
         return RefinementResult(None, "", first_line(error))
 

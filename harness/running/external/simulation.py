@@ -59,6 +59,7 @@ def simulate(spec: RunSpec, description: Any, report: Callable[[float], None]) -
     check_inputs(spec.inputs, variables)
     selection = select_variables(spec, variables, values)
     start, stop = check_time_span(spec, description)
+    report(0.0)
     with unpack(spec.fmu) as folder, temporary_directory("rows-") as directory:
         check_library(spec.fmu, description, exchange, folder)
         inputs = {name: tuple(map(float, column)) for name, column in spec.inputs.items()}

@@ -3,11 +3,15 @@
 Co-simulation halves the communication step; model exchange divides the solver tolerance by ten. If halving changes
 nothing, the FMU has internal steps; their error can only be estimated if a smaller tolerance, passed at the start,
 changes the result.
+
+The changes of successive halvings give the order of convergence. Refinement stops early if the changes do not fall, or
+if the order shows that the tolerance requires more than `MAX_STEPS` steps. The last run is then the result, with the
+error that it achieves; it is a failure only if the user demanded the tolerance.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from math import ceil, inf
+from dataclasses import dataclass, field
+from math import ceil, inf, log2
 from typing import Any
 
 import numpy as np
@@ -23,6 +27,9 @@ COARSEST_STEPS = 64  # communication steps of the coarsest run by default
 MAX_STEPS = 2**18  # communication steps
 STEPS_TO_SEE_INTERNAL_STEP = 2**12  # communication steps that make internal steps visible
 MIN_OUTPUT_STEPS = 512  # minimum number of output points
+STEPS_TO_SEE_STAGNATION = 2**13  # communication steps before changes that do not fall end a refinement
+STEPS_TO_SEE_ORDER = 2**14  # communication steps before the order of convergence may end a refinement
+STAGNATION_HALVINGS = 3  # successive halvings that together at least halve the changes, or refinement stops
 MAX_TOLERANCE_REDUCTIONS = 6  # of model exchange
 TOLERANCE_FACTOR = 0.1  # tolerance passed to the FMU, relative to that of the run
 MIN_TOLERANCE = 1e-13  # of any solver
@@ -63,6 +70,68 @@ class RefinementResult:
 
 
 RunFunction = Callable[[float, float], RefinementRun]  # (communication step in s, tolerance)
+NoteCallback = Callable[[str], object]  # receives the current accuracy, for the display of the progress
+
+
+@dataclass(frozen=True)
+class Change:
+    """Largest change of an output from one run to the next, relative to the largest value of that output."""
+
+    size: float
+    name: str = ""
+
+    def __str__(self) -> str:
+        return f"{self.size:.2g} of its largest value ({self.name})" if self.name else f"{self.size:.2g}"
+
+
+@dataclass
+class Convergence:
+    """Changes of successive halvings of the step.
+
+    Attributes
+    ----------
+    changes : list of Change
+        Change by each halving.
+    """
+
+    changes: list[Change] = field(default_factory=list)
+
+    @property
+    def order(self) -> float | None:
+        """Return the order of convergence that the last two changes show; None without two finite changes."""
+        sizes = [change.size for change in self.changes[-2:]]
+        if len(sizes) < 2 or not all(0.0 < size < inf for size in sizes):
+            return None
+        return log2(sizes[0] / sizes[1])
+
+    @property
+    def order_text(self) -> str:
+        """Return the order as a text; empty if the changes do not fall regularly."""
+        return "" if self.order is None or self.stagnates else f", order {self.order:.1f}"
+
+    @property
+    def error(self) -> float:
+        """Return the estimated error of the last run.
+
+        It is the last change if the order is at least 1, more if it is lower, and the largest of the last changes if
+        these do not fall.
+        """
+        last, recent = self.changes[-1].size, max(change.size for change in self.changes[-STAGNATION_HALVINGS:])
+        if self.order is None or (self.order >= 1.0 and not self.stagnates):
+            return last
+        return recent if self.stagnates or self.order <= 0.0 else last / (2.0**self.order - 1.0)
+
+    @property
+    def stagnates(self) -> bool:
+        """Return whether the last halvings together did not even halve the changes."""
+        sizes = [change.size for change in self.changes[-STAGNATION_HALVINGS - 1 :]]
+        return len(sizes) > STAGNATION_HALVINGS and sizes[-1] > 0.5 * sizes[0]
+
+    def halvings_to(self, tolerance: float) -> float:
+        """Return how many more halvings the order requires to reach a tolerance; inf if the changes do not fall."""
+        if self.order is None:
+            return 0.0 if len(self.changes) < 2 else inf
+        return log2(self.changes[-1].size / tolerance) / self.order if self.order > 0.0 else inf
 
 
 def coarsest_grid(spec: RunSpec) -> TimeGrid:
@@ -76,7 +145,9 @@ def coarsest_grid(spec: RunSpec) -> TimeGrid:
     return TimeGrid(spec.start, spec.stop, min(spec.grid, duration) if spec.grid else duration / COARSEST_STEPS)
 
 
-def refine(spec: RunSpec, description: Any, run: RunFunction) -> RefinementResult:
+def refine(
+    spec: RunSpec, description: Any, run: RunFunction, show: NoteCallback = lambda note: None
+) -> RefinementResult:
     """Run the FMU with refined steps and select a run.
 
     Parameters
@@ -87,11 +158,13 @@ def refine(spec: RunSpec, description: Any, run: RunFunction) -> RefinementResul
         Model description of the FMU.
     run : callable
         Runs the FMU with a communication step in s and a tolerance; returns a RefinementRun.
+    show : callable
+        Receives the current accuracy.
     """
     duration = coarsest_grid(spec).duration
     requested_step = None if spec.follow else spec.grid or (inf if len(spec.times) else None)
     if spec.exchange:
-        return refine_tolerance(spec, requested_step or integer_fraction(spec, MIN_OUTPUT_STEPS), run)
+        return refine_tolerance(spec, requested_step or integer_fraction(spec, MIN_OUTPUT_STEPS), run, show)
     fixed_step = declared_step(description)
     if fixed_step:
         fixed_run = run(communication_step(fixed_step, duration), solver_tolerance(spec))
@@ -100,7 +173,7 @@ def refine(spec: RunSpec, description: Any, run: RunFunction) -> RefinementResul
         requested_run = run(requested_step, solver_tolerance(spec))
         requested = f"step of {requested_step:g} s" if requested_step < inf else "times"
         return accept_run(requested_run, f"requested communication {requested}, error unknown")
-    result = refine_steps(spec, run)
+    result = refine_steps(spec, run, show)
     default_step = description.defaultExperiment.stepSize if description.defaultExperiment else None
     if result.run_number is None and default_step:  # no run advanced by a step
         default_run = run(float(default_step), solver_tolerance(spec))
@@ -137,12 +210,12 @@ def accept_run(result: RefinementRun, note: str) -> RefinementResult:
 
 def solver_tolerance(spec: RunSpec) -> float:
     """Return the tolerance to pass to an FMU with its own solver."""
-    return TOLERANCE_FACTOR * spec.tolerance
+    return TOLERANCE_FACTOR * spec.rtol
 
 
-def refine_steps(spec: RunSpec, run: RunFunction) -> RefinementResult:
+def refine_steps(spec: RunSpec, run: RunFunction, show: NoteCallback) -> RefinementResult:
     """Halve the communication step until two results agree at the times of the coarsest run."""
-    coarsest, difference = coarsest_grid(spec), inf
+    coarsest, convergence = coarsest_grid(spec), Convergence()
     duration, h = coarsest.duration, coarsest.h
     previous: RefinementRun | None = None
     while h >= min(duration / MAX_STEPS, coarsest.h / 2):
@@ -150,24 +223,49 @@ def refine_steps(spec: RunSpec, run: RunFunction) -> RefinementResult:
         if current.message and not (current.terminated or current.step_refused):
             return keep_longest_run(previous, current)
         if previous and not (current.step_refused or previous.step_refused):
-            difference = max_difference(previous, current, spec)
-            if difference == 0.0:
-                return refine_solver_tolerance(spec, h, current, run)
-            if difference <= spec.tolerance and h <= duration / MIN_OUTPUT_STEPS:
-                return accept_run(
-                    current, f"communication step {h:.4g} s; halving it changes no output by more than {difference:.2g}"
-                )
+            change = largest_change(previous, current, spec)
+            if change.size == 0.0:
+                return refine_solver_tolerance(spec, h, current, run, show)
+            convergence.changes.append(change)
+            show(f"{duration / h:.0f} steps, error {convergence.error:.1g}")
+            step = f"communication step {h:.4g} s"
+            if change.size <= spec.rtol and h <= duration / MIN_OUTPUT_STEPS:
+                note = f"{step}; halving it changes no output by more than {change.size:.2g}{convergence.order_text}"
+                return accept_run(current, note)
+            if reason := reason_to_stop(convergence, duration / h, spec.rtol):
+                return accept_inexact_run(spec, current, step, convergence, find_internal_step(current) or reason)
         previous, h = current, h / 2
-    if current.step_refused:
+    if current.step_refused or not convergence.changes:
         return keep_longest_run(None, current)
-    change = f"the last halving, to {round(duration / (2 * h))} communication steps,"
-    return no_agreement(change, current, difference, spec)
+    return accept_inexact_run(spec, current, step, convergence, f"more than {MAX_STEPS} steps are not taken")
 
 
-def no_agreement(change: str, current: RefinementRun, difference: float, spec: RunSpec) -> RefinementResult:
-    """Select the last run and report that it differs from the previous one."""
-    message = f"{change} still changes an output by {difference:.2g} of its largest value"
-    return RefinementResult(current.number, "", f"{message}, more than the tolerance of {spec.tolerance:g}; raise rtol")
+def reason_to_stop(convergence: Convergence, steps: float, tolerance: float) -> str:
+    """Return why further halving of the communication step cannot reach the tolerance; empty if it may."""
+    if steps >= STEPS_TO_SEE_STAGNATION and convergence.stagnates:
+        return "further halving does not reduce it"
+    if steps >= STEPS_TO_SEE_ORDER:
+        required = log2(steps) + convergence.halvings_to(tolerance)
+        if required > log2(MAX_STEPS):
+            count = f"about {2.0**required:.1g}" if required < 100 else "too many"
+            return f"the tolerance of {tolerance:g} needs {count} steps"
+    return ""
+
+
+def accept_inexact_run(
+    spec: RunSpec, current: RefinementRun, step: str, convergence: Convergence, reason: str
+) -> RefinementResult:
+    """Select a run that misses the tolerance: a result with its error, or a failure if the tolerance was demanded."""
+    name = convergence.changes[-1].name
+    error = f"error about {convergence.error:.2g} of the largest {name}{convergence.order_text}; {reason}"
+    return accept_inexact(spec, current, f"{step}; {error}")
+
+
+def accept_inexact(spec: RunSpec, current: RefinementRun, note: str) -> RefinementResult:
+    """Select a run that misses the tolerance: a result, or a failure if the tolerance was demanded."""
+    if spec.tolerance is None or current.message:
+        return accept_run(current, note)
+    return RefinementResult(current.number, note, f"the rtol of {spec.tolerance:g} is not reached: {note}; raise rtol")
 
 
 def keep_longest_run(previous: RefinementRun | None, current: RefinementRun) -> RefinementResult:
@@ -177,28 +275,37 @@ def keep_longest_run(previous: RefinementRun | None, current: RefinementRun) -> 
     return RefinementResult(longest.number if longest else None, "", current.message)
 
 
-def refine_solver_tolerance(spec: RunSpec, h: float, current: RefinementRun, run: RunFunction) -> RefinementResult:
+def refine_solver_tolerance(
+    spec: RunSpec, h: float, current: RefinementRun, run: RunFunction, show: NoteCallback
+) -> RefinementResult:
     """Reduce the tolerance passed to the FMU after halving the communication step changed nothing."""
     if not any(np.ptp(column) for column in current.columns.values()):
         return accept_run(current, f"communication step {h:.4g} s; no output changes")
-    tolerance = solver_tolerance(spec)
+    tolerance, changes = solver_tolerance(spec), list[Change]()
     short_step = min(integer_fraction(spec, STEPS_TO_SEE_INTERNAL_STEP), coarsest_grid(spec).h / 4)
     for _ in range(3):
         tolerance = max(tolerance / 100, MIN_TOLERANCE)
         refined = run(short_step, tolerance)
         if refined.message and not refined.terminated:
             return keep_longest_run(current, refined)
-        difference = max_difference(current, refined, spec)
-        if difference == 0.0:
-            fixed_step = find_fixed_step(refined)
-            kind = f"fixed internal step of {fixed_step:.3g} s" if fixed_step else "internal steps"
+        change = largest_change(current, refined, spec)
+        if change.size == 0.0:
+            kind = find_internal_step(refined) or "internal steps"
             reason = "neither shorter communication steps nor a smaller tolerance change the result"
             return accept_run(refined, f"{kind}, error unknown: {reason}")
-        if difference <= spec.tolerance:
-            note = f"internal steps, controlled by a tolerance of {tolerance:.2g}"
-            return accept_run(refined, f"{note}; a hundred times that changes no output by more than {difference:.2g}")
+        note = f"internal steps, controlled by a tolerance of {tolerance:.2g}"
+        show(f"tolerance {tolerance:.1g}, error {change.size:.1g}")
+        if change.size <= spec.rtol:
+            return accept_run(refined, f"{note}; a hundred times that changes no output by more than {change.size:.2g}")
         current = refined
-    return no_agreement(f"a reduction of its tolerance by 100, to {tolerance:.2g},", current, difference, spec)
+        changes.append(change)
+    return accept_inexact(spec, current, f"{note}; a hundred times that changes an output by {changes[-1]}")
+
+
+def find_internal_step(samples: RefinementRun) -> str:
+    """Return a text with the fixed internal step of an FMU; empty if none is visible."""
+    fixed_step = find_fixed_step(samples)
+    return f"fixed internal step of {fixed_step:.3g} s" if fixed_step else ""
 
 
 def find_fixed_step(samples: RefinementRun) -> float | None:
@@ -217,27 +324,26 @@ def find_fixed_step(samples: RefinementRun) -> float | None:
     return float((samples.time[indices[-1]] - samples.time[indices[0]]) / (len(indices) - 1))
 
 
-def refine_tolerance(spec: RunSpec, h: float, run: RunFunction) -> RefinementResult:
+def refine_tolerance(spec: RunSpec, h: float, run: RunFunction, show: NoteCallback) -> RefinementResult:
     """Divide the solver tolerance by ten until two results agree at the output points."""
-    rtol, difference = spec.tolerance, inf
+    rtol, change = spec.rtol, Change(inf)
     previous: RefinementRun | None = None
     for _ in range(MAX_TOLERANCE_REDUCTIONS):
         current = run(h, rtol)
         if current.message and not current.terminated:
             return keep_longest_run(previous, current)
+        note = f"fmpy's CVode at rtol {rtol:.2g}"
         if previous:
-            difference = max_difference(previous, current, spec)
-            if difference <= spec.tolerance:
-                note = (
-                    f"fmpy's CVode at rtol {rtol:.2g}; ten times that changes no output by more than {difference:.2g}"
-                )
-                return accept_run(current, note)
+            change = largest_change(previous, current, spec)
+            show(f"rtol {rtol:.1g}, error {change.size:.1g}")
+            if change.size <= spec.rtol:
+                return accept_run(current, f"{note}; ten times that changes no output by more than {change.size:.2g}")
         previous, rtol = current, max(rtol / 10, MIN_TOLERANCE)
-    return no_agreement("a reduction of the tolerance of fmpy's CVode by 10", current, difference, spec)
+    return accept_inexact(spec, current, f"{note}; ten times that changes an output by {change}")
 
 
 @np.errstate(over="ignore")  # a warning of numpy would appear as output of the FMU
-def max_difference(first: RefinementRun, second: RefinementRun, spec: RunSpec) -> float:
+def largest_change(first: RefinementRun, second: RefinementRun, spec: RunSpec) -> Change:
     """Return the largest difference of two runs at the coarsest times, relative to each variable's largest value."""
     grid = coarsest_grid(spec)
     end = min(run.time[-1] if len(run.time) else grid.start for run in (first, second))
@@ -245,15 +351,17 @@ def max_difference(first: RefinementRun, second: RefinementRun, spec: RunSpec) -
     times = np.append(np.arange(grid.start, grid.stop - tolerance, grid.h), grid.stop)
     times = times[times <= end + tolerance]
     if len(times) < 2:
-        return inf
-    largest = 0.0
+        return Change(inf)
+    largest = Change(0.0)
     for name, column in second.columns.items():
         left, right = (
             first.columns[name][last_rows_before(first.time, times)].astype(float),
             column[last_rows_before(second.time, times)].astype(float),
         )
         scale = float(np.abs(right).max())
-        largest = max(largest, float(np.abs(left - right).max()) / scale if scale else float(np.abs(left).max() > 0))
+        size = float(np.abs(left - right).max()) / scale if scale else float(np.abs(left).max() > 0)
+        if size > largest.size:
+            largest = Change(size, name)
     return largest
 
 

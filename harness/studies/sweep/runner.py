@@ -129,7 +129,8 @@ class ExternalFmuRunner:
         self.measures = select_measures(runs, self.variables, is_own_fmu=False)
         texts = {name for name, variable in self.variables.items() if variable.type == "String"}
         outputs = tuple(name for name in default_outputs(fmu_description) if name not in texts)
-        self.shared = replace(runs.run, outputs=outputs, follow=True)
+        # a table of values has no place for the error of each run, so a run that misses the tolerance fails
+        self.shared = replace(runs.run, outputs=outputs, follow=True, tolerance=runs.run.rtol)
         self.columns = measure_columns(self.measures, self.variables, outputs)
         self.parameters_used: dict[str, tuple[object, str]] = {}
 
