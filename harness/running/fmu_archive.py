@@ -9,6 +9,7 @@ import atexit
 from collections.abc import Callable, Hashable, Iterator
 from contextlib import ExitStack, contextmanager
 from functools import cache, wraps
+from inspect import signature
 from pathlib import Path
 from shutil import disk_usage
 from typing import Any, TypeVar
@@ -16,7 +17,8 @@ from xml.etree import ElementTree
 from zipfile import ZipFile
 
 import fmpy
-from fmpy.model_description import ValidationError
+from fmpy.model_description import SimpleType, ValidationError
+from lxml import etree
 
 from ..errors import HarnessError, SceneError, first_line
 from ..process.temporary_directory import has_plain_uri, temporary_directory
@@ -31,6 +33,18 @@ MAX_LISTED_FAULTS = 50  # violations listed in a message
 REQUIRED_VARIABLES = ("solver.t_next", "solver.steps", "solver.rejected", "solver.evaluations")  # of this project
 # file with the name of the script of a Python FMU; the libraries of both packages contain this file name
 SCRIPT_NAME_FILE = "slavemodule.txt"
+# variabilities for which fmpy knows whether a variable has a start value, if the attribute `initial` is missing
+VARIABILITIES = {
+    "parameter": ("fixed", "tunable"),
+    "structuralParameter": ("fixed", "tunable"),
+    "calculatedParameter": ("fixed", "tunable"),
+    "input": ("discrete", "continuous"),
+    "output": ("constant", "discrete", "continuous"),
+    "local": ("constant", "fixed", "tunable", "discrete", "continuous"),
+    "independent": ("continuous",),
+}
+SET_CAUSALITIES = ("parameter", "structuralParameter", "input")
+FMI2_TYPES = ("Real", "Integer", "Boolean", "String", "Enumeration")
 PROCESS_RESOURCES = ExitStack()  # directories that exist until the process ends
 atexit.register(PROCESS_RESOURCES.close)
 
@@ -68,7 +82,8 @@ def validate_description(path: Path, lenient: bool) -> Any:
     """Read and validate the model description of an existing file."""
     try:
         fmi_version = read_fmi_version(path)
-        description = None if fmi_version.startswith("1.") else fmpy.read_model_description(path, validate=not lenient)
+        read = read_leniently if lenient else fmpy.read_model_description
+        description = None if fmi_version.startswith("1.") else read(path)
     except ValidationError as error:
         violations = [" ".join(fault.split()) for fault in error.problems]
         listed = "\n- ".join(
@@ -90,6 +105,75 @@ def validate_description(path: Path, lenient: bool) -> Any:
     if description is None:
         raise HarnessError(f"{path.name} has FMI version {fmi_version}; supported are 2.0 and 3.0: export it again")
     return description
+
+
+def read_leniently(path: Path) -> Any:
+    """Read the model description of an FMU or of a folder without validation.
+
+    If fmpy cannot read it, parts that a run does not need are removed: declared types, units and entries of the model
+    structure that refer to something undefined, unknown attributes of types, and variables without a type.
+    """
+    try:
+        return fmpy.read_model_description(path, validate=False)
+    except Exception as error:  # fmpy raises bare Exceptions
+        with ExitStack() as stack:
+            if path.is_dir():
+                file: Any = str(path / DESCRIPTION_FILE)
+            else:
+                file = stack.enter_context(stack.enter_context(ZipFile(path)).open(DESCRIPTION_FILE))
+            tree = etree.parse(file)
+            repair_description(tree.getroot())
+            repaired = stack.enter_context(temporary_directory("xml-")) / DESCRIPTION_FILE
+            tree.write(str(repaired))
+            try:
+                return fmpy.read_model_description(str(repaired), validate=False)
+            except Exception:
+                raise error from None  # of the file as it is
+
+
+def repair_description(root: Any) -> None:
+    """Remove the parts of a model description that fmpy cannot read and a run does not need."""
+    version = root.get("fmiVersion", "")
+    root.set("fmiVersion", "2.0" if version.startswith("2.") else version)
+    type_attributes = {*signature(SimpleType).parameters} - {"type", "items"}
+    types: set[str | None] = {None}
+    for element in root.findall("TypeDefinitions/*"):
+        inner = element[0] if element.tag == "SimpleType" and len(element) else element
+        for name in {*inner.attrib} - type_attributes:
+            del inner.attrib[name]
+        for item in inner.findall("Item"):
+            for name in {*item.attrib} - {"name", "value", "description"}:
+                del item.attrib[name]
+        if element.tag == "SimpleType" and not len(element):
+            element.getparent().remove(element)
+        else:
+            types.add(element.get("name"))
+    variables = root.find("ModelVariables")
+    for variable in variables.findall("ScalarVariable"):
+        if not any(
+            child.tag in FMI2_TYPES for child in variable
+        ):  # an entry of the list remains: indices count entries
+            variable.insert(0, etree.Element("String"))
+            variable.set("causality", "local")
+    references = {variable.get("valueReference") for variable in variables}
+    defined = references if version.startswith("3.") else {str(i + 1) for i in range(len(variables))}
+    for element in variables.iter():
+        if element.get("declaredType") not in types:
+            del element.attrib["declaredType"]
+        for name in "derivative", "clocks":
+            if not defined.issuperset(element.get(name, "").split()):
+                del element.attrib[name]
+    for variable in variables:
+        if variable.get("initial") is None:  # its default is defined for the combinations that the standard allows
+            causality, variability = variable.get("causality", "local"), variable.get("variability", "continuous")
+            if variability not in VARIABILITIES.get(causality, ()):
+                variable.set("initial", "exact" if causality in SET_CAUSALITIES else "calculated")
+    for unknown in root.findall("ModelStructure//*[@index]") + root.findall("ModelStructure/*[@valueReference]"):
+        if (unknown.get("index") or unknown.get("valueReference")) not in defined:
+            unknown.getparent().remove(unknown)
+        elif not defined.issuperset(unknown.get("dependencies", "").split()):
+            del unknown.attrib["dependencies"]
+            unknown.attrib.pop("dependenciesKind", None)
 
 
 def exposes_solver_steps(description: Any) -> bool:

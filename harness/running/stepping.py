@@ -178,7 +178,7 @@ def step_to_stop(
     """
     stop, tolerance, point_at = grid.stop, grid.tolerance, grid.point_at
     t, target, point, n_steps = grid.start, point_at(1), 1, 0
-    stepper.start(t)
+    call_recorded(stepper.start, t, record)
     record(t)
     while t < stop:
         if n_steps % report_every == 0:
@@ -195,8 +195,17 @@ def step_to_stop(
             raise
         record(t)
         if stepper.is_event:
-            stepper.handle_event(t)
+            call_recorded(stepper.handle_event, t, record)
             record(t)
+
+
+def call_recorded(handle: Callable[[float], object], t: float, record: Callable[[float], object]) -> None:
+    """Handle an event at t in s; if it terminates the simulation, record its values before the exception propagates."""
+    try:
+        handle(t)
+    except TerminatedError:
+        record(t)
+        raise
 
 
 def check_inputs(inputs: Inputs, variables: Mapping[str, Any]) -> None:

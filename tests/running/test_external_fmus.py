@@ -20,7 +20,9 @@ from harness.results.provenance import load_provenance
 from harness.running.external.simulation import read_longest_rows
 from harness.running.external.step_refinement import RefinementRun, refine
 from harness.running.fmu_archive import read_description
+from harness.running.fmu_session import TerminatedError
 from harness.running.recorder import Recorder, array_shape
+from harness.running.stepping import TimeGrid, step_to_stop
 from harness.running.variable_values import convert_value
 from harness.scenes.assignments import NumberWithText
 from harness.scenes.run_spec import RunSpec
@@ -274,6 +276,53 @@ def test_violations_of_the_standard_are_listed_and_tolerated_with_lenient(run):
     assert (rows["up"] == (rows["x"] > 0)).all()
 
 
+TYPE = '<TypeDefinitions><SimpleType name="T"><Real odd="1"/></SimpleType></TypeDefinitions>'
+UNREADABLE = {
+    "undefined type": ("<Real", '<Real declaredType="Nowhere"'),
+    "unknown attribute of a type": ("<DefaultExperiment", f"{TYPE}<DefaultExperiment"),
+    "undefined variable": ('index="1"', 'index="77"'),
+    "undefined dependency": ('index="1"', 'index="1" dependencies="77"'),
+    "undefined state": ("<Real", '<Real derivative="77"'),
+    "variability of a parameter": ('variability="tunable"', 'variability="continuous"'),
+    "variable without a type": ("</ModelVariables>", '<ScalarVariable name="z" valueReference="9"/></ModelVariables>'),
+    "version": ('fmiVersion="2.0"', 'fmiVersion="2.0.4"'),
+}
+
+
+@pytest.mark.parametrize(("old", "new"), UNREADABLE.values(), ids=UNREADABLE)
+def test_descriptions_that_fmpy_cannot_read_are_read_with_lenient(run, external_fmu_folder, tmp_path, old, new):
+    changes = edited_description(lambda text: text.replace(old, new))
+    external_fmus.edited_copy(external_fmu_folder / "Midpoint.fmu", tmp_path / "odd.fmu", changes)
+    assert run("odd.fmu")[0].returncode == 1
+    done, rows = run("odd.fmu", "--lenient", "--stop", "0.5", "--rtol", "1e-3")
+    assert_succeeded(done)
+    assert {"x", "v"} <= {*rows}
+    assert rows["x"][-1] == pytest.approx(cos(0.5 * sqrt(40)), abs=1e-3)
+
+
+def test_the_event_that_terminates_a_run_is_recorded_in_model_exchange():
+    class Stepper:
+        """A counter that an event raises every second and that terminates the simulation at 3."""
+
+        is_event, counter = True, 0
+
+        def start(self, t):
+            pass
+
+        def advance(self, t, target):
+            return target
+
+        def handle_event(self, t):
+            self.counter += 1
+            if self.counter == 3:
+                raise TerminatedError(t, "an event")
+
+    stepper, rows = Stepper(), []
+    with pytest.raises(TerminatedError):
+        step_to_stop(stepper, TimeGrid(0.0, 9.0, 1.0), lambda t: rows.append((t, stepper.counter)), lambda share: None)
+    assert rows == [(0.0, 0), (1.0, 0), (1.0, 1), (2.0, 1), (2.0, 2), (3.0, 2), (3.0, 3)]
+
+
 @pytest.mark.parametrize(
     ("name", "arguments", "status", "sentence"),
     [
@@ -345,6 +394,11 @@ def edited_description(change):
             "Midpoint",
             {"binaries/linux64/Midpoint.so": None},
             "has no binary linux64/Midpoint for this machine",
+        ),
+        (
+            "Midpoint",
+            {"binaries/linux64/Midpoint.so": None, "binaries/linux64/Other.so": b"\x7fELF"},
+            "binaries/linux64 has Other.so, and the name must be the modelIdentifier",
         ),
         ("Midpoint", {"binaries/linux64/Midpoint.so": b"\x7fELF"}, "needs the tool that exported it"),
         (

@@ -7,12 +7,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import fmpy
 from fmpy.fmi1 import FMICallException
 
 from ...errors import HarnessError, first_line
 from ...process.child_process import RequestServer
 from ...scenes.run_spec import RunSpec
+from ..fmu_archive import read_leniently
 from ..fmu_session import STATUS_NAMES, FmuSession, LogCapture, StepError, StepRefusedError, TerminatedError
 from ..model_exchange import ModelExchange
 from ..recorder import Recorder, StringTable, read_rows, select_variables
@@ -55,7 +55,7 @@ class ExternalFmu:
 
     def __init__(self, spec: RunSpec, folder: str, directory: Path, report: Callable[[float, str], None]) -> None:
         self.spec, self.folder, self.directory = spec, folder, directory
-        self.description = fmpy.read_model_description(folder, validate=False)
+        self.description = read_leniently(Path(folder))
         variables = {variable.name: variable for variable in self.description.modelVariables}
         self.settings = [(variables[name], value) for name, value in spec.values.items()]
         self.selection = select_variables(spec, variables, spec.values)

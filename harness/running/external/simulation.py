@@ -116,6 +116,9 @@ def check_library(fmu: Path, description: Any, exchange: bool, folder: Path) -> 
         return
     others = sorted(file.name for file in folder.glob("binaries/*"))
     available = f"it has {', '.join(others)}" if others else "it has no binaries at all"
+    names = sorted(file.name for file in folder.glob(f"binaries/{platform}/*{fmpy.sharedLibraryExtension}"))
+    if names:
+        available = f"binaries/{platform} has {', '.join(names)}, and the name must be the modelIdentifier"
     sources = "; it contains C sources: `fmpy compile` may build a binary" if any(folder.glob("sources/*.c")) else ""
     raise HarnessError(f"{fmu.name} has no binary {platform}/{identifier} for this machine: {available}{sources}")
 
