@@ -166,6 +166,13 @@ class FmuSession:
         self, values: Iterable[tuple[Any, Any]], start: float, stop: float | None, tolerance: float | None = None
     ) -> None:
         """Set (variable, value) and initialize the instance; times in s."""
+        self.enter_initialization(values, start, stop, tolerance)
+        self.fmu.exitInitializationMode()
+
+    def enter_initialization(
+        self, values: Iterable[tuple[Any, Any]], start: float, stop: float | None, tolerance: float | None = None
+    ) -> None:
+        """Set (variable, value) and enter the initialization of the instance; times in s."""
         experiment = {"tolerance": tolerance, "startTime": start, "stopTime": stop}
         values = list(values)
         structural = [(variable, value) for variable, value in values if variable.causality == "structuralParameter"]
@@ -180,7 +187,6 @@ class FmuSession:
             if variable.causality != "structuralParameter":
                 self.set(variable, value)
         self.fmu.enterInitializationMode(**({} if self.is_fmi2 else experiment))
-        self.fmu.exitInitializationMode()
 
     def type_name(self, variable: Any) -> str:
         """Return the type in the names of the functions that set and get a variable."""

@@ -172,7 +172,7 @@ def test_a_shipped_scene_converges_to_its_reference_in_every_engine(run, scene):
     steps, errors = np.loadtxt(run(scene) / "error.csv", delimiter=",", skiprows=1).T
     assert np.log(errors[0] / errors[-1]) / np.log(steps[0] / steps[-1]) == pytest.approx(1.0, abs=0.25)
     engine_errors = engines(run(scene))
-    assert [why for _, why in engine_errors.values()] == [""] * 4
+    assert [why for _, why in engine_errors.values()] == [""] * 5
     assert engine_errors["libcosim"][0] == pytest.approx(engine_errors["Ecos"][0], rel=1e-4)
     assert engine_errors["fmpy"][0][-1] < 2 * engine_errors["Ecos"][0][-1]
     size = np.abs(np.loadtxt(run(scene) / "trajectory.csv", delimiter=",", skiprows=1)[:, 1:]).max()

@@ -1,4 +1,4 @@
-"""Eleven FMUs that do not come from this project: pythonfmu (FMI 2.0), pythonfmu3 (FMI 3.0) and C. Sources:
+"""Twelve FMUs that do not come from this project: pythonfmu (FMI 2.0), pythonfmu3 (FMI 3.0) and C. Sources:
 tests/external_fmus."""
 
 import os
@@ -16,6 +16,7 @@ SWEEP_AXES = {
     "FixedStep": "k=0.5:1:3",  # has a fixed internal step
     "Fmi3FixedStep": "k=0.5:1:3",  # FMI 3.0, has the same fixed internal step
     "Switching": "loss=0.1:0.2:3",  # Boolean, Integer and String outputs and parameters
+    "Gain": "k=1:2:3",  # FMI 2.0: without states, the part of a system
     "Falling": "height=1:4:3",  # terminates the simulation
     "NonConforming": "k=30:50:3",  # violates the standard, but runs
     "Faulty": "k=1:2:3",  # with kind=1 to 7 it hangs, crashes, raises, prints, returns NaN, fails, stops its process
@@ -27,7 +28,7 @@ SWEEP_AXES = {
 
 
 def build_external_fmus():
-    """Return the folder of all eleven FMUs."""
+    """Return the folder of all twelve FMUs."""
 
     def make(folder):
         path = os.environ | {"PYTHONPATH": str(build_cache.ROOT)}

@@ -4,6 +4,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from .engine import MAIN_ENGINE
+
 
 @dataclass(frozen=True)
 class Convergence:
@@ -25,6 +27,10 @@ class Convergence:
         Description of the reference.
     values : str
         Name of the parameter set in the archive.
+    candidates : tuple of str
+        Engines for the runs at all steps; the first one that runs the archive is used.
+    unsupported : dict
+        Reasons of the engines that do not support the archive.
     time : numpy.ndarray
         Times (m,) in s of the run with the smallest step.
     x : numpy.ndarray
@@ -45,6 +51,8 @@ class Convergence:
     stop: float
     reference: str
     values: str = "initialValues"
+    candidates: tuple[str, ...] = (MAIN_ENGINE,)
+    unsupported: dict[str, str] = field(default_factory=dict)
     time: np.ndarray = field(default_factory=lambda: np.zeros(0))
     x: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
     truth: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))

@@ -1,98 +1,80 @@
-"""Reader of a given SSP archive: outputs to record, communication steps and parameters."""
+"""A given SSP archive: outputs to record, communication steps, parameters, and the engines that support it."""
 
 import zipfile
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from shutil import copy
-from typing import Any
-
-from lxml import etree
-from pyssp_standard.ssd import Component
-from pyssp_standard.ssp import SSP
-from pyssp_standard.ssv import SSV
 
 from ...errors import HarnessError, SceneError, first_line
-from ...running.fmu_archive import declared_parameters, read_description
-from ...running.variable_values import REAL_TYPES, parse_element, variable_unit
+from ...process.temporary_directory import temporary_directory
+from ...running.variable_values import REAL_TYPES, effective_value, variable_unit
 from .convergence import Convergence
+from .engine import ENGINES, UNSUPPORTED
+from .system import CoupledSystem, read_system
 
 COARSEST, HALVINGS = 100, 4  # steps of the first run, and number of halvings
 
 
+@contextmanager
+def open_system(archive: Path) -> Iterator[CoupledSystem]:
+    """Read the system of an archive; its FMUs exist until the end of the context."""
+    with temporary_directory("ssp-") as folder:
+        try:
+            with zipfile.ZipFile(archive) as content:
+                content.extractall(folder)
+            system = read_system(folder)
+        except HarnessError as error:
+            raise HarnessError(f"{archive.name} cannot be run: {error}") from None
+        except (OSError, ValueError, zipfile.BadZipFile) as error:
+            raise HarnessError(f"{archive.name} cannot be read: {first_line(error)}") from None
+        yield system
+
+
 def read_archive(source: Path, file: Path, stop: float | None) -> Convergence:
-    """Copy an archive to `file`; return its study, which records every Real output of every component."""
+    """Copy an archive to `file`; return its study, which records the Real outputs of all components."""
     if not source.is_file():
         raise SceneError(f"{source} does not exist: give an existing archive, or a scene of `friction-fmus list`")
     copy(source, file)
-    try:
-        with SSP(file, mode="r") as archive, archive.system_structure as structure:
-            system, experiment = structure.system, structure.default_experiment
-            variables = [
-                (component.name, variable)
-                for component in components(system)
-                for variable in outputs(component, archive.unpacked_path)
-            ]
-            sets = [
-                name
-                for part in (system, *components(system))
-                for name, _ in parameter_sets(part, archive.unpacked_path)
-            ]
-    except (OSError, KeyError, ValueError, AttributeError, zipfile.BadZipFile, etree.LxmlError) as error:
-        raise HarnessError(f"{source.name} cannot be read: {first_line(error)}") from None
-    end = stop if stop is not None else experiment and experiment.stop_time
+    with open_system(source) as system:
+        variables = [
+            (path, variable)
+            for path, component in system.components.items()
+            for variable in component.variables.values()
+            if variable.causality == "output" and variable.type in REAL_TYPES and not variable.dimensions
+        ]
+    end = stop if stop is not None else system.stop
     if not end:
         raise SceneError(f"{source.name} has no stop time; give one, as in --stop 10")
     if not variables:
         raise HarnessError(f"{source.name} has no component with a Real output")
     return Convergence(
         caption=str(system.name),
-        read=tuple((name, variable.name, int(variable.valueReference)) for name, variable in variables),
-        labels=tuple(f"{name}.{variable.name}" for name, variable in variables),
+        read=tuple((path, variable.name, int(variable.valueReference)) for path, variable in variables),
+        labels=tuple(f"{path}.{variable.name}" for path, variable in variables),
         units=tuple(variable_unit(variable) for _, variable in variables),
         steps=tuple(float(end) / COARSEST / 2**i for i in range(HALVINGS + 1)),
         stop=float(end),
         reference="finest run",
-        values=sets[0] if sets else "",
+        values=next(iter(system.parameter_sets), ""),
+        candidates=tuple(ENGINES),
+        unsupported={
+            engine: f"{engine} does not support {', '.join(sorted(system.features & features))}"
+            for engine, features in UNSUPPORTED.items()
+            if system.features & features
+        },
     )
 
 
-def outputs(part: Component, folder: Path) -> list[Any]:
-    """Return the Real variables of a component that are output connectors."""
-    names = [variable.name for variable in part.connectors if variable.kind == "output"]
-    variables = read_description(folder / part.source).modelVariables if names else []
-    return [variable for variable in variables if variable.name in names and variable.type in REAL_TYPES]
-
-
-def components(system: Any) -> list[Component]:
-    return [element for element in system.elements if isinstance(element, Component)]
-
-
-def parameter_sets(part: Any, folder: Path) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Yield name and values of each parameter set that a part of an archive binds."""
-    for binding in part.parameter_bindings or ():
-        if binding.ssv is not None:
-            table = binding.ssv
-        else:
-            with SSV(folder / binding.source, mode="r") as file:
-                table = file.ssv_elem
-        values = {
-            parameter["name"]: parameter["type_value"].parameter.get("value", "") for parameter in table.parameters
-        }
-        yield str(table.name), {f"{binding.prefix or ''}{name}": value for name, value in values.items()}
-
-
 def effective_parameters(file: Path) -> dict[str, tuple[object, str]]:
-    """Return value and unit of every parameter, with the sets of the components and then of the system applied."""
-    with SSP(file, mode="r") as archive, archive.system_structure as structure:
-        folder, parts = archive.unpacked_path, components(structure.system)
-        values_by_name = {
-            f"{part.name}.{name}": value
-            for part in parts
-            for name, value in declared_parameters(folder / part.source).items()
+    """Return value and unit of every parameter of the components of an archive."""
+    with open_system(file) as system:
+        return {
+            f"{path}.{name}": (
+                effective_value(variable, system.values.get((path, name), variable.start)),
+                variable_unit(variable),
+            )
+            for path, component in system.components.items()
+            for name, variable in component.variables.items()
+            if variable.causality == "parameter"
         }
-        for part, prefix in [*((component, f"{component.name}.") for component in parts), (structure.system, "")]:
-            for _, values in parameter_sets(part, folder):
-                for name, value in values.items():
-                    if prefix + name in values_by_name:
-                        values_by_name[prefix + name] = parse_element(value), values_by_name[prefix + name][1]
-    return values_by_name

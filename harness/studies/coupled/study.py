@@ -26,7 +26,7 @@ from ...scenes.coupled.scene import CoupledScene, load_coupled_scene
 from ...scenes.fmu_files import find_fmu
 from ...scenes.run_spec import RunSpec
 from .convergence import Convergence
-from .engine import ENGINES, EXTRA, MAIN_ENGINE, run_engine
+from .engine import ENGINES, EXTRA, run_engine
 from .result import CoupledResult
 
 STUDY = find_study("coupled")
@@ -172,10 +172,11 @@ def run_study(
     report: ProgressCallback,
 ) -> Convergence:
     """Run the archive at each communication step, and at the smallest step in the other engines as well."""
-    runs = []
-    for i, step in enumerate(plan.steps):
-        runs.append(run_step(MAIN_ENGINE, plan, archive, step))
+    main_engine, first = run_first_step(plan, archive)
+    runs = [first]
+    for i, step in enumerate(plan.steps[1:]):
         report((i + 1) / (len(plan.steps) + len(ENGINES)))
+        runs.append(run_step(main_engine, plan, archive, step))
     finest = runs[-1]
     times = [np.arange(len(x)) * step for step, x in zip(plan.steps, runs, strict=True)]
     all_times = np.unique(np.concatenate(times))
@@ -190,7 +191,7 @@ def run_study(
     engines = {}
     for engine in ENGINES:
         try:
-            x = finest if engine == MAIN_ENGINE else run_step(engine, plan, archive, plan.steps[-1])
+            x = finest if engine == main_engine else run_step(engine, plan, archive, plan.steps[-1])
             n_missing = len(references[-1]) - len(x)
             engines[engine] = tuple(x[-1].tolist()), float(np.abs(x - references[-1][n_missing:]).max()), ""
         except HarnessError as error:
@@ -198,7 +199,26 @@ def run_study(
     return replace(plan, time=times[-1], x=finest, truth=references[-1], errors=tuple(errors), engines=engines)
 
 
+def run_first_step(plan: Convergence, archive: Path) -> tuple[str, np.ndarray]:
+    """Return the first engine that runs the archive with the largest step, and the rows (m, n) of that run.
+
+    Raises
+    ------
+    HarnessError
+        If no engine runs it, with the reason of each.
+    """
+    reasons = []
+    for engine in plan.candidates:
+        try:
+            return engine, run_step(engine, plan, archive, plan.steps[0])
+        except HarnessError as error:
+            reasons.append(str(error))
+    raise HarnessError("\n".join(reasons))
+
+
 def run_step(engine: str, plan: Convergence, archive: Path, step: float) -> np.ndarray:
     """Return the rows (m, n) of a run of an archive with a communication step in s."""
+    if engine in plan.unsupported:
+        raise HarnessError(plan.unsupported[engine])
     run = RunSpec(archive, plan.names, stop=plan.stop, grid=step, follow=False)
     return np.array(run_engine(engine, run, plan.read, plan.values))

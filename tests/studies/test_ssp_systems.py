@@ -1,0 +1,108 @@
+"""Systems of other tools in SSP archives: every engine gives the right value or is named with its reason."""
+
+import csv
+import json
+from importlib.util import find_spec
+from math import cos, sqrt
+from zipfile import ZipFile
+
+import commands
+import external_fmus
+import pytest
+from ssp_archives import ARCHIVES, CONNECTION, FILES, INNER, SINK, SOURCE, UNIT_TABLE, bind, component, structure
+from ssp_archives import write_archive as write
+
+from harness.studies.coupled.engine import ENGINES
+
+HAS_ENGINES = all(map(find_spec, ("pyssp_standard", "ecospy", "libcosimpy")))
+pytestmark = pytest.mark.skipif(not HAS_ENGINES, reason="the extras 'coupled' and 'importers' are not installed")
+
+
+@pytest.fixture(scope="module")
+def gain():
+    return external_fmus.build_external_fmus() / "Gain.fmu"
+
+
+@pytest.mark.parametrize("feature", ARCHIVES)
+def test_each_engine_runs_a_system_or_is_named_with_its_reason(tmp_path, gain, feature):
+    description, files, expected = ARCHIVES[feature]
+    write(tmp_path / "pair.ssp", description, files, gain)
+    done = commands.harness(tmp_path, "couple", "pair.ssp", "--json")
+    assert (done.returncode, done.stderr) == (0, "")
+    failures = {name: item["failure"] for name, item in json.loads(done.stdout)["engines"].items()}
+    assert set(failures) == set(ENGINES)
+    assert failures["own master"] == ""
+    with (tmp_path / "results/coupled/pair/engines.csv").open(newline="") as file:
+        heading, *rows = csv.reader(file)
+    column = next(i for i, name in enumerate(heading) if "sink.y" in name)
+    ends = {row[0]: float(row[column]) for row in rows if row[0] in ENGINES and not failures[row[0]]}
+    assert ends == pytest.approx(dict.fromkeys(ends, expected), rel=1e-12)
+    for name in set(ENGINES) - set(ends):
+        assert failures[name].startswith(f"{name} does not support ")
+    if feature in ("plain", "inputs without a connection", "linear transformations"):
+        assert {"Ecos", "libcosim"} < set(ends)
+    elif feature != "inline parameter values":
+        assert feature in failures["Ecos"]
+
+
+def test_a_component_for_model_exchange_is_integrated(tmp_path):
+    fmu = external_fmus.build_external_fmus() / "ModelExchangeOnly.fmu"
+    part = f'<ssd:Component name="body" source="resources/{fmu.stem}.fmu"/>'
+    with ZipFile(tmp_path / "one.ssp", "w") as archive:
+        archive.writestr("SystemStructure.ssd", structure(part, ""))
+        archive.write(fmu, f"resources/{fmu.name}")
+    done = commands.harness(tmp_path, "couple", "one.ssp")
+    assert (done.returncode, done.stderr) == (0, "")
+    heading, *rows = (tmp_path / "results/coupled/one/trajectory.csv").read_text().splitlines()
+    column = next(i for i, name in enumerate(heading.split(",")) if name.startswith("body.x"))
+    assert float(rows[-1].split(",")[column]) == pytest.approx(cos(sqrt(40.0)), abs=1e-6)
+    assert "Ecos does not support components for model exchange" in done.stdout
+
+
+LINK = f"<ssd:Connection {CONNECTION}/>"
+MAPPED_LINK = f"<ssd:Connection {CONNECTION}><ssc:BooleanMappingTransformation/></ssd:Connection>"
+CIRCLE = (
+    '<ssd:System name="inner"><ssd:Elements/><ssd:Connections><ssd:Connection startConnector="b" endConnector="a"/>'
+    '<ssd:Connection startConnector="a" endConnector="b"/></ssd:Connections></ssd:System>'
+)
+DICTIONARY = (
+    '<ssd:SignalDictionaries><ssd:SignalDictionary name="bus" source="resources/bus.ssb"/></ssd:SignalDictionaries>'
+)
+TO_INNER = '<ssd:Connection startElement="inner" startConnector="a" endElement="sink" endConnector="u"/>'
+
+
+@pytest.mark.parametrize(
+    ("description", "sentence"),
+    [
+        (structure(SOURCE + SINK, more=DICTIONARY), "it has the signal dictionary bus; they are not supported"),
+        (structure(SOURCE + SINK, version="3.0"), "it has SSP version 3.0; supported are 1.0 and 2.0"),
+        (structure(SINK + CIRCLE, TO_INNER), "the connections to sink.u form a circle"),
+        (structure(SINK + INNER, TO_INNER), "starts at inner.a, which is no output"),
+        (structure(SOURCE + SINK, 2 * LINK), "two connections end at sink.u"),
+        (structure(SOURCE + SINK.replace("Gain.fmu", "None.fmu")), "the component sink has no FMU: there is no file"),
+        (structure(SOURCE + component("sink", bind("gone"))), "it has no file resources/gone.ssv"),
+        (
+            structure(SOURCE + SINK.replace("x-fmu-sharedlibrary", "x-ssp-package")),
+            "of the type application/x-ssp-package",
+        ),
+        (structure(SOURCE + SINK, LINK.replace('"y"', '"z"')), "has no variable z"),
+        (
+            structure(
+                component("source", bind("source"), "m") + component("sink", bind("sink"), "kg"), units=UNIT_TABLE
+            ),
+            "sink.u: m cannot be converted to kg",
+        ),
+        (structure(component("source", bind("source"), "m") + component("sink", "", "ell")), "the unit m at"),
+        (
+            structure(SOURCE + SINK, MAPPED_LINK),
+            "the connection to sink.u has a BooleanMappingTransformation",
+        ),
+    ],
+)
+def test_what_a_system_cannot_have_is_refused_by_name(tmp_path, gain, description, sentence):
+    write(tmp_path / "pair.ssp", description, FILES, gain)
+    done = commands.harness(tmp_path, "couple", "pair.ssp")
+    assert done.returncode == 1
+    assert sentence in done.stderr
+    assert done.stderr.count("\n") == 1
+    assert not (tmp_path / "results/coupled/pair").exists()
