@@ -13,7 +13,7 @@ from pathsim_fmi import CoSimulationFMU
 
 
 def run(fmu: str, step: float, stop: float, output: str) -> list[float]:
-    """Return the values; the block steps at the beginning of a step, so the values are one step late."""
+    """Return the values; the block steps at the beginning of a step, so a value is that of the end of the step."""
     block, scope = CoSimulationFMU(fmu, dt=step), Scope()
     simulation = Simulation([block, scope], [Connection(block[output], scope)], dt=step, log=False)
     simulation.run(stop)
