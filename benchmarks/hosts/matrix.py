@@ -6,7 +6,6 @@ import subprocess
 import venv
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from itertools import zip_longest
 from math import isfinite, nan
 from pathlib import Path
 
@@ -113,14 +112,15 @@ def run_models(python: Path, host: Host, folder: Path) -> Iterator[tuple[str, fl
         (str(folder / f"{model}.fmu"), (time[-1] - time[0]) / (len(time) - 1), time[-1], name)
         for model, (time, _, name) in certified.items()
     ]
-    command = [python, Path(__file__).with_name(host.script), json.dumps(requests)]
+    command = [str(python), str(Path(__file__).with_name(host.script)), json.dumps(requests)]
     try:
         done = subprocess.run(command, capture_output=True, text=True, timeout=TIMEOUT)
     except subprocess.TimeoutExpired:
         raise HarnessError(f"{host.package} does not end within {TIMEOUT:g} s") from None
     replies = [json.loads(line) for line in done.stdout.splitlines() if line.startswith("[[")]
-    messages = re.split("^---$", done.stderr, flags=re.M)[1:]
-    for model, (values, failure), text in zip_longest(MODELS, replies, messages, fillvalue=([], "no reply")):
+    replies += [([], "no reply")] * (len(MODELS) - len(replies))
+    messages = re.split("^---$", done.stderr, flags=re.M)[1:] + [""] * len(MODELS)
+    for model, (values, failure), text in zip(MODELS, replies, messages, strict=False):
         yield (model, *judge(values, certified[model][1][host.first :], failure, text))
 
 
