@@ -178,8 +178,8 @@ def plot_stick(runs: dict[str, dict[str, np.ndarray]], closed_form: float, colou
             )
         off = {law: f"{1e3 * abs(run['x'][-1] - closed_form):.1f} mm" for law, run in runs.items()}
         figure.supxlabel(
-            "Solver on both sides: ode23, tolerance 0.001, absolute 1e-6 (MATLAB's defaults)\nDistance from the closed form at the end: "
-            f"{off['sign']} with sign(v), {off['hybrid']} with true sticking",
+            "Solver on both sides: ode23, tolerance 0.001, absolute 1e-6 (MATLAB's defaults)\n"
+            f"Distance from the closed form at the end: {off['sign']} with sign(v), {off['hybrid']} with true sticking",
             fontsize=9,
         )
         position.set(xlabel="time, s", ylabel="position, cm", xlim=(0, 6))
