@@ -67,7 +67,7 @@ def side(value: Any) -> Any:
 
 RECORD = Rule(f"{KINDS}, or a row of values with their rate", record_source)
 RECORDS = Rule(f"{KINDS}, or a list of these", record_sources)
-SIDE = Rule(f"a name, or {KINDS}", side)
+SIDE = Rule("a name, a file, a DataFrame, a Series, a mapping of columns, or a trajectory", side)
 
 
 def convert_to_table(source: Any, heading: str = SIGNAL, rate: float | None = None) -> "Table":

@@ -10,7 +10,7 @@ from harness.analyses.fit.fit_problem import FitProblem
 from harness.analyses.fit.fit_procedure import subdivide_inputs
 from harness.analyses.fit.measured_record import MeasuredRecord, RecordData
 from harness.analyses.fit.unknowns import Unknown
-from harness.analyses.fit.validation import validate
+from harness.analyses.fit.validation import prepare_record, validate
 from harness.scenes.run_spec import RunSpec
 
 NOISE = 1e-4
@@ -51,9 +51,7 @@ def test_the_inputs_of_a_validation_record_are_as_fine_as_those_of_the_fit():
     fitted = MeasuredRecord(SIMULATOR, driven, binned=False)
     fitted.subdivide(4)
     problem = FitProblem([fitted], ["x"], [Unknown("size", "size", "m", 0.5, 2.0)], {})
-    z = np.zeros(1)
-    raw_fit = SimpleNamespace(z=z, uncertainty=SimpleNamespace(residuals=problem.residuals(z, problem.all)))
-    (record,) = validate(problem, raw_fit, [driven]).records
+    record = prepare_record(problem, SimpleNamespace(z=np.zeros(1)), driven)
     assert len(record.fine_t) == len(record.driven["F"]) == 4 * (len(data.t) - 1) + 1
 
 

@@ -25,13 +25,8 @@ def validate(problem: FitProblem, raw_fit: RawFit, data: Sequence[RecordData]) -
         If the FMU refuses the values there.
     """
     records, predictions = [], []
-    fitted = problem.records[0]
     for record_data in data:
-        record = MeasuredRecord(fitted.simulator, record_data, fitted.width > 1)
-        if not record.can_be_averaged(problem.values(raw_fit.z, 0)):
-            record = MeasuredRecord(fitted.simulator, record_data, binned=False)
-        record.noise = np.where(np.ptp(record.y, axis=0) > 0.0, record.noise, fitted.noise)  # of a body at rest
-        record.subdivide(fitted.subdivision)
+        record = prepare_record(problem, raw_fit, record_data)
         prediction = problem.predict_record(raw_fit.z, record, 0, record.all)
         if prediction is None:
             raise HarnessError(
@@ -45,6 +40,17 @@ def validate(problem: FitProblem, raw_fit: RawFit, data: Sequence[RecordData]) -
     columns = column_residuals(records, residuals, problem.outputs)
     remarks = tuple(validation_remarks(problem, raw_fit, columns, residuals))
     return Validation(columns, tuple(record.fitted for record in records), tuple(predictions), remarks)
+
+
+def prepare_record(problem: FitProblem, raw_fit: RawFit, data: RecordData) -> MeasuredRecord:
+    """Return a record that is averaged and whose inputs are subdivided as those of the first fitted record."""
+    fitted = problem.records[0]
+    record = MeasuredRecord(fitted.simulator, data, fitted.width > 1)
+    if not record.can_be_averaged(problem.values(raw_fit.z, 0)):
+        record = MeasuredRecord(fitted.simulator, data, binned=False)
+    record.noise = np.where(np.ptp(record.y, axis=0) > 0.0, record.noise, fitted.noise)  # of a body at rest
+    record.subdivide(fitted.subdivision)
+    return record
 
 
 def validation_remarks(
