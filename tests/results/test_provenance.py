@@ -133,12 +133,12 @@ def test_a_damaged_summary_is_reported_in_the_page(workspace, first_run):
 
 
 def files(folder):
-    """Return the files of a result, except the provenance and the summary (which have a date) and the quantities (which
-    have a run time)."""
+    """Return the files of a result, except the provenance and the summary (which have a date), and the quantities and
+    data.npz (which have run times)."""
     return {
         path.name: path.read_bytes()
         for path in folder.iterdir()
-        if path.name not in ("provenance.json", "summary.json", "quantities.csv")
+        if path.name not in ("provenance.json", "summary.json", "quantities.csv", "data.npz")
     }
 
 
