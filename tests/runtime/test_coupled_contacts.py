@@ -442,7 +442,7 @@ def test_a_crank_passes_its_dead_points(method, start_angle):
     assert [mode for _, mode in changes] == [1 if cos(q + 0.1) > 0.0 else -1 for q in dead_points]
     elapsed = quad(lambda q: 1.0 / speed(q), start_angle, step.y1_q, points=dead_points, limit=200, epsabs=1e-13)[0]
     assert elapsed == pytest.approx(stop, abs=3e3 * rtol)
-    assert step.w1 == pytest.approx(speed(step.y1_q), abs=3e3 * rtol)
+    assert step.y1_w == pytest.approx(speed(step.y1_q), abs=3e3 * rtol)
 
 
 def test_a_crank_at_rest_at_its_dead_point_is_not_held():
