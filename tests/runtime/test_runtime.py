@@ -28,7 +28,8 @@ from harness.running.embedded_model import create_run, load_model_class
 
 FMI_SIDE = [
     *("__init__", "failure_handling", "fmu_instance", "messages", "method_registry", "pythonfmu_workarounds"),
-    *("saved_state", "slave", "variable_access", "variable_declarations", "vectors"),
+    *("saved_state", "slave", "variable_access", "variable_declarations"),
+    *("linear_solver", "vectors"),  # of the build: never embedded
 ]
 NUMERICS = {
     path.stem: path.read_text() for path in (ROOT / "fmus" / "runtime").glob("*.py") if path.stem not in FMI_SIDE
