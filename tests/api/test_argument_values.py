@@ -23,15 +23,16 @@ NOTHING = {"[]", "{}"}  # of names
 ACCEPTED = {  # arguments by function, and the values that they may have; None as well if it is the default
     "simulate": {
         "values": {"{}"},
+        "start": FINITE,
         "stop": ABOVE_ZERO,
         "interval": ABOVE_ZERO,
         "outputs": {"'x'"},
         "rtol": ABOVE_ZERO,
         "inputs": {"{}"},
         "timeout": ABOVE_ZERO,
-        "progress": {"type"},
+        "progress": {"type", *FLAG},
     },
-    "compare": {"stop": ABOVE_ZERO, "rtol": ABOVE_ZERO, "timeout": ABOVE_ZERO, "progress": {"type"}},
+    "compare": {"stop": ABOVE_ZERO, "rtol": ABOVE_ZERO, "timeout": ABOVE_ZERO, "progress": {"type", *FLAG}},
     "identify_decay": {
         "unit": {"'x'", "'8'", "long text"},  # a unit that is not known is that of a sensor
         "k": ABOVE_ZERO,
@@ -42,7 +43,7 @@ ACCEPTED = {  # arguments by function, and the values that they may have; None a
         "begin": FINITE,
         "end": ABOVE_ZERO,
         "rate": ABOVE_ZERO,
-        "progress": {"type"},
+        "progress": {"type", *FLAG},
     },
     "fit": {
         "observe": {"'x'", *NOTHING},
@@ -59,7 +60,7 @@ ACCEPTED = {  # arguments by function, and the values that they may have; None a
         "begin": FINITE,
         "end": ABOVE_ZERO,
         "timeout": ABOVE_ZERO,
-        "progress": {"type", "function"},
+        "progress": {"type", "function", *FLAG},
     },
     "sweep": {
         "values": {"{}"},
@@ -69,7 +70,7 @@ ACCEPTED = {  # arguments by function, and the values that they may have; None a
         "rtol": ABOVE_ZERO,
         "timeout": ABOVE_ZERO,
         "folder": {"'x'", "'8'", "Path"},
-        "progress": {"type"},
+        "progress": {"type", *FLAG},
     },
     "load_result": {},
     "describe": {},
