@@ -30,9 +30,9 @@ ACCEPTED = {  # arguments by function, and the values that they may have; None a
         "rtol": ABOVE_ZERO,
         "inputs": {"{}"},
         "timeout": ABOVE_ZERO,
-        "progress": {"type", *FLAG},
+        "progress": {"type"},
     },
-    "compare": {"stop": ABOVE_ZERO, "rtol": ABOVE_ZERO, "timeout": ABOVE_ZERO, "progress": {"type", *FLAG}},
+    "compare": {"stop": ABOVE_ZERO, "rtol": ABOVE_ZERO, "timeout": ABOVE_ZERO, "progress": {"type"}},
     "identify_decay": {
         "unit": {"'x'", "'8'", "long text"},  # a unit that is not known is that of a sensor
         "k": ABOVE_ZERO,
@@ -43,7 +43,7 @@ ACCEPTED = {  # arguments by function, and the values that they may have; None a
         "begin": FINITE,
         "end": ABOVE_ZERO,
         "rate": ABOVE_ZERO,
-        "progress": {"type", *FLAG},
+        "progress": {"type"},
     },
     "fit": {
         "observe": {"'x'", *NOTHING},
@@ -60,7 +60,7 @@ ACCEPTED = {  # arguments by function, and the values that they may have; None a
         "begin": FINITE,
         "end": ABOVE_ZERO,
         "timeout": ABOVE_ZERO,
-        "progress": {"type", "function", *FLAG},
+        "progress": {"type", "function"},
     },
     "sweep": {
         "values": {"{}"},
@@ -70,7 +70,7 @@ ACCEPTED = {  # arguments by function, and the values that they may have; None a
         "rtol": ABOVE_ZERO,
         "timeout": ABOVE_ZERO,
         "folder": {"'x'", "'8'", "Path"},
-        "progress": {"type", *FLAG},
+        "progress": {"type"},
     },
     "load_result": {},
     "describe": {},
