@@ -37,7 +37,7 @@ NAMES = {
     BELT: [
         ("h", "size", "end", "i"),
         ("OVERFLOW_LIMIT", "d_x", "to", "tie_tolerance"),
-        ("x", "_x", "x_", "end_x"),  # underscores, as between a vector and its component
+        ("x", "x_", "y_x", "end_x"),  # underscores, as between a vector and its component
     ],
 }
 NATIVE = ("--native", "--platform", "linux64")

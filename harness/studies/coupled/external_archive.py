@@ -32,7 +32,7 @@ def open_system(archive: Path) -> Iterator[CoupledSystem]:
 
 
 def read_archive(source: Path, file: Path, stop: float | None) -> Convergence:
-    """Copy an archive to `file`; return its study, which records the Real outputs of all components."""
+    """Copy an archive to `file`; return its study, which records the Real output connectors of all components."""
     if not source.is_file():
         raise SceneError(f"{source} does not exist: give an existing archive, or a scene of `friction-fmus list`")
     copy(source, file)
@@ -41,7 +41,7 @@ def read_archive(source: Path, file: Path, stop: float | None) -> Convergence:
             (path, variable)
             for path, component in system.components.items()
             for variable in component.variables.values()
-            if variable.causality == "output" and variable.type in REAL_TYPES and not variable.dimensions
+            if (path, variable.name) in system.outputs and variable.type in REAL_TYPES and not variable.dimensions
         ]
     end = stop if stop is not None else system.stop
     if not end:

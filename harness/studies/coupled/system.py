@@ -93,6 +93,8 @@ class CoupledSystem:
         Default stop in s.
     components : dict
         Components by path.
+    outputs : set of Node
+        Output connectors of elements.
     links : list of Link
     values : dict
         Values to set, by node of a component, in the unit of its variable.
@@ -105,6 +107,7 @@ class CoupledSystem:
     name: str
     stop: float | None
     components: dict[str, Component] = field(default_factory=dict)
+    outputs: set[Node] = field(default_factory=set)
     links: list[Link] = field(default_factory=list)
     values: dict[Node, Any] = field(default_factory=dict)
     parameter_sets: list[str] = field(default_factory=list)
@@ -178,8 +181,11 @@ class SystemReader:
             kind = next(
                 (child for child in connector if local_name(child) not in ("ConnectorGeometry", "Annotations")), None
             )
+            node = path, connector.get("name", "")
             if kind is not None and kind.get("unit"):
-                self.connector_units[path, connector.get("name", "")] = kind.get("unit", "")
+                self.connector_units[node] = kind.get("unit", "")
+            if connector.get("kind") == "output":
+                self.system.outputs.add(node)
         if local_name(element) == "Component":
             self.read_component(element, path)
         elif local_name(element) == "System":
