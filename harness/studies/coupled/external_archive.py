@@ -32,16 +32,21 @@ def open_system(archive: Path) -> Iterator[CoupledSystem]:
 
 
 def read_archive(source: Path, file: Path, stop: float | None) -> Convergence:
-    """Copy an archive to `file`; return its study, which records the Real output connectors of all components."""
+    """Copy an archive to `file`; return its study.
+
+    It records the Real output connectors of each component, or all of its Real outputs if it has no output connector.
+    """
     if not source.is_file():
         raise SceneError(f"{source} does not exist: give an existing archive, or a scene of `friction-fmus list`")
     copy(source, file)
     with open_system(source) as system:
+        with_connectors = {path for path, _ in system.outputs}
         variables = [
             (path, variable)
             for path, component in system.components.items()
             for variable in component.variables.values()
-            if (path, variable.name) in system.outputs and variable.type in REAL_TYPES and not variable.dimensions
+            if variable.causality == "output" and variable.type in REAL_TYPES and not variable.dimensions
+            if path not in with_connectors or (path, variable.name) in system.outputs
         ]
     end = stop if stop is not None else system.stop
     if not end:
