@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from ...errors import HarnessError, install_command
 from ...process.child_process import ChildDiedError, ask_once
 from ...scenes.run_spec import RunSpec
-from .system import BOUND, EXCHANGE, MAPPED, NESTED, OPEN, OUTER_VALUES, TRANSFORMED, UNITS, VERSION_2
+from .system import BOUND, EXCHANGE, MAPPED, NESTED, OUTER_VALUES, TRANSFORMED, UNITS, VERSION_2
 
 ENGINE_TIMEOUT = 300.0  # s, for one run
 EXTRA = "coupled"
@@ -19,7 +19,7 @@ ENGINES = {  # modules of the child processes
 UNSUPPORTED = {  # with these features an engine fails, or ignores them without a message (measured)
     "Ecos": {NESTED, UNITS, MAPPED, OUTER_VALUES, VERSION_2, EXCHANGE},
     "libcosim": {NESTED, UNITS, MAPPED, OUTER_VALUES, EXCHANGE},
-    "fmpy": {TRANSFORMED, UNITS, BOUND, OUTER_VALUES, VERSION_2, EXCHANGE, OPEN},
+    "fmpy": {TRANSFORMED, UNITS, BOUND, OUTER_VALUES, VERSION_2, EXCHANGE},
 }
 
 ElementVariable = tuple[str, str, int]  # element of an archive, variable, value reference

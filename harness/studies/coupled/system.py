@@ -26,7 +26,7 @@ MAPPING_TRANSFORMATIONS = ("BooleanMapping", "IntegerMapping", "EnumerationMappi
 FMU_TYPE = "application/x-fmu-sharedlibrary"
 # features of a system that other engines do not support
 NESTED, TRANSFORMED, UNITS, MAPPED = "nested systems", "linear transformations", "unit conversions", "mapped parameters"
-VERSION_2, EXCHANGE, OPEN = "SSP 2.0", "components for model exchange", "inputs without a connection"
+VERSION_2, EXCHANGE = "SSP 2.0", "components for model exchange"
 BOUND, OUTER_VALUES = "parameter values outside of resources/parameters.ssv", "values of the system"
 ALL_PARAMETERS = "resources/parameters.ssv"  # all values of an archive of this project, for fmpy
 
@@ -142,7 +142,6 @@ class SystemReader:
             self.system.features.add(VERSION_2)
         self.units = dict(read_units(self.root))
         self.edges: dict[Node, Edge] = {}  # by the node at their end
-        self.inputs: set[Node] = set()  # of connectors
         self.connector_units: dict[Node, str] = {}
         self.parameters: dict[Node, tuple[Any, str]] = {}  # value and unit
 
@@ -160,8 +159,6 @@ class SystemReader:
         """Return the flattened system."""
         self.read_element(self.outer, "")
         system = self.system
-        if any(node[0] and node not in self.edges for node in self.inputs):
-            system.features.add(OPEN)
         for path, component in system.components.items():
             for name, variable in component.variables.items():
                 if (path, name) in self.edges and variable.causality == "input":
