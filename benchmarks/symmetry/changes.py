@@ -22,11 +22,13 @@ SCALES = (  # exponents of 2 of the units of mass, length and time
     (40, 20, 10),
     (-30, -30, -20),
 )
-TIME, UNITS, MIRROR, ORDER, FRAME, LONG = "start time", "units", "mirror", "order", "frame", "long run"
-KINDS = (TIME, UNITS, MIRROR, ORDER, FRAME, LONG)
+LARGEST_STEPS = (10.0, 1e4)  # of the duration; a tenth of it by default
+TIME, UNITS, MIRROR, ORDER, FRAME = "start time", "units", "mirror", "order", "frame"
+LARGEST_STEP, LONG = "largest step", "long run"
+KINDS = (TIME, UNITS, MIRROR, ORDER, FRAME, LARGEST_STEP, LONG)
 
 # tolerances relative to that of the method: another order changes roundings, another frame the error of each step
-START_SLACK, ORDER_SLACK, FRAME_SLACK = 10.0, 100.0, 1000.0
+START_SLACK, ORDER_SLACK, FRAME_SLACK, LARGEST_STEP_SLACK = 10.0, 100.0, 1000.0, 1000.0
 
 
 @dataclass(frozen=True)
@@ -101,6 +103,22 @@ class Change:
 def shift_start(values: Mapping[str, Any], duration: float, starts: Sequence[float] = START_TIMES) -> list[Change]:
     """Return changes of the start time."""
     return [Change(TIME, f"start {start:g} s", values, start, duration, slack=START_SLACK) for start in starts]
+
+
+def raise_largest_step(values: Mapping[str, Any], duration: float) -> list[Change]:
+    """Return changes of the largest step: as in runs that last longer, seen at their beginning."""
+    steps = [factor * duration for factor in LARGEST_STEPS]
+    return [
+        Change(
+            LARGEST_STEP,
+            f"largest step {step:g} s",
+            {**values, "solver.h_max": step},
+            0.0,
+            duration,
+            slack=LARGEST_STEP_SLACK,
+        )
+        for step in steps
+    ]
 
 
 def move_to_frame(

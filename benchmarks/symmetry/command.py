@@ -67,8 +67,9 @@ def symmetry(
     quiet: bool,
     as_json: bool,
 ) -> None:
-    """Run models under a change of the start time, of the units, of all signs, of the order of declarations, and of the
-    frame of reference.  None of these may change a motion.  Without arguments, run all models of the project.
+    """Run models under a change of the start time, of the units, of all signs, of the order of declarations, of the
+    frame of reference, and of the largest step.  None of these may change a motion.  Without arguments, run all models
+    of the project.
 
     The table has the number of runs that differ and the number of runs.  The list below it has the first difference of
     each run.
@@ -94,10 +95,11 @@ def symmetry(
         )
     failed = [describe(outcome) for outcome in outcomes if outcome.difference]
     cells = list_cells(count_differences(outcomes, by_method))
-    table = make_markdown(cells) if markdown else make_table(cells)
-    terminal.print_result(as_data(outcomes), f"{TITLE}: runs that differ, of all", table)
+    blocks = [] if markdown else [make_table(cells)]
+    terminal.print_result(as_data(outcomes), f"{TITLE}: runs that differ, of all", *blocks)
     if not (quiet or as_json):
-        click.echo("\n".join([*list_reasons(outcomes), *failed]))
+        rows = make_markdown(cells) if markdown else []  # rich would break long rows
+        click.echo("\n".join([*rows, *list_reasons(outcomes), *failed]))
     if failed:
         raise HarnessError(f"{len(failed)} of {len([o for o in outcomes if not o.reason])} runs differ")
 
@@ -160,10 +162,10 @@ def make_table(cells: list[list[str]]) -> Any:
     return table
 
 
-def make_markdown(cells: list[list[str]]) -> str:
-    """Return the table for a page of the documentation."""
+def make_markdown(cells: list[list[str]]) -> list[str]:
+    """Return the rows of the table for a page of the documentation."""
     head, *rows = [f"| {' | '.join(row)} |" for row in cells]
-    return "\n".join([head, "|---" * len(cells[0]) + "|", *rows])
+    return [head, "|---" * len(cells[0]) + "|", *rows]
 
 
 def list_reasons(outcomes: Sequence[Outcome]) -> list[str]:

@@ -18,6 +18,7 @@ from harness.running.variable_values import enumeration_labels
 from .builds import PYTHON, model_label
 from .changes import (
     FRAME,
+    LARGEST_STEP,
     LONG,
     ORDER,
     ORDER_SLACK,
@@ -28,6 +29,7 @@ from .changes import (
     Change,
     invert_signs,
     move_to_frame,
+    raise_largest_step,
     scale_units,
     shift_start,
 )
@@ -39,6 +41,7 @@ from .motion import FmuRuns, Motion, TooManyStepsError, find_difference
 HYBRID = "hybrid"  # law of friction
 STIFF = ("rodas", "radau9")  # methods for stiff problems
 TIME_UNIT = 2.0**-30  # s; the sum of a multiple and a start time is exact
+LONG_RUN_TOLERANCE = 0.01  # of the relative tolerance of other runs
 MAX_CUTS = 8  # of a run that needs too many steps
 ROUNDING = 1e-12  # relative tolerance of the closed form
 
@@ -230,6 +233,8 @@ class Model:
         """Run for a long time and compare the periods."""
         if not self.runs.modes or values.get("friction", HYBRID) != HYBRID:
             return outcome(LONG, "", reason="there are no events")
+        # the error of a position that drifts with its driver is relative to its size, far above the motion in a period
+        values = {**values, "solver.rtol": LONG_RUN_TOLERANCE * rtol}
         try:
             times, modes = record_events(self.runs, values, self.options.long_run)
         except HarnessError as error:
@@ -248,6 +253,10 @@ class Model:
         runs, law = self.runs, values.get("friction", HYBRID)
         if kind == TIME:
             return [(runs, change) for change in shift_start(values, duration, self.options.starts)]
+        if kind == LARGEST_STEP:
+            if law != HYBRID:
+                return f"the law {law} chatters"
+            return [(runs, change) for change in raise_largest_step(values, duration)]
         if kind in self.others:
             other = self.others[kind]
             if isinstance(other, str):

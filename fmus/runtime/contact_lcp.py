@@ -32,7 +32,7 @@ MAX_JOINT_ITERATIONS, MAX_ITERATIONS = 60, 200  # pivots of all contacts at once
 MAX_IMPULSES = 3  # several, since slip velocities may be nonlinear in the positions
 TINY_FORCE = 1e-300  # N, avoids a division by zero
 EQUAL_SHARE = 1.0 - 1e-9  # of the holding limit: a larger sliding force equals it
-PREDICTION_SHARE = 1e-4  # of the longest step: how far slips are predicted
+PREDICTION_SHARE = 1e-4  # of the time scale of the motion: how far slips and loads are predicted
 REVERSED_SHARE = 1e-8  # relative; larger slips against the mode are no rounding errors
 MAX_ENUMERATED = 6  # contacts at rest of which all modes are tried
 SLIPPING, RELOCKED, AT_REST, AT_LIMIT = 0, 1, 2, 3  # status of a contact in the pivoting
@@ -112,6 +112,7 @@ def resolve_after_event(model, step, h, ends: ContactVector, tie_tolerance) -> t
     terms = model.slip_magnitudes(t, step.y1)
     floors = slip_floors(model, step, t, step.y1)
     force, limit, _ = model.contact_forces(t, step.y1, step.modes0)
+    delta = PREDICTION_SHARE * step.time_scale()
     status, new_modes = contact_vector(), contact_vector()
     y = step.y1
     for i in contact_indices:
@@ -124,15 +125,15 @@ def resolve_after_event(model, step, h, ends: ContactVector, tie_tolerance) -> t
             elif ends[i] <= h or new_modes[i] * slips[i] <= SIMULTANEITY_MARGIN * terms[i]:
                 depth = inf
                 if fabs(force[i]) >= EQUAL_SHARE * limit[i]:
-                    depth = reversal_depth(model, t, y, step.modes0, step.h_max, limit[i], i)
+                    depth = reversal_depth(model, t, y, step.modes0, delta, limit[i], i)
                 if depth <= tie_tolerance * (terms[i] + start_slip(model, step, i) + floors[i]):
                     y = raise_slip(model, t, y, step.modes0, 2.0 * depth + ROUNDOFF_MARGIN * terms[i], i)
                 else:
                     status[i], new_modes[i] = AT_REST, STUCK
-    return resolve_contacts(model, t, y, step.modes0, new_modes, status, step.h_max, tie_tolerance)
+    return resolve_contacts(model, t, y, step.modes0, new_modes, status, delta, tie_tolerance)
 
 
-def reversal_depth(model, t, y: StateVector, modes: ContactVector, h_max, holding_limit, i: ContactIndex):
+def reversal_depth(model, t, y: StateVector, modes: ContactVector, delta, holding_limit, i: ContactIndex):
     """Return how far a slip velocity, zero now, would go against its mode before it returns; inf if it does not.
 
     With a holding limit equal to the sliding force, the contact breaks away again when the slip would return; after
@@ -146,7 +147,6 @@ def reversal_depth(model, t, y: StateVector, modes: ContactVector, h_max, holdin
         return 0.0
     if not rate > 0.0:
         return inf
-    delta = PREDICTION_SHARE * h_max
     f = model.rates(t, y, modes)
     y2 = y + delta * f
     slips = model.slip_velocities(t, y)
@@ -241,7 +241,8 @@ def resolve_at_start(
             new_modes[i] = modes[i]
         elif fabs(slips[i]) <= zero_level:
             status[i], new_modes[i] = AT_REST, STUCK
-    return resolve_contacts(model, t, y, modes, new_modes, status, step.h_max, tie_tolerance)
+    delta = PREDICTION_SHARE * step.time_scale()
+    return resolve_contacts(model, t, y, modes, new_modes, status, delta, tie_tolerance)
 
 
 def resolve_contacts(
@@ -251,7 +252,7 @@ def resolve_contacts(
     modes: ContactVector,
     new_modes: ContactVector,
     status: ContactVector,
-    h_max,
+    delta,
     tie_tolerance,
 ) -> tuple[StateVector, ContactVector, bool]:
     """Return the states without slip in the contacts at rest, their modes, and whether these are consistent.
@@ -269,16 +270,16 @@ def resolve_contacts(
         Modes before.
     new_modes, status
         Modes in which contacts at rest are stuck, and the status of each contact.
-    h_max
-        Largest internal step in s; a share of it is how far slips and loads are predicted.
+    delta
+        Time in s ahead at which slips and loads are predicted.
     tie_tolerance
         See `violations`.
     """
     if model.has_variable_levers:
         slips = model.slip_velocities(t, y)
         _force, limit, terms = model.contact_forces(t, y, new_modes)
-        moving_modes, _consistent = solve_modes(model, t, y, new_modes, status, h_max, tie_tolerance)
-        slips_ahead = predict_slips(model, t, y, moving_modes, h_max)
+        moving_modes, _consistent = solve_modes(model, t, y, new_modes, status, delta, tie_tolerance)
+        slips_ahead = predict_slips(model, t, y, moving_modes, delta)
         for i in contact_indices:
             if status[i] == AT_REST and moving_modes[i] != STUCK:
                 status[i], new_modes[i] = SLIPPING, moving_modes[i]
@@ -287,7 +288,7 @@ def resolve_contacts(
                 elif ROUNDOFF_MARGIN * terms[i] > limit[i] and slips_ahead[i] != 0.0:
                     new_modes[i] = sign(slips_ahead[i])  # at a dead point; the load has rounding errors only
     y = stop_slips(model, t, y, new_modes)
-    resolved_modes, consistent = solve_modes(model, t, y, new_modes, status, h_max, tie_tolerance)
+    resolved_modes, consistent = solve_modes(model, t, y, new_modes, status, delta, tie_tolerance)
     return y, resolved_modes, consistent
 
 
@@ -315,7 +316,7 @@ def stop_slips(model, t, y: StateVector, modes: ContactVector) -> StateVector:
 
 
 def solve_modes(
-    model, t, y: StateVector, modes: ContactVector, status: ContactVector, h_max, tie_tolerance
+    model, t, y: StateVector, modes: ContactVector, status: ContactVector, delta, tie_tolerance
 ) -> tuple[ContactVector, bool]:
     """Solve the complementarity problem for the modes of contacts at rest.
 
@@ -337,7 +338,7 @@ def solve_modes(
         pivot_modes[i], pivot_status[i] = modes[i], status[i]
     consistent = False
     for iteration in range(MAX_ITERATIONS):
-        violation, next_modes = violations(model, t, y, pivot_modes, pivot_status, h_max, tie_tolerance)
+        violation, next_modes = violations(model, t, y, pivot_modes, pivot_status, delta, tie_tolerance)
         highest = max_of(violation)
         if not highest > 0.0:
             consistent = True
@@ -360,10 +361,10 @@ def solve_modes(
     if n_at_rest > MAX_ENUMERATED:
         if not consistent:
             return modes, False
-        relocked_modes = relock(model, t, y, pivot_modes, status, h_max, tie_tolerance)
+        relocked_modes = relock(model, t, y, pivot_modes, status, delta, tie_tolerance)
         return relocked_modes, True
     best_modes, found = most_held(
-        model, t, y, modes, status, h_max, tie_tolerance, n_at_rest, n_released if consistent else n_at_rest + 1
+        model, t, y, modes, status, delta, tie_tolerance, n_at_rest, n_released if consistent else n_at_rest + 1
     )
     if found:
         return best_modes, True
@@ -372,9 +373,8 @@ def solve_modes(
     return modes, False
 
 
-def predict_slips(model, t, y: StateVector, modes: ContactVector, h_max) -> ContactVector:
+def predict_slips(model, t, y: StateVector, modes: ContactVector, delta) -> ContactVector:
     """Return the slip velocities a short time ahead, also if the motion only starts."""
-    delta = PREDICTION_SHARE * h_max
     f = model.rates(t, y, modes)
     y2 = y + delta * f
     f2 = model.rates(t + delta, y2, modes)
@@ -383,13 +383,12 @@ def predict_slips(model, t, y: StateVector, modes: ContactVector, h_max) -> Cont
 
 
 def contact_balance_ahead(
-    model, t, y: StateVector, modes: ContactVector, h_max
+    model, t, y: StateVector, modes: ContactVector, delta
 ) -> tuple[ContactVector, ContactVector, ContactVector, ContactVector, ContactVector, ContactVector]:
     """Return forces, holding limits and the terms of forces a short time ahead; rates of forces, limits and residuals.
 
     They decide a tie where the rates at t are zero, or where the load touches the limit.
     """
-    delta = PREDICTION_SHARE * h_max
     f = model.rates(t, y, modes)
     y2 = y + delta * f
     force, limit, terms = model.contact_forces(t + delta, y2, modes)
@@ -398,7 +397,7 @@ def contact_balance_ahead(
 
 
 def relock(
-    model, t, y: StateVector, modes: ContactVector, status: ContactVector, h_max, tie_tolerance
+    model, t, y: StateVector, modes: ContactVector, status: ContactVector, delta, tie_tolerance
 ) -> ContactVector:
     """Return consistent modes in which released contacts are locked again, one after another, where this fits."""
     trial_modes = contact_vector()
@@ -407,13 +406,13 @@ def relock(
     for i in contact_indices:
         if status[i] != SLIPPING and modes[i] != STUCK:
             trial_modes[i] = STUCK
-            if not are_consistent(model, t, y, trial_modes, status, h_max, tie_tolerance):
+            if not are_consistent(model, t, y, trial_modes, status, delta, tie_tolerance):
                 trial_modes[i] = modes[i]
     return trial_modes
 
 
 def most_held(
-    model, t, y: StateVector, modes: ContactVector, status: ContactVector, h_max, tie_tolerance, n_at_rest, n_released
+    model, t, y: StateVector, modes: ContactVector, status: ContactVector, delta, tie_tolerance, n_at_rest, n_released
 ) -> tuple[ContactVector, bool]:
     """Return the consistent modes that release the fewest contacts at rest, fewer than `n_released`, if any.
 
@@ -435,7 +434,7 @@ def most_held(
                 if status[i] != SLIPPING and trial_modes[i] != STUCK:
                     n_sliding += 1
             if n_sliding == n:
-                if are_consistent(model, t, y, trial_modes, status, h_max, tie_tolerance):
+                if are_consistent(model, t, y, trial_modes, status, delta, tie_tolerance):
                     force, limit, _terms = model.contact_forces(t, y, trial_modes)
                     highest = 0.0
                     for i in contact_indices:
@@ -458,14 +457,14 @@ def most_held(
     return best_modes, False
 
 
-def are_consistent(model, t, y: StateVector, modes: ContactVector, status: ContactVector, h_max, tie_tolerance):
+def are_consistent(model, t, y: StateVector, modes: ContactVector, status: ContactVector, delta, tie_tolerance):
     """Return whether no contact at rest violates the conditions of its mode."""
-    violation, _next_modes = violations(model, t, y, modes, status, h_max, tie_tolerance)
+    violation, _next_modes = violations(model, t, y, modes, status, delta, tie_tolerance)
     return not max_of(violation) > 0.0
 
 
 def violations(
-    model, t, y: StateVector, modes: ContactVector, status: ContactVector, h_max, tie_tolerance
+    model, t, y: StateVector, modes: ContactVector, status: ContactVector, delta, tie_tolerance
 ) -> tuple[ContactVector, ContactVector]:
     """Return how far each contact at rest violates the conditions of its mode (0: not at all), and its next mode.
 
@@ -476,9 +475,8 @@ def violations(
     force, limit, terms = model.contact_forces(t, y, modes)
     force_rate, limit_rate, residual_force, residual_force_rate = model.contact_rates(t, y, modes)
     later_force, later_limit, later_terms, later_force_rate, later_limit_rate, later_residual_rate = (
-        contact_balance_ahead(model, t, y, modes, h_max)
+        contact_balance_ahead(model, t, y, modes, delta)
     )
-    delta = PREDICTION_SHARE * h_max
     violation, next_modes = contact_vector(), contact_vector()
     for i in contact_indices:
         violation[i], next_modes[i] = 0.0, STUCK

@@ -609,6 +609,17 @@ class InternalStep:
         h = self.active_method.safety * self.tolerance**self.active_method.power
         return h / rate if h < rate * self.h_max else self.h_max
 
+    def time_scale(self):
+        """Return the time in which the motion changes by its own size: the step to try at a relative tolerance of 1.
+
+        It follows the motion, not the duration of the run, which only limits it from above.
+        """
+        if self.h_next == 0.0:
+            return START_SHARE * self.h_max
+        method = self.active_method
+        scale = self.h_next / (method.safety * self.tolerance**method.power)
+        return scale if scale < self.h_max else self.h_max
+
     def state_at(self, model, t) -> StateVector:
         """Interpolate the state at t inside the step."""
         interpolant = self.interpolant

@@ -1,4 +1,5 @@
-"""A motion does not depend on its start time, the units, a mirror, the order of declarations and the frame."""
+"""A motion does not depend on its start time, the units, a mirror, the order of declarations, the frame and the largest
+step."""
 
 import random
 from contextlib import redirect_stderr
@@ -27,6 +28,7 @@ FEW_MODELS = {
     "pacejka": ("radau9",),
     "sleds": ("dop853",),
     "belt": ("rodas",),
+    "crank": ("ode45",),
 }
 PERIODIC = {"stickslip": 1e5, "joint": 700.0, "forced": 300.0, "sleds": 1000.0}  # duration in s
 HAVE_NONE = {  # no mirror image: a constant of one sign, or a number as start value; no frame: no state is a velocity
