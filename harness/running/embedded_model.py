@@ -47,9 +47,30 @@ def import_model_class(fmu: Path) -> type:
         package = (resources / SCRIPT_NAME_FILE).read_text(encoding="utf-8").removesuffix("_fmu")
         sys.path.insert(0, str(resources))
         try:
-            return import_module(package).Model
+            model: type = import_module(package).Model
         finally:
             sys.path.remove(str(resources))
+        check_names(model, fmu)
+        return model
+
+
+def check_names(model: Any, fmu: Path) -> None:
+    """Check that the code in an FMU has the names that are used here.
+
+    Raises
+    ------
+    HarnessError
+        If another version of this project built it.
+    """
+    try:
+        solver = create_run(model()).solver
+        method_numbers(model)
+        for name in model.states:
+            getattr(solver, component_name("y", name))
+    except (AttributeError, ImportError, TypeError):
+        raise HarnessError(
+            f"{fmu.name} was built by another version of this project: build it again, as with `python build_fmus.py`"
+        ) from None
 
 
 @cache
