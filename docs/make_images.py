@@ -11,7 +11,9 @@ import re
 import shutil
 import subprocess
 import sys
+from base64 import b64decode, b64encode
 from collections.abc import Callable
+from io import BytesIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -343,7 +345,19 @@ def run_notebook(folder: Path) -> None:
     content = nbformat.read(path, as_version=4)
     client = NotebookClient(content, timeout=300, record_timing=False, resources={"metadata": {"path": str(folder)}})
     client.execute(env=os.environ | {"PYTHONPATH": str(DOCS.parent), "MPLBACKEND": INLINE})
+    for output in (output for cell in content.cells for output in cell.get("outputs", ())):
+        if "image/png" in output.get("data", {}):
+            output.data["image/png"] = reduce_colours(output.data["image/png"])
     nbformat.write(content, path)
+
+
+def reduce_colours(png: str) -> str:
+    """Return a PNG picture in base64 with 64 colours, which makes it smaller."""
+    from PIL import Image
+
+    image, reduced = Image.open(BytesIO(b64decode(png))).convert("RGB"), BytesIO()
+    image.quantize(64).save(reduced, "png", optimize=True)
+    return b64encode(reduced.getvalue()).decode()
 
 
 INLINE = "module://matplotlib_inline.backend_inline"

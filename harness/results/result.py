@@ -107,6 +107,11 @@ class Result(ABC):
         -------
         numpy.ndarray
             The matplotlib axes (n,), one for each panel.
+
+        Raises
+        ------
+        HarnessError
+            If the result holds nothing that the figure shows.
         """
         import matplotlib.pyplot as plt
         import numpy as np
@@ -119,6 +124,9 @@ class Result(ABC):
                 return np.array([ax])
             figure = plt.figure(dpi=DPI)
             self.draw(figure)
+            if not figure.axes:
+                plt.close(figure)
+                raise HarnessError(f"this {self.study} result has nothing to plot; to_pandas() has its numbers")
             for text in find_texts(figure):
                 text.set_parse_math(False)
         return np.array(figure.axes)

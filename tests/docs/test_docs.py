@@ -94,7 +94,8 @@ def test_notebook_runs(workspace):
     nbformat = pytest.importorskip("nbformat", reason="extra docs")
     notebook = nbformat.read(DOCS / "tutorials" / "python_api.ipynb", as_version=4)
     client = nbclient.NotebookClient(notebook, timeout=120, resources={"metadata": {"path": str(workspace)}})
-    client.execute(env=ENVIRONMENT)
+    path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"  # has friction-fmus
+    client.execute(env={**ENVIRONMENT, "PATH": path})
 
 
 @pytest.mark.slow

@@ -1,5 +1,6 @@
 """Every result of every study: in one line, as the command prints it, as HTML, table and picture, saved and loaded."""
 
+from dataclasses import replace
 from functools import cache
 from html.parser import HTMLParser
 from math import nan
@@ -241,6 +242,12 @@ def test_every_study_has_a_command_and_a_section_in_the_report(tmp_path):
     page = write_report(tmp_path / "results", ()).path.read_text()
     titles = [page.index(f">{study.title}<") for study in sorted(STUDIES, key=lambda study: study.verifies)]
     assert titles == sorted(titles)
+
+
+def test_a_result_without_anything_to_draw_has_no_empty_figure():
+    result = replace(result_of("stability"), regions=())
+    with pytest.raises(harness.HarnessError, match="this stability result has nothing to plot"):
+        result.plot()
 
 
 def test_a_summary_of_an_unknown_study_is_at_the_end_of_the_report_and_loads(tmp_path):

@@ -245,7 +245,10 @@ def make_unknown(
     if limits is None:
         middle = start if start is not None else variable.start
         if not middle:
-            raise SceneError(f"{name} has no start value other than 0: give the range to search, as in {name}=-1:1")
+            example = f"{max(minimum, -1.0):g}:{min(maximum, 1.0):g}"
+            raise SceneError(
+                f"{name} has no start value other than 0: give the range to search, as in {name}={example}"
+            )
         low, high = sorted((middle / RANGE_FACTOR, middle * RANGE_FACTOR))
         low, high = max(low, minimum), min(high, maximum)
     else:
