@@ -1,4 +1,4 @@
-"""Write the generated parts of the reference pages: commands, FMU variables, scene keys, result and record files.
+"""Write the generated parts of the reference pages: commands, variables, options, scene keys, result and record files.
 
 `python docs/make_reference.py FMUS` reads the built FMUs in the folder FMUS (default: fmus) and replaces the text
 between the comments <!-- generated: NAME --> and <!-- end --> in docs/reference.
@@ -159,6 +159,17 @@ def enumerations(fmus: Path) -> str:
     return format_table(("variable", "value", "name", "meaning", "FMUs"), rows)
 
 
+def declaration_options() -> str:
+    """Return the table of the options of declarations in model files."""
+    from fmus.packaging.equations.declaration_options import OPTIONS
+
+    rows = [
+        (f"`{name}`", {float: "a number", str: "a string"}[option.type], option.text)
+        for name, option in OPTIONS.items()
+    ]
+    return format_table(("option", "value", "meaning"), rows)
+
+
 def constraints(annotation: Any) -> list[str]:
     """Return the constraints of a type as texts, which its annotations contain."""
     markers = getattr(annotation, "__metadata__", ())
@@ -317,6 +328,7 @@ def parts(fmus: Path) -> dict[str, Callable[[], str]]:
         "command-texts": command_texts,
         "variables-common": lambda: common_variables(fmus),
         "enumerations": lambda: enumerations(fmus),
+        "declaration-options": declaration_options,
         "scene-keys": lambda: keys(SCENE_TEXTS, RunSpec, scene.SceneKeys),
         "scene-citation": lambda: keys(CITATION_TEXTS, schema_within(scene.SceneKeys, "citation")),
         "scene-decay": lambda: keys(DECAY_TEXTS, schema_within(scene.SceneKeys, "decay")),

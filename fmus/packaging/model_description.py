@@ -15,6 +15,7 @@ from ..runtime.variable_access import SETTABLE_CAUSALITIES
 from ..runtime.variable_declarations import VariableDeclaration, VariableOwner
 from . import __version__
 from .dependencies import output_dependencies
+from .equations.declaration_options import OPTIONS
 from .fmi_variables import (
     DERIVATIVE_NAME,
     TIME,
@@ -188,8 +189,13 @@ def type_attributes(name: str, meaning: VariableDeclaration) -> dict[str, str]:
     if meaning.type == "Real":
         unit = unit_of(name, meaning.unit, meaning.display)
         attributes |= {"declaredType": unit.quantity, "unit": meaning.unit}
-        if display := meaning.display or unit.display:
-            attributes["displayUnit"] = display
+        if unit.display:
+            attributes["displayUnit"] = unit.display
+        attributes |= {
+            option.attribute: str(vars(meaning)[name])
+            for name, option in OPTIONS.items()
+            if option.attribute and vars(meaning).get(name, "") != ""
+        }
     number = float if meaning.type == "Real" else int
     for key, bound in ("min", max(meaning.low, meaning.above)), ("max", min(meaning.high, meaning.below)):
         if isfinite(bound):

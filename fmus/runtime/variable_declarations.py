@@ -29,21 +29,17 @@ class VariableDeclaration:
     role = ""  # "state", or "contact" for the friction force of a contact
     rate_of = ""  # name of the state whose rate this is
     rate = ""  # name of the parameter that is its constant rate, as for a driver
+    # options, see packaging/equations/declaration_options.py
+    low: float = -inf
+    high: float = inf
+    above: float = -inf
+    below: float = inf
+    display = alias = ""
 
-    def __init__(
-        self,
-        unit: str,
-        text: str,
-        low: float = -inf,
-        high: float = inf,
-        above: float = -inf,
-        below: float = inf,
-        display: str = "",
-        alias: str = "",
-    ) -> None:
+    def __init__(self, unit: str, text: str, **options: Any) -> None:
         self.name = ""
-        self.unit, self.text, self.display, self.alias = unit, text, display, alias
-        self.low, self.high, self.above, self.below = low, high, above, below
+        self.unit, self.text = unit, text
+        vars(self).update(options)
 
     def __set_name__(self, owner: object, name: str) -> None:
         self.name = name

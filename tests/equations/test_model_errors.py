@@ -155,12 +155,17 @@ WRONG = {
     "a text for a number": (
         RATE + '    q = Parameter("1.0", "kg", "q")\n',
         17,
-        "q: start value and bounds must be numbers",
+        "start of q must be a number, got '1.0'",
     ),
     "a variable without a name": (
         RATE.replace("F - k * x", 'Parameter(1.0, "N", "pull") - k * x'),
         16,
         "a uses a variable without a name: assign the variable to a name in the class first",
+    ),
+    "an option that does not exist": (
+        RATE.replace("rate_of=v", "rate_of=v, hi=1.0"),
+        16,
+        "Output has no argument hi, the nearest is high: write Output(unit, text, expression, rate_of=",
     ),
     "an alias of what is calculated": (
         RATE.replace("rate_of=v", 'rate_of=v, alias="b"'),
@@ -259,7 +264,7 @@ WRONG = {
     "a number out of range": (
         RATE + '    q = Parameter(10**400, "kg", "q")\n',
         17,
-        "q: start value and bounds must be numbers",
+        "start of q must be a number, got ",
     ),
     "no rules": (RATE + "    rules = None\n", 4, "rules must be a Rule or a tuple of Rules"),
     "a rule without words": (
@@ -462,7 +467,7 @@ WRONG = {
     "an expression as start": (
         RATE + '    q = Parameter(2.0 * m, "kg", "q")\n',
         17,
-        "q: start value and bounds must be numbers, got an expression",
+        "start of q must be a number, got an expression",
     ),
     "a unit without a point": (RATE + '    q = Parameter(1.0, "Nm", "q")\n', 17, "q has the unit 'Nm': write \"N.m\""),
     "a unit with a power": (

@@ -6,6 +6,7 @@ from typing import Any
 
 from ...runtime.active_method import EXACT_ITEM, METHOD_ITEMS
 from .algebra import depends_on, operands, operands_first, subexpressions
+from .declaration_options import OPTIONS
 from .expressions import (
     NO_EQUALITY,
     Expression,
@@ -118,10 +119,11 @@ def _check_variable(analysis: ModelRoles, e: Variable) -> None:
     if not e.text:
         raise ModelError(f"{e.name} has an empty description: write a text", e.location)
     _check_printable(e.name, e.location, e.text, *(sentence for _, _, sentence in e.items))
-    for value in (e.start, e.low, e.high, e.above, e.below):
+    numbers = {name: vars(e)[name] for name, option in OPTIONS.items() if option.type is float and name in vars(e)}
+    for word, value in {"start": e.start, **numbers}.items():
         if not is_number(value) or (isinstance(value, int) and abs(value) > LARGEST_FLOAT):
             got = "an expression" if isinstance(value, Expression) else describe(value)
-            raise ModelError(f"{e.name}: start value and bounds must be numbers, got {got}", e.location)
+            raise ModelError(f"{word} of {e.name} must be a number, got {got}", e.location)
     if not max(e.low, e.above) <= min(e.high, e.below):
         raise ModelError(f"{e.name} has an empty range: no number is {e.allowed}", e.location)
     if isinstance(e, Contact) and is_among(e.slip, analysis.positions):
@@ -184,7 +186,9 @@ def declared_content(model: type[Model]) -> list[tuple[Any, ...]]:
     for e in roots:
         subexpressions(e, found)
     variables = [
-        (e, e.name, e.start, e.low, e.high, e.above, e.below) for e in found.values() if isinstance(e, Variable)
+        (e, e.name, e.start, *(vars(e).get(name) for name in OPTIONS))
+        for e in found.values()
+        if isinstance(e, Variable)
     ]
     terms = [e for e in found.values() if isinstance(e, Term)]
     return [*variables, *((e, e.op, *(one for one in e.args if is_number(one))) for e in terms)]

@@ -3,18 +3,20 @@
 from collections.abc import Callable, MutableMapping
 from difflib import get_close_matches
 from functools import cached_property
-from inspect import signature
+from inspect import Parameter as Argument
+from inspect import Signature, cleandoc, signature
 from linecache import getline
-from math import inf
 from types import FunctionType, ModuleType
-from typing import Any
+from typing import Any, ClassVar, Unpack, get_args, get_type_hints
 
 from ...runtime import variable_declarations
+from .declaration_options import OPTIONS, Options, SettableOptions
 from .expressions import Expression, ModelError, Operand, Term, as_operand, author_location, describe, is_comparison
 
 HYBRID, SIGN, THRESHOLD = "hybrid", "sign", "threshold"
 SETTINGS = ("rules", "stop_time", "step_size", "tolerance", "method")  # attributes of Model
 FUNCTION_TYPES = (FunctionType, property, staticmethod, classmethod, cached_property)
+OPTIONS_ENTRY = "**options\n    See the table of options."  # of docstrings
 
 
 def signature_text(function: Callable[..., object]) -> str:
@@ -27,27 +29,34 @@ def signature_text(function: Callable[..., object]) -> str:
 
 
 class Variable(Expression, variable_declarations.VariableDeclaration):
-    """A declared variable: name, unit, description and range."""
+    """A declared variable: name, unit, description and options such as its range."""
 
-    def __init__(
-        self,
-        unit: str,
-        text: str,
-        *,
-        low: float = -inf,
-        high: float = inf,
-        above: float = -inf,
-        below: float = inf,
-        display: str = "",
-        alias: str = "",
-    ) -> None:
-        for word, value in ("unit", unit), ("text", text), ("display", display), ("alias", alias):
+    __signature__: ClassVar[Signature]
+
+    def __init_subclass__(cls) -> None:
+        """Name the single options instead of **options in the signature and the docstring, which help() shows."""
+        _, *arguments = signature(cls.__init__).parameters.values()
+        options = {}
+        if arguments[-1].name == "options":
+            (table,) = get_args(arguments.pop().annotation)
+            options = {name: OPTIONS[name] for name in get_type_hints(table)}
+        arguments += [Argument(name, Argument.KEYWORD_ONLY, default=None) for name in options]
+        cls.__signature__ = Signature(arguments)
+        texts = "\n".join(f"{name}\n    {option.text}" for name, option in options.items())
+        cls.__doc__ = cleandoc(cls.__doc__ or "").replace(OPTIONS_ENTRY, texts)
+
+    def __init__(self, unit: str, text: str, **options: Unpack[SettableOptions]) -> None:
+        for word in options:
+            if word not in signature(type(self)).parameters:
+                raise TypeError(f"{type(self).__name__}() got an unexpected keyword argument {word!r}")
+        texts = {word: value for word, value in options.items() if OPTIONS[word].type is str}
+        for word, value in {"unit": unit, "text": text, **texts}.items():
             if not isinstance(value, str):
                 raise ModelError(
                     f"{word} of a declaration must be a string, got {describe(value)}: write "
                     f"{type(self).__name__}{signature_text(type(self))}"
                 )
-        variable_declarations.VariableDeclaration.__init__(self, unit, text, low, high, above, below, display, alias)
+        variable_declarations.VariableDeclaration.__init__(self, unit, text, **options)
         self.location = author_location()
 
     def __set_name__(self, owner: object, name: str) -> None:
@@ -57,20 +66,8 @@ class Variable(Expression, variable_declarations.VariableDeclaration):
 class SettableVariable(Variable):
     """A variable with a value that the user or another FMU sets."""
 
-    def __init__(
-        self,
-        start: float,
-        unit: str,
-        text: str,
-        *,
-        low: float = -inf,
-        high: float = inf,
-        above: float = -inf,
-        below: float = inf,
-        display: str = "",
-        alias: str = "",
-    ) -> None:
-        Variable.__init__(self, unit, text, low=low, high=high, above=above, below=below, display=display, alias=alias)
+    def __init__(self, start: float, unit: str, text: str, **options: Unpack[SettableOptions]) -> None:
+        Variable.__init__(self, unit, text, **options)
         self.start = start
 
 
@@ -85,14 +82,8 @@ class Parameter(SettableVariable, variable_declarations.Parameter):
         SI unit, such as "N.s/m".
     text
         Short description.
-    low, high
-        Inclusive bounds.
-    above, below
-        Exclusive bounds.
-    display
-        Display unit, such as "deg".
-    alias
-        Alternative name, exported in FMI 3.0.
+    **options
+        See the table of options.
     """
 
 
@@ -101,8 +92,10 @@ class Fixed(SettableVariable, variable_declarations.Fixed):
 
     Parameters
     ----------
-    start, unit, text, low, high, above, below, display, alias
+    start, unit, text
         As for Parameter.
+    **options
+        See the table of options.
     """
 
 
@@ -113,14 +106,18 @@ class Input(SettableVariable, variable_declarations.Input):
         a_belt = Input(0.0, "m/s2", "acceleration of the belt")
         v_belt = Input(0.2, "m/s", "speed of the belt", rate=a_belt)
 
+    An input with a rate has no range.
+
     Parameters
     ----------
-    start, unit, text, low, high, above, below, display, alias
-        As for Parameter.  An input with a rate has no range.
+    start, unit, text
+        As for Parameter.
     rate
         Derivative of the input by time: another input, or a linear expression of inputs with parameters as
         coefficients.  It continues the input between communication points.  An input in the slip of a contact needs
         it; rate=0.0 means constant between jumps.
+    **options
+        See the table of options.
     """
 
     def __init__(
@@ -129,17 +126,9 @@ class Input(SettableVariable, variable_declarations.Input):
         unit: str,
         text: str,
         rate: Operand = None,
-        *,
-        low: float = -inf,
-        high: float = inf,
-        above: float = -inf,
-        below: float = inf,
-        display: str = "",
-        alias: str = "",
+        **options: Unpack[SettableOptions],
     ) -> None:
-        SettableVariable.__init__(
-            self, start, unit, text, low=low, high=high, above=above, below=below, display=display, alias=alias
-        )
+        SettableVariable.__init__(self, start, unit, text, **options)
         self.declared_rate: Operand = None if rate is None else as_operand(rate)
 
 
@@ -180,7 +169,8 @@ class State(Variable, variable_declarations.Output):
         a = Output("m/s2", "acceleration", (-k * x - F_friction) / m, rate_of=v)
         x_driver = State("m", "position of the driver", rate=v_driver)
 
-    Its rate is the state or output with `rate_of`, or its own constant `rate`.
+    Its rate is the state or output with `rate_of`, or its own constant `rate`.  Its range is a property of the solution
+    and is not enforced.
 
     Parameters
     ----------
@@ -194,8 +184,8 @@ class State(Variable, variable_declarations.Output):
         Constant rate of this state, such as the speed of a driver: a parameter or an expression of parameters.
     nominal_velocity
         Smallest magnitude that the integrator must resolve, where the friction law defines one.
-    low, high, above, below, display
-        As for Parameter; the range is a property of the solution and is not enforced.
+    **options
+        See the table of options.
     """
 
     def __init__(
@@ -206,20 +196,15 @@ class State(Variable, variable_declarations.Output):
         rate_of: "State | None" = None,
         rate: Operand = None,
         nominal_velocity: Operand = None,
-        *,
-        low: float = -inf,
-        high: float = inf,
-        above: float = -inf,
-        below: float = inf,
-        display: str = "",
+        **options: Unpack[Options],
     ) -> None:
-        Variable.__init__(self, unit, text, low=low, high=high, above=above, below=below, display=display)
+        Variable.__init__(self, unit, text, **options)
         self.start_expression, self.integrates, self.nominal_velocity = as_operand(start), rate_of, nominal_velocity
         self.constant_rate: Operand = None if rate is None else as_operand(rate)
 
 
 class Output(Variable, variable_declarations.Output):
-    """A calculated variable.
+    """A calculated variable; its range is a property of the solution and is not enforced.
 
     Parameters
     ----------
@@ -229,8 +214,8 @@ class Output(Variable, variable_declarations.Output):
         The value, an expression of other variables.
     rate_of
         The state whose derivative this is.
-    low, high, above, below, display
-        As for Parameter; the range is a property of the solution and is not enforced.
+    **options
+        See the table of options.
     """
 
     def __init__(
@@ -239,14 +224,9 @@ class Output(Variable, variable_declarations.Output):
         text: str,
         expression: Operand,
         rate_of: State | None = None,
-        *,
-        low: float = -inf,
-        high: float = inf,
-        above: float = -inf,
-        below: float = inf,
-        display: str = "",
+        **options: Unpack[Options],
     ) -> None:
-        Variable.__init__(self, unit, text, low=low, high=high, above=above, below=below, display=display)
+        Variable.__init__(self, unit, text, **options)
         self.expression, self.integrates = as_operand(expression), rate_of
 
 
@@ -254,7 +234,8 @@ class Mode(Variable, variable_declarations.Mode):
     """The direction of sliding: -1, 0 while stuck, or 1."""
 
     def __init__(self, text: str = "-1 sliding backward, 0 stuck, 1 sliding forward") -> None:
-        Variable.__init__(self, "", text, low=-1, high=1)
+        Variable.__init__(self, "", text)
+        self.low, self.high = -1, 1
 
 
 class Contact(Variable, variable_declarations.Output):
@@ -285,8 +266,8 @@ class Contact(Variable, variable_declarations.Output):
         lifted off; its force is zero and it does not stick.  A sliding force that depends on the direction says nothing
         about rest: there the contact has lifted off while `hold` is negative.  False: it never occurs, by the form of
         the equations.
-    low, high, above, below, display
-        As for Parameter; the range is a property of the solution and is not enforced.
+    **options
+        See the table of options.
     """
 
     def __init__(
@@ -300,14 +281,9 @@ class Contact(Variable, variable_declarations.Output):
         laws: tuple[str, ...] = (HYBRID,),
         eps: Operand = None,
         lifts_off: bool | None = None,
-        *,
-        low: float = -inf,
-        high: float = inf,
-        above: float = -inf,
-        below: float = inf,
-        display: str = "",
+        **options: Unpack[Options],
     ) -> None:
-        Variable.__init__(self, unit, text, low=low, high=high, above=above, below=below, display=display)
+        Variable.__init__(self, unit, text, **options)
         if not isinstance(mode, Mode):
             raise ModelError(f"mode of a Contact must be a Mode that is declared before it, got {describe(mode)}")
         if not isinstance(slip, Expression) or is_comparison(slip):

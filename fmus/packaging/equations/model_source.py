@@ -1,7 +1,7 @@
 """Generates the source of a scalar model class, which is embedded in Python FMUs and translated to C."""
 
 import ast
-from inspect import cleandoc, signature
+from inspect import cleandoc
 from textwrap import indent, wrap
 
 from ...runtime.active_method import EXACT_ITEM
@@ -12,6 +12,7 @@ from .algebra import depends_on, has_condition_on, variables_in
 from .codegen_context import CodegenContext, rule_status
 from .conditions import Condition
 from .coupled_contact_methods import coupled_contact_methods
+from .declaration_options import OPTIONS
 from .dimensions import DIMENSIONLESS, Dimensions, declared_dimensions, dimensions_of, expression_text
 from .expression_printer import INDENT
 from .expressions import is_among
@@ -46,11 +47,6 @@ class {name}({base_class}):
 '''
 IMPORTS_MARK = "\0"  # marks the place of the imports; model texts cannot contain it
 WIDTH = 105
-DECLARATION_OPTIONS = {
-    parameter.name: parameter.default
-    for parameter in signature(VariableDeclaration.__init__).parameters.values()
-    if parameter.default is not parameter.empty
-}
 RUN_SETTINGS = ("stop_time", "step_size", "tolerance")
 
 
@@ -138,9 +134,10 @@ def output_declaration(analysis: ModelAnalysis, e: Variable) -> str:
 def declaration_arguments(e: Variable) -> str:
     """Return the arguments unit and description, and the options that differ from their defaults."""
     texts = [string_literal(e.unit), string_literal(e.text)]
-    for name, default in DECLARATION_OPTIONS.items():
-        if (value := getattr(e, name)) != default:
-            texts.append(f"{name}={string_literal(value) if default == '' else repr(type(default)(value))}")
+    for name, option in OPTIONS.items():
+        value = vars(e).get(name)
+        if value not in (None, getattr(VariableDeclaration, name, None)):
+            texts.append(f"{name}={string_literal(value) if option.type is str else repr(option.type(value))}")
     return ", ".join(texts)
 
 
