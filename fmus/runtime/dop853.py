@@ -6,6 +6,7 @@ DOP853: its coefficients in double precision under the same names (A1210: stage 
 
 from math import sqrt
 
+from .codes import STUCK
 from .vectors import ContactVector, RateVector, StateVector, elementwise
 
 NUMBER, TEXT = 4, "Dormand-Prince 8(5,3); for tight tolerances"
@@ -112,8 +113,8 @@ class Dop853:
         """Build the interpolant of the step just computed."""
         inside = step.interpolant
         h, modes, t, y, f, y1, f1 = step.h_full, step.modes0, step.t0, step.y0, step.f0, step.y1, step.f1  # noqa: F841
-        if model.has_other_laws:
-            modes = step.force_modes(modes)
+        if model.has_other_laws and not step.is_hybrid:
+            modes = STUCK * modes
         f6, f7, f8, f9, f10, f11, f12 = self.f6, self.f7, self.f8, self.f9, self.f10, self.f11, self.f12
         u = A141 * f + A147 * f7 + A148 * f8 + A149 * f9
         y14 = y + h * (u + A1410 * f10 + A1411 * f11 + A1412 * f12 + A1413 * f1)

@@ -5,7 +5,7 @@ those before the event.
 """
 
 from . import call_sequence, conditions
-from .codes import BAD_STEP, NEEDS_REPETITION, OK, TOO_MANY_STEPS
+from .codes import BAD_STEP, OK, TOO_MANY_STEPS
 from .integrator import MAX_EVALUATIONS, MAX_STEPS
 
 
@@ -42,8 +42,6 @@ def next_internal_step(run, model, defer_events):
     status = call_sequence.prepare_to_step(run, model)  # an input may have changed
     if status == OK and solver.t >= step.t1:
         status = step.compute_next(model)
-        if (model.has_dry_friction or model.has_conditions) and status == NEEDS_REPETITION:
-            status = step.repeat_steps(model)
     if status != OK:
         return status
     exchange.n_internal_steps += 1

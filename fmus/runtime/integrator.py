@@ -8,7 +8,7 @@ from math import fabs, inf, nan
 
 from . import conditions, contact_lcp, ode23, phase_repetition
 from .active_method import METHOD_ITEMS
-from .codes import DIVERGED, EXACT, HYBRID, HYBRID_LAW_ONLY, NEEDS_REPETITION, OK, STUCK, TOO_MANY_STEPS
+from .codes import DIVERGED, EXACT, HYBRID, HYBRID_LAW_ONLY, OK, STUCK, TOO_MANY_STEPS
 from .linear_closed_form import HIGHER_ORDER_INPUT
 from .step_control import OVERFLOW_LIMIT, InternalStep
 from .variable_declarations import Choice, Count, Fixed, Local, VariableOwner
@@ -141,7 +141,7 @@ class Integrator(VariableOwner):
         if model.has_dry_friction or model.has_conditions:
             phase_repetition.restore_tolerance(step)
         self.apply_parameters(model)
-        if model.has_dry_friction and step.is_hybrid and not model.is_coupled:
+        if step.is_hybrid and not model.is_coupled:
             for i in contact_indices:
                 if self.previous_modes[i] * self.y[slip_index[i]] < 0.0:
                     self.y[slip_index[i]] = 0.0  # a velocity against the mode of a slip phase is rounding
@@ -181,8 +181,6 @@ class Integrator(VariableOwner):
         step = self.step
         if step.t1 < t:
             status = step.compute_next(model)
-            if (model.has_dry_friction or model.has_conditions) and status == NEEDS_REPETITION:
-                status = step.repeat_steps(model)
             if status == OK and step.t1 < t:
                 status = self.advance_past(model, t)
             if status != OK:
@@ -216,8 +214,6 @@ class Integrator(VariableOwner):
         for _ in range(MAX_BATCHES):
             for _ in range(BATCH_STEPS):
                 status = step.compute_next(model)
-                if (model.has_dry_friction or model.has_conditions) and status == NEEDS_REPETITION:
-                    status = step.repeat_steps(model)
                 if status != OK or step.t1 >= t:
                     return status
             if step.n_rhs + step.interpolant.n_event_evals > limit:
@@ -231,8 +227,6 @@ class Integrator(VariableOwner):
             if not (self.t >= step.t1 and step.t1 < step.t_end):
                 break
             status = step.compute_next(model)
-            if (model.has_dry_friction or model.has_conditions) and status == NEEDS_REPETITION:
-                status = step.repeat_steps(model)
             if status != OK:
                 self.t_next = nan
                 return

@@ -163,8 +163,8 @@ def update_rates(run, model):
             exchange.rates[i] = 0.0
     else:
         modes = solver.modes
-        if model.has_other_laws:
-            modes = solver.step.force_modes(modes)
+        if model.has_other_laws and not solver.step.is_hybrid:
+            modes = STUCK * modes
         f = model.rates(solver.t, y, modes)
         for i in state_indices:
             exchange.rates[i] = f[i]
@@ -185,7 +185,7 @@ def update_indicators(run, model):
     to_rest, to_break_away = contact_vector(), contact_vector()
     for i in contact_indices:
         to_rest[i] = to_break_away[i] = 1.0
-    if model.has_dry_friction and solver.step.is_hybrid:
+    if solver.step.is_hybrid:
         if model.is_coupled:
             slips = model.slip_velocities(solver.t, solver.y)
             force, limit, terms = model.contact_forces(solver.t, solver.y, solver.modes)
@@ -265,7 +265,7 @@ def handle_event(run, model):
             exchange.states_changed = True
     if model.has_dry_friction:
         solver.step.has_consistent_modes = True
-    if model.has_dry_friction and solver.step.is_hybrid:
+    if solver.step.is_hybrid:
         if update_modes(run, model):
             exchange.states_changed = True
         elapsed = next_breakaway(model, solver)

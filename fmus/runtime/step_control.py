@@ -79,18 +79,24 @@ class RoundoffCompensation:
         """Return the time h seconds after the start t0 of a step; note its rounding error."""
         elapsed = h + self.t0
         t1 = t0 + elapsed
-        if t1 <= t0 and h > 0.0:
-            t1 = t0 * (1.0 + EPSILON)  # two events never have the same time
         t_step = t1 - t0
         self.t1 = (t0 - (t1 - t_step)) + (elapsed - t_step)
+        return t1
+
+    def event_time(self, t0, h):
+        """Return the end time of a step that ends at an event: two events never have the same time."""
+        t1 = self.end_time(t0, h)
+        if t1 <= t0 and h > 0.0:
+            t1 = t0 * (1.0 + EPSILON)
+            self.t1 = h + self.t0 - (t1 - t0)
         return t1
 
 
 class InternalStep:
     """Current internal step, with counters up to both ends.
 
-    Keep fewer than thirty attributes: CPython 3.11 then stores them inline; with more, a step of ode23 takes a tenth
-    longer.
+    A model of one body has 29 attributes here.  CPython 3.11 stores fewer than thirty inline; one more, and a step of
+    ode23 in stickslip took 4.4 us instead of 3.8 (November 2026).
     """
 
     y0: StateVector
@@ -104,10 +110,10 @@ class InternalStep:
         self.active_method = ActiveMethod(model)
         if model.has_dry_friction or model.has_conditions:
             self.event_location = EventLocation(model.n_event_functions)
-        # run: relative tolerance, largest step; stop time (inf if unknown); hybrid law
+        # run: relative tolerance, largest step; stop time (inf if unknown)
         self.tolerance = self.h_max = 0.0
         self.t_end = inf
-        self.is_hybrid = False
+        self.is_hybrid = False  # law of friction with stick and slip; a constant where the FMU offers no choice
         # step: start, end, modes inside and after it
         self.t0 = self.y0 = self.f0 = 0.0
         self.t1 = self.y1 = self.f1 = 0.0
@@ -185,13 +191,14 @@ class InternalStep:
         self.n_rhs, self.h_next = counters.n_rhs, counters.h_next
 
     def compute_next(self, model):
-        """Compute the internal step that starts at t1.
+        """Compute the internal step that starts at t1, repeating it where that is needed.  Returns a status."""
+        status = self.try_next(model)
+        if (model.has_dry_friction or model.has_conditions) and status == NEEDS_REPETITION:
+            status = self.repeat_steps(model)
+        return status
 
-        Returns
-        -------
-        int
-            Status; NEEDS_REPETITION if the caller must call `repeat_steps`.
-        """
+    def try_next(self, model):
+        """Compute the internal step that starts at t1.  Returns a status, or NEEDS_REPETITION."""
         if model.has_conditions:
             # names the contact if its sliding force exceeds what it holds
             status = conditions.violation_status(model, self.event_location)
@@ -206,9 +213,7 @@ class InternalStep:
         counters = self.start_counters
         if self.t1 > self.t0:
             counters.h_last = self.t1 - self.t0
-        # as save_counters; a call would take a fiftieth of a step of ode23
-        counters.n_accepted, counters.n_rejected = self.n_accepted, self.n_rejected
-        counters.n_rhs, counters.h_next = self.n_rhs, self.h_next
+        self.save_counters()
         self.t0, self.y0 = self.t1, self.y1
         self.f0, self.modes0 = self.f1, self.modes1
         self.is_stuck = self.interpolant.ready = False
@@ -246,16 +251,10 @@ class InternalStep:
                 repeats = True
             elif not repeats or self.t1 > t_reported:
                 break
-            status = self.compute_next(model)
+            status = self.try_next(model)
             if status != OK and status != NEEDS_REPETITION:
                 break
         return status
-
-    def force_modes(self, modes: ContactVector) -> ContactVector:
-        """Return the modes that enter the friction force: zeros under a law without stick and slip."""
-        if not self.is_hybrid:
-            modes = STUCK * modes
-        return modes
 
     def update_law_modes(self, model):
         """Update the modes at t1 under a law without stick and slip, where a step ends without regard to them."""
@@ -308,7 +307,7 @@ class InternalStep:
         if model.has_dry_friction:
             end = self.t0 + (duration + roundoff.t0)
             if end <= self.t1 and end < inf:
-                self.t1 = roundoff.end_time(self.t0, duration)
+                self.t1 = roundoff.event_time(self.t0, duration)
                 self.y1, roundoff.x1 = exact.state_at_standstill(duration)
                 return self.end_at_event(model)
         if self.t1 < inf:
@@ -347,13 +346,13 @@ class InternalStep:
         """Compute a step of the method that meets the tolerance; end it at a change of mode."""
         t, y, f, modes = self.t0, self.y0, self.f0, self.modes0
         if model.has_other_laws and not self.is_hybrid:
-            modes = STUCK * modes  # as force_modes, without a call
+            modes = STUCK * modes
         tolerance = self.tolerance
         h_min = SHORTEST_STEP * self.h_max
         roundoff = self.roundoff
         roundoff.t0, roundoff.t1 = roundoff.t1, 0.0
         h_new = self.h_next if self.h_next < self.h_max else self.h_max
-        if model.has_dry_friction and model.has_nominal_velocity and self.is_hybrid:
+        if model.has_nominal_velocity and self.is_hybrid:
             y1 = y + h_new * f
             h_new *= step_limits.narrow_feature_share(model, self, h_new, y1, f)
         if h_new < h_min:
@@ -383,7 +382,7 @@ class InternalStep:
                 error = h * max_of(e) / tolerance
             share = 1.0
             if error <= 1.0 and sum_of(size1, e) < OVERFLOW_LIMIT:  # False for NaN
-                if model.has_dry_friction and model.has_nominal_velocity and self.is_hybrid:
+                if model.has_nominal_velocity and self.is_hybrid:
                     share = step_limits.narrow_feature_share(model, self, h, y1, f1)
                 if not (model.has_dry_friction and model.has_nominal_velocity) or share == 1.0 or h <= h_min:
                     break
@@ -424,12 +423,8 @@ class InternalStep:
         self.h_full = h
         if last:
             self.t1 = self.t_end
-        else:  # as roundoff.end_time(), without a call
-            elapsed = h + roundoff.t0
-            t1 = t + elapsed
-            t_step = t1 - t
-            roundoff.t1 = (t - (t1 - t_step)) + (elapsed - t_step)
-            self.t1 = t1
+        else:
+            self.t1 = roundoff.end_time(t, h)
         self.y1, self.f1 = y1, f1
         if model.has_dry_friction and not model.is_coupled and not model.has_conditions:
             # Most steps end here.  The Bernstein coefficients of the cubic Hermite polynomial of the slip velocity are
@@ -451,7 +446,7 @@ class InternalStep:
                     location.peaks[i] = self.largest_slip
                 else:
                     location.peaks[i] = largest_of(total, start, end, location.peaks[i])
-        if (model.has_dry_friction and self.is_hybrid) or model.has_conditions:
+        if self.is_hybrid or model.has_conditions:
             if model.is_coupled or model.has_conditions:
                 event_location.evaluate_on_cubic(model, self)
                 step_limits.limit_step(model, self)
@@ -485,8 +480,8 @@ class InternalStep:
             return True
         y_end = self.state_after(model, h)
         modes = self.modes0
-        if model.has_other_laws:
-            modes = self.force_modes(modes)
+        if model.has_other_laws and not self.is_hybrid:
+            modes = STUCK * modes
         y2, _f2, e = method.propose(model, self, modes, self.t0, self.y0, self.f0, h)
         self.n_rhs += method.stages
         scale = magnitude(self.y0)
@@ -502,7 +497,7 @@ class InternalStep:
     def end_at(self, model, h):
         """End the step at an event, h seconds after its start."""
         self.y1 = self.state_after(model, h)
-        self.t1 = end = self.roundoff.end_time(self.t0, h)
+        self.t1 = end = self.roundoff.event_time(self.t0, h)
         if model.has_slip_conditions:
             if self.is_hybrid:
                 self.y1 = contact_lcp.stop_slips(model, end, self.y1, self.modes0)
@@ -511,7 +506,7 @@ class InternalStep:
             status = conditions.update_at_event(model, self.event_location, end, self.y1, self.modes0, self.h_max)
             if status != OK:
                 return status
-        if model.has_dry_friction and self.is_hybrid:
+        if self.is_hybrid:
             location = self.event_location
             ends = contact_vector()
             for i in contact_indices:
@@ -569,17 +564,14 @@ class InternalStep:
             self.f1 = 0.0
         else:
             modes = self.modes1
-            if model.has_other_laws:
-                modes = self.force_modes(modes)
+            if model.has_other_laws and not self.is_hybrid:
+                modes = STUCK * modes
             self.f1 = model.rates(self.t1, self.y1, modes)
             self.n_rhs += 1
             if model.has_dry_friction and not model.is_coupled:
                 for i in contact_indices:
-                    if (
-                        self.is_hybrid
-                        and self.y1[slip_index[i]] == 0.0
-                        and self.modes1[i] * self.f1[slip_index[i]] < 0.0
-                    ):
+                    is_at_rest = self.is_hybrid and self.y1[slip_index[i]] == 0.0
+                    if is_at_rest and self.modes1[i] * self.f1[slip_index[i]] < 0.0:
                         self.has_consistent_modes = self.grazes_at_end or stick_slip.is_consistent(
                             model, self.t1, self.y1, self.modes1, i
                         )

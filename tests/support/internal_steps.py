@@ -7,7 +7,6 @@ from array_model import to_array_model
 
 from fmus.packaging.lowering import component_name
 from fmus.runtime import vectors
-from fmus.runtime.codes import NEEDS_REPETITION
 from harness.running.embedded_model import create_run
 
 COUNTS = ("n_accepted", "n_rejected", "n_rhs")
@@ -68,8 +67,7 @@ def array_steps(model, values, stop, most):
 
 def compute_step(model, run):
     """Compute the next internal step of a model, as the integrator does. Returns a status."""
-    status = run.solver.step.compute_next(model)
-    return run.solver.step.repeat_steps(model) if status == NEEDS_REPETITION else status
+    return run.solver.step.compute_next(model)
 
 
 def counts(step):

@@ -11,7 +11,7 @@ from .. import __version__
 from ..equations.model_file import ModelFile
 from ..syntax_trees import all_nodes, parsed_nodes
 from .emit_source import FileLowerer
-from .feature_selection import EXACT, FeatureSelection
+from .feature_selection import EXACT, HYBRID, FeatureSelection
 from .layout import ModelLayout
 from .source_symbols import SourceSymbols
 from .unused_code import remove_unused_code
@@ -45,7 +45,9 @@ def model_layout(source: ModelFile, features: FeatureSelection) -> ModelLayout:
     flags = {flag: getattr(model, flag) for flag, default in vars(Oscillator).items() if isinstance(default, bool)}
     flags["is_linear"] = EXACT in features.methods
     flags["real_only"] = features.real_only
-    flags["has_other_laws"] = any(law != "hybrid" for law in features.laws)
+    flags["has_other_laws"] = any(law != HYBRID for law in features.laws)
+    if not (HYBRID in features.laws and flags["has_other_laws"]):
+        flags["is_hybrid"] = HYBRID in features.laws
     layout = ModelLayout(
         model.states, model.contacts, flags, features.choices, features.excluded, features.stepping_methods
     )
