@@ -1,5 +1,7 @@
 """Certified results of the shipped models: those of generation.py, and of event_located.py for fmus/more."""
 
+from pathlib import Path
+
 from harness.references.certification import CertifiedFile, certify_default_run, write_references
 from harness.references.certified_reference import FOLDER
 from harness.references.models import CASES
@@ -9,6 +11,7 @@ from harness.scenes.fmu_files import find_fmu
 
 from .event_located import PROBLEMS, certify_by_two_routes
 from .generation import generate_reference
+from .icon import draw_missing_icon
 
 
 def certify_shipped(name: str) -> list[CertifiedFile]:
@@ -19,11 +22,28 @@ def certify_shipped(name: str) -> list[CertifiedFile]:
     HarnessError
         If no model has this name, its FMU is not built, or its two methods disagree.
     """
-    fmu = find_fmu(name)
-    model = load_model_class(fmu)
-    file = next(folder / f"{name}.py" for folder in (FOLDER, FOLDER / "more") if (folder / f"{name}.py").is_file())
+    model = load_model_class(find_fmu(name))
+    file = model_file(name)
     references = generate_all(name) or {name: certify_default_run(model, file)}
     return write_references(references, model, file.parent)
+
+
+def model_file(name: str) -> Path:
+    """Return the file of a shipped model."""
+    return next(folder / f"{name}.py" for folder in (FOLDER, FOLDER / "more") if (folder / f"{name}.py").is_file())
+
+
+def missing_parts(name: str) -> list[str]:
+    """Draw the icon of a shipped model that has none; return sentences on this and on a missing second formulation."""
+    folder, sentences = model_file(name).parent, []
+    if icon := draw_missing_icon(name, folder):
+        sentences.append(f"{icon}: drawn from the result; a function of docs/make_icons.py draws a better one")
+    if folder != FOLDER and name not in PROBLEMS:
+        sentences.append(
+            f"{name} has no second formulation, so two methods of its FMU certify it: add one to "
+            "benchmarks/references/event_located.py and repeat the command"
+        )
+    return sentences
 
 
 def generate_all(name: str) -> dict[str, Solution]:

@@ -1,6 +1,7 @@
 """The references: certified by closed forms and independent solutions, and reproduced by the FMUs."""
 
 from itertools import pairwise
+from shutil import copy
 
 import independent_pendulum
 import independent_solution
@@ -8,10 +9,12 @@ import numpy as np
 import pytest
 from independent_solution import ClosedFormMotion, LinearSegment
 from mpmath import mpf
+from PIL import Image
 
 from benchmarks.literature.problems import BeltBlock, ChatteringOscillatorSign, SmoothedBeltBlock
 from benchmarks.references.generation import CLOSED_FORMS, evaluate_closed_form
-from harness.references.certified_reference import POINTS, compute_errors, event_time_error, load_reference
+from benchmarks.references.icon import draw_missing_icon
+from harness.references.certified_reference import FOLDER, POINTS, compute_errors, event_time_error, load_reference
 from harness.references.models import CASES
 from harness.references.reference_trajectory import motion_error
 from harness.running.solution import Solution
@@ -177,3 +180,13 @@ def test_event_times_are_compared_only_where_the_modes_agree():
     assert np.isnan(event_time_error([(1.0, 1)], truth))
     assert np.isnan(event_time_error([(1.0, -1), (2.0, 0)], truth))
     assert event_time_error([], []) == 0.0
+
+
+def test_a_model_without_an_icon_gets_the_curve_of_its_result(tmp_path):
+    """And an icon that exists stays."""
+    copy(FOLDER / "more" / "sleds.csv", tmp_path)
+    icon = draw_missing_icon("sleds", tmp_path)
+    with Image.open(icon) as picture:
+        assert picture.size == (256, 256)
+        assert len(picture.convert("RGB").getcolors(65536)) > 2
+    assert draw_missing_icon("sleds", tmp_path) is None
