@@ -9,7 +9,19 @@ from zipfile import ZipFile
 import commands
 import external_fmus
 import pytest
-from ssp_archives import ARCHIVES, CONNECTION, FILES, INNER, SINK, SOURCE, UNIT_TABLE, bind, component, structure
+from ssp_archives import (
+    ARCHIVES,
+    CONNECTION,
+    FILES,
+    INNER,
+    SINK,
+    SOURCE,
+    UNIT_TABLE,
+    bind,
+    component,
+    parameter_set,
+    structure,
+)
 from ssp_archives import write_archive as write
 
 from harness.studies.coupled.engine import ENGINES
@@ -43,6 +55,16 @@ def test_each_engine_runs_a_system_or_is_named_with_its_reason(tmp_path, gain, f
         assert {"Ecos", "libcosim"} < set(ends)
     elif feature != "inline parameter values":
         assert feature in failures["Ecos"]
+
+
+def test_a_parameter_that_reaches_no_variable_is_named(tmp_path, gain):
+    files = FILES | {"sink": parameter_set(k=5.0, gian=2.0)}
+    write(tmp_path / "pair.ssp", structure(SOURCE + SINK, LINK), files, gain)
+    done = commands.harness(tmp_path, "couple", "pair.ssp")
+    assert (done.returncode, done.stderr) == (0, "")
+    sentence = "The parameter sink.gian of the archive reaches no variable of an FMU: check its name."
+    assert " ".join(done.stdout.split()).count("reaches no variable") == 1
+    assert sentence in " ".join(done.stdout.split())
 
 
 def test_a_component_for_model_exchange_is_integrated(tmp_path):

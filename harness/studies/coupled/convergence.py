@@ -31,6 +31,8 @@ class Convergence:
         Engines for the runs at all steps; the first one that runs the archive is used.
     unsupported : dict
         Reasons of the engines that do not support the archive.
+    ignored : tuple of str
+        Parameters of the archive that reach no variable of an FMU.
     time : numpy.ndarray
         Times (m,) in s of the run with the smallest step.
     x : numpy.ndarray
@@ -53,6 +55,7 @@ class Convergence:
     values: str = "initialValues"
     candidates: tuple[str, ...] = (MAIN_ENGINE,)
     unsupported: dict[str, str] = field(default_factory=dict)
+    ignored: tuple[str, ...] = ()
     time: np.ndarray = field(default_factory=lambda: np.zeros(0))
     x: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
     truth: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))

@@ -68,6 +68,7 @@ def read_archive(source: Path, file: Path, stop: float | None) -> Convergence:
             for engine, features in UNSUPPORTED.items()
             if system.features & features
         },
+        ignored=tuple(system.ignored),
     )
 
 

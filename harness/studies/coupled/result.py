@@ -47,7 +47,8 @@ class CoupledResult(Result, Convergence):
         engines = {
             name: {"largest error": error, "failure": reason} for name, (_, error, reason) in self.engines.items()
         }
-        return {"steps": self.steps, "errors": self.errors, "order": self.order, "engines": engines}
+        numbers = {"steps": self.steps, "errors": self.errors, "order": self.order}
+        return numbers | {"engines": engines, "ignored": self.ignored}
 
     def blocks(self) -> list[Any]:
         return [
@@ -57,6 +58,10 @@ class CoupledResult(Result, Convergence):
             *(
                 f"{name:<24} {reason or f'{error:.3e} at the smallest step'}"
                 for name, (_, error, reason) in self.engines.items()
+            ),
+            *(
+                f"The parameter {name} of the archive reaches no variable of an FMU: check its name."
+                for name in self.ignored
             ),
         ]
 

@@ -102,6 +102,8 @@ class CoupledSystem:
         Names of the parameter sets.
     features : set of str
         Features that other engines may not support.
+    ignored : list of str
+        Parameters that reach no variable of a component, which SSP allows.
     """
 
     name: str
@@ -112,6 +114,7 @@ class CoupledSystem:
     values: dict[Node, Any] = field(default_factory=dict)
     parameter_sets: list[str] = field(default_factory=list)
     features: set[str] = field(default_factory=set)
+    ignored: list[str] = field(default_factory=list)
 
 
 def read_system(folder: Path) -> CoupledSystem:
@@ -164,7 +167,10 @@ class SystemReader:
                 if (path, name) in self.edges and variable.causality == "input":
                     self.add_link((path, name))
         for node, (value, unit) in self.parameters.items():
-            for target, convert in self.targets(node):
+            targets = list(self.targets(node))
+            if not targets:
+                system.ignored.append(join(*node))
+            for target, convert in targets:
                 variable = system.components[target[0]].variables[target[1]]
                 if variable.type in REAL_TYPES:
                     to_node = self.conversion(unit, self.unit_of(node) or self.variable_unit(target), node)
@@ -318,7 +324,7 @@ class SystemReader:
                     yield target, convert.then(edge.transformation).then(rest)
 
     def read_binding(self, binding: ElementTree.Element, path: str) -> None:
-        """Read a parameter binding of the element at a path. A name that the element does not have is ignored."""
+        """Read a parameter binding of the element at a path."""
         source = binding.get("source")
         if source:
             base = Path(self.component_source(path)).parent if binding.get("sourceBase") == "component" else Path()
