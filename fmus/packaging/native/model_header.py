@@ -28,6 +28,8 @@ from .c_types import BOOL, FLOAT, INT, CType, StructPointer, c_literal
 from .call_graph import CallGraph
 from .directional_derivative import Tangent, build_tangent_functions, tangent_fields
 
+# Filled by str.format.  Jinja2 would save the doubled braces, but its {{ begins nested initializers in C, and the rows
+# and cases would still come from functions.
 HEADER = """\
 /* {sentence}
  *
