@@ -40,6 +40,7 @@ if TYPE_CHECKING:
         Rule,
         State,
     )
+    from .packaging.equations.tables import Table
 
 __all__ = [
     "HYBRID",
@@ -55,6 +56,7 @@ __all__ = [
     "Parameter",
     "Rule",
     "State",
+    "Table",
     "acos",
     "asin",
     "atan",
@@ -75,7 +77,7 @@ __all__ = [
 
 def __getattr__(name: str) -> Any:
     """Import a name at its first use, so that `import fmus.runtime` loads nothing else."""
-    for module in ("expressions", "model_declaration") if name in __all__ else ():
+    for module in ("expressions", "model_declaration", "tables") if name in __all__ else ():
         names = vars(import_module(f".packaging.equations.{module}", __name__))
         if name in names:
             return names[name]

@@ -1,7 +1,8 @@
 """Conditions of the equations: which of them hold in a step, and how they change at events.
 
-A condition keeps its value during a step, so that the equations are smooth there; its change is an event.  Limits are
-conditions that must hold during the whole run.
+A condition keeps its value during a step, so that the equations are smooth there; its change is an event.  So does the
+piece of a table, a number that two conditions have as their side: they hold above its lower and below its upper edge.
+Limits are conditions that must hold during the whole run.
 """
 
 from math import inf
@@ -23,9 +24,13 @@ def update_sides(model, location, t, y: StateVector, modes: ContactVector):
     """Determine which conditions hold; a condition may depend on others."""
     for _ in range(model.n_event_functions + 1):
         update_margins(model, location, t, y, modes)
+        if model.has_pieces:
+            model.update_pieces(t, y, modes)
         changed = False
         for j in range(model.n_switches):
             side = 1.0 if location.margins[j] > 0.0 else -1.0
+            if model.has_pieces and model.condition_pieces[j] >= 0.0:
+                side = model.condition_pieces[j]
             if side != model.condition_sides[j]:
                 model.condition_sides[j], changed = side, True
         if not changed:

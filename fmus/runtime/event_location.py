@@ -87,9 +87,12 @@ def update_event_functions(model, location, t, y: StateVector, modes: ContactVec
         for j in range(model.n_event_functions - model.first_condition):
             k = model.first_condition + j
             location.scales[k] = location.margin_scales[j]
-            location.values[k] = (
-                model.condition_sides[j] * location.margins[j] + CONDITION_MARGIN * location.margin_scales[j] + TINY
-            )
+            if model.has_pieces and is_edge(model, k):  # the margin is relative to the current piece
+                location.values[k] = location.margins[j] + CONDITION_MARGIN * location.margin_scales[j] + TINY
+            else:
+                location.values[k] = (
+                    model.condition_sides[j] * location.margins[j] + CONDITION_MARGIN * location.margin_scales[j] + TINY
+                )
 
 
 def event_function(model, step, elapsed, j):
@@ -121,7 +124,10 @@ def locate_events(model, step):
     first = inf
     for j in range(n):
         location.times[j] = inf
-        found = examine_cubic(location, step, j)
+        if model.has_pieces and is_edge(model, j):
+            found = examine_edge(location, step, j)
+        else:
+            found = examine_cubic(location, step, j)
         if found == ONE_ZERO:
             location.times[j] = find_root(model, step, step.h_full, location.start[j], location.end[j], j)
         elif found == UNKNOWN:
@@ -191,6 +197,22 @@ def examine_cubic(location, step, j):
         inside = late if start <= 0.0 or late < early else early  # a slip starts at zero
         return NO_ZERO if inside >= INTERPOLANT_SHARE * (high - low) else UNKNOWN
     return UNKNOWN if start > 0.0 and early < INTERPOLANT_SHARE * (high - end) and late > early else ONE_ZERO
+
+
+def is_edge(model, j):
+    """Return whether an event function is the distance from an edge of a piece of a table."""
+    return j >= model.first_condition and model.condition_pieces[j - model.first_condition] >= 0.0
+
+
+def examine_edge(location, step, j):
+    """Return how many zeros the cubic polynomial of such a distance has.
+
+    The table is continuous at the edge, so that an edge in doubt does not change the motion by more than the tolerance.
+    """
+    in_doubt = location.in_doubt
+    found = examine_cubic(location, step, j)
+    location.in_doubt = in_doubt
+    return found
 
 
 def search_polynomial(model, step, j):

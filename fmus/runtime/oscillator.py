@@ -24,7 +24,9 @@ class Oscillator(VariableOwner):
     solver_class: Any  # Integrator with the methods that suit the model
     friction: int  # friction law, of models with contacts
     inconsistent_input: int  # index, from 1, of a prescribed input that jumps again and again against its rate; or 0
-    condition_sides: list[float]  # of each condition: 1.0 where it holds, else -1.0; the solver sets them at events
+    # of each condition: 1.0 where it holds, else -1.0, or the piece of its table; the solver sets them at events
+    condition_sides: list[float]
+    condition_pieces: list[float]  # of each condition: the piece of its table at the latest evaluation, or -1.0
 
     states: dict[str, str] = {"x": "v", "v": "a"}  # state -> its rate, which may be a state
     contacts: dict[str, str] = {}  # mode -> state that is the slip velocity of the contact
@@ -43,6 +45,7 @@ class Oscillator(VariableOwner):
     has_prescribed_slips = False  # some of them are part of a slip: slip_deviations() is defined
     is_linear = False  # piecewise linear (linear_closed_form.py)
     real_only = False  # the FMU offers Reals only, for hosts without other types
+    has_pieces = False  # the piece of a table may change during a step: update_pieces() is defined
     has_conditions = False  # choose() with conditions that change during a step (event_location.py)
     # event functions: number, first of a condition; conditions that switch; status of the first of the others, limits
     n_event_functions = first_condition = n_switches = first_limit_rule = 0
@@ -76,6 +79,9 @@ class Oscillator(VariableOwner):
         self, t: float, y: StateVector, modes: ContactVector
     ) -> tuple[ConditionVector, ConditionVector]:
         """Return the margins of the conditions, if there are any, and the sums of the absolute terms of each."""
+
+    def update_pieces(self, t: float, y: StateVector, modes: ContactVector) -> None:
+        """Find the pieces of tables that contain their arguments, if there are any."""
 
     def linear_coefficients(self) -> tuple[float, float, float, float]:
         """Return m, c, k and u of a linear model: m v' + c v + k x = F + k u t between changes of mode."""

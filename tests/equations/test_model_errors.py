@@ -70,7 +70,7 @@ WRONG = {
     "a table": (
         RATE + "    table = [1.0, 2.0]\n    y = table[x]\n",
         18,
-        "x has no value at build time and cannot index a table: write a formula",
+        "x has no value at build time and cannot index a list: declare name = Table(x, y, unit_x, unit_y)",
     ),
     "a power": (RATE + "    y = x ** 2\n", 17, "** is not supported"),
     "math.sin": (
@@ -394,8 +394,8 @@ WRONG = {
     "a count of bodies": (
         '    n = Parameter(3, "1", "number of bodies")\n' + RATE + "    for i in range(n):\n        pass\n",
         18,
-        "n has no value at build time and cannot index a table: write a formula, or a piecewise one with "
-        "choose(condition, this, that); a count, as in range(n), must be a number such as n = 3",
+        "n has no value at build time and cannot index a list: declare name = Table(x, y, unit_x, unit_y) and write "
+        "name(n); a count, as in range(n), must be a number such as n = 3",
     ),
     "a maximum": (
         RATE + "    y = max(x, 0.0)\n",

@@ -2,6 +2,7 @@
 
     expressions.py              expressions and their functions
     model_declaration.py        variables, rules and the base class of models
+    tables.py                   lookup tables
     model_file.py               loads a model file and reports errors with file and line
     algebra.py                  substitution, differentiation, solving for a variable, rounding scales
     conditions.py               conditions of the equations that may change during a step

@@ -12,6 +12,7 @@ from contextlib import suppress
 
 from .expressions import COMPARISONS, FUNCTIONS, Expression, ModelError, Operand, Term
 from .model_declaration import Mode, Output, Parameter
+from .tables import EDGE, Coefficient, Piece
 
 Memo = dict[int, Operand]
 ARITHMETIC: dict[str, Callable[[float, float], float]] = {
@@ -182,6 +183,8 @@ def build_term(op: str, *args: Operand) -> Operand:
         if isinstance(condition, bool):  # decided at build time
             return this if condition else that
         return this if is_same_expression(this, that) else Term(op, *args)
+    if isinstance(op, (Piece, Coefficient)) and not isinstance(args[0], Expression):
+        return op.evaluate(args[0])
     if op in FUNCTIONS and not isinstance(args[0], Expression):
         with suppress(ArithmeticError, ValueError):  # for example a logarithm in a branch that is not taken
             return getattr(math, op)(args[0])
@@ -263,6 +266,8 @@ def differentiate(e: Operand, by: Mapping[Expression, Operand], names: dict[Expr
 
 def _differentiate_term(e: Term, slope: Callable[[Operand], Operand]) -> Operand:
     a, b = e.args[0], e.args[-1]
+    if isinstance(e.op, (Piece, Coefficient)):  # constant between two points of a table
+        return 0.0
     match e.op:
         case "+" | "-":
             return build_term(e.op, slope(a), slope(b))
@@ -379,6 +384,8 @@ def rounding_scales(expressions: Sequence[Operand]) -> list[Operand]:
 
 def _term_rounding_scale(e: Term, scales: Memo) -> Operand:
     a, b = e.args[0], e.args[-1]
+    if isinstance(e.op, Coefficient) and e.op.kind == EDGE:
+        return e.op.table.scale
     match e.op:
         case "+" | "-" | "*":
             return build_term("*" if e.op == "*" else "+", scales[id(a)], scales[id(b)])
@@ -405,6 +412,8 @@ def _growth_exponent(e: Operand, exponents: list[float]) -> float:
     if not exponents:
         return 1.0
     match getattr(e, "op", "neg"):
+        case Piece() | Coefficient():
+            return 0.0
         case "+" | "-" | "neg" | "fabs" | "choose":
             return max(exponents)
         case "*":

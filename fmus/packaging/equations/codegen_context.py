@@ -113,7 +113,9 @@ class CodegenContext:
             {s: s.name for s in analysis.states} | {m: m.name for m in analysis.modes} | {TIME: "t"}
         )
         for n, condition in enumerate(analysis.switches):
-            if condition.is_frozen:
+            if condition.piece is not None:
+                names |= dict.fromkeys(condition.comparisons, f"int(self.condition_sides[{n}])")
+            elif condition.is_frozen:
                 names |= dict.fromkeys(condition.comparisons, f"self.condition_sides[{n}] > 0.0")
         return ExpressionPrinter(names, self.constants, self.used_names, depth, self.names, on_trial)
 

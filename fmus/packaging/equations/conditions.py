@@ -1,7 +1,8 @@
-"""Conditions of the equations that may change during a step: choose() and limits of friction forces.
+"""Conditions of the equations that may change during a step: choose(), pieces of tables and limits of friction forces.
 
-A condition of choose() that depends on states or time keeps its value during a step; its change is an event.  So the
-equations are smooth in every step.  Limits must hold during the whole run.
+A condition of choose() that depends on states or time keeps its value during a step; its change is an event.  So does
+the piece of a table, which has two conditions: its argument lies above the lower and below the upper edge of the piece.
+So the equations are smooth in every step.  Limits must hold during the whole run.
 """
 
 from collections import defaultdict
@@ -21,8 +22,9 @@ from .algebra import (
     variables_in,
     with_operands,
 )
-from .expressions import COMPARISONS, Expression, Operand, Term, is_among
+from .expressions import COMPARISONS, Expression, ModelError, Operand, Term, is_among
 from .model_declaration import Contact, Model, Output, SettableVariable, State, Variable
+from .tables import EDGE, REFUSE, Coefficient, Piece, is_piece, looked_up
 
 LIMITED_DOMAIN = ("sqrt", "log", "asin", "acos", "/")  # operations that fail for some operands
 HOLD_TOLERANCE = 1e-9  # the sliding force may exceed the holding force by rounding errors
@@ -30,7 +32,10 @@ HOLD_TOLERANCE = 1e-9  # the sliding force may exceed the holding force by round
 
 @dataclass(frozen=True)
 class Condition:
-    """A condition: its margin, positive while it holds; both sides; comparisons it replaces; message of a limit."""
+    """A condition: its margin, positive while it holds; both sides; comparisons it replaces; message of a limit.
+
+    Two conditions that belong to the piece of a table have this piece, in all its copies, in place of comparisons.
+    """
 
     margin: Operand
     sides: tuple[Operand, ...]
@@ -38,9 +43,17 @@ class Condition:
     is_frozen: bool = False  # whether the equations use its value at the start of the step
     sentence: str = ""
 
+    @property
+    def piece(self) -> Term | None:
+        """The piece of a table to which the condition belongs, if any."""
+        return self.comparisons[0] if self.comparisons and is_piece(self.comparisons[0]) else None
+
 
 def find_conditions(targets: Iterable[Operand], varying: Iterable[Expression]) -> list[Condition]:
-    """Find the conditions of choose() in some equations that depend on `varying`; equal ones are one condition."""
+    """Find the conditions of choose() and the pieces of tables in some equations that depend on `varying`.
+
+    Equal ones are one condition.
+    """
     varying, targets = tuple(varying), tuple(targets)
     moving = dependents(targets, varying)
     terms = [e for target in targets for e in subexpressions(target).values() if isinstance(e, Term)]
@@ -60,7 +73,7 @@ def find_conditions(targets: Iterable[Operand], varying: Iterable[Expression]) -
         group_by_hash[e.structure_hash].append(groups[-1])
 
     for e in terms:
-        if e.op in COMPARISONS and id(e) in moving:
+        if (e.op in COMPARISONS or is_piece(e)) and id(e) in moving:
             if (group := find_group(e)) is None:
                 add_group(e)
             else:
@@ -68,7 +81,7 @@ def find_conditions(targets: Iterable[Operand], varying: Iterable[Expression]) -
     visited: set[int] = set()
     margins = []
     for group in groups:  # grows: a kink may lie within another one
-        margins.append(comparison_margin(group[0]))
+        margins.append(group[0].args[0] if is_piece(group[0]) else comparison_margin(group[0]))
         for e in kinks(margins[-1], visited):
             side = Term(">", e.args[0], 0.0)
             side.location = e.location
@@ -78,9 +91,47 @@ def find_conditions(targets: Iterable[Operand], varying: Iterable[Expression]) -
     # A search on a polynomial would pass the narrow dip of fabs(u) - b without a zero; u itself has none.
     margins = replace_absolute_values(margins, lambda kink, _: find_side(kink))
     return [
-        Condition(margin, group[0].args, tuple(group), protecting.isdisjoint(map(id, group)))
+        Condition(one, group[0].args, tuple(group), protecting.isdisjoint(map(id, group)))
         for group, margin in zip(groups, margins, strict=True)
+        for one in (piece_margins(group[0], margin) if is_piece(group[0]) else (margin,))
     ]
+
+
+def piece_margins(piece: Term, u: Operand) -> tuple[Term, Term]:
+    """Return the distances of the argument u of a table from the lower and the upper edge of its piece."""
+    assert isinstance(piece.op, Piece)
+    overlap = piece.op.table.overlap
+    lower, upper = (Term(Coefficient(piece.op.table, EDGE, offset), piece) for offset in (0, 1))
+    return Term("+", Term("-", u, lower), overlap), Term("+", Term("-", upper, u), overlap)
+
+
+def table_limits(targets: Iterable[Operand], forces: Collection[Expression]) -> list[Condition]:
+    """Return the limits of arguments of tables that refuse values beyond their first and their last point."""
+    pieces: dict[int, list[Term]] = {}  # by hash, each once
+    for e in operands_first(*targets):
+        if isinstance(e, Term) and isinstance(e.op, Piece) and e.op.table.ends == REFUSE:
+            if depends_on(e, forces):
+                raise ModelError(
+                    f"{e.op.table} refuses values beyond its ends, but its argument depends on the force of a contact: "
+                    'declare ends="hold" or ends="continue"',
+                    e.location,
+                )
+            same = pieces.setdefault(e.structure_hash, [])
+            if not any(is_same_expression(e, piece) for piece in same):
+                same.append(e)
+    result = []
+    for piece in (piece for same in pieces.values() for piece in same):
+        assert isinstance(piece.op, Piece)
+        table, (u,) = piece.op.table, piece.args
+        for margin, event, x in (
+            (Term("-", u, table.x[0]), "falls below the first", table.x[0]),
+            (Term("-", table.x[-1], u), "exceeds the last", table.x[-1]),
+        ):
+            point = f"the argument of {table} {event} point of the table, {x!r} {table.unit_x}"
+            remedy = 'extend the table, or declare ends="hold" or ends="continue"'
+            sentence = f"{point}, at t = {{violation_time!r}} s: {remedy}"
+            result.append(Condition(margin, (u,), sentence=sentence))
+    return result
 
 
 def kinks(e: Operand, visited: set[int]) -> list[Term]:
@@ -277,6 +328,9 @@ class Signs:
                 return True
             case "+" if self._is_weighted_mean(*e.args):
                 return True
+            case "+" if found := looked_up(e):
+                table, u = found
+                return table.is_nonnegative(self._nonnegative[id(u)])
             case "+" | "*" | "/":
                 return all(signs)
             case "-":

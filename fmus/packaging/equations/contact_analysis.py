@@ -19,7 +19,7 @@ from .algebra import (
     substitute,
     variables_in,
 )
-from .conditions import HOLD_TOLERANCE, Condition, is_nonnegative
+from .conditions import HOLD_TOLERANCE, Condition, is_nonnegative, table_limits
 from .expressions import Expression, ModelError, Operand, Term, is_among
 from .model_declaration import Contact, Rule, State
 from .model_roles import TIME, ModelRoles
@@ -237,7 +237,8 @@ class ContactAnalysis(ModelRoles):
             )
             margin = Term("choose", Term("==", c.mode, 0), surplus, 1.0)
             result.append(Condition(margin, (c.slide,), sentence=sentence))
-        return result
+        declared = [e for variable in self.declared for e in self.declared_expressions(variable)]
+        return [*result, *table_limits(declared, self.contacts)]
 
     def check_solvable(self) -> None:
         """Raise ModelError if the solver cannot run the model."""

@@ -21,6 +21,7 @@ from .expressions import (
 from .model_declaration import Choice, Contact, Model, Output, Rule, SettableVariable, Variable
 from .model_roles import ModelRoles
 from .reserved_names import RESERVED
+from .tables import Table
 
 LARGEST_FLOAT = float_info.max
 METHODS = [label for label, _, _ in (EXACT_ITEM, *METHOD_ITEMS)]
@@ -159,7 +160,8 @@ def check_use(analysis: ModelRoles) -> None:
         *(one for e in analysis.declared for one in analysis.declared_expressions(e)),
     ):
         subexpressions(part, read)
-    for e in (*analysis.parameters, *analysis.choices, *analysis.inputs):
+    read |= {id(table): table for table in analysis.tables if table.is_called}
+    for e in (*analysis.parameters, *analysis.choices, *analysis.inputs, *analysis.tables):
         if id(e) not in read:
             raise ModelError(f"no equation uses {e.name}: use it, or remove its declaration", e.location)
 
@@ -191,4 +193,5 @@ def declared_content(model: type[Model]) -> list[tuple[Any, ...]]:
         if isinstance(e, Variable)
     ]
     terms = [e for e in found.values() if isinstance(e, Term)]
+    variables += [(e, e.name, *e.x, *e.y) for e in vars(model).values() if isinstance(e, Table)]
     return [*variables, *((e, e.op, *(one for one in e.args if is_number(one))) for e in terms)]

@@ -13,6 +13,7 @@ from .expression_printer import COMPARISON_OPERATORS
 from .expressions import Expression, ModelError, Operand, Term
 from .model_analysis import ModelAnalysis
 from .model_declaration import Choice, Contact, Input, Mode, Output, State, Variable
+from .tables import EDGE, KNOT, Coefficient, Piece, Table, looked_up
 
 Dimensions = tuple[Fraction, ...]  # exponents of DIMENSIONS
 DIMENSIONS = tuple(base for base in BASE_UNITS if base != "rad")  # angles are dimensionless
@@ -30,6 +31,9 @@ PRECEDENCE = {"+": 1, "-": 1, "*": 2, "/": 2, "neg": 3} | dict.fromkeys(COMPARIS
 def check_units(analysis: ModelAnalysis) -> None:
     """Check the units of all outputs, rates, start values, slips and forces."""
     memo: dict[int, Dimensions | None] = {}
+    for table in analysis.tables:
+        for word, unit in axes(table):
+            unit_dimensions(table, word, unit)
     for e in analysis.declared:
         own, prefix = declared_dimensions(e), f"{e.name} is declared in {e.unit}, but"
         if isinstance(e, Output):
@@ -187,6 +191,10 @@ def dimensions_of(e: Operand, memo: dict[int, Dimensions | None]) -> Dimensions 
 
 def _term_dimensions(e: Expression, memo: dict[int, Dimensions | None]) -> Dimensions | None:
     assert isinstance(e, Term)
+    if isinstance(e.op, Piece):
+        return _piece_dimensions(e, memo)
+    if isinstance(e.op, Coefficient):
+        return _coefficient_dimensions(e.op)
     dimensions = [
         memo[id(argument)] if isinstance(argument, Expression) else dimensions_of(argument, memo) for argument in e.args
     ]
@@ -224,6 +232,41 @@ def _term_dimensions(e: Expression, memo: dict[int, Dimensions | None]) -> Dimen
     return DIMENSIONLESS
 
 
+def _piece_dimensions(e: Term, memo: dict[int, Dimensions | None]) -> Dimensions:
+    """Check the unit of the argument of a table; return that of the number of a piece."""
+    assert isinstance(e.op, Piece)
+    table, u = e.op.table, memo[id(e.args[0])]
+    if u is not None and u != unit_dimensions(table, "x", table.unit_x):
+        raise ModelError(
+            f"{table} takes an argument in {table.unit_x}, but {expression_text(e.args[0])} is in {dimensions_text(u)}",
+            e.location,
+        )
+    return DIMENSIONLESS
+
+
+def _coefficient_dimensions(op: Coefficient) -> Dimensions:
+    """Return the exponents of a coefficient of a table."""
+    x, result = (unit_dimensions(op.table, word, unit) for word, unit in axes(op.table))
+    if op.kind in (EDGE, KNOT):
+        return x
+    for _ in range(op.table.kinds.index(op.kind) - 1):
+        result = quotient(result, x)
+    return result
+
+
+def axes(table: Table) -> tuple[tuple[str, str], tuple[str, str]]:
+    """Return the axes of a table with their units."""
+    return ("x", table.unit_x), ("y", table.unit_y)
+
+
+def unit_dimensions(table: Table, word: str, unit: str) -> Dimensions:
+    """Return the exponents of the unit of one axis of a table."""
+    if (parsed := parse_unit(unit)) is None:
+        hint = unit_hint(unit, "") or "write a product or a quotient of SI units"
+        raise ModelError(f"{word} of the table {table} has the unit {unit!r}: {hint}", table.location)
+    return tuple(Fraction(getattr(parsed, base)) for base in DIMENSIONS)
+
+
 def expression_text(e: Operand, level: int = 0) -> str:
     """Format an expression for messages; named subexpressions appear by name, parts of a long one as an ellipsis."""
     n_left = MAX_OPERATIONS
@@ -239,6 +282,8 @@ def expression_text(e: Operand, level: int = 0) -> str:
             return "..."
         n_left -= 1
         own = PRECEDENCE.get(e.op, 4)
+        if found := looked_up(e):
+            return f"{found[0]}({text(found[1], 0)})"
         if e.op == "choose" and is_absolute_value(e):
             result = f"fabs({text(e.args[1], 0)})"
         elif e.op == "neg":

@@ -13,6 +13,7 @@ from .algebra import operands, operands_first, unconditional_operands
 from .conditions import Signs
 from .expressions import Expression, ModelError, Operand, Term
 from .model_declaration import Choice, Output, SettableVariable
+from .tables import Coefficient, Piece
 
 INDENT = "    "
 MAX_INLINE_LENGTH = 50  # characters; longer named subexpressions get a separate line
@@ -149,7 +150,7 @@ class ExpressionPrinter:
 
     def name_of(self, e: Expression) -> str:
         """Return the name of an expression, or an empty text."""
-        return e.name or self.names.get(e, "")
+        return e.name or self.names.get(e, "") or (e.op if isinstance(e, Term) and isinstance(e.op, Piece) else "")
 
     def _is_constant(self, e: Operand) -> bool:
         return id(e) in self.constants
@@ -290,6 +291,10 @@ class ExpressionPrinter:
         return ast.Name(name)
 
     def _build_node(self, e: Term) -> ast.expr:
+        if isinstance(e.op, Coefficient):
+            index: ast.expr = ast.Name(self.local_variable(e.args[0]))
+            index = ast.BinOp(index, ast.Add(), ast.Constant(e.op.offset)) if e.op.offset else index
+            return ast.Subscript(ast.Name(e.op.array), index)
         args = [self._to_ast(argument) for argument in e.args]
         if e.op in BINARY_OPERATORS:
             return binary_node(e.op, *args)
@@ -301,6 +306,8 @@ class ExpressionPrinter:
             return ast.Compare(args[0], [COMPARISON_OPERATORS[e.op]], [args[1]])
         if e.op == "choose":
             return ast.IfExp(*args)
+        if isinstance(e.op, Piece):
+            return ast.Call(ast.Attribute(ast.Name("self"), e.op.method), args, [])
         if e.op in DOMAINS and self._depends_on_trial(e) and not self._signs.is_in_domain(e):
             return self._build_guarded_call(e, args[0])
         return ast.Call(ast.Name(e.op), args, [])

@@ -139,8 +139,8 @@ class Expression:
     __int__ = _refusal(NO_VALUE)
     __iter__ = _refusal("{name} is a scalar: it cannot be iterated over")
     __index__ = _refusal(
-        "{name} has no value at build time and cannot index a table: write a formula, or a piecewise one with "
-        "choose(condition, this, that); a count, as in range(n), must be a number such as n = 3"
+        "{name} has no value at build time and cannot index a list: declare name = Table(x, y, unit_x, unit_y) and "
+        "write name({name}); a count, as in range(n), must be a number such as n = 3"
     )
     __array_ufunc__ = None  # disables numpy arithmetic
 
@@ -148,6 +148,8 @@ class Expression:
 def as_operand(e: Operand) -> Operand:
     """Return an expression unchanged and a number as float; raise ModelError for anything else."""
     if isinstance(e, Expression):
+        if callable(e):
+            raise ModelError(f"{e} is a table: call it with its argument, as in {e.name or 'table'}(x)")
         if is_comparison(e):
             if isinstance(e, Term) and e.op == "==":
                 raise ModelError(NO_EQUALITY)

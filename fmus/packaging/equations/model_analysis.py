@@ -96,6 +96,11 @@ class ModelAnalysis(ContactAnalysis):
         """Conditions of choose(), then limits."""
         return [*self.switches, *self.limits]
 
+    @property
+    def has_pieces(self) -> bool:
+        """Whether the piece of a table may change during a step."""
+        return any(condition.piece is not None for condition in self.switches)
+
     def _keeps_closed_form(self, e: Input) -> bool:
         """Return whether breakaway and motion keep their closed form while the input changes."""
         others = (TIME, *self.drivers, *self.inputs)

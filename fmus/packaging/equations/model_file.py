@@ -41,6 +41,7 @@ class ModelFile:
     path: Path
     source: str
     has_input_derivatives: bool = False  # whether inputs may have time derivatives
+    revision: int = 0  # counts the changes of the files of its tables
 
     @property
     def name(self) -> str:
@@ -187,4 +188,6 @@ def load_model_file(path: Path) -> ModelFile:
     cached = _loaded.get(path.resolve())
     if cached is None or (cached.path, cached.source) != (path, source):
         cached = _loaded[path.resolve()] = ModelFile(path, source)
+    elif "analysis" in vars(cached) and any(table.has_changed() for table in cached.analysis.tables):
+        cached = _loaded[path.resolve()] = ModelFile(path, source, revision=cached.revision + 1)
     return cached

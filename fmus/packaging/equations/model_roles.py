@@ -11,6 +11,7 @@ from .algebra import depends_on, differentiate, has_condition_on, is_same_expres
 from .expressions import Expression, ModelError, Operand, describe, is_among
 from .model_declaration import Choice, Contact, Fixed, Input, Mode, Model, Output, Parameter, Rule, State, Variable
 from .reserved_names import RESERVED, check_name, is_reserved_in_c
+from .tables import Table
 
 TIME = Expression()
 TIME.name = "t"
@@ -31,6 +32,7 @@ class ModelRoles:
         for e in self.named:
             check_name(e.name, e)
         self.declared: list[Variable] = [e for e in self.named if isinstance(e, Variable)]
+        self.tables = [e for e in self.named if isinstance(e, Table)]
         self.parameters = self._of_type(Parameter, Fixed)
         self.choices, self.inputs = self._of_type(Choice), self._of_type(Input)
         self.drivers = [

@@ -23,6 +23,7 @@ from .rate_methods import rate_methods
 from .reserved_names import IMPORTS, MATH
 from .setup_methods import setup_methods
 from .single_contact_methods import single_contact_methods
+from .tables import EDGE, array_name
 
 MODULE_TEMPLATE = '''"""{first}
 
@@ -78,7 +79,18 @@ def model_source(analysis: ModelAnalysis, file: str) -> str:
             ]
         ),
     )
-    return text.replace(IMPORTS_MARK, import_lines(text.replace(IMPORTS_MARK, "")))
+    head = "\n".join([import_lines(text.replace(IMPORTS_MARK, "")), *table_lines(analysis)])
+    return text.replace(IMPORTS_MARK, head)
+
+
+def table_lines(analysis: ModelAnalysis) -> list[str]:
+    """Return the lines with the arrays of the tables; empty without tables."""
+    arrays = {
+        array_name(table, kind): column
+        for table in analysis.tables
+        for kind, column in ((EDGE, table.edges), *table.columns.items())
+    }
+    return ["", *(f"{name} = {column!r}" for name, column in arrays.items())] if arrays else []
 
 
 def base_class(analysis: ModelAnalysis) -> str:
@@ -164,6 +176,7 @@ def class_attribute_lines(analysis: ModelAnalysis) -> list[str]:
             ("counts_jumps", any(depends_on(e.declared_rate, analysis.inputs) for e in analysis.prescribed_inputs)),
             ("has_prescribed_slips", analysis.has_prescribed_slips),
             ("has_conditions", analysis.conditions),
+            ("has_pieces", analysis.has_pieces),
             ("checks_event_steps", analysis.checks_event_steps),
             ("has_nominal_velocity", nominal_velocities),
             ("has_variable_levers", not analysis.rests_when_stuck and analysis.variable_lever_contacts),
@@ -210,7 +223,12 @@ def n_event_functions(analysis: ModelAnalysis) -> int:
 
 def condition_texts(analysis: ModelAnalysis) -> list[str]:
     """Return what changes where the event function of a condition falls to zero."""
-    switches = [f"{expression_text(condition.comparisons[0])} changes" for condition in analysis.switches]
+    switches = [
+        f"{expression_text(condition.comparisons[0])} changes"
+        if condition.piece is None
+        else f"{expression_text(condition.piece.args[0])} reaches a point of {condition.piece.op.table}"
+        for condition in analysis.switches
+    ]
     return switches + [condition.sentence.partition(" at t =")[0] for condition in analysis.limits]
 
 

@@ -5,6 +5,7 @@ from .codegen_context import CodegenContext, emit_return, emit_scales, method_so
 from .coupled_contact_methods import emit_friction_forces, law_mode
 from .expressions import Term
 from .single_contact_methods import emit_friction_force
+from .tables import Piece
 
 MAX_SUMMANDS = 50  # in one statement
 
@@ -62,4 +63,19 @@ def condition_methods(context: CodegenContext) -> list[str]:
     scales = emit_scales(context, printer, rounding_scales(margins))
     context.emit_driver(printer, scales)
     printer.count_uses(*margins, *scales)
-    return [method_source("condition_margins", context.arguments, emit_return(printer, [*margins, *scales]))]
+    lines = emit_return(printer, [*margins, *scales])
+    return [method_source("condition_margins", context.arguments, lines), *pieces_method(context)]
+
+
+def pieces_method(context: CodegenContext) -> list[str]:
+    """Return the source of the method that finds the pieces of tables; nothing without them."""
+    printer = context.printer()
+    conditions = enumerate(context.analysis.conditions)
+    pieces = [(n, condition.piece) for n, condition in conditions if condition.piece is not None]
+    context.emit_driver(printer, [piece.args[0] for _, piece in pieces])
+    printer.count_uses(*(piece.args[0] for _, piece in pieces[::2]))
+    for (n, piece), (other, _) in zip(pieces[::2], pieces[1::2], strict=True):  # both conditions of a piece
+        assert isinstance(piece.op, Piece)
+        printer.emit(f"self.condition_pieces[{n}] = float(self.{piece.op.method}({printer.text(piece.args[0])}))")
+        printer.emit(f"self.condition_pieces[{other}] = self.condition_pieces[{n}]")
+    return [method_source("update_pieces", context.arguments, printer.lines)] if pieces else []

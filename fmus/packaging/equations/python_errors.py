@@ -9,13 +9,13 @@ from traceback import FrameSummary, extract_tb
 from typing import Any
 
 from ... import __all__ as EXPORTED_NAMES
-from . import expressions, model_declaration
+from . import expressions, model_declaration, tables
 from .expressions import FUNCTIONS, NO_VALUE, ModelError
 from .model_declaration import Model, Rule, Variable, signature_text
 
 OFFERED = {
     name: one
-    for module in (expressions, model_declaration)
+    for module in (expressions, model_declaration, tables)
     for name, one in vars(module).items()
     if name in EXPORTED_NAMES
 }

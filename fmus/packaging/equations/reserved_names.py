@@ -31,6 +31,7 @@ ATTRIBUTES = (
     "time",
     "method",
     "condition_sides",
+    "condition_pieces",
     "solver_class",
     "violation_time",
     "violation_value",

@@ -8,6 +8,7 @@ from .codegen_context import CodegenContext, method_source, rule_status
 from .expression_printer import INDENT, ExpressionPrinter
 from .expressions import Expression, Operand, Term, is_among
 from .model_declaration import Input
+from .tables import EDGE, Table, array_name
 
 
 def setup_methods(context: CodegenContext) -> list[str]:
@@ -20,6 +21,7 @@ def setup_methods(context: CodegenContext) -> list[str]:
         *driver_method(context),
         *input_polynomial_methods(context),
         *prescribed_motion_methods(context),
+        *map(piece_method, context.analysis.tables),
     ]
 
 
@@ -29,6 +31,8 @@ def init_method(context: CodegenContext) -> list[str]:
     if context.analysis.conditions:
         lines.append(f"self.condition_sides = [1.0] * {len(context.analysis.conditions)}")
         lines.append("self.violation_time = self.violation_value = 0.0")
+    if context.analysis.has_pieces:
+        lines.append(f"self.condition_pieces = [-1.0] * {len(context.analysis.conditions)}")
     if context.driver is not None:
         lines.append("self.t_base = self.x_base = 0.0")
     for e, rate in context.analysis.input_rates.items():
@@ -158,6 +162,18 @@ def input_polynomial_methods(context: CodegenContext) -> list[str]:
     return [
         method_source(name, ["t"] * (name != "has_higher_order"), printer.lines) for name, printer in printers.items()
     ]
+
+
+def piece_method(table: Table) -> str:
+    """Piece of a table that contains u, by bisection of its edges; the first one where u is NaN."""
+    edges, last = array_name(table, EDGE), len(table.edges) - 2
+    lines = ["piece = 0"]
+    for power in reversed(range(last.bit_length())):
+        lines += [
+            f"if piece + {2**power} <= {last} and u >= {edges}[piece + {2**power}]:",
+            f"{INDENT}piece = piece + {2**power}",
+        ]
+    return method_source(array_name(table, "piece"), ["u"], [2 * INDENT + line for line in [*lines, "return piece"]])
 
 
 def prescribed_motion_methods(context: CodegenContext) -> list[str]:

@@ -10,6 +10,7 @@ from .dimensions import expression_text
 from .expressions import Expression, ModelError, Operand, Term
 from .model_analysis import ModelAnalysis
 from .model_declaration import Contact, Output
+from .tables import Coefficient, Piece
 
 SMALL_SLIP = 1e-9  # m/s or rad/s, for the two sides of zero slip
 FORCE_TOLERANCE = 1e-6  # relative difference of forces that are equal
@@ -148,6 +149,8 @@ def _value_of(e: Expression, values: dict[Expression, float], memo: dict[int, fl
     if isinstance(e, Output) or (isinstance(e, Term) and e.op == "choose"):
         return args[-1]  # type: ignore[return-value]
     assert isinstance(e, Term)
+    if isinstance(e.op, (Piece, Coefficient)):
+        return e.op.evaluate(*args)  # type: ignore[arg-type]
     function = OPERATIONS[e.op] if e.op in OPERATIONS else getattr(math, e.op)
     try:
         return float(function(*args))

@@ -56,9 +56,10 @@ class CallGraph:
         return name
 
     def text(self) -> str:
-        """Return the C text: structs, then functions."""
+        """Return the C text: structs, constant arrays, then functions."""
         tuples = [
             f"{c} {{ {' '.join(f'{part.c} _{i};' for i, part in enumerate(ctype.parts))} }};\n"
             for c, ctype in self._tuples.items()
         ]
-        return "\n".join([self.layout.struct_definitions(), *tuples, *self._texts])
+        arrays = [self.layout.array_definitions()] if self.layout.constant_arrays else []
+        return "\n".join([self.layout.struct_definitions(), *arrays, *tuples, *self._texts])

@@ -203,6 +203,8 @@ class ExpressionTranslator(ast.NodeVisitor):
 
     def visit_Subscript(self, node: ast.Subscript) -> CExpression:
         row, index = self.visit(node.value), self.visit(node.slice)
+        if isinstance(row.ctype, CompileTimeValue) and isinstance(node.value, ast.Name):
+            row = self.constant_array(node.value.id, row)
         if not isinstance(row.ctype, FloatArray):
             raise self.unsupported(node, "is not an element of a list of floats", "create the list in __init__")
         if isinstance(index.ctype, CompileTimeValue):
@@ -216,6 +218,14 @@ class ExpressionTranslator(ast.NodeVisitor):
             index_text = self.emit_temporary(INT, index_text)
             self.emit_fault_check()
         return CExpression(FLOAT, f"{row.text}[{index_text}]")
+
+    def constant_array(self, name: str, row: CExpression) -> CExpression:
+        """Return the static array for a tuple of floats of the module; other values unchanged."""
+        values = row.ctype.value if isinstance(row.ctype, CompileTimeValue) else None
+        if not (isinstance(values, tuple) and values and all(scalar_type_of(value) is FLOAT for value in values)):
+            return row
+        self.layout.constant_arrays[name] = values
+        return CExpression(FloatArray(len(values)), f"table{name}")
 
     # ---- operators
 
@@ -391,12 +401,12 @@ class ExpressionTranslator(ast.NodeVisitor):
 
     def translate_builtin(self, node: ast.Call, function: Callable[..., Any], values: list[CExpression]) -> CExpression:
         """Translate a call of a function of math or one of the supported built-in functions."""
-        allowed = (*NEVER_RAISING, *MAY_RAISE, *PREDICATES, abs, min, max, float)
+        allowed = (*NEVER_RAISING, *MAY_RAISE, *PREDICATES, abs, min, max, float, int)
         if function not in allowed:
             raise self.unsupported(
                 node,
                 "calls a function that cannot be translated to C",
-                "use abs, min, max, float or a function of math that C has",
+                "use abs, min, max, float, int or a function of math that C has",
             )
         if function in (min, max):
             if len(values) < 2:
@@ -415,6 +425,8 @@ class ExpressionTranslator(ast.NodeVisitor):
             return CExpression(FLOAT, f"fabs({text})" if function is abs else text)
         if function is float:
             return CExpression(FLOAT, f"(double){values[0].as_operand(PRIMARY)}", UNARY)
+        if function is int:  # of whole numbers
+            return CExpression(INT, f"(int64_t){values[0].as_operand(PRIMARY)}", UNARY)
         if function in PREDICATES:
             return CExpression(BOOL, f"{function.__name__}({texts}) != 0", EQUALITY)
         if function in NEVER_RAISING:

@@ -23,6 +23,7 @@ class StructLayout:
 
     def __init__(self, model: object, *others: object) -> None:
         self.fields: dict[type, dict[str, CType]] = {}
+        self.constant_arrays: dict[str, tuple[float, ...]] = {}  # of the module of the model, which functions read
         self._seen: set[int] = set()
         self.model, *_ = [self._add(instance, type(instance).__name__) for instance in (model, *others)]
 
@@ -73,6 +74,13 @@ class StructLayout:
             )
             texts.append(f"struct {cls.__name__} {{\n{members}}};\n")
         return "\n".join(texts)
+
+    def array_definitions(self) -> str:
+        """Return the definitions of the constant arrays."""
+        return "".join(
+            f"static const double table{name}[{len(values)}] = {{{', '.join(map(c_literal, values))}}};\n"
+            for name, values in self.constant_arrays.items()
+        )
 
     def initializer(self, instance: object, indent: str = "    ") -> str:
         """Return the initializer of a struct with the current values of an object."""

@@ -1,0 +1,326 @@
+"""Lookup tables in model files: a function of one variable, given by points.
+
+A table is a polynomial in its argument u whose coefficients are constant in each piece between two points:
+
+    mu(u) = value[piece] + slope[piece] * (u - knot[piece])
+
+The expression contains the piece as a term of u, and each coefficient as a term of the piece.  So derivatives and
+rounding scales follow from the rules for sums and products.  In generated code, the coefficients are constant arrays.
+The piece keeps its value during a step; its change is an event (conditions.py).
+"""
+
+import csv
+import math
+from bisect import bisect_right
+from collections.abc import Sequence
+from functools import cached_property
+from itertools import pairwise
+from pathlib import Path
+
+from .expressions import Expression, ModelError, Operand, Term, as_operand, author_location, describe, is_number
+
+LINEAR, PCHIP = "linear", "pchip"
+HOLD, CONTINUE, REFUSE = "hold", "continue", "refuse"
+INTERPOLATIONS, ENDS = (LINEAR, PCHIP), (HOLD, CONTINUE, REFUSE)
+# Where a piece has no end; states beyond this value are treated as divergence
+UNBOUNDED = 1e100
+OVERLAP, OVERLAP_OF_PIECE = 1e-9, 1e-4  # of pieces, as shares of the largest argument and of the shortest piece
+EDGE, KNOT, VALUE, SLOPE, QUADRATIC, CUBIC = "edge", "knot", "value", "slope", "quadratic", "cubic"
+
+
+class Table(Expression):
+    """A function of one variable, given by points: measured friction over slip, stiffness over position. ::
+
+        mu = Table([0.0, 0.01, 0.1, 1.0], [0.8, 0.6, 0.5, 0.45], "m/s", "1")
+        mu = Table("mu.csv")
+        F_friction = Contact("N", "friction force", mode=mode, slip=v, slide=N * mu(fabs(v)))
+
+    Parameters
+    ----------
+    x
+        Values of the argument, which rise; or the name of a CSV file beside the model file, with two columns and their
+        names and units in the first line, as in `slip (m/s),mu (1)`.
+    y
+        Values of the function.
+    unit_x, unit_y
+        Their SI units.
+    interpolation
+        "linear", or "pchip": monotone cubic polynomials without overshoot.
+    ends
+        Beyond the first and the last point: "hold" their values, "continue" with the slope at the end, or "refuse",
+        which ends the run with a message.
+    """
+
+    def __init__(
+        self,
+        x: Sequence[float] | str,
+        y: Sequence[float] | None = None,
+        unit_x: str = "",
+        unit_y: str = "",
+        *,
+        interpolation: str = LINEAR,
+        ends: str = HOLD,
+    ) -> None:
+        self.location = author_location()
+        self.file: Path | None = None
+        if isinstance(x, str):
+            if y is not None or unit_x or unit_y:
+                raise ModelError(f"a table of the file {x} has its points and units from there: write Table({x!r})")
+            self.file = Path(self.location[0]).parent / x
+            self.file_content = read_content(self.file)
+            x, y, unit_x, unit_y = read_points(self.file.name, self.file_content)
+        for word, value, allowed in ("interpolation", interpolation, INTERPOLATIONS), ("ends", ends, ENDS):
+            if value not in allowed:
+                raise ModelError(f"{word} of a table must be {' or '.join(map(repr, allowed))}, got {describe(value)}")
+        for word, unit in ("unit_x", unit_x), ("unit_y", unit_y):
+            if not isinstance(unit, str) or not unit:
+                raise ModelError(f'a table needs its units: {word} is {describe(unit)}; a pure number has the unit "1"')
+        self.x, self.y = checked_points(x, y)
+        self.unit_x, self.unit_y = unit_x, unit_y
+        self.interpolation, self.ends = interpolation, ends
+        self.is_called = False
+
+    def __call__(self, u: Operand) -> Operand:
+        """Return the value of the table at u: an expression, or a number for a number."""
+        u = as_operand(u)
+        if not self.name:
+            raise ModelError("a table without a name is called: assign it to a name in the class first")
+        self.is_called = True
+        if not isinstance(u, Expression):
+            return self.at(u)
+        if len(self.edges) == 2 and self.ends == CONTINUE:  # a straight line
+            return self.y[0] + self.columns[SLOPE][0] * (u - self.x[0])
+        piece = Term(Piece(self), u)
+        knot, *coefficients = (Term(Coefficient(self, kind), piece) for kind in self.kinds)
+        w = u - knot
+        *others, result = coefficients
+        for coefficient in reversed(others):
+            result = coefficient + w * result
+        return result
+
+    def at(self, u: float) -> float:
+        """Return the value at a number."""
+        if self.ends == REFUSE and not self.x[0] <= u <= self.x[-1]:
+            raise ModelError(
+                f'{self}({u!r}) is beyond the ends of the table: extend it, or declare ends="hold" or ends="continue"'
+            )
+        piece = self.piece_at(u)
+        knot, *coefficients = (self.columns[kind][piece] for kind in self.kinds)
+        *others, result = coefficients
+        for coefficient in reversed(others):
+            result = coefficient + (u - knot) * result
+        return result
+
+    def piece_at(self, u: float) -> int:
+        """Return the number of the piece that contains u; a point belongs to the piece above it."""
+        return bisect_right(self.edges, u, 1, len(self.edges) - 1) - 1
+
+    def has_changed(self) -> bool:
+        """Return whether the file of the table has other content than when it was read."""
+        return self.file is not None and read_content(self.file) != self.file_content
+
+    @property
+    def kinds(self) -> tuple[str, ...]:
+        """The columns of a piece: its knot, and the coefficients of the polynomial, lowest first."""
+        return (KNOT, VALUE, SLOPE) if self.interpolation == LINEAR else (KNOT, VALUE, SLOPE, QUADRATIC, CUBIC)
+
+    @property
+    def has_end_pieces(self) -> bool:
+        """Whether there are other polynomials before the first and after the last point."""
+        return self.ends == HOLD or self.interpolation == PCHIP
+
+    @property
+    def scale(self) -> float:
+        """Magnitude of the argument, to which rounding errors of its distance to an edge are relative."""
+        return max(abs(self.x[0]), abs(self.x[-1]))
+
+    @property
+    def overlap(self) -> float:
+        """Distance by which a piece that is in use reaches beyond its edges.
+
+        A motion may settle at a point of the table.  Without the overlap, the errors of a method would change the piece
+        in every step.  A motion that passes the point is off by the square of the overlap.
+        """
+        return min(OVERLAP * self.scale, OVERLAP_OF_PIECE * min(b - a for a, b in pairwise(self.x)))
+
+    @cached_property
+    def edges(self) -> tuple[float, ...]:
+        """Lower ends of all pieces, then the upper end of the last one."""
+        return (-UNBOUNDED, *(self.x if self.has_end_pieces else self.x[1:-1]), UNBOUNDED)
+
+    @cached_property
+    def columns(self) -> dict[str, tuple[float, ...]]:
+        """The knot and the coefficients of all pieces, by kind."""
+        steps = [b - a for a, b in pairwise(self.x)]
+        secants = [(b - a) / h for (a, b), h in zip(pairwise(self.y), steps, strict=True)]
+        rows: list[tuple[float, ...]] = []  # of each piece
+        if self.interpolation == LINEAR:
+            rows = list(zip(self.x, self.y, secants, strict=False))
+            first = last = 0.0
+        else:
+            slopes = pchip_slopes(steps, secants)
+            for x, y, h, secant, (c, d) in zip(self.x, self.y, steps, secants, pairwise(slopes), strict=False):
+                rows.append((x, y, c, (3.0 * secant - 2.0 * c - d) / h, (c + d - 2.0 * secant) / (h * h)))
+            first, last = (0.0, 0.0) if self.ends == HOLD else (slopes[0], slopes[-1])
+        if self.has_end_pieces:
+            zeros = (0.0,) * (len(self.kinds) - 3)
+            rows = [(self.x[0], self.y[0], first, *zeros), *rows, (self.x[-1], self.y[-1], last, *zeros)]
+        return dict(zip(self.kinds, zip(*rows, strict=True), strict=True))
+
+    def is_nonnegative(self, nonnegative_argument: bool) -> bool:
+        """Return whether no value is negative, for arguments of any sign or for those that are not negative."""
+        slopes, is_reached = self.columns[SLOPE], not (nonnegative_argument and self.x[0] <= 0.0)
+        rises_backward, rises_forward = slopes[0] <= 0.0 or not is_reached, self.last_slope >= 0.0
+        return min(self.y) >= 0.0 and (self.ends == HOLD or (rises_backward and rises_forward))
+
+    @property
+    def last_slope(self) -> float:
+        """Slope beyond the last point."""
+        return self.columns[SLOPE][-1]
+
+
+class Piece(str):
+    """The operation that finds the piece of a table that contains its operand; equal for the same table."""
+
+    table: Table
+
+    def __new__(cls, table: Table) -> "Piece":
+        """Create the operation of a table."""
+        piece = super().__new__(cls, f"{table.name}_piece")
+        piece.table = table
+        return piece
+
+    def evaluate(self, u: float) -> float:
+        """Return the number of the piece."""
+        return float(self.table.piece_at(u))
+
+    @property
+    def method(self) -> str:
+        """Name of the method in generated code."""
+        return array_name(self.table, "piece")
+
+
+class Coefficient(str):
+    """The operation that returns a column of a table for its operand, a piece; equal for the same table and column."""
+
+    table: Table
+    kind: str
+    offset: int  # of the edge above a piece: 1
+
+    def __new__(cls, table: Table, kind: str, offset: int = 0) -> "Coefficient":
+        """Create the operation of a column."""
+        coefficient = super().__new__(cls, f"{table.name}_{kind}" + ("_above" if offset else ""))
+        coefficient.table, coefficient.kind, coefficient.offset = table, kind, offset
+        return coefficient
+
+    def evaluate(self, piece: float) -> float:
+        """Return the number in the column."""
+        column = self.table.edges if self.kind == EDGE else self.table.columns[self.kind]
+        return column[int(piece) + self.offset]
+
+    @property
+    def array(self) -> str:
+        """Name of the array in generated code."""
+        return array_name(self.table, self.kind)
+
+
+def array_name(table: Table, kind: str) -> str:
+    """Return the name of a column, or of the search, in generated code; no variable of a model starts with _."""
+    return f"_{table.name}_{kind}"
+
+
+def is_piece(e: Operand) -> bool:
+    """Return whether an expression is the piece of a table."""
+    return isinstance(e, Term) and isinstance(e.op, Piece)
+
+
+def is_coefficient(e: Operand) -> bool:
+    """Return whether an expression is a coefficient or an edge of a table."""
+    return isinstance(e, Term) and isinstance(e.op, Coefficient)
+
+
+def looked_up(e: Operand) -> tuple[Table, Operand] | None:
+    """Return the table and the argument of an expression that is the value of a table, else None."""
+    if isinstance(e, Term) and e.op == "+" and is_coefficient(e.args[0]) and e.args[0].op.kind == VALUE:
+        return e.args[0].op.table, e.args[0].args[0].args[0]
+    return None
+
+
+def pchip_slopes(steps: Sequence[float], secants: Sequence[float]) -> list[float]:
+    """Return the slopes at the points, with which cubic polynomials are monotone where the points are.
+
+    References
+    ----------
+    F. N. Fritsch, J. Butland, A method for constructing local monotone piecewise cubic interpolants, SIAM J. Sci. Stat.
+    Comput. 5 (1984) 300-304; the ends: C. Moler, Numerical Computing with MATLAB, 3.6.
+    """
+    if len(steps) == 1:
+        return [secants[0], secants[0]]
+    inner = []
+    for (h, k), (a, b) in zip(pairwise(steps), pairwise(secants), strict=True):
+        w, q = 2.0 * k + h, k + 2.0 * h
+        inner.append((w + q) / (w / a + q / b) if a * b > 0.0 else 0.0)
+    first = end_slope(steps[0], steps[1], secants[0], secants[1])
+    last = end_slope(steps[-1], steps[-2], secants[-1], secants[-2])
+    return [first, *inner, last]
+
+
+def end_slope(h: float, k: float, a: float, b: float) -> float:
+    """Return the slope at the end of the first of two steps h and k, with secants a and b."""
+    slope = ((2.0 * h + k) * a - h * b) / (h + k)
+    if slope * a <= 0.0:
+        return 0.0
+    return 3.0 * a if a * b <= 0.0 and abs(slope) > 3.0 * abs(a) else slope
+
+
+def checked_points(x: object, y: object) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Return the points as floats; raise ModelError for points that are no table."""
+    columns = []
+    for word, values in ("x", x), ("y", y):
+        try:
+            numbers = [*values]  # type: ignore[misc]
+        except (TypeError, ModelError):
+            raise ModelError(f"{word} of a table must be a list of numbers, got {describe(values)}") from None
+        for n, number in enumerate(numbers, 1):
+            if not is_number(number) or not math.isfinite(number):
+                raise ModelError(f"{word} of a table must be finite numbers, got {describe(number)} as point {n}")
+        columns.append(tuple(map(float, numbers)))
+    first, second = columns
+    if len(first) != len(second):
+        raise ModelError(f"a table needs as many values of y as of x, got {len(second)} and {len(first)}")
+    if len(first) < 2:
+        raise ModelError(f"a table needs at least two points, got {len(first)}")
+    for n, (a, b) in enumerate(pairwise(first), 2):
+        if not a < b:
+            raise ModelError(f"x of a table must rise, but point {n} has {b!r} after {a!r}")
+    return first, second
+
+
+def read_content(file: Path) -> str:
+    """Return the text of a file; raise ModelError if it cannot be read."""
+    try:
+        return file.read_text(encoding="utf-8-sig")
+    except (OSError, UnicodeDecodeError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise ModelError(f"the table {file.name} beside the model file cannot be read: {reason}") from error
+
+
+def read_points(name: str, content: str) -> tuple[list[float], list[float], str, str]:
+    """Return both columns of a CSV file and their units."""
+    rows = [row for row in csv.reader(content.splitlines()) if any(cell.strip() for cell in row)]
+    titles = rows[0] if rows else []
+    units = [title.strip().removesuffix(")").rpartition("(")[2] for title in titles if title.strip().endswith(")")]
+    if len(titles) != 2 or len(units) != 2:
+        raise ModelError(
+            f"{name} must begin with the names and units of two columns, as in 'slip (m/s),mu (1)', got "
+            f"{describe(','.join(titles))}"
+        )
+    columns: tuple[list[float], list[float]] = [], []
+    for n, row in enumerate(rows[1:], 2):
+        try:
+            x, y = map(float, row)
+        except ValueError:
+            raise ModelError(f"{name}, row {n}: {','.join(row)!r} is not two numbers") from None
+        columns[0].append(x)
+        columns[1].append(y)
+    return *columns, *units  # type: ignore[return-value]
