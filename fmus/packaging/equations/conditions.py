@@ -23,7 +23,7 @@ from .algebra import (
     with_operands,
 )
 from .expressions import COMPARISONS, Expression, ModelError, Operand, Term, is_among
-from .model_declaration import Contact, Model, Output, SettableVariable, State, Variable
+from .model_declaration import HYBRID, Contact, Model, Output, SettableVariable, State, Variable
 from .tables import EDGE, REFUSE, Coefficient, Piece, is_piece, looked_up
 
 LIMITED_DOMAIN = ("sqrt", "log", "asin", "acos", "/")  # operations that fail for some operands
@@ -49,10 +49,12 @@ class Condition:
         return self.comparisons[0] if self.comparisons and is_piece(self.comparisons[0]) else None
 
 
-def find_conditions(targets: Iterable[Operand], varying: Iterable[Expression]) -> list[Condition]:
+def find_conditions(
+    targets: Iterable[Operand], varying: Iterable[Expression], contacts: Collection[Contact] = ()
+) -> list[Condition]:
     """Find the conditions of choose() and the pieces of tables in some equations that depend on `varying`.
 
-    Equal ones are one condition.
+    Equal ones are one condition.  The slips of `contacts` have the signs of their modes.
     """
     varying, targets = tuple(varying), tuple(targets)
     moving = dependents(targets, varying)
@@ -81,7 +83,7 @@ def find_conditions(targets: Iterable[Operand], varying: Iterable[Expression]) -
     visited: set[int] = set()
     margins = []
     for group in groups:  # grows: a kink may lie within another one
-        margins.append(group[0].args[0] if is_piece(group[0]) else comparison_margin(group[0]))
+        margins.append(sign_slips(group[0].args[0], contacts) if is_piece(group[0]) else comparison_margin(group[0]))
         for e in kinks(margins[-1], visited):
             side = Term(">", e.args[0], 0.0)
             side.location = e.location
@@ -95,6 +97,18 @@ def find_conditions(targets: Iterable[Operand], varying: Iterable[Expression]) -
         for group, margin in zip(groups, margins, strict=True)
         for one in (piece_margins(group[0], margin) if is_piece(group[0]) else (margin,))
     ]
+
+
+def sign_slips(u: Operand, contacts: Collection[Contact]) -> Operand:
+    """Return an expression with mode * slip in place of |slip|: smooth, and no event apart from that of the contact."""
+    sizes = {
+        e: Term("*", c.mode, c.slip)
+        for e in subexpressions(u).values()
+        if isinstance(e, Term) and e.op == "fabs"
+        for c in contacts
+        if c.laws == (HYBRID,) and is_same_expression(e.args[0], c.slip)
+    }
+    return substitute(u, sizes)
 
 
 def piece_margins(piece: Term, u: Operand) -> tuple[Term, Term]:

@@ -48,7 +48,7 @@ class ModelAnalysis(ContactAnalysis):
             *self._holding_rules(),
         )
         self.switches = find_conditions(
-            self._dynamic_expressions(), (TIME, *self.states, *self.drivers, *self.input_rates)
+            self._dynamic_expressions(), (TIME, *self.states, *self.drivers, *self.input_rates), self.contacts
         )
         self.limits = self._find_limits()
         for e in self.named if self.contacts and not self.rests_when_stuck else ():

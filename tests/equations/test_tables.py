@@ -1,0 +1,342 @@
+"""Lookup tables in model files: values against numpy and scipy, motions against scipy from point to point."""
+
+from bisect import bisect_right
+from random import Random
+
+import fmpy
+import numpy as np
+import pytest
+from build_cache import build_user_model
+from fmpy.fmi3 import FMU3Model
+from model_text import remove_unused
+from models import DOP853, ODE23, ODE45, RODAS
+from native_fmus import require_compiler
+from row_comparison import assert_identical
+from scipy.integrate import solve_ivp
+from scipy.interpolate import PchipInterpolator
+from worker_client import FmiError
+
+from fmus.packaging import BuildError
+from fmus.packaging.model_lookup import find_model
+
+KINDS = {
+    "": (),
+    "native": ("--native", "--platform", "linux64"),
+    "native/fmi3": ("--fmi", "3", "--platform", "linux64"),
+}
+STOP, N, M, X0 = 2.0, 10.0, 1.0, 0.2  # SI
+FRICTION = ((0.0, 0.01, 0.1, 0.5, 1.0), (0.5, 0.35, 0.3, 0.32, 0.4))
+SPRING = ((-0.2, -0.1, 0.1, 0.2), (-80.0, -10.0, 10.0, 80.0))
+MODEL = '''from fmus import Contact, Fixed, Mode, Model, Output, Parameter, State, Table, fabs
+
+
+class Bench(Model):
+    """Mass on a spring, with friction; both are tables."""
+
+    m = Parameter(1.0, "kg", "mass", above=0.0)
+    N = Parameter(10.0, "N", "normal force", low=0.0)
+    x0 = Fixed(0.2, "m", "position at the start")
+    mu = Table({friction})
+    spring = Table({spring}, ends="continue")
+    x = State("m", "position", start=x0)
+    v = State("m/s", "speed", rate_of=x)
+    mode = Mode()
+    F_friction = Contact("N", "friction", mode=mode, slip=v, slide=N * mu(fabs(v)))
+    a = Output("m/s2", "acceleration", (-spring(x) - F_friction) / m, rate_of=v)
+    stop_time = 2.0
+'''
+HEAD = '''from fmus import Model, Output, State, Table
+
+
+class Wrong(Model):
+    """A clock."""
+
+    clock = State("s", "time", start=-1.0, rate=1.0)
+'''
+
+
+def points(table, units):
+    """Return the arguments of a Table."""
+    return f"{list(table[0])}, {list(table[1])}, {units}"
+
+
+def build_bench(folder, friction=FRICTION, spring=SPRING, kind=""):
+    """Build the model with these tables; return the path of the FMU."""
+    texts = {"friction": points(friction, '"m/s", "1"'), "spring": points(spring, '"m", "N"')}
+    (folder / "bench.py").write_text(MODEL.format(**texts))
+    return build_user_model(folder / "bench.py", *KINDS[kind]) / kind / "bench.fmu"
+
+
+class Line:
+    """A table, as the straight line of one of its pieces; held at its ends, or continued."""
+
+    def __init__(self, table, is_held):
+        (self.x, self.y), self.is_held = table, is_held
+        self.edges = self.x if is_held else self.x[1:-1]
+        self.piece = 0
+
+    def select(self, u):
+        """Select the piece that contains u."""
+        self.piece = bisect_right(self.edges, u)
+
+    def ends(self):
+        """Return where the piece ends."""
+        edges = (-np.inf, *self.edges, np.inf)
+        return edges[self.piece], edges[self.piece + 1]
+
+    def __call__(self, u):
+        if self.is_held and self.piece in (0, len(self.x)):
+            return self.y[0 if self.piece == 0 else -1]
+        i = self.piece - self.is_held
+        return self.y[i] + (u - self.x[i]) / (self.x[i + 1] - self.x[i]) * (self.y[i + 1] - self.y[i])
+
+
+def reference(friction=FRICTION, spring=SPRING):
+    """Return the final position and the changes of the mode, by scipy from one point of a table to the next."""
+    mu, force = Line(friction, True), Line(spring, False)
+    t, y, hold = 0.0, [X0, 0.0], N * friction[1][0]
+    force.select(X0)
+    mode = -int(np.sign(force(X0))) if abs(force(X0)) > hold else 0
+    events = [(t, mode)]
+    while mode and t < STOP:
+        ahead = 1e-12 * (-force(y[0]) - mode * N * mu(abs(y[1]))) / M  # in the direction of the motion
+        force.select(y[0] + 1e-12 * np.sign(y[1]))
+        mu.select(mode * y[1] + mode * ahead)
+        low, high = force.ends()
+        slow, fast = mu.ends()
+        guards = [
+            lambda t, y, mode=mode: mode * y[1],
+            lambda t, y, low=low: y[0] - low if low > -np.inf else 1.0,
+            lambda t, y, high=high: high - y[0] if high < np.inf else 1.0,
+            lambda t, y, slow=slow, mode=mode: mode * y[1] - slow if slow > 0.0 else 1.0,
+            lambda t, y, fast=fast, mode=mode: fast - mode * y[1] if fast < np.inf else 1.0,
+        ]
+        for guard in guards:
+            guard.terminal, guard.direction = True, -1
+        rates = lambda t, y, mode=mode: [y[1], (-force(y[0]) - mode * N * mu(mode * y[1])) / M]  # noqa: E731
+        run = solve_ivp(rates, (t, STOP), y, "DOP853", events=guards, rtol=3e-14, atol=1e-16, max_step=STOP / 200.0)
+        t, y = run.t[-1], list(run.y[:, -1])
+        if run.status == 1 and len(run.t_events[0]):
+            force.select(y[0])
+            y[1], mode = 0.0, -int(np.sign(force(y[0]))) if abs(force(y[0])) > hold else 0
+            events.append((t, mode))
+    return y[0], events
+
+
+# ---- values
+
+
+def random_points(rng, n):
+    """Return a table with points at uneven distances."""
+    x = np.cumsum([rng.uniform(-1.0, 0.0), *(10.0 ** rng.uniform(-3.0, 0.0) for _ in range(n - 1))])
+    return x.tolist(), [rng.uniform(-1.0, 1.0) for _ in x]
+
+
+def test_values_are_those_of_numpy_and_scipy_in_each_kind_of_fmu(worker, tmp_path):
+    """Random tables of 2 to 40 points, held and continued, over a clock; the same bits from each kind of FMU."""
+    require_compiler()
+    rng, lines, expected = Random(5), [], {}
+    tables = {f"{kind}_{ends}_{n}": (kind, ends, random_points(rng, n)) for kind in ("linear", "pchip")
+              for ends in ("hold", "continue") for n in (2, 3, 7, 40)}  # fmt: skip
+    times = np.linspace(0.0, 12.0, 241)
+    u = times - 1.0
+    for name, (kind, ends, (x, y)) in tables.items():
+        lines.append(f'    {name} = Table({x}, {y}, "s", "m", interpolation="{kind}", ends="{ends}")')
+        lines.append(f'    of_{name} = Output("m", "value", {name}(clock))')
+        inner = np.interp(u, x, y) if kind == "linear" else PchipInterpolator(x, y)(np.clip(u, x[0], x[-1]))
+        slopes = np.diff(y) / np.diff(x) if kind == "linear" else PchipInterpolator(x, y).derivative()([x[0], x[-1]])
+        beyond = np.where(u < x[0], (u - x[0]) * slopes[0], np.where(u > x[-1], (u - x[-1]) * slopes[-1], 0.0))
+        expected[f"of_{name}"] = inner + (beyond if ends == "continue" else 0.0)
+    (tmp_path / "many.py").write_text(HEAD.replace("Wrong", "Many") + "\n".join(lines) + "\n")
+    rows = []
+    for kind, words in KINDS.items():
+        fmu = worker.instantiate(build_user_model(tmp_path / "many.py", *words) / kind / "many.fmu").begin(
+            {}, stop=12.0
+        )
+        rows.append(fmu.run(times.tolist(), [*expected]))
+        fmu.free()
+    for column, name in zip(np.array(rows[0]).T, expected, strict=True):
+        assert np.abs(column - expected[name]).max() <= 4e-15 * np.abs(expected[name]).max(), name
+    assert_identical(rows[0], rows[1], [*expected])
+    assert_identical(rows[0], rows[2], [*expected])
+
+
+# ---- motions
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_error_is_proportional_to_the_tolerance(worker, tmp_path, kind):
+    """Each method, against a solution from one point of the tables to the next: position and changes of the mode."""
+    if kind:
+        require_compiler()
+    x, events = reference()
+    path = build_bench(tmp_path, kind=kind)
+    for method in (ODE23, ODE45, DOP853, RODAS):
+        for rtol in (1e-6, 1e-10):
+            fmu = worker.instantiate(path).begin({"solver.method": method, "solver.rtol": rtol}, stop=STOP)
+            fmu.step(0.0, STOP)
+            assert abs(fmu.get("x") - x) < 10.0 * rtol
+            assert fmu.get("events.count") == len(events) - 1
+            assert abs(fmu.get("events.t_last") - events[-1][0]) < 10.0 * rtol
+            fmu.free()
+
+
+def random_tables(seed):
+    """Return a friction curve with points among the speeds of the motion, and a spring that hardens or softens."""
+    rng = Random(seed)
+    speeds = sorted(rng.uniform(0.0, 1.5) for _ in range(rng.randint(1, 12)))
+    friction = ((0.0, *speeds), tuple(rng.uniform(0.05, 0.5) for _ in range(len(speeds) + 1)))
+    lengths = sorted({round(rng.uniform(-0.2, 0.2), 6) for _ in range(rng.randint(2, 8))} | {-0.21, 0.21})
+    rise = np.cumsum([rng.uniform(2.0, 30.0) for _ in lengths])
+    return friction, (tuple(lengths), tuple((rise - rise.mean()).tolist()))
+
+
+@pytest.mark.parametrize("seed", [1, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(2, 201))])
+def test_random_tables_give_the_motion_of_an_event_located_solution(worker, tmp_path, seed):
+    tables = random_tables(seed)
+    x, events = reference(*tables)
+    fmu = worker.instantiate(build_bench(tmp_path, *tables))
+    fmu.begin({"solver.method": DOP853, "solver.rtol": 1e-11}, stop=STOP)
+    fmu.step(0.0, STOP)
+    assert abs(fmu.get("x") - x) < 1e-9
+    assert fmu.get("events.count") == len(events) - (events[0][0] == 0.0)
+    fmu.free()
+
+
+def test_a_motion_may_settle_at_a_point(worker, tmp_path):
+    """A motor whose torque equals its friction at a point of the table does not step from event to event there."""
+    (tmp_path / "motor.py").write_text('''from fmus import Fixed, Model, Output, Parameter, State, Table
+
+
+class Motor(Model):
+    """Motor with a friction torque over speed."""
+
+    M = Parameter(2.0, "N.m", "torque")
+    J = Parameter(1.0, "kg.m2", "inertia", above=0.0)
+    w0 = Fixed(0.0, "rad/s", "initial speed")
+    brake = Table([0.0, 1.0, 3.0], [0.5, 2.0, 8.0], "rad/s", "N.m", ends="continue")
+    w = State("rad/s", "speed", start=w0)
+    alpha = Output("rad/s2", "acceleration", (M - brake(w)) / J, rate_of=w)
+''')
+    path = build_user_model(tmp_path / "motor.py") / "motor.fmu"
+    for method in (ODE23, ODE45, DOP853, RODAS):
+        for w0 in (0.0, 2.0):
+            fmu = worker.instantiate(path).begin({"solver.method": method, "w0": w0}, stop=100.0)
+            fmu.step(0.0, 100.0)
+            assert abs(fmu.get("w") - 1.0) < 1e-6
+            assert fmu.get("solver.steps") < 600
+            fmu.free()
+
+
+def test_importers_integrate_tables_and_get_exact_derivatives(worker, tmp_path):
+    """Model exchange by CVode, and directional and adjoint derivatives of FMI 3.0 in each piece."""
+    require_compiler()
+    path, (x, _) = build_bench(tmp_path, kind="native/fmi3"), reference()
+    columns = worker.simulate(path, "ModelExchange", stop_time=STOP, relative_tolerance=1e-10, output=["x"])
+    assert abs(columns["x"][-1] - x) < 1e-7
+    description = fmpy.read_model_description(path)
+    number = {variable.name: variable.valueReference for variable in description.modelVariables}
+    folder = str(fmpy.extract(path, tmp_path / "unzipped"))
+    fmu = FMU3Model(guid=description.guid, unzipDirectory=folder, modelIdentifier="bench")
+    fmu.instantiate()
+    fmu.enterInitializationMode()
+    fmu.exitInitializationMode()
+    for speed, slope in (0.005, -15.0), (0.05, -0.05 / 0.09), (0.3, 0.05), (2.0, 0.0):
+        fmu.updateDiscreteStates()
+        fmu.enterContinuousTimeMode()
+        fmu.setContinuousStates((fmpy.fmi3.fmi3Float64 * 2)(0.15, -speed), 2)
+        fmu.enterEventMode()
+        fmu.updateDiscreteStates()
+        knowns = [number["x"], number["v"]]
+        by_x, by_v = (fmu.getDirectionalDerivative([number["a"]], [one], [1.0])[0] for one in knowns)
+        assert (by_x, by_v) == pytest.approx((-700.0, -N * slope), rel=1e-12)
+        assert list(fmu.getAdjointDerivative([number["a"]], knowns, [1.0], 2)) == [by_x, by_v]
+    fmu.freeInstance()
+
+
+def test_an_argument_beyond_the_ends_is_refused_where_the_table_says_so(worker, tmp_path):
+    text = remove_unused(MODEL).format(friction=points(FRICTION, '"m/s", "1"'), spring=points(SPRING, '"m", "N"'))
+    (tmp_path / "bench.py").write_text(text.replace('ends="continue"', 'ends="refuse"'))
+    fmu = worker.instantiate(build_user_model(tmp_path / "bench.py") / "bench.fmu").begin({"x0": 0.2}, stop=STOP)
+    fmu.step(0.0, STOP)
+    fmu.free()
+    fmu = worker.instantiate(build_user_model(tmp_path / "bench.py") / "bench.fmu")
+    with pytest.raises(FmiError):
+        fmu.begin({"x0": 0.21}, stop=STOP).step(0.0, STOP)
+    (message,) = [text for status, _, text in fmu.messages() if status != 0]
+    assert (
+        "the argument of spring exceeds the last point of the table, 0.2 m, at t = 0.0 s: extend the table" in message
+    )
+    fmu.free()
+
+
+# ---- files and mistakes
+
+
+def test_a_table_reads_a_file_beside_the_model(tmp_path):
+    """And reads it again if it changes."""
+    text = MODEL.format(friction='"mu.csv"', spring=points(SPRING, '"m", "N"'))
+    (tmp_path / "bench.py").write_text(text)
+    for value in (0.5, 0.7):
+        (tmp_path / "mu.csv").write_text(f"slip (m/s),mu (1)\n0,{value}\n1,0.25\n")
+        source = find_model(tmp_path / "bench.py")
+        assert f"_mu_value = ({value}, {value}, 0.25)" in source.generated_source
+        assert source.model().prepare() == 0
+
+
+WRONG = {
+    "one point": ('Table([0.0], [1.0], "s", "1")', "a table needs at least two points, got 1"),
+    "points that do not rise": (
+        'Table([0.0, 1.0, 1.0], [1.0, 2.0, 3.0], "s", "1")',
+        "x of a table must rise, but point 3 has 1.0 after 1.0",
+    ),
+    "no number": (
+        'Table([0.0, 1.0], [1.0, float("nan")], "s", "1")',
+        "y of a table must be finite numbers, got nan as point 2",
+    ),
+    "other lengths": ('Table([0.0, 1.0], [1.0], "s", "1")', "a table needs as many values of y as of x, got 1 and 2"),
+    "no unit": ("Table([0.0, 1.0], [1.0, 2.0])", "a table needs its units: unit_x is ''"),
+    "an unknown unit": (
+        'Table([0.0, 1.0], [1.0, 2.0], "sec", "1")',
+        "x of the table T has the unit 'sec': write \"s\"",
+    ),
+    "another unit": (
+        'Table([0.0, 1.0, 2.0], [1.0, 2.0, 2.0], "m", "1")',
+        "T takes an argument in m, but clock is in s",
+    ),
+    "a missing file": ('Table("none.csv")', "the table none.csv beside the model file cannot be read: No such file"),
+    "an unknown interpolation": (
+        'Table([0.0, 1.0], [1.0, 2.0], "s", "1", interpolation="spline")',
+        "interpolation of a table must be 'linear' or 'pchip', got 'spline'",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_a_wrong_table_is_refused_in_one_sentence(tmp_path, name):
+    table, message = WRONG[name]
+    (tmp_path / "wrong.py").write_text(f'{HEAD}    T = {table}\n    y = Output("1", "value", T(clock))\n')
+    with pytest.raises(BuildError) as raised:
+        find_model(tmp_path / "wrong.py").generated_source  # noqa: B018
+    line = 8 if name not in ("another unit",) else 9
+    assert str(raised.value).startswith(f"{tmp_path / 'wrong.py'}, line {line}: {message}")
+
+
+@pytest.mark.parametrize(
+    ("lines", "message"),
+    [
+        ('    y = Output("1", "value", 2.0 * T)\n', "line 9: T is a table: call it with its argument, as in T(x)"),
+        ("", "line 8: no equation uses T: use it, or remove its declaration"),
+    ],
+)
+def test_a_table_is_called(tmp_path, lines, message):
+    (tmp_path / "wrong.py").write_text(f'{HEAD}    T = Table([0.0, 1.0], [1.0, 2.0], "s", "1")\n{lines}')
+    with pytest.raises(BuildError, match=message.replace("(", r"\(").replace(")", r"\)")):
+        find_model(tmp_path / "wrong.py").model  # noqa: B018
+
+
+def test_a_file_without_units_is_refused(tmp_path):
+    (tmp_path / "mu.csv").write_text("slip,mu\n0,1\n")
+    (tmp_path / "wrong.py").write_text(f'{HEAD}    T = Table("mu.csv")\n')
+    with pytest.raises(BuildError, match=r"mu\.csv must begin with the names and units of two columns"):
+        find_model(tmp_path / "wrong.py").generated_source  # noqa: B018
