@@ -292,7 +292,9 @@ class ExpressionPrinter:
 
     def _build_node(self, e: Term) -> ast.expr:
         if isinstance(e.op, Coefficient):
-            index: ast.expr = ast.Name(self.local_variable(e.args[0]))
+            (piece,) = e.args
+            is_fixed = not isinstance(piece, Expression)
+            index: ast.expr = ast.Constant(int(piece)) if is_fixed else ast.Name(self.local_variable(piece))
             index = ast.BinOp(index, ast.Add(), ast.Constant(e.op.offset)) if e.op.offset else index
             return ast.Subscript(ast.Name(e.op.array), index)
         args = [self._to_ast(argument) for argument in e.args]

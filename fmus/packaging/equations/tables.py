@@ -88,9 +88,8 @@ class Table(Expression):
         self.is_called = True
         if not isinstance(u, Expression):
             return self.at(u)
-        if len(self.edges) == 2 and self.ends == CONTINUE:  # a straight line
-            return self.y[0] + self.columns[SLOPE][0] * (u - self.x[0])
-        piece = Term(Piece(self), u)
+        is_straight = len(self.edges) == 2 and self.ends == CONTINUE
+        piece = 0.0 if is_straight else Term(Piece(self), u)
         knot, *coefficients = (Term(Coefficient(self, kind), piece) for kind in self.kinds)
         w = u - knot
         *others, result = coefficients
@@ -241,8 +240,9 @@ def is_coefficient(e: Operand) -> bool:
 
 def looked_up(e: Operand) -> tuple[Table, Operand] | None:
     """Return the table and the argument of an expression that is the value of a table, else None."""
-    if isinstance(e, Term) and e.op == "+" and is_coefficient(e.args[0]) and e.args[0].op.kind == VALUE:
-        return e.args[0].op.table, e.args[0].args[0].args[0]
+    first = e.args[0] if isinstance(e, Term) and e.op == "+" else None
+    if is_coefficient(first) and first.op.kind == VALUE and is_piece(first.args[0]):
+        return first.op.table, first.args[0].args[0]
     return None
 
 
