@@ -140,8 +140,21 @@ def joint(axes: Axes) -> None:
     ground(axes, 56, rough=(24, 100))
 
 
+def servo(axes: Axes) -> None:
+    """Draw a slide on a screw, and its friction over speed by points."""
+    block(axes, 12, 44, 56, 56)
+    axes.plot([70, 244], [72, 72], color=INK, **STYLE)
+    block(axes, 132, 40, 70, 64)
+    axes.plot([30, 30], [124, 240], color=INK, **STYLE)
+    axes.plot([30, 240], [124, 124], color=INK, **STYLE)
+    x, y = np.array([30, 52, 84, 130, 182, 232]), np.array([226, 184, 158, 160, 178, 204])
+    curve(axes, x, y)
+    for point in zip(x, y, strict=True):
+        axes.add_patch(Circle(point, 7, fc=RED, ec=RED))
+
+
 ICONS: dict[str, Callable[[Axes], None]] = {
-    drawing.__name__: drawing for drawing in (belt, lugre, elastoplastic, sleds, stacked, forced, clutch, joint)
+    drawing.__name__: drawing for drawing in (belt, lugre, elastoplastic, sleds, stacked, forced, clutch, joint, servo)
 }
 
 

@@ -370,6 +370,36 @@ class Joint(HybridProblem):
     stop_slip = Sleds.stop_slip
 
 
+class Servo(HybridProblem):
+    """Axis under PID control; the conditions are the points of its friction curve, in the sizes of the speed."""
+
+    start, stop, first = (0.0, 0.0, 0.0), 10.0, (1,)
+    speeds = (0.0, 0.001, 0.005, 0.02, 0.05, 0.1, 0.2)
+    forces = (30.0, 26.0, 18.0, 15.0, 16.0, 18.0, 22.0)
+
+    def conditions(self, t: float, y: StateVector) -> list[float]:
+        return [abs(y[1]) - speed for speed in self.speeds[1:-1]]
+
+    def drive(self, y: StateVector) -> float:
+        """Return the force of the controller."""
+        return 2e4 * (0.01 - y[0]) - 500.0 * y[1] + 5e4 * y[2]
+
+    def friction(self, speed: float, piece: int) -> float:
+        """Return the sliding force on the line through the two points of a piece."""
+        (v_1, v_2), (f_1, f_2) = self.speeds[piece : piece + 2], self.forces[piece : piece + 2]
+        return f_1 + (f_2 - f_1) * (speed - v_1) / (v_2 - v_1)
+
+    def rates(self, t: float, y: StateVector, modes: list[int]) -> list[float]:
+        mode, piece = modes[0], sum(sign > 0 for sign in modes[1:])
+        a = (self.drive(y) - mode * self.friction(mode * y[1], piece)) / 10.0 if mode else 0.0
+        return [y[1], a, 0.01 - y[0]]
+
+    def contacts(self, t: float, y: StateVector, modes: list[int]) -> list[tuple[float, float, float]]:
+        return [(y[1], self.drive(y), self.forces[0])]
+
+    stop_slip = Forced.stop_slip
+
+
 PROBLEMS: dict[str, type[HybridProblem]] = {
     "belt": Belt,
     "lugre": Bristles,
@@ -379,4 +409,5 @@ PROBLEMS: dict[str, type[HybridProblem]] = {
     "forced": Forced,
     "clutch": Clutch,
     "joint": Joint,
+    "servo": Servo,
 }
