@@ -1,6 +1,7 @@
 """Lookup tables in model files: values against numpy and scipy, motions against scipy from point to point."""
 
 from bisect import bisect_right
+from contextlib import contextmanager
 from random import Random
 
 import fmpy
@@ -63,6 +64,7 @@ def points(table, units):
 def build_bench(folder, friction=FRICTION, spring=SPRING, kind=""):
     """Build the model with these tables; return the path of the FMU."""
     texts = {"friction": points(friction, '"m/s", "1"'), "spring": points(spring, '"m", "N"')}
+    folder.mkdir(exist_ok=True)
     (folder / "bench.py").write_text(MODEL.format(**texts))
     return build_user_model(folder / "bench.py", *KINDS[kind]) / kind / "bench.fmu"
 
@@ -238,24 +240,60 @@ def test_importers_integrate_tables_and_get_exact_derivatives(worker, tmp_path):
     path, (x, _) = build_bench(tmp_path, kind="native/fmi3"), reference()
     columns = worker.simulate(path, "ModelExchange", stop_time=STOP, relative_tolerance=1e-10, output=["x"])
     assert abs(columns["x"][-1] - x) < 1e-7
+    with fmi3_instance(path, tmp_path) as (fmu, number):
+        for speed, slope in (0.005, -15.0), (0.05, -0.05 / 0.09), (0.3, 0.05), (2.0, 0.0):
+            move(fmu, 0.15, -speed)
+            knowns = [number["x"], number["v"]]
+            by_x, by_v = (fmu.getDirectionalDerivative([number["a"]], [one], [1.0])[0] for one in knowns)
+            assert (by_x, by_v) == pytest.approx((-700.0, -N * slope), rel=1e-12)
+            assert list(fmu.getAdjointDerivative([number["a"]], knowns, [1.0], 2)) == [by_x, by_v]
+
+
+@contextmanager
+def fmi3_instance(path, folder):
+    """An initialized instance for model exchange, and the value references by name."""
     description = fmpy.read_model_description(path)
-    number = {variable.name: variable.valueReference for variable in description.modelVariables}
-    folder = str(fmpy.extract(path, tmp_path / "unzipped"))
-    fmu = FMU3Model(guid=description.guid, unzipDirectory=folder, modelIdentifier="bench")
+    unzipped = str(fmpy.extract(path, folder / "unzipped"))
+    fmu = FMU3Model(guid=description.guid, unzipDirectory=unzipped, modelIdentifier="bench")
     fmu.instantiate()
     fmu.enterInitializationMode()
     fmu.exitInitializationMode()
-    for speed, slope in (0.005, -15.0), (0.05, -0.05 / 0.09), (0.3, 0.05), (2.0, 0.0):
-        fmu.updateDiscreteStates()
-        fmu.enterContinuousTimeMode()
-        fmu.setContinuousStates((fmpy.fmi3.fmi3Float64 * 2)(0.15, -speed), 2)
-        fmu.enterEventMode()
-        fmu.updateDiscreteStates()
-        knowns = [number["x"], number["v"]]
-        by_x, by_v = (fmu.getDirectionalDerivative([number["a"]], [one], [1.0])[0] for one in knowns)
-        assert (by_x, by_v) == pytest.approx((-700.0, -N * slope), rel=1e-12)
-        assert list(fmu.getAdjointDerivative([number["a"]], knowns, [1.0], 2)) == [by_x, by_v]
+    yield fmu, {variable.name: variable.valueReference for variable in description.modelVariables}
     fmu.freeInstance()
+
+
+def move(fmu, x, v):
+    """Set the states of an instance in event mode, and update its modes and pieces."""
+    fmu.updateDiscreteStates()
+    fmu.enterContinuousTimeMode()
+    fmu.setContinuousStates((fmpy.fmi3.fmi3Float64 * 2)(x, v), 2)
+    fmu.enterEventMode()
+    fmu.updateDiscreteStates()
+
+
+def test_values_may_be_parameters(worker, tmp_path):
+    """The motion and its changes in FMI 3.0 are those of the same numbers, and derivatives by a value are exact."""
+    require_compiler()
+    lines = "".join(f'    mu_{n} = Parameter(0.1, "1", "friction at point {n}", low=0.0)\n' for n in range(5))
+    text = MODEL.format(friction=points(FRICTION, '"m/s", "1"'), spring=points(SPRING, '"m", "N"'))
+    text = text.replace("    mu = ", f"{lines}    mu = ").replace(
+        str(list(FRICTION[1])), "[mu_0, mu_1, mu_2, mu_3, mu_4]"
+    )
+    (tmp_path / "bench.py").write_text(text)
+    path = build_user_model(tmp_path / "bench.py", *KINDS["native/fmi3"]) / "native" / "fmi3" / "bench.fmu"
+    values = {f"mu_{n}": value for n, value in enumerate(FRICTION[1])}
+    times, names, rows = np.linspace(0.0, STOP, 41).tolist(), ["x", "v", "F_friction", "events.count"], []
+    for fmu, start in (path, values), (build_bench(tmp_path / "fixed", kind="native/fmi3"), {}):
+        instance = worker.instantiate(fmu).begin(start, stop=STOP)
+        rows.append(instance.run(times, names))
+        instance.free()
+    assert_identical(rows[0], rows[1], names)
+    with fmi3_instance(path, tmp_path) as (fmu, number):
+        fmu.setFloat64([number[name] for name in values], [*values.values()])
+        move(fmu, 0.15, -0.04)
+        for n, share in (1, 2.0 / 3.0), (2, 1.0 / 3.0), (3, 0.0):
+            (derivative,) = fmu.getDirectionalDerivative([number["a"]], [number[f"mu_{n}"]], [1.0])
+            assert derivative == pytest.approx(N / M * share, rel=1e-12)
 
 
 def test_an_argument_beyond_the_ends_is_refused_where_the_table_says_so(worker, tmp_path):

@@ -183,8 +183,8 @@ def build_term(op: str, *args: Operand) -> Operand:
         if isinstance(condition, bool):  # decided at build time
             return this if condition else that
         return this if is_same_expression(this, that) else Term(op, *args)
-    if isinstance(op, (Piece, Coefficient)) and not isinstance(args[0], Expression):
-        return op.evaluate(args[0])
+    if isinstance(op, (Piece, Coefficient)) and not any(isinstance(e, Expression) for e in args):
+        return op.evaluate(*args)
     if op in FUNCTIONS and not isinstance(args[0], Expression):
         with suppress(ArithmeticError, ValueError):  # for example a logarithm in a branch that is not taken
             return getattr(math, op)(args[0])

@@ -193,5 +193,5 @@ def declared_content(model: type[Model]) -> list[tuple[Any, ...]]:
         if isinstance(e, Variable)
     ]
     terms = [e for e in found.values() if isinstance(e, Term)]
-    variables += [(e, e.name, *e.x, *e.y) for e in vars(model).values() if isinstance(e, Table)]
+    variables += [(e, e.name, *e.x, *filter(is_number, e.y)) for e in vars(model).values() if isinstance(e, Table)]
     return [*variables, *((e, e.op, *(one for one in e.args if is_number(one))) for e in terms)]

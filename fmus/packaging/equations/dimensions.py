@@ -34,6 +34,10 @@ def check_units(analysis: ModelAnalysis) -> None:
     for table in analysis.tables:
         for word, unit in axes(table):
             unit_dimensions(table, word, unit)
+        for parameter in table.parameters:
+            if declared_dimensions(parameter) != unit_dimensions(table, "y", table.unit_y):
+                sentence = f"y of {table} is in {table.unit_y}, but {parameter} is in {parameter.unit}"
+                raise ModelError(sentence, table.location)
     for e in analysis.declared:
         own, prefix = declared_dimensions(e), f"{e.name} is declared in {e.unit}, but"
         if isinstance(e, Output):

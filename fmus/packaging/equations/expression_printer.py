@@ -292,11 +292,11 @@ class ExpressionPrinter:
 
     def _build_node(self, e: Term) -> ast.expr:
         if isinstance(e.op, Coefficient):
-            (piece,) = e.args
+            piece = e.args[0]
             is_fixed = not isinstance(piece, Expression)
             index: ast.expr = ast.Constant(int(piece)) if is_fixed else ast.Name(self.local_variable(piece))
             index = ast.BinOp(index, ast.Add(), ast.Constant(e.op.offset)) if e.op.offset else index
-            return ast.Subscript(ast.Name(e.op.array), index)
+            return ast.Subscript(ast.parse(e.op.array, mode="eval").body, index)
         args = [self._to_ast(argument) for argument in e.args]
         if e.op in BINARY_OPERATORS:
             return binary_node(e.op, *args)

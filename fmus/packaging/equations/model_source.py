@@ -23,7 +23,7 @@ from .rate_methods import rate_methods
 from .reserved_names import IMPORTS, MATH
 from .setup_methods import setup_methods
 from .single_contact_methods import single_contact_methods
-from .tables import EDGE, array_name
+from .tables import EDGE, VARIABLE_KINDS, array_name
 
 MODULE_TEMPLATE = '''"""{first}
 
@@ -89,6 +89,7 @@ def table_lines(analysis: ModelAnalysis) -> list[str]:
         array_name(table, kind): column
         for table in analysis.tables
         for kind, column in ((EDGE, table.edges), *table.columns.items())
+        if not (table.parameters and kind in VARIABLE_KINDS)
     }
     return ["", *(f"{name} = {column!r}" for name, column in arrays.items())] if arrays else []
 

@@ -8,7 +8,7 @@ from .codegen_context import CodegenContext, method_source, rule_status
 from .expression_printer import INDENT, ExpressionPrinter
 from .expressions import Expression, Operand, Term, is_among
 from .model_declaration import Input
-from .tables import EDGE, Table, array_name
+from .tables import EDGE, VARIABLE_KINDS, Table, array_name
 
 
 def setup_methods(context: CodegenContext) -> list[str]:
@@ -33,6 +33,9 @@ def init_method(context: CodegenContext) -> list[str]:
         lines.append("self.violation_time = self.violation_value = 0.0")
     if context.analysis.has_pieces:
         lines.append(f"self.condition_pieces = [-1.0] * {len(context.analysis.conditions)}")
+    for table in context.analysis.tables:
+        for kind in VARIABLE_KINDS if table.parameters else ():
+            lines.append(f"self.{array_name(table, kind)} = {[*table.columns[kind]]!r}")
     if context.driver is not None:
         lines.append("self.t_base = self.x_base = 0.0")
     for e, rate in context.analysis.input_rates.items():
@@ -69,6 +72,10 @@ def prepare_method(context: CodegenContext) -> str:
     printer, constants = context.printer(), {id(e): e for e in context.constants}
     printer.constants = set()
     emit_input_polynomials(context, printer)
+    for table in context.analysis.tables:
+        for kind, numbers in table.variable_columns.items():
+            for piece, value in numbers:
+                printer.emit(f"self.{array_name(table, kind)}[{piece}] = {printer.text(value)}")
     printer.count_uses(*context.constants, *(rule.broken for rule in context.analysis.rules))
 
     def calculate(selection: Collection[int] = constants) -> None:

@@ -16,8 +16,10 @@ from collections.abc import Sequence
 from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 from .expressions import Expression, ModelError, Operand, Term, as_operand, author_location, describe, is_number
+from .model_declaration import Fixed, Parameter, SettableVariable
 
 LINEAR, PCHIP = "linear", "pchip"
 HOLD, CONTINUE, REFUSE = "hold", "continue", "refuse"
@@ -25,6 +27,7 @@ INTERPOLATIONS, ENDS = (LINEAR, PCHIP), (HOLD, CONTINUE, REFUSE)
 # Where a piece has no end; states beyond this value are treated as divergence
 UNBOUNDED = 1e100
 OVERLAP, OVERLAP_OF_PIECE = 1e-9, 1e-4  # of pieces, as shares of the largest argument and of the shortest piece
+VARIABLE_KINDS = ("value", "slope")  # columns that depend on the values at the points
 EDGE, KNOT, VALUE, SLOPE, QUADRATIC, CUBIC = "edge", "knot", "value", "slope", "quadratic", "cubic"
 
 
@@ -41,7 +44,7 @@ class Table(Expression):
         Values of the argument, which rise; or the name of a CSV file beside the model file, with two columns and their
         names and units in the first line, as in `slip (m/s),mu (1)`.
     y
-        Values of the function.
+        Values of the function: numbers, or parameters of the model where users set them (linear tables only).
     unit_x, unit_y
         Their SI units.
     interpolation
@@ -54,7 +57,7 @@ class Table(Expression):
     def __init__(
         self,
         x: Sequence[float] | str,
-        y: Sequence[float] | None = None,
+        y: Sequence[float | Expression] | None = None,
         unit_x: str = "",
         unit_y: str = "",
         *,
@@ -78,6 +81,12 @@ class Table(Expression):
         self.x, self.y = checked_points(x, y)
         self.unit_x, self.unit_y = unit_x, unit_y
         self.interpolation, self.ends = interpolation, ends
+        self.parameters = tuple(value for value in self.y if isinstance(value, SettableVariable))
+        if self.parameters and interpolation != LINEAR:
+            raise ModelError(
+                f"the table has the parameter {self.parameters[0]}, but tables with parameters are linear: write "
+                f'numbers instead, or interpolation="{LINEAR}"'
+            )
         self.is_called = False
 
     def __call__(self, u: Operand) -> Operand:
@@ -86,12 +95,14 @@ class Table(Expression):
         if not self.name:
             raise ModelError("a table without a name is called: assign it to a name in the class first")
         self.is_called = True
-        if not isinstance(u, Expression):
+        if not isinstance(u, Expression) and not self.parameters:
             return self.at(u)
         is_straight = len(self.edges) == 2 and self.ends == CONTINUE
-        piece = 0.0 if is_straight else Term(Piece(self), u)
-        knot, *coefficients = (Term(Coefficient(self, kind), piece) for kind in self.kinds)
-        w = u - knot
+        is_number = not isinstance(u, Expression)
+        piece = 0.0 if is_straight else float(self.piece_at(u)) if is_number else Term(Piece(self), u)
+        knot = Term(Coefficient(self, KNOT), piece)
+        coefficients = [Term(Coefficient(self, kind), piece, *self.parameters) for kind in self.kinds[1:]]
+        w = Term("-", u, knot)
         *others, result = coefficients
         for coefficient in reversed(others):
             result = coefficient + w * result
@@ -149,28 +160,50 @@ class Table(Expression):
 
     @cached_property
     def columns(self) -> dict[str, tuple[float, ...]]:
-        """The knot and the coefficients of all pieces, by kind."""
+        """The knot and the coefficients of all pieces, by kind, with the start values of parameters."""
+        return self.columns_with([value.start for value in self.parameters])
+
+    def columns_with(self, values: Sequence[float]) -> dict[str, tuple[float, ...]]:
+        """Return the knot and the coefficients of all pieces, by kind, with values of the parameters."""
+        known = dict(zip(self.parameters, values, strict=True))
+        points = [known[value] if isinstance(value, SettableVariable) else value for value in self.y]
         steps = [b - a for a, b in pairwise(self.x)]
-        secants = [(b - a) / h for (a, b), h in zip(pairwise(self.y), steps, strict=True)]
+        secants = [(b - a) / h for (a, b), h in zip(pairwise(points), steps, strict=True)]
         rows: list[tuple[float, ...]] = []  # of each piece
         if self.interpolation == LINEAR:
-            rows = list(zip(self.x, self.y, secants, strict=False))
+            rows = list(zip(self.x, points, secants, strict=False))
             first = last = 0.0
         else:
             slopes = pchip_slopes(steps, secants)
-            for x, y, h, secant, (c, d) in zip(self.x, self.y, steps, secants, pairwise(slopes), strict=False):
+            for x, y, h, secant, (c, d) in zip(self.x, points, steps, secants, pairwise(slopes), strict=False):
                 rows.append((x, y, c, (3.0 * secant - 2.0 * c - d) / h, (c + d - 2.0 * secant) / (h * h)))
             first, last = (0.0, 0.0) if self.ends == HOLD else (slopes[0], slopes[-1])
         if self.has_end_pieces:
             zeros = (0.0,) * (len(self.kinds) - 3)
-            rows = [(self.x[0], self.y[0], first, *zeros), *rows, (self.x[-1], self.y[-1], last, *zeros)]
+            rows = [(self.x[0], points[0], first, *zeros), *rows, (self.x[-1], points[-1], last, *zeros)]
         return dict(zip(self.kinds, zip(*rows, strict=True), strict=True))
+
+    @property
+    def variable_columns(self) -> dict[str, list[tuple[int, Operand]]]:
+        """The numbers in the columns that depend on parameters, as expressions of these, each with its piece."""
+        first = int(self.has_end_pieces)  # piece that begins at the first point
+        values: list[tuple[int, Operand]] = [(n + first, y) for n, y in enumerate(self.y[: len(self.x) - 1])]
+        if self.has_end_pieces:
+            values = [(0, self.y[0]), *values, (len(self.x), self.y[-1])]
+        slopes: list[tuple[int, Operand]] = []
+        for n, ((a, b), (u, w)) in enumerate(zip(pairwise(self.y), pairwise(self.x), strict=True)):
+            if isinstance(a, Expression) or isinstance(b, Expression):
+                slopes.append((n + first, Term("/", Term("-", b, a), w - u)))
+        return {VALUE: [item for item in values if isinstance(item[1], Expression)], SLOPE: slopes}
 
     def is_nonnegative(self, nonnegative_argument: bool) -> bool:
         """Return whether no value is negative, for arguments of any sign or for those that are not negative."""
+        least = [y if not isinstance(y, SettableVariable) else max(y.low, y.above) for y in self.y]
+        if self.ends == HOLD or self.parameters or min(least) < 0.0:
+            return self.ends == HOLD and min(least) >= 0.0
         slopes, is_reached = self.columns[SLOPE], not (nonnegative_argument and self.x[0] <= 0.0)
         rises_backward, rises_forward = slopes[0] <= 0.0 or not is_reached, self.last_slope >= 0.0
-        return min(self.y) >= 0.0 and (self.ends == HOLD or (rises_backward and rises_forward))
+        return rises_backward and rises_forward
 
     @property
     def last_slope(self) -> float:
@@ -212,15 +245,18 @@ class Coefficient(str):
         coefficient.table, coefficient.kind, coefficient.offset = table, kind, offset
         return coefficient
 
-    def evaluate(self, piece: float) -> float:
-        """Return the number in the column."""
-        column = self.table.edges if self.kind == EDGE else self.table.columns[self.kind]
-        return column[int(piece) + self.offset]
+    def evaluate(self, piece: float, *values: float) -> float:
+        """Return the number in the column, with values of the parameters of the table."""
+        table = self.table
+        if self.kind == EDGE:
+            return table.edges[int(piece) + self.offset]
+        return (table.columns_with(values) if values else table.columns)[self.kind][int(piece)]
 
     @property
     def array(self) -> str:
-        """Name of the array in generated code."""
-        return array_name(self.table, self.kind)
+        """The array in generated code: a constant of the module, or an attribute where parameters set it."""
+        name = array_name(self.table, self.kind)
+        return f"self.{name}" if self.table.parameters and self.kind in VARIABLE_KINDS else name
 
 
 def array_name(table: Table, kind: str) -> str:
@@ -273,8 +309,8 @@ def end_slope(h: float, k: float, a: float, b: float) -> float:
     return 3.0 * a if a * b <= 0.0 and abs(slope) > 3.0 * abs(a) else slope
 
 
-def checked_points(x: object, y: object) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Return the points as floats; raise ModelError for points that are no table."""
+def checked_points(x: object, y: object) -> tuple[tuple[float, ...], tuple[Any, ...]]:
+    """Return the points as floats, or as parameters of y; raise ModelError for points that are no table."""
     columns = []
     for word, values in ("x", x), ("y", y):
         try:
@@ -282,9 +318,11 @@ def checked_points(x: object, y: object) -> tuple[tuple[float, ...], tuple[float
         except (TypeError, ModelError):
             raise ModelError(f"{word} of a table must be a list of numbers, got {describe(values)}") from None
         for n, number in enumerate(numbers, 1):
+            if word == "y" and isinstance(number, (Parameter, Fixed)):
+                continue
             if not is_number(number) or not math.isfinite(number):
                 raise ModelError(f"{word} of a table must be finite numbers, got {describe(number)} as point {n}")
-        columns.append(tuple(map(float, numbers)))
+        columns.append(tuple(one if isinstance(one, Expression) else float(one) for one in numbers))
     first, second = columns
     if len(first) != len(second):
         raise ModelError(f"a table needs as many values of y as of x, got {len(second)} and {len(first)}")

@@ -79,6 +79,8 @@ def build_tangent_functions(model: Any, declared: Variables) -> tuple[Tangent, d
     tangent = Tangent()
     for field in (*tangent_fields(declared).values(), *constants):
         setattr(tangent, field, 0.0)
+    for field in writer.arrays:
+        setattr(tangent, field, [0.0] * len(getattr(model(), field)))
     return tangent, functions
 
 
@@ -149,6 +151,7 @@ class TangentWriter:
         texts = {e.name: ExpressionPrinter({}, (), (), 0).text(value) for e, value in derivatives.items()}
         self.input_derivatives = {name: parse_expression(text) for name, text in texts.items()}
         self.driver_rates = {fields[DERIVATIVE_NAME.format(name)]: d.rate for name, d in declared if d.rate}
+        self.arrays: list[str] = []  # lists of constants, which have lists of tangents
         self.with_tangent: set[str] = set()  # local variables with a tangent
         self.temporaries = count(1)
         self.pending: list[ast.stmt] = []  # statements that the next assignment needs
@@ -199,6 +202,9 @@ class TangentWriter:
                     lines.append(node)
                 case ast.Assign(targets=[ast.Attribute(attr=name)], value=value) if name in results:
                     lines += self.assign_tangent(f"{TANGENT}.{results[name]}", value)
+                case ast.Assign(targets=[ast.Subscript(ast.Attribute(attr=name), index)], value=value):
+                    self.arrays += [name] if name not in self.arrays else []
+                    lines += self.assign_tangent(f"{TANGENT}.{name}[{source_of(index)}]", value)
                 case ast.If():
                     branches = (self.differentiate(part, results, returned) for part in (node.body, node.orelse))
                     lines.append(ast.If(node.test, *branches))
@@ -238,6 +244,8 @@ class TangentWriter:
                 return ast.Name(PREFIX + name)
             case ast.Attribute(attr=name) if name in self.seeds:
                 return ast.parse(f"{TANGENT}.{self.seeds[name]}", mode="eval").body
+            case ast.Subscript(value=ast.Attribute(attr=name), slice=index) if name in self.arrays:
+                return parse_expression(f"{TANGENT}.{name}[{source_of(index)}]")
             case ast.Call(func=ast.Attribute(value=polynomial, attr="value_at")):
                 return self.tangent_of(polynomial)
             case ast.UnaryOp(op=ast.USub(), operand=inner):
