@@ -24,7 +24,7 @@ from .algebra import (
 )
 from .expressions import COMPARISONS, Expression, ModelError, Operand, Term, is_among
 from .model_declaration import HYBRID, Contact, Model, Output, SettableVariable, State, Variable
-from .tables import EDGE, REFUSE, Coefficient, Piece, is_piece, looked_up
+from .tables import EDGE, REFUSE, Coefficient, Piece, is_piece, looked_up, table_of
 
 LIMITED_DOMAIN = ("sqrt", "log", "asin", "acos", "/")  # operations that fail for some operands
 HOLD_TOLERANCE = 1e-9  # the sliding force may exceed the holding force by rounding errors
@@ -101,7 +101,7 @@ def find_conditions(
 
 def sign_slips(u: Operand, contacts: Collection[Contact]) -> Operand:
     """Return an expression with mode * slip in place of |slip|: smooth, and no event apart from that of the contact."""
-    sizes = {
+    sizes: dict[Expression, Operand] = {
         e: Term("*", c.mode, c.slip)
         for e in subexpressions(u).values()
         if isinstance(e, Term) and e.op == "fabs"
@@ -113,10 +113,9 @@ def sign_slips(u: Operand, contacts: Collection[Contact]) -> Operand:
 
 def piece_margins(piece: Term, u: Operand) -> tuple[Term, Term]:
     """Return the distances of the argument u of a table from the lower and the upper edge of its piece."""
-    assert isinstance(piece.op, Piece)
-    overlap = piece.op.table.overlap
-    lower, upper = (Term(Coefficient(piece.op.table, EDGE, offset), piece) for offset in (0, 1))
-    return Term("+", Term("-", u, lower), overlap), Term("+", Term("-", upper, u), overlap)
+    table = table_of(piece)
+    lower, upper = (Term(Coefficient(table, EDGE, offset), piece) for offset in (0, 1))
+    return Term("+", Term("-", u, lower), table.overlap), Term("+", Term("-", upper, u), table.overlap)
 
 
 def table_limits(targets: Iterable[Operand], forces: Collection[Expression]) -> list[Condition]:
@@ -135,8 +134,7 @@ def table_limits(targets: Iterable[Operand], forces: Collection[Expression]) -> 
                 same.append(e)
     result = []
     for piece in (piece for same in pieces.values() for piece in same):
-        assert isinstance(piece.op, Piece)
-        table, (u,) = piece.op.table, piece.args
+        table, (u,) = table_of(piece), piece.args
         for margin, event, x in (
             (Term("-", u, table.x[0]), "falls below the first", table.x[0]),
             (Term("-", table.x[-1], u), "exceeds the last", table.x[-1]),

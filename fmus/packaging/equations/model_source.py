@@ -23,7 +23,7 @@ from .rate_methods import rate_methods
 from .reserved_names import IMPORTS, MATH
 from .setup_methods import setup_methods
 from .single_contact_methods import single_contact_methods
-from .tables import EDGE, VARIABLE_KINDS, array_name
+from .tables import EDGE, VARIABLE_KINDS, array_name, table_of
 
 MODULE_TEMPLATE = '''"""{first}
 
@@ -227,7 +227,7 @@ def condition_texts(analysis: ModelAnalysis) -> list[str]:
     switches = [
         f"{expression_text(condition.comparisons[0])} changes"
         if condition.piece is None
-        else f"{expression_text(condition.piece.args[0])} reaches a point of {condition.piece.op.table}"
+        else f"{expression_text(condition.piece.args[0])} reaches a point of {table_of(condition.piece)}"
         for condition in analysis.switches
     ]
     return switches + [condition.sentence.partition(" at t =")[0] for condition in analysis.limits]

@@ -269,17 +269,18 @@ def is_piece(e: Operand) -> bool:
     return isinstance(e, Term) and isinstance(e.op, Piece)
 
 
-def is_coefficient(e: Operand) -> bool:
-    """Return whether an expression is a coefficient or an edge of a table."""
-    return isinstance(e, Term) and isinstance(e.op, Coefficient)
+def table_of(piece: Term) -> Table:
+    """Return the table of a piece."""
+    assert isinstance(piece.op, Piece)
+    return piece.op.table
 
 
 def looked_up(e: Operand) -> tuple[Table, Operand] | None:
     """Return the table and the argument of an expression that is the value of a table, else None."""
     first = e.args[0] if isinstance(e, Term) and e.op == "+" else None
-    if is_coefficient(first) and first.op.kind == VALUE and is_piece(first.args[0]):
-        return first.op.table, first.args[0].args[0]
-    return None
+    if not (isinstance(first, Term) and isinstance(first.op, Coefficient) and is_piece(first.args[0])):
+        return None
+    return (first.op.table, first.args[0].args[0]) if first.op.kind == VALUE else None
 
 
 def pchip_slopes(steps: Sequence[float], secants: Sequence[float]) -> list[float]:
@@ -311,7 +312,7 @@ def end_slope(h: float, k: float, a: float, b: float) -> float:
 
 def checked_points(x: object, y: object) -> tuple[tuple[float, ...], tuple[Any, ...]]:
     """Return the points as floats, or as parameters of y; raise ModelError for points that are no table."""
-    columns = []
+    columns: list[tuple[Any, ...]] = []
     for word, values in ("x", x), ("y", y):
         try:
             numbers = [*values]  # type: ignore[misc]
