@@ -30,7 +30,7 @@ def test_a_push_before_the_motion_is_excluded_and_reported():
     fit = fit_decay(Record("pushed", t, x), KnownParameters(), drag=False)
     assert values(fit.estimates)["zeta"] == pytest.approx(0.01, rel=1e-2)
     assert fit.t[0] >= 1.2
-    assert "The motion is free from t = " in remarks_text(fit)
+    assert "The free decay from t = 1.3" in remarks_text(fit)
 
 
 def test_a_motion_stopped_from_outside_is_cut_and_reported():

@@ -107,6 +107,68 @@ def extrema_in_slice(
     record: Record, part: slice, half_period: float, noise: float, step: float, span: float, pendulum: bool
 ) -> Extrema | None:
     """Return the turning points in one segment of the record; None if it has too few."""
+    motion = smooth_motion(record, part, half_period, noise, span, pendulum)
+    if motion is None:
+        return None
+    y, grid, width = motion.y, motion.t, motion.width
+    i = select_regular_reversals(motion.reversals, half_period / motion.interval)
+    i = i[(i < len(y) - 1 - width // 2) | (np.arange(len(i)) < 4)]
+    if len(i) < thresholds.MIN_TURNING_POINTS:
+        return None
+    t_start, i = locate_start(y, grid, i, width)
+    times, positions = motion.refine(i)
+    error = motion.position_error(positions)
+    if pendulum and len(positions) > 6 and abs(positions[0] - positions[1]) > 2 * thresholds.MIN_EXTRAPOLATED:
+        # near pi an extrapolated start would be unreliable: start at the first turning point recorded
+        t_start, times, positions = times[0], times[1:], positions[1:]
+    return Extrema(times, positions, t_start, half_period, noise, step, float(record.t[part][0]), error)
+
+
+@dataclass(frozen=True)
+class SmoothMotion:
+    """Smoothed position on even times, whatever the quantity of the record.
+
+    Attributes
+    ----------
+    t, y : numpy.ndarray
+        Times (n,) in s and smoothed positions (n,).
+    width : int
+        Samples of the smoothing window.
+    threshold : float
+        Size of the smallest reversal that exceeds the noise.
+    reversals : numpy.ndarray
+        Samples (k,) at which the position reverses.
+    """
+
+    t: np.ndarray
+    y: np.ndarray
+    width: int
+    threshold: float
+    reversals: np.ndarray
+
+    @property
+    def interval(self) -> float:
+        """Interval between the samples in s."""
+        return float(self.t[-1] - self.t[0]) / (len(self.t) - 1)
+
+    def refine(self, i: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return times (k,) in s and positions (k,) of the reversals at the samples i (k,), from parabolas."""
+        y = self.y
+        distance = max(1, min(self.width // 4, int(min(i[0], len(y) - 1 - i[-1]))))
+        before, top, after = y[i - distance], y[i], y[np.minimum(i + distance, len(y) - 1)]
+        curvature = before - 2 * top + after
+        shift = np.clip(0.5 * (before - after) / np.where(curvature == 0, 1, curvature), -1, 1)
+        return self.t[i] + shift * distance * self.interval, top - 0.25 * (before - after) * shift
+
+    def position_error(self, positions: np.ndarray) -> float:
+        """Return the standard error of the positions (k,) of reversals."""
+        return max(1.5 * self.threshold / thresholds.MIN_SMOOTH_REVERSAL, 2e-4 * float(np.ptp(positions)) / 2)
+
+
+def smooth_motion(
+    record: Record, part: slice, half_period: float, noise: float, span: float, pendulum: bool
+) -> SmoothMotion | None:
+    """Return the smoothed position in one segment of the record; None if it has too few turning points."""
     t, x = record.t[part], record.x[part]
     dt = (t[-1] - t[0]) / (len(t) - 1)
     block = max(1, int(half_period / dt / thresholds.MAX_SAMPLES_PER_HALF_PERIOD))
@@ -123,25 +185,10 @@ def extrema_in_slice(
     )
     if record.order:
         y, threshold = integrate_to_position(y, dt, half_period, record.order, threshold, pendulum)
-        span = float(np.ptp(y))
     i = find_reversals(y, threshold)
     if len(i) < thresholds.MIN_TURNING_POINTS:
         return None
-    i = select_regular_reversals(i, half_period / dt)
-    i = i[(i < len(y) - 1 - width // 2) | (np.arange(len(i)) < 4)]
-    if len(i) < thresholds.MIN_TURNING_POINTS:
-        return None
-    t_start, i = locate_start(y, grid, i, width)
-    distance = max(1, min(width // 4, int(min(i[0], len(y) - 1 - i[-1]))))
-    before, top, after = y[i - distance], y[i], y[np.minimum(i + distance, len(y) - 1)]
-    curvature = before - 2 * top + after
-    shift = np.clip(0.5 * (before - after) / np.where(curvature == 0, 1, curvature), -1, 1)
-    times, positions = grid[i] + shift * distance * dt, top - 0.25 * (before - after) * shift
-    error = max(1.5 * threshold / thresholds.MIN_SMOOTH_REVERSAL, 2e-4 * float(np.ptp(positions)) / 2)
-    if pendulum and len(positions) > 6 and abs(positions[0] - positions[1]) > 2 * thresholds.MIN_EXTRAPOLATED:
-        # near pi an extrapolated start would be unreliable: start at the first turning point recorded
-        t_start, times, positions = times[0], times[1:], positions[1:]
-    return Extrema(times, positions, t_start, half_period, noise, step, float(t[0]), error)
+    return SmoothMotion(grid, y, width, threshold, i)
 
 
 def select_regular_reversals(i: np.ndarray, half_period: float) -> np.ndarray:

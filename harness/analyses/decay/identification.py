@@ -32,6 +32,7 @@ from .intervals import FitUncertainty, estimate_uncertainty
 from .law import DRIFT, REST, TERMS, Terms
 from .model_selection import FittedLaw, fit_all_laws, select_reported_law
 from .remarks import check_fit, compare_halves, make_remarks
+from .window import select_decay
 
 
 @dataclass(frozen=True, repr=False)
@@ -210,14 +211,15 @@ def identify_record(
             "--pendulum"
         )
     terms: Terms = TERMS if drag else ("zeta", "r")
-    extrema = find_extrema(record, parameters.pendulum)
+    decay = select_decay(record, parameters.pendulum)
+    extrema = find_extrema(decay, parameters.pendulum)
     unknowns = 5 + len(terms) + drift
-    if len(record.t) <= unknowns:
+    if len(decay.t) <= unknowns:
         raise HarnessError(
-            f"{record.name} has {len(record.t)} samples, too few to fit {unknowns} unknowns: sample finer"
+            f"{record.name} has {len(decay.t)} samples, too few to fit {unknowns} unknowns: sample finer"
         )
     report(0.1)
-    free_motion = select_free_motion(record, extrema, terms, parameters.pendulum, drift)
+    free_motion = select_free_motion(decay, extrema, terms, parameters.pendulum, drift)
     problem = free_motion.problem
     report(0.5)
     amplitudes = amplitudes_of(extrema) / problem.scale
@@ -228,7 +230,7 @@ def identify_record(
     check_fit(record, problem, full, uncertainty, parameters.pendulum)
     reported = select_reported_law(laws, full, problem)
     estimates = make_estimates(record, problem, reported, full, uncertainty, parameters)
-    remarks = [*record.notes, *free_motion.notes, *make_remarks(record, problem, laws, full, uncertainty)]
+    remarks = [*decay.notes, *free_motion.notes, *make_remarks(record, problem, laws, full, uncertainty)]
     if record.base not in ("m", "rad") and (parameters.k or parameters.m):
         remarks.append(
             f"The forces f, c and q need a position in m or rad, and that of {record.name} is in {record.base}: "

@@ -33,6 +33,36 @@ PARTIAL_SWING = 0.25  # of a half cycle: a record that begins farther from a tur
 MIN_EXTRAPOLATED = 2.0  # rad: the start of a pendulum beyond it, near its upper rest, is not extrapolated
 GROWTH_ERRORS, GROWTH = 8.0, 1.001  # standard errors and ratio of the last amplitude to the first: it is driven
 
+# --- Free decay within a record (window.py) ---
+SPECTRUM_SAMPLES = 65_536  # of the spectrum that suggests half periods
+MIN_SAMPLES_PER_PERIOD = 8.0  # of a half period from the spectrum: faster ones are noise
+SAME_PERIOD = 0.1  # relative difference below which two half periods are one
+MIN_SELECTED_TURNS = 7  # turning points: with fewer, a decay cannot be distinguished from other motions
+MIN_SWINGS = 4  # of a decay
+SMALL_GROWTH = 1.02  # ratio of neighbouring swings: the scatter of a disturbed decay
+SIGNIFICANT_LOSS = 4.0  # standard errors of the loss of all swings
+MIN_STEADY_SWINGS = 6  # of a drive before the decay
+STEADY = 0.02  # of the largest swing: scatter of swings that a drive keeps up
+STEADY_LOSS = 0.2  # of the loss per swing afterwards: the loss per swing of a decay never rises
+SUDDEN_LOSS = 3.0  # times the loss that drag explains: a swing before it is that of a hand
+LARGE_SWING = 2.0  # rad, amplitude from which on a pendulum swings in no wave
+NO_WAVE = 0.05  # of the power of a cycle
+MANY_SWINGS = 12  # swings that show whether a motion is regular, grows or is constant
+LARGE_PART = 0.5  # of the record: a longer decay needs no other half period
+SMALL_PART = 0.25  # of the swings: a shorter decay may be a chance
+LARGE_FIRST = 1.5  # times the median swing: a shorter decay from such a swing is no chance
+IRREGULAR = 0.3  # standard deviation of the logarithm of the times between turning points
+SAWTOOTH = 2.0  # ratio of the times of rise and fall
+MAX_NODE_SWINGS = 6  # swings from the end of a decay to the node of a beat
+MIN_REGROWTH = 3  # swings in which a beat rises
+REGROWTH = 1.5  # ratio of the swings after and before a regrowth
+CONSTANT = 0.01  # standard error of the loss below which its absence is a constant amplitude
+LONG_REST = 2.4  # half periods before the first swing that are left out
+BEFORE_FIRST_TURN = 1.1  # half periods: the release before the first swing
+SMALL_BEFORE = 0.2  # of the first swing: smaller motions before it are a rest
+LARGE_AFTER = 1.2  # times the last swing: a larger one is another motion
+RIVAL = 0.5  # weight of another decay, relative to the selected one
+
 # --- Fit of the signal (fit_problem.py) ---
 MODEL_ACCURACY = 1e-9  # relative to the motion: truncation error of the series, below which no fit is better
 UNREACHED = 30.0  # standard errors: residual of a turning point that the motion never reaches

@@ -1,0 +1,348 @@
+"""The free decay within a record: rest, motion by hand, release, decay, rest, and perhaps a second release.
+
+A decay is the longest series of regular turning points whose swings, the distances between neighbouring turning points,
+do not grow.  A swing does not depend on the rest position, so this may drift.  Motions that are no decay are refused by
+what was measured of their swings: they grow, are constant, rise and fall again, or are no waves.
+"""
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from ...errors import HarnessError
+from ...records.record import Record
+from . import thresholds
+from .extrema import estimate_half_period, estimate_noise, gapless_slices, remove_spikes, smooth_motion
+
+
+@dataclass(frozen=True)
+class Swings:
+    """Swings between neighbouring turning points of a record.
+
+    Attributes
+    ----------
+    t : numpy.ndarray
+        Times (n + 1,) in s of the turning points.
+    size : numpy.ndarray
+        Sizes (n,) of the swings.
+    rises : numpy.ndarray
+        Whether each swing (n,) rises.
+    error : float
+        Standard error of a size.
+    half_period : float
+        Half period in s.
+    shape_error : numpy.ndarray
+        Share (n + 1,) of the power about each turning point that no wave explains; NaN at the ends of the record.
+    """
+
+    t: np.ndarray
+    size: np.ndarray
+    rises: np.ndarray
+    error: float
+    half_period: float
+    shape_error: np.ndarray
+
+    @property
+    def duration(self) -> np.ndarray:
+        return np.diff(self.t)
+
+    @property
+    def is_regular(self) -> np.ndarray:
+        """Whether each swing (n,) but the first takes about as long as the one before."""
+        ratio = self.duration[1:] / self.duration[:-1]
+        return np.concatenate([[True], (ratio > thresholds.MIN_SPACING) & (ratio < thresholds.MAX_SPACING)])
+
+    def loss(self, first: int, last: int) -> tuple[float, float]:
+        """Return the share that the swings lose from the first to the last, and its standard error."""
+        size = self.size[first : last + 1]
+        k = np.arange(len(size)) - (len(size) - 1) / 2
+        slope = float(k @ size / (k @ k))
+        scatter = size - size.mean() - slope * k
+        error = max(float(np.sqrt(scatter @ scatter / max(len(size) - 2, 1))), self.error) / np.sqrt(float(k @ k))
+        scale = (len(size) - 1) / float(size.mean())
+        return -slope * scale, error * scale
+
+
+@dataclass(frozen=True)
+class Decay:
+    """Swings `first` to `last` of a record, which decay."""
+
+    swings: Swings
+    first: int
+    last: int
+
+    @property
+    def count(self) -> int:
+        return self.last - self.first + 1
+
+    @property
+    def begin(self) -> float:
+        return float(self.swings.t[self.first])
+
+    @property
+    def end(self) -> float:
+        return float(self.swings.t[self.last + 1])
+
+    @property
+    def weight(self) -> float:
+        """How much the decay says about the losses: long, large and deep decays say most."""
+        first, last = float(self.swings.size[self.first]), float(self.swings.size[self.last])
+        return (self.end - self.begin) * float(np.sqrt(first * max(first - last, 0.0)))
+
+
+def select_decay(record: Record, pendulum: bool) -> Record:
+    """Return the part of a record that holds its free decay, or the record itself if it holds little else.
+
+    Raises
+    ------
+    HarnessError
+        If the turning points are those of another motion.
+    """
+    if not np.ptp(record.x) > 0:
+        return record
+    measured = remove_spikes(record)
+    noise, _ = estimate_noise(measured.t, measured.x)
+    periods = half_periods(measured, noise)
+    if len(gapless_slices(measured, periods[0])) > 1:
+        return record
+    best: Decay | None = None
+    motions: list[Swings] = []
+    for period in periods:
+        swings = measure_swings(measured, period, noise, pendulum)
+        if swings is None:
+            continue
+        motions.append(swings)
+        best = max([*([best] if best else []), *find_decays(swings)], key=lambda decay: decay.weight, default=None)
+        if best is not None and best.end - best.begin > thresholds.LARGE_PART * (record.t[-1] - record.t[0]):
+            break
+    if motions:
+        check_motion(record, motions[0] if best is None else best.swings, best, pendulum)
+    return record if best is None else crop(record, best)
+
+
+def half_periods(record: Record, noise: float) -> list[float]:
+    """Return different half periods that the record may have: of its reversals, and of its slow and fast spectrum."""
+    result = [estimate_half_period(record, noise, float(np.ptp(record.x)))]
+    n = min(len(record.t), thresholds.SPECTRUM_SAMPLES)
+    t = np.linspace(record.t[0], record.t[-1], n)
+    x = np.interp(t, record.t, record.x)
+    x = (x - np.polyval(np.polyfit(t - t[0], x, 1), t - t[0])) * np.hanning(n)
+    frequencies, power = np.fft.rfftfreq(4 * n, t[1] - t[0]), np.abs(np.fft.rfft(x, 4 * n)) ** 2
+    power[frequencies < 2 / (t[-1] - t[0])] = 0.0
+    for derivative in range(3):
+        peak = float(frequencies[np.argmax(power * frequencies ** (2 * derivative))])
+        if (
+            thresholds.MIN_SAMPLES_PER_PERIOD * peak * (t[-1] - t[0]) < len(record.t)
+            and peak > 0
+            and all(abs(2 * peak * other - 1) > thresholds.SAME_PERIOD for other in result)
+        ):
+            result.append(0.5 / peak)
+    return result
+
+
+def measure_swings(record: Record, half_period: float, noise: float, pendulum: bool) -> Swings | None:
+    """Return the swings of a record with this half period; None if it has too few turning points."""
+    motion = smooth_motion(record, slice(None), half_period, noise, float(np.ptp(record.x)), pendulum)
+    if motion is None or len(motion.reversals) < thresholds.MIN_SELECTED_TURNS:
+        return None
+    t, x = motion.refine(motion.reversals)
+    error = motion.position_error(x)
+    half_period = float(np.median(np.diff(t)))
+    shape_error = wave_residuals(motion.y, motion.reversals, half_period / motion.interval)
+    return Swings(t, np.abs(np.diff(x)), np.diff(x) > 0, error * np.sqrt(2), half_period, shape_error)
+
+
+def wave_residuals(y: np.ndarray, i: np.ndarray, half_period: float) -> np.ndarray:
+    """Return the share of the power of y (n,) within a period about the samples i (k,) that no wave explains.
+
+    The wave may drift, decay and change its frequency.  NaN where the period exceeds the samples.
+    """
+    half = max(int(half_period), 4)
+    share = np.full(len(i), np.nan)
+    inner = (i >= half) & (i + half < len(y))
+    if inner.any():
+        u = np.arange(-half, half + 1) / half
+        wave = np.stack([np.cos(np.pi * u), np.sin(np.pi * u)])
+        basis, _ = np.linalg.qr(np.concatenate([np.ones((1, len(u))), u[None], wave, u * wave]).T)
+        parts = np.lib.stride_tricks.sliding_window_view(y, 2 * half + 1)[i[inner] - half]
+        parts = parts - parts.mean(axis=1, keepdims=True)
+        total = (parts**2).sum(axis=1)
+        share[inner] = 1 - ((parts @ basis) ** 2).sum(axis=1) / np.where(total > 0, total, 1.0)
+    return share
+
+
+def find_decays(swings: Swings) -> list[Decay]:
+    """Return all series of regular swings that do not grow, and that lose more than their scatter explains."""
+    size, margin = swings.size, thresholds.GROWTH_ERRORS * swings.error
+    is_continued = swings.is_regular[1:] & (size[1:] < size[:-1] * thresholds.SMALL_GROWTH + margin)
+    ends = np.flatnonzero(~is_continued).tolist()
+    decays = []
+    for before, last in zip([-1, *ends], [*ends, len(size) - 1], strict=True):
+        first = skip_disturbed_swings(swings, skip_steady_swings(swings, before + 1, last), last)
+        if last - first + 1 >= thresholds.MIN_SWINGS:
+            loss, error = swings.loss(first, last)
+            if loss > thresholds.SIGNIFICANT_LOSS * error:
+                decays.append(Decay(swings, first, last))
+    return decays
+
+
+def skip_steady_swings(swings: Swings, first: int, last: int) -> int:
+    """Return the swing at which the decay starts, after swings kept up by a drive that is then switched off.
+
+    The loss per swing of a decay never rises, whatever the law.
+    """
+    size = swings.size[first : last + 1]
+    n = len(size)
+    if n < 2 * thresholds.MIN_STEADY_SWINGS:
+        return first
+    largest = float(size.max())
+    steady = int(np.flatnonzero(size > (1 - thresholds.STEADY) * largest - 3 * swings.error)[-1])
+    if steady < thresholds.MIN_STEADY_SWINGS:
+        return first
+    after = min(steady, n - 1 - steady)
+    if after < 2:
+        return first
+    loss_before = (size[0] - size[steady]) / steady
+    loss_after = (size[steady] - size[steady + after]) / after
+    return first + steady if loss_before < thresholds.STEADY_LOSS * loss_after else first
+
+
+def skip_disturbed_swings(swings: Swings, first: int, last: int) -> int:
+    """Return the first swing that loses no more than drag would, compared with the next swing."""
+    size, margin = swings.size, thresholds.GROWTH_ERRORS * swings.error
+    while last - first > thresholds.MIN_SWINGS:
+        lost, next_lost = size[first] - size[first + 1], size[first + 1] - size[first + 2]
+        if lost <= thresholds.SUDDEN_LOSS * next_lost * (size[first] / size[first + 1]) ** 2 + margin:
+            break
+        first += 1
+    return first
+
+
+def check_motion(record: Record, swings: Swings, best: Decay | None, pendulum: bool) -> None:
+    """Raise HarnessError if the swings are those of a motion that is no free decay."""
+    if best is None:
+        at = longest_regular(swings)
+        if at.stop - at.start < thresholds.MIN_SWINGS:
+            at = slice(0, len(swings.size))
+        first, last = at.start + 1, at.stop - 1  # the first swing may be cut
+    else:
+        first, last = best.first, best.last
+    name, unit, size = record.name, record.base, swings.size
+    regular = size[first : last + 1]
+    is_large_pendulum = (pendulum or unit == "rad") and regular.max() > 2 * thresholds.LARGE_SWING
+    shape = float(np.nanmedian(shape)) if np.isfinite(shape := swings.shape_error[first : last + 2]).any() else 0.0
+    if shape > thresholds.NO_WAVE and not is_large_pendulum:
+        raise HarnessError(describe_shape(record, swings, slice(first, last + 1), shape))
+    few = best is None or (best.count < thresholds.SMALL_PART * len(size))
+    spread = duration_spread(swings.duration)
+    is_large = best is not None and size[best.first] > thresholds.LARGE_FIRST * float(np.median(size))
+    if few and not is_large and len(size) >= thresholds.MANY_SWINGS and spread > thresholds.IRREGULAR:
+        raise HarnessError(describe_shape(record, swings, slice(None), shape))
+    if best is not None:
+        weighty = (decay for decay in find_decays(swings) if decay.weight >= thresholds.RIVAL * best.weight)
+        if rise := next(filter(None, (find_regrowth(swings, decay) for decay in weighty)), None):
+            raise HarnessError(
+                f"{name} beats: its swings fall to {size[rise[0]]:.3g} {unit} at "
+                f"t = {record.format_time(swings.t[rise[0]])} s and rise again to {size[rise[1]]:.3g} {unit} at "
+                f"t = {record.format_time(swings.t[rise[1]])} s, as those of two modes or of a drive do; fit a model "
+                "with both by friction-fmus fit, or select a decay of one mode with --from and --until"
+            )
+        return
+    if len(regular) < thresholds.MANY_SWINGS:
+        return
+    loss, error = swings.loss(first, last)
+    if loss < -thresholds.SIGNIFICANT_LOSS * error and regular[-1] > thresholds.GROWTH * regular[0]:
+        raise HarnessError(
+            f"{name} grows, from {regular[0]:.4g} to {regular[-1]:.4g} {unit} peak to peak: it is driven or "
+            "gains energy, and has no decay to measure; fit a model with its drive by friction-fmus fit"
+        )
+    if abs(loss) < thresholds.SIGNIFICANT_LOSS * error and error < thresholds.CONSTANT:
+        raise HarnessError(
+            f"{name} has a constant amplitude: over {len(regular)} half cycles its swings change by "
+            f"{-100 * loss:+.2g} % +- {200 * error:.1g} %, so it is driven or loses less than that; make a longer "
+            "record, or fit a model with its drive by friction-fmus fit"
+        )
+
+
+def duration_spread(duration: np.ndarray) -> float:
+    """Return the relative scatter of durations (n,), half the range of their middle 68 %."""
+    low, middle, high = np.percentile(duration, [16, 50, 84])
+    return float((high - low) / (2 * middle))
+
+
+def longest_regular(swings: Swings) -> slice:
+    """Return the longest series of regular swings."""
+    starts = np.flatnonzero(~swings.is_regular)
+    edges = [0, *starts.tolist(), len(swings.size)]
+    first, last = max(pairwise(edges), key=lambda pair: pair[1] - pair[0])
+    return slice(first, last)
+
+
+def describe_shape(record: Record, swings: Swings, part: slice, shape: float) -> str:
+    """Return the sentence that refuses swings that are no waves."""
+    duration, rises = swings.duration[part], swings.rises[part]
+    up, down = (float(np.median(duration[which])) if which.any() else 1.0 for which in (rises, ~rises))
+    ratio = max(up, down) / min(up, down)
+    if ratio > thresholds.SAWTOOTH:
+        slow, fast = ("rises", "falls") if up > down else ("falls", "rises")
+        return (
+            f"{record.name} {slow} {ratio:.1f} times as long as it {fast}, as in stick-slip, and is no decay: use "
+            "friction-fmus fit stickslip, or select a free decay with --from and --until"
+        )
+    spread = 100 * duration_spread(duration)
+    if spread > 100 * thresholds.IRREGULAR:
+        return (
+            f"{record.name} is not one oscillation: the times between its turning points vary by {spread:.0f} %, as in "
+            "noise or stick-slip; filter the record, select a free decay with --from and --until, or use "
+            "friction-fmus fit stickslip"
+        )
+    return (
+        f"{record.name} is no free decay: {100 * shape:.0f} % of the power of its cycles is no wave, as in relaxation "
+        "oscillations, stick-slip or several modes; use friction-fmus fit stickslip for a driven motion, or select a "
+        "free decay with --from and --until"
+    )
+
+
+def find_regrowth(swings: Swings, best: Decay) -> tuple[int, int] | None:
+    """Return the smallest and the largest swing of a regular growth after the decay; None without one.
+
+    A hand or a second release makes the swings grow at once; a beat takes several cycles.
+    """
+    size, regular = swings.size, swings.is_regular
+    for first in range(best.last, min(best.last + thresholds.MAX_NODE_SWINGS, len(size))):
+        last = first
+        while last + 1 < len(size) and regular[last + 1] and size[last + 1] > size[last]:
+            last += 1
+        if last - first >= thresholds.MIN_REGROWTH and size[last] > thresholds.REGROWTH * size[first]:
+            return first, last
+    return None
+
+
+def crop(record: Record, best: Decay) -> Record:
+    """Return the record of a decay, with a note; unchanged if only a rest or a cycle is before and after it."""
+    swings = best.swings
+    before, after = swings.size[: best.first], swings.size[best.last + 1 :]
+    begin, end, reasons = float(record.t[0]), float(record.t[-1]), []
+    if best.begin - begin > thresholds.LONG_REST * swings.half_period:
+        if (before > thresholds.SMALL_BEFORE * swings.size[best.first]).any():
+            begin = best.begin
+            reasons.append("before it the motion is not free")
+        else:
+            begin = best.begin - thresholds.BEFORE_FIRST_TURN * swings.half_period
+            reasons.append("before it is a rest")
+    if len(after) and after.max() > thresholds.LARGE_AFTER * swings.size[best.last]:
+        end = float(swings.t[best.last + (best.count < thresholds.MANY_SWINGS)])
+        reasons.append(f"after it the swings grow to {after.max():.3g} {record.base}")
+    if not reasons:
+        return record
+    t = record.format_time
+    note = (
+        f"The free decay from t = {t(begin)} to {t(end)} s is taken, {best.count} half cycles: {' and '.join(reasons)}."
+    )
+    others = [other for other in find_decays(swings) if other.first > best.last or other.last < best.first]
+    if rivals := [other for other in others if other.weight > thresholds.RIVAL * best.weight]:
+        spans = ", ".join(f"{t(other.begin)} to {t(other.end)}" for other in rivals)
+        note += f" The record also decays from t = {spans} s: select a part with --from and --until."
+    cropped = record.select(begin, end)
+    return replace(cropped, notes=(*record.notes, note))
