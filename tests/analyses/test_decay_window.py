@@ -18,7 +18,7 @@ def test_the_free_decay_is_found_within_a_laboratory_record(scene):
     for seed in SEEDS:
         record, law, (begin, end) = laboratory_record(scene, seed)
         half_period = np.pi / law["omega"]
-        found = select_decay(record, False)
+        found, _ = select_decay(record, False)
         assert begin - 1.6 * half_period < found.t[0] < begin + 1.6 * half_period
         if scene == "two":
             assert (begin + end) / 2 < found.t[-1] < end + 1.6 * half_period
@@ -55,5 +55,5 @@ def test_another_motion_is_refused_by_its_feature(kind):
 def test_a_second_decay_of_nearly_the_same_weight_is_named():
     """Without the first swings of the first decay, both are alike."""
     record, _, (begin, end) = laboratory_record("two", 303)
-    found = select_decay(record.select(begin + 0.3 * (end - begin), np.inf), False)
+    found, _ = select_decay(record.select(begin + 0.3 * (end - begin), np.inf), False)
     assert "The record also decays from t =" in " ".join(found.notes)

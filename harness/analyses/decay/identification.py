@@ -14,7 +14,7 @@ Steps 2 and 4 follow J. W. Liang, B. F. Feeny, Nonlinear Dynamics 16 (1998), and
 
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -25,13 +25,14 @@ from ..estimation.estimate import Estimate
 from . import thresholds
 from .energy_loss import EnergyLoss, loss_fractions
 from .estimates import KnownParameters, estimate_from_extrema, estimate_from_two_peaks, make_estimates
-from .extrema import Extrema, find_extrema, remove_spikes
+from .extrema import Extrema, estimate_noise, find_extrema, remove_spikes
 from .fit_problem import FitError, FitProblem
 from .free_motion import select_free_motion
 from .intervals import FitUncertainty, estimate_uncertainty
 from .law import DRIFT, REST, TERMS, Terms
 from .model_selection import FittedLaw, fit_all_laws, select_reported_law
 from .remarks import check_fit, compare_halves, make_remarks
+from .thinning import block_size, thin, thinning_error
 from .window import select_decay
 
 
@@ -211,8 +212,10 @@ def identify_record(
             "--pendulum"
         )
     terms: Terms = TERMS if drag else ("zeta", "r")
-    decay = select_decay(record, parameters.pendulum)
-    extrema = find_extrema(decay, parameters.pendulum)
+    decay, half_period = select_decay(record, parameters.pendulum)
+    _, quantiser_step = estimate_noise(decay.t, decay.x)
+    record, decay = thin_around(record, decay, half_period)
+    extrema = replace(find_extrema(decay, parameters.pendulum), quantiser_step=quantiser_step)
     unknowns = 5 + len(terms) + drift
     if len(decay.t) <= unknowns:
         raise HarnessError(
@@ -255,6 +258,23 @@ def identify_record(
         unavailable,
         tuple(remarks),
     )
+
+
+def thin_around(record: Record, decay: Record, half_period: float) -> tuple[Record, Record]:
+    """Return the record and its decay, both thinned, with a note, if the decay is denser than its motion requires."""
+    size = block_size(decay, half_period)
+    if size == 1:
+        return record, decay
+    error = thinning_error(decay, half_period, size)
+    before, after = record.t < decay.t[0], record.t > decay.t[-1]
+    note = (
+        f"The {len(decay.t)} samples of the decay are averaged over {size} each, which shifts none by more than "
+        f"{error:.1g} of the amplitude."
+    )
+    thinned = thin(replace(decay, notes=(*decay.notes, note)), size)
+    parts = [thin(replace(record, t=record.t[part], x=record.x[part]), size) for part in (before, after)]
+    t, x = (np.concatenate([getattr(part, name) for part in (parts[0], thinned, parts[1])]) for name in ("t", "x"))
+    return replace(record, t=t, x=x), thinned
 
 
 def amplitudes_of(extrema: Extrema) -> np.ndarray:

@@ -63,6 +63,13 @@ SMALL_BEFORE = 0.2  # of the first swing: smaller motions before it are a rest
 LARGE_AFTER = 1.2  # times the last swing: a larger one is another motion
 RIVAL = 0.5  # weight of another decay, relative to the selected one
 
+# --- Thinning (thinning.py) ---
+MAX_DENSE_SAMPLES = 10_000  # a record with fewer samples is fitted as it is
+MIN_THINNED_SAMPLES = 5_000  # of a thinned record
+MIN_THINNED_PER_PERIOD = 64.0  # samples: their means differ by 1.3e-6 of the amplitude
+EVEN_INTERVALS = 1.05  # ratio of long to short intervals: with a larger one the times are uneven
+MAX_BLOCK_SPAN = 1.5  # times the median span of neighbouring blocks: a longer one has a gap
+
 # --- Fit of the signal (fit_problem.py) ---
 MODEL_ACCURACY = 1e-9  # relative to the motion: truncation error of the series, below which no fit is better
 UNREACHED = 30.0  # standard errors: residual of a turning point that the motion never reaches

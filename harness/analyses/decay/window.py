@@ -91,8 +91,10 @@ class Decay:
         return (self.end - self.begin) * float(np.sqrt(first * max(first - last, 0.0)))
 
 
-def select_decay(record: Record, pendulum: bool) -> Record:
-    """Return the part of a record that holds its free decay, or the record itself if it holds little else.
+def select_decay(record: Record, pendulum: bool) -> tuple[Record, float]:
+    """Return the part of a record that holds its free decay, and its half period in s.
+
+    It is the record itself if this holds little else.
 
     Raises
     ------
@@ -100,12 +102,12 @@ def select_decay(record: Record, pendulum: bool) -> Record:
         If the turning points are those of another motion.
     """
     if not np.ptp(record.x) > 0:
-        return record
+        return record, 0.0
     measured = remove_spikes(record)
     noise, _ = estimate_noise(measured.t, measured.x)
     periods = half_periods(measured, noise)
     if len(gapless_slices(measured, periods[0])) > 1:
-        return record
+        return record, min(periods)
     best: Decay | None = None
     motions: list[Swings] = []
     for period in periods:
@@ -118,7 +120,7 @@ def select_decay(record: Record, pendulum: bool) -> Record:
             break
     if motions:
         check_motion(record, motions[0] if best is None else best.swings, best, pendulum)
-    return record if best is None else crop(record, best)
+    return (record, min(periods)) if best is None else (crop(record, best), best.swings.half_period)
 
 
 def half_periods(record: Record, noise: float) -> list[float]:
