@@ -22,6 +22,7 @@ from .samples import (
     mark_dropouts,
     mark_sentinels,
     parse_timestamps,
+    sort_times,
     undo_time_rounding,
 )
 from .table_files import Cells, Table, load_table
@@ -127,7 +128,9 @@ def parse_record(table: Table, columns: ColumnOptions, name: str) -> Record:
     notes += choice
     if not any(table.column_headings) and len(candidates) > 1:
         times = "" if time_column is None or interval else f"{time_column.heading} is used as time in s and "
-        notes.append(f"The file has no headings: {times}{motion_column.heading} is the signal; --headings names them.")
+        notes.insert(
+            0, f"The file has no headings: {times}{motion_column.heading} is the signal; --headings names them."
+        )
     elif time_column is not None and columns.time is None:
         notes += describe_further_runs(candidates, time_column, motion_column)
     label, unit = motion_column.name or motion_column.heading, columns.unit or motion_column.unit
@@ -149,8 +152,10 @@ def parse_record(table: Table, columns: ColumnOptions, name: str) -> Record:
     t, rounding = undo_time_rounding(t[: len(is_complete)])
     notes += filter(None, (*gaps, rounding, assumption))
     t, x = t[is_complete], size * x[: len(is_complete)][is_complete]
+    order_of_time, sorting = sort_times(t)
+    t, x = t[order_of_time], x[order_of_time]
     is_repeated, repetition = find_repeated_times(t)
-    notes += filter(None, [repetition])
+    notes += filter(None, [sorting, repetition])
     t, x = t[~is_repeated], x[~is_repeated]
     record = Record(name, t, x, base + RATE_SUFFIXES[order], order, base, tuple(notes)).select(*columns.interval)
     record = leave_out_saturated(record)

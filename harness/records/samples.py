@@ -8,6 +8,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import replace
 from datetime import datetime
+from itertools import pairwise
 
 import numpy as np
 
@@ -33,6 +34,7 @@ MIN_STAY = 3  # samples at the largest value, in a peak
 MIN_RARE_STEPS = 3  # of rounded times: a single step of another size is a repeated or a missing sample
 MAX_RARE_SPREAD = 2  # samples by which the distances between them differ
 MAX_REPEATED_SHARE = 0.2  # of the times
+MIN_RUN = 4  # samples on average of runs in one table whose times overlap: shorter ones are rows in no order
 MIN_DWELL = 4.0  # times the samples at the level before the last; 1/(sqrt(2) - 1) = 2.4 at a rounded turning point
 
 
@@ -112,6 +114,23 @@ def is_rounding_pattern(steps: np.ndarray, sizes: np.ndarray) -> bool:
     kinds = np.searchsorted(sizes, np.round(steps, 9))
     rare = np.flatnonzero(kinds != np.argmax(np.bincount(kinds)))
     return len(rare) >= MIN_RARE_STEPS and (len(sizes) > 2 or int(np.ptp(np.diff(rare))) <= MAX_RARE_SPREAD)
+
+
+def sort_times(t: np.ndarray) -> tuple[np.ndarray, str]:
+    """Return the order of samples (n,) by time, and a sentence if it is not that of the rows.
+
+    Rows of several runs, whose times overlap, keep their order, and so do rows with equal times.
+    """
+    unchanged = np.arange(len(t))
+    falls = np.flatnonzero(np.diff(t) < 0)
+    if not len(falls) or len(np.unique(t)) < len(t):
+        return unchanged, ""
+    parts = np.split(t, falls + 1)
+    spans = sorted((float(part[0]), float(part[-1])) for part in parts)
+    is_overlapping = any(later < end for (_, end), (later, _) in pairwise(spans))
+    if is_overlapping and len(t) > MIN_RUN * len(parts):
+        return unchanged, ""
+    return np.argsort(t), f"The rows are not in the order of time ({len(falls)} times fall): they are sorted."
 
 
 def find_repeated_times(t: np.ndarray) -> tuple[np.ndarray, str]:

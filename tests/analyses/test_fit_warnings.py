@@ -81,6 +81,12 @@ def test_a_record_without_decay_is_refused_in_one_sentence(x, sentence):
     assert "\n" not in str(refusal.value)
 
 
+def test_a_refusal_names_what_was_assumed_in_reading():
+    record = Record("bare", T, np.exp(-T), notes=("The file has no headings: column 2 is the signal.",))
+    with pytest.raises(HarnessError, match=r"turning points .* The file has no headings: column 2 is the signal$"):
+        fit_decay(record, KnownParameters())
+
+
 @pytest.mark.parametrize(
     ("sine", "order", "drift", "drag"),
     [

@@ -10,7 +10,7 @@ from harness.analyses.decay.estimates import KnownParameters
 from harness.analyses.decay.identification import fit_decay
 from harness.errors import SceneError
 from harness.records.columns import ColumnOptions, read_record
-from harness.records.samples import find_saturated, leave_out_saturated, mark_dropouts, mark_sentinels
+from harness.records.samples import find_saturated, leave_out_saturated, mark_dropouts, mark_sentinels, sort_times
 
 T = np.linspace(0.0, 12.0, 2401)
 ZETA = 0.0119
@@ -180,3 +180,16 @@ def test_the_largest_value_of_one_peak_or_of_no_motion_is_not_saturation():
     assert leave_out_saturated(held) is held
     still = replace(record, x=np.ones_like(record.x))
     assert leave_out_saturated(still) is still
+
+
+def test_rows_in_no_order_are_sorted_and_reported():
+    """Falling times, whole parts that are exchanged, and shuffled rows; two runs in one table keep their order."""
+    t = np.arange(40) * 0.25
+    for order in (np.arange(40)[::-1], np.roll(np.arange(40), 15), np.random.default_rng(1).permutation(40)):
+        found, sentence = sort_times(t[order])
+        assert (t[order][found] == t).all()
+        assert "The rows are not in the order of time" in sentence
+    for times in (t, np.concatenate([t, t + 0.1]), np.concatenate([t, t])):
+        found, sentence = sort_times(times)
+        assert (found == np.arange(len(times))).all()
+        assert sentence == ""

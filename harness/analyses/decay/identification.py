@@ -177,10 +177,13 @@ def fit_decay(
         if without_spikes is not record:
             with suppress(HarnessError):
                 return identify_record(without_spikes, parameters, drag, drift, report)
-        if not isinstance(error, FitError):
-            raise
-        advice = suggest_remedy(record, parameters, drag, drift) or error.advice
-        raise HarnessError(f"{record.name} {error}; {advice}") from None
+        message = str(error)
+        if isinstance(error, FitError):
+            advice = suggest_remedy(record, parameters, drag, drift) or error.advice
+            message = f"{record.name} {error}; {advice}"
+        if record.notes:  # what was assumed in reading may be wrong
+            message += f". {record.notes[0].removesuffix('.')}"
+        raise HarnessError(message) from None
 
 
 def suggest_remedy(record: Record, parameters: KnownParameters, drag: bool, drift: bool) -> str:
