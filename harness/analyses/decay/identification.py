@@ -1,10 +1,12 @@
 """Identification of damping, dry friction and drag from the record of a decay.
 
-1. Locate and number the turning points (extrema.py).
+1. Find the free decay within the record (window.py) and thin it (thinning.py); locate and number its turning points
+   (extrema.py).
 2. Estimate the losses from the energy lost per half cycle (energy_loss.py), then fit the numbered turning points.
 3. Fit the law (law.py) to every sample of the free motion (signal_model.py, free_motion.py).
 4. Fit and rank the seven laws (model_selection.py); the full law gives the uncertainty (intervals.py).
-5. Remark on what is doubtful and refuse what is not a free decay (remarks.py).
+5. Fit the law to the swings alone, as a second opinion (swing_fit.py).
+6. Remark on what is doubtful and refuse what is not a free decay (remarks.py).
 
 References
 ----------
@@ -24,14 +26,15 @@ from ...records.record import Record
 from ..estimation.estimate import Estimate
 from . import thresholds
 from .energy_loss import EnergyLoss, loss_fractions
-from .estimates import KnownParameters, estimate_from_extrema, estimate_from_two_peaks, make_estimates
+from .estimates import KnownParameters, estimate_from_extrema, estimate_from_two_peaks, make_estimates, to_record_units
 from .extrema import Extrema, estimate_noise, find_extrema, remove_spikes
 from .fit_problem import FitError, FitProblem
 from .free_motion import select_free_motion
 from .intervals import FitUncertainty, estimate_uncertainty
 from .law import DRIFT, REST, TERMS, Terms
 from .model_selection import FittedLaw, fit_all_laws, select_reported_law
-from .remarks import check_fit, compare_halves, make_remarks
+from .remarks import check_fit, compare_halves, compare_swings, make_remarks
+from .swing_fit import fit_swings
 from .thinning import block_size, thin, thinning_error
 from .window import select_decay
 
@@ -58,6 +61,8 @@ class DecayIdentification:
         Estimates from all turning points.
     two_peak_estimates : tuple of Estimate
         Estimates from the first and the last turning point.
+    swing_estimates : tuple of Estimate
+        Estimates of the losses from the swings between neighbouring turning points; empty if there are too few.
     unavailable : dict
         Reasons why the estimates from turning points are empty, by method; an empty text if they are not.
     remarks : tuple of str
@@ -72,6 +77,7 @@ class DecayIdentification:
     estimates: tuple[Estimate, ...]
     extrema_estimates: tuple[Estimate, ...]
     two_peak_estimates: tuple[Estimate, ...]
+    swing_estimates: tuple[Estimate, ...]
     unavailable: dict[str, str]
     remarks: tuple[str, ...]
 
@@ -245,6 +251,15 @@ def identify_record(
     if uncertainty.is_correlated and uncertainty.rms > thresholds.ROUGH * problem.noise:
         estimates, disagreements = compare_halves(problem, full, estimates)
         remarks += disagreements
+    from_swings: tuple[Estimate, ...] = ()
+    swing_fit = fit_swings(problem, extrema, full.p, terms)
+    if swing_fit is not None:
+        from_swings = tuple(
+            to_record_units(record, problem, unknown, value, swing_fit.errors[unknown], *swing_fit.intervals[unknown])
+            for unknown, value in swing_fit.values.items()
+        )
+        estimates, disagreements = compare_swings(estimates, from_swings, swing_fit.departure)
+        remarks += disagreements
     omega = estimates[0]
     by_extrema, no_extrema = estimate_from_extrema(record, problem, extrema, laws[0], parameters, omega)
     by_two_peaks, no_peaks = estimate_from_two_peaks(record, problem, extrema, laws[0], parameters, omega)
@@ -258,6 +273,7 @@ def identify_record(
         estimates,
         by_extrema,
         by_two_peaks,
+        from_swings,
         unavailable,
         tuple(remarks),
     )

@@ -13,6 +13,8 @@ from .intervals import FitUncertainty, estimate_uncertainty
 from .law import AMPLITUDE, DRIFT, OMEGA, REST, UNKNOWNS, ZETA
 from .model_selection import FittedLaw, deviance_difference
 
+FORCES = {"f": "r", "T_f": "r", "c": "zeta", "q": "b"}  # the loss that each constant of a force is proportional to
+
 
 def check_fit(
     record: Record, problem: FitProblem, full: FittedLaw, uncertainty: FitUncertainty, pendulum: bool
@@ -191,4 +193,53 @@ def compare_halves(
                 f"{estimate.text}, {estimate.name}: {first:.4g} in the first half of the record, "
                 f"{second:.4g} in the second."
             )
+    return tuple(widened), tuple(remarks)
+
+
+def compare_swings(
+    estimates: tuple[Estimate, ...], from_swings: tuple[Estimate, ...], departure: float
+) -> tuple[tuple[Estimate, ...], tuple[str, ...]]:
+    """Compare the estimates from the whole signal with those from the swings.
+
+    Parameters
+    ----------
+    estimates, from_swings : tuple of Estimate
+        Estimates from the whole signal, and of the losses from the swings.
+    departure : float
+        Fraction by which the loss of the half cycles departs from the law, or 0.
+
+    Returns
+    -------
+    estimates : tuple of Estimate
+        The estimates; where both disagree, or the loss departs from the law, the interval covers both.
+    remarks : tuple of str
+        A remark on the departure, or on each quantity in which both disagree.
+    """
+    remarks, factors = [], {}
+    by_name = {estimate.name: estimate for estimate in from_swings}
+    widened = list(estimates)
+    if departure:
+        remarks.append(
+            f"The loss per half cycle departs from every law by {100 * departure:.0f} %, which is no noise: the "
+            "intervals of the losses cover this departure, and the estimates from the swings."
+        )
+    for i, estimate in enumerate(widened):
+        other = by_name.get(estimate.name)
+        if other is not None:
+            differs = abs(estimate.value - other.value) > thresholds.SWING_DISAGREEMENT * np.hypot(
+                estimate.error, other.error
+            )
+            if not (departure or differs):
+                continue
+            low, high = min(estimate.low, other.low), max(estimate.high, other.high)
+            widened[i] = replace(estimate, error=max(estimate.error, other.error), low=low, high=high)
+            factors[estimate.name] = low / estimate.low if estimate.low else 1.0, high / estimate.high
+            if differs:
+                remarks.append(
+                    f"{estimate.text}, {estimate.name}: {estimate.value:.4g} from the whole signal, {other.value:.4g} "
+                    "from the swings alone; the interval covers both."
+                )
+        elif estimate.name in FORCES and FORCES[estimate.name] in factors:
+            low_factor, high_factor = factors[FORCES[estimate.name]]
+            widened[i] = replace(estimate, low=estimate.low * low_factor, high=estimate.high * high_factor)
     return tuple(widened), tuple(remarks)

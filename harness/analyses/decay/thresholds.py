@@ -109,6 +109,14 @@ NEGLIGIBLE_BOUND = 4.0  # standard errors above zero: the bound at zero no longe
 MAX_BOUND = 8.0  # standard errors above the most likely value: no end of an interval is beyond
 INTERVAL_PRECISION = 1e-4  # standard errors: of the ends of an interval, well below what the draws leave uncertain
 
+# --- Fit of the swings (swing_fit.py) ---
+MAX_FITTED_SWINGS = 200  # the largest ones say most; the cost grows with the third power
+MIN_FITTED_SWINGS = 10  # for a variance of noise and one of the departure from the law
+RIDGE = 1e-10  # of the mean variance: keeps matrices positive definite in rounding
+PROVEN_DEPARTURE = 4.0  # of the logarithm of the likelihood: no record of 14 without a departure exceeds 2.5
+SMALL_DEPARTURE = 0.01  # of the loss: a smaller departure from the law is not reported
+SWING_DISAGREEMENT = 4.0  # standard errors between the estimates from the signal and from the swings
+
 # --- Remarks and refusals (remarks.py) ---
 ROUGH = 1.5  # times the noise: larger residuals are not the noise of single samples
 NOT_A_DECAY = 0.1  # fraction of the motion: with larger residuals the record is refused

@@ -75,6 +75,7 @@ class DecayResult(Result, DecayIdentification):
                 "unit": record.base,
             },
             "turning_points": [asdict(estimate) for estimate in self.extrema_estimates],
+            "swings": [asdict(estimate) for estimate in self.swing_estimates],
             "published": [asdict(estimate) for estimate in self.two_peak_estimates],
             "why_empty": {name: reason for name, reason in self.unavailable.items() if reason},
             "laws": [
