@@ -41,9 +41,10 @@ def spoil(record, truth, defect, rng):
         step = duration / (len(t) - 1)
         noise = 1e-4 * size
         before, after = (int(rng.uniform(0.2, 0.8) * len(t)) for _ in range(2))
-        held = x[0] + noise * rng.standard_normal(before)
+        start = int(np.argmax(np.abs(x - truth["rest"])[: int(1.2 * np.pi / truth["omega"] / step) + 1]))  # from rest
+        held = x[start] + noise * rng.standard_normal(before)
         ended = x[-1] + noise * rng.standard_normal(after)
-        x = np.concatenate([held, x, ended])
+        x = np.concatenate([held, x[start:], ended])
         t = t[0] + step * (np.arange(len(x)) - before)
     elif defect == "outliers":
         x = x.copy()

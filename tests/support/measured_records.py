@@ -1,7 +1,8 @@
-"""The measured pendulum of the README, whose record is not a part of the project.
+"""Measured records, which are not a part of the project.
 
-It is a reduced copy of a file of github.com/dynamicslab/MultiArm-Pendulum (MIT, Kaheman et al., arXiv 2205.06231): the
-angle minus pi and the time minus 60 s, every 50th sample.
+The pendulum of the README is a reduced copy of a file of github.com/dynamicslab/MultiArm-Pendulum (MIT, Kaheman et al.,
+arXiv 2205.06231): the angle minus pi and the time minus 60 s, every 50th sample. The bicycle wheel, a torsion pendulum
+with a rate gyro, is a file of github.com/moorepants/resonance (MIT, Moore and Lyons).
 """
 
 import os
@@ -15,15 +16,22 @@ VARIABLE = "FRICTION_FMUS_RECORDS"
 RECORD = "pendulum_multiarm.csv"
 ORIGINAL = "SingleDataFreeSwing_1_Dt_0_0001.mat"
 COMMAND = f"decay {ORIGINAL} --time Theta1.time --column Theta1.signals --unit rad --until 68"
-MISSING = f"no {RECORD}: it is not a part of the project; {VARIABLE} names its folder"
 
 
-def find_record():
-    """Return the path of the record, in the folder that the variable names or in shared/records near the checkout."""
+def missing(name):
+    """Return the reason for which a test without a record is skipped."""
+    return f"no {name}: it is not a part of the project; {VARIABLE} names its folder"
+
+
+MISSING = missing(RECORD)
+
+
+def find_record(name=RECORD):
+    """Return the path of a record, in the folder that the variable names or in shared/records near the checkout."""
     folders = [parent / "shared" / "records" for parent in ROOT.parents]
     if VARIABLE in os.environ:
         folders = [Path(os.environ[VARIABLE])]
-    return next((folder / RECORD for folder in folders if (folder / RECORD).is_file()), None)
+    return next((folder / name for folder in folders if (folder / name).is_file()), None)
 
 
 def write_original(record, folder):

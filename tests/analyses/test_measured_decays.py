@@ -1,0 +1,52 @@
+"""Measured records, which are not a part of the project: the losses of windows of one record agree."""
+
+from functools import cache
+from itertools import combinations, pairwise
+
+import numpy as np
+import pytest
+from measured_records import find_record, missing
+
+from harness.analyses.decay.estimates import KnownParameters
+from harness.analyses.decay.identification import fit_decay
+from harness.records.columns import ColumnOptions, read_record
+
+RECORDS = ("pendulum_multiarm.csv", "bicycle_wheel.csv")
+LOSSES = ("zeta", "r", "b")
+
+
+@cache
+def fits(name):
+    """Return the fits of a whole record, of its halves and of its thirds."""
+    path = find_record(name)
+    if path is None:
+        pytest.skip(missing(name))
+    record = read_record(str(path), ColumnOptions(), path.stem)
+    whole = fit_decay(record, KnownParameters())
+    parts = []
+    for count in (2, 3):
+        edges = np.linspace(whole.t[0], whole.t[-1], count + 1)
+        windows = pairwise(edges)
+        parts.append([fit_decay(record.select(begin, end), KnownParameters()) for begin, end in windows])
+    return whole, parts
+
+
+@pytest.mark.parametrize("name", RECORDS)
+def test_the_losses_of_halves_and_thirds_of_a_measured_record_agree(name):
+    _, parts = fits(name)
+    for windows in parts:
+        for one, other in combinations(windows, 2):
+            for loss in LOSSES:
+                assert one[loss].low <= other[loss].high, loss
+                assert other[loss].low <= one[loss].high, loss
+
+
+def test_a_measured_pendulum_on_ball_bearings_has_dry_friction():
+    """An amplitude of 0.066 rad that friction alone takes in n half cycles falls by 2 r in each."""
+    whole, _ = fits("pendulum_multiarm.csv")
+    largest = 0.066 / (2 * len(whole.extrema.t))
+    assert 0.7 * largest < whole["r"].low < whole["r"].high < largest
+    assert "r" in whole.best.terms
+    (from_swings,) = (one for one in whole.swing_estimates if one.name == "r")
+    assert whole["r"].low < from_swings.value < whole["r"].high
+    assert from_swings.error < whole["r"].error / 3
