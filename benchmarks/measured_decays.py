@@ -20,14 +20,14 @@ NAMES = ("omega", "zeta", "r", "b")
 LOSSES = NAMES[1:]
 
 
-def table_row(path):
+def table_row(path: Path) -> list[str]:
     """Return the row of a record: values, or the sentence that refuses it, and windows that disagree."""
     try:
         record = read_record(str(path), ColumnOptions(), path.stem)
         whole = fit_decay(record, KnownParameters())
     except HarnessError as refusal:
         return [path.stem, str(refusal)]
-    disagreements = set()
+    disagreements: set[str] = set()
     for count in (2, 3):
         edges = np.linspace(whole.t[0], whole.t[-1], count + 1)
         fits = []

@@ -42,10 +42,11 @@ def test_the_losses_of_halves_and_thirds_of_a_measured_record_agree(name):
 
 
 def test_a_measured_pendulum_on_ball_bearings_has_dry_friction():
-    """An amplitude of 0.066 rad that friction alone takes in n half cycles falls by 2 r in each."""
+    """Its swings fall by 4 r in each half cycle under friction alone, and by more with other losses."""
     whole, _ = fits("pendulum_multiarm.csv")
-    largest = 0.066 / (2 * len(whole.extrema.t))
-    assert 0.7 * largest < whole["r"].low < whole["r"].high < largest
+    swings = np.abs(np.diff(whole.extrema.x))[:9]
+    largest = (swings[0] - swings[-1]) / (4 * (len(swings) - 1))
+    assert 0.5 * largest < whole["r"].low < whole["r"].value < largest
     assert "r" in whole.best.terms
     (from_swings,) = (one for one in whole.swing_estimates if one.name == "r")
     assert whole["r"].low < from_swings.value < whole["r"].high
