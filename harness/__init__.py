@@ -15,16 +15,18 @@ if sys.argv[:1] == ["-m"]:  # python -m harness: no file of the working folder, 
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from .api import compare, describe, fit, identify_decay, load_result, simulate, sweep
+from .api import compare, describe, fit, identify_curve, identify_decay, load_result, simulate, sweep
 from .errors import HarnessError, SceneError
 
 if TYPE_CHECKING:
+    from .analyses.curve.identification import CurveIdentification
     from .analyses.decay.identification import DecayIdentification
     from .analyses.fit.parameter_fit import ParameterFit
     from .running.fmu_variables import FmuDescription
     from .running.trajectory import Trajectory
     from .studies.compare.difference import Comparison
     from .studies.compare.result import ComparisonResult
+    from .studies.curve.result import CurveResult
     from .studies.decay.result import DecayResult
     from .studies.fit.result import FitResult
     from .studies.sweep.result import SweepResult
@@ -35,6 +37,8 @@ if TYPE_CHECKING:
 __all__ = [
     "Comparison",
     "ComparisonResult",
+    "CurveIdentification",
+    "CurveResult",
     "DecayIdentification",
     "DecayResult",
     "FitResult",
@@ -48,6 +52,7 @@ __all__ = [
     "compare",
     "describe",
     "fit",
+    "identify_curve",
     "identify_decay",
     "load_result",
     "simulate",
@@ -58,6 +63,8 @@ __all__ = [
 TYPES = {
     "Comparison": "harness.studies.compare.difference",
     "ComparisonResult": "harness.studies.compare.result",
+    "CurveIdentification": "harness.analyses.curve.identification",
+    "CurveResult": "harness.studies.curve.result",
     "FitResult": "harness.studies.fit.result",
     "FmuDescription": "harness.running.fmu_variables",
     "DecayIdentification": "harness.analyses.decay.identification",

@@ -3,6 +3,7 @@
 Each function imports what it needs when it is called, so that importing `harness` stays fast.
 """
 
+from .curves import identify_curve
 from .decay import identify_decay
 from .descriptions import describe
 from .fits import fit
@@ -10,4 +11,4 @@ from .results import load_result
 from .runs import compare, simulate
 from .sweeps import sweep
 
-__all__ = ["compare", "describe", "fit", "identify_decay", "load_result", "simulate", "sweep"]
+__all__ = ["compare", "describe", "fit", "identify_curve", "identify_decay", "load_result", "simulate", "sweep"]

@@ -92,6 +92,14 @@ STUDIES = (
         ("a decay", "decay coulomb"),
     ),
     Study(
+        "curve",
+        "curve",
+        "studies.curve.result:CurveResult",
+        ("curve.json", "curve.csv", "table.csv", "measured.py", PICTURE),
+        "Friction curves",
+        "Friction over velocity: constants of the laws with 95 % intervals, and values for models.",
+    ),
+    Study(
         "fit",
         "fit",
         "studies.fit.result:FitResult",

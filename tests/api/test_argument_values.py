@@ -45,6 +45,14 @@ ACCEPTED = {  # arguments by function, and the values that they may have; None a
         "rate": ABOVE_ZERO,
         "progress": {"type"},
     },
+    "identify_curve": {
+        "points": FLAG,
+        "begin": FINITE,
+        "end": FINITE,
+        "mass": ABOVE_ZERO,
+        "bias": FINITE,
+        "backlash": {"0", *ABOVE_ZERO},
+    },
     "fit": {
         "observe": {"'x'", *NOTHING},
         "inputs": NOTHING,

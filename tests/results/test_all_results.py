@@ -45,6 +45,13 @@ def identified_decay():
     return harness.identify_decay(record.t, record.x, unit="m", k=157.9)
 
 
+def identified_curve():
+    v = np.array([s * w for w in np.geomspace(1e-3, 0.3, 10) for s in (1, -1)])
+    force = np.sign(v) * (1.0 + 0.5 * np.exp(-((v / 0.02) ** 2))) + 2.0 * v + 0.1 + 0.01 * np.sin(1e3 * v)
+    force[3] += 1.0
+    return harness.identify_curve((v, force), mass=2.0)
+
+
 def compared_runs():
     return harness.compare(harness.simulate("coulomb"), harness.simulate("coulomb", {"f": 0.6}))
 
@@ -111,6 +118,7 @@ def judged_cases():
 MAKERS = {
     "run": pulled_sled,
     "decay": identified_decay,
+    "curve": identified_curve,
     "fit": fitted_parameters,
     "sweep": swept_parameters,
     "compare": compared_runs,

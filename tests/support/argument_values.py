@@ -64,10 +64,13 @@ VALUES = {
 T = np.linspace(0.0, 6.0, 121)
 X = np.exp(-0.1 * T) * np.cos(6.0 * T)
 RECORD = pandas.DataFrame({"t [s]": T, "x [m]": X})
+V = np.array([-0.3, -0.1, -0.03, -0.01, 0.01, 0.03, 0.1, 0.3])
+CURVE = pandas.DataFrame({"v [m/s]": V, "F [N]": np.sign(V) + 2.0 * V})
 CALLS = {  # valid arguments, in which one is replaced
     "simulate": {"source": "coulomb", "stop": 0.2},
     "compare": {"a": "coulomb", "b": "smd", "stop": 0.2},
     "identify_decay": {"record": T, "x": X, "unit": "m"},
+    "identify_curve": {"record": CURVE},
     "fit": {"source": "smd", "records": RECORD, "free": {"k": (20.0, 60.0)}, "values": {"c": 0.2, "x0": 1.0}},
     "sweep": {"source": "coulomb", "grid": {"f": [0.5, 1.0]}, "stop": 0.2},
     "load_result": {"folder": "result"},

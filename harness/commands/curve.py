@@ -1,0 +1,83 @@
+"""curve: identify friction over velocity from points, or from a record over time."""
+
+from typing import Any
+
+import click
+
+from .terminal import (
+    BEGIN_OPTION,
+    END_OPTION,
+    FINITE,
+    HEADINGS_OPTION,
+    NONNEGATIVE,
+    POSITIVE,
+    Terminal,
+    result_options,
+)
+
+
+@click.command()
+@click.argument("source", metavar="FILE|-")
+@click.option("--velocity", help="Heading of the velocity. Default: v, speed, ..., or the first unit of a velocity.")
+@click.option("--position", help="Heading of the position, in a record over time without a velocity.")
+@click.option("--force", help="Heading of the force or torque. Default: F, torque, ..., or the first such unit.")
+@click.option("--current", help="Heading of the current of the motor, instead of a force.")
+@click.option("--constant", metavar="SIZE", help="Constant of the motor: '0.12 N.m/A' or '35 N/A'.")
+@click.option("--points", "is_points", is_flag=True, help="Take each row as a point, even if the file has times.")
+@click.option("--time", help="Heading of the time, in a record over time. Default: t, time, ...")
+@click.option("--time-unit", help="Unit of time, if the heading has none. Default: s.")
+@HEADINGS_OPTION
+@click.option("--rate", type=POSITIVE, metavar="HZ", help="Sampling rate in Hz, which replaces the times in the file.")
+@BEGIN_OPTION
+@END_OPTION
+@click.option(
+    *("--mass", "--inertia", "mass"),
+    type=POSITIVE,
+    help="Mass in kg, or moment of inertia in kg.m2, to remove inertia; stickslip needs it as well.",
+)
+@click.option("--bias", type=FINITE, help="Known constant force or gravity in N or N.m. Default: it is identified.")
+@click.option(
+    "--backlash",
+    type=NONNEGATIVE,
+    default=0.0,
+    show_default=True,
+    help="Distance in m or rad after a reversal to leave out of a record over time.",
+)
+@result_options
+def curve(
+    source: str,
+    velocity: str | None,
+    position: str | None,
+    force: str | None,
+    current: str | None,
+    constant: str | None,
+    is_points: bool,
+    mass: float | None,
+    bias: float | None,
+    backlash: float,
+    terminal: Terminal,
+    **columns: Any,
+) -> None:
+    """Identify friction over velocity from measured points in FILE, or from a record over time.
+
+    A row of FILE is a point, a velocity and a force or torque.  With a column of times FILE is a record: plateaus of
+    constant velocity become points, and without plateaus, samples of nearly the same velocity.  The laws are Coulomb,
+    viscous, Tustin and Stribeck friction, equal in both directions or not.  A constant bias is removed.
+
+    The results are the constants of each law with 95 % confidence intervals, the Bayesian information criterion (BIC)
+    of each law, the points that do not fit, values for models, the curve as a table, and a model file.
+
+    \b
+    Examples:
+      points:           friction-fmus curve bench.csv --velocity "v [mm/s]" --force "F [N]"
+      a motor:          friction-fmus curve axis.csv --velocity speed --current i --constant "0.12 N.m/A"
+      a record:         friction-fmus curve slide.csv --time t --position x --force F --mass 2.5
+      one direction:    friction-fmus curve brake.csv --bias 0
+    """
+    from ..records.columns import ColumnOptions
+    from ..records.curve_table import CurveColumns
+    from ..studies.curve.study import identify_file
+
+    options = CurveColumns(velocity, position, force, current, constant, is_points, ColumnOptions(**columns))
+    result, folder = identify_file(source, options, mass, bias, backlash, terminal.out)
+    terminal.print_result(result.as_json(), *result.blocks(), folder=folder)

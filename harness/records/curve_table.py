@@ -1,0 +1,264 @@
+"""Friction over velocity from a table: points, or a record over time.
+
+A column of velocities or positions and a column of forces, torques or motor currents are found by their headings and
+units, or named. A table with a column of times is a record over time.
+"""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..errors import SceneError, format_value
+from .columns import (
+    Column,
+    ColumnOptions,
+    find_time_column,
+    find_time_columns,
+    list_columns,
+    no_time_message,
+    parse_numbers,
+    read_times,
+)
+from .record import Record, check_record
+from .samples import find_repeated_times, mark_sentinels, undo_time_rounding
+from .signal_table import find_signal
+from .table_files import Table, load_table
+from .units import conversion_factor, find_unit, time_unit_size, unit_size
+
+MAX_MISSING_SHARE = 0.2  # of the rows
+FORCE_NAME = re.compile(r"^(f|force|kraft|friction|reibung\w*|load|t|m|tau|torque|moment|drehmoment)(?![^\W_])", re.I)
+CURRENT_NAME = re.compile(r"^(i|iq|current|strom)(?![^\W_])", re.I)
+FORCE_UNITS = {"m/s": "N", "rad/s": "N.m"}
+
+
+@dataclass(frozen=True)
+class CurveColumns:
+    """Columns of friction over velocity.
+
+    Attributes
+    ----------
+    velocity, position, force, current : str or None
+        Headings. A heading may state the unit, as in "v [mm/s]"; without any, columns are found by name and unit.
+    constant : str or None
+        Force or torque per current, with its unit, as in "0.12 N.m/A".
+    is_points : bool
+        Whether the rows are points even if the table has times.
+    time : ColumnOptions
+        Options for the times: column, unit, sampling rate, interval, headings.
+    """
+
+    velocity: str | None = None
+    position: str | None = None
+    force: str | None = None
+    current: str | None = None
+    constant: str | None = None
+    is_points: bool = False
+    time: ColumnOptions = field(default_factory=ColumnOptions)
+
+
+@dataclass(frozen=True)
+class CurveRecord:
+    """Measured velocities or positions, and forces, in SI units.
+
+    Attributes
+    ----------
+    name : str
+        Name of the record.
+    motion, force : numpy.ndarray
+        Velocities or positions (n,), and forces or torques (n,).
+    is_position : bool
+        Whether `motion` is a position.
+    velocity_unit, force_unit : str
+        m/s and N, or rad/s and N.m.
+    t : numpy.ndarray or None
+        Times (n,) in s; None for points.
+    rows : numpy.ndarray
+        Numbers (n,) of the rows in the file.
+    notes : tuple of str
+        Assumptions made when reading.
+    """
+
+    name: str
+    motion: np.ndarray
+    force: np.ndarray
+    is_position: bool
+    velocity_unit: str
+    force_unit: str
+    t: np.ndarray | None
+    rows: np.ndarray
+    notes: tuple[str, ...]
+
+
+def read_curve(source: str, columns: CurveColumns, name: str) -> CurveRecord:
+    """Read friction over velocity from a file; SceneError if it has none."""
+    return parse_curve(load_table(source, columns.time.names), columns, name)
+
+
+def parse_curve(table: Table, columns: CurveColumns, name: str) -> CurveRecord:
+    """Return the friction over velocity in a table; SceneError if it has none."""
+    check_options(columns)
+    candidates, notes = list_columns(table), list(table.notes)
+    motion, motion_unit, is_position = find_motion(table, candidates, columns)
+    time_column, interval = find_times(table, candidates, columns, motion)
+    taken = [column for column in (motion, time_column) if column]
+    force, force_unit, is_current = find_force(table, candidates, columns, taken)
+    velocity_unit, motion_size, note = resolve_motion(motion, motion_unit, is_position)
+    notes += note
+    unit, force_size, note = resolve_force(force, force_unit, is_current, velocity_unit, columns.constant)
+    notes += note
+    x, y = (parse_numbers(table, column.index).copy() for column in (motion, force))
+    for values, column in ((x, motion), (y, force)):
+        notes += mark_sentinels(values, column.heading)
+    t = None
+    if interval is not None:
+        t = np.arange(len(x)) * interval
+    elif time_column is not None:
+        t = read_times(table, time_column, columns.time)
+    if is_position and t is None:
+        raise SceneError(f"{motion.heading} is a position: {no_time_message(table)}")
+    complete = np.isfinite(x) & np.isfinite(y) & (np.isfinite(t) if t is not None else True)
+    rows = np.flatnonzero(complete)
+    missing = len(x) - len(rows)
+    if missing > MAX_MISSING_SHARE * len(x):
+        raise SceneError(
+            f"{table.name}: {missing} of {len(x)} rows have no number for {motion.heading} or {force.heading}"
+        )
+    if missing:
+        notes.append(f"{missing} of {len(x)} rows have a missing cell and are skipped.")
+    if t is not None:
+        t, rounding = undo_time_rounding(t[rows])
+        is_repeated, repetition = find_repeated_times(t)
+        begin, end = columns.time.interval
+        kept = ~is_repeated & (t >= begin) & (t <= end)
+        t, rows = t[kept], rows[kept]
+        notes += filter(None, (rounding, repetition))
+        check_record(Record(name, t, x[rows]))
+        check_record(Record(name, t, y[rows]))
+    x, y = motion_size * x[rows], force_size * y[rows]
+    return CurveRecord(name, x, y, is_position, velocity_unit, unit, t, table.line + 1 + rows, tuple(notes))
+
+
+def check_options(columns: CurveColumns) -> None:
+    """Raise SceneError for options that exclude each other."""
+    for one, other in (("velocity", "position"), ("force", "current")):
+        if getattr(columns, one) is not None and getattr(columns, other) is not None:
+            raise SceneError(f"{one} and {other} are both given: leave one of them out")
+    if columns.current is not None and columns.constant is None:
+        raise SceneError("a current needs the constant of the motor, as in --constant '0.12 N.m/A'")
+    if columns.position is not None and columns.is_points:
+        raise SceneError("points need a column of velocities, not of positions")
+
+
+def find_times(
+    table: Table, candidates: Sequence[Column], columns: CurveColumns, motion: Column
+) -> tuple[Column | None, float | None]:
+    """Return the column of times and the sampling interval in s; None and None for points."""
+    if columns.is_points:
+        return None, None
+    if columns.time.rate:
+        return None, 1 / columns.time.rate
+    others = [part for part in candidates if part is not motion and may_be_time(part)]
+    if columns.time.time is not None:
+        return find_time_column(table, candidates, columns.time), None
+    if others and (columns.position is not None or find_time_columns(others)):
+        return find_time_column(table, others, columns.time), None
+    return None, table.interval
+
+
+def may_be_time(column: Column) -> bool:
+    """Return whether a column may have times: T is a torque, unless its unit is one of time."""
+    return bool(time_unit_size(column.unit)) if column.unit else column.name != "T"
+
+
+def find_motion(table: Table, candidates: Sequence[Column], columns: CurveColumns) -> tuple[Column, str | None, bool]:
+    """Return the column of velocities or positions, its unit, and whether it has positions."""
+    for heading, is_position in ((columns.velocity, False), (columns.position, True)):
+        if heading is not None:
+            return *find_signal(heading, table, list(candidates)), is_position
+    times = find_time_columns([part for part in candidates if may_be_time(part)])
+    for order in (1, 0) if times or columns.time.rate else (1,):
+        for part in candidates:
+            if part not in times and part.order == order and not FORCE_NAME.search(part.name):
+                return part, part.unit, order == 0
+    names = ", ".join(filter(None, (part.heading for part in candidates)))
+    raise SceneError(f"{table.name} has no column of velocities (it has {names}): name it, as in --velocity v")
+
+
+def find_force(
+    table: Table, candidates: Sequence[Column], columns: CurveColumns, taken: Sequence[Column]
+) -> tuple[Column, str | None, bool]:
+    """Return the column of forces or currents, its unit, and whether it has currents."""
+    for heading, is_current in ((columns.force, False), (columns.current, True)):
+        if heading is not None:
+            return *find_signal(heading, table, list(candidates)), is_current
+    others = [part for part in candidates if all(part.index != column.index for column in taken)]
+    by_unit = [part for part in others if part.unit and any(force_unit_size(part.unit, base) for base in ("N", "N.m"))]
+    by_name = [part for part in others if FORCE_NAME.search(part.name)]
+    for part in (*by_unit, *by_name):
+        return part, part.unit, False
+    if columns.constant is not None:
+        for part in others:
+            if CURRENT_NAME.search(part.name) or (part.unit and conversion_factor(part.unit, "A")):
+                return part, part.unit, True
+    names = ", ".join(filter(None, (part.heading for part in candidates)))
+    raise SceneError(f"{table.name} has no column of forces (it has {names}): name it, as in --force F")
+
+
+def resolve_motion(column: Column, unit: str | None, is_position: bool) -> tuple[str, float, list[str]]:
+    """Return the SI unit of the velocity, the size of the unit of the column, and notes."""
+    if unit is None:
+        name, base = ("a position", "m") if is_position else ("a velocity", "m/s")
+        return "m/s", 1.0, [f"{column.heading} has no unit: {name} in {base} is assumed."]
+    motion = find_unit(unit)
+    if motion is None or motion.order != (0 if is_position else 1):
+        expected = "a position, as m, mm or deg" if is_position else "a velocity, as m/s, mm/s, rad/s or rpm"
+        raise SceneError(f"{column.name} is in {unit}, which is not the unit of {expected}")
+    return f"{motion.base}/s", motion.size, []
+
+
+def resolve_force(
+    column: Column, unit: str | None, is_current: bool, velocity_unit: str, constant: str | None
+) -> tuple[str, float, list[str]]:
+    """Return the SI unit of the force, the size of the unit of the column, and notes."""
+    base = FORCE_UNITS[velocity_unit]
+    motion = f"the velocity is in {velocity_unit}"
+    if is_current:
+        size = 1.0 if unit is None else conversion_factor(unit, "A")
+        if size is None:
+            raise SceneError(f"{column.name} is in {unit}, which is not the unit of a current, as A or mA")
+        number, constant_unit = parse_constant(str(constant))
+        factor = conversion_factor(constant_unit, f"{base}/A")
+        if factor is None:
+            raise SceneError(f"constant {format_value(constant)} does not fit, because {motion}: give it in {base}/A")
+        note = [f"{column.heading} has no unit: A is assumed."] if unit is None else []
+        return base, number * factor * size, note
+    if unit is None:
+        return base, 1.0, [f"{column.heading} has no unit: {base} is assumed, because {motion}."]
+    size = force_unit_size(unit, base)
+    if size is None:
+        raise SceneError(
+            f"{column.name} is in {unit}, and {motion}: give a force with a velocity in m/s, or a torque with one in "
+            "rad/s, or set the right unit, as in "
+            f"--force '{column.name} [{base}]'"
+        )
+    return base, size, []
+
+
+def force_unit_size(unit: str, base: str) -> float | None:
+    """Return the size of a unit of force (N) or torque (N.m); None if it is none. N.m is no unit of energy here."""
+    size = unit_size(unit)
+    return size[0] if size and size[1] == unit_size(base)[1] else None  # type: ignore[index]
+
+
+def parse_constant(text: str) -> tuple[float, str]:
+    """Return number and unit of the constant of a motor, as in 0.12 N.m/A or 'kt [N.m/A]'."""
+    match = re.fullmatch(r"\s*([-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?)\s*\[?\s*(\S.*?)\]?\s*", text)
+    try:
+        number = float(match[1]) if match else 0.0
+    except ValueError:
+        number = 0.0
+    if not match or not number or not np.isfinite(number) or unit_size(match[2]) is None:
+        raise SceneError(f"constant {format_value(text)}: give a number other than 0 and a unit, as in 0.12 N.m/A")
+    return number, match[2]

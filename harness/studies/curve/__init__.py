@@ -1,0 +1,1 @@
+"""Identification of friction over velocity from points or records over time."""

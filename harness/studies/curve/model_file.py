@@ -1,0 +1,138 @@
+"""A model file with the identified friction: a body that a driver of constant speed pulls through a spring."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...analyses.curve.identification import CurveIdentification
+
+MODEL_FILE = "measured.py"
+TIME_TO_SLIP = 1.0  # s, after which the spring of the default run exceeds the static friction
+
+
+@dataclass(frozen=True)
+class Names:
+    """Names and units of the variables of a motion."""
+
+    inertia: str
+    inertia_unit: str
+    stiffness_unit: str
+    position: str
+    position_unit: str
+    velocity: str
+    acceleration: str
+    acceleration_unit: str
+    force: str
+    kind: str
+
+
+LINEAR = Names("m", "kg", "N/m", "x", "m", "v", "a", "m/s2", "F", "force")
+ROTATION = Names("J", "kg.m2", "N.m/rad", "theta", "rad", "omega", "alpha", "rad/s2", "T", "torque")
+
+
+def write_model(result: CurveIdentification) -> str:
+    """Return the text of the model file."""
+    best, points = result.best, result.points
+    names = LINEAR if points.force_unit == "N" else ROTATION
+    suffixes = ("",) if best.law.is_symmetric else ("+", "-")
+    sliding = ["sliding"] if best.law.is_symmetric else ["forward", "backward"]
+    curves = [
+        f"    {name} = {friction_expression(best.law.exponent, best.law.is_viscous, suffix)}"
+        for name, suffix in zip(sliding, suffixes, strict=True)
+    ]
+    holding = [symbol("F_s" if best.law.exponent else "F_c", suffix) for suffix in suffixes]
+    force, kind = names.force, names.kind
+    slide, hold = (terms[0] if len(terms) == 1 else f"0.5 * ({terms[0]} + {terms[1]})" for terms in (sliding, holding))
+    contact = f"{force}_friction" if best.law.is_symmetric else f"{force}_mean"
+    asymmetry = (
+        ""
+        if best.law.is_symmetric
+        else f"""
+    {force}_friction = Output(
+        "{points.force_unit}",
+        "friction {kind}, opposing the motion",
+        {force}_mean + 0.5 * (forward - backward),
+    )"""
+    )
+    static = max(best.values.get(name, 0.0) for name in ("F_s", "F_c", "F_s+", "F_s-", "F_c+", "F_c-"))
+    speed = default_speed(result)
+    declarations = [
+        f'    {symbol(item.name)} = Parameter({item.value:.9g}, "{item.unit}", "{item.text}")'
+        for item in best.estimates
+        if item.name != "bias"
+    ]
+    imports = "Contact, Fixed, Input, Mode, Model, Output, Parameter, State"
+    imports += ", exp" * bool(best.law.exponent) + ", fabs"
+    return f'''"""Body on a spring, with measured friction."""
+
+from fmus import {imports}
+
+
+class Measured(Model):
+    """Body that a driver of constant speed pulls through a spring; friction identified from {one_line(points.name)}.
+
+    {best.law.text}.
+    """
+
+    {names.inertia} = Parameter({result.mass or 1.0:.9g}, "{names.inertia_unit}", "inertia", above=0.0)
+    k = Parameter({static / (speed * TIME_TO_SLIP):.4g}, "{names.stiffness_unit}", "stiffness of the spring", low=0.0)
+    v_driver = Parameter({speed:.4g}, "{points.velocity_unit}", "speed of the driver")
+    bias = Parameter({best.bias:.9g}, "{points.force_unit}", "constant {kind} against the motion, such as gravity")
+{chr(10).join(declarations)}
+    {names.position}0 = Fixed(0.0, "{names.position_unit}", "initial position")
+    {names.velocity}0 = Fixed(0.0, "{points.velocity_unit}", "initial speed")
+    {force}_ext = Input(0.0, "{points.force_unit}", "external {kind}")
+
+    {names.position} = State("{names.position_unit}", "position", start={names.position}0)
+    {names.velocity} = State("{points.velocity_unit}", "speed", start={names.velocity}0, rate_of={names.position})
+    driver = State("{names.position_unit}", "position of the driver", rate=v_driver)
+    mode = Mode()
+
+    speed = fabs({names.velocity})
+{chr(10).join(curves)}
+    {force}_spring = Output("{points.force_unit}", "{kind} of the spring", k * (driver - {names.position}))
+    {contact} = Contact(
+        "{points.force_unit}",
+        "{"friction " + kind + ", opposing the motion" if best.law.is_symmetric else "mean of both directions"}",
+        mode=mode,
+        slip={names.velocity},
+        slide={slide},
+        hold={hold},
+    ){asymmetry}
+    {names.acceleration} = Output(
+        "{names.acceleration_unit}",
+        "acceleration",
+        ({force}_ext + {force}_spring - bias - {force}_friction) / {names.inertia},
+        rate_of={names.velocity},
+    )
+
+    stop_time, step_size = {10 * TIME_TO_SLIP}, {0.01 * TIME_TO_SLIP}
+'''
+
+
+def symbol(name: str, suffix: str = "") -> str:
+    """Return the Python name of a constant, as F_c_forward for F_c+."""
+    return f"{name}{suffix}".replace("+", "_forward").replace("-", "_backward")
+
+
+def friction_expression(exponent: int, is_viscous: bool, suffix: str) -> str:
+    """Return friction over `speed` in one direction as an expression."""
+    coulomb, static, v_s, viscous = (symbol(name, suffix) for name in ("F_c", "F_s", "v_s", "F_v"))
+    ratio = f"(speed / {v_s})"
+    decrease = {0: "", 1: f"exp(-{ratio})", 2: f"exp(-{ratio} * {ratio})"}[exponent]
+    text = coulomb + (f" + ({static} - {coulomb}) * {decrease}" if exponent else "")
+    return text + (f" + {viscous} * speed" if is_viscous else "")
+
+
+def default_speed(result: CurveIdentification) -> float:
+    """Return a speed of the driver: half of the Stribeck velocity, or the smallest measured speed."""
+    values = result.best.values
+    for name in ("v_s", "v_s+"):
+        if name in values:
+            return 0.5 * values[name]
+    return float(np.abs(result.points.v).min())
+
+
+def one_line(name: str) -> str:
+    """Return the name of a record without characters that end a docstring."""
+    return "".join(letter if letter.isalnum() or letter in " ._-" else "_" for letter in name)

@@ -1,0 +1,44 @@
+"""Study that identifies friction over velocity in a file, and writes the result folder."""
+
+from pathlib import Path
+
+from ...analyses.curve.identification import identify
+from ...analyses.curve.plateaus import build_points
+from ...records.curve_table import CurveColumns, CurveRecord, read_curve
+from ...results import provenance
+from ...results.folder import replace_folder
+from ...results.registry import find_study
+from ...results.summary import write_summary
+from .result import CurveResult
+
+STUDY = find_study("curve")
+
+
+def identify_record(record: CurveRecord, mass: float | None, bias: float | None, backlash: float) -> CurveResult:
+    """Identify the friction in a record.
+
+    Parameters
+    ----------
+    mass, bias : float or None
+        Known mass in kg or moment of inertia in kg.m2, and known constant force, in the units of the record.
+    backlash : float
+        Distance in m or rad after a reversal that is left out.
+    """
+    return CurveResult(**vars(identify(build_points(record, mass, backlash), bias, mass)))
+
+
+def identify_file(
+    source: str, columns: CurveColumns, mass: float | None, bias: float | None, backlash: float, out: Path
+) -> tuple[CurveResult, Path]:
+    """Identify the friction in a file, and write the results to out/curve/<name>."""
+    name = "stdin" if source == "-" else Path(source).stem.encode("utf-8", "replace").decode()
+    folder = out / STUDY.name / name
+    source_text = provenance.describe_sources(source)
+    with replace_folder(folder, STUDY.files, source_text) as new_folder:
+        result = identify_record(read_curve(source, columns, name), mass, bias, backlash)
+        result.write(new_folder)
+        files = () if source == "-" else (Path(source),)
+        options = vars(columns) | {"mass": mass, "bias": bias, "backlash": backlash}
+        provenance.write_provenance(new_folder, files=files, scene=options, source=source_text)
+        write_summary(new_folder, result.summary())
+    return result, folder
