@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..arguments import FINITE, FLAG, NONNEGATIVE, POSITIVE, TEXT, Rule, check_arguments
-from ..errors import SceneError
 from .options import check_time_range
 from .tables import build_table, convert_to_table, has_columns, is_pair, is_trajectory, record_source
 
@@ -130,8 +129,6 @@ def identify_curve(
         loaded = read_curve(source, columns, Path(source).stem)
     else:
         table = to_table(record)
-        if is_trajectory(record):
-            columns = replace(columns, velocity=columns.velocity or velocity_of(record))
         loaded = parse_curve(table, columns, table.name)
     return identify_record(loaded, mass, bias, backlash)
 
@@ -142,12 +139,3 @@ def to_table(record: Any) -> "Table":
         table = convert_to_table(record)
         return replace(table, name=record.spec.model) if is_trajectory(record) else table
     return build_table(dict(zip(("v", "F"), record, strict=True)), {"v": "m/s", "F": "N"})
-
-
-def velocity_of(trajectory: "Trajectory") -> str:
-    """Return the name of the velocity of a run."""
-    outputs = trajectory.spec.motion_outputs
-    if "velocity" not in outputs:
-        raise SceneError(f"{trajectory.spec.model} records no velocity: add it to the outputs, or name a column")
-    name: str = outputs["velocity"]
-    return name

@@ -29,6 +29,7 @@ from .units import conversion_factor, find_unit, time_unit_size, unit_size
 
 MAX_MISSING_SHARE = 0.2  # of the rows
 FORCE_NAME = re.compile(r"^(f|force|kraft|friction|reibung\w*|load|t|m|tau|torque|moment|drehmoment)(?![^\W_])", re.I)
+FRICTION_NAME = re.compile(r"friction|reibung", re.I)
 CURRENT_NAME = re.compile(r"^(i|iq|current|strom)(?![^\W_])", re.I)
 FORCE_UNITS = {"m/s": "N", "rad/s": "N.m"}
 
@@ -195,6 +196,7 @@ def find_force(
             return *find_signal(heading, table, list(candidates)), is_current
     others = [part for part in candidates if all(part.index != column.index for column in taken)]
     by_unit = [part for part in others if part.unit and any(force_unit_size(part.unit, base) for base in ("N", "N.m"))]
+    by_unit.sort(key=lambda part: not FRICTION_NAME.search(part.name))  # friction before the other forces of a run
     by_name = [part for part in others if FORCE_NAME.search(part.name)]
     for part in (*by_unit, *by_name):
         return part, part.unit, False

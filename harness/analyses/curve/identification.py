@@ -215,7 +215,7 @@ def find_remarks(result: CurveIdentification) -> list[str]:
     remarks = []
     outliers = np.flatnonzero(~used)
     if len(outliers):
-        listed = ", ".join(describe_point(result, i) for i in outliers)
+        listed = ", ".join(describe_point(result, int(i)) for i in outliers)
         remarks.append(f"{len(outliers)} of {len(v) + len(outliers)} points do not fit and are left out: {listed}.")
     for name in ("v_s", "v_s+", "v_s-"):
         if name in best.values and not np.isfinite(result[name].high):

@@ -171,17 +171,11 @@ class Part:
         errors = self.standard_errors(variance)
         order = [symbol for symbol in ("F_c", "F_s", "v_s", "F_v", "bias") if symbol in values]
         suffix, text = DIRECTIONS[self.direction]
-        return [
-            Estimate(
-                symbol + suffix,
-                float(values[symbol]),
-                float(errors[symbol]),
-                *map(float, intervals[symbol]),
-                units[symbol],
-                TEXTS[symbol] + text,
-            )
-            for symbol in order
-        ]
+        estimates = []
+        for symbol in order:
+            value, error, (low, high) = float(values[symbol]), float(errors[symbol]), map(float, intervals[symbol])
+            estimates.append(Estimate(symbol + suffix, value, error, low, high, units[symbol], TEXTS[symbol] + text))
+        return estimates
 
     def intervals(self, values: dict[str, float], margin: float) -> dict[str, tuple[float, float]]:
         """Return the interval of each constant; its ends are infinite, or 0, if a v_s out of the range is possible."""

@@ -10,7 +10,7 @@ from scipy import special
 from .law_fit import MIN_FREEDOM, LawFit, fit_law
 from .laws import Law
 
-SIGNIFICANCE = 0.01  # of all points together
+SIGNIFICANCE = 0.001  # of all points together
 MAX_SHARE = 0.2  # of the points
 
 
