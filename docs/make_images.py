@@ -37,6 +37,7 @@ FIGURES_OF_PAGES = {
     "shaken": ("tutorials/own_model.md", "results/shaken/figure.svg"),
     "chain": ("tutorials/own_model.md", "results/speeds/figure.svg"),
     "decay": ("tutorials/identify_decay.md", "results/decay/record/figure.svg"),
+    "curve": ("how-to/friction_curve.md", "results/curve/bench/figure.svg"),
     "fit": ("tutorials/fit_parameters.md", "results/fit/pulled_block/figure.svg"),
     "sweep": ("tutorials/sweep.md", "results/sweep/map/figure.svg"),
     "compare": ("how-to/external_fmus.md", "results/compare/coulomb-coulomb-sign/figure.svg"),

@@ -95,7 +95,7 @@ STUDIES = (
         "curve",
         "curve",
         "studies.curve.result:CurveResult",
-        ("curve.json", "curve.csv", "table.csv", "measured.py", PICTURE),
+        ("curve.json", "curve.csv", "table.csv", "table-forward.csv", "table-backward.csv", "measured.py", PICTURE),
         "Friction curves",
         "Friction over velocity: constants of the laws with 95 % intervals, and values for models.",
     ),

@@ -257,7 +257,7 @@ def fit_law(
     count = sum(part.count for part in parts)
     required = max(count + MIN_FREEDOM, int(np.ceil(MIN_POINTS_PER_CONSTANT * count)))
     if len(v) < required:
-        return f"{count} constants need at least {required} points"
+        return f"with {count} constants at least {required} points are required"
     if not all(part.is_valid for part in parts):
         return "friction does not fall with the speed"
     floor = len(v) * (ROUNDOFF * float(np.abs(force).max())) ** 2
@@ -274,15 +274,15 @@ def build_parts(law: Law, v: np.ndarray, force: np.ndarray, fits_bias: bool) -> 
     required = MIN_SPEEDS[law.exponent] + (law.is_viscous and not law.exponent)
     if law.is_symmetric:
         if count_speeds(v) < required:
-            return f"it needs points at {required} different speeds"
+            return f"points at {required} different speeds are required"
         return [Part(law, v, force, 0, fits_bias)]
     if len(directions) < 2:
-        return "it needs points of both directions"
+        return "points of both directions are required"
     if fits_bias and not law.is_viscous:
-        return "a bias has the same effect"
+        return "a bias in the law coulomb has the same effect"
     masks = [direction * v > 0 for direction in directions]
     if min(count_speeds(v[mask]) for mask in masks) < required:
-        return f"it needs points at {required} different speeds in each direction"
+        return f"points at {required} different speeds in each direction are required"
     return [
         Part(law, v[mask], force[mask], direction, False) for direction, mask in zip(directions, masks, strict=True)
     ]

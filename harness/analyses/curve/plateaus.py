@@ -24,7 +24,7 @@ NOISE_BAND = 4.0  # standard deviations
 MAX_SKIPPED = 2  # blocks outside of the band in succession
 MIN_SHARE = 0.3  # of the moving time that plateaus take, otherwise the record is a sweep
 STANDSTILL = 1e-3  # of the largest speed
-SWEEP_POINTS = 40  # of each direction
+SWEEP_POINTS = 80  # of each direction
 MIN_SWEEP_BLOCKS = 3  # of a point
 
 

@@ -46,8 +46,8 @@ def model_values(result: CurveIdentification) -> dict[str, Values]:
 
 
 def assignments(values: Values) -> str:
-    """Return values for --set of `run`, `sweep` and `fit`."""
-    return ",".join(f"{name}={value if isinstance(value, str) else repr(value)}" for name, value in values.items())
+    """Return values as options of `run`, `sweep` and `fit`, as in "--set F_c=1.2 --set F_s=1.5"."""
+    return " ".join(f"--set {name}={value}" for name, value in values.items())
 
 
 def tabulate(result: CurveIdentification) -> dict[str, np.ndarray]:

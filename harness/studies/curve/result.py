@@ -106,17 +106,17 @@ class CurveResult(Result, CurveIdentification):
         }
 
     def write_tables(self, folder: Path) -> None:
-        """Write curve.json, points, table and model file."""
+        """Write curve.json, points, tables and model file."""
         points = self.points
         velocity, force = points.velocity_unit, points.force_unit
         (folder / "curve.json").write_text(to_json(self.as_json()) + "\n", encoding="utf-8")
         headings = [column_heading("v", velocity), *(column_heading(name, force) for name in ("F", "fit", "residual"))]
         columns = [points.v, points.force, self.best.force(points.v), self.residuals, self.used.astype(int)]
         write_csv(folder / "curve.csv", [*headings, "used"], columns)
-        table = self.table()
-        units = [velocity, *[force] * (len(table) - 1)]
-        headings = [column_heading(name, unit) for name, unit in zip(table, units, strict=True)]
-        write_csv(folder / "table.csv", headings, [*table.values()])
+        speed, *frictions = self.table().items()
+        for name, values in frictions:  # as `Table` of a model file reads them: two columns, and units in parentheses
+            file = "table.csv" if name == "friction" else f"table-{name}.csv"
+            write_csv(folder / file, [f"speed ({velocity})", f"friction ({force})"], [speed[1], values])
         (folder / MODEL_FILE).write_text(write_model(self), encoding="utf-8")
 
     def draw(self, figure: "Figure") -> None:

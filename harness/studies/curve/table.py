@@ -10,7 +10,7 @@ from ...analyses.estimation.estimate import Estimate
 from ...results.quantity import format_interval
 from ...results.summary import Summary, make_terminal_table, read_cells
 from .model_file import MODEL_FILE
-from .model_values import assignments, law_of_models, model_values
+from .model_values import LINEAR_FORCE, assignments, law_of_models, model_values
 
 
 def constants_table(fit: LawFit, title: str) -> Table:
@@ -39,10 +39,10 @@ def laws_table(identification: CurveIdentification) -> Table:
 
 
 def models_table(identification: CurveIdentification) -> Table:
-    """Return the table of the values for models, as --set takes them."""
+    """Return the table of the values for models, as options of `run`, `sweep` and `fit`."""
     result = make_terminal_table("Values for models")
     result.add_column("model")
-    result.add_column("--set", overflow="fold")
+    result.add_column("options", overflow="fold")
     for model, values in model_values(identification).items():
         result.add_row(model, assignments(values))
     return result
@@ -60,14 +60,17 @@ def sentences(identification: CurveIdentification) -> list[str]:
     used, count = int(identification.used.sum()), len(identification.points.v)
     fit, unit = identification.best, identification.points.force_unit
     lines = [identification.sentence, f"Residual of {used} of {count} points: {fit.residual:.3g} {unit}."]
-    for name, reason in identification.unavailable.items():
-        lines.append(f"The law {name} is not fitted: {reason}.")
+    for reason in dict.fromkeys(identification.unavailable.values()):
+        laws = [name for name, text in identification.unavailable.items() if text == reason]
+        lines.append(f"Not fitted: {', '.join(laws)}; {reason}.")
     return [*lines, *describe_models(identification), *identification.remarks, *identification.points.notes]
 
 
 def describe_models(identification: CurveIdentification) -> list[str]:
     """Return the sentences on the values for models."""
     fit, best = law_of_models(identification), identification.best
+    if identification.points.force_unit != LINEAR_FORCE:
+        return [f"The models of this project with such friction move along a line; {MODEL_FILE} rotates."]
     if fit is None:
         return [f"No model of this project has this friction; {MODEL_FILE} has it."]
     lines = []
