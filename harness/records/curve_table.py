@@ -107,6 +107,8 @@ def parse_curve(table: Table, columns: CurveColumns, name: str) -> CurveRecord:
     force, force_unit, is_current = find_force(table, candidates, columns, taken)
     velocity_unit, motion_size, note = resolve_motion(motion, motion_unit, is_position)
     notes += note
+    if columns.constant is not None and not is_current:
+        raise SceneError(f"constant has no effect, because {force.heading} is no current: name it, as in --current i")
     unit, force_size, note = resolve_force(force, force_unit, is_current, velocity_unit, columns.constant)
     notes += note
     x, y = (parse_numbers(table, column.index).copy() for column in (motion, force))
@@ -119,6 +121,8 @@ def parse_curve(table: Table, columns: CurveColumns, name: str) -> CurveRecord:
         t = read_times(table, time_column, columns.time)
     if is_position and t is None:
         raise SceneError(f"{motion.heading} is a position: {no_time_message(table)}")
+    if t is None and columns.time.interval != (-np.inf, np.inf):
+        raise SceneError("begin and end (--from and --until) have no effect on points without times")
     complete = np.isfinite(x) & np.isfinite(y) & (np.isfinite(t) if t is not None else True)
     rows = np.flatnonzero(complete)
     missing = len(x) - len(rows)

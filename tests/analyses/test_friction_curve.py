@@ -132,8 +132,11 @@ def test_one_direction_needs_a_known_bias():
     force = stribeck(SPEEDS, **TRUTH)
     with pytest.raises(SceneError, match=r"only forward motion, .* as in --bias 0"):
         harness.identify_curve((SPEEDS, force))
-    curve = harness.identify_curve((SPEEDS, force), bias=0.3)
-    assert curve["F_s"].value == pytest.approx(16.0, rel=1e-6)
+    for sign in (1, -1):
+        curve = harness.identify_curve((SPEEDS, sign * force), bias=sign * 0.3)
+        assert curve["F_s"].value == pytest.approx(16.0, rel=1e-6)
+    with pytest.raises(HarnessError, match="friction would drive the motion in one direction"):
+        harness.identify_curve((V, noisy_points(1)), bias=30.0)
 
 
 REFUSED = [
@@ -149,6 +152,9 @@ REFUSED = [
     ({"v [m/s]": V, "i [A]": V}, {"current": "i"}, "a current needs the constant of the motor"),
     ({"v [m/s]": V, "i [A]": V}, {"current": "i", "constant": "2 N.m/A"}, "give it in N/A"),
     ({"v [m/s]": V, "i [A]": V}, {"current": "i", "constant": "two"}, "give a number other than 0 and a unit"),
+    ({"v [m/s]": V, "F [N]": V}, {"constant": "2 N/A"}, "constant has no effect, because F .* is no current"),
+    ({"v [m/s]": V, "F [N]": V}, {"begin": 0.0}, "no effect on points without times"),
+    ({"v [m/s]": V, "F [N]": V}, {"backlash": 0.1}, "no effect on points without times"),
     ({"x [m]": V, "F [N]": V}, {"position": "x"}, "has no column of times"),
     ({"t [s]": np.arange(24.0), "v [m/s]": 0 * V, "F [N]": V}, {}, "too little motion"),
 ]

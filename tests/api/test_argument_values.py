@@ -47,11 +47,9 @@ ACCEPTED = {  # arguments by function, and the values that they may have; None a
     },
     "identify_curve": {
         "points": FLAG,
-        "begin": FINITE,
-        "end": FINITE,
         "mass": ABOVE_ZERO,
-        "bias": FINITE,
-        "backlash": {"0", *ABOVE_ZERO},
+        "bias": {"0", "0.5", "-1", "0-d array"},
+        "backlash": {"0"},
     },
     "fit": {
         "observe": {"'x'", *NOTHING},

@@ -14,6 +14,7 @@ from .outliers import find_outliers
 
 MIN_POINTS = 6
 OUTLIER_COST = 3.0  # unknowns for which an outlier counts: its size, and twice the choice of the point among n
+MAX_BIAS = 1e3  # of the largest force
 CLEAR_DIFFERENCE = 6.0  # of two BIC
 SIGNIFICANT_RUNS = 0.002  # probability of as few runs of signs in independent residuals
 
@@ -133,7 +134,7 @@ def identify(points: CurvePoints, bias: float | None = None, mass: float | None 
     HarnessError
         If the force does not oppose the velocity.
     """
-    points = check_points(points, bias)
+    points, bias = check_points(points, bias)
     used = find_used_points(points, bias)
     fits, unavailable = [], {}
     for law in LAWS:
@@ -147,15 +148,15 @@ def identify(points: CurvePoints, bias: float | None = None, mass: float | None 
     return CurveIdentification(points, used, tuple(fits), unavailable, mass, tuple(find_remarks(result)))
 
 
-def check_points(points: CurvePoints, bias: float | None) -> CurvePoints:
-    """Return the points with velocity, with forces that have its sign.
+def check_points(points: CurvePoints, bias: float | None) -> tuple[CurvePoints, float | None]:
+    """Return the points with velocity, with forces that have its sign, and the known bias with the same sign.
 
     Raises
     ------
     SceneError
         If they are too few, at one velocity, or of one direction without a known bias.
     HarnessError
-        If the force does not reverse with the velocity.
+        If the force does not reverse with the velocity, or with the known bias.
     """
     moving, name = points.v != 0.0, points.name
     count = int((~moving).sum())
@@ -168,24 +169,35 @@ def check_points(points: CurvePoints, bias: float | None) -> CurvePoints:
             f"{name}: all points have the speed {np.abs(v).mean():.4g} {points.velocity_unit}; measure at several"
         )
     is_forward = v > 0
-    if is_forward.all() or not is_forward.any():
-        if bias is None:
-            direction = "forward" if is_forward[0] else "backward"
-            raise SceneError(
-                f"{name} has only {direction} motion, so that a constant bias cannot be separated from friction: "
-                "measure both directions, or give the known bias, as in --bias 0"
-            )
-        difference = float(np.mean(np.sign(v) * (force - bias)))
-    else:
-        difference = float(force[is_forward].mean() - force[~is_forward].mean())
-    if difference < 0:
-        force = -force
+    if bias is None and len(set(is_forward)) == 1:
+        direction = "forward" if is_forward[0] else "backward"
+        raise SceneError(
+            f"{name} has only {direction} motion, so that a constant bias cannot be separated from friction: "
+            "measure both directions, or give the known bias, as in --bias 0"
+        )
+    if float(np.ptp(force)) == 0.0:
+        raise HarnessError(f"{name}: the force is {force[0]:.4g} {points.force_unit} at all points")
+    if drives_backward(is_forward, force, bias, points):
+        force, bias = -force, None if bias is None else -bias
         notes.append("The force opposes the velocity; its sign is reversed, so that it drives the motion.")
     all_labels = points.labels or [f"point {i + 1}" for i in range(len(moving))]
     labels = tuple(label for label, is_kept in zip(all_labels, moving, strict=True) if is_kept)
-    if float(np.ptp(force)) == 0.0:
-        raise HarnessError(f"{name}: the force is {force[0]:.4g} {points.force_unit} at all points")
-    return CurvePoints(name, v, force, points.velocity_unit, points.force_unit, labels, (*points.notes, *notes))
+    notes = (*points.notes, *notes)
+    return CurvePoints(name, v, force, points.velocity_unit, points.force_unit, labels, notes), bias
+
+
+def drives_backward(is_forward: np.ndarray, force: np.ndarray, bias: float | None, points: CurvePoints) -> bool:
+    """Return whether the forces (n,) have the sign opposite to the velocity; HarnessError if they have no such sign."""
+    directions = [(sign, mask) for sign, mask in ((1, is_forward), (-1, ~is_forward)) if mask.any()]
+    friction = [float(sign * (force[mask] - (bias or 0.0)).mean()) for sign, mask in directions]
+    if bias is None:
+        return sum(friction) < 0
+    if abs(bias) > MAX_BIAS * float(np.abs(force).max()) or min(friction) < 0 < max(friction):
+        raise HarnessError(
+            f"{points.name}: with the bias {bias:.4g} {points.force_unit} friction would drive the motion in one "
+            "direction: give another bias, or omit it to identify it from both directions"
+        )
+    return max(friction) < 0
 
 
 def find_used_points(points: CurvePoints, bias: float | None) -> np.ndarray:

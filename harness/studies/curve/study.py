@@ -4,6 +4,7 @@ from pathlib import Path
 
 from ...analyses.curve.identification import identify
 from ...analyses.curve.plateaus import build_points
+from ...errors import SceneError
 from ...records.curve_table import CurveColumns, CurveRecord, read_curve
 from ...results import provenance
 from ...results.folder import replace_folder
@@ -24,6 +25,8 @@ def identify_record(record: CurveRecord, mass: float | None, bias: float | None,
     backlash : float
         Distance in m or rad after a reversal that is left out.
     """
+    if backlash and record.t is None:
+        raise SceneError("backlash has no effect on points without times")
     return CurveResult(**vars(identify(build_points(record, mass, backlash), bias, mass)))
 
 

@@ -1,0 +1,81 @@
+"""The command curve, its files, and the FMU of its model file."""
+
+import json
+
+import commands
+import numpy as np
+import pytest
+
+import harness
+
+SPEEDS = np.geomspace(1e-3, 0.3, 10)
+V = np.concatenate([SPEEDS, -SPEEDS])
+FORWARD, BACKWARD = (10.0, 16.0, 0.02, 20.0), (8.0, 11.0, 0.03, 30.0)
+
+
+def friction(v, constants):
+    F_c, F_s, v_s, F_v = constants
+    return np.sign(v) * (F_c + (F_s - F_c) * np.exp(-((v / v_s) ** 2))) + F_v * v
+
+
+def write_points(file, headings, backward, v=V):
+    force = np.where(v > 0, friction(v, FORWARD), friction(v, backward)) + 0.05 * np.sin(1e4 * v)
+    np.savetxt(file, np.column_stack([v, force]), delimiter=",", header=headings, comments="")
+
+
+@pytest.mark.parametrize(
+    ("headings", "backward", "speed", "force"),
+    [("v [m/s],F [N]", FORWARD, "v", "F_friction"), ("w [rad/s],T [N.m]", BACKWARD, "omega", "T_friction")],
+)
+def test_the_fmu_of_the_model_file_has_the_friction_of_the_best_law(tmp_path, headings, backward, speed, force):
+    write_points(tmp_path / "bench.csv", headings, backward)
+    done = commands.harness(tmp_path, "curve", "bench.csv", "--velocity", headings[:1], blank=True)
+    assert done.returncode == 0, done.stderr
+    curve = harness.load_result(tmp_path / "results" / "curve" / "bench")
+    assert curve.best.law.is_symmetric == (backward is FORWARD)
+    built = commands.build("results/curve/bench/measured.py", folder=tmp_path)
+    assert built.returncode == 0, built.stderr
+    fmu = tmp_path / "results" / "curve" / "bench" / "measured.fmu"
+    for v_driver in (0.2, -0.2):
+        run = harness.simulate(fmu, {"k": 1e4, "v_driver": v_driver}, stop=1.0)
+        slides = np.abs(run[speed]) > 1e-3
+        assert slides.sum() > 10
+        np.testing.assert_allclose(run[force][slides], curve.best.friction(run[speed][slides]), rtol=1e-6)
+
+
+def test_a_result_goes_on_to_models_and_tables(tmp_path):
+    write_points(tmp_path / "bench.csv", "v [m/s],F [N]", FORWARD)
+    done = commands.harness(tmp_path, "curve", "bench.csv", "--mass", "2", "--json", blank=True)
+    result = json.loads(done.stdout)
+    values = {item["name"]: item["value"] for item in result["fit"]}
+    assert values["F_s"] == pytest.approx(16.0, rel=0.02)
+    belt, lugre, sled = (result["models"][name] for name in ("belt", "lugre", "stickslip"))
+    assert (belt["law"], belt["m"]) == ("stribeck", 2.0)
+    expected = [values[name] for name in ("F_s", "F_c", "v_s", "F_v")]
+    np.testing.assert_allclose([belt[name] for name in ("F_s", "F_c", "v_s", "b")], expected, rtol=1e-5)
+    np.testing.assert_allclose([lugre[name] for name in ("F_s", "F_c", "v_s", "sigma_2")], expected, rtol=1e-5)
+    assert sled["mu_s"] * 2.0 * 9.81 == pytest.approx(values["F_s"], rel=1e-5)
+    folder = tmp_path / "results" / "curve" / "bench"
+    for file in ("table.csv", "table-forward.csv", "table-backward.csv"):
+        heading, *rows = (folder / file).read_text().splitlines()
+        assert heading == "speed (m/s),friction (N)"
+        speed, force = np.array([[float(cell) for cell in row.split(",")] for row in rows]).T
+        assert (np.diff(speed) > 0).all()
+        np.testing.assert_allclose(force, friction(speed, FORWARD), atol=0.1)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--velocity", "v", "--position", "v"], "velocity and position are both given"),
+        (["--current", "F"], "a current needs the constant of the motor, as in --constant '0.12 N.m/A'"),
+        (["--mass", "-1"], "'-1' is not a finite number above 0"),
+        (["--force", "G"], "unknown column 'G'; allowed: F [N], v [m/s]"),
+    ],
+)
+def test_options_that_do_not_fit_are_refused_in_a_sentence(tmp_path, options, message):
+    write_points(tmp_path / "bench.csv", "v [m/s],F [N]", FORWARD)
+    done = commands.harness(tmp_path, "curve", "bench.csv", *options)
+    assert done.returncode == 2
+    assert message in done.stderr
+    assert not (tmp_path / "results" / "curve" / "bench").exists()
