@@ -182,8 +182,8 @@ def check_points(points: CurvePoints, bias: float | None) -> tuple[CurvePoints, 
         notes.append("The force opposes the velocity; its sign is reversed, so that it drives the motion.")
     all_labels = points.labels or [f"point {i + 1}" for i in range(len(moving))]
     labels = tuple(label for label, is_kept in zip(all_labels, moving, strict=True) if is_kept)
-    notes = (*points.notes, *notes)
-    return CurvePoints(name, v, force, points.velocity_unit, points.force_unit, labels, notes), bias
+    units = points.velocity_unit, points.force_unit
+    return CurvePoints(name, v, force, *units, labels, (*points.notes, *notes)), bias
 
 
 def drives_backward(is_forward: np.ndarray, force: np.ndarray, bias: float | None, points: CurvePoints) -> bool:
