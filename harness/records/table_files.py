@@ -132,7 +132,10 @@ def parse_table_file(data: bytes, name: str) -> Table:
         arrays = array_files.read_json(text_table.decode_text(data, name))
         if arrays is not None:
             return table_from_arrays(arrays, name)
-    headings, rows, line, interval = text_table.parse_text_table(data, name)
+    headings, rows, line, interval, _ = text_table.parse_text_table(data, name)
+    if isinstance(rows, np.ndarray):
+        headings = headings or [""] * rows.shape[1]
+        return Table(name, tuple(headings), tuple(np.ascontiguousarray(rows.T)), line, interval)
     return replace(table_from_rows(headings, rows, line, name), interval=interval)
 
 

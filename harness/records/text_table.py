@@ -13,6 +13,8 @@ from collections.abc import Sequence
 from itertools import chain, pairwise
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from ..errors import SceneError
 from .headings import TIME_NAME, is_unit, order_from_name, split_heading
 from .units import COUNT_NAMES, time_unit_size, unit_size
@@ -31,6 +33,7 @@ END_OF_HEADER = "***End_of_Header***"
 INTERVAL_ROW = "delta_x"  # LabVIEW: the row with the sampling interval, where the file has no times
 SAMPLE_LINES = 200  # lines examined to detect the layout
 BEFORE_UNIT = re.compile(r"(?<=[^\s\])])\s+(?=[\[(])")  # the space in `t [s]`
+LONG_TABLE = 20_000  # lines above which numbers are read by numpy, if all cells are numbers
 MAX_LINE_LENGTH = 10_000  # characters; longer lines are not a table
 MAX_LINES = 5_000_000
 
@@ -42,18 +45,21 @@ class TextTable(NamedTuple):
     ----------
     headings : list of str
         Headings; empty if the file has none.
-    rows : list of list of str
-        Cells of each row.
+    rows : list of list of str, or numpy.ndarray
+        Cells of each row; numbers (n, columns) of a long table that has nothing else.
     line : int
         Number of the line before the first row.
     interval : float or None
         Sampling interval in s, if the file has one.
+    delimiter : str
+        Character between the cells.
     """
 
     headings: list[str]
-    rows: list[list[str]]
+    rows: list[list[str]] | np.ndarray
     line: int
     interval: float | None = None
+    delimiter: str = ""
 
 
 def decode_text(data: bytes, name: str) -> str:
@@ -85,6 +91,31 @@ def parse_text_table(data: bytes, name: str) -> TextTable:
     lines = decode_text(data, name).splitlines()
     if len(lines) > MAX_LINES:
         raise SceneError(f"{name} has {len(lines)} lines, and a record at most {MAX_LINES}: leave out every second one")
+    return parse_long_table(lines, name) or parse_lines(lines, name)
+
+
+def parse_long_table(lines: list[str], name: str) -> TextTable | None:
+    """Parse a long table that has only numbers below its headings; None if it has other cells, or is short.
+
+    The layout follows from its first lines, those in the middle and the last ones. This takes a tenth of the time.
+    """
+    if len(lines) <= LONG_TABLE:
+        return None
+    middle = len(lines) // 2
+    parts = lines[: 2 * SAMPLE_LINES], lines[middle : middle + 2 * SAMPLE_LINES], lines[-2 * SAMPLE_LINES :]
+    try:
+        sample = parse_lines([line for part in parts for line in part], name)
+        delimiter = None if sample.delimiter == " " else sample.delimiter
+        numbers = np.loadtxt(lines[sample.line :], delimiter=delimiter, comments=None, ndmin=2)
+    except (SceneError, ValueError):
+        return None
+    if sample.line > SAMPLE_LINES or numbers.shape[1] != len(sample.rows[0]):
+        return None
+    return sample._replace(rows=numbers)
+
+
+def parse_lines(lines: list[str], name: str) -> TextTable:
+    """Parse the lines of a file; raise SceneError if they contain no table."""
     numbered_lines = [
         (number, line)
         for number, line in enumerate(lines, 1)
@@ -107,7 +138,7 @@ def parse_text_table(data: bytes, name: str) -> TextTable:
     if not headings:
         headings = find_commented_headings(lines[:line], delimiter, width)
     headings = add_units(headings, find_units_line(lines[:line], delimiter, width))
-    return TextTable(headings, rows[first_row:], line, find_interval(rows[:first_row]))
+    return TextTable(headings, rows[first_row:], line, find_interval(rows[:first_row]), delimiter)
 
 
 def split_lines(texts: list[str], name: str) -> tuple[str, list[list[str]]]:
