@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from symmetry_models import KINDS, LABELS, examine, open_model
 
 from benchmarks.symmetry.builds import FMI3, NATIVE
-from benchmarks.symmetry.changes import FRAME, LONG, MIRROR, TIME, UNITS
+from benchmarks.symmetry.changes import FRAME, LARGEST_STEP, LONG, MIRROR, TIME, UNITS
 from benchmarks.symmetry.command import describe
 from benchmarks.symmetry.study import Options, list_choices
 
@@ -32,9 +32,12 @@ FEW_MODELS = {
 }
 PERIODIC = {"stickslip": 1e5, "joint": 700.0, "forced": 300.0, "sleds": 1000.0}  # duration in s
 HAVE_NONE = {  # no mirror image: a constant of one sign, or a number as start value; no frame: no state is a velocity
+    UNITS: ("servo",),  # a table holds numbers with units
     MIRROR: ("bumper", "clutch", "forced", "joint", "lift", "viscous_pendulum"),
     FRAME: ("spring",),
 }
+# from rest in a very long run: the first magnitude of the integral of the controller is too large (accuracy.md)
+NEED_A_LARGEST_STEP = ("servo",)
 
 
 @pytest.mark.parametrize("label", FEW_MODELS)
@@ -47,8 +50,9 @@ def test_a_motion_depends_on_no_time_unit_sign_order_or_frame(label):
 @pytest.mark.slow
 @pytest.mark.parametrize("label", LABELS)
 def test_no_motion_of_any_method_and_law_depends_on_them(label):
-    examined, differences = examine(label, **MORE)
-    assert {*examined} == {kind for kind in KINDS if label not in HAVE_NONE.get(kind, ())}
+    kinds = [kind for kind in KINDS if kind != LARGEST_STEP or label not in NEED_A_LARGEST_STEP]
+    examined, differences = examine(label, kinds=kinds, **MORE)
+    assert {*examined} == {kind for kind in kinds if label not in HAVE_NONE.get(kind, ())}
     assert not differences
 
 
