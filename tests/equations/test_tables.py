@@ -315,12 +315,13 @@ def test_an_argument_beyond_the_ends_is_refused_where_the_table_says_so(worker, 
 # ---- files and mistakes
 
 
-def test_a_table_reads_a_file_beside_the_model(tmp_path):
+@pytest.mark.parametrize("headings", ["slip (m/s),mu (1)", "slip [m/s],mu [1]", "v (forward) (m/s) ,mu[1]"])
+def test_a_table_reads_a_file_beside_the_model(tmp_path, headings):
     """And reads it again if it changes."""
     text = MODEL.format(friction='"mu.csv"', spring=points(SPRING, '"m", "N"'))
     (tmp_path / "bench.py").write_text(text)
     for value in (0.5, 0.7):
-        (tmp_path / "mu.csv").write_text(f"slip (m/s),mu (1)\n0,{value}\n1,0.25\n")
+        (tmp_path / "mu.csv").write_text(f"{headings}\n0,{value}\n1,0.25\n")
         source = find_model(tmp_path / "bench.py")
         assert f"_mu_value = ({value}, {value}, 0.25)" in source.generated_source
         assert source.model().prepare() == 0

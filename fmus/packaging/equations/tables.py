@@ -11,6 +11,7 @@ The piece keeps its value during a step; its change is an event (conditions.py).
 
 import csv
 import math
+import re
 from bisect import bisect_right
 from collections.abc import Sequence
 from functools import cached_property
@@ -28,6 +29,7 @@ INTERPOLATIONS, ENDS = (LINEAR, PCHIP), (HOLD, CONTINUE, REFUSE)
 UNBOUNDED = 1e100
 OVERLAP, OVERLAP_OF_PIECE = 1e-9, 1e-4  # of pieces, as shares of the largest argument and of the shortest piece
 VARIABLE_KINDS = ("value", "slope")  # columns that depend on the values at the points
+UNIT_OF_HEADING = re.compile(r"\[([^][]+)\]\s*$|\(((?:[^()]|\([^()]*\))+)\)\s*$")  # x [m], or k (N/(m.s))
 EDGE, KNOT, VALUE, SLOPE, QUADRATIC, CUBIC = "edge", "knot", "value", "slope", "quadratic", "cubic"
 
 
@@ -42,7 +44,7 @@ class Table(Expression):
     ----------
     x
         Values of the argument, which rise; or the name of a CSV file beside the model file, with two columns and their
-        names and units in the first line, as in `slip (m/s),mu (1)`.
+        names and units in the first line, as in `slip [m/s],mu [1]` or `slip (m/s),mu (1)`.
     y
         Values of the function: numbers, or parameters of the model where users set them (linear tables only).
     unit_x, unit_y
@@ -348,10 +350,10 @@ def read_points(name: str, content: str) -> tuple[list[float], list[float], str,
     """Return both columns of a CSV file and their units."""
     rows = [row for row in csv.reader(content.splitlines()) if any(cell.strip() for cell in row)]
     titles = rows[0] if rows else []
-    units = [title.strip().removesuffix(")").rpartition("(")[2] for title in titles if title.strip().endswith(")")]
+    units = [match[1] or match[2] for match in map(UNIT_OF_HEADING.search, titles) if match]
     if len(titles) != 2 or len(units) != 2:
         raise ModelError(
-            f"{name} must begin with the names and units of two columns, as in 'slip (m/s),mu (1)', got "
+            f"{name} must begin with the names and units of two columns, as in 'slip [m/s],mu [1]', got "
             f"{describe(','.join(titles))}"
         )
     columns: tuple[list[float], list[float]] = [], []

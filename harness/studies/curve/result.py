@@ -113,10 +113,11 @@ class CurveResult(Result, CurveIdentification):
         headings = [column_heading("v", velocity), *(column_heading(name, force) for name in ("F", "fit", "residual"))]
         columns = [points.v, points.force, self.best.force(points.v), self.residuals, self.used.astype(int)]
         write_csv(folder / "curve.csv", [*headings, "used"], columns)
+        headings = [column_heading("speed", velocity), column_heading("friction", force)]
         speed, *frictions = self.table().items()
-        for name, values in frictions:  # as `Table` of a model file reads them: two columns, and units in parentheses
+        for name, values in frictions:  # as `Table` of a model file reads them: two columns
             file = "table.csv" if name == "friction" else f"table-{name}.csv"
-            write_csv(folder / file, [f"speed ({velocity})", f"friction ({force})"], [speed[1], values])
+            write_csv(folder / file, headings, [speed[1], values])
         (folder / MODEL_FILE).write_text(write_model(self), encoding="utf-8")
 
     def draw(self, figure: "Figure") -> None:
