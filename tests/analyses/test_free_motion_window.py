@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from decays import OMEGA, decay_record, remarks_text, values
 
+from harness.analyses.decay import fit_problem, return_map, signal_model
 from harness.analyses.decay.estimates import KnownParameters
 from harness.analyses.decay.identification import fit_decay
 from harness.records.record import QUANTITIES, Record
@@ -100,3 +101,24 @@ def test_both_sides_of_a_gap_are_used(gap):
         {"zeta": 0.01, "r": 0.001, "omega": OMEGA, "rest": 0.02}, rel=2e-2, abs=0.05
     )
     assert fit.t[0] < gap[0] < gap[1] < fit.t[-1]
+
+
+@pytest.mark.parametrize(("hold", "phase"), [(0.05, 1.5), (0.12, 1.0)])
+def test_a_motion_that_starts_in_mid_swing_with_speed_costs_a_bounded_number_of_half_cycles(monkeypatch, hold, phase):
+    """Held at its rest position before.  No law starts so, and a fit must not try laws with many more half cycles."""
+    evaluated = []
+
+    def counted(*args, **options):
+        sequence = return_map.iterate_return_map(*args, **options)
+        evaluated.append(len(sequence.amplitudes))
+        return sequence
+
+    for module in (signal_model, fit_problem):
+        monkeypatch.setattr(module, "iterate_return_map", counted)
+    t = np.linspace(0.0, 6.0, 240)
+    swing = np.exp(-0.01 * 6 * (t - hold)) * np.cos(6 * (t - hold) + phase)
+    x = np.where(t < hold, 0.0, swing) + 1e-3 * np.random.default_rng(3).standard_normal(len(t))
+    fit = fit_decay(Record("mid-swing", t, x), KnownParameters(), drag=False)
+    assert values(fit.estimates)["zeta"] == pytest.approx(0.01, rel=0.1)
+    assert max(evaluated) < 10 * 6 * 6 / np.pi
+    assert len(evaluated) < 2000

@@ -2,9 +2,11 @@
 
 import numpy as np
 import pytest
+from decays import decay_record
 
-from harness.analyses.decay.fit_problem import FitError, least_squares
-from harness.analyses.decay.law import AMPLITUDE, OMEGA, REST, T0, UNKNOWNS, ZETA, B, R
+from harness.analyses.decay.extrema import find_extrema
+from harness.analyses.decay.fit_problem import FitError, least_squares, prepare_problem
+from harness.analyses.decay.law import AMPLITUDE, OMEGA, REST, T0, TERMS, UNKNOWNS, ZETA, B, R
 
 T = np.linspace(0.0, 1.0, 21)
 START = np.zeros(len(UNKNOWNS))
@@ -83,6 +85,36 @@ def test_no_step_loses_the_cycles_of_the_record(unknown, best, low, high):
     start[[ZETA, R]] = 0.1
     p, _ = least_squares(lambda p: (p[unknown] - (LINE - 3.0 + best), np.ones((len(T), 1))), start, np.array([unknown]))
     assert low < p[unknown] < high
+
+
+@pytest.mark.parametrize(("unknown", "best", "limit"), [(OMEGA, 100.0, 10.0), (T0, -50.0, 6.3)])
+def test_a_step_that_loses_the_cycles_of_the_record_is_not_evaluated(unknown, best, limit):
+    """Its evaluation could cost a million half cycles."""
+    evaluated = []
+
+    def residual(p):
+        evaluated.append(p[unknown])
+        return p[unknown] - (LINE - 3.0 + best), np.ones((len(T), 1))
+
+    least_squares(residual, START, np.array([unknown]))
+    assert limit / 2 < np.abs(evaluated).max() <= limit
+
+
+def test_fits_one_after_another_do_not_leave_the_frequency_of_the_record():
+    """Each alone may change the frequency by a factor of ten; a million half cycles would be evaluated for minutes."""
+    record = decay_record(0.0, 0.0, turn=0.0)
+    problem, p = prepare_problem(record, find_extrema(record, False), False, False)
+    turns = np.ptp(record.t) / problem.half_period
+    for factor in (1.0, 3.0, 100.0, 1e5):
+        p[OMEGA] = factor * np.pi / problem.half_period
+        e, _ = problem.residuals(p, TERMS)
+        amplitudes, _ = problem.half_cycles(p, max_count=1000)
+        assert np.isfinite(e).all() == (factor < 10)
+        if factor < 10:
+            assert len(amplitudes) < 10 * turns
+        else:
+            with pytest.raises(FitError, match="does not have the turning points"):
+                problem.fit(p, TERMS)
 
 
 def test_a_loss_that_few_steps_from_zero_have_not_reached_is_not_absent():

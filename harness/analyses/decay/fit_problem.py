@@ -94,7 +94,13 @@ class FitProblem:
         return problem
 
     def residuals(self, p: np.ndarray, terms: Terms) -> tuple[np.ndarray, np.ndarray]:
-        """Return the residuals (n,), model minus samples, and their Jacobian (n, k)."""
+        """Return the residuals (n,), model minus samples, and their Jacobian (n, k).
+
+        They are NaN far from the frequency of the record: its half cycles, and so the cost, would be without limit.
+        """
+        change = p[OMEGA] * self.half_period / np.pi
+        if not 1 / thresholds.MAX_FREQUENCY_CHANGE < change < thresholds.MAX_FREQUENCY_CHANGE:
+            return np.full(len(self.t), np.nan), np.full((len(self.t), len(self.unknowns(terms))), np.nan)
         key = p.tobytes(), terms
         if key not in self.cache:
             signal, jacobian = self.model(p, self.unknowns(terms), self.t)
@@ -266,9 +272,10 @@ def least_squares(
         """Return the problem at these values of the unknowns, compressed, and its number of residuals."""
         q = p.copy()
         q[unknowns] = np.frombuffer(values)
+        if not (np.array_equal(q, p) or is_admissible(q, p)):  # before its cost, which may be large
+            return *no_values(len(unknowns)), 0
         r, jacobian = residual(q)
-        is_motion = jacobian.any() and (is_admissible(q, p) or np.array_equal(q, p))
-        residuals, slopes = compress(r if is_motion else np.full_like(r, np.nan), jacobian)
+        residuals, slopes = compress(r, jacobian) if jacobian.any() else no_values(len(unknowns))
         return residuals, slopes, len(r)
 
     lowest = np.where(unknowns >= ZETA, 0.0, -np.inf)
@@ -318,10 +325,15 @@ def compress(r: np.ndarray, jacobian: np.ndarray) -> tuple[np.ndarray, np.ndarra
     both /= scale
     products = both.T @ both
     if not np.isfinite(products).all():
-        return np.full(len(scale), np.nan), np.full((len(scale), len(scale) - 1), np.nan)
+        return no_values(len(scale) - 1)
     eigenvalues, axes = np.linalg.eigh(products)
     root = np.sqrt(np.maximum(eigenvalues, 0.0))[:, None] * axes.T * scale
     return root[:, -1], root[:, :-1]
+
+
+def no_values(k: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return NaN for the compressed residuals (k + 1,) and Jacobian (k + 1, k), which scipy refuses."""
+    return np.full(k + 1, np.nan), np.full((k + 1, k), np.nan)
 
 
 def column_norms(jacobian: np.ndarray) -> np.ndarray:

@@ -81,7 +81,7 @@ UNEXPLAINED = 1.3  # times the noise: larger residuals call for a fit by growing
 CONVERGED_GAIN = 1e-2  # variances of a sample: a fit whose next step gains less has converged to a tenth of an error
 CONVERGED_CHANGE = 1e-14  # relative, of the values: records without noise converge to rounding
 ABSENT_LOSS = 1e-2  # standard errors: a loss that the fit pushes to zero and that is smaller is zero
-MAX_FREQUENCY_CHANGE = 10.0  # factor from the start of a fit: a step beyond it has lost the cycles of the record
+MAX_FREQUENCY_CHANGE = 10.0  # factor from the start of a fit or the half period: beyond, a step has lost the cycles
 MAX_PHASE_CHANGE = 6.3  # rad, a cycle, from the start of a fit: a step beyond it has lost the cycles as well
 MAX_DAMPING_RATIO = 0.9  # beyond, nothing oscillates
 
