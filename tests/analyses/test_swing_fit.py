@@ -42,5 +42,18 @@ def test_a_loss_that_departs_from_the_law_is_reported_and_covered():
         assert fit[force].high / fit[loss].high == pytest.approx(100.0 if loss == "r" else 100.0 / 12.566**2, rel=0.01)
 
 
+def test_forces_have_the_widened_intervals_of_their_losses():
+    """The damping rises during the record, so that its halves disagree, and the swings with every law."""
+    record = decay_record(0.004, 4e-4, turn=-0.1, t=T, noise=2e-5, rest=0.0)
+    x = record.x * np.exp(-0.005 * np.maximum(T - 3.0, 0.0))
+    fit = fit_decay(Record("swung", T, x), KnownParameters(k=100.0), drag=False)
+    remarks = " ".join(fit.remarks)
+    assert "in the first half of the record" in remarks
+    assert "departs from every law" in remarks
+    for force, loss, factor in (("f", "r", 100.0), ("c", "zeta", 2 * 100.0 / fit["omega"].value)):
+        ends = factor * fit[loss].low, factor * fit[loss].high
+        assert (fit[force].low, fit[force].high) == pytest.approx(ends, rel=1e-3)
+
+
 def test_few_swings_give_no_second_estimate():
     assert fit_decay(decay_record(0.01, t=np.linspace(0, 2, 400), noise=1e-4), KnownParameters()).swing_estimates == ()

@@ -101,9 +101,8 @@ def make_estimates(
     law: FittedLaw,
     full: FittedLaw,
     uncertainty: FitUncertainty,
-    parameters: KnownParameters,
-) -> tuple[Estimate, ...]:
-    """Return the estimates of all quantities; for a term that is not in the law, `high` is the upper limit.
+) -> dict[int, Estimate]:
+    """Return the estimates by index in UNKNOWNS; for a term that is not in the law, `high` is the upper limit.
 
     Parameters
     ----------
@@ -114,7 +113,7 @@ def make_estimates(
     uncertainty : FitUncertainty
         Uncertainty of the full law.
     """
-    estimates = {}
+    estimates: dict[int, Estimate] = {}
     at_bound = any(full.p[UNKNOWNS.index(term)] <= 0 for term in full.terms)  # elsewhere the bounds have no effect
     center = uncertainty.unconstrained if at_bound else full.p[uncertainty.unknowns]
     intervals = {
@@ -136,7 +135,7 @@ def make_estimates(
             value, (low, high) = float(law.p[unknown]), intervals[unknown]
             bounds = min(low, value), max(high, value)
             estimates[unknown] = to_record_units(record, problem, unknown, value, errors[unknown], *bounds)
-    return (*estimates.values(), *force_estimates(record, estimates[OMEGA], estimates, parameters))
+    return estimates
 
 
 def force_estimates(

@@ -26,12 +26,19 @@ from ...records.record import Record
 from ..estimation.estimate import Estimate
 from . import thresholds
 from .energy_loss import EnergyLoss, loss_fractions
-from .estimates import KnownParameters, estimate_from_extrema, estimate_from_two_peaks, make_estimates, to_record_units
+from .estimates import (
+    KnownParameters,
+    estimate_from_extrema,
+    estimate_from_two_peaks,
+    force_estimates,
+    make_estimates,
+    to_record_units,
+)
 from .extrema import Extrema, estimate_noise, find_extrema, remove_spikes
 from .fit_problem import FitError, FitProblem
 from .free_motion import select_free_motion
 from .intervals import FitUncertainty, estimate_uncertainty
-from .law import DRIFT, REST, TERMS, Terms
+from .law import DRIFT, OMEGA, REST, TERMS, Terms
 from .model_selection import FittedLaw, fit_all_laws, select_reported_law
 from .remarks import check_fit, compare_halves, compare_swings, make_remarks
 from .swing_fit import fit_swings
@@ -241,7 +248,8 @@ def identify_record(
     uncertainty = estimate_uncertainty(problem, full.p, terms)
     check_fit(record, problem, full, uncertainty, parameters.pendulum)
     reported = select_reported_law(laws, full, problem)
-    estimates = make_estimates(record, problem, reported, full, uncertainty, parameters)
+    by_unknown = make_estimates(record, problem, reported, full, uncertainty)
+    estimates = tuple(by_unknown.values())
     remarks = [*decay.notes, *free_motion.notes, *make_remarks(record, problem, laws, full, uncertainty)]
     if record.base not in ("m", "rad") and (parameters.k or parameters.m):
         remarks.append(
@@ -260,7 +268,9 @@ def identify_record(
         )
         estimates, disagreements = compare_swings(estimates, from_swings, swing_fit.departure)
         remarks += disagreements
-    omega = estimates[0]
+    by_unknown = dict(zip(by_unknown, estimates, strict=True))
+    omega = by_unknown[OMEGA]
+    estimates += force_estimates(record, omega, by_unknown, parameters)  # of the widened intervals
     by_extrema, no_extrema = estimate_from_extrema(record, problem, extrema, laws[0], parameters, omega)
     by_two_peaks, no_peaks = estimate_from_two_peaks(record, problem, extrema, laws[0], parameters, omega)
     unavailable = {"turning points": no_extrema, "two peaks": no_peaks}

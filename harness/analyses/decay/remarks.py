@@ -13,8 +13,6 @@ from .intervals import FitUncertainty, estimate_uncertainty
 from .law import AMPLITUDE, DRIFT, OMEGA, REST, UNKNOWNS, ZETA
 from .model_selection import FittedLaw, deviance_difference
 
-FORCES = {"f": "r", "T_f": "r", "c": "zeta", "q": "b"}  # the loss that each constant of a force is proportional to
-
 
 def check_fit(
     record: Record, problem: FitProblem, full: FittedLaw, uncertainty: FitUncertainty, pendulum: bool
@@ -215,7 +213,7 @@ def compare_swings(
     remarks : tuple of str
         A remark on the departure, or on each quantity in which both disagree.
     """
-    remarks, factors = [], {}
+    remarks = []
     by_name = {estimate.name: estimate for estimate in from_swings}
     widened = list(estimates)
     if departure:
@@ -225,21 +223,18 @@ def compare_swings(
         )
     for i, estimate in enumerate(widened):
         other = by_name.get(estimate.name)
-        if other is not None:
-            differs = abs(estimate.value - other.value) > thresholds.SWING_DISAGREEMENT * np.hypot(
-                estimate.error, other.error
+        if other is None:
+            continue
+        differs = abs(estimate.value - other.value) > thresholds.SWING_DISAGREEMENT * np.hypot(
+            estimate.error, other.error
+        )
+        if not (departure or differs):
+            continue
+        low, high = min(estimate.low, other.low), max(estimate.high, other.high)
+        widened[i] = replace(estimate, error=max(estimate.error, other.error), low=low, high=high)
+        if differs:
+            remarks.append(
+                f"{estimate.text}, {estimate.name}: {estimate.value:.4g} from the whole signal, {other.value:.4g} "
+                "from the swings alone; the interval covers both."
             )
-            if not (departure or differs):
-                continue
-            low, high = min(estimate.low, other.low), max(estimate.high, other.high)
-            widened[i] = replace(estimate, error=max(estimate.error, other.error), low=low, high=high)
-            factors[estimate.name] = low / estimate.low if estimate.low else 1.0, high / estimate.high
-            if differs:
-                remarks.append(
-                    f"{estimate.text}, {estimate.name}: {estimate.value:.4g} from the whole signal, {other.value:.4g} "
-                    "from the swings alone; the interval covers both."
-                )
-        elif estimate.name in FORCES and FORCES[estimate.name] in factors:
-            low_factor, high_factor = factors[FORCES[estimate.name]]
-            widened[i] = replace(estimate, low=estimate.low * low_factor, high=estimate.high * high_factor)
     return tuple(widened), tuple(remarks)
