@@ -208,7 +208,8 @@ class Trajectory(Result):
 
     @property
     def headline(self) -> str:
-        return f"{', '.join(self.columns)}; {len(self.time)} points from {self.time[0]:g} to {self.time[-1]:g} s"
+        span = f" from {self.time[0]:g} to {self.time[-1]:g} s" if len(self.time) else ""
+        return f"{', '.join(self.columns) or 'no outputs'}; {len(self.time)} points{span}"
 
     def __getitem__(self, name: str) -> np.ndarray:
         """Return the values (n,) of an output by its name."""

@@ -162,6 +162,12 @@ def test_a_result_is_one_line_text_and_html(study):
     assert (summary.study, bool(summary.sentences or summary.tables)) == (study, True)
 
 
+def test_a_run_without_points_is_one_line():
+    """As in the outcomes of stability, which keep no signals."""
+    motion = judged_cases().outcomes[0].motion
+    assert repr(motion) == f"<Trajectory of {motion.title}: no outputs; 0 points>"
+
+
 @every_study
 def test_a_result_converts_to_a_table(study):
     pytest.importorskip("pandas")
