@@ -42,6 +42,10 @@ START_SHARE = 1e-4  # of the largest step: the first step takes what a state mov
 ROUGH_ERROR, ROUGH_CHANGE = 0.5, 10.0  # relative error and change of states in a proposal that is roughly right
 MAX_STALLED_STEPS = 100  # consecutive steps that hardly advance the time
 SHORTEST_STEP = 16.0 * EPSILON  # share of the largest step; the solver stalls at shorter ones
+# Rounding error of a rate, relative to the sum of its absolute terms, below which no step is rejected.  A product and a
+# sum round by half EPSILON each, as does each operand.  With 128 EPSILON, dop853 was allowed errors of 4e-10 in pacejka
+# at any tolerance below 1e-12.
+RATE_ROUNDING = 2.0 * EPSILON
 INTERPOLATION_ERROR = 10.0  # of a state at an event, relative to the solver tolerance
 TIE_FACTOR = 30.0  # tolerance for ties between stick and slip, relative to the solver tolerance
 
@@ -376,7 +380,7 @@ class InternalStep:
             if error > 1.0 and method.floor_share > 0.0:
                 # It may be a rounding error of the rates: of velocities, and of positions by these.
                 terms = model.rate_magnitudes(t + h, y, modes)  # y1 may be unstable
-                rounding = dynamic_part(2.0 * ROUNDOFF_MARGIN * h / tolerance * terms)
+                rounding = dynamic_part(RATE_ROUNDING * h / tolerance * terms)
                 least = select_kinematic(h * kinematic_rates(rounding), rounding)
                 e = d / elementwise_max(size2, least)
                 error = h * max_of(e) / tolerance
