@@ -23,6 +23,7 @@ from harness.running.solution import Solution
 from harness.running.step_sequence import RefusalSummary, RefusedRun, inject_nonfinite
 from harness.running.trajectory import Statistics, Trajectory
 from harness.scenes.run_spec import RunSpec
+from harness.studies.stability import study
 from harness.studies.stability.cases import StabilityCase, expand_scene, load_scenes, value_spans
 from harness.studies.stability.study import (
     CASE_PROCESS,
@@ -257,6 +258,16 @@ def test_a_part_of_the_table_ends_as_expected(user_folder, tmp_path, monkeypatch
     assert error_table(rows).row_count > 20
     assert refusal_table(rows).row_count > 5
     assert summary(rows, []).startswith(f"{len(rows)} of {len(rows)} ended as expected.")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", MODELS)
+def test_every_case_of_a_shipped_model_ends_as_expected(user_folder, tmp_path, monkeypatch, name):
+    monkeypatch.chdir(user_folder)
+    monkeypatch.setattr(study, "LIMIT", 1200.0)  # a loaded machine needs minutes until a run is refused
+    rows = run_stability(tmp_path, ignore_progress, grouped_cases(models=[name])).outcomes
+    assert [f"{row.case.label}: {row.text}" for row in rows if not row.has_passed] == []
+    assert {row.case.title for row in rows} == {scene["title"] for scene in load_scenes()[0] if scene["model"] == name}
 
 
 @pytest.mark.parametrize(
