@@ -383,6 +383,7 @@ REPEATED = {  # a call of each command whose result can be repeated, and the fol
     "run": ({"fmu": "fmus/smd.fmu", "stop": 0.5}, "smd"),
     "compare": ({"first": "fmus/smd.fmu", "second": "fmus/coulomb.fmu", "stop": 0.1}, "compare/smd-coulomb"),
     "couple": ({"scene": "two-masses"}, "coupled/two-masses"),
+    "curve": ({"source": "bench.csv", "mass": 1.0}, "curve/bench"),
     "decay": ({"source": "swing.csv", "m": 1.0}, "decay/swing"),
     "stability": ({"models": ["smd"]}, "stability"),
     "sweep": ({"model": "smd", "vary": ["k=1,2"], "stop": 0.1}, "sweep/smd-k"),
@@ -401,6 +402,8 @@ def test_an_edited_provenance_file_chooses_no_folder_to_write(workspace, name):
     t = np.linspace(0, 10, 200)
     table = "".join(f"{a:.3f},{b:.6f}\n" for a, b in zip(t, np.exp(-0.1 * t) * np.cos(6 * t), strict=True))
     (workspace / "swing.csv").write_text("t [s],x [m]\n" + table)
+    points = "".join(f"{v},{(1.3 + 2 * abs(v)) * np.sign(v)}\n" for v in np.linspace(-0.3, 0.3, 20))
+    (workspace / "bench.csv").write_text("v [m/s],F [N]\n" + points)
     options, place = REPEATED[name]
     call = {"command": "harness", "date": "2026-11-27", "files": {}, "parameters": {}, "scene": None}
     folder, victim = workspace / "stranger" / place, workspace / "mine" / place
