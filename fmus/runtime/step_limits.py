@@ -6,10 +6,10 @@ small range of slip velocities (narrow features).
 
 from math import fabs, sqrt
 
-from .codes import STUCK
+from .codes import ROUNDOFF_MARGIN, STUCK
 from .event_location import update_event_functions
 from .interpolant import largest_of, smallest_of
-from .vectors import RateVector, StateVector, contact_indices, contact_vector, slip_index
+from .vectors import RateVector, StateVector, contact_indices, contact_vector, select_kinematic, slip_index
 
 MAX_CUBIC_ERROR = 0.02  # share of the range of an event function by which it may differ from a cubic polynomial
 SHORTEST_STEP = 1e-6  # share of the largest step; shorter steps are not shortened for an event function
@@ -26,15 +26,42 @@ def limit_step(model, step):
     follows a clock while nothing moves.
     """
     location = step.event_location
-    largest = 0.0
-    for j in range(model.n_event_functions):
-        error = location.cubic_errors[j]
-        largest = error if error > largest else largest
+    largest = largest_cubic_error(model, location)
+    if model.has_dry_friction and model.is_coupled and largest > MAX_CUBIC_ERROR:
+        ignore_rounding_errors(model, step)
+        largest = largest_cubic_error(model, location)
     if largest > MAX_CUBIC_ERROR and step.h_full > SHORTEST_STEP * step.h_max:
         location.must_shorten = True
     elif largest > 0.0:
         h = 0.8 * step.h_full * sqrt(sqrt(MAX_CUBIC_ERROR / largest))  # the error grows with h^4
         step.h_next = h if h < step.h_next else step.h_next
+
+
+def largest_cubic_error(model, location):
+    """Return the largest difference of an event function from a cubic polynomial, as a share of its range."""
+    largest = 0.0
+    for j in range(model.n_event_functions):
+        error = location.cubic_errors[j]
+        largest = error if error > largest else largest
+    return largest
+
+
+def ignore_rounding_errors(model, step):
+    """Ignore the shape of slips that change by no more than the rounding errors of their rates in the step.
+
+    A body that creeps, because its load equals its friction but for rounding errors, follows no polynomial.
+    """
+    location = step.event_location
+    y1 = step.y1
+    terms = model.rate_magnitudes(step.t1, y1, step.modes0)
+    rounding = ROUNDOFF_MARGIN * step.h_full * terms
+    y2 = select_kinematic(y1, rounding)
+    noise = model.slip_magnitudes(step.t1, y2)
+    for i in contact_indices:
+        start, early, late, end = location.start[i], location.early[i], location.late[i], location.end[i]
+        change = largest_of(start, early, late, end) - smallest_of(start, early, late, end)
+        if step.modes0[i] != STUCK and change <= noise[i]:
+            location.cubic_errors[i] = 0.0
 
 
 def limit_first_step(model, step):
