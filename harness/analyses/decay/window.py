@@ -106,7 +106,8 @@ def select_decay(record: Record, pendulum: bool) -> tuple[Record, float]:
     measured = remove_spikes(record)
     noise, _ = estimate_noise(measured.t, measured.x)
     periods = half_periods(measured, noise)
-    if len(gapless_slices(measured, periods[0])) > 1:
+    # the angular acceleration of a pendulum has two peaks per half cycle at large amplitudes: no window is searched
+    if len(gapless_slices(measured, periods[0])) > 1 or (pendulum and record.order == 2):
         return record, min(periods)
     best: Decay | None = None
     motions: list[Swings] = []
