@@ -611,7 +611,7 @@ class InternalStep:
         It follows the motion, not the duration of the run, which only limits it from above.
         """
         if self.h_next == 0.0:
-            return START_SHARE * self.h_max
+            return self.h_max
         method = self.active_method
         scale = self.h_next / (method.safety * self.tolerance**method.power)
         return scale if scale < self.h_max else self.h_max
