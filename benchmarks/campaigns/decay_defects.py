@@ -25,7 +25,7 @@ SAMPLES = 1500
 FAR = 5.0  # standard errors
 
 
-def spoil(record, truth, defect, rng):
+def add_defect(record, true_values, defect, rng):
     """Return the record with a defect."""
     t, x = record.t, record.x
     size, duration = np.ptp(x), np.ptp(t)
@@ -33,7 +33,7 @@ def spoil(record, truth, defect, rng):
         x = x + 0.003 * size * np.cumsum(rng.standard_normal(len(t))) / np.sqrt(len(t))
     elif defect == "clock":  # its rate wanders by 0.1 %
         knots = np.linspace(t[0], t[-1], 9)
-        error = 3e-4 / truth["omega"] * np.cumsum(rng.standard_normal(9))
+        error = 3e-4 / true_values["omega"] * np.cumsum(rng.standard_normal(9))
         error -= np.polyval(np.polyfit(knots, error, 1), knots)  # a wrong mean rate is a wrong frequency
         t = t + np.interp(t, knots, error)
     elif defect == "uneven":
@@ -43,10 +43,11 @@ def spoil(record, truth, defect, rng):
         step = duration / (len(t) - 1)
         noise = 1e-4 * size
         before, after = (int(rng.uniform(0.2, 0.8) * len(t)) for _ in range(2))
-        start = int(np.argmax(np.abs(x - truth["rest"])[: int(1.2 * np.pi / truth["omega"] / step) + 1]))  # from rest
-        held = x[start] + noise * rng.standard_normal(before)
-        ended = x[-1] + noise * rng.standard_normal(after)
-        x = np.concatenate([held, x[start:], ended])
+        half_period = int(1.2 * np.pi / true_values["omega"] / step) + 1
+        start = int(np.argmax(np.abs(x - true_values["rest"])[:half_period]))  # of the decay, without speed
+        before_release = x[start] + noise * rng.standard_normal(before)
+        at_rest = x[-1] + noise * rng.standard_normal(after)
+        x = np.concatenate([before_release, x[start:], at_rest])
         t = t[0] + step * (np.arange(len(x)) - before)
     elif defect == "outliers":
         x = x.copy()
@@ -56,7 +57,7 @@ def spoil(record, truth, defect, rng):
     elif defect == "loss":  # the envelope wanders by 2 % about that of the law
         knots = np.linspace(t[0], t[-1], 7)
         wander = np.interp(t, knots, 0.02 * np.cumsum(rng.standard_normal(7)) / np.sqrt(7))
-        x = truth["rest"] + (x - truth["rest"]) * (1 + wander)
+        x = true_values["rest"] + (x - true_values["rest"]) * (1 + wander)
     return replace(record, t=t, x=x)
 
 
@@ -65,16 +66,16 @@ def check_record(task):
     number, seed = task
     defect = DEFECTS[number % len(DEFECTS)]
     sine = bool(number // len(DEFECTS) % 2)
-    record, truth, _ = random_record((seed, number), None, sine, defect == "quantised", SAMPLES, 0)
-    record = spoil(record, truth, defect, np.random.default_rng((seed, number, 5)))
+    record, true_values, _ = random_record((seed, number), None, sine, defect == "quantised", SAMPLES, 0)
+    record = add_defect(record, true_values, defect, np.random.default_rng((seed, number, 5)))
     try:
         fit = fit_decay(record, KnownParameters(pendulum=sine))
     except HarnessError as refusal:
         return number, defect, None, 0.0, str(refusal)
     by_name = {one.name: one for one in fit.estimates}
-    held = [by_name[name].low <= truth[name] <= by_name[name].high for name in NAMES]
-    far = max(abs(by_name[name].value - truth[name]) / by_name[name].error for name in NAMES)
-    return number, defect, held, far, " ".join(fit.remarks)
+    contained = [by_name[name].low <= true_values[name] <= by_name[name].high for name in NAMES]
+    far = max(abs(by_name[name].value - true_values[name]) / by_name[name].error for name in NAMES)
+    return number, defect, contained, far, " ".join(fit.remarks)
 
 
 def table_lines(rows):
@@ -84,16 +85,16 @@ def table_lines(rows):
     )
     for defect in (*DEFECTS, "all"):
         group = [row for row in rows if defect in ("all", row[1])]
-        held = [row[2] for row in group if row[2] is not None]
-        shares = np.mean(held, axis=0) if held else np.full(len(NAMES), np.nan)
+        contained = [row[2] for row in group if row[2] is not None]
+        shares = np.mean(contained, axis=0) if contained else np.full(len(NAMES), np.nan)
         silent = sum(row[2] is not None and row[3] > FAR and not row[4] for row in group)
         yield (
-            f"{defect:12} {len(held):7} {len(group) - len(held):7} "
+            f"{defect:12} {len(contained):7} {len(group) - len(contained):7} "
             + " ".join(f"{share:6.3f}" for share in (*shares, shares.mean()))
             + f" {silent:7}"
         )
-    for number, defect, held, far, text in rows:
-        if held is None:
+    for number, defect, contained, far, text in rows:
+        if contained is None:
             yield f"record {number} ({defect}) refused: {text}"
         elif far > FAR:
             yield f"record {number} ({defect}) off by {far:.1f} errors: {text or 'no remark'}"

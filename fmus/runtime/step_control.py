@@ -608,7 +608,7 @@ class InternalStep:
     def time_scale(self):
         """Return the time in which the motion changes by its own size: the step to try at a relative tolerance of 1.
 
-        It follows the motion, not the duration of the run, which only limits it from above.
+        It follows the motion.  The largest step limits it from above, and is used where no step was tried.
         """
         if self.h_next == 0.0:
             return self.h_max

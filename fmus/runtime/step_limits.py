@@ -27,7 +27,7 @@ def limit_step(model, step):
     """
     location = step.event_location
     largest = largest_cubic_error(model, location)
-    if model.has_dry_friction and model.is_coupled and largest > MAX_CUBIC_ERROR:
+    if model.is_coupled and largest > MAX_CUBIC_ERROR:
         ignore_rounding_errors(model, step)
         largest = largest_cubic_error(model, location)
     if largest > MAX_CUBIC_ERROR and step.h_full > SHORTEST_STEP * step.h_max:

@@ -11,6 +11,8 @@ from .terminal import (
     HEADINGS_OPTION,
     NONNEGATIVE,
     POSITIVE,
+    RATE_OPTION,
+    TIME_UNIT_OPTION,
     Terminal,
     result_options,
 )
@@ -25,9 +27,9 @@ from .terminal import (
 @click.option("--constant", metavar="SIZE", help="Constant of the motor: '0.12 N.m/A' or '35 N/A'.")
 @click.option("--points", "is_points", is_flag=True, help="Take each row as a point, even if the file has times.")
 @click.option("--time", help="Heading of the time, in a record over time. Default: t, time, ...")
-@click.option("--time-unit", help="Unit of time, if the heading has none. Default: s.")
+@TIME_UNIT_OPTION
 @HEADINGS_OPTION
-@click.option("--rate", type=POSITIVE, metavar="HZ", help="Sampling rate in Hz, which replaces the times in the file.")
+@RATE_OPTION
 @BEGIN_OPTION
 @END_OPTION
 @click.option(

@@ -11,6 +11,8 @@ from .terminal import (
     END_OPTION,
     HEADINGS_OPTION,
     POSITIVE,
+    RATE_OPTION,
+    TIME_UNIT_OPTION,
     RenamedOption,
     Terminal,
     refuse_options,
@@ -46,9 +48,9 @@ COLUMN_OPTIONS = (  # of records
 )
 @click.option("--unit", help="Unit of the column, if the heading has none: mm, deg/s, g, ...")
 @click.option("--per-count", metavar="SIZE", help="Size of one count: 0.36deg, 0.001mm, ...")
-@click.option("--time-unit", help="Unit of time, if the heading has none: ms, or 0.01s for sample numbers. Default: s.")
+@TIME_UNIT_OPTION
 @HEADINGS_OPTION
-@click.option("--rate", type=POSITIVE, metavar="HZ", help="Sampling rate in Hz, which replaces the times in the file.")
+@RATE_OPTION
 @BEGIN_OPTION
 @END_OPTION
 @click.option("--k", type=POSITIVE, help="Stiffness in N/m or N.m/rad; required for the friction force.")

@@ -4,7 +4,17 @@ from typing import Any
 
 import click
 
-from .terminal import BEGIN_OPTION, END_OPTION, HEADINGS_OPTION, POSITIVE, RenamedOption, Terminal, result_options
+from .terminal import (
+    BEGIN_OPTION,
+    END_OPTION,
+    HEADINGS_OPTION,
+    POSITIVE,
+    RATE_OPTION,
+    TIME_UNIT_OPTION,
+    RenamedOption,
+    Terminal,
+    result_options,
+)
 
 
 @click.command()
@@ -37,9 +47,9 @@ from .terminal import BEGIN_OPTION, END_OPTION, HEADINGS_OPTION, POSITIVE, Renam
 @click.option("--validate", multiple=True, metavar="FILE", help="Record to predict, not to fit; repeatable.")
 @click.option("--robust", is_flag=True, help="Limit the effect of outliers.")
 @click.option("--time", help="Heading of the time column. Default: t, time, ..., or the first column.")
-@click.option("--time-unit", help="Unit of time, if the heading has none. Default: s.")
+@TIME_UNIT_OPTION
 @HEADINGS_OPTION
-@click.option("--rate", type=POSITIVE, metavar="HZ", help="Sampling rate in Hz, which replaces the times in the file.")
+@RATE_OPTION
 @BEGIN_OPTION
 @END_OPTION
 @click.option(

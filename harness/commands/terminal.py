@@ -150,6 +150,12 @@ HEADINGS_OPTION = click.option(
     metavar="NAMES",
     help="Headings, if the file has none: 't [s],x [mm]'.",
 )
+TIME_UNIT_OPTION = click.option(
+    "--time-unit", help="Unit of time, if the heading has none: ms, or 0.01s for sample numbers. Default: s."
+)
+RATE_OPTION = click.option(
+    "--rate", type=POSITIVE, metavar="HZ", help="Sampling rate in Hz, which replaces the times in the file."
+)
 BEGIN_OPTION = click.option("--from", "begin", type=FINITE, help="Ignore samples before this time in s.")
 END_OPTION = click.option("--until", "end", type=FINITE, help="Ignore samples after this time in s.")
 STOP_OPTION = click.option("--stop", type=FINITE, help="Stop time in s. Default: that of the FMU.")

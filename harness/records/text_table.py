@@ -105,11 +105,13 @@ def parse_long_table(lines: list[str], name: str) -> TextTable | None:
     parts = lines[: 2 * SAMPLE_LINES], lines[middle : middle + 2 * SAMPLE_LINES], lines[-2 * SAMPLE_LINES :]
     try:
         sample = parse_lines([line for part in parts for line in part], name)
+        if sample.line > SAMPLE_LINES:
+            return None
         delimiter = None if sample.delimiter == " " else sample.delimiter
         numbers = np.loadtxt(lines[sample.line :], delimiter=delimiter, comments=None, ndmin=2)
     except (SceneError, ValueError):
         return None
-    if sample.line > SAMPLE_LINES or numbers.shape[1] != len(sample.rows[0]):
+    if numbers.shape[1] != len(sample.rows[0]):
         return None
     return sample._replace(rows=numbers)
 

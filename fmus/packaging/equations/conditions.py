@@ -24,7 +24,7 @@ from .algebra import (
 )
 from .expressions import COMPARISONS, Expression, ModelError, Operand, Term, is_among
 from .model_declaration import HYBRID, Contact, Model, Output, SettableVariable, State, Variable
-from .tables import EDGE, REFUSE, Coefficient, Piece, is_piece, looked_up, table_of
+from .tables import EDGE, REFUSE, Coefficient, Piece, find_table_call, is_piece, table_of
 
 LIMITED_DOMAIN = ("sqrt", "log", "asin", "acos", "/")  # operations that fail for some operands
 HOLD_TOLERANCE = 1e-9  # the sliding force may exceed the holding force by rounding errors
@@ -340,8 +340,8 @@ class Signs:
                 return True
             case "+" if self._is_weighted_mean(*e.args):
                 return True
-            case "+" if found := looked_up(e):
-                table, u = found
+            case "+" if call := find_table_call(e):
+                table, u = call
                 return table.is_nonnegative(self._nonnegative[id(u)])
             case "+" | "*" | "/":
                 return all(signs)

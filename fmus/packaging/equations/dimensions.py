@@ -13,7 +13,7 @@ from .expression_printer import COMPARISON_OPERATORS
 from .expressions import Expression, ModelError, Operand, Term
 from .model_analysis import ModelAnalysis
 from .model_declaration import Choice, Contact, Input, Mode, Output, State, Variable
-from .tables import EDGE, KNOT, Coefficient, Piece, Table, looked_up
+from .tables import EDGE, KNOT, Coefficient, Piece, Table, find_table_call
 
 Dimensions = tuple[Fraction, ...]  # exponents of DIMENSIONS
 DIMENSIONS = tuple(base for base in BASE_UNITS if base != "rad")  # angles are dimensionless
@@ -286,8 +286,8 @@ def expression_text(e: Operand, level: int = 0) -> str:
             return "..."
         n_left -= 1
         own = PRECEDENCE.get(e.op, 4)
-        if found := looked_up(e):
-            return f"{found[0]}({text(found[1], 0)})"
+        if call := find_table_call(e):
+            return f"{call[0]}({text(call[1], 0)})"
         if e.op == "choose" and is_absolute_value(e):
             result = f"fabs({text(e.args[1], 0)})"
         elif e.op == "neg":

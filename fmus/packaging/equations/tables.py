@@ -277,7 +277,7 @@ def table_of(piece: Term) -> Table:
     return piece.op.table
 
 
-def looked_up(e: Operand) -> tuple[Table, Operand] | None:
+def find_table_call(e: Operand) -> tuple[Table, Operand] | None:
     """Return the table and the argument of an expression that is the value of a table, else None."""
     first = e.args[0] if isinstance(e, Term) and e.op == "+" else None
     if not (isinstance(first, Term) and isinstance(first.op, Coefficient) and is_piece(first.args[0])):
