@@ -1,7 +1,7 @@
 """Identification of friction over velocity: law, constants, outliers and remarks."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -145,7 +145,7 @@ def identify(points: CurvePoints, bias: float | None = None, mass: float | None 
             fits.append(fit)
     fits.sort(key=lambda fit: fit.bic)
     result = CurveIdentification(points, used, tuple(fits), unavailable, mass)
-    return CurveIdentification(points, used, tuple(fits), unavailable, mass, tuple(find_remarks(result)))
+    return replace(result, remarks=tuple(find_remarks(result)))
 
 
 def check_points(points: CurvePoints, bias: float | None) -> tuple[CurvePoints, float | None]:
