@@ -19,6 +19,7 @@ WORK = {  # by command; all run in one folder, in this order
     "list": ["list"],
     "info": ["info stickslip"],
     "run": ["", "run stickslip", "run --fmu fmus/more/belt.fmu"],
+    "curve": ["curve bench.csv --mass 2"],
     "decay": ["decay docs/records/spring.csv --m 0.35", "decay coulomb"],
     "compare": ["compare smd coulomb"],
     "fit": [
@@ -49,9 +50,11 @@ def without_extras(wheel, tmp_path_factory):
 
 @pytest.fixture
 def user(tmp_path):
-    """The folder of a user with the records of the pages and a model file."""
+    """The folder of a user with the records of the pages, points of friction, and a model file."""
     (tmp_path / "docs").symlink_to(ROOT / "docs")
     shutil.copy(ROOT / "fmus" / "more" / "belt.py", tmp_path)
+    points = "".join(f"{sign * v},{sign * (1.3 + 2 * v)}\n" for v in (0.01, 0.03, 0.1, 0.2, 0.3) for sign in (1, -1))
+    (tmp_path / "bench.csv").write_text("v [m/s],F [N]\n" + points)
     return tmp_path
 
 
