@@ -112,7 +112,8 @@ def build_unit_table() -> dict[str, MotionUnit]:
         for name, size in sizes.items()
         for order, rate in enumerate(("", "/s", "/s2"))
     }
-    units["rpm"] = MotionUnit(1, "rad", TURN / 60)
+    for name in ("rpm", "rev/min", "r/min", "u/min", "1/min"):
+        units[name] = MotionUnit(1, "rad", TURN / 60)
     units["g"] = MotionUnit(2, "m", STANDARD_GRAVITY)
     units["mg"] = MotionUnit(2, "m", 1e-3 * STANDARD_GRAVITY)
     return units
