@@ -104,8 +104,8 @@ def reference(friction=FRICTION, spring=SPRING):
         ahead = 1e-12 * (-force(y[0]) - mode * N * mu(abs(y[1]))) / M  # in the direction of the motion
         force.select(y[0] + 1e-12 * np.sign(y[1]))
         mu.select(mode * y[1] + mode * ahead)
-        low, high = force.ends()
-        slow, fast = mu.ends()
+        # a piece reaches a little further, so that scipy sees a sign change where the speed only just passes a point
+        low, high, slow, fast = np.array([*force.ends(), *mu.ends()]) + np.array([-1.0, 1.0, -1.0, 1.0]) * 1e-12
         guards = [
             lambda t, y, mode=mode: mode * y[1],
             lambda t, y, low=low: y[0] - low if low > -np.inf else 1.0,
