@@ -5,7 +5,7 @@ from math import inf
 from .codes import EXACT
 from .linear_closed_form import LinearClosedForm
 from .method_registry import methods
-from .vectors import ContactVector, RateVector, StateVector
+from .vectors import ContactVector, RateVector, StateVector, elementwise_max, velocity_indices
 
 EXACT_ITEM = ("exact", EXACT, "closed form of each linear segment, with events; hybrid law only")
 METHOD_ITEMS = tuple((label, file.NUMBER, file.TEXT) for label, file, _ in methods)
@@ -38,6 +38,15 @@ class ActiveMethod:
             if method == file.NUMBER:
                 self.stages, self.extra = file.STAGES, file.EXTRA
                 self.power, self.safety, self.shrink, self.grow = file.POWER, file.SAFETY, file.SHRINK, file.GROW
+
+    def raise_scale_floor(self, model, size: StateVector):
+        """Raise the scale floor of the error norm to a share of the magnitudes of states that have been reached."""
+        floor = self.floor_share * size
+        self.error_scale_floor = elementwise_max(self.error_scale_floor, floor)
+        if model.has_nominal_velocity and self.floor_share > 0.0:
+            for i in velocity_indices:
+                if self.error_scale_floor[i] > self.nominal_velocity:
+                    self.error_scale_floor[i] = self.nominal_velocity
 
     def propose(
         self, model, step, modes: ContactVector, t, y: StateVector, f: RateVector, h

@@ -117,12 +117,8 @@ class LinearClosedForm:
             )
         if self.has_input_derivatives and self.regime == HIGHER_ORDER_INPUT:
             return self.evaluate_series(t)
-        if self.regime == GROWING:
-            return self.evaluate_growth(t)
-        if self.has_input_derivatives and self.q != 0.0:
+        if self.has_input_derivatives and self.q != 0.0 and self.regime != GROWING:
             return self.evaluate_ramp(t)
-        if self.regime == FREE:
-            return self.x0 + (self.v0 + 0.5 * self.a0 * t) * t, self.v0 + self.a0 * t
         if self.regime == UNDERDAMPED:
             half = 0.5 * self.w * t
             e, s, c = exp(-self.z * t), sin(half), cos(half)
@@ -131,8 +127,12 @@ class LinearClosedForm:
             # 1 - e cos is split to avoid cancellation at small t; needed only with a force
             integral = (e * (one_minus_cos - zg) - expm1(-self.z * t)) / self.n2 if self.p != 0.0 else 0.0
             g, slope = e * g, e * (1.0 - one_minus_cos - zg)
-        else:
+        elif self.regime == OVERDAMPED:
             g, slope, integral = self.overdamped_response(t)
+        elif self.regime == FREE:
+            return self.x0 + (self.v0 + 0.5 * self.a0 * t) * t, self.v0 + self.a0 * t
+        else:
+            return self.evaluate_growth(t)
         return (
             self.x0 * (slope + 2.0 * self.z * g) + self.v0 * g + self.p * integral,
             (self.p - self.n2 * self.x0) * g + self.v0 * slope,

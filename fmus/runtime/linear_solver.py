@@ -80,8 +80,9 @@ def solve(k, w, g, h, r, computed, moved):
         for p in moved:
             if (i, p) in w and p in r:
                 b = b + w[i, p] * r[p]
-        k[i] = subtract_products(b, w, i, k, computed[:n])
-    for n, i in reversed(list(enumerate(computed))):
+        b = subtract_products(b, w, i, k, computed[:n])
+        k[i] = b * w[i, i] if i == computed[-1] else b
+    for n, i in reversed(list(enumerate(computed[:-1]))):
         k[i] = subtract_products(k[i], w, i, k, computed[n + 1 :]) * w[i, i]
     for p, rate in moved.items():
         k[p] = g * (r[p] + h * k[rate]) if p in r else g * (h * k[rate])
@@ -124,8 +125,9 @@ def factorize_complex(w, re, im, J, computed, moved):
 def solve_complex(u, w, r, computed):
     """Solve for u, given the factorized matrix; r is zero for states whose rate is a state, and u has no such part."""
     for n, i in enumerate(computed):
-        u[i] = subtract_products(r[i], w, i, u, computed[:n])
-    for n, i in reversed(list(enumerate(computed))):
+        b = subtract_products(r[i], w, i, u, computed[:n])
+        u[i] = b * w[i, i] if i == computed[-1] else b
+    for n, i in reversed(list(enumerate(computed[:-1]))):
         u[i] = subtract_products(u[i], w, i, u, computed[n + 1 :]) * w[i, i]
 
 

@@ -31,7 +31,6 @@ from .vectors import (
     select_kinematic,
     slip_index,
     sum_of,
-    velocity_indices,
 )
 
 OVERFLOW_LIMIT = 1e100  # larger states are treated as divergence: squares, as in an energy, would overflow
@@ -76,7 +75,8 @@ class RoundoffCompensation:
 
     def carry(self):
         """Move the errors at the end of the last step to the start of the next one."""
-        self.t0, self.x0 = self.t1, self.x1
+        self.t0 = self.t1
+        self.x0 = self.x1
         self.t1 = 0.0
 
     def end_time(self, t0, h):
@@ -152,7 +152,8 @@ class InternalStep:
         """Start an empty step at t, given the previous modes; choose a step size unless nothing moves."""
         self.roundoff.t1 = self.roundoff.x1 = 0.0
         self.t1, self.y1 = t, y
-        self.raise_scale_floor(model, self.y1)
+        size = magnitude(self.y1)
+        self.active_method.raise_scale_floor(model, size)
         if model.has_conditions:
             conditions.initialize(model, self.event_location, t, self.y1, modes)
         if model.has_dry_friction:
@@ -164,27 +165,19 @@ class InternalStep:
             if self.h_next == 0.0 and self.active_method.method_number != EXACT:
                 self.h_next = self.initial_step_size()
                 size = START_SHARE * self.h_max * magnitude(self.f1)
-                self.raise_scale_floor(model, size)
+                self.active_method.raise_scale_floor(model, size)
         self.t0 = t
         self.save_counters()
         if model.has_dry_friction or model.has_conditions:
             phase_repetition.begin_phase(model, self)
 
-    def raise_scale_floor(self, model, y: StateVector):
-        """Raise the scale floor of the error norm to a share of the states that have been reached."""
-        method = self.active_method
-        floor = method.floor_share * magnitude(y)
-        method.error_scale_floor = elementwise_max(method.error_scale_floor, floor)
-        if model.has_nominal_velocity and method.floor_share > 0.0:
-            for i in velocity_indices:
-                if method.error_scale_floor[i] > method.nominal_velocity:
-                    method.error_scale_floor[i] = method.nominal_velocity
-
     def save_counters(self):
         """Save the counters at t1, where the next step starts."""
         counters = self.start_counters
-        counters.n_accepted, counters.n_rejected = self.n_accepted, self.n_rejected
-        counters.n_rhs, counters.h_next = self.n_rhs, self.h_next
+        counters.n_accepted = self.n_accepted
+        counters.n_rejected = self.n_rejected
+        counters.n_rhs = self.n_rhs
+        counters.h_next = self.h_next
 
     def restore_counters(self):
         """Restore the counters at t0 and discard those of the step."""
@@ -304,11 +297,9 @@ class InternalStep:
         roundoff = self.roundoff
         roundoff.carry()
         exact.start_segment(self.y0, self.f0, model.applied_acceleration(self.t0, self.modes0), roundoff.x0)
-        duration = inf
-        if model.has_dry_friction:
-            duration = exact.next_standstill(self.modes0)
         self.t1 = self.t_end if self.t_end - self.t0 <= exact.horizon else self.t0 + exact.horizon
         if model.has_dry_friction:
+            duration = exact.next_standstill(self.modes0)
             end = self.t0 + (duration + roundoff.t0)
             if end <= self.t1 and end < inf:
                 self.t1 = roundoff.event_time(self.t0, duration)
@@ -354,7 +345,7 @@ class InternalStep:
         tolerance = self.tolerance
         h_min = SHORTEST_STEP * self.h_max
         roundoff = self.roundoff
-        roundoff.t0, roundoff.t1 = roundoff.t1, 0.0
+        roundoff.t0 = roundoff.t1
         h_new = self.h_next if self.h_next < self.h_max else self.h_max
         if model.has_nominal_velocity and self.is_hybrid:
             y1 = y + h_new * f
@@ -366,7 +357,7 @@ class InternalStep:
         h = remaining if last else h_new
         scale = magnitude(y)
         method = self.active_method
-        self.raise_scale_floor(model, y)
+        method.raise_scale_floor(model, scale)
         scale = elementwise_max(method.error_scale_floor, scale)
         attempts = 0
         while True:
@@ -405,7 +396,7 @@ class InternalStep:
                 excess = change - ROUGH_CHANGE * h * most
                 d = rate1 / size2
                 if h * max_of(d) < ROUGH_CHANGE and max_of(excess) <= 0.0:
-                    self.raise_scale_floor(model, y1)
+                    method.raise_scale_floor(model, size1)
                     scale = elementwise_max(method.error_scale_floor, scale)
             if h <= h_min or attempts == MAX_TRIES:
                 return STALLED if error < inf and sum_of(size1) < OVERFLOW_LIMIT else DIVERGED
@@ -426,7 +417,7 @@ class InternalStep:
         self.h_next = h_new
         self.h_full = h
         if last:
-            self.t1 = self.t_end
+            self.t1, roundoff.t1 = self.t_end, 0.0
         else:
             self.t1 = roundoff.end_time(t, h)
         self.y1, self.f1 = y1, f1
