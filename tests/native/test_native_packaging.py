@@ -1,6 +1,7 @@
 """Contents of native FMUs: complete, reproducible, and compilable by other tools."""
 
 import os
+import shutil
 import subprocess
 import sys
 import xml.etree.ElementTree as ET
@@ -48,6 +49,20 @@ def smd():
     """smd, with one method, for every platform, and the output of the build."""
     out = build_for_all_platforms()
     return out / "smd.fmu", out.with_suffix(".txt").read_text()
+
+
+def test_tcc_gives_the_same_bits(tmp_path):
+    tcc = shutil.which("tcc") or pytest.skip("apt-get install tcc")
+    for name in MODELS:
+        fmu = build_native_fmus() / f"{name}.fmu"
+        folder = tmp_path / name
+        with zipfile.ZipFile(fmu) as archive:
+            archive.extractall(folder)
+        binary = folder / "binaries" / "linux64" / f"{name}.so"
+        subprocess.run([tcc, "-shared", "-o", binary, folder / "sources" / MAIN_SOURCE["2"], "-lm"], check=True)
+        for kind in ("CoSimulation", "ModelExchange"):
+            ours, theirs = (simulate_fmu(path, fmi_type=kind, stop_time=1.0).tobytes() for path in (fmu, folder))
+            assert ours == theirs, (name, kind)
 
 
 @pytest.mark.parametrize("name", MODELS)

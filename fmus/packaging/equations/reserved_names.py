@@ -56,8 +56,8 @@ C_NAMES = frozenset(
     auto break case char const continue default do double else enum extern float for goto if inline int long register
     restrict return short signed sizeof static struct switch typedef union unsigned void volatile while
     bool true false fault
-    BUFSIZ EOF FILENAME_MAX FOPEN_MAX HUGE_VAL HUGE_VALF HUGE_VALL INFINITY MODEL_GUID MODEL_H MODEL_NAME NAN NULL
-    NDEBUG NO_OFFSET RAND_MAX SEEK_CUR SEEK_END SEEK_SET TMP_MAX TOLERANCE errno offsetof stderr stdin stdout
+    BUFSIZ EOF FILENAME_MAX FOPEN_MAX HUGE_VAL HUGE_VALF HUGE_VALL INFINITY MINUS_INFINITY MODEL_GUID MODEL_H MODEL_NAME
+    NAN NULL NDEBUG NO_OFFSET RAND_MAX SEEK_CUR SEEK_END SEEK_SET TMP_MAX TOLERANCE errno offsetof stderr stdin stdout
     COLD FMI MAX_INTEGER STATUS_DISCARD STATUS_ERROR STATUS_OK
     DOMAIN EDOM ERANGE EXIT_FAILURE EXIT_SUCCESS HUGE OVERFLOW PLOSS SING TLOSS UNALIGNED UNDERFLOW environ matherr
     F_LOCK F_OK F_TEST F_TLOCK F_ULOCK L_INCR L_SET L_XTND L_tmpnam P_DETACH P_NOWAIT P_OVERLAY P_WAIT P_tmpdir R_OK

@@ -108,7 +108,7 @@ def c_literal(value: object) -> str:
     if value != value:
         return "NAN"
     if value in (inf, -inf):
-        return "INFINITY" if value > 0.0 else "-INFINITY"
+        return "INFINITY" if value > 0.0 else "MINUS_INFINITY"
     return "-0.0" if value == 0.0 and copysign(1.0, value) < 0.0 else repr(value)
 
 

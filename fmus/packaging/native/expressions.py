@@ -65,7 +65,7 @@ COMPARISONS: dict[type, tuple[str, int]] = {
 
 FAULT_CHECK = "if (*fault) {leave}"
 # Literals and local constants: evaluating them later gives the same value.
-STABLE_TEXT = re.compile(r"-?\d[\w.+-]*|-?INFINITY|NAN|true|false|_\d+")
+STABLE_TEXT = re.compile(r"-?\d[\w.+-]*|INFINITY|MINUS_INFINITY|NAN|true|false|_\d+")
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,13 @@
 #pragma fp_contract(off)
 #endif
 
+/* In a static table, tcc accepts no minus in front of INFINITY. */
+#if defined(__TINYC__)
+#define MINUS_INFINITY (-1.0 / 0.0)
+#else
+#define MINUS_INFINITY (-INFINITY)
+#endif
+
 static inline double py_divide(double a, double b, bool *fault)
 {
     if (b == 0.0) {
