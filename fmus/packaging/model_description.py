@@ -11,8 +11,9 @@ from typing import Any
 from uuid import NAMESPACE_OID, uuid5
 from xml.etree.ElementTree import Element, SubElement, tostring
 
+from ..runtime.run_state import RunState
 from ..runtime.variable_access import SETTABLE_CAUSALITIES
-from ..runtime.variable_declarations import VariableDeclaration, VariableOwner
+from ..runtime.variable_declarations import VariableDeclaration, VariableOwner, variables
 from . import __version__
 from .dependencies import output_dependencies
 from .equations.declaration_options import OPTIONS
@@ -48,6 +49,7 @@ REAL_ONLY_HINT = (  # in the description of every other FMU
     "For hosts that read or set every variable as a Real, build it with --real-only; for hosts without Python, with "
     "--native."
 )
+ANNOTATION = "friction-fmus"  # which the harness reads
 EXPERIMENT_ATTRIBUTES = {"stopTime": "stop_time", "tolerance": "tolerance", "stepSize": "step_size"}
 LOG_CATEGORIES = {
     "logStatusWarning": "Messages with status {fmi}Warning.",
@@ -86,6 +88,7 @@ def describe(model: Any, name: str, code: str, date: datetime, nominals: Sequenc
     add_units(root, declared)
     _add_types(root, declared)
     add_log_categories_and_experiment(root, model, "fmi2")
+    add_fixed_choices(root, model, "VendorAnnotations", "Tool", "name")
     scalars = SubElement(root, "ModelVariables")
     positions = {variable: str(number) for number, (variable, _) in enumerate(declared, 1)}
     for reference, (variable, meaning) in enumerate(declared):
@@ -107,6 +110,22 @@ def create_root(model: Any, name: str, version: str, key: str) -> Element:
     root.attrib |= {"author": "friction-fmus", "version": __version__, "license": "MIT"}
     root.attrib |= {"generationTool": f"friction-fmus {__version__}", "variableNamingConvention": "structured"}
     return root
+
+
+def add_fixed_choices(root: Element, model: Any, group: str, element: str, key: str) -> None:
+    """Add an annotation with the method and law of an FMU with Reals only, where they are no variables.
+
+    `group` and `element` are the elements of annotations, and `key` is the attribute with the name of the tool.
+    """
+    if not model.real_only:
+        return
+    instance = model()
+    offered = {name for name, _ in declared_variables(model)}
+    choices = SubElement(SubElement(SubElement(root, group), element, {key: ANNOTATION}), "FixedChoices")
+    for name, meaning in variables(instance) + variables(RunState(instance)):
+        for label, value, _ in meaning.items:
+            if name not in offered and value == meaning.start:
+                SubElement(choices, "Choice", name=name, label=label, value=str(value))
 
 
 def serialize(root: Element, key: str, code: str, date: datetime) -> bytes:

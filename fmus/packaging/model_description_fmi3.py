@@ -64,6 +64,7 @@ def describe(model: type[VariableOwner], name: str, code: str, date: datetime, n
             SubElement(element, "Alias", name=meaning.alias, description=meaning.text)
     shared.mark_states(list(elements), model, rates, nominals, first=0)
     _add_structure(root, model, declared, rates)
+    shared.add_fixed_choices(root, model, "Annotations", "Annotation", "type")
     return shared.serialize(root, "instantiationToken", code, date)
 
 

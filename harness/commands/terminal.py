@@ -210,7 +210,7 @@ def refuse_ignored_options(
     timeout_is_ignored : bool
         Whether the command limits no time of FMUs of this project.
     """
-    from ..running.fmu_archive import exposes_solver_steps, read_description
+    from ..running.fmu_archive import exposes_solver_steps, read_description, read_fixed_choices
 
     files, uses_exchange = list(fmus), context.params["exchange"] or context.params["interface"] == MODEL_EXCHANGE
     if not files:
@@ -221,13 +221,18 @@ def refuse_ignored_options(
         if all(map(exposes_solver_steps, descriptions)):
             reason = f"on {files[0].name}, which runs at the steps of its own solver"
             refuse_options(context, reason, *["tolerance"] * tolerance_is_ignored, *["timeout"] * timeout_is_ignored)
-            if all(uses_closed_form(description, context.params.get("values", ())) for description in descriptions):
-                reason = f"on {files[0].name} with the method {EXACT}, a closed form: set solver.method as well"
+            methods = [read_fixed_choices(file).get("solver.method", ("", 0))[0] for file in files]
+            assignments = context.params.get("values", ())
+            if all(uses_closed_form(*pair, assignments) for pair in zip(descriptions, methods, strict=True)):
+                remedy = "" if all(methods) else ": set solver.method as well"
+                reason = f"on {files[0].name} with the method {EXACT}, a closed form{remedy}"
                 refuse_options(context, reason, "tolerance")
 
 
-def uses_closed_form(description: Any, assignments: Iterable[str]) -> bool:
+def uses_closed_form(description: Any, fixed_method: str, assignments: Iterable[str]) -> bool:
     """Return whether an FMU of this project is run by its closed form, which has no tolerance."""
+    if fixed_method:
+        return fixed_method == EXACT
     method = next(variable for variable in description.modelVariables if variable.name == "solver.method")
     labels = {str(item.value): item.name for item in method.declaredType.items}
     values = dict(text.partition("=")[::2] for text in assignments)

@@ -107,6 +107,18 @@ def validate_description(path: Path, lenient: bool) -> Any:
     return description
 
 
+@cached_by_mtime
+def read_fixed_choices(path: Path) -> dict[str, tuple[str, int]]:
+    """Return label and number of the method and law that an FMU of this project has no variable for, by name.
+
+    A build with Reals only fixes them, and states them in an annotation.
+    """
+    with ZipFile(path) as archive, archive.open(DESCRIPTION_FILE) as file:
+        root = ElementTree.parse(file).getroot()
+    choices = (choice for group in root.iter("FixedChoices") for choice in group)
+    return {choice.attrib["name"]: (choice.attrib["label"], int(choice.attrib["value"])) for choice in choices}
+
+
 def read_leniently(path: Path) -> Any:
     """Read the model description of an FMU or of a folder without validation.
 

@@ -5,6 +5,8 @@ from typing import Any
 
 from ..scenes.fmu_files import find_fmu
 from ..scenes.run_spec import RunSpec
+from .fmu_archive import read_fixed_choices
+from .fmu_variables import METHOD
 from .runner import read_own_description
 from .variable_values import enumeration_labels
 
@@ -28,7 +30,8 @@ class FmuInfo:
 
 def read_info(model: str) -> FmuInfo:
     """Return the capabilities of a model's FMU."""
-    description = read_own_description(RunSpec(find_fmu(model)))
+    fmu = find_fmu(model)
+    description = read_own_description(RunSpec(fmu))
     settable = [variable for variable in description.modelVariables if variable.causality in ("parameter", "input")]
     enumerations = {variable.name: variable for variable in settable if variable.type == "Enumeration"}
     choices = {
@@ -39,6 +42,8 @@ def read_info(model: str) -> FmuInfo:
         variable.name: int(variable.start) if variable.name in choices else float(variable.start)
         for variable in settable
     }
-    methods = {number: label for label, number in choices["solver.method"].items()}
-    default = methods[int(defaults["solver.method"])]
+    fixed = read_fixed_choices(fmu)
+    choices |= {name: {label: number} for name, (label, number) in fixed.items()}
+    methods = {number: label for label, number in choices[METHOD].items()}
+    default = methods[fixed[METHOD][1] if METHOD in fixed else int(defaults[METHOD])]
     return FmuInfo(tuple(methods.values()), default, defaults, choices, float(description.defaultExperiment.stopTime))

@@ -1,14 +1,14 @@
 """Variables of any FMU as data: units, start values, ranges, friction laws, methods and defaults."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..arguments import CO_SIMULATION, MODEL_EXCHANGE
 from ..errors import import_optional
-from .fmu_archive import read_description
+from .fmu_archive import read_description, read_fixed_choices
 from .variable_values import effective_value, enumeration_labels, find_bound, variable_unit
 
 if TYPE_CHECKING:
@@ -83,6 +83,8 @@ class FmuDescription:
         Start and stop in s and relative tolerance of a default run.
     variables : tuple of VariableInfo
         All variables, in the order of the model description.
+    fixed : dict
+        Labels of the method and the law that a build with Reals only fixed, by the name of the absent variable.
     """
 
     name: str
@@ -93,6 +95,7 @@ class FmuDescription:
     stop: float | None
     tolerance: float | None
     variables: tuple[VariableInfo, ...]
+    fixed: dict[str, str] = field(default_factory=dict)
 
     @property
     def laws(self) -> tuple[str, ...]:
@@ -128,7 +131,8 @@ class FmuDescription:
             yield f"Default run: {self.start or 0.0:g} to {self.stop:g} s{accuracy}"
         for word, name, choices in (("Friction laws", LAW, self.laws), ("Methods", METHOD, self.methods)):
             if choices:
-                yield f"{word} ({name}): {', '.join(choices)}; default {self[name].start}"
+                default = "fixed by the build" if name in self.fixed else f"default {self[name].start}"
+                yield f"{word} ({name}): {', '.join(choices)}; {default}"
 
     def groups(self) -> Iterator[tuple[str, list[VariableInfo]]]:
         """Yield the title and the variables of each group that is not empty; internal variables are the last one."""
@@ -175,7 +179,8 @@ class FmuDescription:
         return "".join(parts)
 
     def _choices(self, name: str) -> tuple[str, ...]:
-        return next((variable.choices for variable in self.variables if variable.name == name), ())
+        fixed = (self.fixed[name],) if name in self.fixed else ()
+        return next((variable.choices for variable in self.variables if variable.name == name), fixed)
 
 
 def describe_fmu(path: Path) -> FmuDescription:
@@ -198,6 +203,7 @@ def describe_fmu(path: Path) -> FmuDescription:
         stop=read_number(experiment, "stopTime"),
         tolerance=read_number(experiment, "tolerance"),
         variables=tuple(map(describe_variable, content.modelVariables)),
+        fixed={name: label for name, (label, _) in read_fixed_choices(path).items()},
     )
 
 

@@ -20,7 +20,14 @@ from ..errors import HarnessError, SceneError, check_names, format_value
 from ..process.interrupt import check_interrupt
 from ..scenes.run_spec import RunSpec
 from ..scenes.scene import SHORT_KEYS
-from .fmu_archive import REQUIRED_VARIABLES, exposes_solver_steps, read_description, resolve_time_span, unpack
+from .fmu_archive import (
+    REQUIRED_VARIABLES,
+    exposes_solver_steps,
+    read_description,
+    read_fixed_choices,
+    resolve_time_span,
+    unpack,
+)
 from .fmu_session import CALL_FAILURES, FmuSession, LogCapture, capture_stderr
 from .recorder import Columns, Recorder, ShapedVariable, default_outputs, read_rows
 from .stepping import (
@@ -254,18 +261,24 @@ def check_fmu(run: RunSpec, variables: dict[str, Any]) -> None:
 def resolve_settings(run: RunSpec, variables: dict[str, Any]) -> list[tuple[Any, float | int]]:
     """Return variables and values to set before the run, checked against their declared ranges."""
     settable = [name for name, variable in variables.items() if variable.causality in ("parameter", "input")]
+    fixed = read_fixed_choices(run.fmu)
+    for name in run.values.keys() & fixed.keys():
+        if run.values[name] not in fixed[name]:
+            setting = f"{name} = {format_value(run.values[name])}"
+            raise SceneError(f"{setting}: {run.fmu.name} was built with {fixed[name][0]} only; remove it")
+    values = {name: value for name, value in run.values.items() if name not in fixed}
     for key, name in SHORT_KEYS.items():
-        if name in run.values and name not in variables:
-            setting = f"{key} = {format_value(run.values[name])}"
+        if name in values and name not in variables:
+            setting = f"{key} = {format_value(values[name])}"
             raise SceneError(f"{setting}: {run.model} has no such choice; remove {key}")
-    for name, value in run.values.items():
+    for name, value in values.items():
         if name in variables and name not in settable:
             raise SceneError(
                 f"{name} = {format_value(value)}: {name} is calculated; to set the start value of a state, "
                 f"declare a Fixed in the model and pass it as start=; allowed: {', '.join(sorted(settable))}"
             )
-    check_names("name in [values]", run.values, settable)
-    return [(variables[name], convert_value(variables[name], value)) for name, value in run.values.items()]
+    check_names("name in [values]", values, settable)
+    return [(variables[name], convert_value(variables[name], value)) for name, value in values.items()]
 
 
 def run_repeats(plan: RunPlan, session: FmuSession, report: ProgressCallback) -> Trajectory:
@@ -319,7 +332,7 @@ def build_trajectory(plan: RunPlan, session: FmuSession, recorded: RecordedRun, 
     if spec.follow:
         ends = find_step_ends(time, samples["solver.t_next"], plan.grid.tolerance)
         steps = SolverSteps(time[ends], np.diff(time[ends]), np.diff(samples["solver.rejected"][ends]))
-    effective = read_parameters(session)
+    effective = read_parameters(session, spec.fmu)
     if spec.follow and effective.get("friction") == "hybrid":
         at = np.flatnonzero(np.diff(samples["events.count"])) + 1
         rows = np.append(0, at)
@@ -329,7 +342,7 @@ def build_trajectory(plan: RunPlan, session: FmuSession, recorded: RecordedRun, 
         spec=spec,
         time=time,
         columns=columns,
-        units={name: variable_unit(variables[name]) for name in [*columns, *effective]},
+        units={name: variable_unit(variables[name]) if name in variables else "" for name in [*columns, *effective]},
         descriptions={name: variables[name].description or name for name in columns},
         parameters=effective,
         steps=steps,
@@ -358,9 +371,10 @@ def read_statistics(session: FmuSession, seconds: float) -> Statistics:
     return Statistics(steps, rejected, evaluations, seconds, session.get("events.count"), session.get("events.t_last"))
 
 
-def read_parameters(session: FmuSession) -> dict[str, float | str]:
-    """Return the value of every parameter: reals in SI units, enumerations by label."""
-    return {
+def read_parameters(session: FmuSession, fmu: Path) -> dict[str, float | str]:
+    """Return the value of every parameter: reals in SI units, enumerations by label, also those that are fixed."""
+    fixed: dict[str, float | str] = {name: label for name, (label, _) in read_fixed_choices(fmu).items()}
+    return fixed | {
         name: enumeration_labels(variable)[session.get(name)] if variable.type == "Enumeration" else session.get(name)
         for name, variable in session.variables.items()
         if variable.causality == "parameter"

@@ -55,12 +55,9 @@ def initialize(session: FmuSession, spec: RunSpec) -> None:
 
 
 def settings(session: FmuSession, values: dict[str, float]) -> list[tuple[Any, float]]:
-    """Return pairs of variable and value, from values by name."""
-    variables = [session.variables[name] for name in values]
-    return [
-        (variable, value if variable.type in REAL_TYPES else int(value))
-        for variable, value in zip(variables, values.values(), strict=True)
-    ]
+    """Return pairs of variable and value, from values by name; a choice that the build fixed is no variable."""
+    given = [(session.variables[name], value) for name, value in values.items() if name in session.variables]
+    return [(variable, value if variable.type in REAL_TYPES else int(value)) for variable, value in given]
 
 
 def set_values(session: FmuSession, values: dict[str, float]) -> None:

@@ -10,6 +10,9 @@ from fmpy import read_model_description
 from models import HYBRID, MODELS, declared, outputs
 
 from fmus.runtime.codes import NO_VALUE
+from harness import describe, simulate, sweep
+from harness.errors import SceneError
+from harness.running.fmu_info import read_info
 
 OPTIONS = {
     "python": (),
@@ -18,6 +21,7 @@ OPTIONS = {
 }
 REAL = {"python": "Real", "native": "Real", "FMI 3.0": "Float64"}
 STEP, STEPS = 0.05, 40
+FMI2 = pytest.mark.parametrize("backend", ["python", "native"], indirect=True, scope="module")  # with internal steps
 
 
 @pytest.fixture(scope="module", params=OPTIONS)
@@ -59,6 +63,29 @@ def test_the_variables_are_reals_and_have_the_same_values(folders, backend, work
     assert present == {variable.name for variable in read_model_description(everything).modelVariables} - absent
     names = [*outputs(name), "events.count", "solver.steps", "solver.evaluations"]
     assert motion(worker.instantiate(reals), names) == motion(worker.instantiate(everything), names)
+
+
+@FMI2
+def test_results_state_the_method_and_the_law_that_the_build_fixed(folders):
+    """Events are those of the FMU with all variables, which the harness finds by the law."""
+    everything, reals = (simulate(folder / "coulomb.fmu") for folder in folders)
+    assert reals.settings_label == everything.settings_label == "exact, hybrid"
+    assert reals.events is not None
+    assert reals.events.t.tolist() == everything.events.t.tolist()
+    assert reals.parameters.keys() == everything.parameters.keys()
+
+
+@FMI2
+def test_commands_work_with_the_choices_of_the_build(folders):
+    fmu = folders[1] / "coulomb.fmu"
+    described = describe(fmu)
+    assert (described.laws, described.methods) == (("hybrid",), ("exact",))
+    assert "Friction laws (friction): hybrid; fixed by the build" in described.summary()
+    assert read_info(str(fmu)).default_method == "exact"
+    assert simulate(fmu, {"friction": "hybrid"}, method="exact").settings_label == "exact, hybrid"
+    with pytest.raises(SceneError, match=r"solver.method = 'ode23': coulomb.fmu was built with exact only; remove it"):
+        simulate(fmu, method="ode23")
+    assert "2 runs, 0 of them resumed, 0 failed" in str(sweep(fmu, {"f": [0.3, 0.4]}, workers=1))
 
 
 def test_a_failed_run_leaves_no_mode_that_could_be_a_result(folders, backend, worker):

@@ -116,7 +116,8 @@ class OwnFmuRunner:
     def constants(self) -> dict[str, tuple[object, str]]:
         """Return value and unit of every parameter in the last run."""
         return {
-            name: (value, variable_unit(self.variables[name])) for name, value in read_parameters(self.session).items()
+            name: (value, variable_unit(self.variables[name]) if name in self.variables else "")
+            for name, value in read_parameters(self.session, self.plan.spec.fmu).items()
         }
 
 
