@@ -67,7 +67,8 @@ def curve(
     viscous, Tustin and Stribeck friction, equal in both directions or not.  A constant bias is removed.
 
     The results are the constants of each law with 95 % confidence intervals, the Bayesian information criterion (BIC)
-    of each law, the points that do not fit, values for models, the curve as a table, and a model file.
+    of each law, the points that do not fit, values for models, the curve as a table, and model files with the best law
+    and with the table.
 
     \b
     Examples:

@@ -12,27 +12,6 @@ SPEEDS = np.geomspace(1e-3, 0.3, 10)
 V = np.concatenate([SPEEDS, -SPEEDS])
 FORWARD, BACKWARD = (10.0, 16.0, 0.02, 20.0), (8.0, 11.0, 0.03, 30.0)
 
-SLIDE = '''from fmus import Contact, Mode, Model, Output, Parameter, State, Table, fabs
-
-
-class Slide(Model):
-    """Slide that a driver of constant speed pulls through a spring, with measured friction."""
-
-    m = Parameter(1.0, "kg", "mass", above=0.0)
-    k = Parameter(2e3, "N/m", "stiffness of the spring", low=0.0)
-    v_driver = Parameter(5e-3, "m/s", "speed of the driver")
-    guide = Table("table.csv")
-
-    x = State("m", "position")
-    v = State("m/s", "speed", rate_of=x)
-    driver = State("m", "position of the driver", rate=v_driver)
-    mode = Mode()
-    F_friction = Contact("N", "friction force", mode=mode, slip=v, slide=guide(fabs(v)))
-    a = Output("m/s2", "acceleration", (k * (driver - x) - F_friction) / m, rate_of=v)
-
-    stop_time, step_size = 10.0, 0.002
-'''
-
 
 def friction(v, constants):
     F_c, F_s, v_s, F_v = constants
@@ -85,24 +64,29 @@ def test_a_result_goes_on_to_models_and_tables(tmp_path):
         np.testing.assert_allclose(force, friction(speed, FORWARD), atol=0.1)
 
 
-def test_points_become_an_fmu_whose_table_has_their_friction(tmp_path):
-    """It sticks and slips, and slides with the friction of the points: half the difference of both directions."""
-    write_points(tmp_path / "bench.csv", "v [m/s],F [N]", BACKWARD)
+@pytest.mark.parametrize("backward", [FORWARD, BACKWARD])
+def test_the_fmu_of_the_table_has_the_friction_of_the_points(tmp_path, backward):
+    """It sticks and slips in both directions, and slides with the friction of the points, less their mean bias."""
+    write_points(tmp_path / "bench.csv", "v [m/s],F [N]", backward)
     done = commands.harness(tmp_path, "curve", "bench.csv", blank=True)
     assert done.returncode == 0, done.stderr
-    (tmp_path / "table.csv").write_bytes((tmp_path / "results" / "curve" / "bench" / "table.csv").read_bytes())
-    (tmp_path / "slide.py").write_text(SLIDE)
-    built = commands.build("slide.py", folder=tmp_path)
+    folder = tmp_path / "results" / "curve" / "bench"
+    built = commands.build("results/curve/bench/measured_table.py", folder=tmp_path)
     assert built.returncode == 0, built.stderr
-    run = harness.simulate(tmp_path / "slide.fmu")
-    assert (np.diff(run["mode"]) > 0).sum() > 3
-    slides = run["v"] > 1e-6
-    assert run["v"][slides].max() > 5.0 * SPEEDS[0]
-    points = np.loadtxt(tmp_path / "bench.csv", delimiter=",", skiprows=1)
-    forward, backward = (points[: len(SPEEDS), 1], points[len(SPEEDS) :, 1])
-    expected = np.interp(run["v"][slides], SPEEDS, 0.5 * (forward - backward))
-    np.testing.assert_allclose(run["F_friction"][slides], expected, rtol=1e-12)
-    assert run["F_friction"][~slides].max() == pytest.approx(0.5 * (forward - backward)[0], rel=5e-3)
+    force = np.loadtxt(tmp_path / "bench.csv", delimiter=",", skiprows=1)[:, 1].reshape(2, -1)
+    bias = harness.load_result(folder).best.bias
+    forward, reverse = force[0] - bias, bias - force[1]
+    if backward is FORWARD:
+        forward = reverse = 0.5 * (forward + reverse)
+    for sign, expected in (1.0, forward), (-1.0, reverse):
+        run = harness.simulate(folder / "measured_table.fmu", {"v_driver": sign * 5e-3, "k": 2e3})
+        assert (np.diff(sign * run["mode"]) > 0).sum() > 3
+        speed = sign * run["v"]
+        slides = speed > 1e-6
+        assert speed[slides].max() > 5.0 * SPEEDS[0]
+        friction = sign * run["F_friction"]
+        np.testing.assert_allclose(friction[slides], np.interp(speed[slides], SPEEDS, expected), rtol=1e-12)
+        assert friction[~slides].max() == pytest.approx(expected[0], rel=0.05)
 
 
 @pytest.mark.parametrize(

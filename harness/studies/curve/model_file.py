@@ -1,4 +1,4 @@
-"""A model file with the identified friction: a body that a driver of constant speed pulls through a spring."""
+"""Model files with the identified friction: a body that a driver of constant speed pulls through a spring."""
 
 from dataclasses import dataclass
 
@@ -6,7 +6,8 @@ import numpy as np
 
 from ...analyses.curve.identification import CurveIdentification
 
-MODEL_FILE = "measured.py"
+LAW_MODEL, TABLE_MODEL = "measured.py", "measured_table.py"  # files
+NEXT_LINE = "\n    "
 TIME_TO_SLIP = 1.0  # s, after which the spring of the default run exceeds the static friction
 
 
@@ -30,23 +31,81 @@ LINEAR = Names("m", "kg", "N/m", "x", "m", "v", "a", "m/s2", "F", "force")
 ROTATION = Names("J", "kg.m2", "N.m/rad", "theta", "rad", "omega", "alpha", "rad/s2", "T", "torque")
 
 
-def write_model(result: CurveIdentification) -> str:
-    """Return the text of the model file."""
+@dataclass(frozen=True)
+class Friction:
+    """Friction of a model file.
+
+    Attributes
+    ----------
+    title : str
+        Name of the class of the model.
+    text : str
+        Line of its docstring.
+    imports : str
+        Names that the expressions need.
+    declarations : list of str
+        Parameters or tables.
+    sliding : list of str
+        Expressions over `speed`: one for both directions, or one for each.
+    holding : list of str
+        Limits of sticking; empty if these are the sliding friction at rest.
+    """
+
+    title: str
+    text: str
+    imports: str
+    declarations: list[str]
+    sliding: list[str]
+    holding: list[str]
+
+
+def write_law_model(result: CurveIdentification) -> str:
+    """Return the text of the model file with the best law."""
+    best = result.best
+    law = best.law
+    suffixes = ("",) if law.is_symmetric else ("+", "-")
+    friction = Friction(
+        "Measured",
+        law.text,
+        ", exp" * bool(law.exponent) + ", fabs",
+        [
+            f'{symbol(item.name)} = Parameter({item.value:.9g}, "{item.unit}", "{item.text}")'
+            for item in best.estimates
+            if item.name != "bias"
+        ],
+        [friction_expression(law.exponent, law.is_viscous, suffix) for suffix in suffixes],
+        [symbol("F_s" if law.exponent else "F_c", suffix) for suffix in suffixes],
+    )
+    return write_model(result, friction)
+
+
+def write_table_model(result: CurveIdentification) -> str:
+    """Return the text of the model file that reads the measured friction from the table beside it."""
+    names = ["friction"] if result.best.law.is_symmetric else ["forward", "backward"]
+    friction = Friction(
+        "MeasuredTable",
+        "The friction is linear between the points of the table, and constant below the first and above the last one",
+        ", Table, fabs",
+        [f'{name}_table = Table("{table_file(name)}")' for name in names],
+        [f"{name}_table(speed)" for name in names],
+        [],
+    )
+    return write_model(result, friction)
+
+
+def write_model(result: CurveIdentification, friction: Friction) -> str:
+    """Return the text of a model file with this friction."""
     best, points = result.best, result.points
     names = LINEAR if points.force_unit == "N" else ROTATION
-    suffixes = ("",) if best.law.is_symmetric else ("+", "-")
-    sliding = ["sliding"] if best.law.is_symmetric else ["forward", "backward"]
-    curves = [
-        f"    {name} = {friction_expression(best.law.exponent, best.law.is_viscous, suffix)}"
-        for name, suffix in zip(sliding, suffixes, strict=True)
-    ]
-    holding = [symbol("F_s" if best.law.exponent else "F_c", suffix) for suffix in suffixes]
     force, kind = names.force, names.kind
-    slide, hold = (terms[0] if len(terms) == 1 else f"0.5 * ({terms[0]} + {terms[1]})" for terms in (sliding, holding))
-    contact = f"{force}_friction" if best.law.is_symmetric else f"{force}_mean"
+    is_symmetric = len(friction.sliding) == 1
+    sliding = ["sliding"] if is_symmetric else ["forward", "backward"]
+    curves = [f"{name} = {text}" for name, text in zip(sliding, friction.sliding, strict=True)]
+    limits = [f"slide={mean_of(sliding)}"] + ([f"hold={mean_of(friction.holding)}"] if friction.holding else [])
+    contact = f"{force}_friction" if is_symmetric else f"{force}_mean"
     asymmetry = (
         ""
-        if best.law.is_symmetric
+        if is_symmetric
         else f"""
     {force}_friction = Output(
         "{points.force_unit}",
@@ -56,29 +115,23 @@ def write_model(result: CurveIdentification) -> str:
     )
     static = max(best.values.get(name, 0.0) for name in ("F_s", "F_c", "F_s+", "F_s-", "F_c+", "F_c-"))
     speed = default_speed(result)
-    declarations = [
-        f'    {symbol(item.name)} = Parameter({item.value:.9g}, "{item.unit}", "{item.text}")'
-        for item in best.estimates
-        if item.name != "bias"
-    ]
-    imports = "Contact, Fixed, Input, Mode, Model, Output, Parameter, State"
-    imports += ", exp" * bool(best.law.exponent) + ", fabs"
+    imports = "Contact, Fixed, Input, Mode, Model, Output, Parameter, State" + friction.imports
     return f'''"""Body on a spring, with measured friction."""
 
 from fmus import {imports}
 
 
-class Measured(Model):
+class {friction.title}(Model):
     """Body that a driver of constant speed pulls through a spring; friction identified from {one_line(points.name)}.
 
-    {best.law.text}.
+    {friction.text}.
     """
 
     {names.inertia} = Parameter({result.mass or 1.0:.9g}, "{names.inertia_unit}", "inertia", above=0.0)
     k = Parameter({static / (speed * TIME_TO_SLIP):.4g}, "{names.stiffness_unit}", "stiffness of the spring", low=0.0)
     v_driver = Parameter({speed:.4g}, "{points.velocity_unit}", "speed of the driver")
     bias = Parameter({best.bias:.9g}, "{points.force_unit}", "constant {kind} against the motion, such as gravity")
-{chr(10).join(declarations)}
+    {NEXT_LINE.join(friction.declarations)}
     {names.position}0 = Fixed(0.0, "{names.position_unit}", "initial position")
     {names.velocity}0 = Fixed(0.0, "{points.velocity_unit}", "initial speed")
     {force}_ext = Input(0.0, "{points.force_unit}", "external {kind}")
@@ -89,15 +142,14 @@ class Measured(Model):
     mode = Mode()
 
     speed = fabs({names.velocity})
-{chr(10).join(curves)}
+    {NEXT_LINE.join(curves)}
     {force}_spring = Output("{points.force_unit}", "{kind} of the spring", k * (driver - {names.position}))
     {contact} = Contact(
         "{points.force_unit}",
-        "{"friction " + kind + ", opposing the motion" if best.law.is_symmetric else "mean of both directions"}",
+        "{"friction " + kind + ", opposing the motion" if is_symmetric else "mean of both directions"}",
         mode=mode,
         slip={names.velocity},
-        slide={slide},
-        hold={hold},
+        {(NEXT_LINE + "    ").join(f"{limit}," for limit in limits)}
     ){asymmetry}
     {names.acceleration} = Output(
         "{names.acceleration_unit}",
@@ -108,6 +160,16 @@ class Measured(Model):
 
     stop_time, step_size = {10 * TIME_TO_SLIP}, {0.01 * TIME_TO_SLIP}
 '''
+
+
+def table_file(name: str) -> str:
+    """Return the file of a column of `tabulate`."""
+    return "table.csv" if name == "friction" else f"table-{name}.csv"
+
+
+def mean_of(terms: list[str]) -> str:
+    """Return the expression of one term, or of the mean of two."""
+    return terms[0] if len(terms) == 1 else f"0.5 * ({terms[0]} + {terms[1]})"
 
 
 def symbol(name: str, suffix: str = "") -> str:

@@ -11,7 +11,7 @@ from ...analyses.curve.identification import CurveIdentification
 from ...results.files import column_heading, to_json, write_csv
 from ...results.result import Result
 from ...results.summary import Summary
-from .model_file import MODEL_FILE, write_model
+from .model_file import LAW_MODEL, TABLE_MODEL, table_file, write_law_model, write_table_model
 from .model_values import model_values, tabulate
 from .table import constants_table, laws_table, models_table, sentences, summarize_curve
 
@@ -106,7 +106,7 @@ class CurveResult(Result, CurveIdentification):
         }
 
     def write_tables(self, folder: Path) -> None:
-        """Write curve.json, points, tables and model file."""
+        """Write curve.json, points, tables and model files."""
         points = self.points
         velocity, force = points.velocity_unit, points.force_unit
         (folder / "curve.json").write_text(to_json(self.as_json()) + "\n", encoding="utf-8")
@@ -116,9 +116,9 @@ class CurveResult(Result, CurveIdentification):
         headings = [column_heading("speed", velocity), column_heading("friction", force)]
         speed, *frictions = self.table().items()
         for name, values in frictions:  # as `Table` of a model file reads them: two columns
-            file = "table.csv" if name == "friction" else f"table-{name}.csv"
-            write_csv(folder / file, headings, [speed[1], values])
-        (folder / MODEL_FILE).write_text(write_model(self), encoding="utf-8")
+            write_csv(folder / table_file(name), headings, [speed[1], values])
+        (folder / LAW_MODEL).write_text(write_law_model(self), encoding="utf-8")
+        (folder / TABLE_MODEL).write_text(write_table_model(self), encoding="utf-8")
 
     def draw(self, figure: "Figure") -> None:
         from .figure import draw

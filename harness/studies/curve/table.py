@@ -9,7 +9,7 @@ from ...analyses.curve.law_fit import LawFit
 from ...analyses.estimation.estimate import Estimate
 from ...results.quantity import format_interval
 from ...results.summary import Summary, make_terminal_table, read_cells
-from .model_file import MODEL_FILE
+from .model_file import LAW_MODEL
 from .model_values import LINEAR_FORCE, assignments, law_of_models, model_values
 
 
@@ -70,13 +70,13 @@ def describe_models(identification: CurveIdentification) -> list[str]:
     """Return the sentences on the values for models."""
     fit, best = law_of_models(identification), identification.best
     if identification.points.force_unit != LINEAR_FORCE:
-        return [f"The models of this project with such friction move along a line; {MODEL_FILE} rotates."]
+        return [f"The models of this project with such friction move along a line; {LAW_MODEL} rotates."]
     if fit is None:
-        return [f"No model of this project has this friction; {MODEL_FILE} has it."]
+        return [f"No model of this project has this friction; {LAW_MODEL} has it."]
     lines = []
     if fit.name != best.name:
         lines.append(
-            f"The models have the law {fit.name}, whose BIC is larger by {fit.bic - best.bic:.1f}; {MODEL_FILE} has "
+            f"The models have the law {fit.name}, whose BIC is larger by {fit.bic - best.bic:.1f}; {LAW_MODEL} has "
             "the best law."
         )
     if identification.mass is None:
