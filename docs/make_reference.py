@@ -71,7 +71,7 @@ COUPLED_TEXTS = {
     "parts": "One table for each FMU, as in `[parts.left]`.",
     "springs": "Springs and dampers between two parts, as in `[[springs]]`.",
     "connections": "Outputs that drive an input of another part, as in `[[connections]]`.",
-    "model": "`smd`, `coulomb` or `stickslip`, which have a reference solution; or the path of an FMU.",
+    "model": "A model, of which `smd`, `coulomb` and `stickslip` have a reference solution; or the path of an FMU.",
     "values": "Parameters of the part, in SI units.",
     "between": "The names of two parts. The spring exerts no force when their positions are equal.",
     "k": "Stiffness in N/m.",

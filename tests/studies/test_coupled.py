@@ -12,11 +12,12 @@ from pathlib import Path
 import commands
 import numpy as np
 import pytest
-from build_cache import ROOT, cached_folder
+from build_cache import ROOT, build_user_model, cached_folder
 from fmpy.ssp.ssd import read_ssd
 from prescribed_motion import solve_block
 from spec_runs import ignore_progress
 
+import harness
 from harness.errors import HarnessError, SceneError
 from harness.references.single_model_reference import CoupledBodies, solve_bodies
 from harness.scenes.coupled.scene import shipped_coupled_scenes
@@ -114,17 +115,18 @@ def test_a_connection_with_a_factor_pushes_in_its_direction(couple, tmp_path, fa
     assert table[:, 2] == pytest.approx(expected, abs=2e-3)
 
 
-def write_page_files(page, folder):
-    """Write the files of a page of the documentation, and build its models."""
+def write_page_files(folder, *models):
+    """Write the files of the page of the documentation, and build these models."""
+    page = ROOT / "docs/how-to/coupled.md"
     for name, text in re.findall(r'```\w+ title="([^"]+)"\n(.*?)```', page.read_text(), re.S):
         (folder / name).write_text(text)
-    for name in "belt.py", "block.py":
+    for name in models:
         assert commands.build(name, folder=folder).returncode == 0
 
 
 def test_a_belt_carries_a_block_of_another_fmu(couple, workspace):
     """Position, speed and acceleration are connected; the reference is scipy with events."""
-    write_page_files(ROOT / "docs/how-to/coupled.md", workspace)
+    write_page_files(workspace, "belt.py", "block.py")
     done = couple("carried.toml", "--json")
     assert (done.returncode, done.stderr) == (0, "")
     folder = workspace / "results/coupled/carried"
@@ -139,6 +141,33 @@ def test_a_belt_carries_a_block_of_another_fmu(couple, workspace):
     for numbers, why in engines(folder).values():
         assert why == ""
         assert numbers[1] == pytest.approx(motion(8.0)[0], abs=3e-4)
+
+
+def test_a_controller_of_another_fmu_lets_the_axis_hunt(couple, workspace):
+    """It sticks where the axis with the same gains in one model sticks; both overshoot the set point in turn."""
+    write_page_files(workspace, "controller.py")
+    servo = build_user_model(ROOT / "fmus/more/servo.py") / "servo.fmu"
+    (workspace / "servo.fmu").symlink_to(servo)
+    scene = workspace / "controlled.toml"
+    scene.write_text(scene.read_text().replace('"servo"', '"servo.fmu"'))
+    done = couple("controlled.toml", "--json")
+    assert (done.returncode, done.stderr) == (0, "")
+    folder = workspace / "results/coupled/controlled"
+    times, x, *_ = np.loadtxt(folder / "trajectory.csv", delimiter=",", skiprows=1).T
+    single = harness.simulate(servo, {"K_i": 2e5}, stop=2.0, rtol=1e-8)
+    events = single.events
+    middles = [
+        0.5 * (begin + end)
+        for begin, end, mode in zip(events.t, events.t[1:], events.modes["F_friction"], strict=False)
+        if mode == 0
+    ]
+    expected = np.interp(middles, single.time, single["x"])
+    assert len(expected) >= 4
+    assert (np.diff(np.sign(expected[1:] - 0.01)) != 0).all()
+    np.testing.assert_allclose(np.interp(middles, times, x), expected, atol=4e-5)
+    for name, ((_, _, error), why) in engines(folder).items():
+        assert why == ""
+        assert error < (1e-3 if name == "fmpy" else 1e-6)
 
 
 @pytest.fixture
@@ -224,7 +253,7 @@ def test_an_invalid_archive_is_reported(couple, tmp_path):
     ("text", "status", "sentence"),
     [
         ("nosuch", 2, "unknown coupled scene 'nosuch'"),
-        (PAIR.replace("smd", "pendulum"), 2, "part a: unknown model 'pendulum'"),
+        (PAIR.replace("smd", "pendulums"), 2, "part a: unknown model 'pendulums'"),
         (PAIR.replace('"b"]', '"c"]'), 2, "unknown part 'c'"),
         (PAIR.replace("stop", "stopp"), 2, "unknown key 'stopp'"),
         (PAIR.replace("x0 =", "xx ="), 1, "part b (smd) has no parameter xx"),

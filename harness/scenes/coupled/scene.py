@@ -4,7 +4,7 @@
     stop = 4.0                         s
     steps = [0.02, 0.01, 0.005]        communication steps in s; the shortest is plotted
     [parts.left]                       one table per part
-    model = "smd"                      smd, coulomb or stickslip, which have a reference solution; or an FMU file
+    model = "smd"                      a model, with a reference solution for smd, coulomb, stickslip; or an FMU file
     values = {m = 2.0, x0 = 0.1}       parameters in SI units
     [[springs]]                        spring and damper between two parts, without force at equal positions
     between = ["left", "right"]

@@ -23,7 +23,7 @@ from ...running.fmu_archive import read_description
 from ...running.runner import ProgressCallback
 from ...running.variable_values import REAL_TYPES, variable_unit
 from ...scenes.coupled.scene import CoupledScene, load_coupled_scene
-from ...scenes.fmu_files import find_fmu
+from ...scenes.fmu_files import find_fmu, list_models
 from ...scenes.run_spec import RunSpec
 from .convergence import Convergence
 from .engine import ENGINES, EXTRA, run_engine
@@ -50,7 +50,7 @@ def run_coupled(source: str, out: Path, stop: float | None, report: ProgressCall
             name, file = Path(source).stem, temporary_folder / "archive.ssp"
             plan, fmus, scene = external_archive.read_archive(Path(source), file, stop), [Path(source)], None
         else:
-            scene = load_coupled_scene(source, BODY_MODELS, stop)
+            scene = load_coupled_scene(source, list_models(), stop)
             defaults = {part.model: start_values(part.fmu) for part in scene.parts.values()}
             check_values(scene, defaults)
             check_connections(scene)
