@@ -1,6 +1,8 @@
 """Writes the files for users in FMUs of all kinds: documentation page, icon, known boundaries, certified result."""
 
+import json
 import re
+from collections.abc import Sequence
 from html import escape
 from inspect import cleandoc
 from pathlib import Path
@@ -9,11 +11,14 @@ from ..runtime.variable_access import SETTABLE_CAUSALITIES
 from ..runtime.variable_declarations import VariableDeclaration, VariableOwner
 from . import __version__
 from .certified_result import RESULT_FOLDER, CertifiedResult, find_certified_result, result_files
+from .equations.tables import PCHIP, Table
 from .fmi_variables import Variables, integrated_states
 from .svg_chart import draw_chart
 from .units import unit_of
 
 GREEK = {"theta": "theta", "omega": "omega", "alpha": "alpha", "mu": "mu", "eps": "epsilon", "phi": "phi", "pi": "pi"}
+TABLES_FILE = "resources/tables.json"  # points of the tables, which harness/running/fmu_tables.py reads
+CURVE_POINTS = 200  # of a table that is not linear
 STYLE = Path(__file__).with_name("documentation_page.css")
 USAGE = """\
 <p>Parameters can be changed at every communication point, those marked <i>fixed</i> only until initialization ends.
@@ -38,7 +43,13 @@ UNRESTRICTED = VariableDeclaration("", "").allowed  # the range text of an unbou
 
 
 def documentation_page(
-    model: type[VariableOwner], name: str, declared: Variables, result: CertifiedResult | None, icon: str, use: str
+    model: type[VariableOwner],
+    name: str,
+    declared: Variables,
+    result: CertifiedResult | None,
+    tables: Sequence[Table],
+    icon: str,
+    use: str,
 ) -> bytes:
     """Return the page of the FMU `name` as self-contained HTML.
 
@@ -51,6 +62,8 @@ def documentation_page(
     parts += map(format_paragraph, blocks)
     if result is not None:
         parts += _result_figure(result, declared)
+    if tables:
+        parts += ["<h2>Tables</h2>", *map(table_figure, tables)]
     choices = [(variable, meaning) for variable, meaning in declared if meaning.items]
     for variable, meaning in choices:
         parts.append(_enumeration_table(variable, meaning))
@@ -108,6 +121,22 @@ def _result_figure(result: CertifiedResult, declared: Variables) -> list[str]:
     return [*parts, f"<figcaption>{escape(result.caption)}</figcaption></figure>"]
 
 
+def table_figure(table: Table) -> str:
+    """Return a chart of a table, with the start values of its parameters, and a caption."""
+    x, y = list(table.x), table.as_json()["y"]
+    if table.interpolation == PCHIP:
+        x = [x[0] + i / CURVE_POINTS * (x[-1] - x[0]) for i in range(CURVE_POINTS)] + [x[-1]]
+        y = [table.at(u) for u in x]
+    label, axis = (
+        f"{text}{f' in {readable_unit(unit)}' if readable_unit(unit) else ''}"
+        for text, unit in ((table.name, table.unit_y), ("argument", table.unit_x))
+    )
+    values = ", with the start values of its parameters" if table.parameters else ""
+    caption = f"{len(table.x)} points, {table.interpolation}, ends: {table.ends}{values}."
+    chart = draw_chart(x, y, escape(label), escape(axis))
+    return f"<div class='table'>{chart}</div><p>Table <code>{escape(table.name)}</code>: {caption}</p>"
+
+
 def _enumeration_table(variable: str, meaning: VariableDeclaration) -> str:
     """Return a table of the items of an enumeration."""
     title = meaning.text[0].upper() + meaning.text[1:]
@@ -160,7 +189,12 @@ def _footer(model: type[VariableOwner], result: CertifiedResult | None) -> str:
 
 
 def extra_files(
-    model: type[VariableOwner], path: Path, declared: Variables, icon: str = "model.png", use: str = ""
+    model: type[VariableOwner],
+    path: Path,
+    declared: Variables,
+    tables: Sequence[Table],
+    icon: str = "model.png",
+    use: str = "",
 ) -> dict[str, bytes]:
     """Return the content of these files by path in the FMU.
 
@@ -171,7 +205,9 @@ def extra_files(
     name, picture, boundaries = path.stem, path.with_suffix(".png"), path.with_suffix(".toml")
     certified = find_certified_result(path, declared)
     icon_path = icon if picture.is_file() else ""
-    entries = {"documentation/index.html": documentation_page(model, name, declared, certified, icon_path, use)}
+    entries = {"documentation/index.html": documentation_page(model, name, declared, certified, tables, icon_path, use)}
+    if tables:
+        entries[TABLES_FILE] = (json.dumps([table.as_json() for table in tables], indent=1) + "\n").encode()
     if certified is not None:
         entries |= result_files(name, certified, declared)
     if picture.is_file():

@@ -1,4 +1,4 @@
-"""Draws a curve over time as inline SVG; colours come from the style sheet of the page."""
+"""Draws a curve as inline SVG; colours come from the style sheet of the page."""
 
 from itertools import pairwise
 from math import ceil, floor, log10
@@ -8,8 +8,8 @@ LEFT, RIGHT, TOP, BOTTOM = 70, 14, 10, 48  # margins for the tick labels
 TICKS = 5
 
 
-def draw_chart(times: list[float], values: list[float], label: str) -> str:
-    """Return the SVG of values over times in s; `label` names the values and their unit."""
+def draw_chart(times: list[float], values: list[float], label: str, axis: str = "time in s") -> str:
+    """Return the SVG of values over times, or over another quantity; `label` and `axis` name both with their units."""
     low, high = min(values), max(values)
     margin = 0.05 * (high - low) or 1.0
     low, high = low - margin, high + margin
@@ -18,7 +18,7 @@ def draw_chart(times: list[float], values: list[float], label: str) -> str:
         x = LEFT + (t - times[0]) / (times[-1] - times[0]) * (WIDTH - LEFT - RIGHT)
         return x, TOP + (high - value) / (high - low) * (HEIGHT - TOP - BOTTOM)
 
-    parts = [f'<svg viewBox="0 0 {WIDTH} {HEIGHT}" role="img" aria-label="{label} over time">']
+    parts = [f'<svg viewBox="0 0 {WIDTH} {HEIGHT}" role="img" aria-label="{label} over {axis}">']
     for value in tick_values(low, high):
         _, y = to_view_box(times[0], value)
         parts.append(f'<line class="grid" x1="{LEFT}" x2="{WIDTH - RIGHT}" y1="{y:.1f}" y2="{y:.1f}"/>')
@@ -29,7 +29,7 @@ def draw_chart(times: list[float], values: list[float], label: str) -> str:
         parts.append(f'<text x="{x:.1f}" y="{HEIGHT - BOTTOM + 19}" text-anchor="middle">{t:g}</text>')
     points = [to_view_box(t, value) for t, value in zip(times, values, strict=True)]
     parts.append(f'<path class="curve" d="{relative_path(points)}"/>')
-    parts.append(f'<text x="{WIDTH - RIGHT}" y="{HEIGHT - 6}" text-anchor="end">time in s</text>')
+    parts.append(f'<text x="{WIDTH - RIGHT}" y="{HEIGHT - 6}" text-anchor="end">{axis}</text>')
     parts.append(f'<text x="{LEFT}" y="{HEIGHT - 6}">{label}</text></svg>')
     return "\n".join(parts)
 

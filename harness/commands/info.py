@@ -10,7 +10,7 @@ from .terminal import Terminal, json_option, quiet_option
 @quiet_option
 @json_option
 def info(model: str, quiet: bool, as_json: bool) -> None:
-    """List the variables of MODEL: units, start values, ranges, friction laws, methods and defaults.
+    """List the variables of MODEL: units, start values, ranges, friction laws, methods, defaults, and lookup tables.
 
     MODEL is the name of a model, or the path of any FMU, FMI 2.0 or 3.0.  The FMU is read, not run.
 
@@ -31,5 +31,12 @@ def info(model: str, quiet: bool, as_json: bool) -> None:
             table.add_column(heading, justify="right" if heading == "start" else "left")
         for variable in variables:
             table.add_row(*variable.cells)
+        blocks += ["", table]
+    for title, headings, rows in description.points():
+        table = make_terminal_table(title)
+        for heading in headings:
+            table.add_column(heading, justify="right")
+        for row in rows:
+            table.add_row(*row)
         blocks += ["", table]
     Terminal(quiet, as_json).print_result(description.as_json(), *blocks)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from ..arguments import CO_SIMULATION, MODEL_EXCHANGE
 from ..errors import import_optional
 from .fmu_archive import read_description, read_fixed_choices
+from .fmu_tables import LookupTable, read_tables
 from .variable_values import effective_value, enumeration_labels, find_bound, variable_unit
 
 if TYPE_CHECKING:
@@ -85,6 +86,8 @@ class FmuDescription:
         All variables, in the order of the model description.
     fixed : dict
         Labels of the method and the law that a build with Reals only fixed, by the name of the absent variable.
+    tables : tuple of LookupTable
+        Lookup tables of an FMU of this project.
     """
 
     name: str
@@ -96,6 +99,7 @@ class FmuDescription:
     tolerance: float | None
     variables: tuple[VariableInfo, ...]
     fixed: dict[str, str] = field(default_factory=dict)
+    tables: tuple[LookupTable, ...] = ()
 
     @property
     def laws(self) -> tuple[str, ...]:
@@ -120,7 +124,19 @@ class FmuDescription:
             lines += [
                 "  ".join(text.ljust(width) for text, width in zip(row, widths, strict=True)).rstrip() for row in rows
             ]
+        for title, headings, rows in self.points():
+            lines += ["", title]
+            lines += ["  ".join(cell.rjust(len(max(headings, key=len))) for cell in row) for row in (headings, *rows)]
         return "\n".join(lines)
+
+    def points(self) -> Iterator[tuple[str, tuple[str, str], list[tuple[str, str]]]]:
+        """Yield the title, the headings and the points of each table; y is a number, or the name of its parameter."""
+        for table in self.tables:
+            rows = [
+                (f"{x:.7g}", f"{y:.7g}" + (f" ({parameter})" if parameter else ""))
+                for x, y, parameter in zip(table.x, table.y, table.parameters, strict=True)
+            ]
+            yield f"Table {table.name}", (f"x [{table.unit_x}]", f"{table.name} [{table.unit_y}]"), rows
 
     def sentences(self) -> Iterator[str]:
         """Yield the sentences above the tables."""
@@ -133,6 +149,8 @@ class FmuDescription:
             if choices:
                 default = "fixed by the build" if name in self.fixed else f"default {self[name].start}"
                 yield f"{word} ({name}): {', '.join(choices)}; {default}"
+        for table in self.tables:
+            yield f"Table {table.name}: {len(table.x)} points, {table.interpolation}, ends: {table.ends}"
 
     def groups(self) -> Iterator[tuple[str, list[VariableInfo]]]:
         """Yield the title and the variables of each group that is not empty; internal variables are the last one."""
@@ -158,8 +176,8 @@ class FmuDescription:
 
     def as_json(self) -> dict[str, Any]:
         """Return the description for JSON output."""
-        variables = [vars(variable) for variable in self.variables]
-        return vars(self) | {"laws": self.laws, "methods": self.methods, "variables": variables}
+        variables, tables = ([vars(item) for item in items] for items in (self.variables, self.tables))
+        return vars(self) | {"laws": self.laws, "methods": self.methods, "variables": variables, "tables": tables}
 
     def __str__(self) -> str:
         return self.summary()
@@ -176,6 +194,11 @@ class FmuDescription:
                 f"<tr>{''.join(f'<td>{escape(cell)}</td>' for cell in variable.cells)}</tr>" for variable in variables
             )
             parts.append(f"<table><caption>{title}</caption><tr>{head}</tr>{''.join(rows)}</table>")
+        for title, *texts in self.points():
+            head, *rows = (
+                f"<tr>{''.join(f'<td>{escape(cell)}</td>' for cell in row)}</tr>" for row in (texts[0], *texts[1])
+            )
+            parts.append(f"<table><caption>{escape(title)}</caption>{head}{''.join(rows)}</table>")
         return "".join(parts)
 
     def _choices(self, name: str) -> tuple[str, ...]:
@@ -204,6 +227,7 @@ def describe_fmu(path: Path) -> FmuDescription:
         tolerance=read_number(experiment, "tolerance"),
         variables=tuple(map(describe_variable, content.modelVariables)),
         fixed={name: label for name, (label, _) in read_fixed_choices(path).items()},
+        tables=read_tables(path),
     )
 
 

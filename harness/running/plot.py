@@ -7,6 +7,7 @@ import numpy as np
 
 from ..results.files import column_heading
 from .fmu_archive import read_description
+from .fmu_tables import LookupTable
 from .variable_values import variable_unit
 
 PANEL = (7.0, 1.7)  # inches, width and height
@@ -78,3 +79,12 @@ def draw_sticking(axes: Any, run: Any, color: str) -> None:
     axes.set_yticks(range(len(run.contacts)), run.contacts)
     axes.set_ylim(len(run.contacts) - 0.5, -0.5)
     axes.grid(visible=False, axis="y")
+
+
+def draw_table(axes: Any, table: LookupTable, y: Sequence[float], color: str, label: str | None = None) -> None:
+    """Draw the points of a lookup table, with values of y, and the curve through them."""
+    axes.plot(*table.curve(y), color=color, linewidth=1.2, label=label)
+    axes.plot(table.x, y, ".", color=color, markersize=5)
+    axes.set_title(f"table {table.name}")
+    axes.set_xlabel(column_heading("argument", table.unit_x))
+    axes.set_ylabel(column_heading(table.name, table.unit_y))

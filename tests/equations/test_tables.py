@@ -17,6 +17,7 @@ from scipy.integrate import solve_ivp
 from scipy.interpolate import PchipInterpolator
 from worker_client import FmiError
 
+import harness
 from fmus.packaging import BuildError
 from fmus.packaging.model_lookup import find_model
 
@@ -154,6 +155,8 @@ def test_values_are_those_of_numpy_and_scipy_in_each_kind_of_fmu(worker, tmp_pat
         fmu = worker.instantiate(path).begin({}, stop=12.0)
         rows.append(fmu.run(np.linspace(0.0, 12.0, 241).tolist(), names))
         fmu.free()
+        carried = harness.describe(path).tables
+        assert [(t.interpolation, t.ends, ([*t.x], [*t.y])) for t in carried] == [*tables.values()]
     u, *columns = np.array(rows[0]).T
     for column, (name, (kind, ends, (x, y))) in zip(columns, tables.items(), strict=True):
         smooth = PchipInterpolator(x, y)

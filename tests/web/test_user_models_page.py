@@ -39,6 +39,22 @@ def test_the_models_of_fmus_more_run_on_a_second_page(quiet):
         page.open(f".model={name}")
         assert page.run("app.session.runs.main.failure") == ""
         assert page.run("app.session.runs.main.time.at(-1)") >= find_model(name).model.stop_time
+    check_servo(page)
+
+
+def check_servo(page):
+    """The friction has the bits of the table in Python at the speed, and the page draws the table."""
+    page.open(".model=servo")
+    (table,) = find_model("servo").analysis.tables
+    columns = page.run(
+        "(({ columns: { v, mode, F_friction } }) => [v, mode, F_friction].map(c => [...c]))(app.session.runs.main)"
+    )
+    slides = [(v, mode, force) for v, mode, force in zip(*columns, strict=True) if mode]
+    assert len(slides) > 100
+    assert all(force == mode * table.at(abs(v)) for v, mode, force in slides)
+    assert page.run("document.querySelector('#equations .table svg').getAttribute('aria-label')") == (
+        "friction_curve in N over argument in m/s"
+    )
 
 
 def test_user_models_run_on_a_page_of_their_own(quiet):

@@ -131,6 +131,21 @@ class Table(Expression):
         """Return whether the file of the table has other content than when it was read."""
         return self.file is not None and read_content(self.file) != self.file_content
 
+    def as_json(self) -> dict[str, Any]:
+        """Return the points as data; values of y that are parameters have their start values and names."""
+        start = [value.start if isinstance(value, SettableVariable) else value for value in self.y]
+        names = [value.name if isinstance(value, SettableVariable) else "" for value in self.y]
+        return {
+            "name": self.name,
+            "unit_x": self.unit_x,
+            "unit_y": self.unit_y,
+            "x": list(self.x),
+            "y": start,
+            "parameters": names,
+            "interpolation": self.interpolation,
+            "ends": self.ends,
+        }
+
     @property
     def kinds(self) -> tuple[str, ...]:
         """The columns of a piece: its knot, and the coefficients of the polynomial, lowest first."""

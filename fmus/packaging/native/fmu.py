@@ -3,6 +3,7 @@
 modelDescription.xml
 binaries/<platform>/<name>.{so,dll,dylib}
 sources/                                  the C sources, for any other platform
+resources/tables.json                     points of lookup tables, if the model has any
 documentation/, extra/                    documentation, licence and certified result
 model.png                                 the icon; in FMI 3.0 terminalsAndIcons/, with the terminal
 """
@@ -75,7 +76,7 @@ def build(
     name, cls = source.name, lowered_model(source, select_features(source, methods, laws, real_only))
     files, description = generate_c_sources(cls, name, date, fmi)
     declared = declared_variables(cls)
-    entries = extra_files(cls, source.path, declared, ICON_PATHS[fmi], USAGE_NOTE)
+    entries = extra_files(cls, source.path, declared, source.analysis.tables, ICON_PATHS[fmi], USAGE_NOTE)
     if fmi == "3":
         entries |= terminals(declared)
     entries |= {"modelDescription.xml": description, LICENSE: license_files()[LICENSE]}

@@ -6,7 +6,7 @@ from math import isfinite
 from typing import Any
 
 from ...runtime.variable_declarations import VariableDeclaration, VariableOwner
-from ..documentation_page import format_paragraph, readable_unit, typeset
+from ..documentation_page import format_paragraph, readable_unit, table_figure, typeset
 from ..equations.algebra import depends_on, differentiate, is_same_expression, variables_in
 from ..equations.expressions import Operand
 from ..equations.model_analysis import ModelAnalysis
@@ -25,7 +25,7 @@ def build_model_json(source: ModelFile, model: type[VariableOwner]) -> ModelJson
     return {
         "name": source.name,
         "title": title,
-        "text": "\n".join(map(format_paragraph, blocks)),
+        "text": "\n".join((*map(format_paragraph, blocks), *map(table_figure, source.analysis.tables))),
         "stop": float(model.stop_time),  # type: ignore[attr-defined]
         "tolerance": float(model.tolerance),  # type: ignore[attr-defined]
         "variables": [variable_json(name, meaning) for name, meaning in declared_variables(model)],

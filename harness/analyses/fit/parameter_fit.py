@@ -6,6 +6,7 @@ from math import isfinite, log
 import numpy as np
 
 from ...errors import check_names
+from ...running.fmu_tables import LookupTable
 from ..estimation.estimate import ColumnResiduals, Estimate
 
 CLEAR_DIFFERENCE = 6.0  # of two BIC, which is strong evidence
@@ -196,6 +197,8 @@ class ParameterFit:
         Fits of other FMUs to the same records.
     comparison : LawComparison or None
         Comparison with the other FMUs.
+    tables : tuple of LookupTable
+        Lookup tables of the FMU with values of y among the unknowns, whose start values they have.
     """
 
     fmu: str
@@ -218,6 +221,7 @@ class ParameterFit:
     validation: Validation | None = None
     against: "tuple[ParameterFit, ...]" = ()
     comparison: LawComparison | None = None
+    tables: tuple[LookupTable, ...] = ()
 
     @property
     def n_samples(self) -> int:

@@ -1,4 +1,4 @@
-"""Figure of a fit: records and fits, the residuals of each law, and the profiles of the parameters."""
+"""Figure of a fit: records and fits, residuals of each law, fitted lookup tables, and profiles of the parameters."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,10 +12,12 @@ from ...analyses.estimation.figure import plot_legend, plot_record, plot_residua
 from ...analyses.fit.parameter_fit import FittedRecord, ParameterFit, Profile
 from ...results.quantity import display_unit
 from ...results.style import GREEN, GREY, HEIGHT, ORANGE, WIDTH, Axes, Figure, axis_label, set_size
+from ...running.fmu_tables import LookupTable
+from ...running.plot import draw_table
 
 MAX_COLUMNS, MAX_PROFILES = 6, 12  # drawn at most
 COLOURS = (ORANGE, GREEN, "#CC79A7", "#56B4E9")  # of the laws
-RECORD, RESIDUALS, PROFILES = 2.0, 1.0, 1.3  # relative heights of the panels
+RECORD, RESIDUALS, PROFILES, TABLE = 2.0, 1.0, 1.3, 2.0  # relative heights of the panels
 PROFILES_IN_ROW = 4
 HIGHEST_EXCESS = 2.0  # of a profile, in units of the limit of the 95 % interval
 
@@ -39,16 +41,18 @@ def draw(fit: ParameterFit, figure: Figure) -> None:
     in_row = min(len(profiles), PROFILES_IN_ROW)
     rows = -(-len(profiles) // PROFILES_IN_ROW)
     heights = [RECORD, *[RESIDUALS] * len(laws)] * len(columns)
-    signal_height, profile_height = sum(heights), PROFILES * rows
-    set_size(figure, 1.8 * WIDTH, 0.53 * HEIGHT * (signal_height + profile_height))
-    grid = figure.add_gridspec(2, 1, height_ratios=(signal_height, max(profile_height, 1e-6)))
-    upper = figure.add_subfigure(grid[0]) if rows else figure
-    axes = upper.subplots(len(heights), 1, height_ratios=heights, squeeze=False)[:, 0]
+    tables = [(n, law, table) for n, law in enumerate(laws) for table in law.tables]
+    parts = {"records": sum(heights), "tables": TABLE * len(tables), "profiles": PROFILES * rows}
+    parts = {name: height for name, height in parts.items() if height}
+    set_size(figure, 1.8 * WIDTH, 0.53 * HEIGHT * sum(parts.values()))
+    grid = figure.add_gridspec(len(parts), 1, height_ratios=list(parts.values()))
+    areas = {name: figure.add_subfigure(cell) for name, cell in zip(parts, grid, strict=True)}
+    axes = areas["records"].subplots(len(heights), 1, height_ratios=heights, squeeze=False)[:, 0]
     for n, column in enumerate(columns):
         plot_column(axes[n * (len(laws) + 1) :][: len(laws) + 1], laws, column)
     axes[-1].set_xlabel("t [s]")
     if rows:
-        panels = figure.add_subfigure(grid[1]).subplots(rows, in_row, sharey=True, squeeze=False)
+        panels = areas["profiles"].subplots(rows, in_row, sharey=True, squeeze=False)
         for panel, (n, profile) in zip(panels.flat, profiles, strict=False):
             plot_profile(panel, profile, laws[n][profile.name], COLOURS[n % len(COLOURS)])
             panel.set_title(f"profile: {laws[n].fmu}" if len(laws) > 1 else "profile")
@@ -56,6 +60,10 @@ def draw(fit: ParameterFit, figure: Figure) -> None:
             panel.set_axis_off()
         for panel in panels[:, 0]:
             panel.set_ylabel("rise of squares\n(1: 95 %)")
+    if tables:
+        curves = areas["tables"].subplots(len(tables), 1, squeeze=False)[:, 0]
+        for axes, (n, law, table) in zip(curves, tables, strict=True):
+            plot_table(axes, law, table, COLOURS[n % len(COLOURS)])
 
 
 def fitted_columns(laws: Sequence[ParameterFit]) -> list[FittedColumn]:
@@ -96,6 +104,18 @@ def plot_fits(axes: Axes, laws: Sequence[ParameterFit], fitted: FittedColumn) ->
     for n, (law, signal) in enumerate(zip(laws, fitted.signals, strict=True)):
         colour = COLOURS[n % len(COLOURS)]
         axes.plot(fitted.record.t, signal / size, color=colour, linewidth=0.9, label=f"fit: {law.fmu}")
+    plot_legend(axes)
+
+
+def plot_table(axes: Axes, fit: ParameterFit, table: LookupTable, colour: str) -> None:
+    """Plot a lookup table with fitted values and their 95 % intervals, and the curve at the start of the fit."""
+    estimates = {estimate.name: estimate for estimate in fit.estimates}
+    draw_table(axes, table, table.y, GREY, "start")
+    y = table.y_with({name: estimate.value for name, estimate in estimates.items()})
+    draw_table(axes, table, y, colour, f"fit: {fit.fmu}")
+    for x, name in zip(table.x, table.parameters, strict=True):
+        if name in estimates and isfinite(estimates[name].low) and isfinite(estimates[name].high):
+            axes.plot([x, x], [estimates[name].low, estimates[name].high], "_-", color=colour)
     plot_legend(axes)
 
 

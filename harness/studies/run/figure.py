@@ -2,6 +2,7 @@
 
 Sticking is shaded, reversals are marked, known values are drawn in green, and angles are in degrees.  With several
 contacts, only the panels of their friction forces and modes are shaded; a panel below shows when each contact sticks.
+Lookup tables of the FMU are drawn in the right column, with the values of the run.
 The report draws the sketches, small curves with few points, in its own colours.
 """
 
@@ -28,7 +29,8 @@ from ...results.style import (
 )
 from ...results.summary import SKETCH_SIZE, Sketch
 from ...running.fmu_archive import exposes_solver_steps, read_description
-from ...running.plot import draw_sticking
+from ...running.fmu_tables import LookupTable, read_tables
+from ...running.plot import draw_sticking, draw_table
 from ...running.runner import run_own_fmu
 from ...running.trajectory import Trajectory
 from ...scenes.scene import MAX_DEFAULT_PLOTS, KnownValues, is_panel
@@ -88,9 +90,12 @@ def draw(
     known: KnownValues | None = None,
 ) -> None:
     """Save the figure of the named plots; arrays are drawn by element, strings are skipped."""
-    columns = arrange_columns([panel for name in plots for panel in expand_plot(name, run)], run)
+    columns: list[list[Any]] = [*arrange_columns([panel for name in plots for panel in expand_plot(name, run)], run)]
     if not columns:
         return
+    if tables := read_tables(run.spec.fmu):
+        right = columns.pop() if is_right(columns[-1][0], run) else []
+        columns.append([*right, *tables])
     plotted = PlottedRun(refine(run), results, known)
     # with several contacts, each column over time ends with a panel of all contacts
     below = [len(run.contacts) * CONTACT_HEIGHT + 0.2] if len(run.contacts) > 1 else []
@@ -103,14 +108,17 @@ def draw(
             over_time = not is_right(names[0], run)
             grid = part.subplots(len(heights), sharex=over_time, squeeze=False, height_ratios=heights)[:, 0]
             for axes, name in zip(grid, names, strict=False):
+                if isinstance(name, LookupTable):
+                    draw_table(axes, name, name.y_with(run.parameters), BLUE)
+                    continue
                 PANELS.get(name if is_panel(name, run.columns) else "", plot_output)(axes, plotted, name)
             if len(heights) > len(names):
                 plot_sticking(grid[-1], plotted)
 
 
-def is_right(name: str, run: Trajectory) -> bool:
+def is_right(panel: str | LookupTable, run: Trajectory) -> bool:
     """Return whether a panel belongs to the right column."""
-    return name in RIGHT_COLUMN and is_panel(name, run.columns)
+    return isinstance(panel, LookupTable) or (panel in RIGHT_COLUMN and is_panel(panel, run.columns))
 
 
 def arrange_columns(panels: list[str], run: Trajectory) -> list[list[str]]:
