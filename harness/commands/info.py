@@ -32,7 +32,7 @@ def info(model: str, quiet: bool, as_json: bool) -> None:
         for variable in variables:
             table.add_row(*variable.cells)
         blocks += ["", table]
-    for title, headings, rows in description.points():
+    for title, (headings, *rows) in description.points():
         table = make_terminal_table(title)
         for heading in headings:
             table.add_column(heading, justify="right")

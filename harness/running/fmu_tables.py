@@ -44,7 +44,7 @@ class LookupTable:
     interpolation: str
     ends: str
 
-    def y_with(self, values: Mapping[str, float]) -> tuple[float, ...]:
+    def y_with(self, values: Mapping[str, float | str]) -> tuple[float, ...]:
         """Return y with values of the parameters, by name; others have their start values."""
         return tuple(
             float(values.get(name, start)) if name else start

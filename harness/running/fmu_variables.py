@@ -124,19 +124,19 @@ class FmuDescription:
             lines += [
                 "  ".join(text.ljust(width) for text, width in zip(row, widths, strict=True)).rstrip() for row in rows
             ]
-        for title, headings, rows in self.points():
-            lines += ["", title]
-            lines += ["  ".join(cell.rjust(len(max(headings, key=len))) for cell in row) for row in (headings, *rows)]
+        for title, points in self.points():
+            width = max(len(cell) for row in points for cell in row)
+            lines += ["", title, *("  ".join(cell.rjust(width) for cell in row) for row in points)]
         return "\n".join(lines)
 
-    def points(self) -> Iterator[tuple[str, tuple[str, str], list[tuple[str, str]]]]:
-        """Yield the title, the headings and the points of each table; y is a number, or the name of its parameter."""
+    def points(self) -> Iterator[tuple[str, list[tuple[str, str]]]]:
+        """Yield the title of each table, and its headings and points; y has the name of its parameter, if any."""
         for table in self.tables:
             rows = [
                 (f"{x:.7g}", f"{y:.7g}" + (f" ({parameter})" if parameter else ""))
                 for x, y, parameter in zip(table.x, table.y, table.parameters, strict=True)
             ]
-            yield f"Table {table.name}", (f"x [{table.unit_x}]", f"{table.name} [{table.unit_y}]"), rows
+            yield f"Table {table.name}", [(f"x [{table.unit_x}]", f"{table.name} [{table.unit_y}]"), *rows]
 
     def sentences(self) -> Iterator[str]:
         """Yield the sentences above the tables."""
@@ -194,11 +194,9 @@ class FmuDescription:
                 f"<tr>{''.join(f'<td>{escape(cell)}</td>' for cell in variable.cells)}</tr>" for variable in variables
             )
             parts.append(f"<table><caption>{title}</caption><tr>{head}</tr>{''.join(rows)}</table>")
-        for title, *texts in self.points():
-            head, *rows = (
-                f"<tr>{''.join(f'<td>{escape(cell)}</td>' for cell in row)}</tr>" for row in (texts[0], *texts[1])
-            )
-            parts.append(f"<table><caption>{escape(title)}</caption>{head}{''.join(rows)}</table>")
+        for title, points in self.points():
+            cells = (f"<tr>{''.join(f'<td>{escape(cell)}</td>' for cell in row)}</tr>" for row in points)
+            parts.append(f"<table><caption>{escape(title)}</caption>{''.join(cells)}</table>")
         return "".join(parts)
 
     def _choices(self, name: str) -> tuple[str, ...]:

@@ -96,8 +96,9 @@ def test_a_sweep_without_plateaus_gives_points_without_inertia():
         assert curve[name].value == pytest.approx(value, rel=0.03)
 
 
-def test_the_region_of_the_backlash_is_left_out():
-    """Without load in the first 4 mm after a reversal, the force there is not the friction."""
+@pytest.mark.parametrize("backlash", [4e-3, 0.0])
+def test_the_region_of_the_backlash_is_left_out(backlash):
+    """Without load in the first 4 mm after a reversal, the force there is not the friction; long plateaus show it."""
     t, v, x, force = ramps_and_plateaus(mass=0.0)
     reversal = np.zeros(len(v))
     direction, start = 0.0, 0.0
@@ -109,7 +110,7 @@ def test_the_region_of_the_backlash_is_left_out():
     free[x < x[np.flatnonzero(v < 0)[0]]] &= True
     force = np.where(free & (np.abs(v) > 0.02), 0.0, force)
     record = {"t [s]": t, "v [m/s]": v, "F [N]": force + 0.02 * np.random.default_rng(4).standard_normal(len(v))}
-    curve = harness.identify_curve(record, backlash=4e-3)
+    curve = harness.identify_curve(record, backlash=backlash)
     fast = np.abs(curve.points.v) > 0.02
     np.testing.assert_allclose(curve.points.force[fast], stribeck(curve.points.v[fast], **TRUTH), atol=0.05)
 

@@ -46,7 +46,7 @@ def draw(fit: ParameterFit, figure: Figure) -> None:
     parts = {name: height for name, height in parts.items() if height}
     set_size(figure, 1.8 * WIDTH, 0.53 * HEIGHT * sum(parts.values()))
     grid = figure.add_gridspec(len(parts), 1, height_ratios=list(parts.values()))
-    areas = {name: figure.add_subfigure(cell) for name, cell in zip(parts, grid, strict=True)}
+    areas = {name: figure.add_subfigure(grid[i]) for i, name in enumerate(parts)}
     axes = areas["records"].subplots(len(heights), 1, height_ratios=heights, squeeze=False)[:, 0]
     for n, column in enumerate(columns):
         plot_column(axes[n * (len(laws) + 1) :][: len(laws) + 1], laws, column)
