@@ -14,7 +14,7 @@ import numpy as np
 
 from ..arguments import QUANTITIES
 from ..errors import SceneError, unknown_name_message
-from .headings import DATE_NAME, MAGNITUDE_NAME, TIME_NAME, order_from_name, split_heading
+from .headings import DATE_NAME, FORCE_NAME, MAGNITUDE_NAME, TIME_NAME, order_from_name, split_heading
 from .record import Record, check_record
 from .samples import (
     find_repeated_times,
@@ -27,7 +27,7 @@ from .samples import (
 )
 from .table_files import Cells, Table, load_table
 from .text_table import GROUPED_NUMBER, MISSING, TIMESTAMP
-from .units import COUNT_NAMES, TIMES, find_unit, parse_per_count, time_unit_size
+from .units import COUNT_NAMES, TIMES, find_unit, is_force_unit, parse_per_count, time_unit_size
 
 MAX_PLAUSIBLE_TIME = 1e11  # s: the year 5138
 EXPONENT = re.compile("[dD](?=[-+0-9])")  # Fortran
@@ -118,6 +118,8 @@ def parse_record(table: Table, columns: ColumnOptions, name: str) -> Record:
     candidates = list_columns(table)
     time_column = find_time_column(table, candidates, columns)
     interval = 1 / columns.rate if columns.rate else None if time_column else table.interval
+    if interval is None and columns.time is None:
+        refuse_friction_curve(table, candidates, time_column)
     if time_column is None and interval is None:
         raise SceneError(no_time_message(table))
     if interval is None and len(candidates) < 2 and time_column is not None:
@@ -202,6 +204,21 @@ def list_columns(table: Table) -> list[Column]:
         number = f" #{counts[heading]}" if heading and counts[heading] > 1 else ""
         candidates.append(Column(index, heading + number, *split_heading(heading)))
     return candidates
+
+
+def refuse_friction_curve(table: Table, candidates: Sequence[Column], time_column: Column | None) -> None:
+    """Raise SceneError if a table without times holds a force over a velocity."""
+    if time_column is not None and time_column.order != 1:
+        return
+    velocity = next((part for part in candidates if part.order == 1), None)
+    others = [part for part in candidates if part is not velocity]
+    force = next((part for part in others if part.unit and is_force_unit(part.unit)), None)
+    force = force or next((part for part in others if not part.unit and FORCE_NAME.search(part.name)), None)
+    if velocity and force:
+        raise SceneError(
+            f"{table.name} has no times but a force over a velocity, {force.heading} over {velocity.heading}, and is "
+            "no decay: use friction-fmus curve, or name the column of times, as in --time t"
+        )
 
 
 def no_time_message(table: Table) -> str:

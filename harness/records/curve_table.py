@@ -21,14 +21,14 @@ from .columns import (
     parse_numbers,
     read_times,
 )
+from .headings import FORCE_NAME
 from .record import Record, check_record
 from .samples import find_repeated_times, mark_sentinels, undo_time_rounding
 from .signal_table import find_signal
 from .table_files import Table, load_table
-from .units import conversion_factor, find_unit, time_unit_size, unit_size
+from .units import conversion_factor, find_unit, force_unit_size, is_force_unit, time_unit_size, unit_size
 
 MAX_MISSING_SHARE = 0.2  # of the rows
-FORCE_NAME = re.compile(r"^(f|force|kraft|friction|reibung\w*|load|t|m|tau|torque|moment|drehmoment)(?![^\W_])", re.I)
 FRICTION_NAME = re.compile(r"friction|reibung", re.I)
 CURRENT_NAME = re.compile(r"^(i|iq|current|strom)(?![^\W_])", re.I)
 FORCE_UNITS = {"m/s": "N", "rad/s": "N.m"}
@@ -199,7 +199,7 @@ def find_force(
         if heading is not None:
             return *find_signal(heading, table, list(candidates)), is_current
     others = [part for part in candidates if all(part.index != column.index for column in taken)]
-    by_unit = [part for part in others if part.unit and any(force_unit_size(part.unit, base) for base in ("N", "N.m"))]
+    by_unit = [part for part in others if part.unit and is_force_unit(part.unit)]
     by_unit.sort(key=lambda part: not FRICTION_NAME.search(part.name))  # friction before the other forces of a run
     by_name = [part for part in others if FORCE_NAME.search(part.name)]
     for part in (*by_unit, *by_name):
@@ -250,12 +250,6 @@ def resolve_force(
             f"--force '{column.name} [{base}]'"
         )
     return base, size, []
-
-
-def force_unit_size(unit: str, base: str) -> float | None:
-    """Return the size of a unit of force (N) or torque (N.m); None if it is none. N.m is no unit of energy here."""
-    size = unit_size(unit)
-    return size[0] if size and size[1] == unit_size(base)[1] else None  # type: ignore[index]
 
 
 def parse_constant(text: str) -> tuple[float, str]:

@@ -19,6 +19,7 @@ QUANTITY_NAMES = (
     re.compile(r"^(v|vel|velocity|speed|omega|gyro|gyroscope|rate)\b|velocity|gyroscope|speed", re.I),
     re.compile(r"^(a|acc|accel|accelerometer|alpha|a[xyz])\b|acceleration|accelerometer|accel|^a_|^acc", re.I),
 )
+FORCE_NAME = re.compile(r"^(f|force|kraft|friction|reibung\w*|load|t|m|tau|torque|moment|drehmoment)(?![^\W_])", re.I)
 MAGNITUDE_NAME = re.compile(r"\b(abs|absolute|magnitude|norm)\b", re.I)  # of a vector; has no sign
 BRACKETED_UNIT = re.compile(r"[^\[\]()]*(\([^()]*\))?")  # with at most one group, as in m/(s^2)
 BRACKETS = re.compile(r"[\[(]([^\[\]()]+)[\])]")

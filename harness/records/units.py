@@ -160,6 +160,17 @@ def unit_size(text: str) -> tuple[float, Powers] | None:
     return size, {base: power for base, power in totals.items() if power}
 
 
+def force_unit_size(unit: str, base: str) -> float | None:
+    """Return the size of a unit of force (N) or torque (N.m); None if it is none. N.m is no unit of energy here."""
+    size = unit_size(unit)
+    return size[0] if size and size[1] == unit_size(base)[1] else None  # type: ignore[index]
+
+
+def is_force_unit(unit: str) -> bool:
+    """Return whether a unit is one of force or torque."""
+    return any(force_unit_size(unit, base) is not None for base in ("N", "N.m"))
+
+
 def named_unit(name: str) -> tuple[float, Powers] | None:
     """Return a unit of one word, with a prefix or without."""
     if name in NAMED:

@@ -283,6 +283,14 @@ FORMATS = (
         "motions.csv has no column of times (it has x [mm], y [mm]): name it, as in --time 'x [mm]', or set the "
         "sampling rate in Hz, as in --rate 100",
     ),
+    Format(
+        "friction over velocity",
+        "friction.csv",
+        lambda: lines("v [mm/s],F [N]\n", "{x},{x}"),
+        {},
+        "friction.csv has no times but a force over a velocity, F [N] over v [mm/s], and is no decay: use "
+        "friction-fmus curve, or name the column of times, as in --time t",
+    ),
     # compressed text
     Format("gzip", "packed.csv.gz", lambda: gzip.compress(lines(COMMAS, PLAIN).encode())),
     Format(
