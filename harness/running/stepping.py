@@ -251,13 +251,29 @@ def values_of_steps(inputs: Inputs, points: np.ndarray) -> np.ndarray:
     points : numpy.ndarray
         Communication points (n,) in s; all times of the table in between are among them.
     """
+    begin, end = ends_of_steps(inputs, points)
+    return np.concatenate([begin[:1], 0.5 * (begin + end)])
+
+
+def ramps_of_steps(inputs: Inputs, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the inputs (n, inputs) at the start of a run and of each step, and their slopes (n, inputs) in a step.
+
+    The parameters are those of `values_of_steps`.
+    """
+    begin, end = ends_of_steps(inputs, points)
+    slopes = (end - begin) / np.diff(points)[:, None]
+    return np.concatenate([begin[:1], begin]), np.concatenate([np.zeros_like(slopes[:1]), slopes])
+
+
+def ends_of_steps(inputs: Inputs, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the inputs (n - 1, inputs) at the start and at the end of each step between the points (n,) in s."""
     time = np.asarray(inputs.get(TIME, ()), dtype=float)
     columns = [np.asarray(column, dtype=float) for name, column in inputs.items() if name != TIME]
-    values = np.empty((len(points), len(columns)))
+    ends = np.empty((2, len(points) - 1, len(columns)))
     for j, column in enumerate(columns):
-        begin, end = interpolate(time, column, points[:-1], "right"), interpolate(time, column, points[1:], "left")
-        values[0, j], values[1:, j] = begin[0], 0.5 * (begin + end)
-    return values
+        ends[0, :, j] = interpolate(time, column, points[:-1], "right")
+        ends[1, :, j] = interpolate(time, column, points[1:], "left")
+    return ends[0], ends[1]
 
 
 def interpolate(time: np.ndarray, column: np.ndarray, points: np.ndarray, side: Literal["left", "right"]) -> np.ndarray:

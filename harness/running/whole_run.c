@@ -2,7 +2,7 @@
  *
  * The instance is new or has been reset. The functions of the FMU are passed as pointers, so the library links only the
  * C library. The first row of the inputs u (n, n_in) is set at the start, and each other row before the step to its
- * time. The outputs y are read at the times at which `is_recorded` is true. The result is 0, REFUSED if the FMU does not
+ * time, with the row of their slopes if these are given (FMI 2.0). The outputs y are read at the times at which `is_recorded` is true. The result is 0, REFUSED if the FMU does not
  * initialize, FAILED if a later call fails or an output is not finite, or TOO_SLOW after `limit` seconds of processor
  * time.
  */
@@ -25,6 +25,7 @@ typedef struct {
     int (*leave)(Instance);
     int (*get)(Instance, const Reference *, size_t, double *);
     int (*step)(Instance, double, double, int);
+    int (*derive)(Instance, const Reference *, size_t, const int *, const double *);
 } Fmi2;
 
 typedef struct {
@@ -93,8 +94,15 @@ static bool step(const Fmu *fmu, double t, double h)
     return status <= WARNING && !terminate && !early;
 }
 
+/* `orders` has a 1 for each input. */
+static bool set_slopes(const Fmu *fmu, const Variables *inputs, const int *orders, const double *slopes)
+{
+    return ((const Fmi2 *)fmu->functions)->derive(fmu->instance, inputs->references, inputs->count, orders, slopes) <=
+           WARNING;
+}
+
 int run(const Fmu *fmu, const Variables *parameters, const Variables *inputs, const Variables *outputs,
-        const double *t, const bool *is_recorded, size_t n)
+        const double *t, const bool *is_recorded, size_t n, const int *orders, const double *slopes)
 {
     double *y = outputs->values;
     const double *u = inputs->values;
@@ -103,7 +111,9 @@ int run(const Fmu *fmu, const Variables *parameters, const Variables *inputs, co
     for (size_t i = 0; i < n; i++) {
         if (i > 0) {
             u += inputs->count;
-            if (!set(fmu, inputs, u) || !step(fmu, t[i - 1], t[i] - t[i - 1])) return FAILED;
+            if (!set(fmu, inputs, u)) return FAILED;
+            if (slopes && !set_slopes(fmu, inputs, orders, slopes += inputs->count)) return FAILED;
+            if (!step(fmu, t[i - 1], t[i] - t[i - 1])) return FAILED;
         }
         if (is_recorded[i]) {
             if (!get(fmu, outputs, y)) return FAILED;

@@ -2,6 +2,7 @@
 
 The loop (whole_run.c) is compiled by the package ziglang or the system's compiler. Without either, the same calls are
 made from Python, which takes about thirty times as long. The FMU is instantiated once and reset before each run.
+Inputs are linear within a step if the FMU interpolates inputs, otherwise they have their mean.
 """
 
 import json
@@ -34,13 +35,21 @@ from .fmu_archive import (
     unpack_once,
 )
 from .fmu_session import CALL_FAILURES, FmuSession, capture_stderr
-from .stepping import TIME, make_grid, values_of_steps
+from .stepping import TIME, make_grid, ramps_of_steps, values_of_steps
 from .variable_values import REAL_TYPES, effective_value, find_bound, variable_unit
 
 SOURCE = Path(__file__).with_name("whole_run.c")
 COMPILER = shutil.which("cc") or shutil.which("gcc")  # the compiler of the system
 FUNCTIONS = {  # in the order of the structs in whole_run.c
-    "2.0": ("SetReal", "SetupExperiment", "EnterInitializationMode", "ExitInitializationMode", "GetReal", "DoStep"),
+    "2.0": (
+        "SetReal",
+        "SetupExperiment",
+        "EnterInitializationMode",
+        "ExitInitializationMode",
+        "GetReal",
+        "DoStep",
+        "SetRealInputDerivatives",
+    ),
     "3.0": ("SetFloat64", "EnterInitializationMode", "ExitInitializationMode", "GetFloat64", "DoStep"),
 }
 # without the runtime of the compiler, which would have to be built first
@@ -92,7 +101,8 @@ class RunSession:
         except HarnessError as error:
             raise HarnessError(f"{fmu.name} cannot be loaded: {error}") from None
         self.limit, self.loop, self.is_new = limit, compile_loop(), True
-        version = session.description.fmiVersion
+        version, cosimulation = session.description.fmiVersion, session.description.coSimulation
+        self.interpolates_inputs = version == "2.0" and cosimulation.canInterpolateInputs
         self.functions = (c_void_p * len(FUNCTIONS[version]))(
             *(cast(session.function(name), c_void_p) for name in FUNCTIONS[version])
         )
@@ -138,7 +148,9 @@ class PreparedRun:
     is_recorded : numpy.ndarray
         Whether the outputs are read at each point (n,).
     u : numpy.ndarray
-        Inputs (n, inputs) at the start, and of each step.
+        Inputs (n, inputs) at the start, and of each step: its mean, or the value at its start.
+    slopes : numpy.ndarray or None
+        Slopes (n, inputs) of the inputs in each step; None if they are constant.
     y : numpy.ndarray
         Outputs (recorded points, outputs).
     """
@@ -153,7 +165,11 @@ class PreparedRun:
         self.is_recorded = np.full(len(self.t), len(spec.times) in (0, len(self.t)))
         if not self.is_recorded[0]:
             self.is_recorded[np.searchsorted(self.t, np.asarray(spec.times, dtype=float) - grid.tolerance)] = True
-        self.u = values_of_steps(spec.inputs, self.t)
+        self.slopes: np.ndarray | None = None
+        if runs.interpolates_inputs and spec.inputs:
+            self.u, self.slopes = ramps_of_steps(spec.inputs, self.t)
+        else:
+            self.u = values_of_steps(spec.inputs, self.t)
         self.y = np.empty((np.count_nonzero(self.is_recorded), len(spec.outputs)))
         self.outputs, self.inputs = spec.outputs, tuple(name for name in spec.inputs if name != TIME)
         self.names: tuple[str, ...] | None = None
@@ -167,7 +183,9 @@ class PreparedRun:
         ]
         pointers = [byref(self.runs.handle), *map(byref, self.structs)]
         arrays = [c_void_p(array.ctypes.data) for array in (self.t, self.is_recorded)]
-        self.arguments = (*pointers, *arrays, c_size_t(len(self.t)))
+        self.orders = (c_int * len(self.inputs))(*[1] * len(self.inputs))
+        slopes = None if self.slopes is None else self.slopes.ctypes.data
+        self.arguments = (*pointers, *arrays, c_size_t(len(self.t)), self.orders, c_void_p(slopes))
 
     def run(self, values: Mapping[str, float]) -> np.ndarray | None:
         """Return the outputs (recorded points, outputs); None if the FMU refuses the values or is too slow."""
@@ -198,6 +216,9 @@ class PreparedRun:
             if i:
                 for variable, value in zip(inputs, self.u[i].tolist(), strict=True):
                     session.set(variable, value)
+                if self.slopes is not None:
+                    references = [variable.valueReference for variable in inputs]
+                    session.fmu.setRealInputDerivatives(references, [1] * len(inputs), self.slopes[i].tolist())
                 session.step(t[i - 1], t[i] - t[i - 1])
             if self.is_recorded[i]:
                 next(rows)[:] = [session.get(name) for name in self.outputs]
