@@ -88,6 +88,7 @@ def test_unconstrained_values_are_those_of_least_squares_with_a_negative_loss():
     problem = SimpleNamespace(
         t=t,
         residual_floor=0.0,
+        noise=0.0,
         unknowns=lambda terms: unknowns,
         residuals=lambda p, terms: (columns @ p[unknowns] - y, columns),
     )

@@ -57,3 +57,9 @@ def test_forces_have_the_widened_intervals_of_their_losses():
 
 def test_few_swings_give_no_second_estimate():
     assert fit_decay(decay_record(0.01, t=np.linspace(0, 2, 400), noise=1e-4), KnownParameters()).swing_estimates == ()
+
+
+def test_swings_that_do_not_determine_the_losses_give_no_second_estimate():
+    """Their equations were singular, and the search for the ends of the intervals failed."""
+    record = decay_record(0.0, 1e-6, 0.0, turn=-0.1, t=T, noise=1e-9, rest=0.0)
+    assert fit_decay(record.select(0.0, 3.2), KnownParameters()).swing_estimates == ()

@@ -345,6 +345,13 @@ def test_a_column_at_rest_with_coloured_noise_is_described(motion, is_described)
     assert not is_described or holds(fit["k"], TRUTH["k"])
 
 
+def test_times_in_another_unit_are_named():
+    frame = pull(t=np.linspace(0.0, 16.0, 400))
+    frame["t"] *= 1e-3
+    with pytest.raises(HarnessError, match=r"lasts 0\.016 s, about a thousandth of a run of the FMU \(16 s\)"):
+        harness.fit(native("stickslip"), frame, ["mu_s", "k"], observe="x", fixed=DRIVEN)
+
+
 def test_a_record_without_such_a_motion_is_refused():
     frame = pull()
     frame["x"] = 0.0
@@ -467,3 +474,40 @@ def test_a_peer_that_fails_has_its_reason_in_the_table(capsys):
         ["broken", "1.0", "0/1", "0", "1"],
     ]
     assert lines[3].strip() == "failed: AttributeError: no such thing"
+
+
+def test_irregular_slips_are_described_one_by_one():
+    """Of a real surface each slip starts at another force, which no fit of one static friction describes."""
+    random, t = np.random.default_rng(0), np.linspace(0.0, 40.0, 801)
+    force, level, record, slips = 0.1, 0.2, [], []
+    for time in t:
+        if force >= level:
+            slips.append((time - 0.05, force - 0.004))
+            force, level = random.normal(0.12, 0.01), random.normal(0.2, 0.02)
+        record.append(force)
+        force += 0.004
+    frame = pytest.importorskip("pandas").DataFrame(
+        {"t [s]": t, "F_spring [N]": record + 3e-4 * random.normal(size=len(t))}
+    )
+    known, free = {"m": 0.03, "mu_d": 0.4, "v_driver": 1e-3, "k": 80.0}, {"mu_s": (0.5, 1.0)}
+    with pytest.raises(HarnessError, match=r"no values describe .* slips of F_spring in the record are irregular"):
+        harness.fit(native("stickslip"), frame, free, observe="F_spring", values=known)
+    fit = harness.fit(native("stickslip"), frame, free, observe="F_spring", values=known, robust=True)
+    (found,) = fit.slips
+    times, before = np.array(slips).T
+    assert found.t == pytest.approx(times, abs=0.051)
+    assert found.before == pytest.approx(before, abs=2e-3)
+    assert found.drop == pytest.approx(found.before - found.after)
+    assert f"The {len(found.t)} slips of F_spring in the record are irregular" in fit.remarks[0]
+    assert fit["slips"][0]["before"] == found.before.tolist()
+
+
+def test_regular_slips_are_described_by_the_fit_alone():
+    fit = harness.fit(
+        native("stickslip"),
+        pull(("F_spring",), t=np.linspace(0.0, 30.0, 1000)),
+        {"mu_s": (0.5, 1.0)},
+        observe="F_spring",
+        fixed=DRIVEN | {"k": 900.0},
+    )
+    assert fit.slips == ()

@@ -13,6 +13,7 @@ import numpy as np
 from ...errors import HarnessError
 from ...records.record import MIN_SAMPLES, Record
 from ..estimation.noise import interpolation_residuals, robust_std
+from ..estimation.reversals import find_reversals
 from . import thresholds
 
 
@@ -304,23 +305,3 @@ def savitzky_golay(x: np.ndarray, width: int, degree: int) -> np.ndarray:
     project = powers @ np.linalg.pinv(powers)
     inner = np.convolve(x, project[half][::-1], "valid")
     return np.concatenate([project[:half] @ x[:width], inner, project[half + 1 :] @ x[-width:]])
-
-
-def find_reversals(x: np.ndarray, threshold: float) -> np.ndarray:
-    """Return the samples at which x (n,) reverses by `threshold` or more, including the first extremum."""
-    reversals: list[int] = []
-    low = high = 0
-    rising = None
-    values = x.tolist()
-    for i, value in enumerate(values):
-        if value > values[high]:
-            high = i
-        if value < values[low]:
-            low = i
-        if rising is not False and values[high] - value >= threshold:
-            reversals.append(high)
-            rising, low = False, i
-        elif rising is not True and value - values[low] >= threshold:
-            reversals.append(low)
-            rising, high = True, i
-    return np.array(reversals, int)

@@ -2,7 +2,8 @@
 
 Correlated residuals carry less information than their number suggests.  With the scores g_i = J_i e_i summed over
 blocks, the covariance (J'J)^-1 (sum of g g' over blocks) (J'J)^-1 allows for that; of several block lengths, the
-largest variance counts.
+largest variance counts.  Slow departures of phase and amplitude from the law (wander.py) add their variance if
+the residuals do not exceed the noise; otherwise their correlation shows them.
 
 The intervals of losses near zero, and of losses correlated with them, come from one joint normal measurement of all of
 them.  It starts from the values that the fit would have if losses could be negative: one linear step beyond the bound.
@@ -31,6 +32,7 @@ from ..estimation.noise import block_scores, residual_correlation
 from . import thresholds
 from .fit_problem import FitProblem, column_norms
 from .law import OMEGA, ZETA, Terms
+from .wander import Wander, estimate_wander
 
 N_DRAWS = 1000
 
@@ -57,6 +59,8 @@ class FitUncertainty:
         Whether the residuals differ significantly from white noise.
     degrees_of_freedom : int
         Number of samples less that of unknowns.
+    wander : Wander
+        Slow departures of phase and amplitude from the law.
     """
 
     unknowns: np.ndarray
@@ -67,6 +71,7 @@ class FitUncertainty:
     neighbour_correlation: float
     is_correlated: bool
     degrees_of_freedom: int
+    wander: Wander
 
 
 def estimate_uncertainty(problem: FitProblem, p: np.ndarray, terms: Terms) -> FitUncertainty:
@@ -82,6 +87,10 @@ def estimate_uncertainty(problem: FitProblem, p: np.ndarray, terms: Terms) -> Fi
     quarter = max(int(half_period / 4 / float(np.median(np.diff(problem.t)))), 1)
     neighbour_correlation, is_correlated = residual_correlation(e, [quarter])
     variance = white
+    rms = float(np.sqrt(np.mean(e**2)))
+    wander = Wander(0.0, 0.0, np.zeros(len(unknowns)))
+    if rms < thresholds.ROUGH * problem.noise:
+        wander = estimate_wander(problem, p, e, jacobian * scale, inverse / np.outer(scale, scale))
     if is_correlated:
         half_cycles = (problem.t[-1] - problem.t[0]) / half_period
         counts = {
@@ -90,16 +99,16 @@ def estimate_uncertainty(problem: FitProblem, p: np.ndarray, terms: Terms) -> Fi
         }
         variance = np.max([white, *(block_variances(jacobian, e, inverse, count) for count in sorted(counts))], axis=0)
     unconstrained = p[unknowns] - inverse @ (jacobian.T @ e) / scale
-    rms = float(np.sqrt(np.mean(e**2)))
     return FitUncertainty(
         unknowns,
-        np.sqrt(variance) / scale,
+        np.sqrt(variance / scale**2 + wander.variances),
         to_correlation(inverse),
         unconstrained,
         rms,
         neighbour_correlation,
         is_correlated,
         degrees_of_freedom,
+        wander,
     )
 
 

@@ -83,9 +83,25 @@ def make_remarks(
             f"Neighbouring residuals are correlated ({uncertainty.neighbour_correlation:.2f}): {correlated}. "
             "The intervals are widened."
         )
+    remarks += wander_remark(uncertainty)
     drift = drift_remark(record, problem, full) if uncertainty.is_correlated and not problem.drift else ""
     rounding = rounding_remark(problem, full, unit)
     return (*remarks, *([drift] if drift else []), *rounding, *ambiguity_remark(problem, laws))
+
+
+def wander_remark(uncertainty: FitUncertainty) -> list[str]:
+    """Return a remark on slow departures of phase and amplitude from the law."""
+    phase, amplitude = uncertainty.wander.phase, uncertainty.wander.amplitude
+    sizes = [f"the phase by {phase:.1g} rad"] * (phase > 0) + [f"the amplitude by {100 * amplitude:.1g} %"] * (
+        amplitude > 0
+    )
+    causes = ["a clock whose rate varies"] * (phase > 0) + ["a loss that follows another law"] * (amplitude > 0)
+    if not sizes:
+        return []
+    return [
+        f"The record departs slowly from the law, {' or '.join(sizes)} (rms), as with {' or '.join(causes)}. The "
+        "intervals are widened."
+    ]
 
 
 def rounding_remark(problem: FitProblem, full: FittedLaw, unit: str) -> tuple[str, ...]:

@@ -48,7 +48,10 @@ class SwingFit:
 
 
 def fit_swings(problem: FitProblem, extrema: Extrema, p: np.ndarray, terms: Terms) -> SwingFit | None:
-    """Fit the law to the swings of a record, from the values p of the whole signal; None if there are too few."""
+    """Fit the law to the swings of a record, from the values p of the whole signal.
+
+    Returns None if the swings do not determine the losses.
+    """
     times = extrema.t - problem.time_origin
     is_used = (times >= problem.t[0]) & (times <= problem.t[-1])
     size = np.abs(np.diff(extrema.x[is_used])) / problem.scale
@@ -84,6 +87,8 @@ def fit_swings(problem: FitProblem, extrema: Extrema, p: np.ndarray, terms: Term
         return None
     scale = column_norms(jacobian)
     jacobian = jacobian / scale
+    if np.linalg.cond(jacobian) > thresholds.MAX_CONDITION:
+        return None
     covariance, correction, departure = estimate_covariance(jacobian, -e, a, slopes[:, 0])
     errors, correlation = np.sqrt(np.diag(covariance)) / scale, to_correlation(covariance)
     center = p[unknowns] + correction / scale

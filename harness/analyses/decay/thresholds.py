@@ -105,6 +105,9 @@ EQUAL_DEVIANCE = 1.0  # of n ln(squares): no value of two such laws differs by m
 # --- Intervals (intervals.py) ---
 BLOCKS_PER_HALF_CYCLE = (1.0, 0.3, 0.1, 0.03)  # lengths on which residuals may be correlated
 MIN_BLOCKS, MAX_BLOCKS = 24, 400  # fewer leave the variance uncertain; more are shorter than any correlation
+WANDER_PIECES = 8  # of the random walk of phase and amplitude over a record
+SEEN_WANDER = 1e-9  # of the largest eigenvalue: smaller ones are walks that the fitted values follow
+PROVEN_WANDER = 4.0  # of the logarithm of the likelihood: white noise exceeds it in one record of 400
 NEGLIGIBLE_BOUND = 4.0  # standard errors above zero: the bound at zero no longer matters
 MAX_BOUND = 8.0  # standard errors above the most likely value: no end of an interval is beyond
 INTERVAL_PRECISION = 1e-4  # standard errors: of the ends of an interval, well below what the draws leave uncertain
@@ -112,6 +115,7 @@ INTERVAL_PRECISION = 1e-4  # standard errors: of the ends of an interval, well b
 # --- Fit of the swings (swing_fit.py) ---
 MAX_FITTED_SWINGS = 200  # the largest ones say most; the cost grows with the third power
 MIN_FITTED_SWINGS = 10  # for a variance of noise and one of the departure from the law
+MAX_CONDITION = 1e8  # of the equations of the swings: beyond, they are singular to rounding
 RIDGE = 1e-10  # of the mean variance: keeps matrices positive definite in rounding
 PROVEN_DEPARTURE = 4.0  # of the logarithm of the likelihood: no record of 14 without a departure exceeds 2.5
 SMALL_DEPARTURE = 0.01  # of the loss: a smaller departure from the law is not reported

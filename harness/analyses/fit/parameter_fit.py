@@ -84,6 +84,52 @@ class Validation:
 
 
 @dataclass(frozen=True)
+class Slips:
+    """Irregular slips of a measured force.
+
+    Attributes
+    ----------
+    record, column, unit : str
+        Names of the record and of the observed variable, and its unit.
+    t : numpy.ndarray
+        Times (n,) in s at which the slips start.
+    before, after : numpy.ndarray
+        Forces (n,) at the start and at the end of each slip.
+    waiting : numpy.ndarray
+        Times (n,) in s from the end of the slip before to the start of each slip.
+    """
+
+    record: str
+    column: str
+    unit: str
+    t: np.ndarray
+    before: np.ndarray
+    after: np.ndarray
+    waiting: np.ndarray
+
+    @property
+    def drop(self) -> np.ndarray:
+        """Forces (n,) that the slips take away."""
+        return np.abs(self.before - self.after)
+
+    @property
+    def remark(self) -> str:
+        """The means and standard deviations, in a sentence."""
+        forces = ((self.before, "before"), (self.after, "after"), (self.drop, "drop"))
+        parts = [f"{name} {describe(values)} {self.unit}" for values, name in forces]
+        return (
+            f"The {len(self.t)} slips of {self.column} in {self.record} are irregular, so that one static and one "
+            f"sliding friction do not describe them. Means and standard deviations of the force: {', '.join(parts)}; "
+            f"waiting time {describe(self.waiting)} s."
+        )
+
+
+def describe(values: np.ndarray) -> str:
+    """Return mean and standard deviation of values (n,)."""
+    return f"{values.mean():.3g} ± {values.std(ddof=1):.2g}"
+
+
+@dataclass(frozen=True)
 class ComparedLaw:
     """A law in a comparison.
 
@@ -199,6 +245,8 @@ class ParameterFit:
         Comparison with the other FMUs.
     tables : tuple of LookupTable
         Lookup tables of the FMU with values of y among the unknowns, whose start values they have.
+    slips : tuple of Slips
+        Slips of each observed force whose slips are irregular.
     """
 
     fmu: str
@@ -222,6 +270,7 @@ class ParameterFit:
     against: "tuple[ParameterFit, ...]" = ()
     comparison: LawComparison | None = None
     tables: tuple[LookupTable, ...] = ()
+    slips: tuple[Slips, ...] = ()
 
     @property
     def n_samples(self) -> int:

@@ -1,6 +1,6 @@
 """Request of a fit, checked against the FMU: unknowns, fixed values, observed variables and inputs."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import inf, isfinite
 from pathlib import Path
@@ -14,13 +14,14 @@ from ...errors import SceneError, check_names, format_value
 from ...records.columns import ColumnOptions
 from ...records.record import MIN_SAMPLES
 from ...records.signal_table import SignalSource, SignalTable
-from ...running.fmu_archive import read_description
+from ...running.fmu_archive import read_description, resolve_stop
 from ...running.variable_values import convert_value, enumeration_labels
 from ...running.whole_run import RealVariable, real_variables
 from ...scenes.run_spec import RunSpec
 
 SAMPLES_PER_UNKNOWN = 4
 GAIN_RANGE = (0.5, 2.0)
+SPAN_RATIO = 4.0  # about a factor of a thousand between a record and a run of the FMU: its times have another unit
 DELAY_SHARE = 0.1  # of the duration of the shortest record: default range of a delay
 READABLE = ("output", "local")  # causalities of variables that can be observed
 TOLERANCE, SOLVER_RTOL = 1e-8, "solver.rtol"  # larger tolerances make the derivatives of residuals inaccurate
@@ -285,3 +286,17 @@ def record_data(resolved: ResolvedRequest, table: SignalTable) -> RecordData:
         tuple(request.sigma.get(name) for name in request.observe),
         table.input_t if table.inputs else None,
     )
+
+
+def span_remarks(resolved: ResolvedRequest, records: Sequence[RecordData]) -> Iterator[str]:
+    """Yield a remark on each record that lasts about a thousand times as long as a run of the FMU, or a thousandth."""
+    stop = resolve_stop(RunSpec(resolved.request.run.fmu), read_description(resolved.request.run.fmu))
+    for record in records:
+        duration = float(record.t[-1] - record.t[0])
+        ratio = duration / stop if stop else 1.0
+        for factor, how, unit in ((1000.0, "a thousand times as long as", "ms"), (0.001, "a thousandth of", "s")):
+            if 1 / SPAN_RATIO < ratio / factor < SPAN_RATIO:
+                yield (
+                    f"{record.name} lasts {duration:.4g} s, about {how} a run of the FMU ({stop:g} s): if its times "
+                    f"are in {unit}, state that in their heading, as in t [{unit}], or by --time-unit {unit}."
+                )

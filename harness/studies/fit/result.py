@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...analyses.estimation.estimate import UsedSamples, shared_json
-from ...analyses.fit.parameter_fit import FittedRecord, ParameterFit
+from ...analyses.fit.parameter_fit import FittedRecord, ParameterFit, Slips
 from ...results.files import column_heading, to_json, write_csv
 from ...results.result import Result
 from ...results.summary import Summary
@@ -90,12 +90,20 @@ def fit_as_json(fit: ParameterFit) -> dict[str, Any]:
         "profiles": [asdict(profile) for profile in fit.profiles],
         "correlation": fit.correlation.tolist(),
         "validation": [asdict(column) for column in fit.validation.columns] if fit.validation else [],
+        "slips": [slips_as_json(slips) for slips in fit.slips],
         "bic": fit.bic,
         "searches": fit.n_searches,
         "runs": fit.n_runs,
         "log": list(fit.log),
         **(comparison if fit.against else {}),
     }
+
+
+def slips_as_json(slips: Slips) -> dict[str, Any]:
+    """Return slips for JSON output."""
+    values = {"t": slips.t, "before": slips.before, "after": slips.after, "drop": slips.drop, "waiting": slips.waiting}
+    texts = {"record": slips.record, "column": slips.column, "unit": slips.unit}
+    return texts | {name: numbers.tolist() for name, numbers in values.items()}
 
 
 def write_fitted_signals(

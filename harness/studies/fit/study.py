@@ -11,6 +11,7 @@ from ...analyses.fit.fit_description import describe_fit
 from ...analyses.fit.fit_procedure import fit_records
 from ...analyses.fit.law_comparison import compare_laws
 from ...analyses.fit.parameter_fit import ParameterFit
+from ...analyses.fit.slips import irregular_slips
 from ...analyses.fit.validation import validate
 from ...errors import HarnessError, SceneError, format_value
 from ...records.signal_table import SignalTable, parse_signals
@@ -25,7 +26,7 @@ from ...running.whole_run import open_simulator
 from ...scenes.run_spec import RunSpec
 from .laws import ResolvedLaws, resolve_laws
 from .observed import choose_observed
-from .request import FitRequest, ResolvedRequest, make_unknowns, record_data
+from .request import FitRequest, ResolvedRequest, make_unknowns, record_data, span_remarks
 from .result import FitResult
 
 STUDY = find_study("fit")
@@ -179,17 +180,23 @@ def fit_tables(
             "leave out --each or --validate"
         )
     data = [record_data(resolved, table) for table in tables]
-    unknowns = make_unknowns(resolved, data)
+    units = {name: resolved.variables[name].unit for name in request.observe}
+    slips = irregular_slips(data, [*units.items()])
+    unknowns, doubts = make_unknowns(resolved, data), [*span_remarks(resolved, data), *(one.remark for one in slips)]
     with open_simulator(replace(resolved.shared, fmu=native_equivalent(request.run.fmu))) as simulator:
-        problem, raw_fit = fit_records(simulator, data, unknowns, resolved.fixed, request.robust, report, averages)
+        try:
+            problem, raw_fit = fit_records(simulator, data, unknowns, resolved.fixed, request.robust, report, averages)
+        except HarnessError as error:
+            raise HarnessError(". ".join([str(error), *doubts]).removesuffix(".")) from None
         prediction = (
             validate(problem, raw_fit, [record_data(resolved, table) for table in validation]) if validation else None
         )
         notes = [note for table in (*tables, *validation) for note in table.notes]
         fit = describe_fit(resolved.name, problem, raw_fit, notes, simulator.n_runs, process_time() - start_time)
-    units = {name: resolved.variables[name].unit for name in request.observe}
     curves = fitted_tables(request.run, [estimate.name for estimate in fit.estimates])
-    fit = replace(fit, columns=set_units(fit.columns, units), tables=curves)
+    fit = replace(
+        fit, columns=set_units(fit.columns, units), remarks=(*doubts, *fit.remarks), slips=slips, tables=curves
+    )
     if prediction:
         prediction = replace(prediction, columns=set_units(prediction.columns, units))
         fit = replace(fit, validation=prediction, remarks=(*fit.remarks, *prediction.remarks))
