@@ -45,6 +45,8 @@ class StepRefusedError(StepError):
 
 CALL_FAILURES = (FMICallException, StepError)
 
+EVENT_MODE_OPTIONS = ("eventModeUsed", "earlyReturnAllowed")
+
 PreparedCall = tuple[str, Any, tuple[Any, ...]]  # name, function and arguments
 
 
@@ -88,6 +90,9 @@ class FmuSession:
         Name of the instance; by default its model identifier.
     log : LogCapture, optional
         Stores the log messages; by default a new log.
+    ticks_clocks : bool
+        Whether the caller ticks the clocks of an FMU of FMI 3.0. An FMU with clocks then runs in event mode in
+        co-simulation, and is refused otherwise.
 
     Raises
     ------
@@ -102,7 +107,14 @@ class FmuSession:
         exchange: bool = False,
         name: str | None = None,
         log: LogCapture | None = None,
+        ticks_clocks: bool = False,
     ) -> None:
+        clocks = clocks_of(description)
+        if clocks and not ticks_clocks:
+            names = ", ".join(clock.name for clock in clocks)
+            raise HarnessError(f"it has clocks ({names}), which only run, compare and sweep tick")
+        self.ticks_clocks = bool(clocks) and (exchange or description.coSimulation.hasEventMode)
+        self.uses_event_mode = self.ticks_clocks and not exchange
         self.description, self.exchange, self.log = description, exchange, log or LogCapture()
         self.is_fmi2 = description.fmiVersion == "2.0"
         self.prefix = "fmi2" if self.is_fmi2 else "fmi3"
@@ -135,8 +147,11 @@ class FmuSession:
             if self.is_fmi2:
                 fmu.instantiate(loggingOn=True, callbacks=fmi2_callbacks(log))
             else:
+                event_mode = {} if self.exchange else dict.fromkeys(EVENT_MODE_OPTIONS, self.uses_event_mode)
                 fmu.instantiate(
-                    loggingOn=True, logMessage=lambda instance, status, category, text: log.add(status, text)
+                    loggingOn=True,
+                    logMessage=lambda instance, status, category, text: log.add(status, text),
+                    **event_mode,
                 )
         except Exception as error:  # fmpy raises bare Exceptions
             hint = (
@@ -222,7 +237,7 @@ class FmuSession:
             _, terminate, early, last_time = (result.value for result in self.step_results)
             if terminate:
                 raise TerminatedError(last_time if early else t + h, "fmi3DoStep returned terminateSimulation")
-            if early:
+            if early and not self.uses_event_mode:
                 raise HarnessError("fmi3DoStep returned early without permission")
 
     def step_failure(self, status: int, t: float, h: float) -> Exception:
@@ -329,6 +344,11 @@ def call_all(calls: Iterable[PreparedCall]) -> None:
         status = function(*arguments)
         if status > WARNING:
             raise FMICallException(name, status)
+
+
+def clocks_of(description: Any) -> list[Any]:
+    """Return the clocks of an FMU, which FMI 3.0 has."""
+    return [variable for variable in description.modelVariables if variable.type == "Clock"]
 
 
 def type_name(variable: Any, description: Any) -> str:

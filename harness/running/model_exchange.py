@@ -13,11 +13,11 @@ from fmpy.simulation import Input
 from fmpy.sundials import CVodeSolver
 
 from ..errors import HarnessError
+from .event_mode import MAX_EVENTS, Clocks, update_discrete_states
 from .fmu_session import FmuSession, TerminatedError
 from .stepping import InputSignals, TimeGrid
 
 MAX_CVODE_STEPS = 100_000  # between two points
-MAX_EVENTS = 1000  # at one time
 LOG_FILES = ("SUNLOGGER_ERROR_FILENAME", "SUNLOGGER_WARNING_FILENAME")  # environment variables of CVode
 
 
@@ -84,6 +84,8 @@ class ModelExchange:
         Input signals.
     max_steps : int
         Largest number of solver steps from point to point.
+    clocks : Clocks, optional
+        Clocks of an instance of FMI 3.0.
     """
 
     def __init__(
@@ -94,8 +96,9 @@ class ModelExchange:
         report_work: Callable[[], Any],
         signals: InputSignals | None = None,
         max_steps: int = MAX_CVODE_STEPS,
+        clocks: Clocks | None = None,
     ) -> None:
-        self.session, self.fmu, self.grid, self.signals = session, session.fmu, grid, signals
+        self.session, self.fmu, self.grid, self.signals, self.clocks = session, session.fmu, grid, signals, clocks
         self.rtol, self.report_work, self.max_steps = rtol, report_work, max_steps
         self.is_event, self.n_stalled = False, 0
 
@@ -104,7 +107,7 @@ class ModelExchange:
             self.signals.apply(t, after_event=True)
         fmu, description = self.fmu, self.session.description
         self.update = fmu.newDiscreteStates if self.session.is_fmi2 else fmu.updateDiscreteStates
-        self.next_event = update_discrete_states(self.update, t)
+        self.next_event = self.update_states(t)
         fmu.enterContinuousTimeMode()
         self.solver = CheckedCVode(
             self.report_work,
@@ -126,6 +129,8 @@ class ModelExchange:
     def advance(self, t: float, target: float) -> float:
         jump = self.signals.next_jump(t) if self.signals else inf
         target = min(target, self.next_event, jump)
+        if self.clocks:
+            target = self.clocks.limit(target)
         has_root, _, t_end = self.solver.step(t, target)
         t_end = target if abs(t_end - target) <= self.grid.tolerance else t_end
         self.fmu.setTime(t_end)
@@ -136,7 +141,8 @@ class ModelExchange:
             needs_event, terminated = self.fmu.completedIntegratorStep()
         if terminated:
             raise TerminatedError(t_end, "it returned terminateSimulation from a completed step")
-        self.is_event = has_root or needs_event or t_end >= min(self.next_event, jump)
+        is_tick = self.clocks is not None and self.clocks.is_due(t_end)
+        self.is_event = has_root or needs_event or is_tick or t_end >= min(self.next_event, jump)
         self.n_stalled = 0 if t_end > t else self.n_stalled + 1
         if self.n_stalled > MAX_EVENTS:
             raise HarnessError(f"{MAX_EVENTS} events in a row at t = {t_end:.9g} s")
@@ -146,19 +152,10 @@ class ModelExchange:
         self.fmu.enterEventMode()
         if self.signals:
             self.signals.apply(t, after_event=True)
-        self.next_event = update_discrete_states(self.update, t)
+        self.next_event = self.update_states(t)
         self.fmu.enterContinuousTimeMode()
         self.solver.reset(t)
 
-
-def update_discrete_states(update: Callable[[], tuple[bool, bool, bool, bool, bool, float]], t: float) -> float:
-    """Iterate the discrete states at an event; return the time of the next event in s, inf if there is none."""
-    for _ in range(MAX_EVENTS):
-        needs_update, terminated, _, _, is_defined, next_event = update()
-        if terminated:
-            raise TerminatedError(t, "it returned terminateSimulation from an event")
-        if is_defined and not next_event >= t:
-            raise HarnessError(f"it sets its next event to {next_event:.9g} s, at t = {t:.9g} s")
-        if not needs_update and not (is_defined and next_event == t):
-            return next_event if is_defined else inf
-    raise HarnessError(f"its discrete states do not settle at t = {t:.9g} s")
+    def update_states(self, t: float) -> float:
+        """Tick the clocks and iterate the discrete states; return the time of the next event in s."""
+        return self.clocks.handle_event(t, self.update) if self.clocks else update_discrete_states(self.update, t)

@@ -24,7 +24,7 @@ from ctypes import (
 )
 from math import isfinite, prod
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from fmpy.fmi1 import FMICallException
@@ -139,6 +139,14 @@ def row_type(selection: Sequence[ShapedVariable], is_fmi2: bool) -> np.dtype:
     return np.dtype([("time", c_double), *groups], align=True)
 
 
+class ClockedCall(NamedTuple):
+    """Call that reads a variable that belongs to clocks."""
+
+    clocks: set[int]  # value references
+    call: PreparedCall
+    texts: list[tuple[Any, Any]]  # of Strings: pointers and indices
+
+
 class Recorder:
     """Reads variables of a session and writes them as a row.
 
@@ -165,24 +173,59 @@ class Recorder:
         only_finite: bool = False,
     ) -> None:
         layout = row_type(selection, session.is_fmi2)
-        self.row, self.write, self.strings, self.only_finite = bytearray(layout.itemsize), write, strings, only_finite
+        self.session, self.row, self.write = session, bytearray(layout.itemsize), write
+        self.strings, self.only_finite = strings, only_finite
         self.time = c_double.from_buffer(self.row)
         self.calls: list[PreparedCall] = []
         self.cells: dict[str, tuple[Any, int]] = {}  # of Reals: buffer and index
         self.texts: list[tuple[Any, Any]] = []  # of Strings: pointers and indices
+        self.clocked: list[ClockedCall] = []
         for type_name, variables, names in group_by_type(selection):
             kind, offset = layout.fields[type_name][0].base, layout.fields[type_name][1]  # type: ignore[index]
-            buffer = (np.ctypeslib.as_ctypes_type(kind) * len(names)).from_buffer(self.row, offset)
+            item = np.ctypeslib.as_ctypes_type(kind)
+            buffer = (item * len(names)).from_buffer(self.row, offset)
             if type_name in REAL_TYPES:
                 self.cells |= {name: (buffer, i) for i, name in enumerate(names)}
-            values = buffer
-            if type_name == "String":
-                values = (c_char_p * len(names))()
-                self.texts = [(values, buffer)]
-            references = (c_uint * len(variables))(*(variable.valueReference for variable in variables))
-            count = () if session.is_fmi2 else (len(names),)
-            name = f"Get{session.type_name(variables[0])}"
-            self.calls.append(session.prepare_call(name, references, len(variables), values, *count))
+            sizes = [prod(shape) for variable, shape in selection if variable.type == type_name]
+            groups = [(variables, len(names))]
+            if session.ticks_clocks:
+                groups = [([variable], size) for variable, size in zip(variables, sizes, strict=True)]
+            for group, size in groups:
+                indices = (item * size).from_buffer(self.row, offset)
+                offset += size * sizeof(item)
+                self.add_call(type_name, group, indices, size)
+
+    def add_call(self, type_name: str, variables: list[Any], buffer: Any, size: int) -> None:
+        """Prepare the call that reads variables of one type into a buffer of the row."""
+        is_text = type_name == "String"
+        values = (c_char_p * size)() if is_text else buffer
+        references = (c_uint * len(variables))(*(variable.valueReference for variable in variables))
+        count = () if self.session.is_fmi2 else (size,)
+        name = f"Get{self.session.type_name(variables[0])}"
+        call = self.session.prepare_call(name, references, len(variables), values, *count)
+        texts = [(values, buffer)] if is_text else []
+        if self.session.ticks_clocks and variables[0].clocks:
+            clocks = {clock.valueReference for clock in variables[0].clocks}
+            self.clocked.append(ClockedCall(clocks, call, texts))
+        else:
+            self.calls.append(call)
+            self.texts += texts
+
+    def read_clocked(self, active: set[int]) -> None:
+        """Read the variables that belong to an active clock, given by value references; rows repeat their values."""
+        for reading in self.clocked:
+            if reading.clocks & active:
+                self.read([reading.call], reading.texts)
+
+    def read(self, calls: list[PreparedCall], texts: list[tuple[Any, Any]]) -> None:
+        """Read variables into the row."""
+        for name, function, arguments in calls:
+            status = function(*arguments)
+            if status > WARNING:
+                raise FMICallException(name, status)
+        for pointers, indices in texts:
+            assert self.strings
+            indices[:] = [self.strings.index_of(text) for text in pointers]
 
     def cell(self, name: str) -> c_double:
         """Return the ctypes object with the last recorded value of a Float64."""
@@ -192,13 +235,7 @@ class Recorder:
     def record(self, t: float) -> None:
         """Write a row of the current values at a time in s."""
         self.time.value = t
-        for name, function, arguments in self.calls:
-            status = function(*arguments)
-            if status > WARNING:
-                raise FMICallException(name, status)
-        for texts, indices in self.texts:
-            assert self.strings
-            indices[:] = [self.strings.index_of(text) for text in texts]
+        self.read(self.calls, self.texts)
         if self.only_finite:
             for name, (buffer, i) in self.cells.items():
                 if not isfinite(buffer[i]):

@@ -248,8 +248,11 @@ class ChildSession:
         self.timeout = spec.timeout + BUSY_TIME
         try:
             self.process.ask({"fmu": spec.fmu, "limit": spec.timeout}, self.timeout)
-        except ChildError:
-            raise HarnessError(f"{spec.fmu.name} cannot be loaded: it crashes or hangs") from None
+        except BaseException as error:
+            self.close()
+            if isinstance(error, ChildError):
+                raise HarnessError(f"{spec.fmu.name} cannot be loaded: it crashes or hangs") from None
+            raise
 
     def prepare(self, spec: RunSpec) -> Run:
         """Prepare runs that differ in Reals only."""

@@ -99,6 +99,41 @@ def test_a_state_that_jumps_at_events_agrees_with_its_closed_form(run):
     assert rows["v [m/s]"][jumps + 1] == pytest.approx(-e * rows["v [m/s]"][jumps], abs=1e-9)
 
 
+@pytest.mark.parametrize("interface", ["CoSimulation", "ModelExchange"])
+def test_clocks_tick_at_their_times_in_event_mode(run, interface):
+    """x = e^(-2 t). The FMU refuses ticks at other times, steps past a tick, and reading without an active clock."""
+    done, rows = run("Ticking", "--interface", interface)
+    assert_succeeded(done)
+    ticks = {"samples": 0.05 + 0.1 * np.arange(10), "growths": [0.125, 0.375, 0.875], "timed_out": [0.25 + 0.07]}
+    for name, times in ticks.items():
+        assert rows["t [s]"][1:][np.diff(rows[name]) != 0] == pytest.approx(times, abs=1e-12)
+    assert rows["held"][-1] == pytest.approx(exp(-2 * 0.95), rel=1e-6)
+    assert rows["fifth_x"][-1] == pytest.approx(exp(-2 * 0.45), rel=1e-6)  # of a clock that the FMU ticks itself
+
+
+def test_clocks_that_cannot_tick_are_refused(run, external_fmu_folder, tmp_path):
+    def run_edited(old, new, *arguments):
+        assert old in (external_fmus.SOURCES / "Ticking/modelDescription.xml").read_text()
+        edit = {"modelDescription.xml": lambda text: text.replace(old, new)}
+        copy = external_fmus.edited_copy(external_fmu_folder / "Ticking.fmu", tmp_path / "Ticking.fmu", edit)
+        return run(str(copy), *arguments)
+
+    done, _ = run_edited('hasEventMode="true"', "")
+    assert_refused(done, 1, "(sample, timeout, growing, fifth), but no event mode; use --interface ModelExchange")
+    name, countdown = 'name="timeout" ', 'intervalVariability="countdown"'
+    triggered = 'causality="input" variability="discrete" intervalVariability="triggered"'
+    done, _ = run_edited(
+        f'{name}valueReference="10" causality="input" variability="discrete" {countdown}',
+        f'{name}valueReference="10" {triggered}',
+    )
+    assert_refused(done, 1, "Ticking has triggered input clocks (timeout), which only another FMU can tick")
+    done, _ = run_edited('intervalDecimal="0.1"', 'intervalDecimal="0"')
+    assert_refused(done, 1, "its clock sample has an interval of 0.0 s; it must be positive")
+    (tmp_path / "x.csv").write_text("time,x\n" + "".join(f"{0.1 * i},{exp(-0.2 * i)}\n" for i in range(21)))
+    done = commands.harness(tmp_path, "fit", external_fmu_folder / "Ticking.fmu", "x.csv", "--free", "k", blank=True)
+    assert_refused(done, 1, "it has clocks (sample, timeout, growing, fifth), which only run, compare and sweep tick")
+
+
 def test_an_fmu_with_a_fixed_internal_step_is_reported_as_such(run):
     done, rows = run("FixedStep", blank=True)
     assert_succeeded(done)
@@ -237,6 +272,7 @@ def test_the_longest_of_the_aborted_refinement_runs_is_kept(tmp_path):
 
     selection = [(ModelVariable("x", type="Float64", valueReference=0), ())]
     session = SimpleNamespace(
+        ticks_clocks=False,
         is_fmi2=False,
         type_name=lambda variable: variable.type,
         prepare_call=lambda name, *arguments: (name, answer, (None, *arguments)),

@@ -11,9 +11,9 @@ from fmpy.model_description import ModelVariable
 from spec_runs import ignore_progress
 
 from harness.errors import HarnessError
+from harness.running.event_mode import update_discrete_states
 from harness.running.external.step_refinement import RefinementRun, refine
 from harness.running.fmu_session import FmuSession, TerminatedError
-from harness.running.model_exchange import update_discrete_states
 from harness.running.recorder import Recorder, StringTable, read_rows
 from harness.running.stepping import CoSimulation, TimeGrid, step_to_stop
 from harness.scenes.run_spec import RunSpec
@@ -30,7 +30,7 @@ def run_with_step(answer):
         return 0
 
     session = FmuSession.__new__(FmuSession)  # without a library
-    session.instance, session.do_step = None, do_step
+    session.instance, session.do_step, session.uses_event_mode = None, do_step, False
     session.step_results = (c_bool(), c_bool(), c_bool(), c_double())
     session.step_arguments = tuple(map(byref, session.step_results))
     times, grid = [], TimeGrid(0.0, 1.0, 0.25)
@@ -88,6 +88,7 @@ def test_a_null_or_malformed_string_is_recorded(tmp_path, bytes_, text):
 
     variable = ModelVariable("said", valueReference=7, type="String")
     session = SimpleNamespace(
+        ticks_clocks=False,
         is_fmi2=False,
         type_name=lambda variable: "String",
         prepare_call=lambda name, *arguments: (name, answer, (None, *arguments)),

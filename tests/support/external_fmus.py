@@ -1,4 +1,4 @@
-"""Twelve FMUs that do not come from this project: pythonfmu (FMI 2.0), pythonfmu3 (FMI 3.0) and C. Sources:
+"""Thirteen FMUs that do not come from this project: pythonfmu (FMI 2.0), pythonfmu3 (FMI 3.0) and C. Sources:
 tests/external_fmus."""
 
 import os
@@ -23,12 +23,13 @@ SWEEP_AXES = {
     "Fmi3Midpoint": "k=30:50:3",  # FMI 3.0, with units; terminates at `limit`
     "Arrays": "omega=1:3:3",  # FMI 3.0: arrays, an enumeration, a string
     "ModelExchangeOnly": "k=30:50:3",  # FMI 3.0, model exchange only
+    "Ticking": "k=1:3:3",  # FMI 3.0, both interfaces, in C: clocks of all kinds that one FMU can have
     "Bouncing": "e=0.7:0.9:3",  # FMI 2.0, model exchange only, in C: events that change states; with units
 }
 
 
 def build_external_fmus():
-    """Return the folder of all twelve FMUs."""
+    """Return the folder of all thirteen FMUs."""
 
     def make(folder):
         path = os.environ | {"PYTHONPATH": str(build_cache.ROOT)}
@@ -61,11 +62,13 @@ def main(out):
         package = pythonfmu3 if "pythonfmu3" in source.read_text() else pythonfmu
         package.FmuBuilder.build_FMU(source, out)
     for source in SOURCES.glob("*/*.c"):
-        files = {file.name: file.read_text() for file in HEADERS.glob("fmi2*.h")}
+        description = source.with_name("modelDescription.xml")
+        version = "3" if 'fmiVersion="3.0"' in description.read_text() else "2"
+        files = {file.name: file.read_text() for file in HEADERS.glob(f"fmi{version}*.h")}
         files[source.name] = UNUSED_PARAMETERS_ALLOWED + source.read_text()
         with ZipFile(Path(out) / f"{source.stem}.fmu", "w", ZIP_DEFLATED) as archive:
-            archive.write(source.with_name("modelDescription.xml"), "modelDescription.xml")
-            for path, content in compile_binaries(source.stem, files, source.name, "linux64", "2").items():
+            archive.write(description, "modelDescription.xml")
+            for path, content in compile_binaries(source.stem, files, source.name, "linux64", version).items():
                 archive.writestr(path, content)
 
 

@@ -12,8 +12,16 @@ from fmpy.fmi1 import FMICallException
 from ...errors import HarnessError, first_line
 from ...process.child_process import RequestServer
 from ...scenes.run_spec import RunSpec
+from ..event_mode import Clocks, EventCoSimulation
 from ..fmu_archive import read_leniently
-from ..fmu_session import STATUS_NAMES, FmuSession, LogCapture, StepError, StepRefusedError, TerminatedError
+from ..fmu_session import (
+    STATUS_NAMES,
+    FmuSession,
+    LogCapture,
+    StepError,
+    StepRefusedError,
+    TerminatedError,
+)
 from ..model_exchange import ModelExchange
 from ..recorder import Recorder, StringTable, read_rows, select_variables
 from ..stepping import CoSimulation, Stepper, input_signals, make_grid, step_to_stop
@@ -104,16 +112,22 @@ class ExternalFmu:
         """Run a new instance and record its rows; exceptions propagate."""
         span = coarsest_grid(self.spec)
         grid = make_grid(replace(self.spec, grid=h), span.start, span.stop)
-        session = FmuSession(self.description, self.folder, self.spec.exchange, log=log)
-        session.initialize(self.settings, grid.start, grid.stop, tolerance)
+        session = FmuSession(self.description, self.folder, self.spec.exchange, log=log, ticks_clocks=True)
+        session.enter_initialization(self.settings, grid.start, grid.stop, tolerance)
+        clocks = Clocks(session, self.folder, grid.start, grid.tolerance) if session.ticks_clocks else None
+        session.fmu.exitInitializationMode()
         signals = input_signals(self.spec.inputs, session)
-        stepper: Stepper = (
-            ModelExchange(session, grid, tolerance, self.report_progress, signals)
-            if self.spec.exchange
-            else CoSimulation(session, grid, signals, only_grid=True)
-        )
+        stepper: Stepper
+        if self.spec.exchange:
+            stepper = ModelExchange(session, grid, tolerance, self.report_progress, signals, clocks=clocks)
+        elif clocks:
+            stepper = EventCoSimulation(session, grid, clocks, signals)
+        else:
+            stepper = CoSimulation(session, grid, signals, only_grid=True)
         with path.open("wb", buffering=0) as file:
             recorder = Recorder(session, self.selection, file.write, self.strings, only_finite=True)
+            if clocks:
+                clocks.read_values = recorder.read_clocked
             try:
                 step_to_stop(stepper, grid, recorder.record, self.report_progress)
             except StepError:  # after any other failure the next call may crash; the exit frees the instance

@@ -16,6 +16,7 @@ from ...process.child_process import ChildDiedError, ChildProcess, ChildTimeoutE
 from ...process.temporary_directory import temporary_directory
 from ...results.files import replace_nonfinite
 from ...scenes.run_spec import RunSpec
+from ..event_mode import check_clocks
 from ..fmu_archive import resolve_time_span, unpack
 from ..recorder import Columns, ShapedVariable, array_shape, element_names, read_rows, select_variables
 from ..stepping import check_inputs
@@ -55,6 +56,7 @@ def simulate(spec: RunSpec, description: Any, report: Callable[[float], None]) -
         interfaces = " and ".join(offered_interfaces(description)) or "no interface"
         problem = "model exchange is not among them" if spec.exchange else "neither co-simulation nor model exchange"
         raise HarnessError(f"{spec.fmu.name} offers {interfaces}; {problem}")
+    check_clocks(description, exchange, spec.lenient)
     values = convert_values(spec, variables)
     check_inputs(spec.inputs, variables)
     selection = select_variables(spec, variables, values)
