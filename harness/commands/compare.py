@@ -53,19 +53,19 @@ def compare(
       friction-fmus compare fmus/coulomb.fmu other.fmu --stop 2
       friction-fmus compare results/smd measured.csv --rtol 1e-3 --atol 1e-6
     """
-    from ..running.resolve import FMU_SUFFIXES
-    from ..scenes.fmu_files import find_fmu
-    from ..scenes.run_spec import RunSpec
-    from ..studies.compare import study
-    from ..studies.compare.trajectory_sources import RUN_SUFFIXES
+    with terminal.progress(1) as report:  # the imports take most of a second
+        from ..running.resolve import FMU_SUFFIXES
+        from ..scenes.fmu_files import find_fmu
+        from ..scenes.run_spec import RunSpec
+        from ..studies.compare import study
+        from ..studies.compare.trajectory_sources import RUN_SUFFIXES
 
-    suffixes = [Path(source).suffix for source in (first, second)]
-    if all(Path(source).exists() for source in (first, second)) and not {*suffixes} & {*RUN_SUFFIXES}:
-        refuse_options(context, "on stored results and files", "stop")
-    fmus = [find_fmu(source) for source in (first, second) if Path(source).suffix in FMU_SUFFIXES]
-    refuse_ignored_options(context, fmus, tolerance_is_ignored=True)
-    options = {name: value for name, value in options.items() if name != "tolerance" or value is not None}
-    with terminal.progress(1) as report:
+        suffixes = [Path(source).suffix for source in (first, second)]
+        if all(Path(source).exists() for source in (first, second)) and not {*suffixes} & {*RUN_SUFFIXES}:
+            refuse_options(context, "on stored results and files", "stop")
+        fmus = [find_fmu(source) for source in (first, second) if Path(source).suffix in FMU_SUFFIXES]
+        refuse_ignored_options(context, fmus, tolerance_is_ignored=True)
+        options = {name: value for name, value in options.items() if name != "tolerance" or value is not None}
         spec = RunSpec(Path(), **options)
         comparison, folder = study.run_comparison((first, second), spec, terminal.out, partial(report, "compare"))
     failed = [side.failure for side in (comparison.one, comparison.two) if side.failure]

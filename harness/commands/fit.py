@@ -95,31 +95,31 @@ def fit(
           --free k,mu_s,mu_d,f_s,f_d,v_s --observe x=laser
       friction-fmus fit sled.fmu a.csv b.csv --free f,v --each v --observe F=load
     """
-    from ..errors import SceneError
-    from ..records.columns import ColumnOptions
-    from ..scenes.fmu_files import check_built, find_fmu
-    from ..scenes.run_spec import RunSpec
-    from ..studies.fit import options, study
-    from ..studies.fit.request import FitRequest
+    with terminal.progress(1) as report:  # the imports take most of a second
+        from ..errors import SceneError
+        from ..records.columns import ColumnOptions
+        from ..scenes.fmu_files import check_built, find_fmu
+        from ..scenes.run_spec import RunSpec
+        from ..studies.fit import options, study
+        from ..studies.fit.request import FitRequest
 
-    fmu, *others = map(find_fmu, (model, *against))
-    for path in (fmu, *others):
-        check_built(path, SceneError)
-    ranges = options.parse_ranges(free)
-    per_record = tuple(options.split_list([each or ""]))
-    request = FitRequest(
-        run=RunSpec(fmu, values=options.parse_values("--set", fixed), timeout=timeout),
-        against=tuple(others),
-        free=ranges,
-        observe=options.parse_columns("--observe", observe),
-        inputs=options.parse_columns("--input", inputs),
-        sigma=options.parse_numbers("--sigma", sigma),
-        start=options.parse_starts(start, ranges, per_record),
-        each=per_record,
-        robust=robust,
-        columns=ColumnOptions(**columns),
-    )
-    with terminal.progress(1) as report:
+        fmu, *others = map(find_fmu, (model, *against))
+        for path in (fmu, *others):
+            check_built(path, SceneError)
+        ranges = options.parse_ranges(free)
+        per_record = tuple(options.split_list([each or ""]))
+        request = FitRequest(
+            run=RunSpec(fmu, values=options.parse_values("--set", fixed), timeout=timeout),
+            against=tuple(others),
+            free=ranges,
+            observe=options.parse_columns("--observe", observe),
+            inputs=options.parse_columns("--input", inputs),
+            sigma=options.parse_numbers("--sigma", sigma),
+            start=options.parse_starts(start, ranges, per_record),
+            each=per_record,
+            robust=robust,
+            columns=ColumnOptions(**columns),
+        )
         result, folder = study.fit_files(
             request, records, validate, terminal.out, lambda share: report(records[0], share)
         )
