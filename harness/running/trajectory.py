@@ -469,7 +469,8 @@ def summarize_run(run: Trajectory, title: str) -> Summary:
     signals = {"t [s]": run.time} | {column_heading(name, run.units[name]): run.columns[name] for name in run.columns}
     rows = ((heading, *map(format_value, span_of(column))) for heading, column in signals.items())
     tables = make_table(("variable", *SPAN), rows) + summarize_steps(run, title)
-    return Summary("run", title, tables=tables, picture=f"{title}: plots of the run")
+    remarks = tuple(filter(None, [run.note]))
+    return Summary("run", title, remarks, tables=tables, picture=f"{title}: plots of the run")
 
 
 SPAN = ("start", "end", "smallest", "largest")  # what `span_of` returns

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 from fmpy.model_description import Dimension, ModelVariable
 
+from harness import load_result
 from harness.errors import HarnessError, SceneError
 from harness.results.provenance import load_provenance
 from harness.running.external.simulation import read_longest_rows
@@ -134,10 +135,12 @@ def test_clocks_that_cannot_tick_are_refused(run, external_fmu_folder, tmp_path)
     assert_refused(done, 1, "it has clocks (sample, timeout, growing, fifth), which only run, compare and sweep tick")
 
 
-def test_an_fmu_with_a_fixed_internal_step_is_reported_as_such(run):
+def test_an_fmu_with_a_fixed_internal_step_is_reported_as_such_also_in_its_result(run, tmp_path):
     done, rows = run("FixedStep", blank=True)
     assert_succeeded(done)
-    assert "fixed internal step of 0.1 s, error unknown" in done.stdout
+    note = "fixed internal step of 0.1 s, error unknown"
+    assert note in done.stdout
+    assert note in load_result(tmp_path / "results/FixedStep").note
     assert rows["x"][-1] == pytest.approx(0.9**100)  # 41 % off
     assert abs(0.9**100 / exp(-10) - 1) > 0.4
 

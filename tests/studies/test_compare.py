@@ -246,6 +246,20 @@ def test_a_file_has_integers_only_if_its_program_marks_reals(tmp_path, file, tex
     assert {name for name, column in read.columns.items() if column.dtype.kind == "i"} == held
 
 
+@pytest.mark.parametrize(
+    ("file", "text", "units"),
+    [
+        ("fmpy.csv", '"time","h","h_ft"\n0.0,1.0,3.3\n1.0,2.0,6.6\n', {"h": "", "h_ft": ""}),
+        ("results/trajectory.csv", "t [s],x_mm,h [ft]\n0.0,1.0,3.3\n1.0,2.0,6.6\n", {"x_mm": "", "h": "ft"}),
+        ("logger.csv", "t [s],x_mm\n0.0,1.0\n1.0,2.0\n", {"x": "mm"}),
+    ],
+)
+def test_names_of_simulated_variables_are_not_split_into_name_and_unit(tmp_path, file, text, units):
+    (tmp_path / file).parent.mkdir(exist_ok=True)
+    (tmp_path / file).write_text(text)
+    assert read_trajectory(tmp_path / "results" if file.startswith("results") else tmp_path / file).units == units
+
+
 def test_results_without_a_common_variable_are_refused():
     t = np.arange(20.0)
     with pytest.raises(HarnessError, match="have no variable in common"):

@@ -17,6 +17,7 @@ from ...records.columns import read_numeric
 from ...records.headings import split_heading
 from ...records.table_files import read_content
 from ...records.units import TIMES
+from ...results.loading import load_summary
 from ...results.provenance import load_provenance
 from ...running.fmu_archive import read_description
 from ...running.recorder import element_names
@@ -25,6 +26,7 @@ from ...scenes.run_spec import RunSpec
 
 MAX_TIME = 1e100  # s; largest absolute time
 ELEMENT = re.compile(r".*\[\d+(,\d+)*\]")  # name of an array element; its brackets do not contain a unit
+UNIT_IN_BRACKETS = re.compile(r" \[.+\]$")
 BOOLEANS = {"True": 1.0, "False": 0.0, "true": 1.0, "false": 0.0}
 INTEGER = re.compile(r"[-+]?\d{1,18}")  # fits into 64 bits
 INTEGER_TYPE = re.compile(r"#\(type=(Boolean|Integer|Enumeration)\b", re.I)  # in the comment of a Modelica variable
@@ -44,7 +46,10 @@ def read_trajectory(path: Path) -> Trajectory:
     file = path / "trajectory.csv" if path.is_dir() else path
     if path.is_dir() and not file.is_file():
         raise SceneError(f"{path} is not a result folder: trajectory.csv is missing")
-    (time_heading, time), *others = (read_modelica(file) or read_csv(file, path.is_dir()) or read_table(file)).items()
+    modelica = read_modelica(file)
+    # of this project, fmpy, OpenModelica or Dymola: headings are names of variables, as h_ft, and units are in brackets
+    is_exact = bool(modelica) or path.is_dir() or read_content(file).startswith(FMPY_TIME.encode())
+    (time_heading, time), *others = (modelica or read_csv(file, path.is_dir()) or read_table(file)).items()
     unit = parse_heading(time_heading)[1] or "s"
     if unit not in TIMES:
         raise SceneError(f"{file.name}: the first column must be time, but its unit is '{unit}'")
@@ -55,7 +60,7 @@ def read_trajectory(path: Path) -> Trajectory:
         raise SceneError(f"{file.name}: the time in the first column must increase and stay below {MAX_TIME:g} s")
     columns, units = Columns(), dict[str, str]()
     for heading, column in others:
-        name, unit = parse_heading(heading)
+        name, unit = parse_heading(heading, is_exact)
         if name in columns or name == parse_heading(time_heading)[0]:
             raise SceneError(f"{file.name}: two columns are named {format_value(name)}")
         columns[name], units[name] = column, unit
@@ -73,9 +78,9 @@ def read_events(path: Path) -> ModeChanges | None:
     return ModeChanges(rows[:, 0], dict(zip(contacts, rows[:, 1:].T.astype(int), strict=True)))
 
 
-def parse_heading(heading: str) -> tuple[str, str]:
-    """Split a heading into name and unit."""
-    if ELEMENT.fullmatch(heading):
+def parse_heading(heading: str, is_exact: bool = False) -> tuple[str, str]:
+    """Split a heading into name and unit. If `is_exact`, only brackets contain a unit."""
+    if ELEMENT.fullmatch(heading) or (is_exact and not UNIT_IN_BRACKETS.search(heading)):
         return heading, ""
     name, unit = split_heading(heading)
     return name, unit or ""
@@ -199,4 +204,6 @@ def read_run(folder: Path) -> Trajectory:
             contacts = [*find_contacts(variables)]
             if events and len(events.modes) == len(contacts) == 1:
                 events = ModeChanges(events.t, {contacts[0]: events.mode})
-    return Trajectory(spec, signals.time, signals.columns, units, names, parameters, steps, events)
+    summary = load_summary(folder)
+    note = " ".join(summary.sentences) if summary and origin.get("scene") is None else ""  # a scene has other sentences
+    return Trajectory(spec, signals.time, signals.columns, units, names, parameters, steps, events, note=note)

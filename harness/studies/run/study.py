@@ -85,7 +85,7 @@ def run_and_write(scene: Scene, folder: Path, report: Callable[[float], None]) -
         write_quantities(quantities, scene.known, folder / "quantities.csv")
         summary = summarize_quantities(summary, quantities, scene.known, run)
     if not run.failure:
-        summary = replace(summary, sentences=describe_scene(scene) or summary.sentences)
+        summary = replace(summary, sentences=(*describe_scene(scene), *summary.sentences))
     if scene.about and not run.failure:
         from .figure import draw_sketches
 
