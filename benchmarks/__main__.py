@@ -22,6 +22,7 @@ if __name__ == "__main__":
 import click
 
 from benchmarks.bench.command import bench
+from benchmarks.external.command import external
 from benchmarks.hosts.command import hosts
 from benchmarks.importers.command import importers
 from benchmarks.literature.command import literature
@@ -45,5 +46,5 @@ def main() -> None:
     """
 
 
-for command in (bench, hosts, importers, literature, references, rivals, symmetry):
+for command in (bench, external, hosts, importers, literature, references, rivals, symmetry):
     main.add_command(command)

@@ -251,7 +251,7 @@ class EventCoSimulation:
             )
         if self.signals:
             self.signals.apply(t_end)
-        self.is_event = needs_event or self.clocks.is_due(t_end) or t_end >= min(self.next_event, jump)
+        self.is_event = bool(needs_event) or self.clocks.is_due(t_end) or t_end >= min(self.next_event, jump)
         self.n_stalled = 0 if t_end > t else self.n_stalled + 1
         if self.n_stalled > MAX_EVENTS:
             raise HarnessError(f"{MAX_EVENTS} events in a row at t = {t_end:.9g} s")

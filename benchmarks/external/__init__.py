@@ -1,0 +1,1 @@
+"""FMUs of other tools through the commands run, compare, sweep and fit."""
