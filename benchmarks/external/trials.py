@@ -146,6 +146,7 @@ def try_fmu(fmu: Path, folder: Path, timeout: float) -> Iterator[Trial]:
         yield Trial(fmu.stem, fmi, "run", *judge_run(reply, remark + reply.message), *times_of(reply))
         return
     result = load_result(folder / fmu.stem)
+    assert isinstance(result, Trajectory)
     yield Trial(fmu.stem, fmi, "run", *judge_run(reply, remark + (reply.message or result.note)), *times_of(reply))
 
     def compare(name: str, first: Path, *more: str) -> tuple[Reply, float]:
