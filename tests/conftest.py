@@ -1,6 +1,8 @@
 """Fixtures: the FMUs, built once, and a process that runs them."""
 
 import os
+import sys
+from importlib import import_module
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -62,6 +64,20 @@ def in_workspace(workspace, monkeypatch):
     """The same folder, as the current directory."""
     monkeypatch.chdir(workspace)
     return workspace
+
+
+@pytest.fixture
+def make_module(tmp_path, monkeypatch):
+    """A function that writes a module, which this process and its child processes can import, and returns it."""
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path), os.pathsep)
+
+    def make(name, code):
+        (tmp_path / f"{name}.py").write_text(code)
+        monkeypatch.delitem(sys.modules, name, raising=False)
+        return import_module(name)
+
+    return make
 
 
 @pytest.fixture(scope="session")

@@ -4,8 +4,8 @@ import re
 import subprocess
 from functools import cache
 
-from harness.process.child_process import ChildDiedError
 from harness.process.subprocess_runner import run_subprocess
+from harness.process.worker import WorkerDiedError
 
 from ..c_host import find_compiler, load_library
 from .request import ImporterReply, ImporterRequest
@@ -17,7 +17,7 @@ def run_request(request: ImporterRequest, timeout: float) -> tuple[ImporterReply
     calls = [*(reset_cycle_calls(request) * request.reset_cycles or list_calls(request)), "0 unload"]
     process = run_subprocess(library.command, "".join(f"{call}\n" for call in calls), library.environment, timeout)
     if process.returncode:
-        raise ChildDiedError(process.returncode, process.stderr)
+        raise WorkerDiedError(process.returncode, process.stderr)
     return parse_reply(request, process.stdout), process.stderr
 
 

@@ -13,14 +13,14 @@ from typing import Any
 from zipfile import ZipFile
 
 from harness.errors import HarnessError, install_command
-from harness.process.child_process import ChildError, ChildProcess
+from harness.process.worker import Worker, WorkerError
 from harness.running.fmu_archive import read_description
 from harness.running.whole_run import COMPILER
 from harness.scenes.run_spec import RunSpec
 
 from ..c_host import PYTHON_LIBRARY
 from . import c_adapter
-from .request import ImporterReply, ImporterRequest
+from .request import ImporterReply, ImporterRequest, run_in_adapter
 
 TOLERANCE = 1e-6
 TIMEOUT = 300.0  # s per request
@@ -132,23 +132,22 @@ def prepare(importer: Importer, requests: list[ImporterRequest]) -> None:
     """Run all new requests of an importer in one process; after a crash or timeout, another process continues."""
     keys = {(importer.adapter, repr(request)): request for request in requests}
     new_requests = {key: request for key, request in keys.items() if key not in RESULTS}
-    with ChildProcess(f"{__package__}.{importer.adapter}") as process:
+    with Worker() as worker:
         for key, request in new_requests.items():
-            RESULTS[key] = run_adapter(process, importer, request)
+            RESULTS[key] = run_adapter(worker, importer, request)
         try:
-            process.finish()
-        except ChildError as error:
+            worker.finish()
+        except WorkerError as error:
             RESULTS[key] = CheckFailedError(str(error))
 
 
-def run_adapter(
-    process: ChildProcess, importer: Importer, request: ImporterRequest
-) -> AdapterResult | CheckFailedError:
+def run_adapter(worker: Worker, importer: Importer, request: ImporterRequest) -> AdapterResult | CheckFailedError:
     """Run a request in the process of an adapter, or in the C program."""
     try:
         if importer.adapter == "c_adapter":
             return AdapterResult(*c_adapter.run_request(request, TIMEOUT))
-        return AdapterResult(ImporterReply(**process.ask(request, TIMEOUT)), process.messages)
+        module = f"{__package__}.{importer.adapter}"
+        return AdapterResult(worker.call(run_in_adapter, module, request, timeout=TIMEOUT), worker.messages)
     except HarnessError as error:
         return CheckFailedError(str(error))
 

@@ -5,7 +5,7 @@ import sys
 from importlib.metadata import version
 from pathlib import Path
 
-from .request import ImporterReply, ImporterRequest, serve
+from .request import ImporterReply, ImporterRequest
 
 if sys.platform == "linux":
     ctypes.CDLL(str(Path(sys.prefix) / "lib" / "libtbb.so.12"), ctypes.RTLD_GLOBAL)
@@ -52,7 +52,3 @@ def run(
         simulation.step(1)
         rows.append(row())
     return rows
-
-
-if __name__ == "__main__":
-    serve(run_request)

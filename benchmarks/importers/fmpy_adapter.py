@@ -12,7 +12,7 @@ from fmpy.logging import addLoggerProxy
 
 from harness.running.fmu_archive import read_description, unpack_once
 
-from .request import ImporterReply, ImporterRequest, serve
+from .request import ImporterReply, ImporterRequest
 
 
 def run_request(request: ImporterRequest, prefixes: tuple[str, ...] = ("",)) -> ImporterReply:
@@ -99,7 +99,3 @@ def make_callbacks(prefixes: tuple[str, ...]) -> fmi2.fmi2CallbackFunctions:
     callbacks.freeMemory = fmi2.fmi2CallbackFreeMemoryTYPE(fmi2.free)
     addLoggerProxy(ctypes.byref(callbacks))
     return callbacks
-
-
-if __name__ == "__main__":
-    serve(run_request)

@@ -20,7 +20,7 @@ from harness.process.temporary_directory import temporary_directory
 from harness.running.fmu_archive import PROCESS_RESOURCES, cached_by_mtime, read_description
 
 from . import fmpy_adapter
-from .request import ImporterReply, ImporterRequest, serve
+from .request import ImporterReply, ImporterRequest
 
 
 def run_request(request: ImporterRequest) -> ImporterReply:
@@ -64,7 +64,3 @@ def build_container(fmu: Path, files: tuple[str, ...], container: str) -> Path:
     with redirect_stdout(StringIO()):
         fmucontainer()
     return folder / "container.fmu"
-
-
-if __name__ == "__main__":
-    serve(run_request)

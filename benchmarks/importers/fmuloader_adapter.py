@@ -14,7 +14,7 @@ from harness.running.fmu_archive import read_description, unpack_once
 from harness.running.fmu_session import FMICallException
 
 from .fmpy_adapter import run_instances
-from .request import ImporterReply, ImporterRequest, serve
+from .request import ImporterReply, ImporterRequest
 
 
 class Instance:
@@ -55,7 +55,3 @@ def run_request(request: ImporterRequest) -> ImporterReply:
     fmu_description = read_description(request.run.fmu)
     instances = [Instance(unpack_once(request.run.fmu), fmu_description, name) for name in request.instances]
     return run_instances(request, instances, version("fmuloader"))
-
-
-if __name__ == "__main__":
-    serve(run_request)

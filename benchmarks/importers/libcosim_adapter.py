@@ -8,7 +8,7 @@ from libcosimpy.CosimManipulator import CosimManipulator
 from libcosimpy.CosimObserver import CosimObserver
 from libcosimpy.CosimSlave import CosimLocalSlave
 
-from .request import ImporterReply, ImporterRequest, serve
+from .request import ImporterReply, ImporterRequest
 
 NANO = 1e9  # libcosim counts time in ns
 
@@ -49,7 +49,3 @@ def run(
         accepted += execution.step(1)
         rows.append(row())
     return rows, accepted
-
-
-if __name__ == "__main__":
-    serve(run_request)

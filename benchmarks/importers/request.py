@@ -3,11 +3,9 @@
 An adapter prints log messages of the FMU to standard error if the tool forwards them.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any
+from importlib import import_module
 
-from harness.process.child_process import RequestServer
 from harness.scenes.run_spec import RunSpec
 
 
@@ -22,11 +20,6 @@ class ImporterRequest:
     connection: list[str] = field(default_factory=list)  # output of the first instance, input of the second
     rerun: bool = False  # reset and run again with start values
     reset_cycles: int = 0  # C program only: number of reset cycles to run instead; three last rows of each
-
-    @classmethod
-    def from_json(cls, table: dict[str, Any]) -> "ImporterRequest":
-        """Return the request in a table."""
-        return cls(**{**table, "run": RunSpec.from_json(table["run"])})
 
     @property
     def step(self) -> float:
@@ -61,6 +54,7 @@ class ImporterReply:
     accepted: int
 
 
-def serve(run_request: Callable[[ImporterRequest], ImporterReply]) -> None:
-    """Execute the requests of the parent."""
-    RequestServer().serve(lambda request: run_request(ImporterRequest.from_json(request)))
+def run_in_adapter(module: str, request: ImporterRequest) -> ImporterReply:
+    """Execute a request by the module of an adapter, in a worker process: importing some tools may end it."""
+    reply: ImporterReply = import_module(module).run_request(request)
+    return reply

@@ -1,4 +1,4 @@
-"""Child process that runs rivals."""
+"""Runs of rivals, in a worker process."""
 
 from dataclasses import dataclass, field
 from importlib import import_module
@@ -7,7 +7,6 @@ from time import process_time
 import numpy as np
 
 from harness.errors import HarnessError, first_line
-from harness.process.child_process import RequestServer
 
 from .scenes import SCENES, Events, NotOfferedError, Setting, sample, slip_changes
 
@@ -74,12 +73,3 @@ def run_case(case: RivalCase) -> RivalReply:
     has_modes = motion.events is not None
     changes = slip_changes(motion, scene.level) if motion.events is None else motion.events
     return RivalReply("", states.tolist(), has_modes, changes, int(motion.steps), min(times))
-
-
-def serve() -> None:
-    """Answer the requests of the parent."""
-    RequestServer().serve(lambda request: run_case(RivalCase(**request)))
-
-
-if __name__ == "__main__":
-    serve()

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from benchmarks import command_line
 from harness.errors import install_command
-from harness.process.child_process import ChildError, ChildProcess
+from harness.process.worker import Worker, WorkerError
 from harness.results.files import write_csv_rows
 from harness.results.folder import replace_folder
 from harness.results.provenance import write_provenance
@@ -15,7 +15,7 @@ from harness.running.solution import Solution
 from harness.scenes.fmu_files import find_fmu
 
 from .catalogue import Rival, find_rivals
-from .child import RivalCase, RivalReply
+from .child import RivalCase, RivalReply, run_case
 from .comparison import Comparison, Result, format_setting
 from .figure import draw
 from .measures import measure
@@ -79,11 +79,11 @@ def run_rival(rival: Rival, references: dict[str, Solution], timeout: float) -> 
 def run_in_child(cases: list[RivalCase], timeout: float) -> list[RivalReply]:
     """Run cases in one process. After a crash or a timeout, which is a gap, another process continues."""
     replies: list[RivalReply] = []
-    with ChildProcess(f"{__package__}.child") as child:
+    with Worker() as worker:
         for case in cases:
             try:
-                replies.append(RivalReply(**child.ask(case, timeout)))
-            except ChildError as error:
+                replies.append(worker.call(run_case, case, timeout=timeout))
+            except WorkerError as error:
                 replies.append(RivalReply(str(error)))
     return replies
 

@@ -11,8 +11,7 @@ import click
 
 from harness.commands.terminal import POSITIVE, Terminal, json_option, quiet_option
 from harness.errors import HarnessError
-from harness.process.temporary_directory import temporary_directory
-from harness.process.worker_pool import WorkerPool
+from harness.process.worker import WorkerPool
 
 from .builds import BACKENDS, NATIVE, ROOT, all_models, build_fmu, find_source
 from .changes import KINDS
@@ -111,17 +110,13 @@ def run_tasks(
     if len(tasks) == 1:
         yield run_model(*tasks[0], *arguments)
         return
-    with temporary_directory("symmetry-") as folder:
-        pool = WorkerPool(min(workers, len(tasks)), folder, [__name__])
-        try:
-            futures = {pool.submit(run_model, *task, *arguments): task[0].stem for task in tasks}
-            while futures:
-                report(next(iter(futures.values())), 0.0)  # raises after Ctrl-C
-                for future in pool.wait_for_any([*futures]):
-                    report(futures.pop(future), 1.0)
-                    yield future.result()
-        finally:
-            pool.kill()
+    with WorkerPool(min(workers, len(tasks))) as pool:
+        futures = {pool.submit(run_model, *task, *arguments): task[0].stem for task in tasks}
+        while futures:
+            report(next(iter(futures.values())), 0.0)  # raises after Ctrl-C
+            for future in pool.wait_for_any([*futures]):
+                report(futures.pop(future), 1.0)
+                yield future.result()
 
 
 Counts = dict[str, dict[str, tuple[int, int]]]  # runs that differ, and all runs, by row and symmetry

@@ -89,8 +89,7 @@ def sweep(
     stop, rtol, interface, timeout
         As in `simulate`.
     workers : int, optional
-        Number of worker processes; by default all runs are done in this process. A script with workers must call
-        `sweep` below ``if __name__ == "__main__":``.
+        Number of worker processes; by default all runs are done in this process.
     scheduler : str, optional
         Address of a Dask cluster, as ``"tcp://host:8786"``.
     folder : path, optional
@@ -113,7 +112,6 @@ def sweep(
     from contextlib import nullcontext
 
     from ..process.temporary_directory import temporary_directory
-    from ..process.worker_pool import exit_while_importing_main
     from ..scenes.fmu_files import find_fmu
     from ..scenes.run_spec import RunSpec
     from ..studies.sweep.labels import read_labels, replace_labels
@@ -125,8 +123,6 @@ def sweep(
         import_optional(package, "a sweep", "sweep")
     if not grid:
         raise SceneError("grid is empty: name at least one parameter and its values, as in {'mu_d': [0.3, 0.6]}")
-    if workers is not None:
-        exit_while_importing_main()
     if workers is not None and scheduler is not None:
         raise SceneError("workers has no effect with scheduler, whose cluster has its own workers: leave one out")
     run = RunSpec(find_fmu(str(source)), values=dict(values or {}), follow=False)

@@ -1,1 +1,1 @@
-"""Signals, child processes and temporary directories."""
+"""Signals, worker processes and temporary directories."""

@@ -75,22 +75,6 @@ def defer_signals() -> Iterator[None]:
         raise KeyboardInterrupt
 
 
-@contextmanager
-def ignore_sigint() -> Iterator[None]:
-    """Make processes and threads that start in the block ignore SIGINT. Defer the signal in this process."""
-    # imported after `exit_after_signal` is registered, so that its own cleanup runs first
-    from multiprocessing import resource_tracker
-
-    resource_tracker.ensure_running()  # multiprocessing would start it in the block, and unblock the signal
-    mask = getattr(signal, "pthread_sigmask", lambda operation, signals: None)  # none on Windows
-    with defer_signals():
-        mask(signal.SIG_BLOCK, [SIGINT])  # child processes inherit it
-        try:
-            yield
-        finally:
-            mask(signal.SIG_UNBLOCK, [SIGINT])
-
-
 def exit_after_signal() -> None:
     """Exit at once after a signal.
 

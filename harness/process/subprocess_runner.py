@@ -102,7 +102,7 @@ def place_temporary_files(environment: Mapping[str, str], directory: Path) -> di
     return {**environment, **dict.fromkeys(("TMPDIR", "TEMP", "TMP"), str(directory))}
 
 
-def kill_process_group(process: subprocess.Popen[str]) -> None:
+def kill_process_group(process: subprocess.Popen[Any]) -> None:
     """Kill a process and, on POSIX, the processes that it started."""
     if os.name == "posix":
         with suppress(ProcessLookupError):  # all have ended

@@ -1,4 +1,4 @@
-"""Reader of spreadsheets, .mat, HDF5 and Parquet files in a child process with limited memory.
+"""Reader of spreadsheets, .mat, HDF5 and Parquet files in a worker process with limited memory.
 
 Some files make the libraries for these formats end the process: a cell in the last row and column of a sheet makes
 python-calamine allocate 549 GB, and scipy reads beyond the end of some damaged .mat files.
@@ -9,11 +9,15 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..errors import HarnessError, SceneError, first_line
-from ..process.child_process import ChildDiedError, ChildTimeoutError, RequestServer, ask_once
 from ..process.temporary_directory import temporary_directory
+from ..process.worker import WorkerDiedError, WorkerTimeoutError, call_once
 from . import text_table
 
 MAX_MEMORY = 4 << 30  # bytes
+MEMORY_PROBLEM = (
+    "it is damaged, has cells far from its table, or needs more than "
+    f"{MAX_MEMORY >> 30} GB of memory; save its columns as .csv"
+)
 TIMEOUT = 120.0  # s
 
 
@@ -40,29 +44,27 @@ def read_in_child(data: bytes, name: str, file_format: str) -> dict[str, Any]:
         path = folder / "record"
         path.write_bytes(data)
         try:
-            contents: dict[str, Any] = ask_once(__name__, ReadRequest(str(path), name, file_format), TIMEOUT)
-        except ChildTimeoutError:
+            request = ReadRequest(str(path), name, file_format)
+            contents: dict[str, Any] = call_once(read_file, request, timeout=TIMEOUT, memory=MAX_MEMORY)
+        except WorkerTimeoutError:
             raise SceneError(f"{name} takes longer than {TIMEOUT:g} s to read: save its columns as .csv") from None
-        except ChildDiedError:
-            raise SceneError(
-                f"{name} cannot be read: it is damaged, has cells far from its table, or needs more than "
-                f"{MAX_MEMORY >> 30} GB of memory; save its columns as .csv"
-            ) from None
-        except HarnessError as error:
-            raise SceneError(str(error)) from None
+        except WorkerDiedError:
+            raise SceneError(f"{name} cannot be read: {MEMORY_PROBLEM}") from None
     if "library" in contents:
         raise ImportError(name=contents["library"])
     return contents
 
 
-def answer_request(request: ReadRequest) -> dict[str, Any]:
+def read_file(request: ReadRequest) -> dict[str, Any]:
     """Return the contents of a file, or the `library` that is missing."""
     try:
         return read_workbook(request) if request.format == "workbook" else read_arrays(request)
-    except (HarnessError, MemoryError):
+    except HarnessError:
         raise
     except ImportError as error:
         return {"library": error.name}
+    except MemoryError:
+        raise SceneError(f"{request.name} cannot be read: {MEMORY_PROBLEM}") from None
     except Exception as error:  # the readers raise arbitrary exceptions for damaged files
         raise SceneError(f"{request.name} cannot be read: {first_line(error)}") from None
 
@@ -100,7 +102,3 @@ def read_arrays(request: ReadRequest) -> dict[str, Any]:
         (column.name, array_files.as_list(column.values), column.unit) for column in array_files.list_columns(arrays)
     ]
     return {"columns": columns, "names": [*filter(None, arrays)]}
-
-
-if __name__ == "__main__":
-    RequestServer(MAX_MEMORY).serve(lambda request: answer_request(ReadRequest(**request)))

@@ -1,20 +1,20 @@
-"""Child process that runs an SSP archive with fmpy; requests and replies as for the other co-simulation engines.
+"""Runs of an SSP archive with fmpy; arguments and result as of the other co-simulation engines.
 
 fmpy reads a parameter set only if it is passed explicitly, and records no values before the first step.
 """
 
+from collections.abc import Sequence
 from typing import Any
 from zipfile import ZipFile
 
 from fmpy.ssp.simulation import simulate_ssp
 from fmpy.ssp.ssd import read_ssv
 
-from ..process.child_process import RequestServer
 from ..process.temporary_directory import temporary_directory
 from ..scenes.run_spec import RunSpec
 
 
-def run_archive(run: RunSpec) -> list[list[float]]:
+def run_archive(run: RunSpec, variables: Sequence[Any], parameter_set: str) -> list[list[float]]:
     """Run the archive and return one row per step."""
     assert run.stop is not None
     assert run.grid is not None
@@ -26,7 +26,3 @@ def run_archive(run: RunSpec) -> list[list[float]]:
             parameters = read_ssv(content.extract(name, directory))
         rows = simulate_ssp(str(run.fmu), stop_time=stop, step_size=run.grid, parameter_set=parameters)
     return [[float(row[name]) for name in run.outputs] for row in rows]
-
-
-if __name__ == "__main__":
-    RequestServer().serve(lambda request: run_archive(RunSpec.from_json(request["run"])))

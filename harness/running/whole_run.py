@@ -5,27 +5,25 @@ made from Python, which takes about thirty times as long. The FMU is instantiate
 Inputs are linear within a step if the FMU interpolates inputs, otherwise they have their mean.
 """
 
-import json
+import pickle
 import shutil
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from ctypes import CDLL, Array, Structure, addressof, byref, c_double, c_int, c_size_t, c_uint32, c_void_p, cast
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 from importlib.util import find_spec
 from pathlib import Path
 from time import process_time
 from typing import Any
-from weakref import finalize
 
 import numpy as np
 
 from ..errors import HarnessError
-from ..process.child_process import ChildError, ChildProcess
 from ..process.subprocess_runner import run_subprocess
 from ..process.temporary_directory import temporary_directory
-from ..results.files import replace_nonfinite
+from ..process.worker import Worker, WorkerError
 from ..scenes.run_spec import RunSpec
 from .fmu_archive import (
     PROCESS_RESOURCES,
@@ -55,7 +53,8 @@ FUNCTIONS = {  # in the order of the structs in whole_run.c
 # without the runtime of the compiler, which would have to be built first
 OPTIONS = ("-std=c99", "-O2", "-shared", "-fPIC", "-nostdlib", "-lc")
 STEPS_PER_CHECK = 16
-BUSY_TIME = 20.0  # s that a run in a child process may take beyond its processor time, on a busy machine
+MAX_PREPARED = 64  # runs in the cache of a worker process
+BUSY_TIME = 20.0  # s that a run in a worker process may take beyond its processor time, on a busy machine
 
 
 class FmuStruct(Structure):
@@ -232,53 +231,66 @@ class RunTimeError(Exception):
     """A run exceeds its time limit, or outputs are not finite."""
 
 
-class ChildSession:
-    """Runs of an external FMU in a child process, which is replaced when it crashes or exceeds the time limit.
+class WorkerSession:
+    """Runs of an external FMU in a worker process, which is replaced when it crashes or exceeds the time limit.
 
     Parameters
     ----------
     spec : RunSpec
         Settings that all runs share.
-    folder : pathlib.Path
-        Folder for specifications and results.
     """
 
-    def __init__(self, spec: RunSpec, folder: Path) -> None:
-        self.process, self.folder, self.n_files = ChildProcess(f"{__package__}.whole_run_process"), folder, 0
-        self.timeout = spec.timeout + BUSY_TIME
+    def __init__(self, spec: RunSpec) -> None:
+        self.worker, self.timeout = Worker(), spec.timeout + BUSY_TIME
         try:
-            self.process.ask({"fmu": spec.fmu, "limit": spec.timeout}, self.timeout)
+            self.worker.call(load_session, spec.fmu, spec.timeout, timeout=self.timeout)
         except BaseException as error:
             self.close()
-            if isinstance(error, ChildError):
+            if isinstance(error, WorkerError):
                 raise HarnessError(f"{spec.fmu.name} cannot be loaded: it crashes or hangs") from None
             raise
 
     def prepare(self, spec: RunSpec) -> Run:
         """Prepare runs that differ in Reals only."""
-        return ChildRun(spec, self).run
+        pickled_spec = pickle.dumps(spec)
+
+        def run(values: Mapping[str, float]) -> np.ndarray | None:
+            try:
+                y: np.ndarray | None = self.worker.call(
+                    run_pickled_spec, pickled_spec, dict(values), timeout=self.timeout
+                )
+            except WorkerError:
+                return None
+            return y
+
+        return run
 
     def close(self) -> None:
-        """End the child process."""
-        self.process.kill()
+        """End the process."""
+        self.worker.kill()
 
 
-class ChildRun:
-    """A run in a child process, which reads its specification from a file."""
+@cache
+def open_session(fmu: Path, limit: float) -> RunSession:
+    """Return the session of an FMU, with a limit of the processor time of a run in s."""
+    return RunSession(fmu, limit)
 
-    def __init__(self, spec: RunSpec, runs: ChildSession) -> None:
-        self.runs, self.path = runs, runs.folder / f"{runs.n_files}.json"
-        runs.n_files += 1
-        self.path.write_text(json.dumps(replace_nonfinite(spec)), encoding="utf-8")
-        finalize(self, self.path.unlink, missing_ok=True)
 
-    def run(self, values: Mapping[str, float]) -> np.ndarray | None:
-        """Return the outputs (recorded points, outputs); None if the FMU refuses the values, crashes or is too slow."""
-        try:
-            results = self.runs.process.ask({"spec": self.path, "values": values}, self.runs.timeout)
-        except ChildError:
-            return None
-        return np.load(results) if results else None
+def load_session(fmu: Path, limit: float) -> None:
+    """Load an FMU."""
+    open_session(fmu, limit)
+
+
+@lru_cache(MAX_PREPARED)
+def prepare_pickled_spec(pickled_spec: bytes) -> PreparedRun:
+    """Return the run of a specification, which is compared by its bytes."""
+    spec = pickle.loads(pickled_spec)
+    return PreparedRun(spec, open_session(spec.fmu, spec.timeout))
+
+
+def run_pickled_spec(pickled_spec: bytes, values: dict[str, float]) -> np.ndarray | None:
+    """Run a specification with other values, and return the outputs; None if there are none."""
+    return prepare_pickled_spec(pickled_spec).run(values)
 
 
 class Simulator:
@@ -295,7 +307,7 @@ class Simulator:
     """
 
     def __init__(
-        self, spec: RunSpec, variables: Mapping[str, RealVariable], session: "RunSession | ChildSession"
+        self, spec: RunSpec, variables: Mapping[str, RealVariable], session: "RunSession | WorkerSession"
     ) -> None:
         self.spec, self.variables, self.session, self.n_runs = spec, variables, session, 0
 
@@ -324,7 +336,7 @@ class Simulator:
 
 @contextmanager
 def open_simulator(spec: RunSpec) -> Iterator[Simulator]:
-    """Instantiate an FMU for many runs; one that is not of this project runs in a child process.
+    """Instantiate an FMU for many runs; one that is not of this project runs in a worker process.
 
     Parameters
     ----------
@@ -340,13 +352,13 @@ def open_simulator(spec: RunSpec) -> Iterator[Simulator]:
     description = read_description(spec.fmu)
     if description.coSimulation is None:
         raise HarnessError(f"{spec.fmu.name} offers no co-simulation: export it for co-simulation")
-    session: RunSession | ChildSession
+    session: RunSession | WorkerSession
     with ExitStack() as stack:
         if exposes_solver_steps(description):
             stack.enter_context(capture_stderr())  # an FMU prints a sentence about each set that it refuses
             session = RunSession(spec.fmu, spec.timeout)
         else:
-            session = ChildSession(spec, stack.enter_context(temporary_directory("fit-")))
+            session = WorkerSession(spec)
         stack.callback(session.close)
         yield Simulator(spec, real_variables(description), session)
 

@@ -16,7 +16,6 @@ from benchmarks.importers import checks, table
 from benchmarks.importers.checks import CHECKS, IMPORTERS, NOT_RUN, CheckFailedError
 from benchmarks.importers.request import ImporterRequest
 from harness.errors import HarnessError
-from harness.process.child_process import ChildProcess
 from harness.scenes.run_spec import RunSpec
 
 pytestmark = pytest.mark.slow
@@ -75,9 +74,9 @@ def test_an_fmu_unsuitable_for_the_checks_is_skipped_with_a_reason(tmp_path, mon
 
 ADAPTER = """
 import os, sys, time
-from benchmarks.importers.request import ImporterReply, serve
+from benchmarks.importers.request import ImporterReply
 
-def run(request):
+def run(module, request):
     (name,) = request.instances
     print(f"{name} speaks", file=sys.stderr)
     if name == "crash":
@@ -86,16 +85,12 @@ def run(request):
     if name == "leak":
         __import__("atexit").register(os.kill, os.getpid(), 9)
     return ImporterReply(name, [], [], os.getpid())
-
-serve(run)
 """
 
 
-def test_a_crash_or_timeout_affects_only_its_own_check(tmp_path, monkeypatch):
+def test_a_crash_or_timeout_affects_only_its_own_check(make_module, monkeypatch):
     """The checks that follow run in another process; a process that ends badly loses its last answer."""
-    (tmp_path / "ecos_adapter.py").write_text(ADAPTER)
-    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
-    monkeypatch.setattr(checks, "ChildProcess", lambda module: ChildProcess(module.rpartition(".")[2]))
+    monkeypatch.setattr(checks, "run_in_adapter", make_module("adapter_that_crashes", ADAPTER).run)
     monkeypatch.setattr(checks, "RESULTS", {})
     monkeypatch.setattr(checks, "TIMEOUT", 2.0)
     tool, *_ = (importer for importer in IMPORTERS if importer.name == "Ecos")

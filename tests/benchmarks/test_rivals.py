@@ -20,7 +20,6 @@ from benchmarks.rivals.reference_motions import FINE, compute_reference_motion
 from benchmarks.rivals.scenes import SCENES, Solution, slip_changes
 from benchmarks.rivals.study import run_in_child
 from benchmarks.rivals.table import exact_rivals, gap_lines, rivals_table
-from harness.process.child_process import ChildProcess
 from harness.references.certified_reference import FOLDER, load_reference
 
 CERTIFIED = {"sled": "stickslip", "belt": "more/belt", "pendulum": "pendulum"}  # whole runs have certified files
@@ -146,7 +145,8 @@ def simulate(scene, setting):
         os.kill(os.getpid(), 9) if setting["how"] == "dies" else time.sleep(600)
     return Solution(scene.times, np.zeros((len(scene.times), 3)), steps=1)
 sys.modules[child.__package__ + ".engines.broken"] = sys.modules[__name__]
-child.serve()
+def run_case(case):
+    return child.run_case(case)
 """
 
 
@@ -157,10 +157,8 @@ child.serve()
         pytest.param("hangs", "no answer after 8 s", marks=pytest.mark.slow),
     ],
 )
-def test_after_a_rival_that_dies_or_hangs_the_next_scene_runs(tmp_path, monkeypatch, how, reason):
-    (tmp_path / "broken.py").write_text(BROKEN)
-    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
-    monkeypatch.setattr(study, "ChildProcess", lambda module: ChildProcess("broken"))
+def test_after_a_rival_that_dies_or_hangs_the_next_scene_runs(make_module, monkeypatch, how, reason):
+    monkeypatch.setattr(study, "run_case", make_module("broken_rival", BROKEN).run_case)
     replies = run_in_child([RivalCase("broken", name, {"how": how}) for name in ("rest", "sled", "held")], 8.0)
     assert [reply.gap for reply in replies] == ["", reason, ""]
 

@@ -23,7 +23,6 @@ from harness.process import interrupt, interruptible_wait
 from harness.process.interrupt import CommandInterruptedError, check_interrupt, defer_signals, interruptible
 from harness.process.interruptible_wait import wait_for_any
 from harness.process.subprocess_runner import SubprocessTimeoutError, run_subprocess
-from harness.process.worker_pool import WorkerDiedError, WorkerPool
 
 SLOW = 'title = "t"\nmodel = "pacejka"\noutputs = ["x", "v"]\ngrid = 5e-6\n[values]\nx_m = 0.001\n'
 COMMANDS = {  # and a file or folder that exists once it has started
@@ -224,41 +223,18 @@ def child_of_killed_parent(code, file):
     return file.read_text()
 
 
-def test_a_child_process_exits_after_its_parent_was_killed(tmp_path, monkeypatch):
-    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
-    hang = f"lambda request: (Path({str(tmp_path / 'pid')!r}).write_text(str(os.getpid())), time.sleep(100))"
-    (tmp_path / "hanging.py").write_text(
-        "import os, time\nfrom pathlib import Path\nfrom harness.process.child_process import RequestServer\n"
-        f"RequestServer().serve({hang})"
-    )
-    code = "from harness.process.child_process import ChildProcess; ChildProcess('hanging').ask(1)"
-    assert ends(child_of_killed_parent(code, tmp_path / "pid"))
-
-
-def test_a_child_process_exits_if_its_parent_was_killed_during_its_imports(tmp_path, monkeypatch):
-    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
-    (tmp_path / "importing.py").write_text(
-        "import os, time\nfrom pathlib import Path\nparent = os.getppid()\n"
-        f"Path({str(tmp_path / 'pid')!r}).write_text(str(os.getpid()))\n"
-        "while os.getppid() == parent:\n    time.sleep(0.01)\n"
-        "from harness.process.child_process import RequestServer\n"
-        "server = RequestServer()\ntime.sleep(100)"
-    )
-    code = "from harness.process.child_process import ChildProcess; ChildProcess('importing').ask(1)"
-    assert ends(child_of_killed_parent(code, tmp_path / "pid"))
-
-
-def test_a_worker_exits_and_removes_its_files_after_its_parent_was_killed(tmp_path):
-    folder = tmp_path / "files"
-    folder.mkdir()
+@pytest.mark.parametrize("call", ["time.sleep, 100", "os.getcwd"], ids=["in a call", "between calls"])
+def test_a_worker_exits_and_removes_its_files_after_its_parent_was_killed(tmp_path, monkeypatch, call):
+    (tmp_path / "temporary").mkdir()
+    monkeypatch.setenv("TMPDIR", str(tmp_path / "temporary"))
     code = (
-        "import os, time\nfrom pathlib import Path\nfrom harness.process.worker_pool import WorkerPool\n"
-        f"pool = WorkerPool(1, Path({str(folder)!r}), [])\nfuture = pool.submit(os.getpid)\n"
+        "import os, time\nfrom pathlib import Path\nfrom harness.process.worker import WorkerPool\n"
+        "pool = WorkerPool(1)\nfuture = pool.submit(os.getpid)\n"
         "while not pool.wait_for_any([future]):\n    pass\n"
-        f"Path({str(tmp_path / 'pid')!r}).write_text(str(future.result()))\ntime.sleep(100)"
+        f"Path({str(tmp_path / 'pid')!r}).write_text(str(future.result()))\npool.submit({call})\ntime.sleep(100)"
     )
     assert ends(child_of_killed_parent(code, tmp_path / "pid"))
-    assert not folder.exists()
+    assert not [*(tmp_path / "temporary").iterdir()]
 
 
 def test_a_program_awaited_by_a_thread_ends_with_the_command(tmp_path, monkeypatch):
@@ -276,26 +252,6 @@ def test_a_program_awaited_by_a_thread_ends_with_the_command(tmp_path, monkeypat
     interrupt.RECEIVED_SIGNALS.append(signal.SIGINT)
     thread.join(timeout=30)
     assert ended == ["here"]
-
-
-def test_a_worker_killed_while_it_receives_data_is_replaced(tmp_path):
-    pool = WorkerPool(1, tmp_path, [])
-    try:
-        pid = result(pool, os.getpid)
-        os.kill(pid, signal.SIGSTOP)  # it stops reading
-        threading.Timer(0.2, os.kill, [pid, signal.SIGKILL]).start()
-        with pytest.raises(WorkerDiedError, match="exit code -9"):
-            result(pool, len, bytes(10_000_000))
-        assert result(pool, len, bytes(10_000_000)) == 10_000_000
-    finally:
-        pool.kill()
-
-
-def result(pool, function, *arguments):
-    future = pool.submit(function, *arguments)
-    while not pool.wait_for_any([future]):
-        pass
-    return future.result()
 
 
 def test_the_interrupt_message_survives_cleanup(monkeypatch):

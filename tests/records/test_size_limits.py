@@ -11,7 +11,6 @@ import pytest
 import record_formats
 
 from harness.errors import HarnessError, SceneError
-from harness.process.child_process import ask_once
 from harness.records import array_files, child_reader, size_limits
 from harness.records.columns import ColumnOptions, read_record
 from harness.studies.compare.trajectory_files import read_trajectory
@@ -112,13 +111,10 @@ def test_a_cell_far_from_the_table_does_not_end_the_command(tmp_path):
     )
 
 
-def test_a_file_at_which_its_library_crashes_does_not_end_the_command(tmp_path, monkeypatch):
-    code = f"import os\nfrom {child_reader.__name__} import RequestServer\n"
-    code += "RequestServer().serve(lambda request: os.kill(os.getpid(), 9))"
-    (tmp_path / "crashing_reader.py").write_text(code)
+def test_a_file_at_which_its_library_crashes_does_not_end_the_command(tmp_path, monkeypatch, make_module):
+    code = "import os\ndef read_file(request):\n    os.kill(os.getpid(), 9)"
+    monkeypatch.setattr(child_reader, "read_file", make_module("crashing_reader", code).read_file)
     (tmp_path / "record.mat").write_bytes(record_formats.mat(t=record_formats.T, x=record_formats.MM))
-    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
-    monkeypatch.setattr(child_reader, "__name__", "crashing_reader")
     for read in (lambda path: read_record(str(path), ColumnOptions(), "record"), read_trajectory):
         with pytest.raises(SceneError, match=r"record.mat cannot be read: it is damaged"):
             read(tmp_path / "record.mat")
@@ -140,13 +136,11 @@ def test_a_file_that_takes_too_long_is_refused(monkeypatch):
         child_reader.read_in_child(wide_sheet(), "book", "workbook")
 
 
-def test_the_memory_of_the_reader_is_limited(tmp_path, monkeypatch):
-    pytest.importorskip("resource", reason="a module of POSIX")
-    code = f"import resource\nfrom {child_reader.__name__} import MAX_MEMORY, RequestServer\n"
-    code += "RequestServer(MAX_MEMORY).serve(lambda request: resource.getrlimit(resource.RLIMIT_AS))"
-    (tmp_path / "limits.py").write_text(code)
-    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
-    assert ask_once("limits", None, 60.0) == [child_reader.MAX_MEMORY] * 2
+def test_the_memory_of_the_reader_is_limited(monkeypatch):
+    resource = pytest.importorskip("resource", reason="a module of POSIX")
+    monkeypatch.setattr(child_reader, "read_file", resource.getrlimit)
+    monkeypatch.setattr(child_reader, "ReadRequest", lambda *request: resource.RLIMIT_AS)
+    assert child_reader.read_in_child(b"", "record", "npy") == (child_reader.MAX_MEMORY,) * 2
 
 
 @pytest.mark.parametrize("name", ["record.npy", "record.npz"])

@@ -155,14 +155,6 @@ def test_external_fmus_run_in_a_process_of_their_own(name):
     assert coarse.shape == (51, 1)
 
 
-def test_the_file_of_a_run_that_is_no_longer_used_is_removed():
-    spec = RunSpec(build_external_fmus() / "Midpoint.fmu", ("x",), times=np.linspace(0.0, 1.0, 11), follow=False)
-    with open_simulator(spec) as simulator:
-        for _ in range(3):
-            assert simulator.prepare(spec)({}) is not None
-            assert not list(simulator.session.folder.glob("*.json"))
-
-
 @pytest.mark.parametrize(("name", "value"), [("Faulty", {"kind": 5}), ("Fmi3Midpoint", {"limit": 0.5})])
 def test_a_run_that_is_lost_or_terminates_is_refused(name, value):
     spec = RunSpec(build_external_fmus() / f"{name}.fmu", ("x",), times=np.linspace(0.0, 1.0, 11), follow=False)

@@ -293,11 +293,9 @@ def test_a_scene_is_checked_before_any_fmu(monkeypatch, tmp_path):
         study.run_coupled("two-mases", tmp_path, None, ignore_progress)
 
 
-def test_an_engine_that_hangs_is_reported_by_name(monkeypatch, tmp_path):
-    code = "import time\nfrom harness.process.child_process import RequestServer\n"
-    (tmp_path / "sleeps.py").write_text(f"{code}RequestServer().serve(lambda request: time.sleep(100))")
-    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
-    monkeypatch.setitem(ENGINES, "Sleeper", "sleeps")
+def test_an_engine_that_hangs_is_reported_by_name(monkeypatch, make_module):
+    code = "import time\ndef run_archive(run, variables, parameter_set):\n    time.sleep(100)"
+    monkeypatch.setitem(ENGINES, "Sleeper", make_module("engine_that_sleeps", code).run_archive)
     monkeypatch.setattr(engine, "ENGINE_TIMEOUT", 0.3)
     with pytest.raises(HarnessError, match=r"Sleeper could not run pair\.ssp: no answer after 0\.3 s"):
         engine.run_engine("Sleeper", RunSpec(Path("pair.ssp"), stop=0.1, grid=0.1), [])

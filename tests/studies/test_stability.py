@@ -14,7 +14,7 @@ from build_cache import build_user_model
 from models import EXAMPLE_MODELS, LARGER_MODELS, MODELS, declared
 from spec_runs import ignore_progress
 
-from harness.process.child_process import ChildProcess, ChildTimeoutError
+from harness.process.worker import Worker, WorkerTimeoutError
 from harness.references.models.pacejka import MagicFormula
 from harness.references.reference_trajectory import CommunicationGrid, compute_reference
 from harness.results.provenance import load_provenance
@@ -26,7 +26,6 @@ from harness.scenes.run_spec import RunSpec
 from harness.studies.stability import study
 from harness.studies.stability.cases import StabilityCase, expand_scene, load_scenes, value_spans
 from harness.studies.stability.study import (
-    CASE_PROCESS,
     FINISHED,
     REFUSED,
     WRONG,
@@ -316,11 +315,11 @@ def test_a_model_without_position_and_speed_is_refused_by_stability_but_not_by_p
 
 
 def test_a_hang_or_crash_is_the_outcome_of_its_case(monkeypatch):
-    def answer(self, request, timeout):
-        raise ChildTimeoutError("no answer after 120 s", "")
+    def call(self, function, *arguments, timeout):
+        raise WorkerTimeoutError("no answer after 120 s", "")
 
-    monkeypatch.setattr(ChildProcess, "ask", answer)
-    (row,) = run_group([CASE], ChildProcess(CASE_PROCESS))
+    monkeypatch.setattr(Worker, "call", call)
+    (row,) = run_group([CASE], Worker())
     assert (row.ended, row.text) == (WRONG, "no answer after 120 s")
 
 
@@ -328,7 +327,7 @@ def test_a_motion_that_differs_from_two_agreeing_methods_is_wrong():
     file = str(build_user_model(EXAMPLE_MODELS[0]) / f"{EXAMPLE_MODELS[0].stem}.fmu")
     group = next(group for group in grouped_cases(models=[file]) if group[0].title == "as it comes")
     one = replace(group[0], max_error=1e-300)
-    with ChildProcess(CASE_PROCESS) as process:
-        (row,) = run_group([one], process)
+    with Worker() as worker:
+        (row,) = run_group([one], worker)
     assert (row.has_passed, row.ended) == (False, WRONG)
     assert "more than 1e-300" in row.text

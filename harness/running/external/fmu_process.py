@@ -1,16 +1,13 @@
-"""Child process that runs an external FMU, writes rows to files and replies with a result."""
+"""Run of an external FMU in a worker process, which writes rows to files, so that they survive a crash."""
 
-import os
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 from fmpy.fmi1 import FMICallException
 
 from ...errors import HarnessError, first_line
-from ...process.child_process import RequestServer
 from ...scenes.run_spec import RunSpec
 from ..event_mode import Clocks, EventCoSimulation
 from ..fmu_archive import read_leniently
@@ -37,14 +34,6 @@ from .step_refinement import (
 REMAINING_SHARE = 0.8  # share of the rest of the progress bar that a run leaves
 
 
-def memory_size() -> int | None:
-    """Return the memory of this machine in bytes, where the system states it: an FMU that needs more cannot run."""
-    try:
-        return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
-    except (AttributeError, ValueError, OSError):
-        return None
-
-
 class ExternalFmu:
     """Runs an external FMU, with a new instance for each run.
 
@@ -52,7 +41,7 @@ class ExternalFmu:
     ----------
     spec : RunSpec
         The run, with its start, stop and converted values.
-    folder : str
+    folder : pathlib.Path
         Directory of the unpacked FMU.
     directory : pathlib.Path
         Directory for results.
@@ -61,9 +50,9 @@ class ExternalFmu:
         its timeout.
     """
 
-    def __init__(self, spec: RunSpec, folder: str, directory: Path, report: Callable[[float, str], None]) -> None:
+    def __init__(self, spec: RunSpec, folder: Path, directory: Path, report: Callable[[float, str], None]) -> None:
         self.spec, self.folder, self.directory = spec, folder, directory
-        self.description = read_leniently(Path(folder))
+        self.description = read_leniently(folder)
         variables = {variable.name: variable for variable in self.description.modelVariables}
         self.settings = [(variables[name], value) for name, value in spec.values.items()]
         self.selection = select_variables(spec, variables, spec.values)
@@ -138,17 +127,12 @@ class ExternalFmu:
         session.close()
 
 
-def run_request(
-    run: dict[str, Any], folder: str, directory: str, report: Callable[[float, str], None]
+def run_unpacked_fmu(
+    spec: RunSpec, folder: Path, directory: Path, report: Callable[[float, str], None]
 ) -> RefinementResult:
-    """Run an unpacked FMU and write rows into a directory."""
+    """Run an FMU that is unpacked in a folder, and write rows into a directory."""
     try:
-        fmu = ExternalFmu(RunSpec.from_json(run), folder, Path(directory), report)
+        fmu = ExternalFmu(spec, folder, directory, report)
         return refine(fmu.spec, fmu.description, fmu.run, fmu.show)
     except Exception as error:
         return RefinementResult(None, "", first_line(error))
-
-
-if __name__ == "__main__":
-    server = RequestServer(memory_size())
-    server.serve(lambda request: run_request(**request, report=server.report))

@@ -1,6 +1,7 @@
-"""Run of an external FMU in a child process, and its result."""
+"""Run of an external FMU in a worker process, and its result."""
 
 import json
+import os
 import signal
 from collections.abc import Callable
 from dataclasses import replace
@@ -12,9 +13,8 @@ import fmpy
 import numpy as np
 
 from ...errors import MAX_VALUE_LENGTH, HarnessError, SceneError, check_names
-from ...process.child_process import ChildDiedError, ChildProcess, ChildTimeoutError
 from ...process.temporary_directory import temporary_directory
-from ...results.files import replace_nonfinite
+from ...process.worker import Worker, WorkerDiedError, WorkerTimeoutError
 from ...scenes.run_spec import RunSpec
 from ..event_mode import check_clocks
 from ..fmu_archive import resolve_time_span, unpack
@@ -22,6 +22,7 @@ from ..recorder import Columns, ShapedVariable, array_shape, element_names, read
 from ..stepping import check_inputs
 from ..trajectory import Trajectory
 from ..variable_values import convert_value, effective_value, variable_unit
+from .fmu_process import run_unpacked_fmu
 from .step_refinement import (
     MAX_STEPS,
     ROWS_PREFIX,
@@ -66,7 +67,7 @@ def simulate(spec: RunSpec, description: Any, report: Callable[[float], None]) -
         check_library(spec.fmu, description, exchange, folder)
         inputs = {name: tuple(map(float, column)) for name, column in spec.inputs.items()}
         resolved = replace(spec, exchange=exchange, start=start, stop=stop, values=values, inputs=inputs)
-        outcome, output = run_fmu_process(resolved, folder, directory, report)
+        outcome, output = run_in_worker(resolved, folder, directory, report)
         time, columns = read_longest_rows(directory, outcome.run_number, selection, description.fmiVersion == "2.0")
         texts = [json.loads(line) for line in read_lines(directory / STRINGS_FILE)]
     failed = f"{spec.fmu.name}: {outcome.failure}" if outcome.failure else ""
@@ -125,19 +126,27 @@ def check_library(fmu: Path, description: Any, exchange: bool, folder: Path) -> 
     raise HarnessError(f"{fmu.name} has no binary {platform}/{identifier} for this machine: {available}{sources}")
 
 
-def run_fmu_process(
+def memory_size() -> int:
+    """Return the memory of this machine in bytes, 0 if the system does not state it: no FMU can use more."""
+    try:
+        return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    except (AttributeError, ValueError, OSError):
+        return 0
+
+
+def run_in_worker(
     spec: RunSpec, folder: Path, directory: Path, report: Callable[[float], None]
 ) -> tuple[RefinementResult, list[str]]:
-    """Run the child process; return its result, or the reason why there is none, and the lines of its output."""
-    request = {"run": replace_nonfinite(spec), "folder": folder, "directory": directory}
-    with ChildProcess(f"{__package__}.fmu_process") as child:
+    """Run the FMU in a worker; return its result, or the reason why there is none, and the lines of its output."""
+    with Worker(memory_size()) as worker:
         try:
-            reply = child.ask(request, spec.timeout + GRACE_PERIOD, report)
-            return RefinementResult(**reply), child.messages.splitlines()
-        except ChildTimeoutError as error:
+            timeout = spec.timeout + GRACE_PERIOD
+            result = worker.call(run_unpacked_fmu, spec, folder, directory, timeout=timeout, report=report)
+            return result, worker.messages.splitlines()
+        except WorkerTimeoutError as error:
             message = f"a call did not return within {spec.timeout:g} s (--timeout sets the limit)"
             return RefinementResult(None, "", message), error.messages.splitlines()
-        except ChildDiedError as error:
+        except WorkerDiedError as error:
             message = f"its binary exited with status {error.status}"
             if error.status < 0:
                 message = f"its binary crashed ({signal.strsignal(-error.status)})"

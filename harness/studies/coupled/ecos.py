@@ -1,15 +1,15 @@
-"""Child process that runs an SSP archive with Ecos (package ecospy, which needs the library of the package tbb)."""
+"""Runs of an SSP archive with Ecos (package ecospy, which needs the library of the package tbb)."""
 
 import ctypes
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
-from ...process.child_process import RequestServer
 from ...scenes.run_spec import RunSpec
-from .engine import ElementVariable
+from .system import ElementVariable
 
 
-def run_archive(run: RunSpec, variables: list[ElementVariable], parameter_set: str) -> list[list[float]]:
+def run_archive(run: RunSpec, variables: Sequence[ElementVariable], parameter_set: str) -> list[list[float]]:
     """Return the rows of a run."""
     assert run.stop is not None
     assert run.grid is not None
@@ -26,7 +26,3 @@ def run_archive(run: RunSpec, variables: list[ElementVariable], parameter_set: s
             simulation.step(1)
             rows.append([simulation.get_real(name) for name in names])
     return rows
-
-
-if __name__ == "__main__":
-    RequestServer().serve(lambda request: run_archive(**request | {"run": RunSpec.from_json(request["run"])}))

@@ -1,28 +1,28 @@
-"""Engines that run an SSP archive, each in a separate process with JSON input and output."""
+"""Engines that run an SSP archive, each in a process of its own."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from ...errors import HarnessError, install_command
-from ...process.child_process import ChildDiedError, ask_once
+from ...process.worker import WorkerCallError, WorkerDiedError, call_once
+from ...running import ssp
 from ...scenes.run_spec import RunSpec
-from .system import BOUND, EXCHANGE, MAPPED, NESTED, OUTER_VALUES, TRANSFORMED, UNITS, VERSION_2
+from . import ecos, libcosim, master
+from .system import BOUND, EXCHANGE, MAPPED, NESTED, OUTER_VALUES, TRANSFORMED, UNITS, VERSION_2, ElementVariable
 
 ENGINE_TIMEOUT = 300.0  # s, for one run
 EXTRA = "coupled"
 MAIN_ENGINE = "Ecos"
-ENGINES = {  # modules of the child processes
-    "own master": f"{__package__}.master",
-    "Ecos": f"{__package__}.ecos",
-    "libcosim": f"{__package__}.libcosim",
-    "fmpy": "harness.running.ssp",
+ENGINES: dict[str, Callable[[RunSpec, Sequence[ElementVariable], str], list[list[float]]]] = {
+    "own master": master.run_archive,
+    "Ecos": ecos.run_archive,
+    "libcosim": libcosim.run_archive,
+    "fmpy": ssp.run_archive,
 }
 UNSUPPORTED = {  # with these features an engine fails, or ignores them without a message (measured)
     "Ecos": {NESTED, UNITS, MAPPED, OUTER_VALUES, VERSION_2, EXCHANGE},
     "libcosim": {NESTED, UNITS, MAPPED, OUTER_VALUES, EXCHANGE},
     "fmpy": {TRANSFORMED, UNITS, BOUND, OUTER_VALUES, VERSION_2, EXCHANGE},
 }
-
-ElementVariable = tuple[str, str, int]  # element of an archive, variable, value reference
 
 
 def run_engine(
@@ -47,10 +47,9 @@ def run_engine(
         If the engine fails or times out; the message has the last line of its output.
     """
     failed = f"{engine} could not run {run.fmu.name}"
-    request = {"run": run, "variables": variables, "parameter_set": parameter_set}
     try:
-        rows: list[list[float]] = ask_once(ENGINES[engine], request, ENGINE_TIMEOUT)
-    except ChildDiedError as error:
+        rows: list[list[float]] = call_once(ENGINES[engine], run, variables, parameter_set, timeout=ENGINE_TIMEOUT)
+    except (WorkerCallError, WorkerDiedError) as error:
         hint = f"; {install_command(EXTRA)}" if "ModuleNotFoundError" in error.last_line else ""
         raise HarnessError(f"{failed}: {error.last_line}{hint}") from None
     except HarnessError as error:

@@ -1,13 +1,15 @@
-"""Child process that runs an SSP archive with libcosim (package libcosimpy); its first row is after the first step."""
+"""Runs of an SSP archive with libcosim (package libcosimpy); its first row is after the first step."""
 
-from ...process.child_process import RequestServer
+from collections.abc import Sequence
+
+from ...errors import HarnessError
 from ...scenes.run_spec import RunSpec
-from .engine import ElementVariable
+from .system import ElementVariable
 
 NANO = 1e9  # libcosim counts time in ns
 
 
-def run_archive(run: RunSpec, variables: list[ElementVariable], parameter_set: str) -> list[list[float]]:
+def run_archive(run: RunSpec, variables: Sequence[ElementVariable], parameter_set: str) -> list[list[float]]:
     """Return the rows of a run; the parameter set is that of the archive."""
     assert run.stop is not None
     assert run.grid is not None
@@ -25,10 +27,6 @@ def run_archive(run: RunSpec, variables: list[ElementVariable], parameter_set: s
     for slave, reference in addresses:
         observer.start_time_series(slave, reference, CosimVariableType.REAL)
     if not execution.step(count):
-        raise SystemExit("libcosim refuses a step")
+        raise HarnessError("libcosim refuses a step")
     columns = [observer.time_series_real_samples(slave, reference, 1, count)[2] for slave, reference in addresses]
     return [list(row) for row in zip(*columns, strict=True)]
-
-
-if __name__ == "__main__":
-    RequestServer().serve(lambda request: run_archive(**request | {"run": RunSpec.from_json(request["run"])}))

@@ -1,9 +1,10 @@
-"""Child process that runs an SSP archive with a fixed-step master of this project.
+"""Runs of an SSP archive with a fixed-step master of this project.
 
 All components step at once with constant inputs; then the outputs are passed on. A component for model exchange is
 integrated by fmpy's CVode from one communication point to the next.
 """
 
+from collections.abc import Sequence
 from contextlib import ExitStack
 from math import inf
 from pathlib import Path
@@ -11,7 +12,6 @@ from typing import Any
 from zipfile import ZipFile
 
 from ...errors import HarnessError
-from ...process.child_process import RequestServer
 from ...process.temporary_directory import temporary_directory
 from ...running.fmu_archive import unpack
 from ...running.fmu_session import CALL_FAILURES, FmuSession, LogCapture
@@ -19,8 +19,7 @@ from ...running.model_exchange import ModelExchange
 from ...running.stepping import TimeGrid
 from ...running.variable_values import REAL_TYPES, convert_value
 from ...scenes.run_spec import RunSpec
-from .engine import ElementVariable
-from .system import Component, CoupledSystem, Node, read_system
+from .system import Component, CoupledSystem, ElementVariable, Node, read_system
 
 EXCHANGE_RTOL = 1e-10  # of components for model exchange
 
@@ -83,7 +82,7 @@ class Part:
                 self.stepper.handle_event(t)
 
 
-def run_archive(run: RunSpec, variables: list[ElementVariable], parameter_set: str) -> list[list[float]]:
+def run_archive(run: RunSpec, variables: Sequence[ElementVariable], parameter_set: str) -> list[list[float]]:
     """Return the rows of a run; all parameter sets of the archive are applied."""
     assert run.stop is not None
     assert run.grid is not None
@@ -142,9 +141,5 @@ def get_value(parts: dict[str, Part], node: Node) -> Any:
     return parts[node[0]].session.get(node[1])
 
 
-def read_row(parts: dict[str, Part], variables: list[ElementVariable]) -> list[float]:
+def read_row(parts: dict[str, Part], variables: Sequence[ElementVariable]) -> list[float]:
     return [float(get_value(parts, (element, name))) for element, name, _ in variables]
-
-
-if __name__ == "__main__":
-    RequestServer().serve(lambda request: run_archive(**request | {"run": RunSpec.from_json(request["run"])}))

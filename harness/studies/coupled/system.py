@@ -15,6 +15,7 @@ from ...errors import HarnessError
 from ...running.fmu_archive import read_description
 from ...running.variable_values import REAL_TYPES, parse_element, variable_unit
 
+ElementVariable = tuple[str, str, int]  # element of an archive, variable, value reference
 Node = tuple[
     str, str
 ]  # path of an element, as in "plant.motor", and name of a connector; the path of the root is empty

@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 
 from ...errors import HarnessError
-from ...process.child_process import ChildProcess, ask_once
 from ...process.interruptible_wait import map_in_threads
+from ...process.worker import Worker, call_once
 from ...references.reference_trajectory import max_or_nan, motion_error
 from ...results.folder import replace_folder
 from ...results.provenance import prefix_parameters, write_provenance
@@ -26,16 +26,16 @@ from ...results.summary import write_summary
 from ...running.fmu_archive import declared_parameters
 from ...running.fmu_info import FmuInfo, read_info
 from ...running.solution import Solution
-from ...running.step_sequence import CommunicationSteps, RefusalSummary, RefusedRun
-from ...running.trajectory import Statistics, Trajectory
+from ...running.step_sequence import CommunicationSteps, RefusalSummary, RefusedRun, inject_nonfinite, run_steps
+from ...running.trajectory import Trajectory
 from ...scenes.fmu_files import check_built, find_fmu
 from .cases import StabilityCase, generic_scenes, load_scenes, scene_cases
 from .outcomes import FINISHED, REFUSED, WRONG, CaseOutcome, StabilityRegion
+from .references import find_modes, solve_reference
 from .result import StabilityResult
 
 WORKERS = 2
 LIMIT = 120.0  # s; time limit of a run and of a reference
-CASE_PROCESS = f"{__package__}.case_process"
 STUDY = find_study("stability")
 REFUSED_STEP = "a communication step of"  # a refused step changes nothing
 
@@ -64,21 +64,21 @@ def without_arrays(outcome: CaseOutcome) -> CaseOutcome:
 
 def run_cases(report: Callable[[str, float], None], groups: list[list[StabilityCase]]) -> list[CaseOutcome]:
     """Run groups of cases in parallel; `report` receives the label of each finished case."""
-    idle: SimpleQueue[ChildProcess] = SimpleQueue()  # starting a process takes longer than most runs
+    idle: SimpleQueue[Worker] = SimpleQueue()  # starting a process takes longer than most runs
 
     def rows(group: list[StabilityCase]) -> list[CaseOutcome]:
-        outcomes, process = [], idle.get()
+        outcomes, worker = [], idle.get()
         try:
-            for row in run_group(group, process):
+            for row in run_group(group, worker):
                 outcomes.append(row)
                 report(row.case.label, 1.0)
         finally:
-            idle.put(process)
+            idle.put(worker)
         return outcomes
 
-    with ExitStack() as processes:
+    with ExitStack() as workers:
         for _ in range(WORKERS):
-            idle.put(processes.enter_context(ChildProcess(CASE_PROCESS)))
+            idle.put(workers.enter_context(Worker()))
         outcomes = [row for outcomes in map_in_threads(WORKERS, rows, groups) for row in outcomes]
     return sorted(outcomes, key=lambda row: row.case.order)
 
@@ -100,7 +100,7 @@ def grouped_cases(
     for model in dict.fromkeys((*models, *(scene["model"] for scene in selected_scenes))):
         infos[model] = read_info(model)
         if model not in [scene["model"] for scene in selected_scenes]:
-            has_comparable_events = len(ask_once(CASE_PROCESS, ("modes", {"model": model}), LIMIT)) < 2
+            has_comparable_events = len(call_once(find_modes, model, timeout=LIMIT)) < 2
             selected_scenes += generic_scenes(model, infos[model], has_comparable_events)
     groups: dict[str, list[StabilityCase]] = {}
     for order, scene in enumerate(selected_scenes):
@@ -110,26 +110,26 @@ def grouped_cases(
     return list(groups.values())
 
 
-def run_group(group: Iterable[StabilityCase], process: ChildProcess) -> Iterator[CaseOutcome]:
-    """Run cases with a common reference in a process."""
+def run_group(group: Iterable[StabilityCase], worker: Worker) -> Iterator[CaseOutcome]:
+    """Run cases with a common reference in a worker process."""
     reference: Solution | None = None
     reference_error = ""
     for case in group:
         try:
             if case.inject_nonfinite:
-                summary = RefusalSummary(**process.ask(("nonfinite", {"run": case.run}), LIMIT))
+                summary = worker.call(inject_nonfinite, case.run, timeout=LIMIT)
                 yield judge_injections(case, summary)
                 continue
             if case.expected_message is None and reference is None and not reference_error:
                 try:
-                    reference = solve_reference(case, process)
+                    reference = worker.call(solve_reference, case.model, case.spans, case.grid, timeout=LIMIT)
                 except HarnessError as error:
                     if not case.may_be_refused:
                         raise
                     reference_error = str(error)  # the run may reject such values
             times = reference.times.tolist() if reference else case.grid.times(())
             calls = case.calls or [(t, next_t - t) for t, next_t in pairwise(times)]
-            outcome = run_case(case, calls, process)
+            outcome = run_case(case, calls, worker)
             if isinstance(outcome, RefusedRun):
                 yield judge_refusal(case, outcome)
             elif reference is None or case.expected_message is not None:
@@ -140,24 +140,10 @@ def run_group(group: Iterable[StabilityCase], process: ChildProcess) -> Iterator
             yield CaseOutcome(case, WRONG, str(error))
 
 
-def solve_reference(case: StabilityCase, process: ChildProcess) -> Solution:
-    """Return the reference of a case, computed in a process."""
-    request = {"model": case.model, "spans": case.spans, "grid": case.grid}
-    reply = process.ask(("reference", request), LIMIT)
-    arrays = {name: np.array(reply[name]) for name in ("times", "states")}
-    return Solution(**{**reply, **arrays, "events": [(t, mode) for t, mode in reply["events"]]})
-
-
-def run_case(case: StabilityCase, calls: CommunicationSteps, process: ChildProcess) -> Trajectory | RefusedRun:
-    """Run a case in a process."""
-    request = {"run": case.run, "calls": calls, "changes": [*case.changes.items()]}
-    reply = process.ask(("steps", request), LIMIT)
-    if "all_nan" in reply:
-        return RefusedRun(**reply)
-    columns = {name: np.array(column) for name, column in reply["columns"].items()}
-    run, statistics = replace(case.run, outputs=tuple(columns)), Statistics(**reply["statistics"])
-    metadata = reply["units"], reply["descriptions"], reply["parameters"]
-    return Trajectory(run, np.array(reply["time"]), columns, *metadata, statistics=statistics)
+def run_case(case: StabilityCase, calls: CommunicationSteps, worker: Worker) -> Trajectory | RefusedRun:
+    """Run a case in a worker process."""
+    outcome: Trajectory | RefusedRun = worker.call(run_steps, case.run, calls, case.changes, timeout=LIMIT)
+    return outcome
 
 
 def judge_injections(case: StabilityCase, ending: RefusalSummary) -> CaseOutcome:

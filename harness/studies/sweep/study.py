@@ -20,8 +20,7 @@ import numpy as np
 
 from ...errors import HarnessError
 from ...process.interrupt import RECEIVED_SIGNALS, CommandInterruptedError, check_interrupt
-from ...process.temporary_directory import temporary_directory
-from ...process.worker_pool import WorkerPool
+from ...process.worker import WorkerPool
 from .checkpoint import Checkpoint, RunBlock
 from .cluster import DaskCluster, connect_cluster
 from .runner import SweepSpec
@@ -119,12 +118,8 @@ def open_workers(
         finally:
             unload()
         return
-    with temporary_directory("sweep-") as folder:
-        pool = WorkerPool(min(workers, runs), folder, [BlockResult.__module__])
-        try:
-            yield pool
-        finally:
-            pool.kill()
+    with WorkerPool(min(workers, runs)) as pool:
+        yield pool
 
 
 class Dispatcher:
