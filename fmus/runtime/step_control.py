@@ -454,6 +454,9 @@ class InternalStep:
             if self.event_location.must_repeat:
                 return NEEDS_REPETITION
             if end <= h:
+                if model.is_coupled and self.is_hybrid and step_limits.is_slip_unresolved(model, self, end):
+                    self.event_location.must_shorten = True
+                    return NEEDS_REPETITION
                 if model.checks_event_steps and not self.is_accurate_at(model, end):
                     self.event_location.must_shorten = True
                     return NEEDS_REPETITION

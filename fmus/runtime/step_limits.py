@@ -6,6 +6,7 @@ small range of slip velocities (narrow features).
 
 from math import fabs, sqrt
 
+from . import contact_lcp
 from .codes import ROUNDOFF_MARGIN, STUCK
 from .event_location import update_event_functions
 from .interpolant import largest_of, smallest_of
@@ -16,6 +17,7 @@ SHORTEST_STEP = 1e-6  # share of the largest step; shorter steps are not shorten
 DIFFERENCE_STEP, FIRST_CHANGE = 1e-5, 0.3  # share of the largest step for differences; change in the first step
 # Narrow features, in widths: slips at which they limit a step; where a step from outside is to end, and may end
 FEATURE_RANGE, APPROACH, NEAREST_APPROACH = 5.0, 4.5, 3.5
+RESOLVED_SHARE = 0.5  # of a step, in which a slip that begins and ends is resolved
 MIN_STEP_SHARE = 0.6  # smallest share to which a step near a feature need not be shortened
 
 
@@ -62,6 +64,26 @@ def ignore_rounding_errors(model, step):
         change = largest_of(start, early, late, end) - smallest_of(start, early, late, end)
         if step.modes0[i] != STUCK and change <= noise[i]:
             location.cubic_errors[i] = 0.0
+
+
+def is_slip_unresolved(model, step, end):
+    """Return whether a slip begins and ends early in the step, `end` seconds after its start, within the tolerance.
+
+    The error control of the step does not see such a slip, so that the interpolant is no motion of the body.
+    """
+    if end >= RESOLVED_SHARE * step.h_full or step.h_full <= SHORTEST_STEP * step.h_max:
+        return False
+    location = step.event_location
+    t = step.t0 + 0.5 * end
+    y2 = step.state_after(model, 0.5 * end)
+    slips = model.slip_velocities(t, y2)
+    floors = contact_lcp.slip_floors(model, step, t, y2)
+    is_unresolved = False
+    for i in contact_indices:
+        least = step.tolerance * floors[i]
+        ends = step.modes0[i] != STUCK and location.times[i] == end
+        is_unresolved = is_unresolved or (ends and location.start[i] <= least and fabs(slips[i]) <= least)
+    return is_unresolved
 
 
 def limit_first_step(model, step):
