@@ -5,6 +5,7 @@
     resources/slavemodule.txt               names the entry script
     resources/<entry>.py                    imports the class (see runtime/pythonfmu_workarounds.py)
     resources/tables.json                   points of lookup tables, if the model has any
+    resources/contacts.json                 names of contacts and modes, if the model has any
     resources/<package>/                    the model and the modules it needs (embedded_modules.py)
     documentation/                          page, licences, requirements on the host
     model.png                               icon

@@ -12,12 +12,13 @@ from ..runtime.variable_declarations import VariableDeclaration, VariableOwner
 from . import __version__
 from .certified_result import RESULT_FOLDER, CertifiedResult, find_certified_result, result_files
 from .equations.tables import PCHIP, Table
-from .fmi_variables import Variables, integrated_states
+from .fmi_variables import Variables, integrated_states, mode_names
 from .svg_chart import draw_chart
 from .units import unit_of
 
 GREEK = {"theta": "theta", "omega": "omega", "alpha": "alpha", "mu": "mu", "eps": "epsilon", "phi": "phi", "pi": "pi"}
 TABLES_FILE = "resources/tables.json"  # points of the tables, which harness/running/fmu_tables.py reads
+CONTACTS_FILE = "resources/contacts.json"  # harness/running/fmu_contacts.py reads it
 CURVE_POINTS = 200  # of a table that is not linear
 STYLE = Path(__file__).with_name("documentation_page.css")
 USAGE = """\
@@ -198,9 +199,9 @@ def extra_files(
 ) -> dict[str, bytes]:
     """Return the content of these files by path in the FMU.
 
-    Icon (.png), known boundaries (.toml, see harness/studies/sweep) and certified result (.csv) are optional and stand
-    next to the model file at `path`, under the same name.  `icon` is the path of the icon in the FMU; `use` is a
-    paragraph of the page on how to run the FMU.
+    The names of contacts and modes are in resources/contacts.json.  Icon (.png), known boundaries (.toml, see
+    harness/studies/sweep) and certified result (.csv) are optional and stand next to the model file at `path`, under
+    the same name.  `icon` is the path of the icon in the FMU; `use` is a paragraph of the page on how to run the FMU.
     """
     name, picture, boundaries = path.stem, path.with_suffix(".png"), path.with_suffix(".toml")
     certified = find_certified_result(path, declared)
@@ -208,6 +209,8 @@ def extra_files(
     entries = {"documentation/index.html": documentation_page(model, name, declared, certified, tables, icon_path, use)}
     if tables:
         entries[TABLES_FILE] = (json.dumps([table.as_json() for table in tables], indent=1) + "\n").encode()
+    if contacts := mode_names(model, declared):
+        entries[CONTACTS_FILE] = (json.dumps(contacts, indent=1) + "\n").encode()
     if certified is not None:
         entries |= result_files(name, certified, declared)
     if picture.is_file():

@@ -32,11 +32,16 @@ def declared_variables(model: Any) -> Variables:
     """Return name and declaration of the variables of a model class and its solver; a mode names its contact."""
     instance = model()
     declared = fmi_variables(instance, RunState(instance))
-    forces = [name for name, meaning in declared if meaning.role == "contact"]
-    force_of = dict(zip(model.contacts, forces, strict=True))
+    force_of = {mode: force for force, mode in mode_names(model, declared).items()}
     return [
         (name, name_contact(meaning, force_of[name]) if name in force_of else meaning) for name, meaning in declared
     ]
+
+
+def mode_names(model: Any, declared: Variables) -> dict[str, str]:
+    """Return the name of the mode of each contact, by that of its friction force."""
+    forces = [name for name, meaning in declared if meaning.role == "contact"]
+    return dict(zip(forces, model.contacts, strict=True))
 
 
 def name_contact(mode: VariableDeclaration, force: str) -> VariableDeclaration:

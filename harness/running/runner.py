@@ -28,6 +28,7 @@ from .fmu_archive import (
     resolve_time_span,
     unpack,
 )
+from .fmu_contacts import read_contacts
 from .fmu_session import CALL_FAILURES, FmuSession, LogCapture, capture_stderr
 from .recorder import Columns, Recorder, ShapedVariable, default_outputs, read_rows
 from .stepping import (
@@ -39,7 +40,7 @@ from .stepping import (
     make_grid,
     step_to_stop,
 )
-from .trajectory import ModeChanges, SolverSteps, Statistics, Trajectory, find_contacts
+from .trajectory import ModeChanges, SolverSteps, Statistics, Trajectory
 from .variable_values import convert_value, effective_value, enumeration_labels, variable_unit
 
 ProgressCallback = Callable[[float], None]  # receives the progress of a run, from 0 to 1
@@ -243,7 +244,7 @@ def plan_run(spec: RunSpec, description: Any) -> RunPlan:
             "solver.rejected",
             "events.count",
             "events.t_last",
-            *find_contacts(variables).values(),
+            *read_contacts(spec.fmu).values(),
         )
         names += [name for name in extra if name in variables and name not in names]
     return RunPlan(spec, variables, grid, names)
@@ -333,11 +334,12 @@ def build_trajectory(plan: RunPlan, session: FmuSession, recorded: RecordedRun, 
         ends = find_step_ends(time, samples["solver.t_next"], plan.grid.tolerance)
         steps = SolverSteps(time[ends], np.diff(time[ends]), np.diff(samples["solver.rejected"][ends]))
     effective = read_parameters(session, spec.fmu)
-    if spec.follow and effective.get("friction") == "hybrid":
+    contacts = read_contacts(spec.fmu)
+    if spec.follow and contacts and effective.get("friction") == "hybrid":
         at = np.flatnonzero(np.diff(samples["events.count"])) + 1
         rows = np.append(0, at)
-        modes = {contact: samples[mode][rows] for contact, mode in find_contacts(variables).items()}
-        events = ModeChanges(np.append(time[0], samples["events.t_last"][at]), modes)
+        modes = {contact: samples[mode][rows].astype(int) for contact, mode in contacts.items()}
+        events = ModeChanges(np.append(time[0], samples["events.t_last"][at]), modes, contacts)
     return Trajectory(
         spec=spec,
         time=time,

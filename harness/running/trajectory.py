@@ -3,9 +3,8 @@
 A contact of an FMU of this project has a friction force and a mode. Its name is that of its force.
 """
 
-import re
 from collections.abc import Collection, ItemsView, Iterator, KeysView, Mapping, Sequence, ValuesView
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise
 from math import nan
 from pathlib import Path
@@ -29,7 +28,6 @@ if TYPE_CHECKING:
 
 MAX_PANELS = 8  # of a plot without named outputs
 MIN_SAMPLES = 8  # in a half cycle or a slip: a parabola through the top samples is then accurate to 1e-4
-MODE_TEXT = re.compile(r"mode of (\w+): ")  # how the description of a mode begins; it names the force of the contact
 
 
 @dataclass(frozen=True)
@@ -61,10 +59,13 @@ class ModeChanges:
         Times (n,) in s.
     modes : dict
         Modes (n,) of each contact by the name of its friction force: -1, 0 while it sticks, or 1.
+    mode_names : mapping
+        Name of the output that is the mode of a contact, by that of its friction force, where it is known.
     """
 
     t: np.ndarray
     modes: dict[str, np.ndarray]
+    mode_names: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def mode(self) -> np.ndarray:
@@ -358,8 +359,8 @@ class Trajectory(Result):
         """
         if len(self.contacts) == 1:
             return self.contacts[0]
-        candidates = (name, contact_of_mode(self.descriptions.get(name)))
-        return next((contact for contact in candidates if contact in self.contacts), "")
+        mode_names = self.events.mode_names if self.events else {}
+        return next((contact for contact in self.contacts if name in (contact, mode_names.get(contact))), "")
 
     def summary(self) -> Summary:
         return summarize_run(self, self.name)
@@ -497,24 +498,6 @@ def summarize_steps(run: Trajectory, title: str) -> tuple[SummaryTable, ...]:
     quantities = step_size_quantities(run.steps.h, int(run.steps.rejected.sum()))
     row = (title, *(" ".join(quantity.format()).strip() for quantity in quantities))
     return make_table(("case", *(quantity.text for quantity in quantities)), (row,), STEPS_TABLE)
-
-
-def contact_of_mode(description: str | None) -> str:
-    """Return the friction force that the description of a mode names; empty if it names none."""
-    named = MODE_TEXT.match(description or "")
-    return named[1] if named else ""
-
-
-def find_contacts(variables: Mapping[str, Any]) -> dict[str, str]:
-    """Return the contacts of an FMU of this project: the mode, an output, by the name of the contact.
-
-    A contact has the name of its friction force, or that of its mode if the description of the mode names no force.
-    """
-    modes = [
-        variable for variable in variables.values() if (variable.causality, variable.type) == ("output", "Integer")
-    ]
-    named = {mode.name: contact_of_mode(mode.description) for mode in modes}
-    return {force if force in variables else mode: mode for mode, force in named.items()}
 
 
 def choose_outputs(outputs: Sequence[str], contacts: Collection[str], count: int) -> tuple[str, ...]:

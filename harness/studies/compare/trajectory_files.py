@@ -20,8 +20,9 @@ from ...records.units import TIMES
 from ...results.loading import load_summary
 from ...results.provenance import load_provenance
 from ...running.fmu_archive import read_description
+from ...running.fmu_contacts import read_contacts
 from ...running.recorder import element_names
-from ...running.trajectory import ModeChanges, SolverSteps, Trajectory, find_contacts
+from ...running.trajectory import ModeChanges, SolverSteps, Trajectory
 from ...scenes.run_spec import RunSpec
 
 MAX_TIME = 1e100  # s; largest absolute time
@@ -201,9 +202,10 @@ def read_run(folder: Path) -> Trajectory:
         with suppress(HarnessError):
             variables = {item.name: item for item in read_description(spec.fmu, lenient=True).modelVariables}
             names |= {name: variables[name].description or name for name in names if name in variables}
-            contacts = [*find_contacts(variables)]
-            if events and len(events.modes) == len(contacts) == 1:
-                events = ModeChanges(events.t, {contacts[0]: events.mode})
+            contacts = read_contacts(spec.fmu)
+            if events and len(events.modes) == len(contacts):
+                modes = events.modes if len(contacts) > 1 else dict.fromkeys(contacts, events.mode)
+                events = ModeChanges(events.t, modes, contacts)
     summary = load_summary(folder)
     note = " ".join(summary.sentences) if summary and origin.get("scene") is None else ""  # a scene has other sentences
     return Trajectory(spec, signals.time, signals.columns, units, names, parameters, steps, events, note=note)
