@@ -142,7 +142,7 @@ def test_the_page_lists_every_variable_law_and_method(content, name):
 
 def test_an_angle_is_drawn_in_the_unit_that_its_label_names(content):
     """The pendulum starts at 10 degrees."""
-    chart = re.search(r'<svg.*?aria-label="theta in deg over time".*?</svg>', content("pendulum")[PAGE].decode(), re.S)
+    chart = re.search(r'<svg.*?aria-label="theta in deg over time in s".*?</svg>', content("pendulum")[PAGE].decode(), re.S)
     ticks = [float(tick) for tick in re.findall(r'text-anchor="end">(-?[\d.]+)<', chart[0])]
     assert max(ticks) == 10.0
 
@@ -197,7 +197,7 @@ def test_the_fmu_reproduces_its_certified_result(content, launch, name):
 
 def test_a_model_without_a_certified_result_has_a_page():
     model = model_class("smd")
-    reader = Reader(documentation_page(model, "sixth", declared_variables(model), None, "model.png", "").decode())
+    reader = Reader(documentation_page(model, "sixth", declared_variables(model), None, [], "model.png", "").decode())
     assert "Default run" not in reader.headings
     assert "sixth" in reader.text
 
