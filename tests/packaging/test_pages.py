@@ -142,7 +142,9 @@ def test_the_page_lists_every_variable_law_and_method(content, name):
 
 def test_an_angle_is_drawn_in_the_unit_that_its_label_names(content):
     """The pendulum starts at 10 degrees."""
-    chart = re.search(r'<svg.*?aria-label="theta in deg over time in s".*?</svg>', content("pendulum")[PAGE].decode(), re.S)
+    chart = re.search(
+        r'<svg.*?aria-label="theta in deg over time in s".*?</svg>', content("pendulum")[PAGE].decode(), re.S
+    )
     ticks = [float(tick) for tick in re.findall(r'text-anchor="end">(-?[\d.]+)<', chart[0])]
     assert max(ticks) == 10.0
 
