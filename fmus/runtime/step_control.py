@@ -297,9 +297,10 @@ class InternalStep:
         roundoff = self.roundoff
         roundoff.carry()
         exact.start_segment(self.y0, self.f0, model.applied_acceleration(self.t0, self.modes0), roundoff.x0)
+        if model.has_dry_friction:
+            duration = exact.next_standstill(self.modes0)  # may shorten the horizon
         self.t1 = self.t_end if self.t_end - self.t0 <= exact.horizon else self.t0 + exact.horizon
         if model.has_dry_friction:
-            duration = exact.next_standstill(self.modes0)
             end = self.t0 + (duration + roundoff.t0)
             if end <= self.t1 and end < inf:
                 self.t1 = roundoff.event_time(self.t0, duration)
