@@ -33,7 +33,7 @@ F_ext = [0, 5, 0, 1]
 INPUTS = {"time": [0.0, 1.0, 1.0, 2.0], "F_ext": [0.0, 5.0, 0.0, 1.0]}
 CALLS = {  # arguments of harness.simulate
     "model": {"source": "coulomb"},
-    "enumerations": {"source": "stickslip", "values": {"friction": "threshold"}, "method": "ode45", "rtol": 1e-5},
+    "enumerations": {"source": "stickslip", "values": {"friction": "threshold"}, "method": "ode45", "stop": 0.2},
     "interval": {"source": "coulomb", "interval": 0.25, "stop": 2.0, "outputs": ["x"]},
     "inputs": {"source": "smd", "inputs": INPUTS, "stop": 2.0},
     "inputs at an interval": {"source": "smd", "inputs": INPUTS, "stop": 2.0, "interval": 0.1},
