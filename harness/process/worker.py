@@ -81,7 +81,7 @@ class WorkerStartError(WorkerError):
 
 
 class WorkerProcess:
-    """A started process.
+    """A started process. It is made where signals are deferred until its owner, which kills it, has stored it.
 
     Parameters
     ----------
@@ -101,7 +101,7 @@ class WorkerProcess:
         directory = self.resources.enter_context(temporary_directory("child-"))
         self.output_file = directory / "output"
         command = [sys.executable, "-m", worker_process.__name__, str(directory), str(memory)]
-        with self.output_file.open("ab") as output, defer_signals():
+        with self.output_file.open("ab") as output:
             self.process = subprocess.Popen(
                 command,
                 stdin=subprocess.PIPE,
@@ -232,7 +232,8 @@ class Worker:
         """Start the process and wait until it is ready."""
         self.kill()
         self.replies: SimpleQueue[tuple[WorkerProcess, bytes | None]] = SimpleQueue()
-        self.process = WorkerProcess(self.replies, self.memory)
+        with defer_signals():
+            self.process = WorkerProcess(self.replies, self.memory)
         self.receive(self.process, START_TIMEOUT)
         return self.process
 
@@ -305,8 +306,9 @@ class WorkerPool:
         """Give queued calls to idle processes."""
         while self.pending and len(self.busy) < self.size:
             future, function, arguments = self.pending.popleft()
-            process = self.idle.pop() if self.idle else WorkerProcess(self.replies)
-            self.busy[process] = future
+            with defer_signals():
+                process = self.idle.pop() if self.idle else WorkerProcess(self.replies)
+                self.busy[process] = future
             process.start_call(function, arguments)
 
     def wait_for_any(self, futures: Collection[Future[Any]]) -> set[Future[Any]]:
@@ -328,9 +330,10 @@ class WorkerPool:
         if process in self.idle:  # it died there
             self.idle.remove(process)
             return
-        future = self.busy.pop(process)
+        future = self.busy[process]
         if reply is not None:
-            self.idle.append(process)
+            self.idle.append(process)  # before it leaves the others: a signal may come in between
+        del self.busy[process]
         if kind == ERROR:
             future.set_exception(content)
         else:
