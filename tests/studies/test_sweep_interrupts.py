@@ -95,7 +95,7 @@ def start_sweep(folder):
 
 def sweep_processes(folder):
     """Return the processes of the sweeps started there."""
-    processes, mark = [], f"PYTHONPATH={folder}{os.pathsep}".encode()
+    processes, mark = [], f"{folder}{os.pathsep}".encode()
     for file in Path("/proc").glob("[0-9]*/environ"):
         try:
             processes += [file.parent.name] if mark in file.read_bytes() else []
@@ -107,7 +107,7 @@ def sweep_processes(folder):
 def test_a_killed_sweep_resumes_and_leaves_no_worker(harness, undisturbed, tmp_path):
     """A kill reaches only the sweep, Ctrl-C in a terminal also its workers; the last write may be truncated."""
     process = start_sweep(tmp_path)
-    assert len(sweep_processes(tmp_path)) >= 3 or not Path("/proc/self/environ").exists()
+    assert len(sweep_processes(tmp_path)) == 2 or not Path("/proc/self/environ").exists()
     process.kill()
     process.communicate(timeout=60)
     late = time.monotonic() + 60
@@ -176,6 +176,7 @@ def test_an_unresponsive_scheduler_is_reported(monkeypatch):
 
 def test_a_run_that_kills_its_worker_is_reported_and_the_others_finish(monkeypatch):
     """In any block, and with any other work in progress."""
+    monkeypatch.setenv("PYTHONPATH", str(Path(killed_worker.__file__).parent), os.pathsep)
     monkeypatch.setattr(study, "run_block", killed_worker.run_block)
     sweep = Sweep(
         SweepSpec(RunSpec(Path("deadly.fmu")), ("a",)), SweepPoints((parse_axis("a=0:39:40", False),)), b"", 1
