@@ -6,7 +6,7 @@ input clocks never tick, because only another FMU could tick them.
 """
 
 from collections.abc import Callable
-from ctypes import c_double, c_int, c_uint
+from ctypes import c_bool, c_double, c_int, c_uint
 from dataclasses import dataclass
 from math import inf
 from pathlib import Path
@@ -159,13 +159,15 @@ class Clocks:
         if declared.get("intervalCounter") is not None:
             return int(declared["intervalCounter"]) / resolution, int(declared.get("shiftCounter", 0)) / resolution
         shift = (c_double * 1)()
-        self.session.fmu.getShiftDecimal((c_uint * 1)(clock.reference), shift)
+        fmu = self.session.fmu  # older versions of fmpy have methods for clocks that fail
+        fmu.fmi3GetShiftDecimal(fmu.component, (c_uint * 1)(clock.reference), 1, shift)
         return self.query(clock)[0], float(shift[0])
 
     def query(self, clock: InputClock) -> tuple[float, int]:
         """Return the interval of a clock in s, and its qualifier."""
         interval, qualifier = (c_double * 1)(), (c_int * 1)()
-        self.session.fmu.getIntervalDecimal((c_uint * 1)(clock.reference), interval, qualifier)
+        fmu = self.session.fmu
+        fmu.fmi3GetIntervalDecimal(fmu.component, (c_uint * 1)(clock.reference), 1, interval, qualifier)
         return float(interval[0]), int(qualifier[0])
 
     def read_interval(self, clock: InputClock, t: float) -> None:
@@ -202,9 +204,14 @@ class Clocks:
 
     def activate(self, references: list[int]) -> None:
         """Activate input clocks, and read the variables of the active clocks, also of those that the FMU activates."""
+        fmu = self.session.fmu
         if references:
-            self.session.fmu.setClock(references, [True] * len(references))
-        states = self.session.fmu.getClock(self.outputs) if self.outputs else []
+            count = len(references)
+            fmu.fmi3SetClock(fmu.component, (c_uint * count)(*references), count, (c_bool * count)(*[True] * count))
+        count = len(self.outputs)
+        states = (c_bool * count)()
+        if count:
+            fmu.fmi3GetClock(fmu.component, (c_uint * count)(*self.outputs), count, states)
         active = {output for output, state in zip(self.outputs, states, strict=True) if state}
         self.read_values(active | {*references} | self.unread)
         self.unread = set()
