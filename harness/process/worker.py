@@ -81,7 +81,7 @@ class WorkerStartError(WorkerError):
 
 
 class WorkerProcess:
-    """A started process. It is made where signals are deferred until its owner, which kills it, has stored it.
+    """A started process. Defer signals until its owner, which kills it, has stored it.
 
     Parameters
     ----------

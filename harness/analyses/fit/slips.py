@@ -27,13 +27,13 @@ def irregular_slips(records: Sequence[RecordData], columns: Sequence[tuple[str, 
     columns : sequence of (str, str)
         Name and unit of each column of the records.
     """
-    found = (
+    measured = (
         measure_slips(record, y, name, unit)
         for record in records
         for y, (name, unit) in zip(record.y.T, columns, strict=True)
         if unit in FORCES
     )
-    return tuple(slips for slips in found if slips and slips.drop.std(ddof=1) > IRREGULAR * slips.drop.mean())
+    return tuple(slips for slips in measured if slips and slips.drop.std(ddof=1) > IRREGULAR * slips.drop.mean())
 
 
 def measure_slips(record: RecordData, y: np.ndarray, column: str, unit: str) -> Slips | None:
