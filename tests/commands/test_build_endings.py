@@ -5,10 +5,13 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import ExitStack
 from functools import partial
 
 import pytest
 from build_cache import ROOT
+
+from harness.process.subprocess_runner import kill_process_group
 
 pytestmark = pytest.mark.slow
 
@@ -20,12 +23,26 @@ def environment(tmp_path):
     return os.environ | {"TMPDIR": str(tmp_path / "temporary")}
 
 
-def start_build(environment, *arguments, **streams):
-    """Start a build in a process group of its own, which handles signals although pytest may ignore them."""
-    reset_sigint = partial(signal.signal, signal.SIGINT, signal.SIG_DFL)
-    command = [sys.executable, ROOT / "build_fmus.py", *arguments]
-    streams = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True} | streams
-    return subprocess.Popen(command, env=environment, start_new_session=True, preexec_fn=reset_sigint, **streams)
+@pytest.fixture
+def start_build(environment):
+    """Return a function that starts a build; kill at the end what a failed test leaves.
+
+    A build has a process group of its own, and handles signals although pytest may ignore them.
+    """
+    with ExitStack() as stack:
+
+        def start(*arguments, **streams):
+            reset_sigint = partial(signal.signal, signal.SIGINT, signal.SIG_DFL)
+            command = [sys.executable, ROOT / "build_fmus.py", *arguments]
+            streams = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True} | streams
+            process = subprocess.Popen(
+                command, env=environment, start_new_session=True, preexec_fn=reset_sigint, **streams
+            )
+            stack.enter_context(process)
+            stack.callback(kill_process_group, process)
+            return process
+
+        yield start
 
 
 def wait_for_directory(process, tmp_path):
@@ -35,8 +52,8 @@ def wait_for_directory(process, tmp_path):
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 @pytest.mark.parametrize(("options", "delay"), [((), 0.05), (("--native",), 0.5)])  # within the build, of 0.3 s and 3 s
-def test_a_signal_ends_a_build_and_leaves_nothing_behind(environment, tmp_path, options, delay, number):
-    process = start_build(environment, "smd", *options, "--out", tmp_path / "out")
+def test_a_signal_ends_a_build_and_leaves_nothing_behind(start_build, tmp_path, options, delay, number):
+    process = start_build("smd", *options, "--out", tmp_path / "out")
     wait_for_directory(process, tmp_path)
     time.sleep(delay)  # into the code generation or the compiler
     os.killpg(process.pid, number)
@@ -49,13 +66,13 @@ def test_a_signal_ends_a_build_and_leaves_nothing_behind(environment, tmp_path, 
 
 
 def test_the_directory_of_a_killed_build_is_removed_by_the_next_run_and_that_of_a_running_one_kept(
-    environment, tmp_path
+    environment, start_build, tmp_path
 ):
-    killed, running = (start_build(environment, "smd", "--native", "--out", tmp_path / "out") for _ in range(2))
+    killed, running = (start_build("smd", "--native", "--out", tmp_path / "out") for _ in range(2))
     for process in (killed, running):
         wait_for_directory(process, tmp_path)
-    while len(directories := list((tmp_path / "temporary").glob("friction-fmus-*"))) < 2:  # not a file of tempfile
-        time.sleep(0.01)
+    while len(directories := {file.parent for file in (tmp_path / "temporary").glob("friction-fmus-build-*/*")}) < 2:
+        time.sleep(0.01)  # a directory with files is locked; an empty one may not be
     os.killpg(running.pid, signal.SIGSTOP)
     os.killpg(killed.pid, signal.SIGKILL)
     killed.communicate(timeout=60)
@@ -70,9 +87,9 @@ def test_the_directory_of_a_killed_build_is_removed_by_the_next_run_and_that_of_
     assert not list((tmp_path / "temporary").iterdir())
 
 
-def test_standard_output_that_is_full_is_one_sentence(environment, tmp_path):
+def test_standard_output_that_is_full_is_one_sentence(start_build, tmp_path):
     with open("/dev/full", "w") as full:
-        process = start_build(environment, "--help", stdout=full)
+        process = start_build("--help", stdout=full)
         assert process.communicate(timeout=60)[1] == "Error: No space left on device\n"
     assert process.returncode == 1
 
