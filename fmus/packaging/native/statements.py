@@ -50,7 +50,7 @@ class FunctionTranslator(ExpressionTranslator):
         if self.translate_block(tree.body) and self.result:
             raise self.unsupported(tree, "may end without a return", "return a value on every path")
 
-    def text(self, name: str) -> str:
+    def text(self, name: str, is_rarely_called: bool = False) -> str:
         """Return the C function."""
         parameters = [
             c_declaration(self.local_types[p], p)
@@ -73,7 +73,7 @@ class FunctionTranslator(ExpressionTranslator):
         about_unused = [f"    {', '.join(unused)};"] if unused else []
         lines = [
             f"/* {about} */",
-            f"static {head}({parameter_list})",
+            f"static {'COLD ' * is_rarely_called}{head}({parameter_list})",
             "{",
             *self.declarations(names),
             *about_unused,
