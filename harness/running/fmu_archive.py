@@ -6,6 +6,7 @@ lack required files are refused.
 """
 
 import atexit
+import json
 from collections.abc import Callable, Hashable, Iterator
 from contextlib import ExitStack, contextmanager
 from functools import cache, wraps
@@ -14,7 +15,7 @@ from pathlib import Path
 from shutil import disk_usage
 from typing import Any, TypeVar
 from xml.etree import ElementTree
-from zipfile import ZipFile
+from zipfile import BadZipFile, ZipFile
 
 import fmpy
 from fmpy.model_description import SimpleType, ValidationError
@@ -105,6 +106,21 @@ def validate_description(path: Path, lenient: bool) -> Any:
     if description is None:
         raise HarnessError(f"{path.name} has FMI version {fmi_version}; supported are 2.0 and 3.0: export it again")
     return description
+
+
+def read_json_resource(fmu: Path, name: str, parse: Callable[[Any], Result]) -> Result | None:
+    """Return the parsed content of a JSON file of an FMU, or None for an FMU without it.
+
+    Raises
+    ------
+    HarnessError
+        If the file is damaged.
+    """
+    try:
+        with ZipFile(fmu) as archive:
+            return parse(json.loads(archive.read(name))) if name in archive.namelist() else None
+    except (OSError, BadZipFile, ValueError, TypeError, KeyError, AttributeError) as error:
+        raise HarnessError(f"{name} of {fmu.name} cannot be read: {first_line(error)}") from None
 
 
 @cached_by_mtime

@@ -1,11 +1,10 @@
 """Contacts of an FMU of this project, from the file resources/contacts.json."""
 
-import json
+from collections.abc import Mapping
 from pathlib import Path
-from zipfile import BadZipFile, ZipFile
+from typing import Any
 
-from ..errors import HarnessError, first_line
-from .fmu_archive import cached_by_mtime
+from .fmu_archive import cached_by_mtime, read_json_resource
 
 CONTACTS_FILE = "resources/contacts.json"  # fmus/packaging/documentation_page.py writes it
 
@@ -19,10 +18,9 @@ def read_contacts(fmu: Path) -> dict[str, str]:
     HarnessError
         If the file is damaged.
     """
-    try:
-        with ZipFile(fmu) as archive:
-            if CONTACTS_FILE not in archive.namelist():
-                return {}
-            return {str(force): str(mode) for force, mode in json.loads(archive.read(CONTACTS_FILE)).items()}
-    except (OSError, BadZipFile, ValueError, AttributeError) as error:
-        raise HarnessError(f"{CONTACTS_FILE} of {fmu.name} cannot be read: {first_line(error)}") from None
+    return read_json_resource(fmu, CONTACTS_FILE, parse_contacts) or {}
+
+
+def parse_contacts(content: Mapping[str, Any]) -> dict[str, str]:
+    """Return contacts from their JSON."""
+    return {str(force): str(mode) for force, mode in content.items()}

@@ -1,16 +1,13 @@
 """Lookup tables of an FMU, from the file resources/tables.json of FMUs of this project."""
 
-import json
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
-from zipfile import BadZipFile, ZipFile
 
 import numpy as np
 
-from ..errors import HarnessError, first_line
-from .fmu_archive import cached_by_mtime
+from .fmu_archive import cached_by_mtime, read_json_resource
 
 TABLES_FILE = "resources/tables.json"  # fmus/packaging/documentation_page.py writes it
 PCHIP = "pchip"
@@ -70,14 +67,18 @@ def read_tables(fmu: Path) -> tuple[LookupTable, ...]:
     HarnessError
         If the file is damaged.
     """
-    try:
-        with ZipFile(fmu) as archive:
-            if TABLES_FILE not in archive.namelist():
-                return ()
-            content = json.loads(archive.read(TABLES_FILE))
-        return tuple(map(parse_table, content))
-    except (OSError, BadZipFile, ValueError, TypeError, KeyError) as error:
-        raise HarnessError(f"{TABLES_FILE} of {fmu.name} cannot be read: {first_line(error)}") from None
+    return read_json_resource(fmu, TABLES_FILE, parse_tables) or ()
+
+
+def read_tables_with(fmu: Path, names: Collection[str], values: Mapping[str, float | str]) -> tuple[LookupTable, ...]:
+    """Return the tables of an FMU that depend on parameters of these names, with values of other parameters."""
+    tables = [table for table in read_tables(fmu) if {*table.parameters} & {*names}]
+    return tuple(replace(table, y=table.y_with(values)) for table in tables)
+
+
+def parse_tables(content: Sequence[Mapping[str, Any]]) -> tuple[LookupTable, ...]:
+    """Return tables from their JSON."""
+    return tuple(map(parse_table, content))
 
 
 def parse_table(content: Mapping[str, Any]) -> LookupTable:

@@ -1,5 +1,6 @@
 """Lookup tables of an FMU in descriptions and figures, and their values as unknowns of a fit."""
 
+import itertools
 import json
 
 import commands
@@ -96,3 +97,21 @@ def test_points_are_listed_and_drawn_with_the_values_of_a_run(sled, tmp_path, mo
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("argument [m/s]", "guide [N]")
     x, y = axes.lines[0].get_data()
     assert ([*x], [*y]) == ([*X], [*(VALUES | {"F_2": 7.5}).values()])
+
+
+@pytest.mark.parametrize("sample", [{}, {"samples": 30, "seed": 1}], ids=["grid", "sample"])
+def test_a_sweep_of_values_of_a_table_shows_its_curves(sled, tmp_path, sample):
+    varied = {"F_0": [12.0, 13.0, 14.0], "F_2": [8.0, 8.5]} if not sample else {"F_0": (12.0, 14.0), "F_2": (8.0, 9.0)}
+    sweep = harness.sweep(sled, varied, values={"F_4": 12.0}, **sample)
+    sweep.save(tmp_path / "sweep")
+    panels = draw(harness.load_result(tmp_path / "sweep"))
+    title = "table guide: 20 of 30 curves" if sample else "table guide"
+    drawn = {tuple(line.get_ydata()) for line in panels[title].lines}
+    if sample:
+        runs = zip(*(sweep.data[name].to_numpy() for name in varied), strict=True)
+    else:
+        runs = itertools.product(*varied.values())
+    expected = {(f_0, VALUES["F_1"], f_2, VALUES["F_3"], 12.0) for f_0, f_2 in runs}
+    assert drawn <= expected
+    assert len(drawn) == (20 if sample else len(expected))
+    assert not json.loads(harness.sweep(sled, {"m": [1.0, 2.0]}).data.attrs.get("tables", "[]"))

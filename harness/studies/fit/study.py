@@ -20,10 +20,9 @@ from ...results import provenance
 from ...results.folder import replace_folder
 from ...results.registry import find_study
 from ...results.summary import write_summary
-from ...running.fmu_tables import LookupTable, read_tables
+from ...running.fmu_tables import read_tables_with
 from ...running.native_equivalent import native_equivalent
 from ...running.whole_run import open_simulator
-from ...scenes.run_spec import RunSpec
 from .laws import ResolvedLaws, resolve_laws
 from .observed import choose_observed
 from .request import FitRequest, ResolvedRequest, make_unknowns, record_data, span_remarks
@@ -193,7 +192,7 @@ def fit_tables(
         )
         notes = [note for table in (*tables, *validation) for note in table.notes]
         fit = describe_fit(resolved.name, problem, raw_fit, notes, simulator.n_runs, process_time() - start_time)
-    curves = fitted_tables(request.run, [estimate.name for estimate in fit.estimates])
+    curves = read_tables_with(request.run.fmu, [estimate.name for estimate in fit.estimates], request.run.values)
     fit = replace(
         fit, columns=set_units(fit.columns, units), remarks=(*doubts, *fit.remarks), slips=slips, tables=curves
     )
@@ -201,12 +200,6 @@ def fit_tables(
         prediction = replace(prediction, columns=set_units(prediction.columns, units))
         fit = replace(fit, validation=prediction, remarks=(*fit.remarks, *prediction.remarks))
     return fit
-
-
-def fitted_tables(run: RunSpec, unknowns: Sequence[str]) -> tuple[LookupTable, ...]:
-    """Return the lookup tables of an FMU with values of y among the unknowns, and with the values that the run sets."""
-    tables = [table for table in read_tables(run.fmu) if {*table.parameters} & {*unknowns}]
-    return tuple(replace(table, y=table.y_with(run.values)) for table in tables)
 
 
 def set_units(columns: Sequence[ColumnResiduals], units: Mapping[str, str]) -> tuple[ColumnResiduals, ...]:

@@ -1,17 +1,22 @@
 """Figure of a sweep: curves for one parameter, maps for two, scatter plots for more parameters or a random sample.
 
-An axis is logarithmic if its values are spaced logarithmically or span decades.  Very many runs are thinned evenly.
+A lookup table whose values are varied has a panel with its curves. An axis is logarithmic if its values are spaced
+logarithmically or span decades. Very many runs are thinned evenly.
 """
 
 import json
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 
+import matplotlib
 import numpy as np
 import xarray
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 
 from ...results.style import BLUE, GREEN, HEIGHT, ORANGE, WIDTH, Figure, axis_label, set_size
+from ...running.fmu_tables import LookupTable, parse_table
+from ...running.plot import draw_table
 from .boundaries import Boundary
 
 FAILED_COLOUR = "#bbbbbb"
@@ -21,6 +26,7 @@ LOG_RATIO = 100.0  # ratio of largest to smallest value from which an axis is lo
 MAX_POINTS = 20_000  # runs drawn in curves and scatter plots
 MAX_CELLS = 300  # cells along each side of a map
 FINE_POINTS = 401  # points along an axis at which boundaries are evaluated
+MAX_CURVES = 20  # drawn of a lookup table
 
 
 def thin_out(dataset: xarray.Dataset) -> xarray.Dataset:
@@ -32,29 +38,56 @@ def thin_out(dataset: xarray.Dataset) -> xarray.Dataset:
 
 
 def draw(data: xarray.Dataset, figure: Figure, boundaries: Sequence[Boundary], failed: int) -> None:
-    """Draw the figure: one panel per measure, or per measure and parameter in scatter plots."""
+    """Draw the figure: panels of the measures, over each parameter in scatter plots, and one of each varied table."""
     measures, varied = [str(name) for name in data.data_vars], [str(name) for name in data.coords]
     scattered = is_scattered(data)
-    n_columns = len(varied) if scattered else min(len(measures), 2)
-    n_rows = len(measures) if scattered else -(-len(measures) // 2)
+    draw_panel: list[Callable[[Axes], None]]
+    if scattered:
+        n_columns = len(varied)
+        draw_panel = [
+            partial(plot_scatter, data=data, measure=measure, name=name) for measure in measures for name in varied
+        ]
+    else:
+        n_columns = 1 if len(measures) == 1 and not tables_of(data) else 2
+        draw_panel = [partial(draw_measure, data=data, measure=measure, boundaries=boundaries) for measure in measures]
+    draw_panel += [partial(draw_curves, data=data, table=table) for table in tables_of(data)]
+    n_rows = -(-len(draw_panel) // n_columns)
     height = HEIGHT * (1.2 if scattered or len(varied) == 1 else 1.7)
     set_size(figure, max(1.2, n_columns) * WIDTH, height * n_rows + 0.6)
     figure.suptitle(f"{data.attrs['title']}{f' ({failed} runs failed)' if failed else ''}", fontsize=11)
-    panels = figure.subplots(n_rows, n_columns, squeeze=False)
-    if scattered:
-        for row, measure in zip(panels, measures, strict=True):
-            for axes, name in zip(row, varied, strict=True):
-                plot_scatter(axes, data, measure, name)
-    else:
-        for axes, measure in zip(panels.flat, measures, strict=False):
-            draw_measure(axes, data, measure, boundaries)
-        for axes in panels.flat[len(measures) :]:
-            axes.remove()
+    panels = figure.subplots(n_rows, n_columns, squeeze=False).flat
+    for axes, draw_on in zip(panels, draw_panel, strict=False):
+        draw_on(axes)
+    for axes in panels[len(draw_panel) :]:
+        axes.remove()
     legend: dict[str, Artist] = {}
     for axes in figure.axes:
         legend |= {text: artist for artist, text in zip(*axes.get_legend_handles_labels(), strict=True)}
     if legend:
         figure.legend(handles=list(legend.values()), labels=list(legend), loc="outside lower center", ncols=2)
+
+
+def tables_of(data: xarray.Dataset) -> list[LookupTable]:
+    """Return the lookup tables with varied values."""
+    return [parse_table(table) for table in json.loads(data.attrs.get("tables", "[]"))]
+
+
+def draw_curves(axes: Axes, data: xarray.Dataset, table: LookupTable) -> None:
+    """Draw the curves of a lookup table, evenly chosen from all combinations of its varied values."""
+    names = [name for name in dict.fromkeys(table.parameters) if name in data.coords]
+    columns = [data[name].to_numpy() for name in names]
+    combinations = np.unique(
+        np.column_stack(columns if "run" in data.dims else [grid.ravel() for grid in np.meshgrid(*columns)]), axis=0
+    )
+    chosen = np.unique(np.linspace(0, len(combinations) - 1, MAX_CURVES).round().astype(int))
+    colours = matplotlib.colormaps["viridis"](np.linspace(0, 0.9, len(chosen)))
+    for n, colour in zip(chosen, colours, strict=True):
+        label = None
+        if len(names) == 1 and n in (0, len(combinations) - 1):
+            label = f"{table.name} with {names[0]} = {combinations[n, 0]:g} {data[names[0]].attrs['units']}"
+        draw_table(axes, table, table.y_with(dict(zip(names, combinations[n], strict=True))), colour, label)
+    if len(chosen) < len(combinations):
+        axes.set_title(f"table {table.name}: {len(chosen)} of {len(combinations)} curves")
 
 
 def is_scattered(data: xarray.Dataset) -> bool:

@@ -10,6 +10,7 @@ Contents of sweep.nc:
     parameters      JSON with the values of all other parameters, in the units of the FMU
     stop_time       stop time of every run in s
     sample          grid, or kind of sample and seed
+    tables          JSON of the lookup tables with varied values; only if there are some
 """
 
 import csv
@@ -29,6 +30,7 @@ from ...results.folder import replace_folder
 from ...results.provenance import describe_sources, write_provenance
 from ...results.summary import write_summary
 from ...running.fmu_archive import read_description
+from ...running.fmu_tables import LookupTable, read_tables_with
 from ...running.variable_values import REAL_TYPES, variable_unit
 from ...scenes.fmu_files import check_built
 from .boundaries import Boundary, read_boundaries
@@ -65,6 +67,8 @@ class SweepDescription:
         Stop time in s.
     boundaries : tuple of Boundary
         Known boundaries in the parameter space.
+    tables : tuple of LookupTable
+        Lookup tables with varied values; the others are those of the runs.
     """
 
     varied: dict[str, tuple[str, str]]
@@ -72,6 +76,7 @@ class SweepDescription:
     constants: dict[str, tuple[object, str]]
     stop: float
     boundaries: tuple[Boundary, ...]
+    tables: tuple[LookupTable, ...]
 
 
 def run_sweep(
@@ -152,9 +157,9 @@ def describe(runs: SweepSpec, points: SweepPoints) -> SweepDescription:
         }
         varied = {name: (variable_unit(variables[name]), text) for name, text in texts.items()}
         numbers = {name: value for name, (value, _) in constants.items() if isinstance(value, float)}
-        return SweepDescription(
-            varied, runner.columns, constants, runner.stop, read_boundaries(runs.run.fmu, runs.varied, numbers)
-        )
+        boundaries = read_boundaries(runs.run.fmu, runs.varied, numbers)
+        tables = read_tables_with(runs.run.fmu, runs.varied, runs.run.values)
+        return SweepDescription(varied, runner.columns, constants, runner.stop, boundaries, tables)
 
 
 def is_settable(variable: Any) -> bool:
@@ -238,6 +243,8 @@ def build_dataset(sweep: Sweep, checkpoint: Checkpoint, about: SweepDescription,
         "parameters": json.dumps({name: value for name, (value, _) in about.constants.items()}, sort_keys=True),
         "sample": "grid" if is_grid else f"Latin hypercube, seed {points.seed}",
     }
+    if about.tables:
+        attributes["tables"] = json.dumps([vars(table) for table in about.tables])
     dataset = xarray.Dataset(variables, coordinates, attributes)
     for name in (*names, *(column.name for column in about.columns)):
         dataset[name].encoding["_FillValue"] = None  # a failed run has NaN, which needs no declaration
