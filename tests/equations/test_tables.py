@@ -20,6 +20,7 @@ from worker_client import FmiError
 import harness
 from fmus.packaging import BuildError
 from fmus.packaging.model_lookup import find_model
+from fmus.runtime.variable_declarations import declarations
 
 KINDS = {
     "": (),
@@ -274,17 +275,19 @@ def move(fmu, x, v):
     fmu.updateDiscreteStates()
 
 
-def test_values_may_be_parameters(worker, tmp_path):
+@pytest.mark.parametrize("declared_by", ["author", "table"])
+def test_values_may_be_parameters(worker, tmp_path, declared_by):
     """The motion and its changes in FMI 3.0 are those of the same numbers, and derivatives by a value are exact."""
     require_compiler()
-    lines = "".join(f'    mu_{n} = Parameter(0.1, "1", "friction at point {n}", low=0.0)\n' for n in range(5))
-    text = MODEL.format(friction=points(FRICTION, '"m/s", "1"'), spring=points(SPRING, '"m", "N"'))
-    text = text.replace("    mu = ", f"{lines}    mu = ").replace(
-        str(list(FRICTION[1])), "[mu_0, mu_1, mu_2, mu_3, mu_4]"
-    )
-    (tmp_path / "bench.py").write_text(text)
+    if declared_by == "author":
+        lines = "".join(f'    mu_y{n} = Parameter(0.1, "1", "friction at point {n}", low=0.0)\n' for n in range(1, 6))
+        friction = f'{[*FRICTION[0]]}, [mu_y1, mu_y2, mu_y3, mu_y4, mu_y5], "m/s", "1"'
+    else:
+        lines, friction = "", f'{[*FRICTION[0]]}, {[0.1] * 5}, "m/s", "1", values="tunable", low=0.0'
+    text = MODEL.format(friction=friction, spring=points(SPRING, '"m", "N"'))
+    (tmp_path / "bench.py").write_text(text.replace("    mu = ", f"{lines}    mu = "))
     path = build_user_model(tmp_path / "bench.py", *KINDS["native/fmi3"]) / "native" / "fmi3" / "bench.fmu"
-    values = {f"mu_{n}": value for n, value in enumerate(FRICTION[1])}
+    values = {f"mu_y{n}": value for n, value in enumerate(FRICTION[1], 1)}
     times, names, rows = np.linspace(0.0, STOP, 41).tolist(), ["x", "v", "F_friction", "events.count"], []
     for fmu, start in (path, values), (build_bench(tmp_path / "fixed", kind="native/fmi3"), {}):
         instance = worker.instantiate(fmu).begin(start, stop=STOP)
@@ -294,8 +297,8 @@ def test_values_may_be_parameters(worker, tmp_path):
     with fmi3_instance(path, tmp_path) as (fmu, number):
         fmu.setFloat64([number[name] for name in values], [*values.values()])
         move(fmu, 0.15, -0.04)
-        for n, share in (1, 2.0 / 3.0), (2, 1.0 / 3.0), (3, 0.0):
-            (derivative,) = fmu.getDirectionalDerivative([number["a"]], [number[f"mu_{n}"]], [1.0])
+        for n, share in (2, 2.0 / 3.0), (3, 1.0 / 3.0), (4, 0.0):
+            (derivative,) = fmu.getDirectionalDerivative([number["a"]], [number[f"mu_y{n}"]], [1.0])
             assert derivative == pytest.approx(N / M * share, rel=1e-12)
 
 
@@ -330,6 +333,18 @@ def test_a_table_reads_a_file_beside_the_model(tmp_path, headings):
         assert source.model().prepare() == 0
 
 
+def test_values_of_a_file_become_parameters_that_keep_their_kind(tmp_path):
+    (tmp_path / "mu.csv").write_text("v [m/s],mu [1]\n0,0.5\n1,0.25\n")
+    text = MODEL.format(friction='"mu.csv", values="fixed", low=0.125', spring=points(SPRING, '"m", "N"'))
+    (tmp_path / "bench.py").write_text(text)
+    declared = [d for d in declarations(find_model(tmp_path / "bench.py").model) if d.name.startswith("mu_")]
+    found = [(d.name, d.start, d.unit, d.low, d.variability, d.text) for d in declared]
+    assert found == [
+        ("mu_y1", 0.5, "1", 0.125, "fixed", "value at 0 m/s"),
+        ("mu_y2", 0.25, "1", 0.125, "fixed", "value at 1 m/s"),
+    ]
+
+
 WRONG = {
     "one point": ('Table([0.0], [1.0], "s", "1")', "a table needs at least two points, got 1"),
     "points that do not rise": (
@@ -351,6 +366,22 @@ WRONG = {
         "T takes an argument in m, but clock is in s",
     ),
     "a missing file": ('Table("none.csv")', "the table none.csv beside the model file cannot be read: No such file"),
+    "unknown values": (
+        'Table([0.0, 1.0], [1.0, 2.0], "s", "1", values="free")',
+        "values of a table must be 'constant' or 'fixed' or 'tunable', got 'free'",
+    ),
+    "a limit of constants": (
+        'Table([0.0, 1.0], [1.0, 2.0], "s", "1", low=0.0)',
+        'low = 0.0 has no effect on constant values: add values="tunable", or leave it out',
+    ),
+    "a value below the limit": (
+        'Table([0.0, 1.0], [1.0, -2.0], "s", "1", values="fixed", low=0.0)',
+        "T_y2 has the start value -2.0; it must be at least 0.0.",
+    ),
+    "values of a curve without kinks": (
+        'Table([0.0, 1.0, 2.0], [1.0, 2.0, 2.0], "s", "1", interpolation="pchip", values="tunable")',
+        'the values of a table with interpolation="pchip" are constant',
+    ),
     "an unknown interpolation": (
         'Table([0.0, 1.0], [1.0, 2.0], "s", "1", interpolation="spline")',
         "interpolation of a table must be 'linear' or 'pchip', got 'spline'",

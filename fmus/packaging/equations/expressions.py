@@ -2,7 +2,7 @@
 
 import math
 import sys
-from collections.abc import Callable, Hashable, Iterable
+from collections.abc import Callable, Hashable, Iterable, Mapping
 from numbers import Real
 from pathlib import Path
 from typing import Any, Never
@@ -86,6 +86,7 @@ class Expression:
     """Base class of expressions: a declared variable or a term."""
 
     name = ""
+    own_variables: Mapping[str, "Expression"] = {}  # that an expression declares, by the suffix after its name
     location: tuple[str, int]
 
     __add__, __radd__ = _binary_operators("+")

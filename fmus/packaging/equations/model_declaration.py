@@ -339,6 +339,8 @@ class _ClassBody(dict[str, Any]):
         if isinstance(value, Expression):
             value.name = value.name or name
             self.unread.pop(name, None)
+            for suffix, variable in value.own_variables.items():
+                self[name + suffix] = variable
         else:
             self.unread[name] = author_location()
         super().__setitem__(name, value)

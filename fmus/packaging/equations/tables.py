@@ -25,6 +25,7 @@ from .model_declaration import Fixed, Parameter, SettableVariable
 LINEAR, PCHIP = "linear", "pchip"
 HOLD, CONTINUE, REFUSE = "hold", "continue", "refuse"
 INTERPOLATIONS, ENDS = (LINEAR, PCHIP), (HOLD, CONTINUE, REFUSE)
+CONSTANT, VALUE_KINDS = "constant", {"fixed": Fixed, "tunable": Parameter}
 # Where a piece has no end; states beyond this value are treated as divergence
 UNBOUNDED = 1e100
 OVERLAP, OVERLAP_OF_PIECE = 1e-9, 1e-4  # of pieces, as shares of the largest argument and of the shortest piece
@@ -54,6 +55,11 @@ class Table(Expression):
     ends
         Beyond the first and the last point: "hold" their values, "continue" with the slope at the end, or "refuse",
         which ends the run with a message.
+    values
+        "constant"; or "fixed" or "tunable": each value of y becomes such a parameter, `mu_y1`, `mu_y2` and so on for a
+        table `mu` (linear tables only).
+    low
+        Smallest allowed value of these parameters, such as 0.0 for friction.
     """
 
     def __init__(
@@ -65,6 +71,8 @@ class Table(Expression):
         *,
         interpolation: str = LINEAR,
         ends: str = HOLD,
+        values: str = CONSTANT,
+        low: float = -math.inf,
     ) -> None:
         self.location = author_location()
         self.file: Path | None = None
@@ -74,13 +82,29 @@ class Table(Expression):
             self.file = Path(self.location[0]).parent / x
             self.file_content = read_content(self.file)
             x, y, unit_x, unit_y = read_points(self.file.name, self.file_content)
-        for word, value, allowed in ("interpolation", interpolation, INTERPOLATIONS), ("ends", ends, ENDS):
+        choices = (
+            ("interpolation", interpolation, INTERPOLATIONS),
+            ("ends", ends, ENDS),
+            ("values", values, (CONSTANT, *VALUE_KINDS)),
+        )
+        for word, value, allowed in choices:
             if value not in allowed:
                 raise ModelError(f"{word} of a table must be {' or '.join(map(repr, allowed))}, got {describe(value)}")
         for word, unit in ("unit_x", unit_x), ("unit_y", unit_y):
             if not isinstance(unit, str) or not unit:
                 raise ModelError(f'a table needs its units: {word} is {describe(unit)}; a pure number has the unit "1"')
         self.x, self.y = checked_points(x, y)
+        if values != CONSTANT and interpolation != LINEAR:
+            raise ModelError(
+                f'the values of a table with interpolation="{interpolation}" are constant: leave out `values`, or '
+                f'write interpolation="{LINEAR}"'
+            )
+        if values != CONSTANT:
+            self.declare_values(VALUE_KINDS[values], unit_x, unit_y, low)
+        elif low != -math.inf:
+            raise ModelError(
+                f'low = {describe(low)} has no effect on constant values: add values="tunable", or leave it out'
+            )
         self.unit_x, self.unit_y = unit_x, unit_y
         self.interpolation, self.ends = interpolation, ends
         self.parameters = tuple(value for value in self.y if isinstance(value, SettableVariable))
@@ -90,6 +114,16 @@ class Table(Expression):
                 f'numbers instead, or interpolation="{LINEAR}"'
             )
         self.is_called = False
+
+    def declare_values(self, kind: type[SettableVariable], unit_x: str, unit_y: str, low: float) -> None:
+        """Replace each value of y by a parameter."""
+        if named := [value for value in self.y if isinstance(value, Expression)]:
+            raise ModelError(
+                f"{named[0]} in the table is a parameter already: leave out `values`, or write numbers in the table"
+            )
+        suffix = "" if unit_x == "1" else f" {unit_x}"
+        self.y = tuple(kind(y, unit_y, f"value at {x:g}{suffix}", low=low) for x, y in zip(self.x, self.y, strict=True))
+        self.own_variables = {f"_y{n}": value for n, value in enumerate(self.y, 1)}
 
     def __call__(self, u: Operand) -> Operand:
         """Return the value of the table at u: an expression, or a number for a number."""
