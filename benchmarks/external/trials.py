@@ -160,12 +160,14 @@ def try_fmu(fmu: Path, folder: Path, timeout: float) -> Iterator[Trial]:
 
     if description.coSimulation and description.modelExchange:
         reply, difference = compare("exchange", folder / fmu.stem, "--interface", "ModelExchange")
-        yield Trial(fmu.stem, fmi, "exchange", *judge_exchange(reply, difference), *times_of(reply))
+        judged = judge_difference(reply, difference, SOLVER_RTOL, "co-simulation", INEXACT)  # it may have a large step
+        yield Trial(fmu.stem, fmi, "exchange", *judged, *times_of(reply))
     varied = simulate_by_fmpy(fmu, stop, folder, timeout)
     if (folder / "reference.csv").is_file():
         reply, difference = compare("compare", folder / "reference.csv")
         allowed = COMPARE_RTOL if description.coSimulation else SOLVER_RTOL
-        yield Trial(fmu.stem, fmi, "compare", *judge_difference(reply, difference, allowed), *times_of(reply))
+        judged = judge_difference(reply, difference, allowed, "fmpy", FAULT)  # at the same steps
+        yield Trial(fmu.stem, fmi, "compare", *judged, *times_of(reply))
     if varied:
         name, value, other = varied
         reply = run_in_terminal(
@@ -227,24 +229,16 @@ def judge_run(reply: Reply, note: str) -> tuple[str, str]:
     return (INEXACT if "error unknown" in note or "error about" in note else RIGHT), note
 
 
-def judge_difference(reply: Reply, difference: float, allowed: float) -> tuple[str, str]:
-    """Return outcome and text of a comparison with fmpy's values at the same steps."""
+def judge_difference(reply: Reply, difference: float, allowed: float, other: str, beyond: str) -> tuple[str, str]:
+    """Return outcome and text of a comparison with the values of another program or interface.
+
+    `beyond` is the outcome of a difference that is not allowed.
+    """
     if not reply.is_orderly:
         return reply.failed_outcome
     if difference != difference:
         return REFUSED, reply.message or "no common variable"
-    outcome = RIGHT if difference <= allowed else FAULT
-    return outcome, f"largest difference from fmpy {difference:.1e}"
-
-
-def judge_exchange(reply: Reply, difference: float) -> tuple[str, str]:
-    """Return outcome and text of a comparison of model exchange with co-simulation, which may have a large step."""
-    if not reply.is_orderly:
-        return reply.failed_outcome
-    if difference != difference:
-        return REFUSED, reply.message or "no common variable"
-    outcome = RIGHT if difference <= SOLVER_RTOL else INEXACT
-    return outcome, f"largest difference from co-simulation {difference:.1e}"
+    return (RIGHT if difference <= allowed else beyond), f"largest difference from {other} {difference:.1e}"
 
 
 def judge_sweep(reply: Reply, folder: Path, result: Trajectory, values: str) -> tuple[str, str]:

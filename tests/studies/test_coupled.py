@@ -5,6 +5,7 @@ import csv
 import json
 import re
 import zipfile
+from dataclasses import replace
 from importlib.util import find_spec
 from math import cos, sqrt
 from pathlib import Path
@@ -109,6 +110,8 @@ def test_a_connection_with_a_factor_pushes_in_its_direction(couple, tmp_path, fa
     connection = f'connections = [{{ from = "a.x", to = "b", factor = {factor} }}]\n'
     done = couple(f'title = "a push"\nstop = 0.2\nsteps = [0.004, 0.002]\n{parts}{connection}')
     assert (done.returncode, done.stderr) == (0, "")
+    one_error = replace(harness.load_result(tmp_path / "results/coupled/mine"), errors=(1e-3,))
+    assert "Order of convergence: not known" in str(one_error)
     table = np.loadtxt(tmp_path / "results/coupled/mine/trajectory.csv", delimiter=",", skiprows=1)
     expected = [0.1 * factor / 157.9 * (1.0 - cos(sqrt(157.9) * t)) for t in table[:, 0]]
     assert table[:, 4] == pytest.approx(expected, abs=1e-8)

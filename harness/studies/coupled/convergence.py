@@ -1,6 +1,7 @@
 """Convergence of a coupled run with its communication step."""
 
 from dataclasses import dataclass, field
+from math import isnan
 
 import numpy as np
 
@@ -74,8 +75,13 @@ class Convergence:
 
     @property
     def order(self) -> float:
-        """Return the order of convergence from the two smallest steps; NaN if there is only one."""
+        """Return the order of convergence from the errors at the two smallest steps; NaN without two errors above 0."""
         if len(self.errors) < 2 or not all(self.errors[-2:]):
             return float("nan")
         steps = self.steps[: len(self.errors)]
         return float(np.log(self.errors[-2] / self.errors[-1]) / np.log(steps[-2] / steps[-1]))
+
+    @property
+    def order_text(self) -> str:
+        """Return the order of convergence in words."""
+        return "not known, it needs errors at two steps" if isnan(self.order) else f"{self.order:.2f}"

@@ -1,6 +1,7 @@
 """Figure of a coupled scene: motion and reference, and error over the communication step."""
 
 from itertools import cycle
+from math import isnan
 
 import numpy as np
 
@@ -40,6 +41,7 @@ def plot_error(axes: Axes, study: Convergence) -> None:
         axes.set_xticks(h, [f"{1e3 * step:g}" for step in h])
         axes.xaxis.minorticks_off()
         axes.legend()
-    axes.set_title(f"error against the {study.reference} (order {study.order:.2f})")
+    order = "" if isnan(study.order) else f" (order {study.order:.2f})"
+    axes.set_title(f"error against the {study.reference}{order}")
     axes.set_xlabel("communication step [ms]")
     axes.set_ylabel(axis_label("error", study.unit))

@@ -35,7 +35,7 @@ class CoupledResult(Result, Convergence):
     @property
     def headline(self) -> str:
         errors = f"{min(self.errors):.3g} {self.unit}" if self.errors else "not known"
-        return f"smallest error {errors.strip()}, order of convergence {self.order:.2f}"
+        return f"smallest error {errors.strip()}, order of convergence {self.order_text}"
 
     def summary(self) -> Summary:
         headings = "communication step [s]", column_heading("largest error", self.unit)
@@ -54,7 +54,7 @@ class CoupledResult(Result, Convergence):
         return [
             f"communication step [s]   largest error{f' [{self.unit}]' if self.unit else ''}",
             *(f"{step:<24g} {error:.3e}" for step, error in zip(self.steps, self.errors, strict=False)),
-            f"Order of convergence: {self.order:.2f}.",
+            f"Order of convergence: {self.order_text}.",
             *(
                 f"{name:<24} {reason or f'{error:.3e} at the smallest step'}"
                 for name, (_, error, reason) in self.engines.items()
