@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from .analyses.decay.identification import DecayIdentification
     from .analyses.fit.parameter_fit import ParameterFit
     from .running.fmu_variables import FmuDescription
+    from .running.signals import Signals
     from .running.trajectory import Trajectory
     from .studies.compare.difference import Comparison
     from .studies.compare.result import ComparisonResult
@@ -46,6 +47,7 @@ __all__ = [
     "HarnessError",
     "ParameterFit",
     "SceneError",
+    "Signals",
     "SweepResult",
     "Trajectory",
     "__version__",
@@ -70,6 +72,7 @@ TYPES = {
     "DecayIdentification": "harness.analyses.decay.identification",
     "DecayResult": "harness.studies.decay.result",
     "ParameterFit": "harness.analyses.fit.parameter_fit",
+    "Signals": "harness.running.signals",
     "SweepResult": "harness.studies.sweep.result",
     "Trajectory": "harness.running.trajectory",
 }

@@ -155,7 +155,7 @@ def run_fmusim(scene: Scenario, rtol: float) -> Trajectory:
             )
         rows = np.genfromtxt(file, delimiter=",", names=True)
         spec = scene.run_with(fmi3_fmu(case.model), rtol, exchange=True)
-        return Trajectory(spec, rows["time"], {name: rows[name] for name in case.run.outputs}, {}, {}, {})
+        return Trajectory(rows["time"], {name: rows[name] for name in case.run.outputs}, {}, spec=spec)
 
 
 def difference_from_cosimulation(scene: Scenario) -> Benchmark:

@@ -47,7 +47,7 @@ def analyse(run: Trajectory) -> AnalysisResult:
     if len(durations):
         quantities.append(Quantity("slip_time", float(np.mean(durations)), "s", "duration of a slip"))
     quantities.append(Quantity("peak_speed", peak_value(run.time, np.abs(v), slipping), "m/s", "peak speed"))
-    if "acceleration" in run.spec.motion_outputs:
+    if "acceleration" in run.motion_outputs:
         peak = peak_value(run.time, np.abs(run.column_of_role("acceleration")), include_neighbours(slipping))
         quantities.append(Quantity("peak_acceleration", peak, "m/s2", "peak acceleration"))
     return AnalysisResult(tuple(quantities))

@@ -15,7 +15,7 @@ def analyse(run: Trajectory) -> AnalysisResult:
         raise HarnessError("the analysis 'steps' needs a run that follows the solver's own steps: set follow = true")
     h = run.steps.h
     collapse = None
-    if "velocity" in run.spec.motion_outputs:
+    if "velocity" in run.motion_outputs:
         collapse = step_collapse(run.steps.t, h, run.time, run.column_of_role("velocity"))
     return AnalysisResult(step_size_quantities(h, int(run.steps.rejected.sum()), collapse))
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..arguments import FINITE, FLAG, NONNEGATIVE, POSITIVE, TEXT, Rule, check_arguments
 from .options import check_time_range
-from .tables import build_table, convert_to_table, has_columns, is_pair, is_trajectory, record_source
+from .tables import build_table, convert_to_table, has_columns, is_pair, is_signals, record_source
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -137,5 +137,5 @@ def to_table(record: Any) -> "Table":
     """Return the table in columns or rows of numbers."""
     if has_columns(record):
         table = convert_to_table(record)
-        return replace(table, name=record.spec.model) if is_trajectory(record) else table
+        return replace(table, name=record.name) if is_signals(record) else table
     return build_table(dict(zip(("v", "F"), record, strict=True)), {"v": "m/s", "F": "N"})

@@ -19,7 +19,7 @@ from ..arguments import (
 )
 from ..errors import SceneError
 from .options import check_time_range, reporter, with_progress_bar
-from .tables import RECORD, SIGNAL, convert_to_table, has_columns, is_trajectory
+from .tables import RECORD, SIGNAL, convert_to_table, has_columns, is_signals
 
 if TYPE_CHECKING:
     import pandas
@@ -168,10 +168,10 @@ def to_record(source: Any, columns: "ColumnOptions") -> "Record":
         columns = replace(columns, position=SIGNAL, rate=columns.rate if isinstance(source, tuple) else None)
     else:
         table = convert_to_table(source)
-    if is_trajectory(source):
-        name = source.spec.model
+    if is_signals(source):
+        name = source.name
         if columns.position is None and columns.quantity is None:
-            if "position" not in source.spec.motion_outputs:
+            if "position" not in source.motion_outputs:
                 raise SceneError(f"{name} records no position: add it to the outputs, or name a column")
-            columns = replace(columns, position=source.spec.motion_outputs["position"])
+            columns = replace(columns, position=source.motion_outputs["position"])
     return parse_record(replace(table, name=name), columns, name)

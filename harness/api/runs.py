@@ -21,7 +21,7 @@ from ..arguments import (
 )
 from ..errors import HarnessError, SceneError, format_value
 from .options import apply_options, reporter, with_progress_bar
-from .tables import SIDE, convert_to_trajectory
+from .tables import SIDE, convert_to_signals
 
 if TYPE_CHECKING:
     import numpy as np
@@ -175,15 +175,15 @@ def compare(
     HarnessError
         If the two sides have no variable or no time in common.
     """
-    from ..scenes.run_spec import RunSpec
+    from ..scenes.run_spec import RunOptions
     from ..studies.compare.difference import compare as difference
     from ..studies.compare.result import ComparisonResult
     from ..studies.compare.trajectory_sources import display_names, load_both
 
     options = {"stop": stop, "interface": interface, "timeout": timeout, "rtol": rtol}
     first, second = load_both(
-        tuple(str(side) if isinstance(side, str | Path) else convert_to_trajectory(side) for side in (a, b)),
-        RunSpec(Path(), stop=stop),
+        tuple(str(side) if isinstance(side, str | Path) else convert_to_signals(side) for side in (a, b)),
+        RunOptions(stop=stop),
         reporter(progress),
         partial(adjust_runs, {name: value for name, value in options.items() if value is not None}),
     )

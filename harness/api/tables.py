@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     import numpy as np
 
     from ..records.table_files import Table
-    from ..running.trajectory import Trajectory
+    from ..running.signals import Signals
 
 KINDS = "a file, a DataFrame, a Series, a mapping of columns, a trajectory, or times and values as in (t, x)"
 SIGNAL = "signal"  # heading of values without a name
@@ -19,7 +19,7 @@ SIGNAL = "signal"  # heading of values without a name
 
 def is_frame(value: Any) -> bool:
     """Return whether a value is a DataFrame."""
-    return hasattr(value, "columns") and hasattr(value, "index") and not is_trajectory(value)
+    return hasattr(value, "columns") and hasattr(value, "index") and not is_signals(value)
 
 
 def is_series(value: Any) -> bool:
@@ -27,11 +27,11 @@ def is_series(value: Any) -> bool:
     return hasattr(value, "to_frame") and hasattr(value, "index")
 
 
-def is_trajectory(value: Any) -> bool:
-    """Return whether a value is a Trajectory."""
-    from ..running.trajectory import Trajectory
+def is_signals(value: Any) -> bool:
+    """Return whether a value is a Trajectory, or signals of a comparison."""
+    from ..running.signals import Signals
 
-    return isinstance(value, Trajectory)
+    return isinstance(value, Signals)
 
 
 def is_pair(value: Any) -> bool:
@@ -41,7 +41,7 @@ def is_pair(value: Any) -> bool:
 
 def has_columns(value: Any) -> bool:
     """Return whether a value is a record by itself: a file, or a table whose columns have names."""
-    return isinstance(value, str | Path | Mapping) or is_frame(value) or is_series(value) or is_trajectory(value)
+    return isinstance(value, str | Path | Mapping) or is_frame(value) or is_series(value) or is_signals(value)
 
 
 def record_source(value: Any) -> Any:
@@ -90,7 +90,7 @@ def convert_to_table(source: Any, heading: str = SIGNAL, rate: float | None = No
     """
     import numpy as np
 
-    if is_trajectory(source):
+    if is_signals(source):
         return build_table({"t": source.time, **source.columns}, {"t": "s", **source.units})
     if is_series(source):
         name = heading if source.name is None else str(source.name)
@@ -157,7 +157,7 @@ def build_table(columns: "dict[str, np.ndarray]", units: dict[str, str]) -> "Tab
     return Table("the record", tuple(column_heading(name, units.get(name, "")) for name in columns), tuple(cells))
 
 
-def convert_to_trajectory(source: Any) -> "Trajectory":
+def convert_to_signals(source: Any) -> "Signals":
     """Return the signals in a record that is not a file.
 
     Raises
@@ -169,12 +169,11 @@ def convert_to_trajectory(source: Any) -> "Trajectory":
 
     from ..records.headings import TIME_NAME, split_heading
     from ..records.units import TIMES
-    from ..running.trajectory import Trajectory
-    from ..scenes.run_spec import RunSpec
+    from ..running.signals import Signals
 
-    if is_trajectory(source):
-        trajectory: Trajectory = source
-        return trajectory
+    if is_signals(source):
+        signals: Signals = source
+        return signals
     table = convert_to_table(source)
     headings = [split_heading(heading) for heading in table.column_headings]
     numbers = [np.asarray(cells) for cells in table.columns]
@@ -187,4 +186,4 @@ def convert_to_trajectory(source: Any) -> "Trajectory":
         raise SceneError("the times of the record must be at least two finite numbers that do not fall")
     columns = {name: column for (name, _), column in zip(headings, numbers, strict=True) if column is not numbers[at]}
     units = {name: unit or "" for name, unit in headings}
-    return Trajectory(RunSpec(Path("record"), tuple(columns)), time, columns, units, {}, {}, label="the record")
+    return Signals(time, columns, units, label="the record")

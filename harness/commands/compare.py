@@ -55,8 +55,9 @@ def compare(
     """
     with terminal.progress(1) as report:  # the imports take most of a second
         from ..running.resolve import FMU_SUFFIXES
+        from ..running.trajectory import Trajectory
         from ..scenes.fmu_files import find_fmu
-        from ..scenes.run_spec import RunSpec
+        from ..scenes.run_spec import RunOptions
         from ..studies.compare import study
         from ..studies.compare.trajectory_sources import RUN_SUFFIXES
 
@@ -66,9 +67,10 @@ def compare(
         fmus = [find_fmu(source) for source in (first, second) if Path(source).suffix in FMU_SUFFIXES]
         refuse_ignored_options(context, fmus, tolerance_is_ignored=True)
         options = {name: value for name, value in options.items() if name != "tolerance" or value is not None}
-        spec = RunSpec(Path(), **options)
+        spec = RunOptions(**options)
         comparison, folder = study.run_comparison((first, second), spec, terminal.out, partial(report, "compare"))
-    failed = [side.failure for side in (comparison.one, comparison.two) if side.failure]
+    runs = [side for side in (comparison.one, comparison.two) if isinstance(side, Trajectory)]
+    failed = [run.failure for run in runs if run.failure]
     if rtol is not None or atol is not None:
         failed += comparison.violations(rtol or 0.0, atol or 0.0)
     terminal.print_result(comparison.as_json(), *comparison.blocks(), folder=folder, failed=failed)

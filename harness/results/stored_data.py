@@ -71,7 +71,8 @@ def rebuild(kind: Any, value: Any, arrays: Any) -> Any:
     if origin in (Union, UnionType):
         if value is None and NoneType in parameters:
             return None
-        return rebuild(next(item for item in parameters if item is not NoneType), value, arrays)
+        kinds = [item for item in parameters if item is not NoneType]
+        return rebuild(next((item for item in kinds if has_fields(item, value)), kinds[0]), value, arrays)
     if is_dataclass(kind):
         types = get_type_hints(kind, include_extras=True)
         names = [field.name for field in fields(kind) if field.init]
@@ -83,3 +84,8 @@ def rebuild(kind: Any, value: Any, arrays: Any) -> Any:
     if origin in (tuple, list):
         return origin(rebuild(parameters[0], item, arrays) for item in value)
     return Path(value) if kind is Path else value
+
+
+def has_fields(kind: Any, value: Any) -> bool:
+    """Return whether the JSON of a dataclass has the fields of a class."""
+    return is_dataclass(kind) and isinstance(value, dict) and {*value} == {field.name for field in fields(kind)}

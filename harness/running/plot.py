@@ -21,8 +21,9 @@ def draw_panels(figure: Any, run: Any, names: Sequence[str], inputs: Sequence[st
     ----------
     figure : matplotlib.figure.Figure
         An empty figure.
-    run : Trajectory
-        The run, whose module imports this one; with several contacts, a further panel shows when each of them sticks.
+    run : Signals
+        The signals, whose module imports this one; with several contacts, a further panel shows when each of them
+        sticks.
     names, inputs : sequence of str
         Recorded outputs, and columns of the table of input signals.
     x : str, optional
@@ -52,7 +53,7 @@ def draw_panels(figure: Any, run: Any, names: Sequence[str], inputs: Sequence[st
     panels[-1].set_xlabel("time [s]" if x is None else column_heading(x, run.units[x]))
     if x is None:
         panels[-1].set_xlim(run.time[0], run.time[-1])
-    figure.suptitle(run.spec.model)
+    figure.suptitle(run.name)
     return panels
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 from ..errors import SceneError, unknown_source_message
 from ..results.provenance import load_verified_provenance
 from ..scenes.fmu_files import check_built, find_fmu, list_models
-from ..scenes.run_spec import DEFAULT_EQUAL_STEPS, RunSpec
+from ..scenes.run_spec import DEFAULT_EQUAL_STEPS, RunOptions, RunSpec
 from ..scenes.scene import load_scene, scene_from_provenance, shipped_scenes
 from .fmu_archive import exposes_solver_steps, read_description
 
@@ -14,7 +14,7 @@ FMU_SUFFIXES = (".fmu", ".py")
 METHOD, RTOL = "solver.method", "solver.rtol"
 
 
-def resolve(source: str | Path, options: RunSpec | None = None, scenes_first: bool = False) -> RunSpec:
+def resolve(source: str | Path, options: RunOptions | None = None, scenes_first: bool = False) -> RunSpec:
     """Return the run that a user specifies.
 
     Parameters
@@ -22,7 +22,7 @@ def resolve(source: str | Path, options: RunSpec | None = None, scenes_first: bo
     source : str or path
         The path of an FMU or of a model file, the name of a model, the name or path of a scene, or the folder of a
         stored result.
-    options : RunSpec, optional
+    options : RunOptions, optional
         Options of the run of an FMU or a model; scenes and stored results have their own.
     scenes_first : bool
         Whether a name that a scene and a model share means the scene.
@@ -35,7 +35,7 @@ def resolve(source: str | Path, options: RunSpec | None = None, scenes_first: bo
     path, name = Path(source), str(source)
     scenes = {file.stem for file in shipped_scenes()} if scenes_first else set()
     if path.suffix in FMU_SUFFIXES or (name in list_models() - scenes and not path.is_dir()):
-        return replace(options or RunSpec(Path(), equal_steps=DEFAULT_EQUAL_STEPS), fmu=find_fmu(name))
+        return RunSpec(find_fmu(name), **vars(options or RunOptions(equal_steps=DEFAULT_EQUAL_STEPS)))
     if path.is_dir() and name not in scenes:
         return read_stored_run(path)
     try:

@@ -31,6 +31,7 @@ from .fmu_archive import (
 from .fmu_contacts import read_contacts
 from .fmu_session import CALL_FAILURES, FmuSession, LogCapture, capture_stderr
 from .recorder import Columns, Recorder, ShapedVariable, default_outputs, read_rows
+from .signals import ModeChanges
 from .stepping import (
     POINT_TOLERANCE,
     CoSimulation,
@@ -40,7 +41,7 @@ from .stepping import (
     make_grid,
     step_to_stop,
 )
-from .trajectory import ModeChanges, SolverSteps, Statistics, Trajectory
+from .trajectory import SolverSteps, Statistics, Trajectory
 from .variable_values import convert_value, effective_value, enumeration_labels, variable_unit
 
 ProgressCallback = Callable[[float], None]  # receives the progress of a run, from 0 to 1
@@ -341,14 +342,14 @@ def build_trajectory(plan: RunPlan, session: FmuSession, recorded: RecordedRun, 
         modes = {contact: samples[mode][rows].astype(int) for contact, mode in contacts.items()}
         events = ModeChanges(np.append(time[0], samples["events.t_last"][at]), modes, contacts)
     return Trajectory(
+        time,
+        columns,
+        {name: variable_unit(variables[name]) if name in variables else "" for name in [*columns, *effective]},
+        {name: variables[name].description or name for name in columns},
+        events,
         spec=spec,
-        time=time,
-        columns=columns,
-        units={name: variable_unit(variables[name]) if name in variables else "" for name in [*columns, *effective]},
-        descriptions={name: variables[name].description or name for name in columns},
         parameters=effective,
         steps=steps,
-        events=events,
         statistics=replace(read_statistics(session, seconds), evaluations=recorded.evaluations),
     )
 

@@ -118,11 +118,10 @@ def run_steps(spec: RunSpec, steps: CommunicationSteps, changes: ScheduledChange
             return read_refusal(session)
         seconds = perf_counter() - started
         return Trajectory(
-            replace(spec, outputs=outputs),
             *read_rows(rows.getbuffer(), selection, session.is_fmi2),
             {variable.name: variable_unit(variable) for variable in recorded},
             {variable.name: variable.description or variable.name for variable in recorded},
-            {},
+            spec=replace(spec, outputs=outputs),
             statistics=read_statistics(session, seconds),
         )
 

@@ -1,14 +1,13 @@
-"""Specification of a run: the FMU, values to set, outputs to record."""
+"""Specification of a run: the FMU, values to set, outputs to record, and how it is run."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from inspect import get_annotations
 from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from .roles import find_roles
-from .schema import FLAG, NAMES, NUMBER, POSITIVE, TABLE, TEXT, TIMES, Constraint, is_whole, parse_table
+from .schema import FLAG, NAMES, NUMBER, POSITIVE, TABLE, TEXT, TIMES, Constraint, field_names, is_whole, parse_table
 
 DEFAULT_EQUAL_STEPS = 4096  # communication steps of a run that sets neither `grid` nor `follow`
 DEFAULT_TOLERANCE = 1e-6
@@ -23,21 +22,12 @@ else:
     Numbers = tuple[Annotated[float, NUMBER], ...]  # in files; importing numpy would take time in every command
 
 
-@dataclass(frozen=True)
-class RunSpec:
-    """Specification of one run of an FMU.
-
-    Scenes, commands, the Python API, sweeps and stability cases build one for each run. Its JSON is stored in the
-    provenance of a result, and `from_json` reads it.
+@dataclass(frozen=True, kw_only=True)
+class RunOptions:
+    """How an FMU is run: times, inputs and limits.
 
     Attributes
     ----------
-    fmu : Annotated[Path, TEXT]
-        Path of the FMU.
-    outputs : tuple of str
-        Outputs to record.
-    values : dict
-        Values to set by variable name; enumerations by label or number.
     inputs : mapping
         Table of input signals: the column "time" in s and one column for each input, tuples or arrays.
     start, stop : float or None
@@ -69,9 +59,6 @@ class RunSpec:
         this time.
     """
 
-    fmu: Annotated[Path, TEXT]
-    outputs: Annotated[tuple[str, ...], NAMES] = ()
-    values: Annotated[dict[str, Any], TABLE] = field(default_factory=dict)
     inputs: Mapping[str, Numbers] = field(default_factory=dict)
     start: Annotated[float | None, NUMBER] = None
     stop: Annotated[float | None, NUMBER] = None
@@ -86,6 +73,33 @@ class RunSpec:
     lenient: Annotated[bool, FLAG] = False
     timeout: Annotated[float, POSITIVE] = 60.0
 
+    @property
+    def rtol(self) -> float:
+        """Return the relative tolerance to aim at."""
+        return DEFAULT_TOLERANCE if self.tolerance is None else self.tolerance
+
+
+@dataclass(frozen=True)
+class RunSpec(RunOptions):
+    """Specification of one run of an FMU.
+
+    Scenes, commands, the Python API, sweeps and stability cases build one for each run. Its JSON is stored in the
+    provenance of a result, and `from_json` reads it. Further attributes are those of `RunOptions`.
+
+    Attributes
+    ----------
+    fmu : Annotated[Path, TEXT]
+        Path of the FMU.
+    outputs : tuple of str
+        Outputs to record.
+    values : dict
+        Values to set by variable name; enumerations by label or number.
+    """
+
+    fmu: Annotated[Path, TEXT]
+    outputs: Annotated[tuple[str, ...], NAMES] = ()
+    values: Annotated[dict[str, Any], TABLE] = field(default_factory=dict)
+
     @classmethod
     def from_json(cls, stored: Mapping[str, Any]) -> "RunSpec":
         """Return the specification in a table, where null stands for a default; SceneError if it is invalid."""
@@ -93,13 +107,8 @@ class RunSpec:
 
     @property
     def options(self) -> dict[str, Any]:
-        """Return all settings except the FMU, for commands that run several FMUs."""
+        """Return all settings except the FMU."""
         return {name: value for name, value in vars(self).items() if name != "fmu"}
-
-    @property
-    def rtol(self) -> float:
-        """Return the relative tolerance to aim at."""
-        return DEFAULT_TOLERANCE if self.tolerance is None else self.tolerance
 
     @property
     def model(self) -> str:
@@ -113,4 +122,4 @@ class RunSpec:
 
 
 # keys of a scene file that set its run; the FMU has other keys, and a scene records every point or its `times`
-SCENE_KEYS = tuple(name for name in get_annotations(RunSpec) if name not in ("fmu", "equal_steps", "interval"))
+SCENE_KEYS = tuple(name for name in field_names(RunSpec) if name not in ("fmu", "equal_steps", "interval"))

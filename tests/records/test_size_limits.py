@@ -13,7 +13,7 @@ import record_formats
 from harness.errors import HarnessError, SceneError
 from harness.records import array_files, child_reader, size_limits
 from harness.records.columns import ColumnOptions, read_record
-from harness.studies.compare.trajectory_files import read_trajectory
+from harness.studies.compare.trajectory_files import read_signals
 
 LIMIT = 100_000  # bytes, for these tests
 
@@ -115,7 +115,7 @@ def test_a_file_at_which_its_library_crashes_does_not_end_the_command(tmp_path, 
     code = "import os\ndef read_file(request):\n    os.kill(os.getpid(), 9)"
     monkeypatch.setattr(child_reader, "read_file", make_module("crashing_reader", code).read_file)
     (tmp_path / "record.mat").write_bytes(record_formats.mat(t=record_formats.T, x=record_formats.MM))
-    for read in (lambda path: read_record(str(path), ColumnOptions(), "record"), read_trajectory):
+    for read in (lambda path: read_record(str(path), ColumnOptions(), "record"), read_signals):
         with pytest.raises(SceneError, match=r"record.mat cannot be read: it is damaged"):
             read(tmp_path / "record.mat")
 
@@ -125,7 +125,7 @@ def test_a_file_whose_library_reads_beyond_its_end_is_refused(tmp_path):
     data = bytearray(record_formats.mat(t=record_formats.T, x=record_formats.MM))
     data[177] = 1
     (tmp_path / "damaged.mat").write_bytes(data)
-    for read in (lambda path: read_record(str(path), ColumnOptions(), "record"), read_trajectory):
+    for read in (lambda path: read_record(str(path), ColumnOptions(), "record"), read_signals):
         with pytest.raises(SceneError, match=r"damaged.mat cannot be read: "):
             read(tmp_path / "damaged.mat")
 

@@ -1,5 +1,6 @@
 """Every result of every study: in one line, as the command prints it, as HTML, table and picture, saved and loaded."""
 
+import json
 from dataclasses import replace
 from functools import cache
 from html.parser import HTMLParser
@@ -109,7 +110,7 @@ def judged_cases():
     finishes = StabilityCase("stiff", "smd", "dop853", run, grid, span, max_error=1e-6)
     refused = StabilityCase("no mass", "smd", "dop853", run, grid, span, expected_message="m = 0")
     counts = Statistics(10, 0, 120, 1e-3)
-    motion = harness.Trajectory(run, np.zeros(0), {}, {}, {}, {}, statistics=counts)
+    motion = harness.Trajectory(np.zeros(0), {}, {}, spec=run, statistics=counts)
     outcomes = CaseOutcome(finishes, "finished", "", 1e-8, 0.0, motion), CaseOutcome(refused, "refused", "m = 0 is not")
     region = StabilityRegion("dop853", np.array([1e-2, 1e-3]), np.array([100.0, 900.0]), -0.95)
     return StabilityResult(outcomes, (region,))
@@ -227,6 +228,21 @@ def test_damaged_data_are_reported(study):
         data.write_bytes(content)
         with pytest.raises(harness.SceneError, match=r"data\.npz cannot be read .*: repeat the command"):
             harness.load_result("kept")
+
+
+def test_a_record_in_a_comparison_has_no_run():
+    """Also after loading; the other side is the run."""
+    run = result_of("run")
+    record = {"t [s]": run.time, "x [m]": run["x"]}
+    harness.compare(run, record).save("kept")
+    comparison = harness.load_result("kept")
+    assert [type(side) for side in (comparison.one, comparison.two)] == [harness.Trajectory, harness.Signals]
+    assert not hasattr(comparison.two, "spec")
+    assert comparison.worst == 0.0
+    assert comparison.two.name == "the record"
+    assert repr(comparison.two).startswith("<Signals of the record: x; ")
+    assert json.loads(Path("kept/provenance.json").read_text())["files"].keys() == {str(run.spec.fmu)}
+    np.testing.assert_array_equal(comparison.two.plot("x")[0].lines[0].get_ydata(), run["x"])
 
 
 def test_a_run_is_a_mapping_from_its_outputs():

@@ -4,7 +4,6 @@ import json
 from functools import partial
 from itertools import combinations
 from math import cos, sqrt
-from pathlib import Path
 
 import commands
 import external_fmus
@@ -14,11 +13,10 @@ from build_cache import run_published_cases
 from scipy.io import savemat
 
 from harness.errors import HarnessError
-from harness.running.trajectory import ModeChanges, Trajectory
-from harness.scenes.run_spec import RunSpec
+from harness.running.signals import ModeChanges, Signals
 from harness.studies.compare.difference import compare
 from harness.studies.compare.result import ComparisonResult
-from harness.studies.compare.trajectory_files import read_trajectory
+from harness.studies.compare.trajectory_files import read_signals
 
 DECLARED_STEP = '<CoSimulation fixedInternalStepSize="0.1" '
 
@@ -116,7 +114,7 @@ def mode_changes(rows, contacts=("mode",)):
 
 
 def signals(name, times, columns, units, events=None):
-    return Trajectory(RunSpec(Path(name)), times, columns, units, {}, {}, events=events)
+    return Signals(times, columns, units, events=events, label=name)
 
 
 def path(name, times, events=None, **columns):
@@ -183,7 +181,7 @@ def test_a_repeated_time_holds_both_sides_of_a_jump(tmp_path):
     (tmp_path / "twice.csv").write_text("t [s],x [m]\n0,1\n1,1\n1,5\n2,5\n")
     for value, difference in ((1, 4.0), (3, 2.0), (5, 4.0), (6, 5.0)):
         (tmp_path / "other.csv").write_text(f"t [s],x [m]\n0,{value}\n1,{value}\n2,{value}\n")
-        one, two = (read_trajectory(tmp_path / name) for name in ("twice.csv", "other.csv"))
+        one, two = (read_signals(tmp_path / name) for name in ("twice.csv", "other.csv"))
         (x,) = compare(one, two).differences
         assert x.largest == difference
         assert abs(x.left[1] - x.right[1]) == (0 if 1 <= value <= 5 else 1)
@@ -224,7 +222,7 @@ def test_a_position_in_whole_millimetres_is_interpolated(tmp_path):
     table = "".join(f"{t:.2f},{round(40 * cos(2 * t))}\n" for t in coarse)
     (tmp_path / "laser.csv").write_text("t [s],x [mm]\n" + table)
     motion = signals("model", fine, {"x": 40 * np.cos(2 * fine)}, {"x": "mm"})
-    for sides in ((read_trajectory(tmp_path / "laser.csv"), motion), (motion, read_trajectory(tmp_path / "laser.csv"))):
+    for sides in ((read_signals(tmp_path / "laser.csv"), motion), (motion, read_signals(tmp_path / "laser.csv"))):
         comparison = compare(*sides)
         assert comparison.interpolated
         assert comparison.differences[0].largest < 0.6  # 4 if it is held
@@ -242,7 +240,7 @@ def test_a_position_in_whole_millimetres_is_interpolated(tmp_path):
 def test_a_file_has_integers_only_if_its_program_marks_reals(tmp_path, file, text, held):
     (tmp_path / file).parent.mkdir(exist_ok=True)
     (tmp_path / file).write_text(text)
-    read = read_trajectory(tmp_path / "results" if file.startswith("results") else tmp_path / file)
+    read = read_signals(tmp_path / "results" if file.startswith("results") else tmp_path / file)
     assert {name for name, column in read.columns.items() if column.dtype.kind == "i"} == held
 
 
@@ -257,7 +255,7 @@ def test_a_file_has_integers_only_if_its_program_marks_reals(tmp_path, file, tex
 def test_names_of_simulated_variables_are_not_split_into_name_and_unit(tmp_path, file, text, units):
     (tmp_path / file).parent.mkdir(exist_ok=True)
     (tmp_path / file).write_text(text)
-    assert read_trajectory(tmp_path / "results" if file.startswith("results") else tmp_path / file).units == units
+    assert read_signals(tmp_path / "results" if file.startswith("results") else tmp_path / file).units == units
 
 
 def test_results_without_a_common_variable_are_refused():
@@ -366,7 +364,7 @@ def test_results_of_other_tools_can_be_compared(tmp_path, pair):
     for name, text in OTHERS.items():
         (tmp_path / name).write_text(text)
     modelica(tmp_path / "modelica.mat", np.array([[0.0, 1, 1, 1, 2], [1, 2, 0, 3, 4], [2, 3, 1, 5, 6]]))
-    comparison = compare(*(read_trajectory(tmp_path / name) for name in pair))
+    comparison = compare(*(read_signals(tmp_path / name) for name in pair))
     assert {difference.name: difference.largest for difference in comparison.differences} == {
         "x": 0,
         "on": 0,
@@ -399,7 +397,7 @@ def modelica(file, rows, turned=True, version="4"):
 def test_units_and_signs_of_a_modelica_result_are_read(tmp_path, turned, version):
     """In both of its layouts, and saved again by MATLAB."""
     modelica(tmp_path / "modelica.mat", np.array([[0.0, 1, 1, 1, 2], [1, 2, 0, 3, 4]]), turned, version)
-    trajectory = read_trajectory(tmp_path / "modelica.mat")
+    trajectory = read_signals(tmp_path / "modelica.mat")
     assert (trajectory.units["x"], trajectory.units["on"]) == ("m", "")
     assert [*trajectory.columns] == ["x", "on", "turn[1]", "turn[2]", "minus"]
     assert trajectory.columns["minus"].tolist() == [-1.0, -2.0]
@@ -408,7 +406,7 @@ def test_units_and_signs_of_a_modelica_result_are_read(tmp_path, turned, version
 def test_strings_are_compared_as_strings(tmp_path):
     (tmp_path / "one.csv").write_text("t [s],says,x\n0,cold,1\n1,cold,1\n2,warm,1\n")
     (tmp_path / "two.csv").write_text("t [s],says,x\n0,cold,1\n1,warm,1\n2,warm,one\n")
-    comparison = compare(*(read_trajectory(tmp_path / name) for name in ("one.csv", "two.csv")))
+    comparison = compare(*(read_signals(tmp_path / name) for name in ("one.csv", "two.csv")))
     (says,) = comparison.differences
     assert (says.name, says.largest, says.at) == ("says", 1.0, 1.0)
     assert comparison.left_out == ("x is a string in two and a number in one; skipped",)

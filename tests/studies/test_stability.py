@@ -158,7 +158,7 @@ COUNTS = Statistics(2, 0, 3, 0.1, events=1, last_event=0.5)
 def motion(columns=None, **counts):
     """Return the correct motion with other columns or other counts."""
     columns = GOOD | (columns or {})
-    return Trajectory(CASE.run, REST.times, columns, {}, {}, {}, statistics=replace(COUNTS, **counts))
+    return Trajectory(REST.times, columns, {}, spec=CASE.run, statistics=replace(COUNTS, **counts))
 
 
 @pytest.fixture

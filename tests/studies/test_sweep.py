@@ -103,7 +103,8 @@ def test_a_sled_pulled_backward_has_the_measures_of_one_pulled_forward(driver):
     time = np.linspace(0.0, 3.0, 3001)
     v = 1.5 * driver * (1.0 - np.cos(2.0 * pi * time))
     spec = RunSpec(Path("sled.fmu"), outputs=("x", "v"))
-    run = Trajectory(spec, time, {"x": 0.0 * v, "v": v}, {"x": "m", "v": "m/s"}, {}, {"v_driver": driver})
+    columns = {"x": 0.0 * v, "v": v}
+    run = Trajectory(time, columns, {"x": "m", "v": "m/s"}, spec=spec, parameters={"v_driver": driver})
     measured = {name: measure.measure(run) for name, measure in TRAJECTORY_MEASURES.items() if not measure.decay}
     expected = {"slips": 3, "period": 1.0, "unsteady": 1.5, "peak_speed": 0.06, "stuck": nan, "rest": nan}
     assert measured == pytest.approx(expected, rel=1e-6, nan_ok=True)

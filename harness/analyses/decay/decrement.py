@@ -80,7 +80,7 @@ def analyse(run: "Trajectory", gives: str, first: int = 0, cycles: float | None 
         unit, text, is_rotation = FORCES[gives]
         force = friction_from_envelope(x_0, x_n, cycles, stiffness(run, is_rotation, f"the decay to {gives}"))
         result = Quantity(gives, force, unit, f"{text}, {cycles:g} cycles")
-    unit = run.units[run.spec.motion_outputs["position"]]
+    unit = run.units[run.motion_outputs["position"]]
     ends = (
         Quantity("x_0", x_0, unit, f"peak {first:g}"),
         Quantity("x_n", x_n, unit, f"peak {first + cycles:g}"),

@@ -194,7 +194,7 @@ def build_trajectory(
             )
     effective_values = {name: effective_value(variables[name], value) for name, value in values.items()}
     effective_spec = replace(spec, outputs=tuple(columns), values=effective_values)
-    return Trajectory(effective_spec, time, columns, units, descriptions, parameters)
+    return Trajectory(time, columns, units, descriptions, spec=effective_spec, parameters=parameters)
 
 
 def alias_key(variable: Any) -> tuple[str, int]:

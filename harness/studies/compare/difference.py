@@ -8,6 +8,7 @@ import numpy as np
 
 from ...errors import HarnessError
 from ...records.units import conversion_factor
+from ...running.signals import Signals
 from ...running.trajectory import Trajectory
 from .event_pairs import EventPairs, match_events, stack_events
 from .interpolation import SignalInterpolant, ValueBounds
@@ -56,8 +57,8 @@ class Comparison:
 
     Attributes
     ----------
-    one, two : Trajectory
-        The two sides.
+    one, two : Trajectory or Signals
+        The two sides: runs, or signals of files and of Python.
     time : numpy.ndarray
         Times (n,) in s of the comparison.
     interpolated : bool
@@ -70,8 +71,8 @@ class Comparison:
         Matched events; None if a side has none.
     """
 
-    one: Trajectory
-    two: Trajectory
+    one: Trajectory | Signals
+    two: Trajectory | Signals
     time: np.ndarray
     interpolated: bool
     differences: tuple[Difference, ...]
@@ -103,7 +104,7 @@ class Comparison:
         return self.pairs.summary((self.one.name, self.two.name)) if self.pairs else ""
 
 
-def compare(one: Trajectory, two: Trajectory) -> Comparison:
+def compare(one: Signals, two: Signals) -> Comparison:
     """Compare the common variables over the common time span.
 
     Raises
@@ -140,7 +141,7 @@ def compare(one: Trajectory, two: Trajectory) -> Comparison:
     return Comparison(one, two, time, interpolated, tuple(differences), tuple(left_out), pairs)
 
 
-def compare_units(one: Trajectory, two: Trajectory, name: str) -> tuple[str | None, float, str]:
+def compare_units(one: Signals, two: Signals, name: str) -> tuple[str | None, float, str]:
     """Return the unit of comparison (None if impossible), the factor from the second unit to it, and a remark."""
     left, right = (side.units[name] for side in (one, two))
     if is_string(one, name) != is_string(two, name):
@@ -155,16 +156,16 @@ def compare_units(one: Trajectory, two: Trajectory, name: str) -> tuple[str | No
     return left, factor, "" if factor == 1.0 else f"{name} is in {right} in {two.name}; compared in {left}"
 
 
-def is_string(trajectory: Trajectory, name: str) -> bool:
-    return trajectory.columns[name].dtype.kind == "U"
+def is_string(signals: Signals, name: str) -> bool:
+    return signals.columns[name].dtype.kind == "U"
 
 
-def is_discrete(trajectory: Trajectory, name: str) -> bool:
+def is_discrete(signals: Signals, name: str) -> bool:
     """Return whether a variable is an Integer, a Boolean, an Enumeration or a String."""
-    return trajectory.columns[name].dtype.kind in "biuU"
+    return signals.columns[name].dtype.kind in "biuU"
 
 
-def make_interpolants(one: Trajectory, two: Trajectory) -> Iterator[SignalInterpolant]:
+def make_interpolants(one: Signals, two: Signals) -> Iterator[SignalInterpolant]:
     """Yield interpolants of both trajectories, with strings replaced by numbers.
 
     A variable that is discrete on one side is held on both, because many files have no types. Whole numbers alone do
@@ -197,7 +198,7 @@ def measure_difference(name: str, unit: str, time: np.ndarray, left: np.ndarray,
     return Difference(name, unit, relative * size, float(time[i]), rms * size, relative, size, left, right)
 
 
-def choose_times(one: Trajectory, two: Trajectory, begin: float, end: float) -> tuple[np.ndarray, bool]:
+def choose_times(one: Signals, two: Signals, begin: float, end: float) -> tuple[np.ndarray, bool]:
     """Return the times of comparison (n,) and whether one side is interpolated.
 
     These are the common times if there are enough of them, otherwise the times of the coarser side.
@@ -213,7 +214,7 @@ def choose_times(one: Trajectory, two: Trajectory, begin: float, end: float) -> 
 
 
 def pair_events(
-    one: Trajectory, two: Trajectory, begin: float, end: float
+    one: Signals, two: Signals, begin: float, end: float
 ) -> tuple[EventPairs | None, tuple[np.ndarray, np.ndarray]]:
     """Match the events of both sides, and return the time intervals (k, 2) in s in which each side jumps.
 

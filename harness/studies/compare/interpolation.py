@@ -14,7 +14,7 @@ import numpy as np
 from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
 
 from ...records.units import is_rate_unit
-from ...running.trajectory import Trajectory
+from ...running.signals import Signals
 
 TIME_ROUNDING = 8 * np.finfo(float).eps  # times that differ by this fraction are equal but for rounding
 LARGE_VALUE, REDUCTION = 1e150, 2.0**-600  # larger values are scaled to avoid overflow
@@ -32,9 +32,9 @@ class ValueBounds:
 
 @dataclass(frozen=True)
 class SignalInterpolant:
-    """Interpolation of a trajectory between its samples; the variables in `held` keep their last value."""
+    """Interpolation of signals between its samples; the variables in `held` keep their last value."""
 
-    trajectory: Trajectory
+    signals: Signals
     held: Set[str] = frozenset()
 
     def bounds_at(self, name: str, at: np.ndarray, jumps: np.ndarray) -> ValueBounds:
@@ -49,7 +49,7 @@ class SignalInterpolant:
         jumps : numpy.ndarray
             Time intervals (k, 2) in s, in each of which the variable jumps once.
         """
-        t, y = self.trajectory.time, self.trajectory.columns[name]
+        t, y = self.signals.time, self.signals.columns[name]
         index = self.sample_indices(at)
         if not np.isfinite(y).all():
             sampled = np.where(index < 0, np.nan, y[index])  # unknown between samples
@@ -81,7 +81,7 @@ class SignalInterpolant:
 
         The times of one grid may differ by rounding in two runs.
         """
-        t = self.trajectory.time
+        t = self.signals.time
         before = np.searchsorted(t, at, "right") - 1
         after = np.minimum(before + 1, len(t) - 1)
         nearest = np.where(np.abs(t[after] - at) < np.abs(t[before] - at), after, before)
@@ -92,8 +92,8 @@ class SignalInterpolant:
 
         A rate has the unit of the variable per second, and its integral matches the change of the variable.
         """
-        columns, units = self.trajectory.columns, self.trajectory.units
-        h, change = np.diff(self.trajectory.time), np.diff(scale * columns[name])
+        columns, units = self.signals.columns, self.signals.units
+        h, change = np.diff(self.signals.time), np.diff(scale * columns[name])
         change = np.where(h > 0, change, 0.0)
         tolerance, changes = RATE_TOLERANCE * np.abs(change).sum(), np.add.reduceat(change, self.parts)
         candidates = {}
@@ -111,15 +111,13 @@ class SignalInterpolant:
     @cached_property
     def parts(self) -> np.ndarray:
         """Return the first indices (p,) of the parts over which integrals are compared first."""
-        return np.unique(np.linspace(0, len(self.trajectory.time) - 1, N_PARTS, endpoint=False).astype(int))
+        return np.unique(np.linspace(0, len(self.signals.time) - 1, N_PARTS, endpoint=False).astype(int))
 
     @cached_property
     def integrals(self) -> dict[str, np.ndarray]:
         """Return the integrals (p,) over the parts, for every column that may be a rate."""
-        h = np.diff(self.trajectory.time)
-        finite = {
-            name: y for name, y in self.trajectory.columns.items() if y.dtype.kind != "U" and np.isfinite(y).all()
-        }
+        h = np.diff(self.signals.time)
+        finite = {name: y for name, y in self.signals.columns.items() if y.dtype.kind != "U" and np.isfinite(y).all()}
         with np.errstate(over="ignore"):
             return {name: np.add.reduceat(h * (y[1:] / 2 + y[:-1] / 2), self.parts) for name, y in finite.items()}
 

@@ -106,11 +106,11 @@ class ComparisonResult(Result, Comparison):
     def origin(self) -> dict[str, Any]:
         sides = (self.one, self.two)
         return {
-            "files": [side.spec.fmu for side in sides],
+            "files": [side.source for side in sides if side.source],
             "parameters": prefix_parameters(
                 {"one": self.one.effective_parameters, "two": self.two.effective_parameters}
             ),
-            "source": describe_sources(*(str(side.spec.fmu) for side in sides)),
+            "source": describe_sources(*(str(side.source or side.name) for side in sides)),
         }
 
     def write_tables(self, folder: Path) -> None:

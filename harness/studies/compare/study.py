@@ -8,7 +8,7 @@ from ...results.provenance import describe_sources, write_provenance
 from ...results.registry import find_study
 from ...results.summary import write_summary
 from ...running.runner import ProgressCallback
-from ...scenes.run_spec import RunSpec
+from ...scenes.run_spec import RunOptions
 from . import trajectory_sources
 from .difference import compare
 from .result import ComparisonResult
@@ -17,7 +17,7 @@ STUDY = find_study("compare")
 
 
 def run_comparison(
-    sources: tuple[str, str], options: RunSpec, out: Path, report: ProgressCallback
+    sources: tuple[str, str], options: RunOptions, out: Path, report: ProgressCallback
 ) -> tuple[ComparisonResult, Path]:
     """Compare two sources and write the differences to out/compare/<one>-<two>; FMUs are run with the `options`."""
     names = trajectory_sources.display_names(sources)
@@ -30,6 +30,6 @@ def run_comparison(
         result = ComparisonResult(**vars(compare(one, two)))
         result.write(new_folder)
         origin = result.origin() | {"source": describe_sources(*sources)}
-        write_provenance(new_folder, **origin, scene=options.options)
+        write_provenance(new_folder, **origin, scene=options)
         write_summary(new_folder, result.summary())
     return result, folder

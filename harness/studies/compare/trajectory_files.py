@@ -22,7 +22,8 @@ from ...results.provenance import load_provenance
 from ...running.fmu_archive import read_description
 from ...running.fmu_contacts import read_contacts
 from ...running.recorder import element_names
-from ...running.trajectory import ModeChanges, SolverSteps, Trajectory
+from ...running.signals import ModeChanges, Signals
+from ...running.trajectory import SolverSteps, Trajectory
 from ...scenes.run_spec import RunSpec
 
 MAX_TIME = 1e100  # s; largest absolute time
@@ -36,13 +37,13 @@ FMPY_TIME = '"time"'  # how a file of fmpy begins
 Columns = dict[str, np.ndarray]
 
 
-def read_trajectory(path: Path) -> Trajectory:
-    """Read the trajectory in a file or a result folder.
+def read_signals(path: Path) -> Signals:
+    """Read the signals in a file or a result folder.
 
     Raises
     ------
     SceneError
-        If it contains no valid trajectory.
+        If it contains no valid signals.
     """
     file = path / "trajectory.csv" if path.is_dir() else path
     if path.is_dir() and not file.is_file():
@@ -65,7 +66,7 @@ def read_trajectory(path: Path) -> Trajectory:
         if name in columns or name == parse_heading(time_heading)[0]:
             raise SceneError(f"{file.name}: two columns are named {format_value(name)}")
         columns[name], units[name] = column, unit
-    return Trajectory(RunSpec(file), time, columns, units, {}, {}, events=read_events(path), label=path.stem)
+    return Signals(time, columns, units, events=read_events(path), label=path.stem, file=file)
 
 
 def read_events(path: Path) -> ModeChanges | None:
@@ -186,13 +187,14 @@ def characters_to_text(letters: np.ndarray) -> str:
 
 def read_run(folder: Path) -> Trajectory:
     """Read the run in a result folder, with its steps, parameters and settings."""
-    signals, origin = read_trajectory(folder), load_provenance(folder)
+    signals, origin = read_signals(folder), load_provenance(folder)
     parameters = {name: parameter["value"] for name, parameter in origin.get("parameters", {}).items()}
     units = signals.units | {name: parameter["unit"] for name, parameter in origin.get("parameters", {}).items()}
     try:
         spec = RunSpec.from_json(origin.get("run") or {})
     except SceneError:  # of an earlier version, or of another tool
-        spec = RunSpec(Path(f"{folder.name}.fmu"), outputs=tuple(signals.columns))
+        fmus = (file for file in origin.get("files", {}) if file.endswith(".fmu"))
+        spec = RunSpec(Path(next(fmus, f"{folder.name}.fmu")), outputs=tuple(signals.columns))
     steps = None
     if (folder / "steps.csv").is_file():
         ends, sizes, rejected = read_numeric(folder / "steps.csv")[1].T
@@ -208,4 +210,6 @@ def read_run(folder: Path) -> Trajectory:
                 events = ModeChanges(events.t, modes, contacts)
     summary = load_summary(folder)
     note = " ".join(summary.sentences) if summary and origin.get("scene") is None else ""  # a scene has other sentences
-    return Trajectory(spec, signals.time, signals.columns, units, names, parameters, steps, events, note=note)
+    return Trajectory(
+        signals.time, signals.columns, units, names, events, spec=spec, parameters=parameters, steps=steps, note=note
+    )

@@ -12,27 +12,29 @@ from ...running.external.step_refinement import communication_step, declared_ste
 from ...running.fmu_archive import read_description, resolve_stop, resolve_time_span
 from ...running.resolve import FMU_SUFFIXES, resolve
 from ...running.runner import DEFAULT_COMMUNICATION_STEPS, ProgressCallback, run
-from ...running.trajectory import Trajectory
-from ...scenes.run_spec import RunSpec
-from .trajectory_files import read_trajectory
+from ...running.signals import Signals
+from ...scenes.run_spec import RunOptions, RunSpec
+from .trajectory_files import read_signals
 
 FILE_SUFFIXES = (".csv", ".txt", ".mat", ".xlsx", ".ods", ".npz")
 RUN_SUFFIXES = (*FMU_SUFFIXES, ".toml")  # sources that are run
 
 
 def load_both(
-    sources: Sequence[str | Trajectory],
-    options: RunSpec,
+    sources: Sequence[str | Signals],
+    options: RunOptions,
     report: ProgressCallback,
     adjust: Callable[[list[RunSpec]], list[RunSpec]] = lambda runs: runs,
-) -> tuple[Trajectory, Trajectory]:
+) -> tuple[Signals, Signals]:
     """Load the trajectories of two folders, files, FMUs or scenes; return given trajectories unchanged.
 
     Both sides share one time grid: FMUs and scenes are run with the communication step of the other side, if it has
     one, or else with the fixed internal step that one of them declares, and to the same stop time. `options` holds
     the other settings of FMUs, and `adjust` may change those of all runs.
     """
-    recordings = [source if isinstance(source, Trajectory) else read_recorded(source) for source in sources]
+    recordings: list[Signals | None] = [
+        source if isinstance(source, Signals) else read_recorded(source) for source in sources
+    ]
     adjusted = iter(
         adjust(
             [
@@ -74,11 +76,11 @@ def display_names(sources: tuple[str, str]) -> list[str]:
     return ["/".join(parts[-n_parts:]) for parts in (one, two)]
 
 
-def read_recorded(source: str) -> Trajectory | None:
+def read_recorded(source: str) -> Signals | None:
     """Read the trajectory of a folder or file; None for sources that are run."""
     path = Path(source)
     if path.exists() and path.suffix not in RUN_SUFFIXES:
-        return read_trajectory(path)
+        return read_signals(path)
     if path.suffix in FILE_SUFFIXES:
         raise SceneError(f"{path} does not exist: give an existing file or result folder, an FMU, or a scene")
     return None
@@ -102,7 +104,7 @@ def fixed_grid(spec: RunSpec) -> float | None:
     return communication_step(fixed_step, stop - start) if fixed_step else None
 
 
-def common_span(one: Trajectory, two: Trajectory) -> tuple[float, float]:
+def common_span(one: Signals, two: Signals) -> tuple[float, float]:
     """Return the common time span in s; HarnessError if there is none."""
     begin, end = max(one.time[0], two.time[0]), min(one.time[-1], two.time[-1])
     if not end > begin:

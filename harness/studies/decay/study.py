@@ -96,7 +96,7 @@ def record_of_scene(
     run = run_fmu(scene.run, report)
     if run.failure:
         raise HarnessError(f"scene {scene.name}: {run.failure}")
-    position = run.spec.motion_outputs["position"]
+    position = run.motion_outputs["position"]
     unit = run.units[position]
     if not unit:
         raise SceneError(

@@ -159,7 +159,7 @@ def plot_output(axes: Axes, plotted: PlottedRun, name: str) -> None:
     """Plot an output, or the output with a role, over time."""
     run = plotted.run
     role = name if is_panel(name, run.columns) else ""
-    name = run.spec.motion_outputs.get(role, name)
+    name = run.motion_outputs.get(role, name)
     values, (unit, size) = plotted.values(name), plotted.unit(name)
     style = "steps-post" if values.dtype.kind in "iu" else "default"
     axes.plot(run.time, values, color=BLUE, drawstyle=style)
@@ -206,7 +206,7 @@ def plot_position(axes: Axes, plotted: PlottedRun, name: str) -> None:
         axes.plot(run.time, run.columns["x_driver"], color=ORANGE, linestyle="--", label="x_driver")
     if "decay" in results:
         decay = results["decay"]
-        _, size = plotted.unit(run.spec.motion_outputs["position"])
+        _, size = plotted.unit(run.motion_outputs["position"])
         axes.plot(decay.times, decay.positions / size, "o", color=ORANGE, fillstyle="none", label="turning points")
         for known, index in KNOWN_PEAKS.items():
             peak = plotted.known_value(known)
@@ -246,7 +246,7 @@ def add_legend(axes: Axes) -> None:
 
 def plot_phase_plane(axes: Axes, plotted: PlottedRun, name: str) -> None:
     """Plot velocity over position."""
-    motion = plotted.run.spec.motion_outputs
+    motion = plotted.run.motion_outputs
     x, v = motion["position"], motion["velocity"]
     axes.plot(plotted.values(x), plotted.values(v), color=BLUE)
     axes.set_title("phase plane")

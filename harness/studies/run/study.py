@@ -17,7 +17,8 @@ from ...results.quantity import Quantity
 from ...results.registry import find_study
 from ...results.summary import write_summary
 from ...running import runner
-from ...running.trajectory import Trajectory, choose_outputs, summarize_run
+from ...running.signals import choose_outputs
+from ...running.trajectory import Trajectory, summarize_run
 from ...scenes.fmu_files import check_built
 from ...scenes.run_spec import RunSpec
 from ...scenes.scene import MAX_DEFAULT_PLOTS, Scene, default_plots, is_panel, load_scene, shipped_scenes
