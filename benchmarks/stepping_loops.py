@@ -9,7 +9,7 @@ from pathlib import Path
 
 import fmpy
 
-from harness.running.runner import open_session, read_own_description, run_own_fmu
+from harness.running.runner import open_instance, read_own_description, run_own_fmu
 from harness.running.timing import time_fastest_call
 from harness.scenes.run_spec import RunSpec
 
@@ -19,14 +19,14 @@ REPEATS = 10
 
 def time_fmpy_loop(file: Path, steps: int) -> float:
     """Return the run time in s of fmpy's loop, the fastest of several runs of one instance."""
-    with open_session(RunSpec(file)) as session:
-        fmu, stop = session.fmu, float(session.description.defaultExperiment.stopTime)
+    with open_instance(RunSpec(file)) as instance:
+        fmu, stop = instance.fmu, float(instance.description.defaultExperiment.stopTime)
 
         def run() -> None:
             fmu.reset()
             fmpy.simulate_fmu(
                 fmu.unzipDirectory,
-                model_description=session.description,
+                model_description=instance.description,
                 fmu_instance=fmu,
                 stop_time=stop,
                 output_interval=stop / steps,

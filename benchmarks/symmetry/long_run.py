@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from harness.errors import HarnessError
-from harness.running.fmu_session import CALL_FAILURES
+from harness.running.fmu_instance import CALL_FAILURES
 from harness.running.recorder import Recorder
 from harness.running.variable_values import convert_value
 
@@ -28,31 +28,31 @@ def record_events(runs: FmuRuns, values: Mapping[str, Any], duration: float) -> 
     HarnessError
         If the run fails.
     """
-    session = runs.open()
+    instance = runs.open()
     settings = [(runs.variables[name], convert_value(runs.variables[name], value)) for name, value in values.items()]
     rows: list[tuple[float, ...]] = []
     names = ["solver.t_next", "events.t_last", *runs.modes]
-    recorder = Recorder(session, [(runs.variables[name], ()) for name in names], lambda row: None)
+    recorder = Recorder(instance, [(runs.variables[name], ()) for name in names], lambda row: None)
     t_next, t_last = recorder.cell("solver.t_next"), recorder.cell("events.t_last")
     t, last, n_steps = 0.0, None, 0
     try:
-        session.initialize(settings, 0.0, duration)
+        instance.initialize(settings, 0.0, duration)
         recorder.record(t)
         last = t_last.value
         while t < duration:
             end = min(t_next.value, duration) if isfinite(t_next.value) else duration  # where the next step fails
-            session.step(t, end - t)
+            instance.step(t, end - t)
             t = end
             recorder.record(t)
             n_steps += 1
             if t_last.value != last:
                 last = t_last.value
-                rows.append((last, *(session.get(name) for name in runs.modes)))
+                rows.append((last, *(instance.get(name) for name in runs.modes)))
             if n_steps > MAX_LONG_STEPS:
                 raise HarnessError(f"it needs more than {MAX_LONG_STEPS} steps: {t:.6g} s are done")
     except CALL_FAILURES as error:
         runs.close()
-        raise HarnessError(session.log.error_message or str(error)) from None
+        raise HarnessError(instance.log.error_message or str(error)) from None
     table = np.array(rows).reshape(-1, 1 + len(runs.modes))
     return table[:, 0], table[:, 1:]
 

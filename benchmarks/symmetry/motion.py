@@ -12,9 +12,9 @@ import numpy as np
 
 from harness.errors import HarnessError
 from harness.running.fmu_archive import read_description, unpack
-from harness.running.fmu_session import CALL_FAILURES, FmuSession
+from harness.running.fmu_instance import CALL_FAILURES, FmuInstance
 from harness.running.recorder import default_outputs
-from harness.running.runner import build_trajectory, plan_run, record_run
+from harness.running.session import Session
 from harness.running.variable_values import enumeration_labels
 from harness.scenes.run_spec import RunSpec
 
@@ -78,7 +78,7 @@ class FmuRuns:
         # sorted, because an FMU with another order of declarations has them in another order
         self.modes = sorted(name for name in self.outputs if self.variables[name].type in INTEGERS)
         self.stack = ExitStack()
-        self.session: FmuSession | None = None
+        self.instance: FmuInstance | None = None
 
     def __enter__(self) -> Self:
         return self
@@ -91,17 +91,17 @@ class FmuRuns:
     def close(self) -> None:
         """Free the instance."""
         self.stack.close()
-        self.session = None
+        self.instance = None
 
-    def open(self) -> FmuSession:
+    def open(self) -> FmuInstance:
         """Return an instance that is not initialized."""
-        if self.session is None:
+        if self.instance is None:
             folder = self.stack.enter_context(unpack(self.fmu))
-            self.session = FmuSession(self.description, folder)
-            self.stack.callback(self.session.close)
+            self.instance = FmuInstance(self.description, folder)
+            self.stack.callback(self.instance.close)
         else:
-            self.session.reset()
-        return self.session
+            self.instance.reset()
+        return self.instance
 
     @property
     def stop(self) -> float:
@@ -149,11 +149,9 @@ class FmuRuns:
             grid=(stop - start) / N_SAMPLES,
         )
         try:
-            session, plan = self.open(), plan_run(spec, self.description)
-            session.initialize(plan.settings, start, stop)
-            trajectory = build_trajectory(plan, session, record_run(plan, session, count_steps), 0.0)
+            trajectory = Session(self.open(), spec).run(report=count_steps)
         except (HarnessError, *CALL_FAILURES) as error:
-            message = self.session.log.error_message if self.session else ""
+            message = self.instance.log.error_message if self.instance else ""
             self.close()
             return Motion.failed(message or str(error))
         except TooManyStepsError:

@@ -16,7 +16,7 @@ from lxml import etree
 
 from ..errors import HarnessError
 from .fmu_archive import DESCRIPTION_FILE
-from .fmu_session import FmuSession, TerminatedError, clocks_of
+from .fmu_instance import FmuInstance, TerminatedError, clocks_of
 from .stepping import InputSignals, TimeGrid
 
 MAX_EVENTS = 1000  # at one time
@@ -100,7 +100,7 @@ class Clocks:
 
     Parameters
     ----------
-    session : FmuSession
+    instance : FmuInstance
         The instance, in initialization mode.
     folder : path
         Directory of the unpacked FMU.
@@ -115,10 +115,10 @@ class Clocks:
         If an interval is missing or not valid.
     """
 
-    def __init__(self, session: FmuSession, folder: Path | str, start: float, tolerance: float) -> None:
-        self.session, self.tolerance = session, tolerance
+    def __init__(self, instance: FmuInstance, folder: Path | str, start: float, tolerance: float) -> None:
+        self.instance, self.tolerance = instance, tolerance
         self.read_values: Callable[[set[int]], object] = lambda active: None
-        clocks = clocks_of(session.description)
+        clocks = clocks_of(instance.description)
         self.unread = {clock.valueReference for clock in clocks}  # clocks whose variables have not been read yet
         self.outputs = [clock.valueReference for clock in clocks if clock.causality != "input"]
         kinds = (*PERIODIC, CHANGING, COUNTDOWN)
@@ -159,14 +159,14 @@ class Clocks:
         if declared.get("intervalCounter") is not None:
             return int(declared["intervalCounter"]) / resolution, int(declared.get("shiftCounter", 0)) / resolution
         shift = (c_double * 1)()
-        fmu = self.session.fmu  # older versions of fmpy have methods for clocks that fail
+        fmu = self.instance.fmu  # older versions of fmpy have methods for clocks that fail
         fmu.fmi3GetShiftDecimal(fmu.component, (c_uint * 1)(clock.reference), 1, shift)
         return self.query(clock)[0], float(shift[0])
 
     def query(self, clock: InputClock) -> tuple[float, int]:
         """Return the interval of a clock in s, and its qualifier."""
         interval, qualifier = (c_double * 1)(), (c_int * 1)()
-        fmu = self.session.fmu
+        fmu = self.instance.fmu
         fmu.fmi3GetIntervalDecimal(fmu.component, (c_uint * 1)(clock.reference), 1, interval, qualifier)
         return float(interval[0]), int(qualifier[0])
 
@@ -204,7 +204,7 @@ class Clocks:
 
     def activate(self, references: list[int]) -> None:
         """Activate input clocks, and read the variables of the active clocks, also of those that the FMU activates."""
-        fmu = self.session.fmu
+        fmu = self.instance.fmu
         if references:
             count = len(references)
             fmu.fmi3SetClock(fmu.component, (c_uint * count)(*references), count, (c_bool * count)(*[True] * count))
@@ -218,12 +218,12 @@ class Clocks:
 
 
 class EventCoSimulation:
-    """Steps a session for co-simulation in event mode, to the next communication point, tick or event.
+    """Steps an instance for co-simulation in event mode, to the next communication point, tick or event.
 
     Parameters
     ----------
-    session : FmuSession
-        Session in event mode.
+    instance : FmuInstance
+        Instance in event mode.
     grid : TimeGrid
         Communication points.
     clocks : Clocks
@@ -233,9 +233,9 @@ class EventCoSimulation:
     """
 
     def __init__(
-        self, session: FmuSession, grid: TimeGrid, clocks: Clocks, signals: InputSignals | None = None
+        self, instance: FmuInstance, grid: TimeGrid, clocks: Clocks, signals: InputSignals | None = None
     ) -> None:
-        self.session, self.grid, self.clocks, self.signals = session, grid, clocks, signals
+        self.instance, self.grid, self.clocks, self.signals = instance, grid, clocks, signals
         self.is_event, self.n_stalled = False, 0
 
     def start(self, t: float) -> None:
@@ -249,8 +249,8 @@ class EventCoSimulation:
         if self.signals:
             self.signals.apply(0.5 * (t + target))
         is_whole = abs(target - t - self.grid.h) <= self.grid.tolerance
-        self.session.step(t, self.grid.h if is_whole else target - t)
-        needs_event, _, is_early, last_time = (result.value for result in self.session.step_results)
+        self.instance.step(t, self.grid.h if is_whole else target - t)
+        needs_event, _, is_early, last_time = (result.value for result in self.instance.step_results)
         t_end = last_time if is_early else target
         if not t <= t_end <= target:
             raise HarnessError(
@@ -265,12 +265,12 @@ class EventCoSimulation:
         return t_end
 
     def handle_event(self, t: float) -> None:
-        self.session.fmu.enterEventMode()
+        self.instance.fmu.enterEventMode()
         if self.signals:
             self.signals.apply(t, after_event=True)
         self.update_states(t)
 
     def update_states(self, t: float) -> None:
         """Tick the clocks, iterate the discrete states, and leave event mode."""
-        self.next_event = self.clocks.handle_event(t, self.session.fmu.updateDiscreteStates)
-        self.session.fmu.enterStepMode()
+        self.next_event = self.clocks.handle_event(t, self.instance.fmu.updateDiscreteStates)
+        self.instance.fmu.enterStepMode()

@@ -14,7 +14,7 @@ from fmpy.sundials import CVodeSolver
 
 from ..errors import HarnessError
 from .event_mode import MAX_EVENTS, Clocks, update_discrete_states
-from .fmu_session import FmuSession, TerminatedError
+from .fmu_instance import FmuInstance, TerminatedError
 from .stepping import InputSignals, TimeGrid
 
 MAX_CVODE_STEPS = 100_000  # between two points
@@ -68,12 +68,12 @@ class CheckedCVode(CVodeSolver):
 
 
 class ModelExchange:
-    """Steps a session for model exchange to the next communication point or event.
+    """Steps an instance for model exchange to the next communication point or event.
 
     Parameters
     ----------
-    session : FmuSession
-        Session for model exchange.
+    instance : FmuInstance
+        Instance for model exchange.
     grid : TimeGrid
         Communication points.
     rtol : float
@@ -90,7 +90,7 @@ class ModelExchange:
 
     def __init__(
         self,
-        session: FmuSession,
+        instance: FmuInstance,
         grid: TimeGrid,
         rtol: float,
         report_work: Callable[[], Any],
@@ -98,15 +98,15 @@ class ModelExchange:
         max_steps: int = MAX_CVODE_STEPS,
         clocks: Clocks | None = None,
     ) -> None:
-        self.session, self.fmu, self.grid, self.signals, self.clocks = session, session.fmu, grid, signals, clocks
+        self.instance, self.fmu, self.grid, self.signals, self.clocks = instance, instance.fmu, grid, signals, clocks
         self.rtol, self.report_work, self.max_steps = rtol, report_work, max_steps
         self.is_event, self.n_stalled = False, 0
 
     def start(self, t: float) -> None:
         if self.signals:
             self.signals.apply(t, after_event=True)
-        fmu, description = self.fmu, self.session.description
-        self.update = fmu.newDiscreteStates if self.session.is_fmi2 else fmu.updateDiscreteStates
+        fmu, description = self.fmu, self.instance.description
+        self.update = fmu.newDiscreteStates if self.instance.is_fmi2 else fmu.updateDiscreteStates
         self.next_event = self.update_states(t)
         fmu.enterContinuousTimeMode()
         self.solver = CheckedCVode(
@@ -115,7 +115,7 @@ class ModelExchange:
             nz=description.numberOfEventIndicators,
             get_x=fmu.getContinuousStates,
             set_x=fmu.setContinuousStates,
-            get_dx=fmu.getDerivatives if self.session.is_fmi2 else fmu.getContinuousStateDerivatives,
+            get_dx=fmu.getDerivatives if self.instance.is_fmi2 else fmu.getContinuousStateDerivatives,
             get_z=fmu.getEventIndicators,
             get_nominals=fmu.getNominalsOfContinuousStates,
             set_time=fmu.setTime,
@@ -137,7 +137,7 @@ class ModelExchange:
         if self.signals:
             self.signals.apply(t_end)
         needs_event = terminated = False
-        if self.session.interface.needsCompletedIntegratorStep:
+        if self.instance.interface.needsCompletedIntegratorStep:
             needs_event, terminated = self.fmu.completedIntegratorStep()
         if terminated:
             raise TerminatedError(t_end, "it returned terminateSimulation from a completed step")

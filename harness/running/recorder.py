@@ -1,4 +1,4 @@
-"""Rows of recorded values. The variables of a session are read into one buffer, which is written at once.
+"""Rows of recorded values. The variables of an instance are read into one buffer, which is written at once.
 
 So a row in a file survives a crash of the FMU.
 """
@@ -27,11 +27,10 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from fmpy.fmi1 import FMICallException
 
 from ..errors import HarnessError, SceneError, check_names
 from ..scenes.run_spec import RunSpec
-from .fmu_session import WARNING, FmuSession, PreparedCall
+from .fmu_instance import WARNING, FMICallException, FmuInstance, PreparedCall, call_all
 from .variable_values import REAL_TYPES, convert_value
 
 C_TYPES: dict[str, Any] = {
@@ -124,6 +123,11 @@ def default_outputs(description: Any, values: Mapping[str, Any] | None = None) -
     return ()
 
 
+def c_type(variable: Any, is_fmi2: bool) -> Any:
+    """Return the type of ctypes of a variable."""
+    return (C_TYPES | (FMI2_TYPES if is_fmi2 else {}))[variable.type]
+
+
 def group_by_type(selection: Sequence[ShapedVariable]) -> Iterator[tuple[str, list[Any], list[str]]]:
     """Yield each type with its variables and the names of their elements, in the order of a row."""
     for type_name in dict.fromkeys(variable.type for variable, _ in selection):
@@ -148,12 +152,12 @@ class ClockedCall(NamedTuple):
 
 
 class Recorder:
-    """Reads variables of a session and writes them as a row.
+    """Reads variables of an instance and writes them as a row.
 
     Parameters
     ----------
-    session : FmuSession
-        Session whose variables are read.
+    instance : FmuInstance
+        Instance whose variables are read.
     selection : sequence of (variable, shape)
         Variables to read, with the shapes of arrays.
     write : callable
@@ -166,17 +170,18 @@ class Recorder:
 
     def __init__(
         self,
-        session: FmuSession,
+        instance: FmuInstance,
         selection: Sequence[ShapedVariable],
         write: Callable[[bytearray], object],
         strings: "StringTable | None" = None,
         only_finite: bool = False,
     ) -> None:
-        layout = row_type(selection, session.is_fmi2)
-        self.session, self.row, self.write = session, bytearray(layout.itemsize), write
+        layout = row_type(selection, instance.is_fmi2)
+        self.instance, self.row, self.write = instance, bytearray(layout.itemsize), write
         self.strings, self.only_finite = strings, only_finite
         self.time = c_double.from_buffer(self.row)
         self.calls: list[PreparedCall] = []
+        self.buffers: list[Any] = []  # of each type
         self.cells: dict[str, tuple[Any, int]] = {}  # of Reals: buffer and index
         self.texts: list[tuple[Any, Any]] = []  # of Strings: pointers and indices
         self.clocked: list[ClockedCall] = []
@@ -184,11 +189,12 @@ class Recorder:
             kind, offset = layout.fields[type_name][0].base, layout.fields[type_name][1]  # type: ignore[index]
             item = np.ctypeslib.as_ctypes_type(kind)
             buffer = (item * len(names)).from_buffer(self.row, offset)
+            self.buffers.append(buffer)
             if type_name in REAL_TYPES:
                 self.cells |= {name: (buffer, i) for i, name in enumerate(names)}
             sizes = [prod(shape) for variable, shape in selection if variable.type == type_name]
             groups = [(variables, len(names))]
-            if session.ticks_clocks:
+            if instance.ticks_clocks:
                 groups = [([variable], size) for variable, size in zip(variables, sizes, strict=True)]
             for group, size in groups:
                 indices = (item * size).from_buffer(self.row, offset)
@@ -200,11 +206,11 @@ class Recorder:
         is_text = type_name == "String"
         values = (c_char_p * size)() if is_text else buffer
         references = (c_uint * len(variables))(*(variable.valueReference for variable in variables))
-        count = () if self.session.is_fmi2 else (size,)
-        name = f"Get{self.session.type_name(variables[0])}"
-        call = self.session.prepare_call(name, references, len(variables), values, *count)
+        count = () if self.instance.is_fmi2 else (size,)
+        name = f"Get{self.instance.type_name(variables[0])}"
+        call = self.instance.prepare_call(name, references, len(variables), values, *count)
         texts = [(values, buffer)] if is_text else []
-        if self.session.ticks_clocks and variables[0].clocks:
+        if self.instance.ticks_clocks and variables[0].clocks:
             clocks = {clock.valueReference for clock in variables[0].clocks}
             self.clocked.append(ClockedCall(clocks, call, texts))
         else:
@@ -219,13 +225,18 @@ class Recorder:
 
     def read(self, calls: list[PreparedCall], texts: list[tuple[Any, Any]]) -> None:
         """Read variables into the row."""
-        for name, function, arguments in calls:
+        for name, function, arguments in calls:  # as `call_all`, without its call: this is done at every point
             status = function(*arguments)
             if status > WARNING:
                 raise FMICallException(name, status)
         for pointers, indices in texts:
             assert self.strings
             indices[:] = [self.strings.index_of(text) for text in pointers]
+
+    def read_values(self) -> list[Any]:
+        """Return the current values of all variables, which are numbers, in the order of a row."""
+        call_all(self.calls)
+        return [value for buffer in self.buffers for value in buffer]
 
     def cell(self, name: str) -> c_double:
         """Return the ctypes object with the last recorded value of a Float64."""

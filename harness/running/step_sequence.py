@@ -16,9 +16,10 @@ from ..errors import HarnessError
 from ..scenes.roles import find_roles
 from ..scenes.run_spec import RunSpec
 from .fmu_archive import unpack_once
-from .fmu_session import CALL_FAILURES, FmuSession
+from .fmu_instance import CALL_FAILURES, FmuInstance
 from .recorder import Recorder, ShapedVariable, read_rows
-from .runner import open_session, read_statistics
+from .runner import open_instance
+from .session import read_statistics
 from .trajectory import Trajectory
 from .variable_values import REAL_TYPES, variable_unit
 
@@ -43,50 +44,50 @@ class RefusalSummary:
 
 
 @contextmanager
-def open_reusable_session(spec: RunSpec) -> Iterator[FmuSession]:
+def open_reusable_instance(spec: RunSpec) -> Iterator[FmuInstance]:
     """Instantiate an FMU, whose files stay unpacked until the process ends."""
-    with open_session(spec, unpack_once(spec.fmu)) as session:
-        yield session
+    with open_instance(spec, unpack_once(spec.fmu)) as instance:
+        yield instance
 
 
-def initialize(session: FmuSession, spec: RunSpec) -> None:
+def initialize(instance: FmuInstance, spec: RunSpec) -> None:
     """Set the values of a run and initialize the instance."""
-    session.initialize(settings(session, spec.values), spec.start or 0.0, spec.stop)
+    instance.initialize(settings(instance, spec.values), spec.start or 0.0, spec.stop)
 
 
-def settings(session: FmuSession, values: dict[str, float]) -> list[tuple[Any, float]]:
+def settings(instance: FmuInstance, values: dict[str, float]) -> list[tuple[Any, float]]:
     """Return pairs of variable and value, from values by name; a choice that the build fixed is no variable."""
-    given = [(session.variables[name], value) for name, value in values.items() if name in session.variables]
+    given = [(instance.variables[name], value) for name, value in values.items() if name in instance.variables]
     return [(variable, value if variable.type in REAL_TYPES else int(value)) for variable, value in given]
 
 
-def set_values(session: FmuSession, values: dict[str, float]) -> None:
+def set_values(instance: FmuInstance, values: dict[str, float]) -> None:
     """Set variables by name."""
-    for variable, value in settings(session, values):
-        session.set(variable, value)
+    for variable, value in settings(instance, values):
+        instance.set(variable, value)
 
 
-def find_reals(session: FmuSession, *causalities: str) -> list[str]:
+def find_reals(instance: FmuInstance, *causalities: str) -> list[str]:
     """Return the names of the Reals with the given causalities."""
     return [
         name
-        for name, variable in session.variables.items()
+        for name, variable in instance.variables.items()
         if variable.type in REAL_TYPES and variable.causality in causalities
     ]
 
 
-def find_outputs(session: FmuSession) -> tuple[str, ...]:
+def find_outputs(instance: FmuInstance) -> tuple[str, ...]:
     """Return position, velocity and, if the FMU has it, energy."""
-    motion = find_roles(session.variables)
+    motion = find_roles(instance.variables)
     if "velocity" not in motion:
-        raise HarnessError(f"{session.description.modelName}: no output is declared as the derivative of a position")
-    return (motion["position"], motion["velocity"], *(["energy"] if "energy" in session.variables else []))
+        raise HarnessError(f"{instance.description.modelName}: no output is declared as the derivative of a position")
+    return (motion["position"], motion["velocity"], *(["energy"] if "energy" in instance.variables else []))
 
 
-def read_refusal(session: FmuSession) -> RefusedRun:
+def read_refusal(instance: FmuInstance) -> RefusedRun:
     """Return the error message of the FMU and the state of its outputs."""
-    values = [session.get(name) for name in find_reals(session, "output", "local")]
-    return RefusedRun(session.log.error_message, all(map(isnan, values)))
+    values = [instance.get(name) for name in find_reals(instance, "output", "local")]
+    return RefusedRun(instance.log.error_message, all(map(isnan, values)))
 
 
 def run_steps(spec: RunSpec, steps: CommunicationSteps, changes: ScheduledChanges) -> Trajectory | RefusedRun:
@@ -101,28 +102,28 @@ def run_steps(spec: RunSpec, steps: CommunicationSteps, changes: ScheduledChange
     changes : dict
         Values to set at a time in s, by time.
     """
-    with open_reusable_session(spec) as session:
-        outputs, rows = find_outputs(session), io.BytesIO()
-        recorded = [session.variables[name] for name in outputs]
+    with open_reusable_instance(spec) as instance:
+        outputs, rows = find_outputs(instance), io.BytesIO()
+        recorded = [instance.variables[name] for name in outputs]
         selection: list[ShapedVariable] = [(variable, ()) for variable in recorded]
-        recorder = Recorder(session, selection, rows.write)
+        recorder = Recorder(instance, selection, rows.write)
         started = perf_counter()
         try:
-            initialize(session, spec)
+            initialize(instance, spec)
             recorder.record(spec.start or 0.0)
             for t, h in steps:
-                set_values(session, changes.get(t, {}))
-                session.step(t, h)
+                set_values(instance, changes.get(t, {}))
+                instance.step(t, h)
                 recorder.record(t + h)
         except CALL_FAILURES:
-            return read_refusal(session)
+            return read_refusal(instance)
         seconds = perf_counter() - started
         return Trajectory(
-            *read_rows(rows.getbuffer(), selection, session.is_fmi2),
+            *read_rows(rows.getbuffer(), selection, instance.is_fmi2),
             {variable.name: variable_unit(variable) for variable in recorded},
             {variable.name: variable.description or variable.name for variable in recorded},
             spec=replace(spec, outputs=outputs),
-            statistics=read_statistics(session, seconds),
+            statistics=read_statistics(instance, seconds),
         )
 
 
@@ -132,22 +133,22 @@ def inject_nonfinite(spec: RunSpec) -> RefusalSummary:
     The FMU must refuse each with a message that starts with the variable's name, and must run again after a reset.
     """
     failures, n_tried = [], 0
-    with open_reusable_session(spec) as session:
-        for name, value, in_run in product(find_reals(session, "parameter", "input"), (nan, inf, -inf), (False, True)):
+    with open_reusable_instance(spec) as instance:
+        for name, value, in_run in product(find_reals(instance, "parameter", "input"), (nan, inf, -inf), (False, True)):
             n_tried += 1
-            session.reset()
+            instance.reset()
             try:
-                initialize(session, spec if in_run else replace(spec, values={**spec.values, name: value}))
-                session.step(0.0, 0.01)
+                initialize(instance, spec if in_run else replace(spec, values={**spec.values, name: value}))
+                instance.step(0.0, 0.01)
                 if in_run:
-                    set_values(session, {name: value})
-                    session.step(0.01, 0.01)
+                    set_values(instance, {name: value})
+                    instance.step(0.01, 0.01)
                 failures.append(f"{name} = {value} was accepted{' during the run' * in_run}")
             except CALL_FAILURES:
-                refusal = read_refusal(session)
+                refusal = read_refusal(instance)
                 if not (refusal.message.startswith(f"{name} = ") and refusal.all_nan):
                     failures.append(f"{name} = {value}: {refusal.message or 'no sentence'}")
-        session.reset()
-        initialize(session, spec)
-        session.step(0.0, 0.01)
+        instance.reset()
+        initialize(instance, spec)
+        instance.step(0.0, 0.01)
     return RefusalSummary(n_tried, tuple(failures))

@@ -16,7 +16,7 @@ import numpy as np
 
 from ..errors import HarnessError, SceneError, check_names
 from ..scenes.run_spec import RunSpec
-from .fmu_session import FmuSession, TerminatedError
+from .fmu_instance import FmuInstance, TerminatedError
 from .variable_values import REAL_TYPES
 
 Inputs = Mapping[str, Sequence[float] | np.ndarray]  # "time" in s, and the values of each input at these times
@@ -133,7 +133,7 @@ def make_grid(spec: RunSpec, start: float, stop: float) -> TimeGrid:
 
 
 class Stepper(Protocol):
-    """Steps one session.
+    """Steps one instance.
 
     Attributes
     ----------
@@ -286,9 +286,9 @@ def interpolate(time: np.ndarray, column: np.ndarray, points: np.ndarray, side: 
     return interpolated
 
 
-def input_signals(inputs: Inputs, session: FmuSession) -> "InputSignals | None":
+def input_signals(inputs: Inputs, instance: FmuInstance) -> "InputSignals | None":
     """Return what sets the inputs of an instance, None without input signals."""
-    return InputSignals(inputs, session) if any(name != TIME for name in inputs) else None
+    return InputSignals(inputs, instance) if any(name != TIME for name in inputs) else None
 
 
 class InputSignals:
@@ -301,7 +301,7 @@ class InputSignals:
     ----------
     inputs : mapping
         The table, as `check_inputs` describes it.
-    session : FmuSession
+    instance : FmuInstance
         The instance.
 
     Raises
@@ -310,12 +310,12 @@ class InputSignals:
         If the inputs are of several types.
     """
 
-    def __init__(self, inputs: Inputs, session: FmuSession) -> None:
-        variables = [session.variables[name] for name in inputs if name != TIME]
+    def __init__(self, inputs: Inputs, instance: FmuInstance) -> None:
+        variables = [instance.variables[name] for name in inputs if name != TIME]
         kinds = {variable.type for variable in variables}
         if len(kinds) > 1:
             raise HarnessError(f"inputs of several types ({', '.join(sorted(kinds))}) cannot be driven at once")
-        self.set_values = getattr(session.fmu, f"set{kinds.pop()}")
+        self.set_values = getattr(instance.fmu, f"set{kinds.pop()}")
         self.references = [variable.valueReference for variable in variables]
         self.time = np.asarray(inputs[TIME], dtype=float)
         self.columns = [np.asarray(column, dtype=float) for name, column in inputs.items() if name != TIME]
@@ -344,11 +344,11 @@ class InputSignals:
 
 
 class CoSimulation:
-    """Steps a session for co-simulation.
+    """Steps an instance for co-simulation.
 
     Parameters
     ----------
-    session : FmuSession
+    instance : FmuInstance
     grid : TimeGrid
     signals : InputSignals, optional
         An input is constant during a step, at its value in the middle.
@@ -360,13 +360,13 @@ class CoSimulation:
 
     def __init__(
         self,
-        session: FmuSession,
+        instance: FmuInstance,
         grid: TimeGrid,
         signals: InputSignals | None = None,
         next_step: c_double | None = None,
         only_grid: bool = False,
     ) -> None:
-        self.session, self.grid, self.signals, self.next_step = session, grid, signals, next_step
+        self.instance, self.grid, self.signals, self.next_step = instance, grid, signals, next_step
         self.is_event = False
         self.only_grid, self.tolerance = only_grid, grid.tolerance
         self.size = grid.h if only_grid and grid.is_even else None
@@ -385,11 +385,11 @@ class CoSimulation:
             if end <= target + self.tolerance and not is_passed:
                 target = min(end, self.grid.stop)
             if not target > t:
-                name = self.session.description.modelName
+                name = self.instance.description.modelName
                 raise HarnessError(f"{name}: solver.t_next = {target!r} s is not after t = {t!r} s")
         if self.signals:
             self.signals.apply(0.5 * (t + target))
-        self.session.step(t, self.size or target - t)
+        self.instance.step(t, self.size or target - t)
         if self.signals:
             self.signals.apply(target, after_event=True)
         return target

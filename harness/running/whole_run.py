@@ -32,7 +32,7 @@ from .fmu_archive import (
     resolve_time_span,
     unpack_once,
 )
-from .fmu_session import CALL_FAILURES, FmuSession, capture_stderr
+from .fmu_instance import CALL_FAILURES, FmuInstance, capture_stderr
 from .stepping import TIME, make_grid, ramps_of_steps, values_of_steps
 from .variable_values import REAL_TYPES, effective_value, find_bound, variable_unit
 
@@ -96,7 +96,7 @@ class RunSession:
 
     def __init__(self, fmu: Path, limit: float) -> None:
         try:
-            session = self.session = FmuSession(read_description(fmu), unpack_once(fmu))
+            session = self.session = FmuInstance(read_description(fmu), unpack_once(fmu))
         except HarnessError as error:
             raise HarnessError(f"{fmu.name} cannot be loaded: {error}") from None
         self.limit, self.loop, self.is_new = limit, compile_loop(), True
@@ -106,7 +106,7 @@ class RunSession:
             *(cast(session.function(name), c_void_p) for name in FUNCTIONS[version])
         )
         self.references: dict[tuple[str, ...], Array[c_uint32]] = {}
-        self.handle = FmuStruct(int(version[0]), cast(self.functions, c_void_p), session.instance, limit)
+        self.handle = FmuStruct(int(version[0]), cast(self.functions, c_void_p), session.component, limit)
 
     def prepare(self, spec: RunSpec) -> Run:
         """Prepare runs that differ in Reals only."""

@@ -21,7 +21,7 @@ from harness.results.provenance import load_provenance
 from harness.running.external.simulation import read_longest_rows
 from harness.running.external.step_refinement import RefinementRun, refine
 from harness.running.fmu_archive import read_description
-from harness.running.fmu_session import TerminatedError
+from harness.running.fmu_instance import TerminatedError
 from harness.running.recorder import Recorder, array_shape
 from harness.running.stepping import TimeGrid, step_to_stop
 from harness.running.variable_values import convert_value
@@ -274,7 +274,7 @@ def test_the_longest_of_the_aborted_refinement_runs_is_kept(tmp_path):
         return 0
 
     selection = [(ModelVariable("x", type="Float64", valueReference=0), ())]
-    session = SimpleNamespace(
+    instance = SimpleNamespace(
         ticks_clocks=False,
         is_fmi2=False,
         type_name=lambda variable: variable.type,
@@ -282,7 +282,7 @@ def test_the_longest_of_the_aborted_refinement_runs_is_kept(tmp_path):
     )
     for number, times in enumerate(([0.0, 0.5, 1.0], [0.0, 0.25, 0.5, 0.75], [])):
         with (tmp_path / f"rows-{number}").open("wb") as file:
-            recorder = Recorder(session, selection, file.write)
+            recorder = Recorder(instance, selection, file.write)
             for t in times:
                 recorder.record(t)
     with (tmp_path / "rows-0").open("ab") as file:

@@ -13,7 +13,7 @@ from spec_runs import ignore_progress
 from harness.errors import HarnessError
 from harness.running.event_mode import update_discrete_states
 from harness.running.external.step_refinement import RefinementRun, refine
-from harness.running.fmu_session import FmuSession, TerminatedError
+from harness.running.fmu_instance import FmuInstance, TerminatedError
 from harness.running.recorder import Recorder, StringTable, read_rows
 from harness.running.stepping import CoSimulation, TimeGrid, step_to_stop
 from harness.scenes.run_spec import RunSpec
@@ -29,13 +29,13 @@ def run_with_step(answer):
             result._obj.value = value
         return 0
 
-    session = FmuSession.__new__(FmuSession)  # without a library
-    session.instance, session.do_step, session.uses_event_mode = None, do_step, False
-    session.step_results = (c_bool(), c_bool(), c_bool(), c_double())
-    session.step_arguments = tuple(map(byref, session.step_results))
+    instance = FmuInstance.__new__(FmuInstance)  # without a library
+    instance.component, instance.do_step, instance.uses_event_mode = None, do_step, False
+    instance.step_results = (c_bool(), c_bool(), c_bool(), c_double())
+    instance.step_arguments = tuple(map(byref, instance.step_results))
     times, grid = [], TimeGrid(0.0, 1.0, 0.25)
     with pytest.raises((TerminatedError, HarnessError)) as caught:
-        step_to_stop(CoSimulation(session, grid, only_grid=True), grid, times.append, ignore_progress)
+        step_to_stop(CoSimulation(instance, grid, only_grid=True), grid, times.append, ignore_progress)
     return times, str(caught.value)
 
 
@@ -87,14 +87,14 @@ def test_a_null_or_malformed_string_is_recorded(tmp_path, bytes_, text):
         return 0
 
     variable = ModelVariable("said", valueReference=7, type="String")
-    session = SimpleNamespace(
+    instance = SimpleNamespace(
         ticks_clocks=False,
         is_fmi2=False,
         type_name=lambda variable: "String",
         prepare_call=lambda name, *arguments: (name, answer, (None, *arguments)),
     )
     texts, rows = StringTable(tmp_path / "texts"), bytearray()
-    Recorder(session, [(variable, ())], rows.extend, texts).record(0.0)
+    Recorder(instance, [(variable, ())], rows.extend, texts).record(0.0)
     texts.file.close()
     _, columns = read_rows(rows, [(variable, ())], is_fmi2=False)
     assert columns["said"].tolist() == [0]

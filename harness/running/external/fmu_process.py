@@ -11,9 +11,9 @@ from ...errors import HarnessError, first_line
 from ...scenes.run_spec import RunSpec
 from ..event_mode import Clocks, EventCoSimulation
 from ..fmu_archive import read_leniently
-from ..fmu_session import (
+from ..fmu_instance import (
     STATUS_NAMES,
-    FmuSession,
+    FmuInstance,
     LogCapture,
     StepError,
     StepRefusedError,
@@ -101,30 +101,30 @@ class ExternalFmu:
         """Run a new instance and record its rows; exceptions propagate."""
         span = coarsest_grid(self.spec)
         grid = make_grid(replace(self.spec, grid=h), span.start, span.stop)
-        session = FmuSession(self.description, self.folder, self.spec.exchange, log=log, ticks_clocks=True)
-        session.enter_initialization(self.settings, grid.start, grid.stop, tolerance)
-        clocks = Clocks(session, self.folder, grid.start, grid.tolerance) if session.ticks_clocks else None
-        session.fmu.exitInitializationMode()
-        signals = input_signals(self.spec.inputs, session)
+        instance = FmuInstance(self.description, self.folder, self.spec.exchange, log=log, ticks_clocks=True)
+        instance.enter_initialization(self.settings, grid.start, grid.stop, tolerance)
+        clocks = Clocks(instance, self.folder, grid.start, grid.tolerance) if instance.ticks_clocks else None
+        instance.fmu.exitInitializationMode()
+        signals = input_signals(self.spec.inputs, instance)
         stepper: Stepper
         if self.spec.exchange:
-            stepper = ModelExchange(session, grid, tolerance, self.report_progress, signals, clocks=clocks)
+            stepper = ModelExchange(instance, grid, tolerance, self.report_progress, signals, clocks=clocks)
         elif clocks:
-            stepper = EventCoSimulation(session, grid, clocks, signals)
+            stepper = EventCoSimulation(instance, grid, clocks, signals)
         else:
-            stepper = CoSimulation(session, grid, signals, only_grid=True)
+            stepper = CoSimulation(instance, grid, signals, only_grid=True)
         with path.open("wb", buffering=0) as file:
-            recorder = Recorder(session, self.selection, file.write, self.strings, only_finite=True)
+            recorder = Recorder(instance, self.selection, file.write, self.strings, only_finite=True)
             if clocks:
                 clocks.read_values = recorder.read_clocked
             try:
                 step_to_stop(stepper, grid, recorder.record, self.report_progress)
             except StepError:  # after any other failure the next call may crash; the exit frees the instance
-                session.close()
+                instance.close()
                 raise
         with suppress(FMICallException):  # all results are recorded
-            session.fmu.terminate()
-        session.close()
+            instance.fmu.terminate()
+        instance.close()
 
 
 def run_unpacked_fmu(

@@ -7,7 +7,7 @@ from ...results.folder import replace_folder
 from ...results.provenance import describe_sources, write_provenance
 from ...results.registry import find_study
 from ...results.summary import write_summary
-from ...running.runner import ProgressCallback
+from ...running.session import ProgressCallback
 from ...scenes.run_spec import RunOptions
 from . import trajectory_sources
 from .difference import compare

@@ -11,7 +11,8 @@ from ...errors import HarnessError, SceneError
 from ...running.external.step_refinement import communication_step, declared_step
 from ...running.fmu_archive import read_description, resolve_stop, resolve_time_span
 from ...running.resolve import FMU_SUFFIXES, resolve
-from ...running.runner import DEFAULT_COMMUNICATION_STEPS, ProgressCallback, run
+from ...running.runner import DEFAULT_COMMUNICATION_STEPS, run
+from ...running.session import ProgressCallback
 from ...running.signals import Signals
 from ...scenes.run_spec import RunOptions, RunSpec
 from .trajectory_files import read_signals

@@ -14,7 +14,7 @@ from zipfile import ZipFile
 from ...errors import HarnessError
 from ...process.temporary_directory import temporary_directory
 from ...running.fmu_archive import unpack
-from ...running.fmu_session import CALL_FAILURES, FmuSession, LogCapture
+from ...running.fmu_instance import CALL_FAILURES, FmuInstance, LogCapture
 from ...running.model_exchange import ModelExchange
 from ...running.stepping import TimeGrid
 from ...running.variable_values import REAL_TYPES, convert_value
@@ -38,7 +38,7 @@ class Part:
 
     def __init__(self, component: Component, folder: Path, grid: TimeGrid) -> None:
         self.component, self.grid, self.log = component, grid, LogCapture()
-        self.session = FmuSession(component.description, folder, component.exchange, log=self.log)
+        self.instance = FmuInstance(component.description, folder, component.exchange, log=self.log)
         self.inputs: dict[str, Any] = {}
         self.has_jump = False  # of an input since the last step
         self.stepper: ModelExchange | None = None
@@ -51,19 +51,19 @@ class Part:
         self.has_jump = self.has_jump or self.inputs.get(name) != value
         self.inputs[name] = value
         if self.stepper is None:
-            self.session.set(variable, value)
+            self.instance.set(variable, value)
 
     def start(self, t: float) -> None:
         """Begin stepping at t in s, after initialization."""
         if self.component.exchange:
             signals: Any = self  # sets the inputs of this part
-            self.stepper = ModelExchange(self.session, self.grid, EXCHANGE_RTOL, lambda: None, signals)
+            self.stepper = ModelExchange(self.instance, self.grid, EXCHANGE_RTOL, lambda: None, signals)
             self.stepper.start(t)
 
     def apply(self, t: float, continuous: bool = True, discrete: bool = True, after_event: bool = False) -> None:
         """Set all inputs, which are constant between communication points, as the solver of model exchange demands."""
         for name, value in self.inputs.items():
-            self.session.set(self.component.variables[name], value)
+            self.instance.set(self.component.variables[name], value)
 
     def next_jump(self, t: float) -> float:
         return inf
@@ -71,7 +71,7 @@ class Part:
     def step(self, t: float, target: float) -> None:
         """Step from t to a target in s."""
         if self.stepper is None:
-            self.session.step(t, target - t)
+            self.instance.step(t, target - t)
             return
         if self.has_jump:
             self.stepper.handle_event(t)
@@ -101,7 +101,7 @@ def run_archive(run: RunSpec, variables: Sequence[ElementVariable], parameter_se
             for _ in range(len(parts) + 1):
                 exchange_values(system, parts)
             for current, part in parts.items():  # noqa: B007
-                part.session.fmu.exitInitializationMode()
+                part.instance.fmu.exitInitializationMode()
                 part.start(grid.start)
             rows = [read_row(parts, variables)]
             for i in range(grid.count):
@@ -111,7 +111,7 @@ def run_archive(run: RunSpec, variables: Sequence[ElementVariable], parameter_se
                 exchange_values(system, parts)
                 rows.append(read_row(parts, variables))
             for part in parts.values():
-                part.session.close()
+                part.instance.close()
         except (*CALL_FAILURES, HarnessError) as error:
             message = parts[current].log.error_message if current in parts else ""
             raise HarnessError(f"{current}: {message or error}") from None
@@ -126,7 +126,7 @@ def enter_initialization(part: Part, path: str, system: CoupledSystem, grid: Tim
         for (owner, name), value in system.values.items()
         if owner == path
     ]
-    part.session.enter_initialization(values, grid.start, grid.stop)
+    part.instance.enter_initialization(values, grid.start, grid.stop)
 
 
 def exchange_values(system: CoupledSystem, parts: dict[str, Part]) -> None:
@@ -138,7 +138,7 @@ def exchange_values(system: CoupledSystem, parts: dict[str, Part]) -> None:
 
 
 def get_value(parts: dict[str, Part], node: Node) -> Any:
-    return parts[node[0]].session.get(node[1])
+    return parts[node[0]].instance.get(node[1])
 
 
 def read_row(parts: dict[str, Part], variables: Sequence[ElementVariable]) -> list[float]:

@@ -20,7 +20,7 @@ from ...results.provenance import describe_sources, write_provenance
 from ...results.registry import find_study
 from ...results.summary import write_summary
 from ...running.fmu_archive import read_description
-from ...running.runner import ProgressCallback
+from ...running.session import ProgressCallback
 from ...running.variable_values import REAL_TYPES, variable_unit
 from ...scenes.coupled.scene import CoupledScene, load_coupled_scene
 from ...scenes.fmu_files import find_fmu, list_models

@@ -12,10 +12,11 @@ from typing import Any
 
 from ...errors import HarnessError, check_names
 from ...running import runner
-from ...running.fmu_archive import exposes_solver_steps, read_description
-from ...running.fmu_session import CALL_FAILURES, FmuSession, PreparedRuns
+from ...running.fmu_archive import exposes_solver_steps, read_description, resolve_time_span
+from ...running.fmu_instance import CALL_FAILURES, FmuInstance
 from ...running.recorder import default_outputs
-from ...running.runner import build_trajectory, open_session, plan_run, read_parameters, record_run
+from ...running.runner import open_instance
+from ...running.session import Session
 from ...running.variable_values import variable_unit
 from ...scenes.roles import find_roles
 from ...scenes.run_spec import RunSpec
@@ -56,25 +57,26 @@ class OwnFmuRunner:
     `columns` are the measured columns; `stop` is the stop time in s.
     """
 
-    def __init__(self, runs: SweepSpec, session: FmuSession) -> None:
-        self.session, self.variables, fmu_description = session, session.variables, session.description
+    def __init__(self, runs: SweepSpec, instance: FmuInstance) -> None:
+        self.instance, self.variables = instance, instance.variables
         measures = select_measures(runs, self.variables, is_own_fmu=True)
         motion = find_roles(self.variables)
         outputs = tuple(motion[role] for role in ("position", "velocity") if role in motion)
         if len(outputs) < 2:
-            outputs = tuple(name for name in default_outputs(fmu_description) if self.variables[name].type == "Real")
-        plan = plan_run(replace(runs.run, outputs=outputs), fmu_description)
-        self.stop = plan.grid.stop
+            outputs = tuple(
+                name for name in default_outputs(instance.description) if self.variables[name].type == "Real"
+            )
+        run = replace(runs.run, outputs=outputs)
         ends = [name for name in measures if name in FINAL_MEASURES]
         self.trajectory_measures = [
             name for name in measures if name in TRAJECTORY_MEASURES or (name in OUTPUT_MEASURES and name != "final")
         ]
         if self.trajectory_measures:
-            step = (plan.grid.stop - plan.grid.start) / N_STEPS
-            plan = plan_run(replace(plan.spec, grid=step, follow=True), fmu_description)
-        self.plan, shared = plan, {variable.name: value for variable, value in plan.settings}
+            start, stop = resolve_time_span(run, instance.description)
+            run = replace(run, grid=(stop - start) / N_STEPS, follow=True)
         to_read = [*outputs, *(FINAL_MEASURES[name][1] for name in ends)]
-        self.runs = PreparedRuns(session, shared, runs.varied, to_read, plan.grid.start, plan.grid.stop)
+        self.session = Session(instance, run, runs.varied, to_read)
+        self.stop = self.session.grid.stop
         self.columns = measure_columns(measures, self.variables, outputs)
         read = [
             column.name
@@ -86,21 +88,19 @@ class OwnFmuRunner:
 
     def run(self, point: Sequence[float]) -> list[float] | str:
         """Return the measures at a point of the varied values, or the error message."""
-        self.session.log.clear()
         try:
             return self.measure_run(point)
         except CALL_FAILURES as error:
-            return self.session.log.error_message or str(error)
+            return self.instance.log.error_message or str(error)
         except HarnessError as error:
             return str(error)
 
     def measure_run(self, point: Sequence[float]) -> list[float]:
         """Return the measures; raise an exception if the run fails."""
-        self.runs.start(point)
+        self.session.start(point)
         start_time, trajectory_values = perf_counter(), []
         if self.trajectory_measures:
-            recorded = record_run(self.plan, self.session, lambda share: None)
-            trajectory = build_trajectory(self.plan, self.session, recorded, 0.0)
+            trajectory = self.session.build_trajectory(self.session.record(), 0.0)
             for name in self.trajectory_measures:
                 trajectory_values += (
                     measure_outputs(name, trajectory.columns)
@@ -108,16 +108,16 @@ class OwnFmuRunner:
                     else [TRAJECTORY_MEASURES[name].measure(trajectory)]
                 )
         else:
-            self.runs.step_to_stop()
+            self.session.step_to_stop()
         seconds = perf_counter() - start_time
-        values = [*self.runs.read(), seconds, *trajectory_values]
+        values = [*self.session.read(), seconds, *trajectory_values]
         return [values[i] for i in self.order]
 
     def constants(self) -> dict[str, tuple[object, str]]:
         """Return value and unit of every parameter in the last run."""
         return {
             name: (value, variable_unit(self.variables[name]) if name in self.variables else "")
-            for name, value in read_parameters(self.session, self.plan.spec.fmu).items()
+            for name, value in self.session.read_parameters().items()
         }
 
 
@@ -170,7 +170,7 @@ def open_runner(runs: SweepSpec) -> Iterator[Runner]:
     """Open the runner of the FMU."""
     fmu_description = read_description(runs.run.fmu, runs.run.lenient)
     if exposes_solver_steps(fmu_description) and not runs.run.exchange:
-        with open_session(runs.run) as session:
-            yield OwnFmuRunner(runs, session)
+        with open_instance(runs.run) as instance:
+            yield OwnFmuRunner(runs, instance)
     else:
         yield ExternalFmuRunner(runs, fmu_description)

@@ -1,4 +1,4 @@
-"""Session with one instance of an FMU through fmpy: FMI 2.0 or 3.0, co-simulation or model exchange.
+"""One instance of an FMU through fmpy: FMI 2.0 or 3.0, co-simulation or model exchange.
 
 A step and a recorded point take only microseconds, so their functions and buffers are looked up once and the library is
 called directly; everything else uses fmpy's methods.
@@ -9,7 +9,7 @@ import os
 from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, redirect_stderr, suppress
-from ctypes import byref, c_bool, c_double, c_int, c_uint, c_void_p
+from ctypes import byref, c_bool, c_double, c_uint, c_void_p
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -75,7 +75,7 @@ class LogCapture:
             self.stderr.seek(self.stderr.truncate(0))
 
 
-class FmuSession:
+class FmuInstance:
     """Instance of an unpacked FMU.
 
     Parameters
@@ -122,7 +122,8 @@ class FmuSession:
         self.interface = description.modelExchange if exchange else description.coSimulation
         self.log.clear()
         self.fmu = self.instantiate(str(folder), name)
-        self.instance = c_void_p(self.fmu.component)
+        self.component = c_void_p(self.fmu.component)
+        self.is_new, self.reset_calls = True, (self.prepare_call("Reset"),)  # new: neither used nor initialized
         self.do_step = None if exchange else self.function("DoStep")
         # of fmi3DoStep: event handling needed, terminate simulation, early return, last successful time
         self.step_results = () if self.is_fmi2 else (c_bool(), c_bool(), c_bool(), c_double())
@@ -173,7 +174,7 @@ class FmuSession:
         name, types = f"{self.prefix}{name}", self.function(name).argtypes
         converted = (
             kind(value) if isinstance(value, int | float) else value
-            for kind, value in zip(types, (self.instance, *arguments), strict=True)
+            for kind, value in zip(types, (self.component, *arguments), strict=True)
         )
         return name, self.fmu.dll[name], tuple(converted)
 
@@ -189,7 +190,7 @@ class FmuSession:
     ) -> None:
         """Set (variable, value) and enter the initialization of the instance; times in s."""
         experiment = {"tolerance": tolerance, "startTime": start, "stopTime": stop}
-        values = list(values)
+        values, self.is_new = list(values), False
         structural = [(variable, value) for variable, value in values if variable.causality == "structuralParameter"]
         if structural:
             self.fmu.enterConfigurationMode()
@@ -230,7 +231,7 @@ class FmuSession:
         HarnessError
             If the FMU returns early, which is not allowed.
         """
-        status = self.do_step(self.instance, t, h, 1, *self.step_arguments)  # type: ignore[misc]
+        status = self.do_step(self.component, t, h, 1, *self.step_arguments)  # type: ignore[misc]
         if status > WARNING:
             raise self.step_failure(status, t, h)
         if self.step_results:
@@ -254,88 +255,26 @@ class FmuSession:
             return TerminatedError(last_time, f"{name} returned Discard with fmi2Terminated")
         return StepRefusedError(f"{name} returned Discard for a step of {h:.4g} s at t = {t:.9g} s")
 
+    def make_references(self, variables: Sequence[Any]) -> Any:
+        """Return the value references of variables, for prepared calls."""
+        return (c_uint * len(variables))(*(variable.valueReference for variable in variables))
+
     def reset(self) -> None:
         """Reset the instance and discard its messages."""
         self.log.clear()
-        self.fmu.reset()
+        call_all(self.reset_calls)
+        self.is_new = True
+
+    def restart(self) -> None:
+        """Discard all messages, and reset the instance unless it is new, to initialize it."""
+        self.log.clear()
+        if not self.is_new:
+            call_all(self.reset_calls)
+        self.is_new = False
 
     def close(self) -> None:
         """Free the instance."""
         self.fmu.freeInstance()
-
-
-class PreparedRuns:
-    """Runs of one session of FMI 2.0 from start to stop in one communication step, each with other values.
-
-    A run by closed form takes 40 microseconds, as long as a few calls through fmpy, so all calls and buffers are
-    prepared.
-
-    Parameters
-    ----------
-    session : FmuSession
-        Session of the FMU.
-    values : dict
-        Values that all runs share, by name.
-    varied : sequence of str
-        Variables whose values differ.
-    read : sequence of str
-        Variables to read at the end of a run, Reals first.
-    start, stop : float
-        Times in s.
-    """
-
-    def __init__(
-        self,
-        session: FmuSession,
-        values: dict[str, float],
-        varied: Sequence[str],
-        read: Sequence[str],
-        start: float,
-        stop: float,
-    ) -> None:
-        self.session, call, slots = session, session.prepare_call, {}
-        self.start_calls = [call("Reset"), call("SetupExperiment", 0, 0.0, start, 1, stop)]
-        for type_name, names in self.group([*values, *varied]).items():
-            references, buffer = self.make_buffer(type_name, names)
-            for i, name in enumerate(names):
-                buffer[i] = values.get(name, 0)
-                slots[name] = buffer, i, float if type_name == "Real" else int
-            self.start_calls.append(call(f"Set{type_name}", references, len(names), buffer))
-        self.slots = [slots[name] for name in varied]
-        self.start_calls += [call("EnterInitializationMode"), call("ExitInitializationMode")]
-        self.step_call = call("DoStep", start, stop - start, 1)
-        self.read_calls, self.results = [], []
-        for type_name, names in self.group(read).items():
-            references, buffer = self.make_buffer(type_name, names)
-            self.results.append(buffer)
-            self.read_calls.append(call(f"Get{type_name}", references, len(names), buffer))
-
-    def group(self, names: Iterable[str]) -> dict[str, list[str]]:
-        """Return the distinct names of variables by type."""
-        groups: dict[str, list[str]] = {}
-        for name in dict.fromkeys(names):
-            groups.setdefault(self.session.type_name(self.session.variables[name]), []).append(name)
-        return groups
-
-    def make_buffer(self, type_name: str, names: list[str]) -> tuple[Any, Any]:
-        """Return value references, and a buffer for the values."""
-        references = (c_uint * len(names))(*(self.session.variables[name].valueReference for name in names))
-        return references, ((c_double if type_name == "Real" else c_int) * len(names))()
-
-    def start(self, point: Sequence[float]) -> None:
-        """Initialize a run with the varied values."""
-        for (buffer, i, number), value in zip(self.slots, point, strict=True):
-            buffer[i] = number(value)
-        call_all(self.start_calls)
-
-    def step_to_stop(self) -> None:
-        """Run to the stop in one communication step."""
-        call_all([self.step_call])
-
-    def read(self) -> list[float]:
-        """Return the variables to read."""
-        call_all(self.read_calls)
-        return [value for buffer in self.results for value in buffer]
 
 
 def call_all(calls: Iterable[PreparedCall]) -> None:

@@ -1,19 +1,19 @@
-"""Sessions of one process do not share their log."""
+"""Instances of one process do not share their log."""
 
 from contextlib import suppress
 
 import fmi3_fixtures
 import pytest
 
-from harness.running.fmu_session import CALL_FAILURES, STATUS_NAMES, LogCapture
-from harness.running.runner import open_session
+from harness.running.fmu_instance import CALL_FAILURES, STATUS_NAMES, LogCapture
+from harness.running.runner import open_instance
 from harness.scenes.run_spec import RunSpec
 
 
 def check_logs(folder):
-    """Refuse a value in one of two sessions."""
+    """Refuse a value in one of two instances."""
     spec = RunSpec(folder / "coulomb.fmu")
-    with open_session(spec) as one, open_session(spec) as other:
+    with open_instance(spec) as one, open_instance(spec) as other:
         with suppress(*CALL_FAILURES):
             one.set(one.variables["m"], -1.0)
             one.initialize([], 0.0, 1.0)
@@ -22,7 +22,7 @@ def check_logs(folder):
         assert list(other.log.messages) == []
 
 
-def test_a_message_is_in_the_log_of_its_session(backend_fmus):
+def test_a_message_is_in_the_log_of_its_instance(backend_fmus):
     check_logs(backend_fmus)
 
 
@@ -34,5 +34,5 @@ def test_a_later_warning_does_not_hide_an_error():
 
 
 @pytest.mark.slow
-def test_a_message_of_fmi3_is_in_the_log_of_its_session():
+def test_a_message_of_fmi3_is_in_the_log_of_its_instance():
     check_logs(fmi3_fixtures.build_fmi3_fmus())
