@@ -1,21 +1,24 @@
 """Runs any FMU: one of this project in a session, an external one with step refinement (external/simulation.py)."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..errors import HarnessError, SceneError, check_names
 from ..scenes.run_spec import RunSpec
 from .fmu_archive import REQUIRED_VARIABLES, exposes_solver_steps, read_description, unpack
-from .fmu_instance import CALL_FAILURES, FmuInstance, LogCapture, capture_stderr
+from .fmu_instance import FmuInstance, LogCapture, capture_stderr
 from .recorder import default_outputs
 from .session import QUIET, ProgressCallback, Session
 from .stepping import POINT_TOLERANCE
 from .trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from .external.simulation import ChildSession
 
 DEFAULT_COMMUNICATION_STEPS = 512  # of a run without a communication step of its own
 
@@ -42,12 +45,8 @@ def run(spec: RunSpec, report: ProgressCallback) -> Trajectory:
     spec = replace(spec, outputs=spec.outputs or default_outputs(description, spec.values))
     if not spec.outputs:
         raise HarnessError(f"{spec.fmu.name} has no outputs or locals to record")
-    if exposes_solver_steps(description) and not spec.exchange:
-        trajectory = run_own_fmu(spec, report)
-    else:
-        from .external import simulation as external
-
-        trajectory = external.simulate(spec, description, report)
+    with open_session(spec) as session:
+        trajectory = session.run(report=report)
     if len(spec.times):
         return keep_times(trajectory, np.asarray(spec.times, dtype=float))
     return trajectory if spec.interval is None else keep_interval(trajectory, spec.interval)
@@ -95,10 +94,36 @@ def run_own_fmu(spec: RunSpec, report: ProgressCallback = QUIET) -> Trajectory:
         If the run fails, with the message of the FMU.
     """
     with open_instance(spec) as instance:
-        try:
-            return Session(instance, spec).run(report=report)
-        except CALL_FAILURES as error:
-            raise HarnessError(instance.log.error_message or f"{spec.fmu.name}: {error}") from None
+        return Session(instance, spec).run(report=report)
+
+
+def runs_in_process(spec: RunSpec) -> bool:
+    """Return whether an FMU runs in this process: one of this project, for co-simulation in FMI 2.0."""
+    return exposes_solver_steps(read_description(spec.fmu, spec.lenient)) and not spec.exchange
+
+
+@contextmanager
+def open_session(
+    spec: RunSpec, varied: Sequence[str] = (), read: Sequence[str] = ()
+) -> "Iterator[Session | ChildSession]":
+    """Open the session of a run: in this process, or in a worker if the FMU is external.
+
+    Parameters
+    ----------
+    spec : RunSpec
+    varied : sequence of str
+        Variables whose values differ from run to run.
+    read : sequence of str
+        Variables that are read at the end of runs in this process.
+    """
+    if runs_in_process(spec):
+        with open_instance(spec) as instance:
+            yield Session(instance, spec, varied, read)
+    else:
+        from .external.simulation import ChildSession
+
+        with ChildSession(spec, read_description(spec.fmu, spec.lenient), varied) as session:
+            yield session
 
 
 def read_own_description(spec: RunSpec) -> Any:

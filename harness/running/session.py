@@ -21,7 +21,7 @@ from ..scenes.run_spec import RunSpec
 from ..scenes.scene import SHORT_KEYS
 from .fmu_archive import read_fixed_choices, resolve_time_span
 from .fmu_contacts import read_contacts
-from .fmu_instance import FmuInstance, call_all
+from .fmu_instance import CALL_FAILURES, FmuInstance, call_all
 from .recorder import Columns, Recorder, ShapedVariable, c_type, read_rows
 from .signals import ModeChanges
 from .stepping import CoSimulation, TimeGrid, check_inputs, input_signals, make_grid, step_to_stop
@@ -208,14 +208,23 @@ class Session:
         return RecordedRun(*read_rows(self.rows.getbuffer(), self.selection, instance.is_fmi2), evaluations)
 
     def run(self, point: Sequence[float] = (), report: ProgressCallback = QUIET) -> Trajectory:
-        """Run `repeat` times with the values of the varied variables; return the last run with the fastest time."""
+        """Run `repeat` times with the values of the varied variables; return the last run with the fastest time.
+
+        Raises
+        ------
+        HarnessError
+            If the run fails, with the message of the FMU.
+        """
         repeat, seconds = self.spec.repeat, list[float]()
-        for _ in range(repeat):
-            self.start(point)
-            started = perf_counter()
-            recorded = self.record(lambda share: report((len(seconds) + share) / repeat))
-            seconds.append(perf_counter() - started)
-        return self.build_trajectory(recorded, min(seconds))
+        try:
+            for _ in range(repeat):
+                self.start(point)
+                started = perf_counter()
+                recorded = self.record(lambda share: report((len(seconds) + share) / repeat))
+                seconds.append(perf_counter() - started)
+            return self.build_trajectory(recorded, min(seconds))
+        except CALL_FAILURES as error:
+            raise HarnessError(self.instance.log.error_message or f"{self.spec.fmu.name}: {error}") from None
 
     def build_trajectory(self, recorded: RecordedRun, seconds: float) -> Trajectory:
         """Build the trajectory of a run that has ended; `seconds` is its run time in s."""

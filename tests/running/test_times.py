@@ -10,7 +10,7 @@ from fmi3_fixtures import build_fmi3_fmus
 from spec_runs import run_spec
 
 import harness
-from harness.running import runner
+from harness.running.session import find_step_ends
 from harness.scenes.run_spec import RunSpec
 
 UNEVEN = np.sort(np.random.default_rng(2).uniform(0.01, 7.99, 40))
@@ -58,7 +58,7 @@ def test_equal_steps_divide_the_time_from_start_to_stop(fmus):
 
 @pytest.mark.parametrize(("next_step", "ends"), [(2.0, [0, 1, 2]), (2.0 + 1e-12, [0, 1, 2]), (2.5, [0, 1])])
 def test_the_last_internal_step_may_end_a_rounding_after_the_stop(next_step, ends):
-    rows = runner.find_step_ends(np.array([0.0, 1.0, 2.0]), np.array([1.0, next_step, 3.0]), 1e-9)
+    rows = find_step_ends(np.array([0.0, 1.0, 2.0]), np.array([1.0, next_step, 3.0]), 1e-9)
     assert rows.tolist() == ends
 
 

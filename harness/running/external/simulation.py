@@ -1,13 +1,16 @@
-"""Run of an external FMU in a worker process, and its result."""
+"""Session of an external FMU in a worker process, and the trajectories of its runs."""
 
 import json
 import os
 import signal
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
 from dataclasses import replace
+from functools import cached_property
 from math import inf
 from pathlib import Path
-from typing import Any
+from types import TracebackType
+from typing import Any, Self
 
 import fmpy
 import numpy as np
@@ -19,6 +22,7 @@ from ...scenes.run_spec import RunSpec
 from ..event_mode import check_clocks
 from ..fmu_archive import resolve_time_span, unpack
 from ..recorder import Columns, ShapedVariable, array_shape, element_names, read_rows, select_variables
+from ..session import QUIET
 from ..stepping import check_inputs
 from ..trajectory import Trajectory
 from ..variable_values import convert_value, effective_value, variable_unit
@@ -36,49 +40,112 @@ GRACE_PERIOD = 0.5  # s beyond the timeout: a report is up to 0.2 s older than t
 SETTABLE = ("parameter", "structuralParameter", "input")
 
 
-def simulate(spec: RunSpec, description: Any, report: Callable[[float], None]) -> Trajectory:
-    """Run an external FMU.
+class ChildSession:
+    """Runs of an external FMU that differ in values, in a worker process; a context manager, which ends the process.
 
-    Returns
-    -------
-    Trajectory
-        If the run is incomplete, `failure` contains the reason.
+    The FMU is unpacked once. A process whose run failed is replaced.
 
-    Raises
-    ------
-    SceneError
-        If the specification names variables or values that the FMU does not have.
-    HarnessError
-        If there is no result at all.
+    Parameters
+    ----------
+    spec : RunSpec
+        The run.
+    description : ModelDescription
+        Model description of the FMU.
+    varied : sequence of str
+        Variables whose values differ from run to run.
     """
-    variables = {variable.name: variable for variable in description.modelVariables}
-    exchange = spec.exchange or description.coSimulation is None
-    if exchange and description.modelExchange is None:
-        interfaces = " and ".join(offered_interfaces(description)) or "no interface"
-        problem = "model exchange is not among them" if spec.exchange else "neither co-simulation nor model exchange"
-        raise HarnessError(f"{spec.fmu.name} offers {interfaces}; {problem}")
-    check_clocks(description, exchange, spec.lenient)
-    values = convert_values(spec, variables)
-    check_inputs(spec.inputs, variables)
-    selection = select_variables(spec, variables, values)
-    start, stop = check_time_span(spec, description)
-    report(0.0)
-    with unpack(spec.fmu) as folder, temporary_directory("rows-") as directory:
-        check_library(spec.fmu, description, exchange, folder)
+
+    def __init__(self, spec: RunSpec, description: Any, varied: Sequence[str] = ()) -> None:
+        self.spec, self.description, self.varied = spec, description, varied
+        self.variables: Values = {variable.name: variable for variable in description.modelVariables}
+        self.exchange = spec.exchange or description.coSimulation is None
+        self.resources, self.worker = ExitStack(), Worker(memory_size())
+
+    def __enter__(self) -> Self:
+        self.resources.enter_context(self.worker)
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+        self.resources.close()
+
+    @cached_property
+    def folder(self) -> Path:
+        """Return the directory of the unpacked FMU."""
+        folder = self.resources.enter_context(unpack(self.spec.fmu))
+        check_library(self.spec.fmu, self.description, self.exchange, folder)
+        return folder
+
+    def run(self, point: Sequence[Any] = (), report: Callable[[float], None] = QUIET) -> Trajectory:
+        """Run with the values of the varied variables.
+
+        Returns
+        -------
+        Trajectory
+            If the run is incomplete, `failure` contains the reason.
+
+        Raises
+        ------
+        SceneError
+            If the specification names variables or values that the FMU does not have.
+        HarnessError
+            If there is no result at all.
+        """
+        spec = replace(self.spec, values={**self.spec.values, **dict(zip(self.varied, point, strict=True))})
+        self.check_interface()
+        values = convert_values(spec, self.variables)
+        check_inputs(spec.inputs, self.variables)
+        selection = select_variables(spec, self.variables, values)
+        start, stop = check_time_span(spec, self.description)
+        report(0.0)
         inputs = {name: tuple(map(float, column)) for name, column in spec.inputs.items()}
-        resolved = replace(spec, exchange=exchange, start=start, stop=stop, values=values, inputs=inputs)
-        outcome, output = run_in_worker(resolved, folder, directory, report)
-        time, columns = read_longest_rows(directory, outcome.run_number, selection, description.fmiVersion == "2.0")
-        texts = [json.loads(line) for line in read_lines(directory / STRINGS_FILE)]
-    failed = f"{spec.fmu.name}: {outcome.failure}" if outcome.failure else ""
-    if failed and len(time) and " at t = " not in failed:
-        failed += f", after t = {time[-1]:.9g} s"
-    if len(time) < 2:
-        raise HarnessError(failed or f"{spec.fmu.name} returns no values")
-    note_on_output = f"it printed: {output[-1][:MAX_VALUE_LENGTH]}" if output else ""
-    note = "; ".join(filter(None, (outcome.note, note_on_output)))
-    trajectory = build_trajectory(spec, variables, values, selection, time, columns, texts)
-    return replace(trajectory, note=note, failure=failed)
+        resolved = replace(spec, exchange=self.exchange, start=start, stop=stop, values=values, inputs=inputs)
+        with temporary_directory("rows-") as directory:
+            outcome, output = self.call_worker(resolved, directory, report)
+            is_fmi2 = self.description.fmiVersion == "2.0"
+            time, columns = read_longest_rows(directory, outcome.run_number, selection, is_fmi2)
+            texts = [json.loads(line) for line in read_lines(directory / STRINGS_FILE)]
+        failed = f"{spec.fmu.name}: {outcome.failure}" if outcome.failure else ""
+        if failed and len(time) and " at t = " not in failed:
+            failed += f", after t = {time[-1]:.9g} s"
+        if len(time) < 2:
+            raise HarnessError(failed or f"{spec.fmu.name} returns no values")
+        note_on_output = f"it printed: {output[-1][:MAX_VALUE_LENGTH]}" if output else ""
+        note = "; ".join(filter(None, (outcome.note, note_on_output)))
+        trajectory = build_trajectory(spec, self.variables, values, selection, time, columns, texts)
+        return replace(trajectory, note=note, failure=failed)
+
+    def check_interface(self) -> None:
+        """Check that the FMU offers the interface, and that its clocks can tick."""
+        if self.exchange and self.description.modelExchange is None:
+            interfaces = " and ".join(offered_interfaces(self.description)) or "no interface"
+            problem = "neither co-simulation nor model exchange"
+            if self.spec.exchange:
+                problem = "model exchange is not among them"
+            raise HarnessError(f"{self.spec.fmu.name} offers {interfaces}; {problem}")
+        check_clocks(self.description, self.exchange, self.spec.lenient)
+
+    def call_worker(
+        self, spec: RunSpec, directory: Path, report: Callable[[float], None]
+    ) -> tuple[RefinementResult, list[str]]:
+        """Run the FMU in the worker; return its result, or the reason why there is none, and the lines of its output.
+
+        The rows are written to files in `directory`.
+        """
+        try:
+            timeout = spec.timeout + GRACE_PERIOD
+            arguments = (run_unpacked_fmu, spec, self.folder, directory)
+            result = self.worker.call(*arguments, timeout=timeout, report=report)
+            if result.failure:
+                self.worker.kill()  # after a failure, the instance still exists
+            return result, self.worker.messages.splitlines()
+        except WorkerTimeoutError as error:
+            message = f"a call did not return within {spec.timeout:g} s (--timeout sets the limit)"
+            return RefinementResult(None, "", message), error.messages.splitlines()
+        except WorkerDiedError as error:
+            message = f"its binary exited with status {error.status}"
+            if error.status < 0:
+                message = f"its binary crashed ({signal.strsignal(-error.status)})"
+            return RefinementResult(None, "", message), error.messages.splitlines()
 
 
 def offered_interfaces(description: Any) -> list[str]:
@@ -132,25 +199,6 @@ def memory_size() -> int:
         return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     except (AttributeError, ValueError, OSError):
         return 0
-
-
-def run_in_worker(
-    spec: RunSpec, folder: Path, directory: Path, report: Callable[[float], None]
-) -> tuple[RefinementResult, list[str]]:
-    """Run the FMU in a worker; return its result, or the reason why there is none, and the lines of its output."""
-    with Worker(memory_size()) as worker:
-        try:
-            timeout = spec.timeout + GRACE_PERIOD
-            result = worker.call(run_unpacked_fmu, spec, folder, directory, timeout=timeout, report=report)
-            return result, worker.messages.splitlines()
-        except WorkerTimeoutError as error:
-            message = f"a call did not return within {spec.timeout:g} s (--timeout sets the limit)"
-            return RefinementResult(None, "", message), error.messages.splitlines()
-        except WorkerDiedError as error:
-            message = f"its binary exited with status {error.status}"
-            if error.status < 0:
-                message = f"its binary crashed ({signal.strsignal(-error.status)})"
-            return RefinementResult(None, "", message), error.messages.splitlines()
 
 
 def read_longest_rows(

@@ -1,21 +1,20 @@
 """Repeated runs of one FMU, in a worker of a sweep.
 
 An FMU of this project is instantiated once and reset before each run.  Other FMUs are run as by `run --fmu`, with step
-refinement.
+refinement, in one worker process.
 """
 
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from time import perf_counter
 from typing import Any
 
 from ...errors import HarnessError, check_names
-from ...running import runner
-from ...running.fmu_archive import exposes_solver_steps, read_description, resolve_time_span
-from ...running.fmu_instance import CALL_FAILURES, FmuInstance
+from ...running.fmu_archive import read_description, resolve_time_span
+from ...running.fmu_instance import CALL_FAILURES
 from ...running.recorder import default_outputs
-from ...running.runner import open_instance
+from ...running.runner import open_session, runs_in_process
 from ...running.session import Session
 from ...running.variable_values import variable_unit
 from ...scenes.roles import find_roles
@@ -57,25 +56,25 @@ class OwnFmuRunner:
     `columns` are the measured columns; `stop` is the stop time in s.
     """
 
-    def __init__(self, runs: SweepSpec, instance: FmuInstance) -> None:
-        self.instance, self.variables = instance, instance.variables
+    def __init__(self, runs: SweepSpec, description: Any, resources: ExitStack) -> None:
+        self.variables = {variable.name: variable for variable in description.modelVariables}
         measures = select_measures(runs, self.variables, is_own_fmu=True)
         motion = find_roles(self.variables)
         outputs = tuple(motion[role] for role in ("position", "velocity") if role in motion)
         if len(outputs) < 2:
-            outputs = tuple(
-                name for name in default_outputs(instance.description) if self.variables[name].type == "Real"
-            )
+            outputs = tuple(name for name in default_outputs(description) if self.variables[name].type == "Real")
         run = replace(runs.run, outputs=outputs)
         ends = [name for name in measures if name in FINAL_MEASURES]
         self.trajectory_measures = [
             name for name in measures if name in TRAJECTORY_MEASURES or (name in OUTPUT_MEASURES and name != "final")
         ]
         if self.trajectory_measures:
-            start, stop = resolve_time_span(run, instance.description)
+            start, stop = resolve_time_span(run, description)
             run = replace(run, grid=(stop - start) / N_STEPS, follow=True)
         to_read = [*outputs, *(FINAL_MEASURES[name][1] for name in ends)]
-        self.session = Session(instance, run, runs.varied, to_read)
+        session = resources.enter_context(open_session(run, runs.varied, to_read))
+        assert isinstance(session, Session)
+        self.session = session
         self.stop = self.session.grid.stop
         self.columns = measure_columns(measures, self.variables, outputs)
         read = [
@@ -91,7 +90,7 @@ class OwnFmuRunner:
         try:
             return self.measure_run(point)
         except CALL_FAILURES as error:
-            return self.instance.log.error_message or str(error)
+            return self.session.instance.log.error_message or str(error)
         except HarnessError as error:
             return str(error)
 
@@ -122,24 +121,24 @@ class OwnFmuRunner:
 
 
 class ExternalFmuRunner:
-    """Runs an FMU that does not expose its internal steps, in a separate process for each run."""
+    """Runs an FMU that does not expose its internal steps, in a worker process."""
 
-    def __init__(self, runs: SweepSpec, fmu_description: Any) -> None:
-        self.varied, self.stop = runs.varied, 0.0
-        self.variables = {variable.name: variable for variable in fmu_description.modelVariables}
+    def __init__(self, runs: SweepSpec, description: Any, resources: ExitStack) -> None:
+        self.stop = 0.0
+        self.variables = {variable.name: variable for variable in description.modelVariables}
         self.measures = select_measures(runs, self.variables, is_own_fmu=False)
         texts = {name for name, variable in self.variables.items() if variable.type == "String"}
-        outputs = tuple(name for name in default_outputs(fmu_description) if name not in texts)
+        outputs = tuple(name for name in default_outputs(description) if name not in texts)
         # a table of values has no place for the error of each run, so a run that misses the tolerance fails
-        self.shared = replace(runs.run, outputs=outputs, follow=True, tolerance=runs.run.rtol)
+        run = replace(runs.run, outputs=outputs, follow=True, tolerance=runs.run.rtol)
+        self.session = resources.enter_context(open_session(run, runs.varied))
         self.columns = measure_columns(self.measures, self.variables, outputs)
         self.parameters_used: dict[str, tuple[object, str]] = {}
 
     def run(self, point: Sequence[float]) -> list[float] | str:
-        values = {**self.shared.values, **dict(zip(self.varied, point, strict=True))}
         start = perf_counter()
         try:
-            trajectory = runner.run(replace(self.shared, values=values), lambda share: None)
+            trajectory = self.session.run(point)
         except HarnessError as error:
             return str(error)
         seconds = perf_counter() - start
@@ -168,9 +167,7 @@ def select_measures(runs: SweepSpec, variables: dict[str, Any], is_own_fmu: bool
 @contextmanager
 def open_runner(runs: SweepSpec) -> Iterator[Runner]:
     """Open the runner of the FMU."""
-    fmu_description = read_description(runs.run.fmu, runs.run.lenient)
-    if exposes_solver_steps(fmu_description) and not runs.run.exchange:
-        with open_instance(runs.run) as instance:
-            yield OwnFmuRunner(runs, instance)
-    else:
-        yield ExternalFmuRunner(runs, fmu_description)
+    description = read_description(runs.run.fmu, runs.run.lenient)
+    runner = OwnFmuRunner if runs_in_process(runs.run) else ExternalFmuRunner
+    with ExitStack() as resources:
+        yield runner(runs, description, resources)
