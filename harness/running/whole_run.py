@@ -10,7 +10,7 @@ import shutil
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
-from ctypes import CDLL, Array, Structure, addressof, byref, c_double, c_int, c_size_t, c_uint32, c_void_p, cast
+from ctypes import CDLL, Structure, addressof, byref, c_double, c_int, c_size_t, c_void_p, cast
 from dataclasses import dataclass
 from functools import cache, lru_cache
 from importlib.util import find_spec
@@ -83,62 +83,15 @@ class RealVariable:
     unit: str
 
 
-class RunSession:
-    """A session that is reset before each run.
-
-    Parameters
-    ----------
-    fmu : pathlib.Path
-        FMU for co-simulation.
-    limit : float
-        Processor time in s that one run may take.
-    """
-
-    def __init__(self, fmu: Path, limit: float) -> None:
-        try:
-            session = self.session = FmuInstance(read_description(fmu), unpack_once(fmu))
-        except HarnessError as error:
-            raise HarnessError(f"{fmu.name} cannot be loaded: {error}") from None
-        self.limit, self.loop, self.is_new = limit, compile_loop(), True
-        version, cosimulation = session.description.fmiVersion, session.description.coSimulation
-        self.interpolates_inputs = version == "2.0" and cosimulation.canInterpolateInputs
-        self.functions = (c_void_p * len(FUNCTIONS[version]))(
-            *(cast(session.function(name), c_void_p) for name in FUNCTIONS[version])
-        )
-        self.references: dict[tuple[str, ...], Array[c_uint32]] = {}
-        self.handle = FmuStruct(int(version[0]), cast(self.functions, c_void_p), session.component, limit)
-
-    def prepare(self, spec: RunSpec) -> Run:
-        """Prepare runs that differ in Reals only."""
-        return PreparedRun(spec, self).run
-
-    def reset(self) -> None:
-        """Reset the instance if it is not new."""
-        if not self.is_new:
-            self.session.reset()
-        self.is_new = False
-
-    def make_struct(self, names: tuple[str, ...], values: np.ndarray) -> VariablesStruct:
-        """Return the struct of variables and values; the value references are cached."""
-        if names not in self.references:
-            references = [self.session.variables[name].valueReference for name in names]
-            self.references[names] = (c_uint32 * len(names))(*references)
-        return VariablesStruct(addressof(self.references[names]), len(names), values.ctypes.data)
-
-    def close(self) -> None:
-        """Free the instance."""
-        self.session.close()
-
-
-class PreparedRun:
+class CompiledLoop:
     """Arguments of whole_run.c for runs that differ in Reals only, and the runs.
 
     Parameters
     ----------
     spec : RunSpec
         Specification of the runs, which must not follow the steps of the solver.
-    runs : RunSession
-        Session in which the run is done.
+    simulator : Simulator
+        Its instance does the runs.
 
     Attributes
     ----------
@@ -154,18 +107,18 @@ class PreparedRun:
         Outputs (recorded points, outputs).
     """
 
-    def __init__(self, spec: RunSpec, runs: RunSession) -> None:
+    def __init__(self, spec: RunSpec, simulator: "Simulator") -> None:
         assert not spec.follow
-        self.runs, session = runs, runs.session
-        self.settings = [(session.variables[name], value) for name, value in spec.values.items()]
-        start, stop = resolve_time_span(spec, session.description)
+        self.simulator, self.instance = simulator, simulator.instance
+        self.settings = [(self.instance.variables[name], value) for name, value in spec.values.items()]
+        start, stop = resolve_time_span(spec, simulator.description)
         grid = make_grid(spec, start, stop)
         self.t = grid.points
         self.is_recorded = np.full(len(self.t), len(spec.times) in (0, len(self.t)))
         if not self.is_recorded[0]:
             self.is_recorded[np.searchsorted(self.t, np.asarray(spec.times, dtype=float) - grid.tolerance)] = True
         self.slopes: np.ndarray | None = None
-        if runs.interpolates_inputs and spec.inputs:
+        if simulator.interpolates_inputs and spec.inputs:
             self.u, self.slopes = ramps_of_steps(spec.inputs, self.t)
         else:
             self.u = values_of_steps(spec.inputs, self.t)
@@ -177,10 +130,10 @@ class PreparedRun:
         """Prepare the arguments for values of these variables."""
         self.names, self.x = names, np.zeros(len(names))
         self.structs = [
-            self.runs.make_struct(*variables)
+            self.simulator.make_struct(*variables)
             for variables in ((names, self.x), (self.inputs, self.u), (self.outputs, self.y))
         ]
-        pointers = [byref(self.runs.handle), *map(byref, self.structs)]
+        pointers = [byref(self.simulator.handle), *map(byref, self.structs)]
         arrays = [c_void_p(array.ctypes.data) for array in (self.t, self.is_recorded)]
         self.orders = (c_int * len(self.inputs))(*[1] * len(self.inputs))
         slopes = None if self.slopes is None else self.slopes.ctypes.data
@@ -192,12 +145,12 @@ class PreparedRun:
             self.name_values(tuple(values))
         self.x[:] = [*values.values()]
         try:
-            self.runs.reset()
+            self.instance.restart()
             for variable, value in self.settings:
-                self.runs.session.set(variable, value)
-            if self.runs.loop is None:
+                self.instance.set(variable, value)
+            if self.simulator.loop is None:
                 self.run_in_python()
-            elif self.runs.loop.run(*self.arguments):
+            elif self.simulator.loop.run(*self.arguments):
                 return None
         except (*CALL_FAILURES, RunTimeError):
             return None
@@ -205,23 +158,23 @@ class PreparedRun:
 
     def run_in_python(self) -> None:
         """Make the calls of whole_run.c from Python; raise RunTimeError if it would return FAILED or TOO_SLOW."""
-        session, t, start_time = self.runs.session, self.t.tolist(), process_time()
-        inputs = [session.variables[name] for name in self.inputs]
+        instance, t, start_time = self.instance, self.t.tolist(), process_time()
+        inputs = [instance.variables[name] for name in self.inputs]
         assert self.names is not None
         start = [*zip(self.names, self.x.tolist(), strict=True), *zip(self.inputs, self.u[0].tolist(), strict=True)]
-        session.initialize([(session.variables[name], value) for name, value in start], t[0], t[-1])
+        instance.initialize([(instance.variables[name], value) for name, value in start], t[0], t[-1])
         rows = iter(self.y)
         for i in range(len(t)):
             if i:
                 for variable, value in zip(inputs, self.u[i].tolist(), strict=True):
-                    session.set(variable, value)
+                    instance.set(variable, value)
                 if self.slopes is not None:
                     references = [variable.valueReference for variable in inputs]
-                    session.fmu.setRealInputDerivatives(references, [1] * len(inputs), self.slopes[i].tolist())
-                session.step(t[i - 1], t[i] - t[i - 1])
+                    instance.fmu.setRealInputDerivatives(references, [1] * len(inputs), self.slopes[i].tolist())
+                instance.step(t[i - 1], t[i] - t[i - 1])
             if self.is_recorded[i]:
-                next(rows)[:] = [session.get(name) for name in self.outputs]
-            if i % STEPS_PER_CHECK == 0 and process_time() - start_time > self.runs.limit:
+                next(rows)[:] = [instance.get(name) for name in self.outputs]
+            if i % STEPS_PER_CHECK == 0 and process_time() - start_time > self.simulator.spec.timeout:
                 raise RunTimeError
         if not np.isfinite(self.y).all():
             raise RunTimeError
@@ -231,27 +184,96 @@ class RunTimeError(Exception):
     """A run exceeds its time limit, or outputs are not finite."""
 
 
-class WorkerSession:
-    """Runs of an external FMU in a worker process, which is replaced when it crashes or exceeds the time limit.
+class Simulator:
+    """Runs of one FMU in this process, each in one call of the compiled loop.
 
     Parameters
     ----------
     spec : RunSpec
-        Settings that all runs share.
+        Settings that all runs share: the FMU, values of variables of any type, and as `timeout` the seconds of
+        processor time that one run may take.
+
+    Attributes
+    ----------
+    variables : dict of RealVariable
+        The scalar Reals of the FMU by name.
+    n_runs : int
+        Number of runs up to now.
     """
 
     def __init__(self, spec: RunSpec) -> None:
-        self.worker, self.timeout = Worker(), spec.timeout + BUSY_TIME
+        self.spec, self.n_runs = spec, 0
+        self.description = read_description(spec.fmu)
+        self.variables = real_variables(self.description)
+        self.load()
+
+    def load(self) -> None:
+        """Instantiate the FMU, and prepare the calls of the loop."""
         try:
-            self.worker.call(load_session, spec.fmu, spec.timeout, timeout=self.timeout)
+            instance = self.instance = FmuInstance(self.description, unpack_once(self.spec.fmu))
+        except HarnessError as error:
+            raise HarnessError(f"{self.spec.fmu.name} cannot be loaded: {error}") from None
+        version, cosimulation = self.description.fmiVersion, self.description.coSimulation
+        self.loop = compile_loop()
+        self.interpolates_inputs = version == "2.0" and cosimulation.canInterpolateInputs
+        self.functions = (c_void_p * len(FUNCTIONS[version]))(
+            *(cast(instance.function(name), c_void_p) for name in FUNCTIONS[version])
+        )
+        self.references: dict[tuple[str, ...], Any] = {}
+        functions = cast(self.functions, c_void_p)
+        self.handle = FmuStruct(int(version[0]), functions, instance.component, self.spec.timeout)
+
+    def prepare(self, spec: RunSpec) -> Run:
+        """Return a function that runs a specification with other values of Reals.
+
+        Parameters
+        ----------
+        spec : RunSpec
+            Specification of the simulator with other outputs, inputs or times.
+
+        Returns
+        -------
+        callable
+            Receives values by name. Returns the outputs (times, outputs), at all communication points if there are no
+            `times`; None if the FMU refuses the values, crashes or is too slow.
+        """
+        run = self.prepare_run(spec)
+
+        def run_values(values: Mapping[str, float]) -> np.ndarray | None:
+            self.n_runs += 1
+            return run(values)
+
+        return run_values
+
+    def prepare_run(self, spec: RunSpec) -> Run:
+        """Prepare runs that differ in Reals only."""
+        return CompiledLoop(spec, self).run
+
+    def make_struct(self, names: tuple[str, ...], values: np.ndarray) -> VariablesStruct:
+        """Return the struct of variables and values; the value references are cached."""
+        if names not in self.references:
+            self.references[names] = self.instance.make_references([self.instance.variables[name] for name in names])
+        return VariablesStruct(addressof(self.references[names]), len(names), values.ctypes.data)
+
+    def close(self) -> None:
+        """Free the instance."""
+        self.instance.close()
+
+
+class ChildSimulator(Simulator):
+    """Runs of an external FMU in a worker process, which is replaced when it crashes or exceeds the time limit."""
+
+    def load(self) -> None:
+        self.worker, self.timeout = Worker(), self.spec.timeout + BUSY_TIME
+        try:
+            self.worker.call(load_simulator, self.spec.fmu, self.spec.timeout, timeout=self.timeout)
         except BaseException as error:
             self.close()
             if isinstance(error, WorkerError):
-                raise HarnessError(f"{spec.fmu.name} cannot be loaded: it crashes or hangs") from None
+                raise HarnessError(f"{self.spec.fmu.name} cannot be loaded: it crashes or hangs") from None
             raise
 
-    def prepare(self, spec: RunSpec) -> Run:
-        """Prepare runs that differ in Reals only."""
+    def prepare_run(self, spec: RunSpec) -> Run:
         pickled_spec = pickle.dumps(spec)
 
         def run(values: Mapping[str, float]) -> np.ndarray | None:
@@ -271,21 +293,21 @@ class WorkerSession:
 
 
 @cache
-def open_session(fmu: Path, limit: float) -> RunSession:
-    """Return the session of an FMU, with a limit of the processor time of a run in s."""
-    return RunSession(fmu, limit)
+def get_simulator(fmu: Path, limit: float) -> Simulator:
+    """Return the simulator of an FMU, with a limit of the processor time of a run in s."""
+    return Simulator(RunSpec(fmu, timeout=limit))
 
 
-def load_session(fmu: Path, limit: float) -> None:
+def load_simulator(fmu: Path, limit: float) -> None:
     """Load an FMU."""
-    open_session(fmu, limit)
+    get_simulator(fmu, limit)
 
 
 @lru_cache(MAX_PREPARED)
-def prepare_pickled_spec(pickled_spec: bytes) -> PreparedRun:
-    """Return the run of a specification, which is compared by its bytes."""
+def prepare_pickled_spec(pickled_spec: bytes) -> "CompiledLoop":
+    """Return the runs of a specification, which is compared by its bytes."""
     spec = pickle.loads(pickled_spec)
-    return PreparedRun(spec, open_session(spec.fmu, spec.timeout))
+    return CompiledLoop(spec, get_simulator(spec.fmu, spec.timeout))
 
 
 def run_pickled_spec(pickled_spec: bytes, values: dict[str, float]) -> np.ndarray | None:
@@ -293,56 +315,9 @@ def run_pickled_spec(pickled_spec: bytes, values: dict[str, float]) -> np.ndarra
     return prepare_pickled_spec(pickled_spec).run(values)
 
 
-class Simulator:
-    """Runs of one FMU with different values.
-
-    Attributes
-    ----------
-    spec : RunSpec
-        Settings that all runs share.
-    variables : dict of RealVariable
-        The scalar Reals of the FMU by name.
-    n_runs : int
-        Number of runs up to now.
-    """
-
-    def __init__(
-        self, spec: RunSpec, variables: Mapping[str, RealVariable], session: "RunSession | WorkerSession"
-    ) -> None:
-        self.spec, self.variables, self.session, self.n_runs = spec, variables, session, 0
-
-    def prepare(self, spec: RunSpec) -> Run:
-        """Return a function that runs a specification with other values of Reals.
-
-        Parameters
-        ----------
-        spec : RunSpec
-            Specification of the simulator with other outputs, inputs or times.
-
-        Returns
-        -------
-        callable
-            Receives values by name. Returns the outputs (times, outputs), at all communication points if there are no
-            `times`; None if the FMU refuses the values, crashes or is too slow.
-        """
-        run = self.session.prepare(spec)
-
-        def run_values(values: Mapping[str, float]) -> np.ndarray | None:
-            self.n_runs += 1
-            return run(values)
-
-        return run_values
-
-
 @contextmanager
 def open_simulator(spec: RunSpec) -> Iterator[Simulator]:
     """Instantiate an FMU for many runs; one that is not of this project runs in a worker process.
-
-    Parameters
-    ----------
-    spec : RunSpec
-        Settings that all runs share: the FMU, values of variables of any type, and as `timeout` the seconds of
-        processor time that one run may take.
 
     Raises
     ------
@@ -352,15 +327,13 @@ def open_simulator(spec: RunSpec) -> Iterator[Simulator]:
     description = read_description(spec.fmu)
     if description.coSimulation is None:
         raise HarnessError(f"{spec.fmu.name} offers no co-simulation: export it for co-simulation")
-    session: RunSession | WorkerSession
     with ExitStack() as stack:
-        if exposes_solver_steps(description):
+        is_own = exposes_solver_steps(description)
+        if is_own:
             stack.enter_context(capture_stderr())  # an FMU prints a sentence about each set that it refuses
-            session = RunSession(spec.fmu, spec.timeout)
-        else:
-            session = WorkerSession(spec)
-        stack.callback(session.close)
-        yield Simulator(spec, real_variables(description), session)
+        simulator = Simulator(spec) if is_own else ChildSimulator(spec)
+        stack.callback(simulator.close)
+        yield simulator
 
 
 def real_variables(description: Any) -> dict[str, RealVariable]:

@@ -44,10 +44,10 @@ def run_each_way(simulator, spec, values):
     In a child process, both are the compiled loop.
     """
     compiled = simulator.prepare(spec)(values)
-    loop = getattr(simulator.session, "loop", None)
-    simulator.session.loop = None
+    loop = getattr(simulator, "loop", None)
+    simulator.loop = None
     stepped = simulator.prepare(spec)(values)
-    simulator.session.loop = loop
+    simulator.loop = loop
     assert (compiled is None and stepped is None) or np.array_equal(compiled, stepped)
     return compiled
 
@@ -168,14 +168,14 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 import numpy as np
-from harness.running.whole_run import RunSession
+from harness.running.whole_run import Simulator
 from harness.scenes.run_spec import RunSpec
 
-session = RunSession(Path(sys.argv[1]), 60.0)
-session.loop = None
+simulator = Simulator(RunSpec(Path(sys.argv[1])))
+simulator.loop = None
 spec = RunSpec(Path("Faulty.fmu"), ("x",), times=np.linspace(0.0, 1.0, 11), follow=False)
-print(session.prepare(spec)({}) is None, session.prepare(replace(spec, values={"kind": 5}))({}) is None)
-session.close()
+print(simulator.prepare(spec)({}) is None, simulator.prepare(replace(spec, values={"kind": 5}))({}) is None)
+simulator.close()
 """
 
 
