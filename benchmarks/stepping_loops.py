@@ -37,7 +37,7 @@ def time_fmpy_loop(file: Path, steps: int) -> float:
 
 def time_direct_loop(file: Path, steps: int) -> float:
     """Return the run time in s of the harness's loop, from initialization on, the fastest of several runs."""
-    description = read_own_description(RunSpec(file))
+    description = read_own_description(file)
     stop = float(description.defaultExperiment.stopTime)
     outputs = tuple(v.name for v in description.modelVariables if v.causality == "output")
     statistics = run_own_fmu(

@@ -244,8 +244,13 @@ def resolve_stop(spec: RunSpec, description: Any) -> float | None:
     """Return the stop time of a run in s, or None if neither the specification nor the FMU has one."""
     if spec.stop is None and len(spec.times):
         return float(spec.times[-1])
-    default_stop = description.defaultExperiment.stopTime if description.defaultExperiment else None
-    return spec.stop if spec.stop is not None else None if default_stop is None else float(default_stop)
+    return default_stop(description) if spec.stop is None else spec.stop
+
+
+def default_stop(description: Any) -> float | None:
+    """Return the stop time of an FMU in s, or None if it has none."""
+    experiment = description.defaultExperiment
+    return None if experiment is None or experiment.stopTime is None else float(experiment.stopTime)
 
 
 def read_fmi_version(path: Path) -> str:

@@ -4,7 +4,6 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..scenes.fmu_files import find_fmu
-from ..scenes.run_spec import RunSpec
 from .fmu_archive import read_fixed_choices
 from .fmu_variables import METHOD
 from .runner import read_own_description
@@ -31,7 +30,7 @@ class FmuInfo:
 def read_info(model: str) -> FmuInfo:
     """Return the capabilities of a model's FMU."""
     fmu = find_fmu(model)
-    description = read_own_description(RunSpec(fmu))
+    description = read_own_description(fmu)
     settable = [variable for variable in description.modelVariables if variable.causality in ("parameter", "input")]
     enumerations = {variable.name: variable for variable in settable if variable.type == "Enumeration"}
     choices = {

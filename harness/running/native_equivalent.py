@@ -10,7 +10,7 @@ from ..process.subprocess_runner import SubprocessTimeoutError, run_module
 from ..process.temporary_directory import temporary_directory
 from ..scenes.fmu_files import FOLDERS
 from ..scenes.run_spec import RunSpec
-from .fmu_archive import PROCESS_RESOURCES, cached_by_mtime, is_python_fmu, read_description, resolve_stop, unpack_once
+from .fmu_archive import PROCESS_RESOURCES, cached_by_mtime, default_stop, is_python_fmu, read_description, unpack_once
 from .whole_run import open_simulator, real_variables
 
 BUILD_TIMEOUT = 300.0  # s
@@ -53,7 +53,7 @@ def is_same_model(fmu: Path, other: Path) -> bool:
         return False
     variables = real_variables(read_description(fmu))
     outputs = tuple(name for name, variable in variables.items() if variable.causality == "output")
-    times = np.linspace(0.0, resolve_stop(RunSpec(fmu), read_description(fmu)) or 1.0, COMPARED_POINTS)
+    times = np.linspace(0.0, default_stop(read_description(fmu)) or 1.0, COMPARED_POINTS)
     runs = []
     for path in (fmu, other):
         with open_simulator(RunSpec(path, outputs, times=times, follow=False)) as simulator:

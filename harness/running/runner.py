@@ -126,7 +126,7 @@ def open_session(
             yield session
 
 
-def read_own_description(spec: RunSpec) -> Any:
+def read_own_description(fmu: Path, exchange: bool = False) -> Any:
     """Return the model description of an FMU of this project.
 
     Raises
@@ -134,19 +134,24 @@ def read_own_description(spec: RunSpec) -> Any:
     HarnessError
         If it cannot be read or does not offer the interface.
     SceneError
-        If the specification does not fit the FMU.
+        If it is not an FMU of this project.
     """
-    description = read_description(spec.fmu)
-    if (description.modelExchange if spec.exchange else description.coSimulation) is None:
-        raise HarnessError(f"{spec.fmu.name} offers no {'model exchange' if spec.exchange else 'co-simulation'}")
-    check_fmu(spec, {variable.name: variable for variable in description.modelVariables})
+    description = read_description(fmu)
+    if (description.modelExchange if exchange else description.coSimulation) is None:
+        raise HarnessError(f"{fmu.name} offers no {'model exchange' if exchange else 'co-simulation'}")
+    names = {variable.name for variable in description.modelVariables}
+    for name in REQUIRED_VARIABLES:
+        if name not in names:
+            raise SceneError(f"{fmu.name} has no variable {name}: it is not an FMU of this project")
     return description
 
 
 @contextmanager
 def open_instance(spec: RunSpec, unpacked: Path | None = None) -> Iterator[FmuInstance]:
     """Instantiate an FMU, unpacked in a temporary directory or before; capture its messages."""
-    description = read_own_description(spec)
+    description = read_own_description(spec.fmu, spec.exchange)
+    readable = [item.name for item in description.modelVariables if item.causality in ("output", "local")]
+    check_names("output", spec.outputs, readable)
     with ExitStack() as stack:
         folder = unpacked or stack.enter_context(unpack(spec.fmu))
         log = LogCapture(stack.enter_context(capture_stderr()))
@@ -156,12 +161,3 @@ def open_instance(spec: RunSpec, unpacked: Path | None = None) -> Iterator[FmuIn
             raise HarnessError(f"{spec.fmu.name} cannot be loaded: {error}") from None
         stack.callback(instance.close)
         yield instance
-
-
-def check_fmu(run: RunSpec, variables: dict[str, Any]) -> None:
-    """Check that the FMU is one of this project and has the outputs to record."""
-    for name in REQUIRED_VARIABLES:
-        if name not in variables:
-            raise SceneError(f"{run.fmu.name} has no variable {name}: it is not an FMU of this project")
-    readable = [name for name, variable in variables.items() if variable.causality in ("output", "local")]
-    check_names("output", run.outputs, readable)

@@ -4,6 +4,8 @@ fmpy reads a parameter set only if it is passed explicitly, and records no value
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 from zipfile import ZipFile
 
@@ -11,18 +13,25 @@ from fmpy.ssp.simulation import simulate_ssp
 from fmpy.ssp.ssd import read_ssv
 
 from ..process.temporary_directory import temporary_directory
-from ..scenes.run_spec import RunSpec
 
 
-def run_archive(run: RunSpec, variables: Sequence[Any], parameter_set: str) -> list[list[float]]:
+@dataclass(frozen=True)
+class ArchiveRun:
+    """Run of an SSP archive from 0 to `stop` in steps of `grid`, in s; names of the variables to record."""
+
+    archive: Path
+    outputs: tuple[str, ...]
+    stop: float
+    grid: float
+
+
+def run_archive(run: ArchiveRun, variables: Sequence[Any], parameter_set: str) -> list[list[float]]:
     """Run the archive and return one row per step."""
-    assert run.stop is not None
-    assert run.grid is not None
     stop = (round(run.stop / run.grid) - 0.5) * run.grid
-    with temporary_directory("ssv-") as directory, ZipFile(run.fmu) as content:
+    with temporary_directory("ssv-") as directory, ZipFile(run.archive) as content:
         name = "resources/parameters.ssv"
         parameters: Any = None
         if name in content.namelist():
             parameters = read_ssv(content.extract(name, directory))
-        rows = simulate_ssp(str(run.fmu), stop_time=stop, step_size=run.grid, parameter_set=parameters)
+        rows = simulate_ssp(str(run.archive), stop_time=stop, step_size=run.grid, parameter_set=parameters)
     return [[float(row[name]) for name in run.outputs] for row in rows]

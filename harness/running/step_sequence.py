@@ -4,8 +4,6 @@ Values are set without a check, because studies of stability and errors also set
 """
 
 import io
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from itertools import product
 from math import inf, isnan, nan
@@ -41,13 +39,6 @@ class RefusalSummary:
 
     n_tried: int
     failures: tuple[str, ...]
-
-
-@contextmanager
-def open_reusable_instance(spec: RunSpec) -> Iterator[FmuInstance]:
-    """Instantiate an FMU, whose files stay unpacked until the process ends."""
-    with open_instance(spec, unpack_once(spec.fmu)) as instance:
-        yield instance
 
 
 def initialize(instance: FmuInstance, spec: RunSpec) -> None:
@@ -102,7 +93,7 @@ def run_steps(spec: RunSpec, steps: CommunicationSteps, changes: ScheduledChange
     changes : dict
         Values to set at a time in s, by time.
     """
-    with open_reusable_instance(spec) as instance:
+    with open_instance(spec, unpack_once(spec.fmu)) as instance:
         outputs, rows = find_outputs(instance), io.BytesIO()
         recorded = [instance.variables[name] for name in outputs]
         selection: list[ShapedVariable] = [(variable, ()) for variable in recorded]
@@ -133,7 +124,7 @@ def inject_nonfinite(spec: RunSpec) -> RefusalSummary:
     The FMU must refuse each with a message that starts with the variable's name, and must run again after a reset.
     """
     failures, n_tried = [], 0
-    with open_reusable_instance(spec) as instance:
+    with open_instance(spec, unpack_once(spec.fmu)) as instance:
         for name, value, in_run in product(find_reals(instance, "parameter", "input"), (nan, inf, -inf), (False, True)):
             n_tried += 1
             instance.reset()

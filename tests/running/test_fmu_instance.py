@@ -1,12 +1,15 @@
-"""Instances of one process do not share their log."""
+"""Instances of one process do not share their log, and runs of one session do not depend on each other."""
 
 from contextlib import suppress
 
 import fmi3_fixtures
+import numpy as np
 import pytest
+from external_fmus import build_external_fmus
 
+from harness.errors import HarnessError
 from harness.running.fmu_instance import CALL_FAILURES, STATUS_NAMES, LogCapture
-from harness.running.runner import open_instance
+from harness.running.runner import open_instance, open_session
 from harness.scenes.run_spec import RunSpec
 
 
@@ -36,3 +39,28 @@ def test_a_later_warning_does_not_hide_an_error():
 @pytest.mark.slow
 def test_a_message_of_fmi3_is_in_the_log_of_its_instance():
     check_logs(fmi3_fixtures.build_fmi3_fmus())
+
+
+@pytest.mark.parametrize(
+    ("fmu", "name", "value", "refused", "message"),
+    [("smd", "m", 2.0, -1.0, "m = -1.0 kg is refused"), ("Faulty", "kind", 0, 2, "its binary crashed")],
+)
+def test_a_run_of_a_session_does_not_depend_on_earlier_runs(fmus, fmu, name, value, refused, message):
+    """Neither in this process, nor in a worker, which is replaced when an external FMU crashes."""
+    folder = fmus if fmu == "smd" else build_external_fmus()
+    spec = RunSpec(folder / f"{fmu}.fmu", ("x",), stop=1.0)
+    motions, failures = [], []
+    with open_session(spec, (name,)) as session:
+        for number in (value, refused, value, value):
+            try:
+                run = session.run([number])
+            except HarnessError as error:
+                failures.append(str(error))
+            else:
+                failures.append(run.failure)
+                motions += [] if run.failure else [run["x"]]
+    assert [bool(failure) for failure in failures] == [False, True, False, False]
+    assert message in failures[1]
+    assert np.ptp(motions[0]) > 0.0
+    for motion in motions[1:]:
+        np.testing.assert_array_equal(motion, motions[0])

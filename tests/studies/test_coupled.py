@@ -21,8 +21,8 @@ from spec_runs import ignore_progress
 import harness
 from harness.errors import HarnessError, SceneError
 from harness.references.single_model_reference import CoupledBodies, solve_bodies
+from harness.running.ssp import ArchiveRun
 from harness.scenes.coupled.scene import shipped_coupled_scenes
-from harness.scenes.run_spec import RunSpec
 from harness.studies.coupled import engine, study
 from harness.studies.coupled.engine import ENGINES
 
@@ -301,4 +301,4 @@ def test_an_engine_that_hangs_is_reported_by_name(monkeypatch, make_module):
     monkeypatch.setitem(ENGINES, "Sleeper", make_module("engine_that_sleeps", code).run_archive)
     monkeypatch.setattr(engine, "ENGINE_TIMEOUT", 0.3)
     with pytest.raises(HarnessError, match=r"Sleeper could not run pair\.ssp: no answer after 0\.3 s"):
-        engine.run_engine("Sleeper", RunSpec(Path("pair.ssp"), stop=0.1, grid=0.1), [])
+        engine.run_engine("Sleeper", ArchiveRun(Path("pair.ssp"), (), 0.1, 0.1), [])

@@ -5,21 +5,19 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from ...scenes.run_spec import RunSpec
+from ...running.ssp import ArchiveRun
 from .system import ElementVariable
 
 
-def run_archive(run: RunSpec, variables: Sequence[ElementVariable], parameter_set: str) -> list[list[float]]:
+def run_archive(run: ArchiveRun, variables: Sequence[ElementVariable], parameter_set: str) -> list[list[float]]:
     """Return the rows of a run."""
-    assert run.stop is not None
-    assert run.grid is not None
     if sys.platform == "linux":
         ctypes.CDLL(str(Path(sys.prefix) / "lib" / "libtbb.so.12"), ctypes.RTLD_GLOBAL)
     from ecospy import EcosLib, EcosSimulation
 
     EcosLib.set_log_level("warn")
     names = [f"{element}::{variable}" for element, variable, _ in variables]
-    with EcosSimulation(step_size=run.grid, ssp_path=str(run.fmu)) as simulation:
+    with EcosSimulation(step_size=run.grid, ssp_path=str(run.archive)) as simulation:
         simulation.init(parameter_set=parameter_set or None)
         rows = [[simulation.get_real(name) for name in names]]
         for _ in range(round(run.stop / run.grid)):

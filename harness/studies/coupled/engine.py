@@ -5,14 +5,13 @@ from collections.abc import Callable, Sequence
 from ...errors import HarnessError, install_command
 from ...process.worker import WorkerCallError, WorkerDiedError, call_once
 from ...running import ssp
-from ...scenes.run_spec import RunSpec
 from . import ecos, libcosim, master
 from .system import BOUND, EXCHANGE, MAPPED, NESTED, OUTER_VALUES, TRANSFORMED, UNITS, VERSION_2, ElementVariable
 
 ENGINE_TIMEOUT = 300.0  # s, for one run
 EXTRA = "coupled"
 MAIN_ENGINE = "Ecos"
-ENGINES: dict[str, Callable[[RunSpec, Sequence[ElementVariable], str], list[list[float]]]] = {
+ENGINES: dict[str, Callable[[ssp.ArchiveRun, Sequence[ElementVariable], str], list[list[float]]]] = {
     "own master": master.run_archive,
     "Ecos": ecos.run_archive,
     "libcosim": libcosim.run_archive,
@@ -26,7 +25,7 @@ UNSUPPORTED = {  # with these features an engine fails, or ignores them without 
 
 
 def run_engine(
-    engine: str, run: RunSpec, variables: Sequence[ElementVariable], parameter_set: str = ""
+    engine: str, run: ssp.ArchiveRun, variables: Sequence[ElementVariable], parameter_set: str = ""
 ) -> list[list[float]]:
     """Run an archive and return one row per communication point, without the start if the engine does not record it.
 
@@ -34,8 +33,8 @@ def run_engine(
     ----------
     engine : str
         Name of the engine, a key of ENGINES.
-    run : RunSpec
-        Run of the archive, whose path is in `fmu`: communication step `grid`, stop, and names of the variables.
+    run : ArchiveRun
+        The archive, communication step, stop, and names of the variables.
     variables : sequence of ElementVariable
         Element, name and value reference of each variable, by which engines address it.
     parameter_set : str
@@ -46,7 +45,7 @@ def run_engine(
     HarnessError
         If the engine fails or times out; the message has the last line of its output.
     """
-    failed = f"{engine} could not run {run.fmu.name}"
+    failed = f"{engine} could not run {run.archive.name}"
     try:
         rows: list[list[float]] = call_once(ENGINES[engine], run, variables, parameter_set, timeout=ENGINE_TIMEOUT)
     except (WorkerCallError, WorkerDiedError) as error:

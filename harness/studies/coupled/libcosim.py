@@ -3,16 +3,14 @@
 from collections.abc import Sequence
 
 from ...errors import HarnessError
-from ...scenes.run_spec import RunSpec
+from ...running.ssp import ArchiveRun
 from .system import ElementVariable
 
 NANO = 1e9  # libcosim counts time in ns
 
 
-def run_archive(run: RunSpec, variables: Sequence[ElementVariable], parameter_set: str) -> list[list[float]]:
+def run_archive(run: ArchiveRun, variables: Sequence[ElementVariable], parameter_set: str) -> list[list[float]]:
     """Return the rows of a run; the parameter set is that of the archive."""
-    assert run.stop is not None
-    assert run.grid is not None
     count = round(run.stop / run.grid)
     from libcosimpy.CosimEnums import CosimVariableType
     from libcosimpy.CosimExecution import CosimExecution
@@ -20,7 +18,7 @@ def run_archive(run: RunSpec, variables: Sequence[ElementVariable], parameter_se
     from libcosimpy.CosimObserver import CosimObserver
 
     log_output_level(CosimLogLevel.ERROR)
-    execution = CosimExecution.from_ssp_file(str(run.fmu), round(run.grid * NANO))
+    execution = CosimExecution.from_ssp_file(str(run.archive), round(run.grid * NANO))
     observer = CosimObserver.create_time_series(count + 1)
     execution.add_observer(observer)
     addresses = [(execution.slave_index_from_instance_name(element), reference) for element, _, reference in variables]

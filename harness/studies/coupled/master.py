@@ -16,9 +16,9 @@ from ...process.temporary_directory import temporary_directory
 from ...running.fmu_archive import unpack
 from ...running.fmu_instance import CALL_FAILURES, FmuInstance, LogCapture
 from ...running.model_exchange import ModelExchange
+from ...running.ssp import ArchiveRun
 from ...running.stepping import TimeGrid
 from ...running.variable_values import REAL_TYPES, convert_value
-from ...scenes.run_spec import RunSpec
 from .system import Component, CoupledSystem, ElementVariable, Node, read_system
 
 EXCHANGE_RTOL = 1e-10  # of components for model exchange
@@ -82,14 +82,12 @@ class Part:
                 self.stepper.handle_event(t)
 
 
-def run_archive(run: RunSpec, variables: Sequence[ElementVariable], parameter_set: str) -> list[list[float]]:
+def run_archive(run: ArchiveRun, variables: Sequence[ElementVariable], parameter_set: str) -> list[list[float]]:
     """Return the rows of a run; all parameter sets of the archive are applied."""
-    assert run.stop is not None
-    assert run.grid is not None
     grid = TimeGrid(0.0, run.stop, run.grid)
     with ExitStack() as stack:
         folder = stack.enter_context(temporary_directory("ssp-"))
-        with ZipFile(run.fmu) as archive:
+        with ZipFile(run.archive) as archive:
             archive.extractall(folder)
         system = read_system(folder)
         parts: dict[str, Part] = {}

@@ -21,10 +21,10 @@ from ...results.registry import find_study
 from ...results.summary import write_summary
 from ...running.fmu_archive import read_description
 from ...running.session import ProgressCallback
+from ...running.ssp import ArchiveRun
 from ...running.variable_values import REAL_TYPES, variable_unit
 from ...scenes.coupled.scene import CoupledScene, load_coupled_scene
 from ...scenes.fmu_files import find_fmu, list_models
-from ...scenes.run_spec import RunSpec
 from .convergence import Convergence
 from .engine import ENGINES, EXTRA, run_engine
 from .result import CoupledResult
@@ -220,5 +220,5 @@ def run_step(engine: str, plan: Convergence, archive: Path, step: float) -> np.n
     """Return the rows (m, n) of a run of an archive with a communication step in s."""
     if engine in plan.unsupported:
         raise HarnessError(plan.unsupported[engine])
-    run = RunSpec(archive, plan.names, stop=plan.stop, grid=step, follow=False)
+    run = ArchiveRun(archive, plan.names, plan.stop, step)
     return np.array(run_engine(engine, run, plan.read, plan.values))

@@ -14,7 +14,7 @@ from ...errors import SceneError, check_names, format_value
 from ...records.columns import ColumnOptions
 from ...records.record import MIN_SAMPLES
 from ...records.signal_table import SignalSource, SignalTable
-from ...running.fmu_archive import read_description, resolve_stop
+from ...running.fmu_archive import default_stop, read_description
 from ...running.variable_values import convert_value, enumeration_labels
 from ...running.whole_run import RealVariable, real_variables
 from ...scenes.run_spec import RunSpec
@@ -290,7 +290,7 @@ def record_data(resolved: ResolvedRequest, table: SignalTable) -> RecordData:
 
 def span_remarks(resolved: ResolvedRequest, records: Sequence[RecordData]) -> Iterator[str]:
     """Yield a remark on each record that lasts about a thousand times as long as a run of the FMU, or a thousandth."""
-    stop = resolve_stop(RunSpec(resolved.request.run.fmu), read_description(resolved.request.run.fmu))
+    stop = default_stop(read_description(resolved.request.run.fmu))
     for record in records:
         duration = float(record.t[-1] - record.t[0])
         ratio = duration / stop if stop else 1.0
