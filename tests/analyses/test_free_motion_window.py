@@ -103,7 +103,7 @@ def test_both_sides_of_a_gap_are_used(gap):
     assert fit.t[0] < gap[0] < gap[1] < fit.t[-1]
 
 
-@pytest.mark.parametrize(("hold", "phase"), [(0.05, 1.5), (0.12, 1.0)])
+@pytest.mark.parametrize(("hold", "phase"), [(0.12, 1.0), (0.3, 0.8)])
 def test_a_motion_that_starts_in_mid_swing_with_speed_costs_a_bounded_number_of_half_cycles(monkeypatch, hold, phase):
     """Held at its rest position before.  No law starts so, and a fit must not try laws with many more half cycles."""
     evaluated = []
@@ -121,4 +121,4 @@ def test_a_motion_that_starts_in_mid_swing_with_speed_costs_a_bounded_number_of_
     fit = fit_decay(Record("mid-swing", t, x), KnownParameters(), drag=False)
     assert values(fit.estimates)["zeta"] == pytest.approx(0.01, rel=0.1)
     assert max(evaluated) < 10 * 6 * 6 / np.pi
-    assert len(evaluated) < 2000
+    assert len(evaluated) < 400

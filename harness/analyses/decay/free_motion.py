@@ -14,7 +14,7 @@ from ...records.record import MIN_SAMPLES, Record
 from ..estimation.noise import robust_std
 from . import thresholds
 from .extrema import Extrema, estimate_noise
-from .fit_problem import FitProblem, FitResult, prepare_problem
+from .fit_problem import FitProblem, prepare_problem
 from .law import OMEGA, T0, TERMS, UNKNOWNS, Terms
 
 
@@ -54,8 +54,16 @@ class FreeMotion:
 
     def fit(self, problem: FitProblem, p: np.ndarray | None = None) -> Self:
         """Return the motion with the samples of another problem and their fit, from the starting values p."""
-        p, squares = fit_with_fallback(problem, self.p if p is None else p, self.terms)
+        p, squares = problem.fit(self.p if p is None else p, self.terms)
         return replace(self, problem=problem, p=p, sum_of_squares=squares)
+
+    def search(self, problem: FitProblem, p: np.ndarray | None = None) -> Self:
+        """Fit as `fit` does, and also by growing windows if that leaves more than noise; return the better fit."""
+        motion = self.fit(problem, p)
+        if not problem.exceeds_noise(motion.sum_of_squares):
+            return motion
+        start = problem.fit_growing_windows(self.p if p is None else p, self.terms)
+        return min(motion, self.fit(problem, start), key=lambda motion: motion.sum_of_squares)
 
     def residuals(self) -> np.ndarray:
         """Return the residuals (n,) of the selected samples."""
@@ -79,6 +87,7 @@ def select_free_motion(record: Record, extrema: Extrema, terms: Terms, pendulum:
         truncate_at_stop,
         remove_outliers,
         skip_disturbed_start,
+        skip_disturbed_turns,
         truncate_at_disturbance,
         estimate_final_noise,
     ):
@@ -95,14 +104,6 @@ def initial_problem(
     problem, p = prepare_problem(record, extrema, pendulum, drift)
     p[[UNKNOWNS.index(term) for term in TERMS if term not in terms]] = 0.0
     return problem, p
-
-
-def fit_with_fallback(problem: FitProblem, p: np.ndarray, terms: Terms) -> FitResult:
-    """Fit the law to all samples, and also by growing windows if that leaves more than noise; return the better fit."""
-    fit = problem.fit(p, terms)
-    if not problem.exceeds_noise(fit[1]):
-        return fit
-    return min(fit, problem.fit(problem.fit_growing_windows(p, terms), terms), key=lambda fit: fit[1])
 
 
 def skip_before_start(motion: FreeMotion) -> FreeMotion:
@@ -122,7 +123,7 @@ def fit_certain_samples(motion: FreeMotion) -> FreeMotion:
     """Fit the samples up to the last turning point."""
     problem, extrema = motion.available, motion.extrema
     last = extrema.t[-1] - problem.time_origin + thresholds.CERTAIN_TIME * extrema.half_period
-    return motion.fit(problem.subset(problem.t <= last))
+    return motion.search(problem.subset(problem.t <= last))
 
 
 def truncate_at_stop(motion: FreeMotion) -> FreeMotion:
@@ -174,13 +175,38 @@ def skip_disturbed_start(motion: FreeMotion) -> FreeMotion:
         return motion
     later, p = problem.skip_half_cycles(motion.p, 1)
     later = later.subset(~first)
-    undisturbed = motion.fit(later, p)
+    undisturbed = motion.search(later, p)
     if undisturbed.sum_of_squares / len(later.t) >= thresholds.BETTER_START * motion.sum_of_squares / len(e):
         return motion
     undisturbed = truncate_at_stop(replace(undisturbed, available=later))
     return undisturbed.add_note(
         f"The motion is free from t = {motion.format_time(later.t[0])} s on; earlier samples are left out."
     )
+
+
+def skip_disturbed_turns(motion: FreeMotion) -> FreeMotion:
+    """Start at the first or the second turning point if a motion before it that is not free bends the whole fit."""
+    problem, extrema, record = motion.problem, motion.extrema, motion.record
+    mean_square = motion.sum_of_squares / len(problem.t)
+    if mean_square <= (thresholds.DISTURBED * max(problem.noise, problem.residual_floor)) ** 2:
+        return motion
+    for count in (1, 2):
+        if len(extrema.t) < thresholds.MIN_UNDISTURBED + count:
+            break
+        begin = float(extrema.t[count - 1])
+        later = replace(extrema, t=extrema.t[count:], x=extrema.x[count:], t_start=begin)
+        available, p = initial_problem(record, later, motion.terms, problem.model.is_pendulum, problem.drift)
+        available = available.subset(available.t >= begin - available.time_origin)
+        undisturbed = replace(motion, extrema=later, available=available, problem=available, p=p)
+        undisturbed = remove_outliers(truncate_at_stop(fit_certain_samples(undisturbed)))
+        share = undisturbed.sum_of_squares / len(undisturbed.problem.t) * (available.scale / problem.scale) ** 2
+        if share < thresholds.BETTER_START * mean_square:
+            notes = [note for note in motion.notes if not note.startswith("The motion is free from")]
+            return replace(undisturbed, notes=tuple(notes)).add_note(
+                f"The motion is free from t = {motion.format_time(begin - problem.time_origin)} s on; earlier samples "
+                "are left out."
+            )
+    return motion
 
 
 def truncate_at_disturbance(motion: FreeMotion) -> FreeMotion:

@@ -34,6 +34,8 @@ class Swings:
         Half period in s.
     shape_error : numpy.ndarray
         Share (n + 1,) of the power about each turning point that no wave explains; NaN at the ends of the record.
+    is_hidden : numpy.ndarray
+        Whether a gap of the record hides a swing (n,), or several; its size is the mean of its neighbours.
     """
 
     t: np.ndarray
@@ -42,10 +44,11 @@ class Swings:
     error: float
     half_period: float
     shape_error: np.ndarray
+    is_hidden: np.ndarray
 
     @property
     def duration(self) -> np.ndarray:
-        return np.diff(self.t)
+        return np.where(self.is_hidden, self.half_period, np.diff(self.t))
 
     @property
     def is_regular(self) -> np.ndarray:
@@ -107,7 +110,7 @@ def select_decay(record: Record, pendulum: bool) -> tuple[Record, float]:
     noise, _ = estimate_noise(measured.t, measured.x)
     periods = half_periods(measured, noise)
     # the angular acceleration of a pendulum has two peaks per half cycle at large amplitudes: no window is searched
-    if len(gapless_slices(measured, periods[0])) > 1 or (pendulum and record.order == 2):
+    if pendulum and record.order == 2:
         return record, min(periods)
     best: Decay | None = None
     motions: list[Swings] = []
@@ -146,14 +149,32 @@ def half_periods(record: Record, noise: float) -> list[float]:
 
 def measure_swings(record: Record, half_period: float, noise: float, pendulum: bool) -> Swings | None:
     """Return the swings of a record with this half period; None if it has too few turning points."""
-    motion = smooth_motion(record, slice(None), half_period, noise, float(np.ptp(record.x)), pendulum)
-    if motion is None or len(motion.reversals) < thresholds.MIN_SELECTED_TURNS:
+    span = float(np.ptp(record.x))
+    motions = []
+    for part in gapless_slices(record, half_period):
+        motion = smooth_motion(record, part, half_period, noise, span, pendulum)
+        if motion is not None:
+            i, edge = motion.reversals, motion.width // 2  # at a gap, a swing is cut
+            is_whole = ((i > edge) | (part.start == 0)) & (
+                (i < len(motion.y) - 1 - edge) | (part.stop == len(record.t))
+            )
+            motions.append(replace(motion, reversals=i[is_whole]))
+    motions = [motion for motion in motions if len(motion.reversals) > 1]
+    if sum(len(motion.reversals) for motion in motions) < thresholds.MIN_SELECTED_TURNS:
         return None
-    t, x = motion.refine(motion.reversals)
-    error = motion.position_error(x)
+    turns = [motion.refine(motion.reversals) for motion in motions]
+    t = np.concatenate([t for t, _ in turns])
     half_period = float(np.median(np.diff(t)))
-    shape_error = wave_residuals(motion.y, motion.reversals, half_period / motion.interval)
-    return Swings(t, np.abs(np.diff(x)), np.diff(x) > 0, error * np.sqrt(2), half_period, shape_error)
+    error = max(motion.position_error(x) for motion, (_, x) in zip(motions, turns, strict=True))
+    shape_error = np.concatenate(
+        [wave_residuals(motion.y, motion.reversals, half_period / motion.interval) for motion in motions]
+    )
+    size = np.concatenate([np.append(np.abs(np.diff(x)), np.nan) for _, x in turns])[:-1]
+    rises = np.concatenate([np.append(np.diff(x) > 0, False) for _, x in turns])[:-1]
+    is_hidden = np.isnan(size)
+    at = np.flatnonzero(is_hidden)
+    size[at] = (size[at - 1] + size[at + 1]) / 2
+    return Swings(t, size, rises, error * np.sqrt(2), half_period, shape_error, is_hidden)
 
 
 def wave_residuals(y: np.ndarray, i: np.ndarray, half_period: float) -> np.ndarray:
