@@ -6,7 +6,8 @@
 3. Fit the law (law.py) to every sample of the free motion (signal_model.py, free_motion.py).
 4. Fit and rank the seven laws (model_selection.py); the full law gives the uncertainty (intervals.py).
 5. Fit the law to the swings alone, as a second opinion (swing_fit.py).
-6. Remark on what is doubtful and refuse what is not a free decay (remarks.py).
+6. Look for friction that rises at low speed (low_speed_friction.py).
+7. Remark on what is doubtful and refuse what is not a free decay (remarks.py).
 
 References
 ----------
@@ -39,8 +40,9 @@ from .fit_problem import FitError, FitProblem
 from .free_motion import select_free_motion
 from .intervals import FitUncertainty, estimate_uncertainty
 from .law import DRIFT, OMEGA, REST, TERMS, Terms
+from .low_speed_friction import LowSpeedRise, find_low_speed_rise, widen_losses
 from .model_selection import FittedLaw, fit_all_laws, select_reported_law
-from .remarks import check_fit, compare_halves, compare_swings, make_remarks
+from .remarks import check_fit, compare_halves, compare_swings, make_remarks, rise_remark
 from .swing_fit import fit_swings
 from .thinning import block_size, thin, thinning_error
 from .window import select_decay
@@ -70,6 +72,8 @@ class DecayIdentification:
         Estimates from the first and the last turning point.
     swing_estimates : tuple of Estimate
         Estimates of the losses from the swings between neighbouring turning points; empty if there are too few.
+    rise : LowSpeedRise or None
+        Rise of friction at low speed; None if there are too few half cycles.
     unavailable : dict
         Reasons why the estimates from turning points are empty, by method; an empty text if they are not.
     remarks : tuple of str
@@ -85,6 +89,7 @@ class DecayIdentification:
     extrema_estimates: tuple[Estimate, ...]
     two_peak_estimates: tuple[Estimate, ...]
     swing_estimates: tuple[Estimate, ...]
+    rise: LowSpeedRise | None
     unavailable: dict[str, str]
     remarks: tuple[str, ...]
 
@@ -144,6 +149,15 @@ class DecayIdentification:
     def rms(self) -> float:
         """Root mean square of the residuals of the best law, in the record's unit."""
         return float(np.sqrt(self.best.sum_of_squares / len(self.problem.t))) * self.problem.scale
+
+    @property
+    def undetected_rise(self) -> float:
+        """Rise of friction at low speed that is not excluded, relative to the dry friction; NaN if one is shown, or if
+        there is no dry friction."""
+        r = self["r"] if self.rise is not None and not self.rise.is_shown else None
+        if r is None or self.rise is None or not r.low > 0:
+            return np.nan
+        return self.rise.limit * self.problem.scale / r.value
 
     @property
     def sentence(self) -> str:
@@ -239,7 +253,7 @@ def identify_record(
         )
     report(0.1)
     free_motion = select_free_motion(decay, extrema, terms, parameters.pendulum, drift)
-    problem = free_motion.problem
+    problem, extrema = free_motion.problem, free_motion.extrema
     report(0.5)
     amplitudes = amplitudes_of(extrema) / problem.scale
     fit = free_motion.p, free_motion.sum_of_squares
@@ -268,6 +282,10 @@ def identify_record(
         )
         estimates, disagreements = compare_swings(estimates, from_swings, swing_fit.departure)
         remarks += disagreements
+    rise = find_low_speed_rise(problem, full, uncertainty)
+    if rise is not None and rise.is_shown:
+        estimates = widen_losses(estimates, problem, rise)
+        remarks.append(rise_remark(record, problem, rise))
     by_unknown = dict(zip(by_unknown, estimates, strict=True))
     omega = by_unknown[OMEGA]
     estimates += force_estimates(record, omega, by_unknown, parameters)  # of the widened intervals
@@ -284,6 +302,7 @@ def identify_record(
         by_extrema,
         by_two_peaks,
         from_swings,
+        rise,
         unavailable,
         tuple(remarks),
     )

@@ -11,6 +11,7 @@ from .estimates import unit_scales
 from .fit_problem import FitError, FitProblem
 from .intervals import FitUncertainty, estimate_uncertainty
 from .law import AMPLITUDE, DRIFT, OMEGA, REST, UNKNOWNS, ZETA
+from .low_speed_friction import LowSpeedRise
 from .model_selection import FittedLaw, deviance_difference
 
 
@@ -162,6 +163,17 @@ def ambiguity_remark(problem: FitProblem, laws: tuple[FittedLaw, ...]) -> tuple[
     return (
         f"{names[0].upper()}{names[1:]} cannot be distinguished from {best.description} at this noise: that takes "
         f"{factor:.1f} times less noise, {np.ceil(factor**2):.0f} times as many samples, or more and larger cycles.",
+    )
+
+
+def rise_remark(record: Record, problem: FitProblem, rise: LowSpeedRise) -> str:
+    """Return the remark on friction that rises at low speed."""
+    size, friction = (value * problem.scale for value in (rise.size, rise.losses["r"]))
+    return (
+        f"Friction that rises at low speed fits better: it is {size:.2g} {record.base} (over stiffness) larger at "
+        f"standstill than the {friction:.2g} {record.base} above about {rise.speed:g} of the first peak speed. No law "
+        "of decay has such a rise, so the intervals of the losses are widened; fit a model with Stribeck friction by "
+        "friction-fmus fit."
     )
 
 

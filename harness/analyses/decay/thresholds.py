@@ -112,6 +112,14 @@ NEGLIGIBLE_BOUND = 4.0  # standard errors above zero: the bound at zero no longe
 MAX_BOUND = 8.0  # standard errors above the most likely value: no end of an interval is beyond
 INTERVAL_PRECISION = 1e-4  # standard errors: of the ends of an interval, well below what the draws leave uncertain
 
+# --- Friction that rises at low speed (low_speed_friction.py) ---
+RISE_SPEEDS = (0.05, 0.1, 0.2, 0.4)  # of the first peak speed: the rise falls to 1/e there
+MIN_RISE_HALF_CYCLES = 8  # with fewer, the laws with three losses follow every rise
+SHOWN_RISE = 10.0  # of n ln(squares): chance exceeds it in one record of 1000 for each speed
+LIMIT_SPEED = 0.1  # of RISE_SPEEDS: the one for which the limit is stated
+RISE_BLOCKS = (24, 100)  # of residuals that may be correlated
+MIN_SENSITIVITY = 1e-3  # of an amplitude to the first one
+
 # --- Fit of the swings (swing_fit.py) ---
 MAX_FITTED_SWINGS = 200  # the largest ones say most; the cost grows with the third power
 MIN_FITTED_SWINGS = 10  # for a variance of noise and one of the departure from the law

@@ -76,6 +76,15 @@ class DecayResult(Result, DecayIdentification):
             },
             "turning_points": [asdict(estimate) for estimate in self.extrema_estimates],
             "swings": [asdict(estimate) for estimate in self.swing_estimates],
+            "low_speed_rise": {
+                "shown": self.rise.is_shown,
+                "size": self.rise.size * problem.scale,
+                "relative_speed": self.rise.speed,
+                "limit": self.rise.limit * problem.scale,
+                "unit": record.base,
+            }
+            if self.rise
+            else None,
             "published": [asdict(estimate) for estimate in self.two_peak_estimates],
             "why_empty": {name: reason for name, reason in self.unavailable.items() if reason},
             "laws": [

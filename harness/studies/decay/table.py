@@ -4,6 +4,7 @@ import numpy as np
 from rich.table import Table
 
 from ...analyses.decay.identification import DecayIdentification
+from ...analyses.decay.thresholds import LIMIT_SPEED
 from ...analyses.estimation.estimate import Estimate
 from ...results.quantity import format_interval
 from ...results.summary import Summary, make_table, make_terminal_table
@@ -98,6 +99,12 @@ def summary_lines(identification: DecayIdentification) -> list[str]:
         lines.append(
             "The values from two peaks are rough checks: each attributes the whole loss to one mechanism, and is too "
             "large if several act."
+        )
+    rise = identification.undetected_rise
+    if np.isfinite(rise):
+        lines.append(
+            f"Friction that rises at low speed by less than {100 * rise:.2g} % of r is not excluded (Stribeck, falling "
+            f"to 1/e of the rise at {LIMIT_SPEED:g} of the first peak speed)."
         )
     t, record = identification.t, identification.record
     n_excluded = len(record.t) - len(t)
