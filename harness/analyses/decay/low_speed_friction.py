@@ -52,8 +52,8 @@ class LowSpeedRise:
 
     @property
     def is_shown(self) -> bool:
-        """Whether the record shows the rise."""
-        return self.deviance > thresholds.SHOWN_RISE
+        """Whether the record shows the rise; without friction at high speed it would be no rise."""
+        return self.deviance > thresholds.SHOWN_RISE and self.size < thresholds.MAX_RISE * self.losses["r"]
 
 
 def signal_changes(problem: FitProblem, p: np.ndarray, slope: np.ndarray, speeds: np.ndarray) -> np.ndarray:
@@ -95,7 +95,7 @@ def find_low_speed_rise(problem: FitProblem, full: FittedLaw, uncertainty: FitUn
         columns = np.column_stack([jacobian, change])
         scale = column_norms(columns)
         columns = columns / scale
-        triangle = np.linalg.qr(np.column_stack([columns, e]), "r")
+        triangle = np.asarray(np.linalg.qr(np.column_stack([columns, e]), mode="r"))
         step = optimize.lsq_linear(triangle[:, :-1], -triangle[:, -1], (low * scale, np.inf)).x
         rest = e + columns @ step
         squares = max(float(rest @ rest), floor)
@@ -116,7 +116,7 @@ def find_low_speed_rise(problem: FitProblem, full: FittedLaw, uncertainty: FitUn
             name: (losses[name] - float(margins[i]), losses[name] + float(margins[i])) for name, i in values.items()
         }
         rises.append(LowSpeedRise(speed, float(step[-1] / scale[-1]), deviance, losses, intervals, limit))
-    best = max(rises, key=lambda rise: rise.deviance)
+    best = max(rises, key=lambda rise: (rise.is_shown, rise.deviance))
     shown = [rise.intervals for rise in rises if rise.is_shown]
     intervals = {
         name: (min(each[name][0] for each in shown), max(each[name][1] for each in shown))

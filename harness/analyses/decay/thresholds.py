@@ -116,6 +116,7 @@ INTERVAL_PRECISION = 1e-4  # standard errors: of the ends of an interval, well b
 RISE_SPEEDS = (0.05, 0.1, 0.2, 0.4)  # of the first peak speed: the rise falls to 1/e there
 MIN_RISE_HALF_CYCLES = 8  # with fewer, the laws with three losses follow every rise
 SHOWN_RISE = 10.0  # of n ln(squares): chance exceeds it in one record of 1000 for each speed
+MAX_RISE = 3.0  # times the friction at high speed: a larger one is another departure from the law
 LIMIT_SPEED = 0.1  # of RISE_SPEEDS: the one for which the limit is stated
 RISE_BLOCKS = (24, 100)  # of residuals that may be correlated
 MIN_SENSITIVITY = 1e-3  # of an amplitude to the first one
