@@ -172,8 +172,8 @@ def rise_remark(record: Record, problem: FitProblem, rise: LowSpeedRise) -> str:
     return (
         f"Friction that rises at low speed fits better: it is {size:.2g} {record.base} (over stiffness) larger at "
         f"standstill than the {friction:.2g} {record.base} above about {rise.speed:g} of the first peak speed. No law "
-        "of decay has such a rise, so the intervals of the losses are widened; fit a model with Stribeck friction by "
-        "friction-fmus fit."
+        "of decay has such a rise. The intervals of the losses are widened, and may still miss the true values: fit a "
+        "model with Stribeck friction by friction-fmus fit."
     )
 
 
