@@ -15,7 +15,7 @@ from typing import Any
 from xml.etree.ElementTree import Element, SubElement
 
 from . import BuildError
-from .fmi_variables import Variables, integrated_states
+from .fmi_variables import Variables, friction_laws, integrated_states
 from .text_output import xml_bytes
 
 RESULT_FOLDER = "extra/org.fmi-standard.fmi-ls-ref"
@@ -40,13 +40,13 @@ class CertifiedResult:
         return f"Certified result of the default experiment: {self.provenance}."
 
 
-def find_certified_result(path: Path, declared: Variables) -> CertifiedResult | None:
+def find_certified_result(path: Path, model: Any, declared: Variables) -> CertifiedResult | None:
     """Return the certified result of the model file, or None.
 
     The result is valid only for FMUs that include the hybrid law, where the model has friction laws.
     """
-    laws: Any = next((meaning.items for variable, meaning in declared if variable == "friction"), ())
-    if laws and "hybrid" not in [label for label, _, _ in laws]:
+    laws = friction_laws(model)
+    if laws and "hybrid" not in laws:
         return None
     file = path.with_suffix(".csv")
     return _read_table(file, len(integrated_states(declared))) if file.is_file() else None

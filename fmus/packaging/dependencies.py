@@ -11,7 +11,7 @@ from .equations.expressions import Expression, Operand
 from .equations.model_analysis import ModelAnalysis
 from .equations.model_declaration import HYBRID, SIGN, THRESHOLD, Contact
 from .equations.model_roles import TIME
-from .fmi_variables import Variables
+from .fmi_variables import Variables, friction_laws
 
 
 def output_dependencies(model: type[VariableOwner], declared: Variables, at_start: bool) -> dict[str, list[str]]:
@@ -23,7 +23,7 @@ def output_dependencies(model: type[VariableOwner], declared: Variables, at_star
     if not outputs:
         return {}
     analysis: ModelAnalysis = model.analysis  # type: ignore[attr-defined]
-    laws = [label for name, meaning in declared if name == "friction" for label, _, _ in meaning.items] or [HYBRID]
+    laws = friction_laws(model) or [HYBRID]
     start: dict[Expression, Operand] = {
         TIME: 0.0,
         **dict.fromkeys(analysis.drivers, 0.0),

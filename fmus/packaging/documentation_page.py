@@ -12,7 +12,7 @@ from ..runtime.variable_declarations import VariableDeclaration, VariableOwner
 from . import __version__
 from .certified_result import RESULT_FOLDER, CertifiedResult, find_certified_result, result_files
 from .equations.tables import PCHIP, Table
-from .fmi_variables import Variables, integrated_states, mode_names
+from .fmi_variables import Variables, fixed_choices, integrated_states, mode_names
 from .svg_chart import draw_chart
 from .units import unit_of
 
@@ -66,7 +66,7 @@ def documentation_page(
     if tables:
         parts += ["<h2>Tables</h2>", *map(table_figure, tables)]
     choices = [(variable, meaning) for variable, meaning in declared if meaning.items]
-    for variable, meaning in choices:
+    for variable, meaning in (*fixed_choices(model), *choices):
         parts.append(_enumeration_table(variable, meaning))
     numbers = [(variable, meaning) for variable, meaning in declared if not meaning.items]
     for title, rows in (
@@ -139,7 +139,7 @@ def table_figure(table: Table) -> str:
 
 
 def _enumeration_table(variable: str, meaning: VariableDeclaration) -> str:
-    """Return a table of the items of an enumeration."""
+    """Return a table of the items of an enumeration; that with one item is no variable and has no value to set."""
     title = meaning.text[0].upper() + meaning.text[1:]
     rows = "".join(
         f"<tr><td><code>{value}</code></td><td><b>{escape(label)}</b>{' (default)' if value == meaning.start else ''}"
@@ -204,7 +204,7 @@ def extra_files(
     the same name.  `icon` is the path of the icon in the FMU; `use` is a paragraph of the page on how to run the FMU.
     """
     name, picture, boundaries = path.stem, path.with_suffix(".png"), path.with_suffix(".toml")
-    certified = find_certified_result(path, declared)
+    certified = find_certified_result(path, model, declared)
     icon_path = icon if picture.is_file() else ""
     entries = {"documentation/index.html": documentation_page(model, name, declared, certified, tables, icon_path, use)}
     if tables:

@@ -6,9 +6,9 @@ They follow the declared variables, whose value references do not change.
 from copy import copy
 from typing import Any
 
-from ..runtime.codes import HYBRID
 from ..runtime.run_state import RunState
-from ..runtime.variable_declarations import Local, VariableDeclaration, fmi_variables
+from ..runtime.stick_slip import HYBRID_LAW
+from ..runtime.variable_declarations import Local, VariableDeclaration, fmi_variables, variables
 
 TIME, TO_REST, TO_BREAK_AWAY = "time", "events.to_rest", "events.to_break_away"
 CONDITION = "events.condition_{}"  # indicator of a condition of the equations, numbered from 1
@@ -51,9 +51,25 @@ def name_contact(mode: VariableDeclaration, force: str) -> VariableDeclaration:
     return named
 
 
-def has_step_events(declared: Variables) -> bool:
+def fixed_choices(model: Any) -> Variables:
+    """Return name and declaration, with its one item, of each enumeration that the build fixed: it is no variable."""
+    instance = model()
+    declared = variables(instance) + variables(RunState(instance))
+    offered = {name for name, _ in declared_variables(model)}
+    fixed = [(name, copy(meaning)) for name, meaning in declared if meaning.items and name not in offered]
+    for _, meaning in fixed:
+        meaning.items = tuple(item for item in meaning.items if item[1] == meaning.start)
+    return fixed
+
+
+def friction_laws(model: Any) -> list[str]:
+    """Return the labels of the friction laws that the build includes, of a model that has a choice of them."""
+    return [label for name, meaning in variables(model()) if name == "friction" for label, _, _ in meaning.items]
+
+
+def has_step_events(model: Any) -> bool:
     """Return whether an importer must report its steps: friction laws without stick and slip change modes there."""
-    return any(value != HYBRID for name, meaning in declared if name == "friction" for _, value, _ in meaning.items)
+    return any(law != HYBRID_LAW[0] for law in friction_laws(model))
 
 
 def integrated_states(declared: Variables) -> Variables:

@@ -11,9 +11,8 @@ from typing import Any
 from uuid import NAMESPACE_OID, uuid5
 from xml.etree.ElementTree import Element, SubElement, tostring
 
-from ..runtime.run_state import RunState
 from ..runtime.variable_access import SETTABLE_CAUSALITIES
-from ..runtime.variable_declarations import VariableDeclaration, VariableOwner, variables
+from ..runtime.variable_declarations import VariableDeclaration, VariableOwner
 from . import __version__
 from .dependencies import output_dependencies
 from .equations.declaration_options import OPTIONS
@@ -25,6 +24,7 @@ from .fmi_variables import (
     declared_variables,
     derivative_indices,
     event_indicator_indices,
+    fixed_choices,
     has_step_events,
 )
 from .text_output import xml_bytes
@@ -77,7 +77,7 @@ def describe(model: Any, name: str, code: str, date: datetime, nominals: Sequenc
     if exchanging:  # FMI 2.0 needs no time variable, and FMILibrary rejects one
         declared = [pair for pair in all_variables(model) if pair[0] != TIME]
         root.set("numberOfEventIndicators", str(len(event_indicator_indices(declared))))
-        step_report = {} if has_step_events(declared) else {"completedIntegratorStepNotNeeded": "true"}
+        step_report = {} if has_step_events(model) else {"completedIntegratorStepNotNeeded": "true"}
         SubElement(root, "ModelExchange", EXCHANGE_CAPABILITIES | step_report, modelIdentifier=name)
     stepping = (
         STEPPING_CAPABILITIES
@@ -113,19 +113,17 @@ def create_root(model: Any, name: str, version: str, key: str) -> Element:
 
 
 def add_fixed_choices(root: Element, model: Any, group: str, element: str, key: str) -> None:
-    """Add an annotation with the method and law of an FMU with Reals only, where they are no variables.
+    """Add an annotation with the method, law or other enumeration that the build fixed, and that is no variable.
 
     `group` and `element` are the elements of annotations, and `key` is the attribute with the name of the tool.
     """
-    if not model.real_only:
+    fixed = fixed_choices(model)
+    if not fixed:
         return
-    instance = model()
-    offered = {name for name, _ in declared_variables(model)}
     choices = SubElement(SubElement(SubElement(root, group), element, {key: ANNOTATION}), "FixedChoices")
-    for name, meaning in variables(instance) + variables(RunState(instance)):
+    for name, meaning in fixed:
         for label, value, _ in meaning.items:
-            if name not in offered and value == meaning.start:
-                SubElement(choices, "Choice", name=name, label=label, value=str(value))
+            SubElement(choices, "Choice", name=name, label=label, value=str(value))
 
 
 def serialize(root: Element, key: str, code: str, date: datetime) -> bytes:

@@ -47,7 +47,7 @@ def describe(model: type[VariableOwner], name: str, code: str, date: datetime, n
     """
     root = shared.create_root(model, name, "3.0", "instantiationToken")
     declared = all_variables(model)
-    step_report = {"needsCompletedIntegratorStep": "true" if has_step_events(declared) else "false"}
+    step_report = {"needsCompletedIntegratorStep": "true" if has_step_events(model) else "false"}
     for interface, abilities in ("ModelExchange", step_report), ("CoSimulation", STEPPING_CAPABILITIES):
         SubElement(root, interface, {"modelIdentifier": name} | COMMON_CAPABILITIES | abilities)
     shared.add_units(root, declared)

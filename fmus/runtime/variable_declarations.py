@@ -171,9 +171,10 @@ def declarations(cls: type) -> list[VariableDeclaration]:
 def fmi_variables(model: Any, run: object) -> list[tuple[str, VariableDeclaration]]:
     """Return dotted name and declaration of every variable that an FMU offers: of the model, then of its run.
 
-    An FMU with Reals only offers integers as Reals, and no enumeration: these keep their start values.
+    An enumeration with one item, as the build leaves it, is no choice: it is left out and keeps its start value.  An
+    FMU with Reals only has no other enumerations, and offers integers as Reals.
     """
-    declared = variables(model) + variables(run)
+    declared = [(name, meaning) for name, meaning in variables(model) + variables(run) if len(meaning.items) != 1]
     if model.real_only:
         declared = [(name, as_real(meaning)) for name, meaning in declared if not meaning.items]
     return declared

@@ -127,7 +127,7 @@ def read_json_resource(fmu: Path, name: str, parse: Callable[[Any], Result]) -> 
 def read_fixed_choices(path: Path) -> dict[str, tuple[str, int]]:
     """Return label and number of the method and law that an FMU of this project has no variable for, by name.
 
-    A build with Reals only fixes them, and states them in an annotation.
+    The build fixed them, by `--method`, `--law` or `--real-only`, and states them in an annotation.
     """
     with ZipFile(path) as archive, archive.open(DESCRIPTION_FILE) as file:
         root = ElementTree.parse(file).getroot()

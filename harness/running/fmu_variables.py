@@ -85,7 +85,7 @@ class FmuDescription:
     variables : tuple of VariableInfo
         All variables, in the order of the model description.
     fixed : dict
-        Labels of the method and the law that a build with Reals only fixed, by the name of the absent variable.
+        Labels of the method and the law that the build fixed, by the name of the absent variable.
     tables : tuple of LookupTable
         Lookup tables of an FMU of this project.
     """

@@ -19,6 +19,7 @@ from fmus.packaging import BuildError
 from fmus.packaging.archive import build
 from fmus.packaging.model_description import REAL_ONLY_HINT
 from fmus.packaging.model_lookup import find_model
+from harness import describe
 
 EVERY_FILE = pytest.mark.parametrize("path", EXAMPLE_MODELS, ids=lambda path: path.stem)
 KINDS = {
@@ -147,9 +148,8 @@ def test_methods_laws_and_folders_are_selected_for_a_file_as_for_a_name(tmp_path
     path = next(path for path in EXAMPLE_MODELS if path.stem == "rotor_brake")
     run = command(path, "--method", "rodas", "--law", "hybrid", "--platform", "linux64", "--out", "lean", cwd=tmp_path)
     assert (run.returncode, run.stderr) == (0, "")
-    variables = {v.name: v for v in read_model_description(tmp_path / "lean" / "rotor_brake.fmu").modelVariables}
-    assert [item.name for item in variables["solver.method"].declaredType.items] == ["rodas"]
-    assert [item.name for item in variables["friction"].declaredType.items] == ["hybrid"]
+    fmu = describe(tmp_path / "lean" / "rotor_brake.fmu")
+    assert (fmu.methods, fmu.laws) == (("rodas",), ("hybrid",))
     refused = command(path, "--method", "exact", cwd=tmp_path)
     assert refused.stderr == "Error: rotor_brake has no method 'exact'; it has ode23, ode45, dop853, rodas, radau9.\n"
 

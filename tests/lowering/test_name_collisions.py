@@ -7,7 +7,7 @@ from build_cache import build_user_model
 from internal_steps import prepared_run, start
 from models import DOP853, LARGER_MODELS, RODAS
 
-from fmus.packaging.fmi_variables import declared_variables
+from fmus.packaging.fmi_variables import declared_variables, fixed_choices
 from fmus.packaging.lowering import LAWS, METHODS, lowered_model, select_features, sibling_module
 from fmus.packaging.model_lookup import find_model
 from fmus.packaging.native.model_header import render_model_header
@@ -85,8 +85,8 @@ def test_author_choices_named_like_an_unavailable_method_or_law_are_kept(tmp_pat
     path.write_text(text.replace("    m =", f'    kind = Choice("kind", {items})\n    m ='))
     source = find_model(path)
     lowered = lowered_model(source, select_features(source, ["ode45"], ["hybrid"]))
-    items = {name: meaning.items for name, meaning in declared_variables(lowered) if meaning.items}
-    labels_by_name = {name: [label for label, _, _ in rows] for name, rows in items.items()}
+    choices = [*declared_variables(lowered), *fixed_choices(lowered)]
+    labels_by_name = {name: [label for label, _, _ in meaning.items] for name, meaning in choices if meaning.items}
     assert labels_by_name == {"kind": labels, "friction": ["hybrid"], "solver.method": ["ode45"]}
     model, rates = lowered(), set()
     for model.kind in range(1, 9):

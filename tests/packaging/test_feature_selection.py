@@ -3,6 +3,7 @@
 import re
 from zipfile import ZipFile
 
+import native_fmus
 import pytest
 from commands import build as command
 from fmpy import read_model_description
@@ -12,6 +13,8 @@ from row_comparison import assert_identical
 from fmus.packaging import archive
 from fmus.packaging.lowering import LAWS, METHODS, lowered_files
 from fmus.packaging.lowering.feature_selection import FeatureSelection
+from harness import describe, simulate
+from harness.running.fmu_archive import read_fixed_choices
 
 LABELS = {"solver.method": "--method", "friction": "--law"}
 
@@ -50,10 +53,9 @@ def test_a_reduced_fmu_carries_one_method_and_runs_alike(lean, launch, worker, c
     assert {variable.name for variable in description.modelVariables} <= {
         *declared(name)
     }  # whose characters are allowed
-    for variable in description.modelVariables:
-        if variable.name in LABELS:
-            assert [item.name for item in variable.declaredType.items] == [options[LABELS[variable.name]]]
-            assert int(variable.start) == values[variable.name]
+    assert not LABELS.keys() & {variable.name for variable in description.modelVariables}
+    chosen = {variable: (options[word], values[variable]) for variable, word in LABELS.items() if word in options}
+    assert read_fixed_choices(path) == chosen
     with ZipFile(path) as archive:
         files = {entry.rsplit("/", 1)[1] for entry in archive.namelist() if "/runtime/" in entry}
         assert {entry.split("/")[1] for entry in archive.namelist() if entry.startswith("binaries")} == {"linux64"}
@@ -82,6 +84,26 @@ def test_only_choices_with_alternatives_are_compared_in_a_run(name, methods, law
     text = "\n".join(lowered_files(name, FeatureSelection(methods, laws)).values())
     assert bool(re.search("(method_number|method|friction) [!=]= ", text)) == has_comparisons
     assert ("def advance_with_method(" in text) == (methods != ("exact",))
+
+
+@pytest.mark.parametrize("options", [(), ("--native", "--platform", "linux64")], ids=["python", "native"])
+def test_an_enumeration_of_one_item_is_no_variable_and_stays_known(tmp_path, options):
+    """The FMU says which law it has: one without stick and slip needs reports of steps, and has other dependencies."""
+    if options:
+        native_fmus.require_compiler()
+    choice = ("--method", "ode23", "--method", "rodas", "--law", "sign")
+    assert command("coulomb", *choice, *options, "--out", tmp_path).returncode == 0
+    fmu = tmp_path / "coulomb.fmu"
+    description = read_model_description(fmu)
+    assert [v.name for v in description.modelVariables if v.type == "Enumeration"] == ["solver.method"]
+    assert describe(fmu).laws == ("sign",)
+    assert "Friction laws (friction): sign; fixed by the build" in describe(fmu).summary()
+    assert simulate(fmu, {"friction": "sign"}, stop=1.0, method="rodas").settings_label == "rodas, sign"
+    exchange = description.modelExchange
+    assert exchange is None or not exchange.completedIntegratorStepNotNeeded
+    with ZipFile(fmu) as archive:
+        assert not [name for name in archive.namelist() if name.startswith("extra/org.fmi-standard.fmi-ls-ref")]
+        assert "<b>sign</b>" in archive.read("documentation/index.html").decode()
 
 
 def test_several_may_be_selected_and_the_first_is_the_default(tmp_path):

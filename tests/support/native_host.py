@@ -112,15 +112,16 @@ def begin(instance, values=(), stop="nan"):
     return [f"{instance} new", *sets, f"{instance} setup nan 0 {stop}", f"{instance} enter", f"{instance} exit"]
 
 
-def life_cycle(name, steps, exchange=False):
+def life_cycle(name, steps, exchange=False, references=None):
     """Return the script of an instance of an FMI 3.0 FMU, which reads position and speed.
 
     The second half of a run is repeated from a saved state and from a serialized one; after a reset, the complete run.
-    In model exchange, Euler steps integrate.
+    In model exchange, Euler steps integrate.  `references` are those of an FMU that lacks some of the variables.
     """
+    references = references or value_references(name)
     states = len(model_class(name).states) + ("x_driver" in declared(name))
     how, (x, v, *_) = f"euler {states}" if exchange else "run", outputs(name)
-    stop, read = model_class(name).stop_time, f"{value_references(name)[x]} {value_references(name)[v]}"
+    stop, read = model_class(name).stop_time, f"{references[x]} {references[v]}"
     first, second = (f"{how} {a} {b} {steps // 2} {read}" for a, b in ((0.0, 0.5 * stop), (0.5 * stop, stop)))
     start = ["enter", "exit", first]
     script = ["new exchange" if exchange else "new", *start, "save 1", second, "restore 1", second, "serialize 1 2"]
