@@ -71,7 +71,13 @@ FMUS = HERE / "fmus" if (HERE / "pyproject.toml").is_file() else Path("fmus")
     is_flag=True,
     help="Offer Reals only, with one method and one law, for hosts without other types; into the folder real-only.",
 )
-@click.option("--platform", "platforms", multiple=True, help="Include only this platform, such as linux64; repeatable.")
+@click.option(
+    "--platform",
+    "platforms",
+    multiple=True,
+    help="Include only this platform, such as linux64; repeatable. wasm32-wasip2 (experimental, with --fmi 3) writes a "
+    "WebAssembly component.",
+)
 @click.option(
     "--out", type=click.Path(path_type=Path), help="Output folder; by default fmus, or the folder of FILE.py."
 )

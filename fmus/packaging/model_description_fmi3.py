@@ -38,9 +38,17 @@ STEPPING_CAPABILITIES = {
     "providesIntermediateUpdate": "true",
     **shared.OUTPUT_DERIVATIVES,
 }
+WITHOUT_INTERMEDIATE_UPDATE = {"canReturnEarlyAfterIntermediateUpdate": "false", "providesIntermediateUpdate": "false"}
 
 
-def describe(model: type[VariableOwner], name: str, code: str, date: datetime, nominals: Sequence[float]) -> bytes:
+def describe(
+    model: type[VariableOwner],
+    name: str,
+    code: str,
+    date: datetime,
+    nominals: Sequence[float],
+    has_intermediate_update: bool = True,
+) -> bytes:
     """Return the FMI 3.0 model description of the FMU `name` as XML; the token is computed like the GUID of FMI 2.0.
 
     `nominals` are the nominal values of the continuous states.
@@ -48,7 +56,8 @@ def describe(model: type[VariableOwner], name: str, code: str, date: datetime, n
     root = shared.create_root(model, name, "3.0", "instantiationToken")
     declared = all_variables(model)
     step_report = {"needsCompletedIntegratorStep": "true" if has_step_events(model) else "false"}
-    for interface, abilities in ("ModelExchange", step_report), ("CoSimulation", STEPPING_CAPABILITIES):
+    stepping = STEPPING_CAPABILITIES | ({} if has_intermediate_update else WITHOUT_INTERMEDIATE_UPDATE)
+    for interface, abilities in ("ModelExchange", step_report), ("CoSimulation", stepping):
         SubElement(root, interface, {"modelIdentifier": name} | COMMON_CAPABILITIES | abilities)
     shared.add_units(root, declared)
     _add_types(root, declared)
