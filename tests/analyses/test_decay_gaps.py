@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from commands import harness
 
+from harness import HarnessError
 from harness.analyses.decay.estimates import KnownParameters
 from harness.analyses.decay.extrema import find_extrema
 from harness.analyses.decay.fit_problem import prepare_problem
 from harness.analyses.decay.identification import fit_decay
-from harness.errors import HarnessError
 from harness.records.record import Record
 
 HALF, RATE = 0.25, 0.3  # s, a half cycle; 1/s, the decay rate

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from laboratory_records import OTHERS, SCENES, laboratory_record, other_motion
 
+from harness import HarnessError
 from harness.analyses.decay.estimates import KnownParameters
 from harness.analyses.decay.identification import fit_decay
 from harness.analyses.decay.window import select_decay
-from harness.errors import HarnessError
 
 SEEDS = range(300, 306)
 

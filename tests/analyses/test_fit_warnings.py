@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from decays import OMEGA, T, decay_record, remarks_text
 
+from harness import HarnessError
 from harness.analyses.decay.estimates import KnownParameters
 from harness.analyses.decay.extrema import find_extrema
 from harness.analyses.decay.fit_problem import prepare_problem
 from harness.analyses.decay.identification import fit_decay
 from harness.analyses.decay.law import DRIFT, REST
-from harness.errors import HarnessError
 from harness.records.record import Record
 
 

@@ -5,7 +5,7 @@ import pytest
 from scipy.optimize import curve_fit
 
 import harness
-from harness.errors import HarnessError, SceneError
+from harness import HarnessError, SceneError
 
 SPEEDS = np.geomspace(1e-3, 0.3, 12)
 V = np.concatenate([SPEEDS, -SPEEDS])

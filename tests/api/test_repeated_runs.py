@@ -13,7 +13,7 @@ import pytest
 from spec_runs import run_spec
 
 import harness
-from harness.errors import SceneError
+from harness import SceneError
 from harness.results.files import to_json
 from harness.running.resolve import resolve
 from harness.scenes.run_spec import RunSpec

@@ -19,7 +19,7 @@ from benchmarks.rivals.comparison import Comparison, Result
 from benchmarks.rivals.measures import Measures
 from benchmarks.rivals.scenes import SCENES
 from benchmarks.rivals.table import rivals_table
-from harness.errors import HarnessError
+from harness import HarnessError
 
 WIDTH = 80
 RIVAL_MEASURES = Measures(1.2e-16, 2e-13, 12, 34, 5e-12, 500000, 0.001)

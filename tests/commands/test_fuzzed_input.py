@@ -15,7 +15,7 @@ import pytest
 from build_cache import ROOT
 from commands import blank_figures, harness
 
-from harness.errors import HarnessError
+from harness import HarnessError
 from harness.scenes.scene import SceneKeys
 from harness.scenes.schema import field_names
 

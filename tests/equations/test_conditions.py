@@ -23,7 +23,8 @@ KINDS = {
     "native/fmi3": ("--fmi", "3", "--platform", "linux64"),
 }
 EVERY_KIND = pytest.mark.parametrize(
-    "kind", ["", *(pytest.param(kind, marks=pytest.mark.slow) for kind in ("native", "native/fmi3"))]
+    "kind",
+    ["", pytest.param("native", marks=pytest.mark.slow), pytest.param("native/fmi3", marks=pytest.mark.campaign)],
 )
 STOP, K, F, GAP, T_ON, MU = 2.0, 100.0, 5.0, 0.1, 0.3, 0.5  # SI, as in the models
 MODEL = '''from fmus import (

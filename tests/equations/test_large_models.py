@@ -124,7 +124,7 @@ def test_the_order_of_operations_stays_as_written(tmp_path):
     assert model.rates(0.0, x, 1.0, 1) == (100.0 * 1.0 * total - 100.0 * x - 2.0) / 1.0
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_5000_terms_are_translated_to_c(tmp_path):
     source = write_model(tmp_path, "sum", 5000)
     texts = collect_sources(lowered_model(source, select_features(source, (), ())), "2")

@@ -108,7 +108,7 @@ def test_slips_and_rests_of_the_sled_have_their_closed_form(ratio):
     assert 0.01 < depth / (w * lead / v) ** 2 * 4.0 < 20.0 or ratio == 1.5
 
 
-STRUCTURES, VALUES = (6, 20, 22, 33), range(2, 6)
+STRUCTURES, VALUES = (6, 22), range(2, 4)
 
 
 @pytest.mark.slow

@@ -12,28 +12,27 @@ from fmpy import read_model_description
 import build_fmus
 from fmus.packaging import __version__, release
 
-pytestmark = pytest.mark.slow
-
 SCENES = sorted((ROOT / "harness" / "scenes").glob("*.toml"))
 
 
-@pytest.fixture(scope="module")
-def archives(tmp_path_factory):
-    """Two builds of a release that holds two small models only, which saves minutes."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(release, "model_names", lambda: ["smd"])
-        patch.setattr(release, "more_model_names", lambda: ["forced"])
-        paths = [release.build_release(tmp_path_factory.mktemp("release"), SCENES) for _ in range(2)]
-    return [path.read_bytes() for path in paths]
+@pytest.fixture
+def build_release(tmp_path_factory, monkeypatch):
+    """Return a function that builds a release with two small models only, which saves minutes."""
+    monkeypatch.setattr(release, "model_names", lambda: ["smd"])
+    monkeypatch.setattr(release, "more_model_names", lambda: ["forced"])
+    return lambda: release.build_release(tmp_path_factory.mktemp("release"), SCENES).read_bytes()
 
 
-def test_two_releases_are_the_same_bytes(archives):
-    assert archives[0] == archives[1]
+@pytest.mark.campaign
+def test_two_releases_are_the_same_bytes(build_release):
+    """The FMUs and the page in them are compared by test_wheel.py and test_page_file.py in CI."""
+    assert build_release() == build_release()
 
 
-def test_the_release_holds_every_kind_and_correct_checksums(archives, tmp_path):
+@pytest.mark.slow
+def test_the_release_holds_every_kind_and_correct_checksums(build_release, tmp_path):
     root = f"friction-fmus-{__version__}/"
-    with ZipFile(BytesIO(archives[0])) as archive:
+    with ZipFile(BytesIO(build_release())) as archive:
         files = {name.removeprefix(root): archive.read(name) for name in archive.namelist()}
     kinds = {"fmus": "2.0", "fmus/native": "2.0", "fmus/native/fmi3": "3.0"}
     assert {f"{kind}/smd.fmu" for kind in kinds} | {"web/index.html", "references/smd.csv", "README.txt"} <= {*files}

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from build_cache import ROOT
 
-from harness.errors import HarnessError, SceneError
+from harness import HarnessError, SceneError
 from harness.process import interrupt
 from harness.process.worker import (
     Worker,
@@ -27,7 +27,7 @@ from harness.process.worker_process import MAX_OUTPUT_BYTES
 
 FUNCTIONS = """
 import atexit, os, signal, sys, time
-from harness.errors import HarnessError, SceneError
+from harness import HarnessError, SceneError
 
 class OddError(HarnessError):
     def __init__(self, one, two):

@@ -7,9 +7,9 @@ import pytest
 import record_formats
 from record_formats import FORMATS, LIBRARIES, OMEGA, ZETA, T
 
+from harness import SceneError
 from harness.analyses.decay.estimates import KnownParameters
 from harness.analyses.decay.identification import fit_decay
-from harness.errors import SceneError
 from harness.records.array_files import columns_of_frame, list_columns
 from harness.records.columns import ColumnOptions, read_record
 from harness.records.record import Record

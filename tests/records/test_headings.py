@@ -6,7 +6,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from harness.errors import HarnessError
+from harness import HarnessError
 from harness.records.columns import ColumnOptions, read_record
 from harness.records.headings import split_heading
 

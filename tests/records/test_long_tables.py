@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from harness.errors import HarnessError
+from harness import HarnessError
 from harness.records import text_table
 from harness.records.columns import parse_numbers
 from harness.records.table_files import parse_table_file

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from decays import decay_record, random_record
 
+from harness import SceneError
 from harness.analyses.decay.estimates import KnownParameters
 from harness.analyses.decay.identification import fit_decay
-from harness.errors import SceneError
 from harness.records.columns import ColumnOptions, read_record
 from harness.records.samples import find_saturated, leave_out_saturated, mark_dropouts, mark_sentinels, sort_times
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from record_formats import FORMATS, LIBRARIES
 
-from harness.errors import SceneError
+from harness import SceneError
 from harness.records.columns import ColumnOptions, find_signal_column, find_time_column, list_columns, read_record
 from harness.records.signal_table import SignalSource, parse_signals, read_signals
 from harness.records.table_files import load_table

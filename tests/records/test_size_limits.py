@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import record_formats
 
-from harness.errors import HarnessError, SceneError
+from harness import HarnessError, SceneError
 from harness.records import array_files, child_reader, size_limits
 from harness.records.columns import ColumnOptions, read_record
 from harness.studies.compare.trajectory_files import read_signals

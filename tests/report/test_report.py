@@ -11,7 +11,7 @@ import web_page
 from build_cache import ROOT, build_user_model, run_published_cases
 from commands import harness
 
-from harness.errors import HarnessError
+from harness import HarnessError
 from harness.report.sections import read_picture
 
 EMPTY = {"meta", "link", "img", "br"}

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from build_cache import ROOT
 
-from harness.errors import HarnessError
+from harness import HarnessError
 from harness.results import folder as folders
 from harness.results.folder import replace_folder
 

@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from harness.errors import HarnessError
+from harness import HarnessError
 from harness.results.provenance import write_provenance
 from harness.results.summary import (
     SUMMARY_FILE,

@@ -15,8 +15,7 @@ import numpy as np
 import pytest
 from fmpy.model_description import Dimension, ModelVariable
 
-from harness import load_result
-from harness.errors import HarnessError, SceneError
+from harness import HarnessError, SceneError, load_result
 from harness.results.provenance import load_provenance
 from harness.running.external.simulation import read_longest_rows
 from harness.running.external.step_refinement import RefinementRun, refine

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from external_fmus import build_external_fmus
 
-from harness.errors import HarnessError
+from harness import HarnessError
 from harness.running.fmu_instance import CALL_FAILURES, STATUS_NAMES, LogCapture
 from harness.running.runner import open_instance, open_session
 from harness.scenes.run_spec import RunSpec

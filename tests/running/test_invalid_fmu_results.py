@@ -10,7 +10,7 @@ import pytest
 from fmpy.model_description import ModelVariable
 from spec_runs import ignore_progress
 
-from harness.errors import HarnessError
+from harness import HarnessError
 from harness.running.event_mode import update_discrete_states
 from harness.running.external.step_refinement import RefinementRun, refine
 from harness.running.fmu_instance import FmuInstance, TerminatedError

@@ -9,7 +9,7 @@ import pytest
 from build_cache import ROOT
 from commands import harness, run_process
 
-from harness.errors import HarnessError
+from harness import HarnessError
 from harness.process.temporary_directory import has_plain_uri, remove_abandoned_directories, temporary_directory
 from harness.running import fmu_archive
 

@@ -25,7 +25,8 @@ ROUNDING = 1e-13  # relative to the largest term of the solution
 DIVERGES = "the solution diverges after t = "
 (FILE,) = (path for path in EXAMPLE_MODELS if path.stem == "unstable_body")
 METHODS = (EXACT, ODE23, ODE45, DOP853, RODAS)
-BACKENDS = {"python": [], "native": ["--native"], "fmi3": ["--native", "--fmi", "3"]}
+NATIVE = ("--native", "--platform", "linux64")
+BACKENDS = {"python": (), "native": NATIVE, "fmi3": (*NATIVE, "--fmi", "3")}
 SIGNS = [(k, c) for k in (-40.0, 0.0, 40.0) for c in (-2.0, 0.0, 2.0)]
 LIMITS = [  # tiny values, negative zeros, and nearly equal roots
     *[(40.0, sign * 80.0**0.5 * 2.0**0.5 * factor) for sign in (1, -1) for factor in (1 - 1e-12, 1.0, 1 + 1e-12)],
@@ -260,7 +261,7 @@ def test_a_driver_pulls_a_body_by_a_negative_stiffness(worker, tmp_path):
     source = (ROOT / "fmus" / "stickslip.py").read_text()
     file = tmp_path / "pulled.py"
     file.write_text(source.replace('"spring stiffness", low=0.0', '"spring stiffness"'))
-    folder = build_user_model(file, "--native")
+    folder = build_user_model(file, *NATIVE)
     for x0, v0, speed in ((0.3, 0.0, 0.034), (-0.1, 0.5, 0.4), (0.0, 0.0, -2.0)):
         motion = ClosedFormMotion([(0.0, stickslip(k=-742.5, v_driver=speed))], x0, v0, 1.5)
         values = {"solver.method": EXACT, "k": -742.5, "v_driver": speed, "x0": x0, "v0": v0}

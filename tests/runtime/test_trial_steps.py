@@ -34,8 +34,13 @@ class Late(Model):
 '''
 
 
-@pytest.mark.parametrize("kind", ["", pytest.param("native", marks=pytest.mark.slow)])
-@pytest.mark.parametrize("name", RATES)
+@pytest.mark.parametrize(
+    ("name", "kind"),
+    [
+        *((name, "") for name in RATES),
+        *(pytest.param(name, "native", marks=pytest.mark.slow) for name in ("log", "division")),
+    ],
+)
 def test_a_trial_step_outside_the_domain_of_a_function_is_repeated(worker, tmp_path, name, kind):
     start, rate, function = RATES[name]
     (file := tmp_path / "late.py").write_text(MODEL.format(t_on=T_ON, stop=STOP, start=start, rate=rate))

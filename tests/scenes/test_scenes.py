@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from harness.errors import SceneError
+from harness import SceneError
 from harness.results.files import to_json
 from harness.scenes.coupled.scene import CoupledKeys
 from harness.scenes.run_spec import RunSpec

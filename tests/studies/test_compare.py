@@ -12,10 +12,9 @@ import pytest
 from build_cache import run_published_cases
 from scipy.io import savemat
 
-from harness.errors import HarnessError
+from harness import ComparisonResult, HarnessError
 from harness.running.signals import ModeChanges, Signals
 from harness.studies.compare.difference import compare
-from harness.studies.compare.result import ComparisonResult
 from harness.studies.compare.trajectory_files import read_signals
 
 DECLARED_STEP = '<CoSimulation fixedInternalStepSize="0.1" '

@@ -9,21 +9,13 @@ import numpy as np
 import pytest
 from build_cache import ROOT
 from decays import decay_record
-from matplotlib.figure import Figure
 from shared_keys import check_shared_keys
 
+from harness import DecayResult
 from harness.analyses.decay.estimates import KnownParameters
 from harness.analyses.decay.identification import fit_decay
 from harness.analyses.decay.law import LAWS
 from harness.analyses.estimation.figure import MAX_POINTS, extremes
-from harness.studies.decay.figure import draw
-from harness.studies.decay.result import DecayResult
-from harness.studies.decay.table import decay_table
-
-
-def test_the_table_has_a_row_for_every_value():
-    fit = fit_decay(decay_record(0.02, 0.003, noise=1e-4), KnownParameters(k=157.9))
-    assert decay_table(fit).row_count == len(fit.estimates) == 8
 
 
 @pytest.mark.parametrize("arguments", [("coulomb",), (ROOT / "docs/records/spring.csv", "--m", "0.35")])
@@ -51,12 +43,10 @@ def test_the_quantities_keep_their_names():
 
 def test_a_figure_shows_angles_in_degrees_and_marks_only_excluded_samples():
     """Of a record whose clock counts from 1970."""
-    figure = Figure()
     t = np.linspace(0.0, 9.0, 3001)
     record = decay_record(0.02, sine=True, a=1.0, turn=0.0, rest=0.0, t=t, noise=1e-3)
     fit = fit_decay(replace(record, t=record.t + 1.7e9), KnownParameters(pendulum=True))
-    draw(fit, figure)
-    signal, residuals, shares = figure.get_axes()
+    signal, residuals, shares = DecayResult(**vars(fit)).plot()
     assert [axes.get_ylabel() for axes in (signal, residuals)] == ["x [deg]", "record - fit [deg]"]
     assert shares.get_xlabel() == "amplitude [deg]"
     curves = {line.get_label(): line.get_data() for line in signal.lines}
@@ -122,7 +112,7 @@ from pathlib import Path
 from decays import decay_record
 from harness.analyses.decay.estimates import KnownParameters
 from harness.analyses.decay.identification import fit_decay
-from harness.studies.decay.result import DecayResult
+from harness import DecayResult
 
 draws, draw = [], Figure.draw
 Figure.draw = lambda *arguments: draws.append(draw(*arguments))

@@ -15,10 +15,10 @@ from shared_keys import check_shared_keys
 import harness
 from benchmarks.campaigns.drawn_records import GROUPS, draw_record
 from benchmarks.campaigns.fit_campaign import SOURCES
+from harness import HarnessError, SceneError
 from harness.analyses.fit.law_comparison import compare_laws
 from harness.analyses.fit.measured_record import RecordData
 from harness.analyses.fit.parameter_fit import information_criterion
-from harness.errors import HarnessError, SceneError
 from harness.results.files import to_json
 from harness.running.fmu_archive import read_description
 from harness.running.variable_values import enumeration_labels

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import harness
-from harness.errors import SceneError
+from harness import SceneError
 
 pytestmark = pytest.mark.usefixtures("in_workspace")
 

@@ -17,7 +17,7 @@ from precision_points import make_point
 from spec_runs import ignore_progress
 
 from benchmarks.references import event_located
-from harness.errors import HarnessError
+from harness import HarnessError
 from harness.references import peer_solvers
 from harness.references.certified_reference import compute_errors, load_reference, relative_errors
 from harness.references.models import CASES
@@ -38,7 +38,6 @@ from harness.studies.precision.study import (
     study_model,
     sweep_tolerances,
 )
-from harness.studies.precision.survey import run_survey
 
 CASE = {case.name: case for case in CASES}
 SMOOTH = [case for case in CASES if not case.is_chattering]
@@ -202,13 +201,13 @@ def test_no_advice_is_given_without_sufficient_evidence():
     assert advice.recommend(Study("stickslip", (CASE["stickslip"],), ()), [], QUICK.min_ratio) == message
 
 
-def test_a_quick_run_does_not_replace_a_full_one(user_folder, tmp_path, monkeypatch):
-    monkeypatch.chdir(user_folder)
+def test_a_quick_run_does_not_replace_a_full_one(user_folder, tmp_path):
     folder = tmp_path / "precision/smd"
     folder.mkdir(parents=True)
     write_provenance(folder, [])
-    with pytest.raises(HarnessError, match="choose another --out, or replace it with --overwrite"):
-        run_survey(["smd"], QUICK, tmp_path, print)
+    done = command(user_folder, "smd", "--quick", "--out", tmp_path)
+    assert done.returncode == 1
+    assert "choose another --out, or replace it with --overwrite" in done.stderr
 
 
 def test_the_laws_creep_and_lose_their_symmetry_as_published(fmus):

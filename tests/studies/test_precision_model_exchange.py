@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from fmi3_fixtures import build_fmi3_fmus
 
-from harness.errors import HarnessError
+from harness import HarnessError
 from harness.references import peer_solvers
 from harness.references.certified_reference import load_reference
 from harness.references.models import CASES

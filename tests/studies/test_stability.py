@@ -14,6 +14,7 @@ from build_cache import build_user_model
 from models import EXAMPLE_MODELS, LARGER_MODELS, MODELS, declared
 from spec_runs import ignore_progress
 
+from harness import Trajectory
 from harness.process.worker import Worker, WorkerTimeoutError
 from harness.references.models.pacejka import MagicFormula
 from harness.references.reference_trajectory import CommunicationGrid, compute_reference
@@ -21,7 +22,7 @@ from harness.results.provenance import load_provenance
 from harness.running import step_sequence
 from harness.running.solution import Solution
 from harness.running.step_sequence import RefusalSummary, RefusedRun, inject_nonfinite
-from harness.running.trajectory import Statistics, Trajectory
+from harness.running.trajectory import Statistics
 from harness.scenes.run_spec import RunSpec
 from harness.studies.stability import study
 from harness.studies.stability.cases import StabilityCase, expand_scene, load_scenes, value_spans
@@ -40,6 +41,7 @@ from harness.studies.stability.study import (
 )
 from harness.studies.stability.table import error_table, refusal_table, summary
 
+SLOW = pytest.mark.slow
 QUICK = (
     "c = {} N.s/m: damping ratio c/20",
     "k = 0",
@@ -259,8 +261,10 @@ def test_a_part_of_the_table_ends_as_expected(user_folder, tmp_path, monkeypatch
     assert summary(rows, []).startswith(f"{len(rows)} of {len(rows)} ended as expected.")
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", MODELS)
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(name, marks=SLOW if name in ("smd", "stickslip") else pytest.mark.campaign) for name in MODELS],
+)
 def test_every_case_of_a_shipped_model_ends_as_expected(user_folder, tmp_path, monkeypatch, name):
     monkeypatch.chdir(user_folder)
     monkeypatch.setattr(study, "LIMIT", 1200.0)  # a loaded machine needs minutes until a run is refused
@@ -269,9 +273,7 @@ def test_every_case_of_a_shipped_model_ends_as_expected(user_folder, tmp_path, m
     assert {row.case.title for row in rows} == {scene["title"] for scene in load_scenes()[0] if scene["model"] == name}
 
 
-@pytest.mark.parametrize(
-    "name", ["rotor_brake", *(pytest.param(name, marks=pytest.mark.slow) for name in ("sleds", "belt"))]
-)
+@pytest.mark.parametrize("name", ["rotor_brake", *(pytest.param(name, marks=SLOW) for name in ("sleds", "belt"))])
 def test_a_user_model_passes_the_standard_scenes(tmp_path, name):
     """Its values, its tolerances and nonfinite numbers, by every method; a rule between two values may refuse them,
     and a belt adds energy."""

@@ -13,8 +13,7 @@ from sweep_results import open_sweep, sweep_folder
 
 pandas = pytest.importorskip("pandas", reason="the extra 'sweep' is not installed")
 
-from harness.errors import SceneError  # noqa: E402
-from harness.running.trajectory import Trajectory  # noqa: E402
+from harness import SceneError, Trajectory  # noqa: E402
 from harness.scenes.run_spec import RunSpec  # noqa: E402
 from harness.studies.sweep.measures import TRAJECTORY_MEASURES  # noqa: E402
 from harness.studies.sweep.runner import SweepSpec, open_runner  # noqa: E402

@@ -8,7 +8,7 @@ import commands
 import numpy as np
 import pytest
 
-from harness.errors import HarnessError
+from harness import HarnessError
 from harness.scenes.run_spec import RunSpec
 from harness.studies.sweep.checkpoint import Checkpoint, RunBlock
 from harness.studies.sweep.runner import SweepSpec

@@ -11,7 +11,7 @@ from build_cache import ROOT
 from models import MODELS
 from sweep_results import open_sweep, xarray
 
-from harness.errors import HarnessError
+from harness import HarnessError
 from harness.running.fmu_archive import read_description
 from harness.scenes.run_spec import RunSpec
 from harness.studies.sweep import figure

@@ -17,7 +17,7 @@ from sweep_results import sweep_folder
 
 distributed = pytest.importorskip("distributed", reason="the extra 'sweep' is not installed")
 
-from harness.errors import HarnessError  # noqa: E402
+from harness import HarnessError  # noqa: E402
 from harness.scenes.run_spec import RunSpec  # noqa: E402
 from harness.studies.sweep import study  # noqa: E402
 from harness.studies.sweep.checkpoint import Checkpoint  # noqa: E402

@@ -2,7 +2,7 @@
 
 The search of a fit and the native build before it are left out: its arguments are valid if the search begins.
 
-python argument_values.py FOLDER [FUNCTION...]  prints JSON: [function, argument, value, outcome] for each call.
+python argument_values.py FOLDER [VALUE...]  prints JSON: [function, argument, value, outcome] for each call.
 """
 
 import inspect
@@ -115,13 +115,13 @@ def answer(folder, connection):
         connection.send(call(*connection.recv()))
 
 
-def run(folder, functions):
+def run(folder, values):
     """Yield each function, argument and value with the outcome of the call; replace a process that does not return."""
     context = multiprocessing.get_context("fork")
     process = None
-    for function in functions:
+    for function in CALLS:
         for argument in inspect.signature(getattr(harness, function)).parameters:
-            for value in VALUES:
+            for value in values:
                 if process is None:
                     connection, other_end = context.Pipe()
                     process = context.Process(target=answer, args=(folder, other_end), daemon=True)
@@ -152,5 +152,5 @@ if __name__ == "__main__":
 
     IMPORTED = dask, fmpy, matplotlib.figure, netCDF4, scipy.integrate, scipy.optimize, xarray  # once, before the forks
     root, *chosen = sys.argv[1:]
-    for result in run(root, chosen or CALLS):
+    for result in run(root, chosen or VALUES):
         print(json.dumps(result), flush=True)

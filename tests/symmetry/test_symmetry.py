@@ -47,16 +47,26 @@ def test_a_motion_depends_on_no_time_unit_sign_order_or_frame(label):
     assert not differences
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("label", LABELS)
-def test_no_motion_of_any_method_and_law_depends_on_them(label):
+def check_all_changes(label, **options):
     kinds = [kind for kind in KINDS if kind != LARGEST_STEP or label not in NEED_A_LARGEST_STEP]
-    examined, differences = examine(label, kinds=kinds, **MORE)
+    examined, differences = examine(label, kinds=kinds, **options)
     assert {*examined} == {kind for kind in kinds if label not in HAVE_NONE.get(kind, ())}
     assert not differences
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("label", ["smd", "blocks", "clutch", "lift", "servo"])
+def test_no_motion_of_a_further_model_depends_on_them(label):
+    check_all_changes(label, methods=("ode45",), **FEW)
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize("label", LABELS)
+def test_no_motion_of_any_method_and_law_depends_on_them(label):
+    check_all_changes(label, **MORE)
+
+
+@pytest.mark.campaign
 @pytest.mark.parametrize("backend", [NATIVE, FMI3])
 @pytest.mark.parametrize("label", FEW_MODELS)
 def test_native_motions_depend_on_no_time_unit_or_sign(label, backend):
@@ -66,8 +76,10 @@ def test_native_motions_depend_on_no_time_unit_or_sign(label, backend):
     assert not differences
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("label", PERIODIC)
+@pytest.mark.parametrize(
+    "label",
+    [pytest.param(label, marks=pytest.mark.campaign if label == "joint" else pytest.mark.slow) for label in PERIODIC],
+)
 def test_every_period_of_a_long_run_has_the_same_events(label):
     examined, differences = examine(
         label, NATIVE if label == "stickslip" else "python", (LONG,), long_run=PERIODIC[label]
@@ -106,7 +118,7 @@ def test_random_motions_depend_on_none_of_them(case, seed, start, scale):
     check_random_run(*case, seed, start, scale)
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 @settings(max_examples=60, deadline=None, phases=PHASES)
 @given(**ARGUMENTS)
 def test_many_random_motions_depend_on_none_of_them(case, seed, start, scale):
