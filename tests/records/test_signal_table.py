@@ -8,7 +8,6 @@ from harness import SceneError
 from harness.records.columns import ColumnOptions, find_signal_column, find_time_column, list_columns, read_record
 from harness.records.signal_table import SignalSource, parse_signals, read_signals
 from harness.records.table_files import load_table
-from harness.records.units import conversion_factor
 
 WANTED = {"x": SignalSource("laser", "m"), "F": SignalSource("load", "N")}
 
@@ -37,9 +36,15 @@ WANTED = {"x": SignalSource("laser", "m"), "F": SignalSource("load", "N")}
         ("furlong", "m", None),
     ],
 )
-def test_units_of_one_quantity_are_converted(unit, other, factor):
-    conversion = conversion_factor(unit, other)
-    assert conversion is factor is None or conversion == pytest.approx(factor, rel=1e-14)
+def test_units_of_one_quantity_are_converted(tmp_path, unit, other, factor):
+    path = write(tmp_path / "a.csv", [(i, 0.25 * i) for i in range(20)], f"t [s],y [{unit}]\n")
+    sources = {"y": SignalSource("y", other)}
+    if factor is None:
+        with pytest.raises(SceneError):
+            read_signals(path, sources, ColumnOptions(), "a")
+    else:
+        values = read_signals(path, sources, ColumnOptions(), "a").columns["y"]
+        assert values == pytest.approx(factor * 0.25 * np.arange(20), rel=1e-14)
 
 
 def write(path, rows, heading="# a comment\nt [ms],laser [mm],load (kN),other\n"):

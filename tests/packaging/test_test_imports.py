@@ -1,0 +1,71 @@
+"""Tests go through commands and the API: the modules of the harness that tests import are listed here."""
+
+import ast
+from pathlib import Path
+
+from build_cache import ROOT
+
+# Modules with an algorithm, a file format or a process whose claims need no run of an FMU, or cannot be seen in one.
+# Remove a module when its last import goes; add none: test a new function through `harness` or a command.
+ALLOWED = """
+.: __main__ commands
+analyses.decay: decrement estimates extrema fit_problem identification intervals law return_map signal_model
+    thinning window
+analyses.estimation: estimate figure
+analyses.fit: feasible_region fit_problem fit_procedure law_comparison measured_record noise parameter_fit
+    profile_likelihood uncertainty unknowns validation
+analyses: slip steps
+commands: terminal
+process: interrupt interruptible_wait progress_bar subprocess_runner temporary_directory worker worker_process
+records: array_files child_reader columns headings record samples signal_table size_limits table_files text_table
+references: certification certified_reference models peer_solvers reference_trajectory single_model_reference
+references.models: pacejka
+report: page sections typeset verdicts
+results: files folder provenance quantity registry result style summary
+running: embedded_model event_mode fmu_archive fmu_instance native_equivalent recorder resolve runner session signals
+    solution ssp step_sequence stepping trajectory variable_values whole_run
+running.external: simulation step_refinement
+scenes: assignments run_spec scene schema
+scenes.coupled: scene
+studies.compare: difference trajectory_files
+studies.coupled: engine result study
+studies.decay: table
+studies.fit: laws options request study
+studies.precision: advice figure law_deviations method_choice result study table
+studies.run: study table
+studies.stability: cases outcomes result study table
+studies.sweep: boundaries checkpoint figure measures result_files runner sampling study worker
+"""
+
+
+def allowed_modules():
+    modules, package = set(), ""
+    for word in ALLOWED.split():
+        if word.endswith(":"):
+            package = "harness" if word == ".:" else f"harness.{word[:-1]}"
+        else:
+            modules.add(f"{package}.{word}")
+    return modules
+
+
+def is_module(name):
+    path = ROOT / name.replace(".", "/")
+    return path.is_dir() or path.with_suffix(".py").is_file()
+
+
+def imported_modules(file):
+    """Return the modules of the harness that a file imports; `from package import module` imports the module."""
+    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            for alias in node.names:
+                module = f"{node.module}.{alias.name}"
+                yield module if is_module(module) else node.module
+
+
+def test_tests_import_no_further_module_of_the_harness():
+    files = Path(ROOT / "tests").rglob("*.py")
+    modules = {module for file in files for module in imported_modules(file) if module.startswith("harness.")}
+    assert sorted(modules - allowed_modules()) == []
+    assert sorted(allowed_modules() - modules) == []  # remove these from the list
