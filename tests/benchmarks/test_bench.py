@@ -180,6 +180,7 @@ def test_the_run_time_at_an_error_is_not_that_of_a_lucky_run():
     assert stiff.time_at_error(runs, 1e-7) == inf
 
 
+@pytest.mark.campaign
 @pytest.mark.skipif(c_host.COMPILER is None, reason="there is no C compiler on this machine: install gcc")
 def test_radau9_is_faster_than_cvode_at_equal_error(both_backends, monkeypatch):
     monkeypatch.setattr(stiff, "RUN_TIME", 0.0)

@@ -20,7 +20,7 @@ pytestmark = pytest.mark.slow
 
 TYPES = ("Real", "Integer", "Boolean", "String")
 SHORT = settings(
-    max_examples=25,
+    max_examples=12,
     stateful_step_count=40,
     derandomize=True,  # the same calls every time
     database=None,

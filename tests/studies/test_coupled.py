@@ -191,6 +191,10 @@ def run():
 
 
 SCENES = [file.stem for file in shipped_coupled_scenes()]
+EVERY_SCENE = pytest.mark.parametrize(
+    "scene",
+    [pytest.param(scene, marks=pytest.mark.campaign if scene == "chain" else pytest.mark.slow) for scene in SCENES],
+)
 
 
 def engines(folder):
@@ -199,8 +203,7 @@ def engines(folder):
     return {name: ([float(number) for number in numbers], why) for name, *numbers, why in rows}
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("scene", SCENES)
+@EVERY_SCENE
 def test_a_shipped_scene_converges_to_its_reference_in_every_engine(run, scene):
     """The error is proportional to the step, also in Ecos and libcosim; fmpy passes the first forces one step later."""
     steps, errors = np.loadtxt(run(scene) / "error.csv", delimiter=",", skiprows=1).T
@@ -213,8 +216,7 @@ def test_a_shipped_scene_converges_to_its_reference_in_every_engine(run, scene):
     assert engine_errors["Ecos"][0][-1] < 0.05 * size
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("scene", SCENES)
+@EVERY_SCENE
 def test_an_archive_avoids_factors_inline_values_and_unusual_names(run, scene):
     (file,) = run(scene).glob("*.ssp")
     system = read_ssd(str(file)).system  # which validates it against the schema

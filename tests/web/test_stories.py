@@ -134,7 +134,7 @@ LABELS_AND_CURVES = """app.stories.then(({ charts }) => {
 })"""
 
 
-@pytest.mark.parametrize("width", [360, 1280])
+@pytest.mark.parametrize("width", [360, pytest.param(1280, marks=pytest.mark.campaign)])
 def test_labels_do_not_touch_curves(still, width):
     still.browser.size(width)
     still.wait("!document.querySelector('.pending')")

@@ -28,7 +28,7 @@ def test_a_phase_angle_is_no_driver(name, driver):
     assert list_bodies(find_model(name).analysis)[0].get("driver", "") == driver
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_the_models_of_fmus_more_run_on_a_second_page(quiet):
     """It leaves index.html, the page of the shipped models, as it is."""
     page = web_page.Page(quiet, web_page.build_page("web-more", "--more", file="more.html"))
