@@ -455,9 +455,11 @@ class InternalStep:
             if self.event_location.must_repeat:
                 return NEEDS_REPETITION
             if end <= h:
-                if model.is_coupled and self.is_hybrid and step_limits.is_slip_unresolved(model, self, end):
-                    self.event_location.must_shorten = True
-                    return NEEDS_REPETITION
+                if model.is_coupled and self.is_hybrid:
+                    is_unresolved = step_limits.is_slip_unresolved(model, self, end)
+                    if is_unresolved:
+                        self.event_location.must_shorten = True
+                        return NEEDS_REPETITION
                 if model.checks_event_steps and not self.is_accurate_at(model, end):
                     self.event_location.must_shorten = True
                     return NEEDS_REPETITION
