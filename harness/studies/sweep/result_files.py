@@ -76,7 +76,7 @@ class SweepDescription:
     constants: dict[str, tuple[object, str]]
     stop: float
     boundaries: tuple[Boundary, ...]
-    tables: tuple[LookupTable, ...]
+    tables: tuple[LookupTable, ...] = ()
 
 
 def run_sweep(
