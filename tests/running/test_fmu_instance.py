@@ -5,7 +5,7 @@ from contextlib import suppress
 import fmi3_fixtures
 import numpy as np
 import pytest
-from external_fmus import build_external_fmus
+from external_fmus import build_external_fmus, edited_copy
 
 from harness import HarnessError
 from harness.running.fmu_instance import CALL_FAILURES, STATUS_NAMES, LogCapture
@@ -64,3 +64,19 @@ def test_a_run_of_a_session_does_not_depend_on_earlier_runs(fmus, fmu, name, val
     assert np.ptp(motions[0]) > 0.0
     for motion in motions[1:]:
         np.testing.assert_array_equal(motion, motions[0])
+
+
+@pytest.mark.parametrize("once", [False, True])
+def test_an_fmu_for_one_instance_in_a_process_has_a_process_for_each_run(tmp_path, once):
+    """Such an FMU may keep values of an earlier instance; here its output is the number of its process."""
+    flag = "true" if once else "false"
+    changes = {
+        "resources/Gain.py": lambda text: (
+            "import os\n" + text.replace("self.k * self.u + self.c", "float(os.getpid())")
+        ),
+        "modelDescription.xml": lambda text: text.replace('OncePerProcess="false"', f'OncePerProcess="{flag}"'),
+    }
+    fmu = edited_copy(build_external_fmus() / "Gain.fmu", tmp_path / "Gain.fmu", changes)
+    with open_session(RunSpec(fmu, ("y",), stop=1.0), ("k",)) as session:
+        processes = {session.run([k])["y"][-1] for k in (1.0, 2.0)}
+    assert len(processes) == (2 if once else 1)

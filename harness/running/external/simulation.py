@@ -43,7 +43,8 @@ SETTABLE = ("parameter", "structuralParameter", "input")
 class ChildSession:
     """Runs of an external FMU that differ in values, in a worker process; a context manager, which ends the process.
 
-    The FMU is unpacked once. A process whose run failed is replaced.
+    The FMU is unpacked once. A process whose run failed is replaced. An FMU that may be instantiated only once in a
+    process has a new process for each run.
 
     Parameters
     ----------
@@ -59,6 +60,8 @@ class ChildSession:
         self.spec, self.description, self.varied = spec, description, varied
         self.variables: Values = {variable.name: variable for variable in description.modelVariables}
         self.exchange = spec.exchange or description.coSimulation is None
+        interface = description.modelExchange if self.exchange else description.coSimulation
+        self.runs_once = interface is not None and interface.canBeInstantiatedOnlyOncePerProcess
         self.resources, self.worker = ExitStack(), Worker(memory_size())
 
     def __enter__(self) -> Self:
@@ -135,8 +138,8 @@ class ChildSession:
             timeout = spec.timeout + GRACE_PERIOD
             arguments = (run_unpacked_fmu, spec, self.folder, directory)
             result = self.worker.call(*arguments, timeout=timeout, report=report)
-            if result.failure:
-                self.worker.kill()  # after a failure, the instance still exists
+            if result.failure or self.runs_once:  # after a failure, the instance still exists
+                self.worker.kill()
             return result, self.worker.messages.splitlines()
         except WorkerTimeoutError as error:
             message = f"a call did not return within {spec.timeout:g} s (--timeout sets the limit)"
