@@ -229,7 +229,8 @@ def integrate_half_cycles(
         starts.append(at)
         series.append(c)
         velocity, powers = differentiate_series(c), h ** np.arange(len(c))
-        y, w = powers @ c, powers[:-1] @ velocity
+        with np.errstate(invalid="ignore", over="ignore"):  # beyond any motion of the law; the loop ends below
+            y, w = powers @ c, powers[:-1] @ velocity
         ends = np.flatnonzero(np.isnan(end) & (w >= 0))
         if len(ends):
             root = time_to_standstill(velocity[:, ends], h)
