@@ -40,7 +40,7 @@ def thin_out(dataset: xarray.Dataset) -> xarray.Dataset:
 def draw(data: xarray.Dataset, figure: Figure, boundaries: Sequence[Boundary], failed: int) -> None:
     """Draw the figure: panels of the measures, over each parameter in scatter plots, and one of each varied table."""
     measures, varied = [str(name) for name in data.data_vars], [str(name) for name in data.coords]
-    scattered = is_scattered(data)
+    scattered, tables = is_scattered(data), tables_of(data)
     draw_panel: list[Callable[[Axes], None]]
     if scattered:
         n_columns = len(varied)
@@ -48,9 +48,9 @@ def draw(data: xarray.Dataset, figure: Figure, boundaries: Sequence[Boundary], f
             partial(plot_scatter, data=data, measure=measure, name=name) for measure in measures for name in varied
         ]
     else:
-        n_columns = 1 if len(measures) == 1 and not tables_of(data) else 2
+        n_columns = 1 if len(measures) == 1 and not tables else 2
         draw_panel = [partial(draw_measure, data=data, measure=measure, boundaries=boundaries) for measure in measures]
-    draw_panel += [partial(draw_curves, data=data, table=table) for table in tables_of(data)]
+    draw_panel += [partial(draw_curves, data=data, table=table) for table in tables]
     n_rows = -(-len(draw_panel) // n_columns)
     height = HEIGHT * (1.2 if scattered or len(varied) == 1 else 1.7)
     set_size(figure, max(1.2, n_columns) * WIDTH, height * n_rows + 0.6)

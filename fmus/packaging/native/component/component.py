@@ -23,7 +23,6 @@ from .encoder import (
     vector,
 )
 from .interfaces import (
-    FACTORY_PARAMETERS,
     FUNCTIONS,
     GET_VERSION,
     LAYERED_STANDARD,
@@ -168,17 +167,24 @@ def memory_module() -> bytes:
     )
 
 
+def count_core_parameters(signature: str) -> int:
+    """Return the number of parameters in the core module, where a string or list has an address and a length."""
+    _, parameters, _ = parse_signature(signature)
+    return sum(2 if kind == "string" or kind.startswith("list<") else 1 for _, kind in parameters)
+
+
 def handle_module() -> bytes:
     """Return a core module whose functions call instantiate-... and replace the address of an instance by a handle."""
-    kinds = list(FACTORY_PARAMETERS)
-    factory_types = [b"\x60" + vector([I32] * n) + vector([I32]) for n in FACTORY_PARAMETERS.values()]
+    kinds = list(FUNCTIONS)
+    counts = {kind: count_core_parameters(FUNCTIONS[kind][0]) for kind in kinds}  # of instantiate-...
+    factory_types = [b"\x60" + vector([I32] * n) + vector([I32]) for n in counts.values()]
     imports = [text("memory") + text("memory") + b"\x02\x00\x00"]
     exports, bodies = [], []
     for i, kind in enumerate(kinds):
         imports.append(text("fmu") + text(f"instantiate-{kind}") + b"\x00" + uleb(i + 1))
         imports.append(text("handles") + text(f"new-{kind}") + b"\x00\x00")
         exports.append(text(f"instantiate-{kind}") + b"\x00" + uleb(2 * len(kinds) + i))
-        n = FACTORY_PARAMETERS[kind]
+        n = counts[kind]
         result = LOCAL_GET + uleb(n)
         code = b"".join(LOCAL_GET + uleb(j) for j in range(n)) + CALL + uleb(2 * i) + LOCAL_TEE + uleb(n)
         code += LOAD_BYTE + IF + VOID + result + result + LOAD + CALL + uleb(2 * i + 1) + STORE + END + result + END

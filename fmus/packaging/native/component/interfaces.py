@@ -105,4 +105,3 @@ RECORDS = {  # the record of each interface with a resource
     ),
 }
 FUNCTIONS = {"co-simulation": CO_SIMULATION, "model-exchange": MODEL_EXCHANGE}
-FACTORY_PARAMETERS = {"co-simulation": 12, "model-exchange": 8}  # of instantiate-...: each string and list counts twice
