@@ -26,7 +26,7 @@ def test_a_host_run_is_judged_by_the_certified_result():
         assert message == text
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_pathsim_agrees_with_certified_results(tmp_path, monkeypatch):
     host = next(host for host in matrix.HOSTS if "pathsim" in host.package)
     try:

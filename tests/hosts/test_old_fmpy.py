@@ -9,7 +9,7 @@ import native_fmus
 import pytest
 from models import MODELS
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.campaign
 
 VERSION = "0.3.9"  # the oldest one that knows FMI 3.0 and can be installed
 SCRIPT = """

@@ -105,7 +105,7 @@ def test_the_fmu_names_the_draft_and_has_no_intermediate_update(fmu, host, descr
     assert host.function("common", "get-version")() == "3.0"
 
 
-@pytest.mark.slow
+@pytest.mark.campaign  # the compiler builds musl for this test
 def test_co_simulation_is_equal_to_the_same_c_with_musl_bit_for_bit(fmu, instantiate, references, tmp_path):
     component, numbers = instantiate(CO_SIMULATION), [references[name] for name in NAMES if name != "mode"]
     with ZipFile(fmu) as archive:

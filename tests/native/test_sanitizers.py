@@ -9,7 +9,7 @@ import sys
 
 import fmi3_fixtures
 import pytest
-from models import MODELS
+from models import MODELS, STICKSLIP_IN_CI
 from native_fmus import build_native_fmus
 from native_host import SANITIZER_ENVIRONMENT, SANITIZERS, compile_sanitized
 
@@ -36,12 +36,12 @@ def program(source, fmu, sanitizers=SANITIZERS):
     return run
 
 
-@pytest.fixture(scope="module", params=MODELS)
+@pytest.fixture(scope="module", params=STICKSLIP_IN_CI)
 def abuse(request):
     return program("fmi2_stress.c", build_native_fmus() / f"{request.param}.fmu")
 
 
-@pytest.fixture(scope="module", params=MODELS)
+@pytest.fixture(scope="module", params=STICKSLIP_IN_CI)
 def walk(request):
     return program("fmi3_stress.c", fmi3_fixtures.build_fmi3_fmus() / f"{request.param}.fmu")
 

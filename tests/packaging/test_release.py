@@ -29,7 +29,7 @@ def test_two_releases_are_the_same_bytes(build_release):
     assert build_release() == build_release()
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_the_release_holds_every_kind_and_correct_checksums(build_release, tmp_path):
     root = f"friction-fmus-{__version__}/"
     with ZipFile(BytesIO(build_release())) as archive:

@@ -16,6 +16,9 @@ MODELS = sorted(path.stem for path in (ROOT / "fmus").glob("*.py") if path.stem 
 BODIES = [
     name for name in MODELS if len(find_model(name).model().states) == 2
 ]  # position and speed are all their states
+STICKSLIP_IN_CI = [  # the other models run in campaigns
+    pytest.param(name, marks=() if name == "stickslip" else pytest.mark.campaign) for name in MODELS
+]
 EXAMPLE_MODELS = sorted((ROOT / "tests" / "example_models").glob("*.py"))  # as users write them, in files of their own
 LARGER_MODELS = sorted((ROOT / "tests" / "example_models" / "larger").glob("*.py"))  # with more states or more contacts
 EXACT, ODE23, ODE45, DOP853, RODAS, RADAU9 = 1, 2, 3, 4, 5, 6
