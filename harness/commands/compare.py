@@ -8,7 +8,6 @@ import click
 
 from .terminal import (
     NONNEGATIVE,
-    RenamedOption,
     Terminal,
     refuse_ignored_options,
     refuse_options,
@@ -20,13 +19,8 @@ from .terminal import (
 @click.command()
 @click.argument("first", metavar="A")
 @click.argument("second", metavar="B")
-@run_options("--run-rtol", "Relative tolerance of runs of FMUs that are not of this project.  [default: 1e-6]")
-@click.option(
-    *("--rtol", "--within", "rtol"),
-    cls=RenamedOption,
-    type=NONNEGATIVE,
-    help="Allowed difference, relative to the largest value.",
-)
+@run_options
+@click.option("--within", type=NONNEGATIVE, help="Allowed difference, relative to the largest value.")
 @click.option("--atol", type=NONNEGATIVE, help="Allowed difference in addition, in the unit of the variable.")
 @result_options
 @click.pass_context
@@ -34,7 +28,7 @@ def compare(
     context: click.Context,
     first: str,
     second: str,
-    rtol: float | None,
+    within: float | None,
     atol: float | None,
     terminal: Terminal,
     **options: Any,
@@ -44,14 +38,14 @@ def compare(
 
     Both sides share one time grid: FMUs and scenes are run at the times of the other side, and two FMUs with the
     fixed internal step that one of them declares.  Between samples, a variable is interpolated with its rate if the
-    rate was recorded, otherwise monotonically; a variable of an integer type keeps its last value.  With --rtol or
+    rate was recorded, otherwise monotonically; a variable of an integer type keeps its last value.  With --within or
     --atol, exit status 1 means that a difference exceeds the tolerance, events do not match, or a run failed.
 
     \b
     Examples:
       friction-fmus compare results/stickslip results/stickslip-threshold
       friction-fmus compare fmus/coulomb.fmu other.fmu --stop 2
-      friction-fmus compare results/smd measured.csv --rtol 1e-3 --atol 1e-6
+      friction-fmus compare results/smd measured.csv --within 1e-3 --atol 1e-6
     """
     with terminal.progress(1) as report:  # the imports take most of a second
         from ..running.resolve import FMU_SUFFIXES
@@ -65,12 +59,11 @@ def compare(
         if all(Path(source).exists() for source in (first, second)) and not {*suffixes} & {*RUN_SUFFIXES}:
             refuse_options(context, "on stored results and files", "stop")
         fmus = [find_fmu(source) for source in (first, second) if Path(source).suffix in FMU_SUFFIXES]
-        refuse_ignored_options(context, fmus, tolerance_is_ignored=True)
-        options = {name: value for name, value in options.items() if name != "tolerance" or value is not None}
-        spec = RunOptions(**options)
-        comparison, folder = study.run_comparison((first, second), spec, terminal.out, partial(report, "compare"))
+        refuse_ignored_options(context, fmus)
+        rtol, spec = options.pop("tolerance"), RunOptions(**options)
+        comparison, folder = study.run_comparison((first, second), spec, rtol, terminal.out, partial(report, "compare"))
     runs = [side for side in (comparison.one, comparison.two) if isinstance(side, Trajectory)]
     failed = [run.failure for run in runs if run.failure]
-    if rtol is not None or atol is not None:
-        failed += comparison.violations(rtol or 0.0, atol or 0.0)
+    if within is not None or atol is not None:
+        failed += comparison.violations(within or 0.0, atol or 0.0)
     terminal.print_result(comparison.as_json(), *comparison.blocks(), folder=folder, failed=failed)

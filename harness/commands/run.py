@@ -19,7 +19,7 @@ UNUSED_SWEEP_OPTIONS = ("name", "scheduler")  # of a recorded call
 @click.argument("scene", required=False)
 @click.option("--fmu", type=click.Path(path_type=Path), help="Run this FMU instead of a scene.")
 @click.option("--set", "values", multiple=True, metavar="NAME=VALUE", help="Start value; only with an FMU. Repeatable.")
-@run_options()
+@run_options
 @result_options
 @click.pass_context
 def run(

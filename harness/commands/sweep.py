@@ -48,7 +48,7 @@ from .terminal import (
 )
 @click.option("--scheduler", metavar="ADDRESS", help="Scheduler of a running Dask cluster: tcp://host:8786.")
 @click.option("--name", help="Name of the result folder.")
-@run_options()
+@run_options
 @result_options
 @click.pass_context
 def sweep(

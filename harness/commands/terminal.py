@@ -23,11 +23,6 @@ from ..errors import HarnessError, check_names, format_value
 from ..process.interrupt import check_interrupt
 from ..process.temporary_directory import temporary_root
 
-FORMER_TIMEOUT, FORMER_TOLERANCE = "--patience", "--tolerance"
-TOLERANCE_HELP = (
-    "Relative tolerance: of the solver of an FMU of this project; of the result of any other FMU.  [default: that of "
-    "the FMU; 1e-6 for any other]"
-)
 Command = Callable[..., Any]
 
 
@@ -158,8 +153,15 @@ RATE_OPTION = click.option(
 )
 BEGIN_OPTION = click.option("--from", "begin", type=FINITE, help="Ignore samples before this time in s.")
 END_OPTION = click.option("--until", "end", type=FINITE, help="Ignore samples after this time in s.")
-STOP_OPTION = click.option("--stop", type=FINITE, help="Stop time in s. Default: that of the FMU.")
 RUN_OPTIONS = (
+    click.option("--stop", type=FINITE, help="Stop time in s. Default: that of the FMU."),
+    click.option(
+        *("--rtol", "--tolerance", "tolerance"),
+        cls=RenamedOption,
+        type=POSITIVE,
+        help="Relative tolerance: of the solver of an FMU of this project; of the result of any other FMU.  [default: "
+        "that of the FMU; 1e-6 for any other]",
+    ),
     click.option(
         "--interface",
         type=click.Choice(INTERFACES, case_sensitive=False),
@@ -169,7 +171,7 @@ RUN_OPTIONS = (
     click.option("--exchange", is_flag=True, hidden=True),  # former name of --interface ModelExchange
     click.option("--lenient", is_flag=True, help="Run the FMU even if it violates the FMI standard."),
     click.option(
-        *("--timeout", FORMER_TIMEOUT, "timeout"),
+        *("--timeout", "--patience", "timeout"),
         cls=RenamedOption,
         type=POSITIVE,
         default=60.0,
@@ -194,7 +196,6 @@ def refuse_options(context: click.Context, reason: str, *options: str) -> None:
 def refuse_ignored_options(
     context: click.Context,
     fmus: Iterable[Path],
-    tolerance_is_ignored: bool = False,
     timeout_is_ignored: bool = False,
 ) -> None:
     """Raise UsageError for an option on the command line that has no effect on any of the FMUs.
@@ -205,8 +206,6 @@ def refuse_ignored_options(
         Context of the command.
     fmus : iterable of pathlib.Path
         FMUs that are run with the options of the command line; scenes have their own options.
-    tolerance_is_ignored : bool
-        Whether the command sets no tolerance of the solver of FMUs of this project.
     timeout_is_ignored : bool
         Whether the command limits no time of FMUs of this project.
     """
@@ -220,7 +219,7 @@ def refuse_ignored_options(
         descriptions = [read_description(file, context.params["lenient"]) for file in files]
         if all(map(exposes_solver_steps, descriptions)):
             reason = f"on {files[0].name}, which runs at the steps of its own solver"
-            refuse_options(context, reason, *["tolerance"] * tolerance_is_ignored, *["timeout"] * timeout_is_ignored)
+            refuse_options(context, reason, *["timeout"] * timeout_is_ignored)
             methods = [read_fixed_choices(file).get("solver.method", ("", 0))[0] for file in files]
             assignments = context.params.get("values", ())
             if all(uses_closed_form(*pair, assignments) for pair in zip(descriptions, methods, strict=True)):
@@ -240,33 +239,22 @@ def uses_closed_form(description: Any, fixed_method: str, assignments: Iterable[
     return labels.get(number, number) == EXACT
 
 
-def run_options(tolerance: str = "--rtol", text: str = TOLERANCE_HELP) -> Callable[[Command], Command]:
-    """Return a decorator that adds the options of commands that run FMUs.
+def run_options(command: Command) -> Command:
+    """Add the options of commands that run FMUs.
 
     The command receives fields of RunSpec, and `tolerance`, which is None unless it is given.
-
-    Parameters
-    ----------
-    tolerance, text : str
-        Name and help of the option for the relative tolerance.
     """
 
-    def decorate(command: Command) -> Command:
-        @wraps(command)
-        def wrapper(interface: str | None, exchange: bool, **others: Any) -> Any:
-            if exchange and interface is not None:
-                raise click.UsageError("--interface and --exchange: give only --interface")
-            return command(exchange=exchange or interface == MODEL_EXCHANGE, **others)
+    @wraps(command)
+    def wrapper(interface: str | None, exchange: bool, **others: Any) -> Any:
+        if exchange and interface is not None:
+            raise click.UsageError("--interface and --exchange: give only --interface")
+        return command(exchange=exchange or interface == MODEL_EXCHANGE, **others)
 
-        tolerance_option = click.option(
-            *(tolerance, FORMER_TOLERANCE, "tolerance"), cls=RenamedOption, type=POSITIVE, help=text
-        )
-        result: Command = wrapper
-        for option in reversed((STOP_OPTION, tolerance_option, *RUN_OPTIONS)):
-            result = option(result)
-        return result
-
-    return decorate
+    result: Command = wrapper
+    for option in reversed(RUN_OPTIONS):
+        result = option(result)
+    return result
 
 
 def prepare_process() -> None:

@@ -50,7 +50,7 @@ OPTIONS_WITHOUT_EFFECT = [
     (["run", "stickslip", "--lenient"], "--lenient"),
     (["sweep", "smd", "--vary", "m=1,2", "--timeout", 5], "--timeout"),
     (["compare", "coulomb", "coulomb-sign", "--exchange"], "--exchange"),
-    (["compare", OWN, "fmus/coulomb.fmu", "--run-rtol", 0.5], "--run-rtol"),
+    (["compare", OWN, "fmus/coulomb.fmu", "--rtol", 0.5], "--rtol"),
     (["compare", "line.csv", "line.csv", "--stop", 2], "--stop"),
     (["sweep", "smd", "--vary", "m=1,2", "--rtol", 0.5], "--rtol"),
     (["sweep", "smd", "--vary", "m=1,2", "--seed", 5], "--seed"),

@@ -12,9 +12,7 @@ from harness.commands import commands as program
 
 RENAMED = [  # a command with its arguments, an option and its former spellings
     *((command, "--timeout=2.5", "--patience=2.5") for command in ("run", "compare a b", "sweep m --vary c=1,2")),
-    *((command, "--rtol=1e-3", "--tolerance=1e-3") for command in ("run", "sweep m --vary c=1,2")),
-    ("compare a b", "--run-rtol=1e-3", "--tolerance=1e-3"),
-    ("compare a b", "--rtol=1e-3", "--within=1e-3"),
+    *((command, "--rtol=1e-3", "--tolerance=1e-3") for command in ("run", "compare a b", "sweep m --vary c=1,2")),
     ("sweep m --vary c=1,2", "--samples=7", "--random=7"),
     ("sweep m --vary c=1,2", "--measures=final", "--measure=final"),
     ("fit m a.csv", "--set=k=3", "--fixed=k=3"),

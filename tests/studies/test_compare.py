@@ -13,6 +13,7 @@ from build_cache import run_published_cases
 from scipy.io import savemat
 
 from harness import ComparisonResult, HarnessError
+from harness import compare as compare_in_python
 from harness.running.signals import ModeChanges, Signals
 from harness.studies.compare.difference import compare
 from harness.studies.compare.trajectory_files import read_signals
@@ -98,7 +99,7 @@ def test_a_result_agrees_with_a_new_run_of_its_fmu_including_events(harness, res
 
 
 def test_a_scene_and_its_fmu_are_run_to_the_same_times(harness):
-    done = harness("compare", "stickslip", "fmus/stickslip.fmu", "--rtol", 1e-12)
+    done = harness("compare", "stickslip", "fmus/stickslip.fmu", "--within", 1e-12)
     assert (done.returncode, done.stderr) == (0, "")
     assert "(common to both)" in done.stdout
 
@@ -414,16 +415,14 @@ def test_strings_are_compared_as_strings(tmp_path):
 @pytest.mark.parametrize(
     ("bounds", "status"),
     [
-        (["--rtol", "0.1"], 0),
-        (["--rtol", "0.01"], 1),
         (["--within", "0.1"], 0),
         (["--within", "0.01"], 1),
         (["--atol", "0.3"], 0),
         (["--atol", "0.2"], 1),
-        (["--rtol", "0.05", "--atol", "0.1"], 0),
+        (["--within", "0.05", "--atol", "0.1"], 0),
     ],
 )
-def test_rtol_and_atol_set_the_allowed_difference(tmp_path, bounds, status):
+def test_within_and_atol_set_the_allowed_difference(tmp_path, bounds, status):
     (tmp_path / "one.csv").write_text("t [s],x [m]\n0,1\n1,4\n2,3\n")
     (tmp_path / "two.csv").write_text("t [s],x [m]\n0,1\n1,3.75\n2,3\n")
     done = commands.harness(tmp_path, "compare", "one.csv", "two.csv", *bounds, "--quiet", blank=True)
@@ -457,15 +456,24 @@ def test_a_name_longer_than_its_column_is_printed_in_full(tmp_path):
 )
 def test_external_fmus_are_compared(harness, external_fmu_folder, pair, message):
     one, two = (external_fmu_folder / f"{name}.fmu" for name in pair)
-    done = harness("compare", one, two, "--tolerance", 1e-4, "--rtol", 2e-4, "--lenient")
+    done = harness("compare", one, two, "--rtol", 1e-4, "--within", 2e-4, "--lenient")
     assert (done.returncode, done.stderr) == (0, "")
     assert message in done.stdout
+
+
+def test_rtol_sets_the_solver_in_the_command_as_in_the_api(harness, fmus):
+    pair = [str(fmus / f"{name}.fmu") for name in ("pacejka", "stickslip")]
+    texts = [harness("compare", *pair, "--rtol", rtol, "--json", "--overwrite").stdout for rtol in (1e-3, 1e-6)]
+    answers = [json.loads(text)["variables"] for text in texts]
+    assert answers[0] != answers[1]
+    expected = compare_in_python(*pair, rtol=1e-3).as_json()["variables"]
+    assert answers[0] == json.loads(json.dumps(expected))
 
 
 def test_fmus_are_run_to_the_same_stop_time(harness, external_fmu_folder, tmp_path):
     shorter = {"modelDescription.xml": lambda text: text.replace('stopTime="1.0"', 'stopTime="0.75"')}
     external_fmus.edited_copy(external_fmu_folder / "NonConforming.fmu", tmp_path / "Shorter.fmu", shorter)
-    done = harness("compare", "Shorter.fmu", external_fmu_folder / "NonConforming.fmu", "--lenient", "--rtol", 0)
+    done = harness("compare", "Shorter.fmu", external_fmu_folder / "NonConforming.fmu", "--lenient", "--within", 0)
     assert (done.returncode, done.stderr) == (0, "")
     assert "(common to both)" in done.stdout
 
