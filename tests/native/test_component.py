@@ -21,6 +21,7 @@ from fmus.packaging.native.compiler import compile_and_link
 from fmus.packaging.native.component.encoder import parse_signature
 from fmus.packaging.native.component.interfaces import COMMIT, FUNCTIONS
 
+pytestmark = pytest.mark.slow  # the compiler builds the C library of WASI
 pytest.importorskip("wasmtime.component", reason="pip install wasmtime")
 from component_host import CO_SIMULATION, MODEL_EXCHANGE, ComponentHost, RefusedError
 
