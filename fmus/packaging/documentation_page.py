@@ -8,7 +8,7 @@ from inspect import cleandoc
 from pathlib import Path
 
 from ..runtime.variable_access import SETTABLE_CAUSALITIES
-from ..runtime.variable_declarations import VariableDeclaration, VariableOwner
+from ..runtime.variable_declarations import VariableDeclaration, VariableOwner, exported_name
 from . import __version__
 from .certified_result import RESULT_FOLDER, CertifiedResult, find_certified_result, result_files
 from .equations.tables import PCHIP, Table
@@ -164,7 +164,7 @@ def _variable_table(variables: Variables) -> str:
         if meaning.variability == "fixed":
             notes.append("fixed")
         text = escape(meaning.text) + (f" <small>({escape('; '.join(notes))})</small>" if notes else "")
-        cells = (f"<code>{escape(variable)}</code>", f"{value} {escape(unit)}".strip(), text)
+        cells = (f"<code>{escape(exported_name(variable, meaning))}</code>", f"{value} {escape(unit)}".strip(), text)
         rows.append("<tr><td>{}</td><td class='number'>{}</td><td>{}</td></tr>".format(*cells))
     set_ = [meaning.causality in SETTABLE_CAUSALITIES for _, meaning in variables]
     value = "default" if all(set_) else "default, unit" if any(set_) else "unit"

@@ -12,7 +12,7 @@ from uuid import NAMESPACE_OID, uuid5
 from xml.etree.ElementTree import Element, SubElement, tostring
 
 from ..runtime.variable_access import SETTABLE_CAUSALITIES
-from ..runtime.variable_declarations import VariableDeclaration, VariableOwner
+from ..runtime.variable_declarations import VariableDeclaration, VariableOwner, exported_name
 from . import __version__
 from .dependencies import output_dependencies
 from .equations.declaration_options import OPTIONS
@@ -193,7 +193,7 @@ def type_name(variable: str) -> str:
 
 def common_attributes(name: str, meaning: VariableDeclaration, reference: int) -> dict[str, str]:
     """Return the XML attributes common to variables of all types."""
-    attributes = {"name": name, "valueReference": str(reference), "description": meaning.text}
+    attributes = {"name": exported_name(name, meaning), "valueReference": str(reference), "description": meaning.text}
     attributes |= {"causality": meaning.causality, "variability": meaning.variability}
     return attributes | ({"initial": meaning.initial} if meaning.initial else {})
 

@@ -10,6 +10,7 @@ from . import call_sequence, messages
 from .codes import DIVERGED, NO_VALUE, OK, UNKNOWN_REFERENCE
 from .failure_handling import FailureHandling
 from .pythonfmu_workarounds import signal_safe
+from .variable_declarations import exported_name
 
 SETTABLE_CAUSALITIES = ("parameter", "input")
 UNKNOWN_NAME = ""  # key in invalid_values for an unknown value reference
@@ -154,7 +155,7 @@ class VariableAccess(FailureHandling):
             setattr(owner, attribute, value)
             self.last_refusal = "", nan  # the next refusal is one of other values
         else:
-            self.set_invalid(name, messages.value_message(reason, name, declared, value))
+            self.set_invalid(name, messages.value_message(reason, exported_name(name, declared), declared, value))
 
     def is_moving(self, name: str) -> bool:
         """Return whether a variable is an input that varies between settings, so that its attribute may be outdated."""

@@ -1,7 +1,8 @@
 """Declarations of variables: start value, unit, range and description.
 
 A declaration is a class attribute, whose name is the name of the variable.  Instances of the class start with plain
-numbers under the same names.  XML, documentation pages and error messages use the declarations.
+numbers under the same names.  XML, documentation pages and error messages use the declarations.  A value of a table has
+an attribute that is an identifier, as mu_y1, and another name in the FMU, as mu.y[1].
 """
 
 from __future__ import annotations
@@ -29,6 +30,7 @@ class VariableDeclaration:
     role = ""  # "state", or "contact" for the friction force of a contact
     rate_of = ""  # name of the state whose rate this is
     rate = ""  # name of the parameter that is its constant rate, as for a driver
+    element = ""  # name in the FMU of an element of an array, as mu.y[1]; others have that of the attribute
     # options, see packaging/equations/declaration_options.py
     low: float = -inf
     high: float = inf
@@ -168,8 +170,13 @@ def declarations(cls: type) -> list[VariableDeclaration]:
     return list(result.values())
 
 
+def exported_name(path: str, declared: VariableDeclaration) -> str:
+    """Return the name in the FMU of the variable at a dotted path."""
+    return declared.element or path
+
+
 def fmi_variables(model: Any, run: object) -> list[tuple[str, VariableDeclaration]]:
-    """Return dotted name and declaration of every variable that an FMU offers: of the model, then of its run.
+    """Return dotted path and declaration of every variable that an FMU offers: of the model, then of its run.
 
     An enumeration with one item, as the build leaves it, is no choice: it is left out and keeps its start value.  An
     FMU with Reals only has no other enumerations, and offers integers as Reals.
@@ -189,7 +196,7 @@ def as_real(declared: VariableDeclaration) -> VariableDeclaration:
 
 
 def variables(owner: object, prefix: str = "") -> list[tuple[str, VariableDeclaration]]:
-    """Return dotted name and declaration of every variable of an object and of the objects it owns, in order."""
+    """Return dotted path and declaration of every variable of an object and of the objects it owns, in order."""
     result = [(prefix + declared.name, declared) for declared in declarations(type(owner))]
     for name, part in vars(owner).items():
         if isinstance(part, VariableOwner):

@@ -130,8 +130,9 @@ class EmbeddedModel:
         """
         instance = model()
         run = create_run(instance)
+        attributes = {getattr(declared, "element", ""): name for name, declared in vars(model).items()}
         for name, value in values.items():
-            setattr(instance, name, value)
+            setattr(instance, attributes.get(name, name), value)
         run.solver.rtol, run.solver.atol = rtol, atol
         if method:
             run.solver.method = method_numbers(model)[method]

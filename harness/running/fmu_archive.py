@@ -25,6 +25,7 @@ from ..errors import HarnessError, SceneError, first_line
 from ..process.temporary_directory import has_plain_uri, temporary_directory
 from ..scenes.fmu_files import check_built
 from ..scenes.run_spec import RunSpec
+from .array_elements import split_own_arrays
 from .variable_values import effective_value, variable_unit
 
 Result = TypeVar("Result")
@@ -84,7 +85,7 @@ def validate_description(path: Path, lenient: bool) -> Any:
     try:
         fmi_version = read_fmi_version(path)
         read = read_leniently if lenient else fmpy.read_model_description
-        description = None if fmi_version.startswith("1.") else read(path)
+        description = None if fmi_version.startswith("1.") else split_own_arrays(read(path))
     except ValidationError as error:
         violations = [" ".join(fault.split()) for fault in error.problems]
         listed = "\n- ".join(

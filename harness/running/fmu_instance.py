@@ -21,6 +21,7 @@ from fmpy.fmi2 import FMU2Model, FMU2Slave, fmi2LastSuccessfulTime, fmi2Terminat
 from fmpy.fmi3 import FMU3Model, FMU3Slave
 
 from ..errors import HarnessError, first_line
+from .array_elements import ArrayElement, ArrayValues, start_values
 
 WARNING, DISCARD = 1, 2  # of the statuses; any status above a warning is a failure
 STATUS_NAMES = ("OK", "Warning", "Discard", "Error", "Fatal", "Pending")
@@ -121,6 +122,7 @@ class FmuInstance:
         self.variables = {variable.name: variable for variable in description.modelVariables}
         self.interface = description.modelExchange if exchange else description.coSimulation
         self.log.clear()
+        self.arrays = ArrayValues()
         self.fmu = self.instantiate(str(folder), name)
         self.component = c_void_p(self.fmu.component)
         self.is_new, self.reset_calls = True, (self.prepare_call("Reset"),)  # new: neither used nor initialized
@@ -206,16 +208,24 @@ class FmuInstance:
 
     def type_name(self, variable: Any) -> str:
         """Return the type in the names of the functions that set and get a variable."""
-        return type_name(variable, self.description)
+        if variable.type == "Enumeration":
+            return "Integer" if self.is_fmi2 else "Int64"
+        return str(variable.type)
 
     def set(self, variable: Any, value: Any) -> None:
         """Set a variable of any type; an array from a list in row-major order."""
-        set_variable(self.fmu, self.description, variable, value)
+        if isinstance(variable, ArrayElement):
+            variable, value = variable.array, self.arrays.update(variable, value)
+        setter = getattr(self.fmu, f"set{self.type_name(variable)}")
+        setter([variable.valueReference], value if isinstance(value, list) else [value])
 
     def get(self, name: str) -> Any:
         """Return the value of a scalar variable that is no string."""
         variable = self.variables[name]
-        return getattr(self.fmu, f"get{self.type_name(variable)}")([variable.valueReference])[0]
+        getter = getattr(self.fmu, f"get{self.type_name(variable)}")
+        if isinstance(variable, ArrayElement):
+            return getter([variable.valueReference], len(start_values(variable.array)))[variable.index]
+        return getter([variable.valueReference])[0]
 
     def step(self, t: float, h: float) -> None:
         """Take a communication step of h from t, in s.
@@ -262,15 +272,20 @@ class FmuInstance:
     def reset(self) -> None:
         """Reset the instance and discard its messages."""
         self.log.clear()
-        call_all(self.reset_calls)
+        self.call_reset()
         self.is_new = True
 
     def restart(self) -> None:
         """Discard all messages, and reset the instance unless it is new, to initialize it."""
         self.log.clear()
         if not self.is_new:
-            call_all(self.reset_calls)
+            self.call_reset()
         self.is_new = False
+
+    def call_reset(self) -> None:
+        """Reset the instance, whose arrays have their start values again."""
+        call_all(self.reset_calls)
+        self.arrays = ArrayValues()
 
     def close(self) -> None:
         """Free the instance."""
@@ -288,19 +303,6 @@ def call_all(calls: Iterable[PreparedCall]) -> None:
 def clocks_of(description: Any) -> list[Any]:
     """Return the clocks of an FMU, which FMI 3.0 has."""
     return [variable for variable in description.modelVariables if variable.type == "Clock"]
-
-
-def type_name(variable: Any, description: Any) -> str:
-    """Return the type in the names of the functions that set and get a variable."""
-    if variable.type == "Enumeration":
-        return "Integer" if description.fmiVersion == "2.0" else "Int64"
-    return str(variable.type)
-
-
-def set_variable(fmu: Any, description: Any, variable: Any, value: Any) -> None:
-    """Set a variable of any type in an instance of fmpy; an array from a list in row-major order."""
-    setter = getattr(fmu, f"set{type_name(variable, description)}")
-    setter([variable.valueReference], value if isinstance(value, list) else [value])
 
 
 LOGS: WeakValueDictionary[int, LogCapture] = WeakValueDictionary()  # by the component environment of FMI 2.0

@@ -8,6 +8,7 @@ import fmpy
 import numpy as np
 import pytest
 from build_cache import build_user_model
+from fmpy.fmi1 import FMICallException
 from fmpy.fmi3 import FMU3Model
 from model_text import remove_unused
 from models import DOP853, ODE23, ODE45, RODAS
@@ -275,19 +276,15 @@ def move(fmu, x, v):
     fmu.updateDiscreteStates()
 
 
-@pytest.mark.parametrize("declared_by", ["author", "table"])
-def test_values_may_be_parameters(worker, tmp_path, declared_by):
+def test_values_may_be_parameters(worker, tmp_path):
     """The motion and its changes in FMI 3.0 are those of the same numbers, and derivatives by a value are exact."""
     require_compiler()
-    if declared_by == "author":
-        lines = "".join(f'    mu_y{n} = Parameter(0.1, "1", "friction at point {n}", low=0.0)\n' for n in range(1, 6))
-        friction = f'{[*FRICTION[0]]}, [mu_y1, mu_y2, mu_y3, mu_y4, mu_y5], "m/s", "1"'
-    else:
-        lines, friction = "", f'{[*FRICTION[0]]}, {[0.1] * 5}, "m/s", "1", values="tunable", low=0.0'
+    lines = "".join(f'    mu_{n} = Parameter(0.1, "1", "friction at point {n}", low=0.0)\n' for n in range(1, 6))
+    friction = f'{[*FRICTION[0]]}, [mu_1, mu_2, mu_3, mu_4, mu_5], "m/s", "1"'
     text = MODEL.format(friction=friction, spring=points(SPRING, '"m", "N"'))
     (tmp_path / "bench.py").write_text(text.replace("    mu = ", f"{lines}    mu = "))
     path = build_user_model(tmp_path / "bench.py", *KINDS["native/fmi3"]) / "native" / "fmi3" / "bench.fmu"
-    values = {f"mu_y{n}": value for n, value in enumerate(FRICTION[1], 1)}
+    values = {f"mu_{n}": value for n, value in enumerate(FRICTION[1], 1)}
     times, names, rows = np.linspace(0.0, STOP, 41).tolist(), ["x", "v", "F_friction", "events.count"], []
     for fmu, start in (path, values), (build_bench(tmp_path / "fixed", kind="native/fmi3"), {}):
         instance = worker.instantiate(fmu).begin(start, stop=STOP)
@@ -298,8 +295,101 @@ def test_values_may_be_parameters(worker, tmp_path, declared_by):
         fmu.setFloat64([number[name] for name in values], [*values.values()])
         move(fmu, 0.15, -0.04)
         for n, share in (2, 2.0 / 3.0), (3, 1.0 / 3.0), (4, 0.0):
-            (derivative,) = fmu.getDirectionalDerivative([number["a"]], [number[f"mu_y{n}"]], [1.0])
+            (derivative,) = fmu.getDirectionalDerivative([number["a"]], [number[f"mu_{n}"]], [1.0])
             assert derivative == pytest.approx(N / M * share, rel=1e-12)
+
+
+# ---- values as parameters, declared by the table
+
+TUNABLE = ((0.0, 0.01, 0.1, 0.5, 1.0), (0.5, 0.3, 0.3, 0.3, 0.3))  # start values
+ELEMENTS = [f"mu.y[{n}]" for n in range(1, 6)]
+FITTED = {"mu.y[2]": 0.35, "mu.y[3]": 0.28}
+
+
+@pytest.fixture(scope="module")
+def tunable_fmus(tmp_path_factory):
+    """The bench of each kind, whose table of friction declares its values as parameters."""
+    require_compiler()
+    folder = tmp_path_factory.mktemp("tunable")
+    friction = points(TUNABLE, '"m/s", "1"') + ', values="tunable", low=0.0'
+    (folder / "bench.py").write_text(MODEL.format(friction=friction, spring=points(SPRING, '"m", "N"')))
+    return {kind: build_user_model(folder / "bench.py", *KINDS[kind]) / kind / "bench.fmu" for kind in KINDS}
+
+
+def fmpy_values(kind, values):
+    """Return values of mu for fmpy: by element in FMI 2.0, as an array in FMI 3.0."""
+    return {"mu.y": [*values]} if kind == "native/fmi3" else dict(zip(ELEMENTS, values, strict=True))
+
+
+def test_values_of_a_table_have_structured_names(tunable_fmus):
+    """Each kind is valid by the schema and fmpy; FMI 2.0 has scalars and FMI 3.0 an array of the same start values."""
+    for kind, path in tunable_fmus.items():
+        description = fmpy.read_model_description(path, validate_variable_names=True)
+        assert description.variableNamingConvention == "structured"
+        declared = {v.name: v for v in description.modelVariables if v.name.startswith("mu.")}
+        assert {*declared} == {*fmpy_values(kind, TUNABLE[1])}
+        assert " ".join(v.start for v in declared.values()) == "0.5 0.3 0.3 0.3 0.3"
+        assert {v.variability for v in declared.values()} == {"tunable"}
+        info = harness.describe(path)
+        assert [v.name for v in info.variables if v.name.startswith("mu.")] == ELEMENTS == [*info.tables[0].parameters]
+        assert (info["mu.y[2]"].start, info["mu.y[2]"].low) == (0.3, 0.0)
+
+
+def test_values_of_a_table_give_the_motion_of_the_same_numbers(worker, tunable_fmus, tmp_path):
+    """Set in fmpy, by co-simulation and model exchange, and by name in this harness, for each kind."""
+    constant = build_bench(tmp_path)
+    expected = worker.simulate(constant, "CoSimulation", stop_time=STOP, output=["x", "F_friction"])
+    run = harness.simulate(constant, rtol=1e-8)
+    for kind, path in tunable_fmus.items():
+        start = {"start_values": fmpy_values(kind, FRICTION[1]), "stop_time": STOP, "output": ["x", "F_friction"]}
+        assert worker.simulate(path, "CoSimulation", **start) == expected
+        if kind:
+            columns = worker.simulate(path, "ModelExchange", relative_tolerance=1e-10, **start)
+            assert abs(columns["x"][-1] - reference()[0]) < 1e-7
+        by_name = harness.simulate(path, dict(zip(ELEMENTS, FRICTION[1], strict=True)), rtol=1e-8)
+        assert abs(by_name["x"][-1] - run["x"][-1]) < 1e-6
+        assert by_name.parameters["mu.y[2]"] == 0.35
+        with pytest.raises(harness.HarnessError, match=r"mu\.y\[4\] = -0\.1 is outside its range; allowed: at least 0"):
+            harness.simulate(path, {"mu.y[4]": -0.1})
+
+
+def test_calls_with_arrays_have_one_value_per_element(tunable_fmus, tmp_path):
+    """Values are read and set with those of scalars, derivatives by each element are exact, others are refused."""
+    with fmi3_instance(tunable_fmus["native/fmi3"], tmp_path) as (fmu, number):
+        mu, mass, a = (number[name] for name in ("mu.y", "m", "a"))
+        fmu.setFloat64([mu, mass], [*FRICTION[1], M])
+        assert fmu.getFloat64([mass, mu], 6) == [M, *FRICTION[1]]
+        for references, values in ([mu], [0.1]), ([mu + 1], [0.1]), ([mu], [0.1, 0.1, 0.1, -0.1, 0.1]):
+            with pytest.raises(FMICallException):
+                fmu.setFloat64(references, values)
+        assert fmu.getFloat64([mu], 5) == [*FRICTION[1]]
+        move(fmu, 0.15, -0.04)
+        expected = [0.0, N / M * 2.0 / 3.0, N / M / 3.0, 0.0, 0.0]
+        assert list(fmu.getAdjointDerivative([a], [mu], [1.0], 5)) == pytest.approx(expected, rel=1e-12)
+        (derivative,) = fmu.getDirectionalDerivative([a], [mu], [0.0, 3.0, 6.0, 1.0, 1.0])
+        assert derivative == pytest.approx(3.0 * expected[1] + 6.0 * expected[2], rel=1e-12)
+        saved = fmu.getFMUState()
+        fmu.setFloat64([mu], [0.0] * 5)
+        fmu.setFMUState(saved)
+        assert fmu.getFloat64([mu], 5) == [*FRICTION[1]]
+
+
+@pytest.mark.parametrize("kind", ["native", "native/fmi3"])
+def test_a_fit_finds_values_of_a_table(tunable_fmus, kind):
+    run = harness.simulate(tunable_fmus["native"], FITTED, times=np.linspace(0.0, STOP, 101), rtol=1e-10)
+    record = {"t": run.time, "x": run["x"]}
+    fit = harness.fit(tunable_fmus[kind], record, [*FITTED], observe=["x"], sigma={"x": 1e-5})
+    for name, value in FITTED.items():
+        assert fit[name].value == pytest.approx(value, rel=1e-4)
+
+
+def test_a_sweep_varies_values_of_a_table(tunable_fmus):
+    """Runs are those with the value set; others keep their start values."""
+    ends = [harness.simulate(tunable_fmus["native"], {"mu.y[2]": value})["x"][-1] for value in (0.2, 0.4)]
+    for kind in ("native", "native/fmi3"):
+        sweep = harness.sweep(tunable_fmus[kind], {"mu.y[2]": [0.2, 0.4]})
+        assert sweep.data["final_x"].dims == ("mu.y[2]",)
+        assert sweep.data["final_x"].to_numpy() == pytest.approx(ends, abs=1e-6)
 
 
 def test_an_argument_beyond_the_ends_is_refused_where_the_table_says_so(worker, tmp_path):
@@ -338,10 +428,10 @@ def test_values_of_a_file_become_parameters_that_keep_their_kind(tmp_path):
     text = MODEL.format(friction='"mu.csv", values="fixed", low=0.125', spring=points(SPRING, '"m", "N"'))
     (tmp_path / "bench.py").write_text(text)
     declared = [d for d in declarations(find_model(tmp_path / "bench.py").model) if d.name.startswith("mu_")]
-    found = [(d.name, d.start, d.unit, d.low, d.variability, d.text) for d in declared]
+    found = [(d.element, d.start, d.unit, d.low, d.variability, d.text) for d in declared]
     assert found == [
-        ("mu_y1", 0.5, "1", 0.125, "fixed", "value at 0 m/s"),
-        ("mu_y2", 0.25, "1", 0.125, "fixed", "value at 1 m/s"),
+        ("mu.y[1]", 0.5, "1", 0.125, "fixed", "value at 0 m/s"),
+        ("mu.y[2]", 0.25, "1", 0.125, "fixed", "value at 1 m/s"),
     ]
 
 
@@ -376,7 +466,7 @@ WRONG = {
     ),
     "a value below the limit": (
         'Table([0.0, 1.0], [1.0, -2.0], "s", "1", values="fixed", low=0.0)',
-        "T_y2 has the start value -2.0; it must be at least 0.0.",
+        "T.y[2] has the start value -2.0; it must be at least 0.0.",
     ),
     "values of a curve without kinks": (
         'Table([0.0, 1.0, 2.0], [1.0, 2.0, 2.0], "s", "1", interpolation="pchip", values="tunable")',

@@ -187,7 +187,7 @@ class ContactAnalysis(ModelRoles):
             ):
                 is_constant = isinstance(e, Expression) and not depends_on(e, (*self.time_varying, *self.input_symbols))
                 if is_constant and not is_nonnegative(e):
-                    values = ", ".join(f"{one.name} = {{{one.name}!r}}" for one in variables_in(e))
+                    values = ", ".join(f"{one.label} = {{{one.name}!r}}" for one in variables_in(e))
                     broken = Term(op, e, 0.0)
                     broken.location = c.location
                     result.append(Rule(broken, f"{c.name}: {meaning} with {values}: set values with which {allowed}"))
@@ -206,7 +206,7 @@ class ContactAnalysis(ModelRoles):
                 for rule in self.rules
             )
             if not has_rule and not depends_on(c.slide - c.hold, (*self.time_varying, *self.input_symbols)):
-                values = ", ".join(f"{e.name} = {{{e.name}!r}}" for e in self.parameters if e in sliding | holding)
+                values = ", ".join(f"{e.label} = {{{e.name}!r}}" for e in self.parameters if e in sliding | holding)
                 sentence = (
                     f"{c.name}: the sliding force exceeds the holding force ({values}): lower slide or raise hold"
                 )

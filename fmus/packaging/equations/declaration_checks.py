@@ -126,14 +126,14 @@ def _check_variable(analysis: ModelRoles, e: Variable) -> None:
             got = "an expression" if isinstance(value, Expression) else describe(value)
             raise ModelError(f"{word} of {e.name} must be a number, got {got}", e.location)
     if not max(e.low, e.above) <= min(e.high, e.below):
-        raise ModelError(f"{e.name} has an empty range: no number is {e.allowed}", e.location)
+        raise ModelError(f"{e.label} has an empty range: no number is {e.allowed}", e.location)
     if isinstance(e, Contact) and is_among(e.slip, analysis.positions):
         raise ModelError(
             f"slip of {e.name} is {e.slip.name}, but a slip is a speed: write slip={analysis.rate[e.slip].name}",
             e.location,
         )
     if isinstance(e, SettableVariable) and not e.accepts(e.start):
-        raise ModelError(f"{e.name} has the start value {e.start!r}; it must be {e.allowed}", e.location)
+        raise ModelError(f"{e.label} has the start value {e.start!r}; it must be {e.allowed}", e.location)
 
 
 def _check_alias(analysis: ModelRoles, e: Variable) -> None:

@@ -2,7 +2,7 @@
 
 import math
 import sys
-from collections.abc import Callable, Hashable, Iterable, Mapping
+from collections.abc import Callable, Hashable, Iterable, Sequence
 from numbers import Real
 from pathlib import Path
 from typing import Any, Never
@@ -86,7 +86,8 @@ class Expression:
     """Base class of expressions: a declared variable or a term."""
 
     name = ""
-    own_variables: Mapping[str, "Expression"] = {}  # that an expression declares, by the suffix after its name
+    # declared variables of an expression: suffix of the attribute and of the name in the FMU, as in mu_y1 and mu.y[1]
+    own_variables: Sequence[tuple[str, str, Any]] = ()
     location: tuple[str, int]
 
     __add__, __radd__ = _binary_operators("+")
@@ -108,6 +109,11 @@ class Expression:
     def __eq__(self, other: object) -> "Term":  # type: ignore[override]
         """Return a comparison; `is` and the keys of sets and dictionaries compare by identity."""
         return Term("==", self, other)
+
+    @property
+    def label(self) -> str:
+        """Name in messages."""
+        return self.name
 
     def __repr__(self) -> str:
         return self.name or "an expression"

@@ -64,7 +64,7 @@ class ModelAnalysis(ContactAnalysis):
             for quotient in unconditional_quotients(self.declared_expressions(owner)):
                 for e in factors(quotient.args[1]):
                     if isinstance(e, (Parameter, Fixed)) and e.accepts(0.0) and e not in result:
-                        sentence = f"{e.name} = {{{e.name}!r}} is refused: {owner.name} divides by {e.name}"
+                        sentence = f"{e.label} = {{{e.name}!r}} is refused: {owner.name} divides by {e.label}"
                         result[e] = Rule(Term("==", e, 0.0), sentence)
                         result[e].broken.location = quotient.location
         return tuple(result.values())
@@ -77,7 +77,7 @@ class ModelAnalysis(ContactAnalysis):
             if e is not None and not (isinstance(e, (Parameter, Fixed)) and e.above >= 0.0):
                 broken = Term("<=", e, 0.0)
                 broken.location = s.location
-                values = ", ".join(f"{one.name} = {{{one.name}!r}}" for one in variables_in(e)) or repr(e)
+                values = ", ".join(f"{one.label} = {{{one.name}!r}}" for one in variables_in(e)) or repr(e)
                 result.append(Rule(broken, f"nominal_velocity of {s.name} must be above 0, got {values}"))
         return result
 

@@ -62,6 +62,11 @@ class Variable(Expression, variable_declarations.VariableDeclaration):
     def __set_name__(self, owner: object, name: str) -> None:
         """Keep the name of the first assignment; an alias such as D = mu_s does not change it."""
 
+    @property
+    def label(self) -> str:
+        """Name in the FMU."""
+        return variable_declarations.exported_name(self.name, self)
+
 
 class SettableVariable(Variable):
     """A variable with a value that the user or another FMU sets."""
@@ -339,7 +344,8 @@ class _ClassBody(dict[str, Any]):
         if isinstance(value, Expression):
             value.name = value.name or name
             self.unread.pop(name, None)
-            for suffix, variable in value.own_variables.items():
+            for suffix, element, variable in value.own_variables:
+                variable.element = name + element
                 self[name + suffix] = variable
         else:
             self.unread[name] = author_location()

@@ -151,6 +151,8 @@ def declaration_arguments(e: Variable) -> str:
         value = vars(e).get(name)
         if value not in (None, getattr(VariableDeclaration, name, None)):
             texts.append(f"{name}={string_literal(value) if option.type is str else repr(option.type(value))}")
+    if e.element:
+        texts.append(f"element={string_literal(e.element)}")
     return ", ".join(texts)
 
 

@@ -56,8 +56,8 @@ class Table(Expression):
         Beyond the first and the last point: "hold" their values, "continue" with the slope at the end, or "refuse",
         which ends the run with a message.
     values
-        "constant"; or "fixed" or "tunable": each value of y becomes such a parameter, `mu_y1`, `mu_y2` and so on for a
-        table `mu` (linear tables only).
+        "constant"; or "fixed" or "tunable": each value of y becomes such a parameter, `mu.y[1]`, `mu.y[2]` and so on
+        for a table `mu` (linear tables only).  In FMI 3.0 they are the array `mu.y`.
     low
         Smallest allowed value of these parameters, such as 0.0 for friction.
     """
@@ -123,7 +123,7 @@ class Table(Expression):
             )
         suffix = "" if unit_x == "1" else f" {unit_x}"
         self.y = tuple(kind(y, unit_y, f"value at {x:g}{suffix}", low=low) for x, y in zip(self.x, self.y, strict=True))
-        self.own_variables = {f"_y{n}": value for n, value in enumerate(self.y, 1)}
+        self.own_variables = [(f"_y{n}", f".y[{n}]", value) for n, value in enumerate(self.y, 1)]
 
     def __call__(self, u: Operand) -> Operand:
         """Return the value of the table at u: an expression, or a number for a number."""
@@ -168,7 +168,7 @@ class Table(Expression):
     def as_json(self) -> dict[str, Any]:
         """Return the points as data; values of y that are parameters have their start values and names."""
         start = [value.start if isinstance(value, SettableVariable) else value for value in self.y]
-        names = [value.name if isinstance(value, SettableVariable) else "" for value in self.y]
+        names = [value.label if isinstance(value, SettableVariable) else "" for value in self.y]
         return {
             "name": self.name,
             "unit_x": self.unit_x,

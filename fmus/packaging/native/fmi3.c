@@ -141,15 +141,26 @@ static int64_t read_int64(const Instance *self, uint32_t reference)
 
 /* ---- values */
 
-/* All variables are scalars. */
-#define REQUIRE_SCALARS \
-    if (nValues != nValueReferences) return refuse(self, WRONG_LENGTH, __func__, "the number of values")
+/* Return the number of values of variables. An invalid value reference counts as one, and is refused later. */
+static size_t count_values(const fmi3ValueReference references[], size_t n)
+{
+    size_t count = n;
+    for (size_t i = 0; HAS_ARRAYS && references && i < n; i++) {
+        uint32_t size = references[i] < VARIABLES ? value_count(references[i]) : 1;
+        if (size > 1) count += size - 1;
+    }
+    return count;
+}
+
+#define REQUIRE_LENGTH                                              \
+    if (nValues != count_values(valueReferences, nValueReferences)) \
+        return refuse(self, WRONG_LENGTH, __func__, "the number of values")
 
 fmi3Status fmi3GetFloat64(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,
                           fmi3Float64 values[], size_t nValues)
 {
     REQUIRE_PHASE(instance, IN_READABLE_PHASE);
-    REQUIRE_SCALARS;
+    REQUIRE_LENGTH;
     READ_VALUES(self, &FLOAT64, valueReferences, nValueReferences, values, read_float64, NAN);
 }
 
@@ -157,7 +168,7 @@ fmi3Status fmi3GetInt64(fmi3Instance instance, const fmi3ValueReference valueRef
                         fmi3Int64 values[], size_t nValues)
 {
     REQUIRE_PHASE(instance, IN_READABLE_PHASE);
-    REQUIRE_SCALARS;
+    REQUIRE_LENGTH;
     READ_VALUES(self, &INT64, valueReferences, nValueReferences, values, read_int64, 0);
 }
 
@@ -165,7 +176,7 @@ fmi3Status fmi3SetFloat64(fmi3Instance instance, const fmi3ValueReference valueR
                           const fmi3Float64 values[], size_t nValues)
 {
     REQUIRE_PHASE(instance, BEFORE_TERMINATION | 1 << INTERMEDIATE);
-    REQUIRE_SCALARS;
+    REQUIRE_LENGTH;
     for (size_t i = 0; self->state.run.phase == INTERMEDIATE && valueReferences && i < nValueReferences; i++) {
         uint32_t reference = valueReferences[i];
         bool is_input = reference < VARIABLES && variables[reference].is_state_or_input &&
@@ -179,7 +190,7 @@ fmi3Status fmi3SetInt64(fmi3Instance instance, const fmi3ValueReference valueRef
                         const fmi3Int64 values[], size_t nValues)
 {
     REQUIRE_PHASE(instance, BEFORE_TERMINATION);
-    REQUIRE_SCALARS;
+    REQUIRE_LENGTH;
     WRITE_VALUES(self, &INT64, valueReferences, nValueReferences, values);
 }
 
@@ -378,8 +389,8 @@ fmi3Status fmi3GetDirectionalDerivative(fmi3Instance instance, const fmi3ValueRe
                                         size_t nSeed, fmi3Float64 sensitivity[], size_t nSensitivity)
 {
     REQUIRE_PHASE(instance, IN_ANY_PHASE);
-    if (nSeed != nKnowns) return refuse(self, WRONG_LENGTH, __func__, "the length of seed");
-    if (nSensitivity != nUnknowns) return refuse(self, WRONG_LENGTH, __func__, "the length of sensitivity");
+    if (nSeed != count_values(knowns, nKnowns)) return refuse(self, WRONG_LENGTH, __func__, "the length of seed");
+    if (nSensitivity != count_values(unknowns, nUnknowns)) return refuse(self, WRONG_LENGTH, __func__, "the length of sensitivity");
     return get_directional_derivative(self, unknowns, nUnknowns, knowns, nKnowns, seed, sensitivity, __func__);
 }
 
@@ -389,17 +400,17 @@ fmi3Status fmi3GetAdjointDerivative(fmi3Instance instance, const fmi3ValueRefere
                                     size_t nSeed, fmi3Float64 sensitivity[], size_t nSensitivity)
 {
     REQUIRE_PHASE(instance, IN_ANY_PHASE);
-    if (nSeed != nUnknowns) return refuse(self, WRONG_LENGTH, __func__, "the length of seed");
-    if (nSensitivity != nKnowns) return refuse(self, WRONG_LENGTH, __func__, "the length of sensitivity");
+    if (nSeed != count_values(unknowns, nUnknowns)) return refuse(self, WRONG_LENGTH, __func__, "the length of seed");
+    if (nSensitivity != count_values(knowns, nKnowns)) return refuse(self, WRONG_LENGTH, __func__, "the length of sensitivity");
     if (check_derivative_references(self, unknowns, nUnknowns, knowns, nKnowns, seed, sensitivity, __func__)) {
         return fmi3Error;
     }
-    for (size_t j = 0; j < nKnowns; j++) {
+    FOR_EACH_VALUE(knowns, nKnowns) {
         struct Tangent tangent = {0};
-        *tangent_value(&tangent, knowns[j]) = 1.0;
-        fmi3Status status = evaluate_tangent(self, &tangent, variables[knowns[j]].is_real_parameter);
-        sensitivity[j] = status ? NAN : 0.0;
-        for (size_t i = 0; i < nUnknowns; i++) sensitivity[j] += seed[i] * *tangent_value(&tangent, unknowns[i]);
+        *tangent_value(&tangent, element) = 1.0;
+        fmi3Status status = evaluate_tangent(self, &tangent, variables[element].is_real_parameter);
+        sensitivity[k] = status ? NAN : 0.0;
+        for (size_t i = 0; i < nUnknowns; i++) sensitivity[k] += seed[i] * *tangent_value(&tangent, unknowns[i]);
         if (status) return status;
     }
     return fmi3OK;
@@ -410,7 +421,7 @@ fmi3Status fmi3GetOutputDerivatives(fmi3Instance instance, const fmi3ValueRefere
                                     size_t nValues)
 {
     REQUIRE_PHASE(instance, IN_STEP_MODE | 1 << EVENT | 1 << INTERMEDIATE | 1 << TERMINATED);
-    REQUIRE_SCALARS;
+    REQUIRE_LENGTH;
     return read_output_derivatives(self, valueReferences, nValueReferences, orders, values, __func__);
 }
 

@@ -10,7 +10,7 @@ from ...runtime.codes import INTERRUPTED
 from ...runtime.failure_handling import lacks_value_after_failure
 from ...runtime.messages import CALL_MESSAGES, INCONSISTENT_RATE, PHASE_NAMES, RUN_MESSAGES, VALUE_MESSAGES
 from ...runtime.variable_access import SETTABLE_CAUSALITIES
-from ...runtime.variable_declarations import VariableDeclaration, VariableOwner
+from ...runtime.variable_declarations import VariableDeclaration, VariableOwner, exported_name
 from ..fmi_variables import (
     CONDITION,
     DERIVATIVE_NAME,
@@ -18,6 +18,7 @@ from ..fmi_variables import (
     TO_BREAK_AWAY,
     TO_REST,
     all_variables,
+    array_starts,
     declared_variables,
     derivative_indices,
     event_indicator_indices,
@@ -55,7 +56,7 @@ typedef struct {run_class} Run;
 
 enum {{ VARIABLES = {count}, DECLARED = {declared}, T_NEXT = {ahead}, STATES = {states}, INDICATORS = {indicators} }};
 
-enum {{ DISCRETE = {count_of_discrete} }};
+enum {{ DISCRETE = {count_of_discrete}, HAS_ARRAYS = {has_arrays} }};
 
 /* Value references of the discrete variables. */
 static const uint32_t discrete_variables[DISCRETE] = {{{discrete}}};
@@ -164,6 +165,8 @@ def render_model_header(model: Any, fmi: str) -> str:
         call_graph.add_entry_point(function, arg_types)
     layout = call_graph.layout
     names = [name for name, _ in declared]
+    references = array_starts(declared) if fmi == "3" else [*range(len(declared))]
+    sizes = [references.count(index) for index in range(len(declared))]
     roots = [("run", type(run)), ("model", type(instance))]
     members = [(path, ctype) for prefix, cls in roots for path, ctype in layout.iter_scalars(cls, f"{prefix}.")]
     members = [(path, ctype) for path, ctype in members if ctype in (INT, BOOL)]
@@ -190,17 +193,19 @@ def render_model_header(model: Any, fmi: str) -> str:
         indicators=len(event_indicator_indices(declared)),
         discrete=", ".join(map(str, discrete)),
         count_of_discrete=len(discrete),
+        has_arrays=int(max(sizes) > 1),
         count_of_members=len(members),
         members="".join(f"    {{offsetof(State, {path}), {c_literal(ctype is BOOL)}}},\n" for path, ctype in members),
         table="".join(
             _variable_row(
                 name,
                 meaning,
+                size,
                 attribute_path(model, name),
                 tangent_fields(declared),
                 getattr(instance, f"{name}_polynomial", None),
             )
-            for name, meaning in declared
+            for (name, meaning), size in zip(declared, sizes, strict=True)
         ),
         statuses=_switch_cases(statuses, FIELD_CODE) + _switch_cases(instance.rules, rule_fields),
         inconsistent_input="model->inconsistent_input" if model.counts_jumps else "0",
@@ -246,10 +251,10 @@ def _items_array_name(name: str) -> str:
 
 
 def _variable_row(
-    name: str, meaning: VariableDeclaration, path: str, tangent_fields: dict[str, str], polynomial: object
+    name: str, meaning: VariableDeclaration, size: int, path: str, tangent_fields: dict[str, str], polynomial: object
 ) -> str:
     """Return the table row of a variable."""
-    texts = (name, meaning.text, meaning.unit_suffix, meaning.allowed)
+    texts = (exported_name(name, meaning), meaning.text, meaning.unit_suffix, meaning.allowed)
     flags = (
         meaning.type == "Real",
         meaning.is_integer,
@@ -269,6 +274,7 @@ def _variable_row(
     existing_parts = ["rate", *(f"polynomial.{part}" for part in vars(polynomial))] if polynomial else []
     parts = [
         *map(c_string_literal, texts),
+        str(size),
         f"offsetof(State, {path})",
         f"offsetof(struct Tangent, {tangent_fields[name]})" if name in tangent_fields else "NO_OFFSET",
         *map(c_literal, flags),

@@ -5,7 +5,7 @@ from inspect import cleandoc
 from math import isfinite
 from typing import Any
 
-from ...runtime.variable_declarations import VariableDeclaration, VariableOwner
+from ...runtime.variable_declarations import VariableDeclaration, VariableOwner, exported_name
 from ..documentation_page import format_paragraph, readable_unit, table_figure, typeset
 from ..equations.algebra import depends_on, differentiate, is_same_expression, variables_in
 from ..equations.expressions import Operand
@@ -38,8 +38,8 @@ def variable_json(name: str, meaning: VariableDeclaration) -> ModelJson:
     """Describe a variable. Its value in the unit `display_unit` is `factor` times its value in SI units."""
     unit = unit_of(name, meaning.unit or "1")
     described = {
-        "name": name,
-        "symbol": typeset(re.sub(r"(?<=[a-z])0$", "_0", name)),
+        "name": exported_name(name, meaning),
+        "symbol": typeset(re.sub(r"(?<=[a-z])0$", "_0", exported_name(name, meaning))),
         "type": meaning.type,
         "causality": meaning.causality,
         "text": meaning.text,

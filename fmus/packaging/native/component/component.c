@@ -224,8 +224,9 @@ CALL("enter-continuous-time-mode", EnterContinuousTimeMode)
 #define ACCESSORS(name, NAME)                                                                                    \
     EXPORT("get-" name) ListResult *get_##NAME(Component *self, const fmi3ValueReference *references, size_t n)  \
     {                                                                                                            \
-        fmi3##NAME *values = allocate(n * sizeof *values);                                                       \
-        RETURN_LIST(fmi3Get##NAME(self->fmu, references, n, values, n), values, n);                              \
+        size_t n_values = count_values(references, n);                                                           \
+        fmi3##NAME *values = allocate(n_values * sizeof *values);                                                \
+        RETURN_LIST(fmi3Get##NAME(self->fmu, references, n, values, n_values), values, n_values);                \
     }                                                                                                            \
     EXPORT("set-" name)                                                                                          \
     fmi3Status set_##NAME(Component *self, const fmi3ValueReference *references, size_t n, fmi3##NAME *values,   \
@@ -321,18 +322,19 @@ EXPORT("set-fmu-state") fmi3Status set_fmu_state(Component *self, const fmi3Byte
     return status;
 }
 
-#define DERIVATIVE(name, NAME, n_values)                                                                               \
+#define DERIVATIVE(name, NAME, results)                                                                                \
     EXPORT(name)                                                                                                       \
     ListResult *get_##NAME(Component *self, const fmi3ValueReference *unknowns, size_t n_unknowns,                     \
                            const fmi3ValueReference *knowns, size_t n_knowns, const double *seed, size_t n_seed)       \
     {                                                                                                                  \
+        size_t n_values = count_values(results, n_##results);                                                          \
         double *values = allocate(n_values * sizeof *values);                                                          \
         RETURN_LIST(fmi3Get##NAME(self->fmu, unknowns, n_unknowns, knowns, n_knowns, seed, n_seed, values, n_values), \
                     values, n_values);                                                                                 \
     }
 
-DERIVATIVE("get-directional-derivative", DirectionalDerivative, n_unknowns)
-DERIVATIVE("get-adjoint-derivative", AdjointDerivative, n_knowns)
+DERIVATIVE("get-directional-derivative", DirectionalDerivative, unknowns)
+DERIVATIVE("get-adjoint-derivative", AdjointDerivative, knowns)
 
 typedef struct {
     fmi3ValueReference reference;

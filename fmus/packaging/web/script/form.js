@@ -34,7 +34,7 @@ export class Form {
     const rows = { fields: [], "solver-fields": [] };
     const addField = (variable, field) => {
       fields.set(variable.name, field);
-      rows[variable.name.includes(".") ? "solver-fields" : "fields"].push(field.element);
+      rows[variable.name.startsWith("solver.") ? "solver-fields" : "fields"].push(field.element);
     };
     const variables = settableVariables(modelInfo).filter(({ name }) => !Object.values(SOLVER_LISTS).some(([listed]) => listed === name));
     for (const variable of variables.filter(({ type }) => type === "Real")) {

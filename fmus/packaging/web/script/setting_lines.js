@@ -11,7 +11,7 @@ function quantity({ name, factor, display_unit }, value) {
 // Parameters and inputs, or the settings of the solver (law, method and options).
 function listValues(modelInfo, values, ofSolver) {
   const variables = modelInfo.variables.filter(({ name, causality, items }) =>
-    (causality === "parameter" || causality === "input") && (items.length > 0 || name.includes(".")) === ofSolver);
+    (causality === "parameter" || causality === "input") && (items.length > 0 || name.startsWith("solver.")) === ofSolver);
   const all = effectiveValues(modelInfo, values);
   return variables.map((variable) => {
     const label = variable.items.find(({ value }) => value === all[variable.name])?.label;

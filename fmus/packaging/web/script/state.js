@@ -33,7 +33,7 @@ export function comparisonSettings(models, state) {
   const [own, other] = [models.get(state.model), models.get(state.comparison.model)];
   const known = new Map(settableVariables(other).map((variable) => [variable.name, variable]));
   const same = own === other;
-  const isShared = (name) => known.has(name) && (same || (known.get(name).type === "Real" && !name.includes(".")));
+  const isShared = (name) => known.has(name) && (same || (known.get(name).type === "Real" && !name.startsWith("solver.")));
   const shared = Object.entries(effectiveValues(own, state.values)).filter(([name]) => isShared(name));
   const changes = state.changes.filter(({ name }) => isShared(name));
   return { values: { ...Object.fromEntries(shared), ...state.comparison.values }, changes };
