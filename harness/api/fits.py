@@ -101,7 +101,8 @@ def fit(
         as in ``x [mm]``, are converted to those of the FMU; a DataFrame or a Series may have them in
         ``attrs["units"]``.
     free : sequence or mapping
-        Parameters to fit, with the range to search, or None for a factor of 4 about the start value of the FMU.
+        Parameters to fit, with the range to search, or None for a factor of 4 about the start value of the FMU; for a
+        value of a table, up to 4 times the largest one of the table.
         ``offset(x)``, ``gain(x)`` and ``delay(x)`` are unknowns of the sensor of the output ``x``: its signal is gain
         times output plus offset, after the delay.
     observe, inputs : sequence or mapping

@@ -77,8 +77,8 @@ def fit(
 
     MODEL is a model of this project or the path of an FMU for co-simulation.  The first sample of a FILE is the start
     of the run; the FMU's start values apply there and can be free.  Units in headings are converted to those of the
-    FMU.  Without LOW:HIGH, a factor of 4 about the start value is searched.  offset(OUTPUT), gain(OUTPUT)
-    and delay(OUTPUT) are unknowns of a sensor.
+    FMU.  Without LOW:HIGH, a factor of 4 about the start value is searched; for a value of a table, up to
+    4 times the largest one of the table.  offset(OUTPUT), gain(OUTPUT) and delay(OUTPUT) are unknowns of a sensor.
 
     --against fits other laws to the same records and compares all by the Bayesian information criterion.  Each FMU
     frees and fixes those of the given names that it has.

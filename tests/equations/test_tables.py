@@ -301,7 +301,7 @@ def test_values_may_be_parameters(worker, tmp_path):
 
 # ---- values as parameters, declared by the table
 
-TUNABLE = ((0.0, 0.01, 0.1, 0.5, 1.0), (0.5, 0.3, 0.3, 0.3, 0.3))  # start values
+TUNABLE = ((0.0, 0.01, 0.1, 0.5, 1.0), (0.5, 0.3, 0.0, 0.3, 0.3))  # start values
 ELEMENTS = [f"mu.y[{n}]" for n in range(1, 6)]
 FITTED = {"mu.y[2]": 0.35, "mu.y[3]": 0.28}
 
@@ -328,7 +328,7 @@ def test_values_of_a_table_have_structured_names(tunable_fmus):
         assert description.variableNamingConvention == "structured"
         declared = {v.name: v for v in description.modelVariables if v.name.startswith("mu.")}
         assert {*declared} == {*fmpy_values(kind, TUNABLE[1])}
-        assert " ".join(v.start for v in declared.values()) == "0.5 0.3 0.3 0.3 0.3"
+        assert " ".join(v.start for v in declared.values()) == "0.5 0.3 0.0 0.3 0.3"
         assert {v.variability for v in declared.values()} == {"tunable"}
         info = harness.describe(path)
         assert [v.name for v in info.variables if v.name.startswith("mu.")] == ELEMENTS == [*info.tables[0].parameters]
@@ -376,6 +376,7 @@ def test_calls_with_arrays_have_one_value_per_element(tunable_fmus, tmp_path):
 
 @pytest.mark.parametrize("kind", ["native", "native/fmi3"])
 def test_a_fit_finds_values_of_a_table(tunable_fmus, kind):
+    """Without ranges to search: one of them starts at zero, and both have the scale of the table."""
     run = harness.simulate(tunable_fmus["native"], FITTED, times=np.linspace(0.0, STOP, 101), rtol=1e-10)
     record = {"t": run.time, "x": run["x"]}
     fit = harness.fit(tunable_fmus[kind], record, [*FITTED], observe=["x"], sigma={"x": 1e-5})

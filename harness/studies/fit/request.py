@@ -15,6 +15,7 @@ from ...records.columns import ColumnOptions
 from ...records.record import MIN_SAMPLES
 from ...records.signal_table import SignalSource, SignalTable
 from ...running.fmu_archive import default_stop, read_description
+from ...running.fmu_tables import read_tables
 from ...running.variable_values import convert_value, enumeration_labels
 from ...running.whole_run import RealVariable, real_variables
 from ...scenes.run_spec import RunSpec
@@ -243,7 +244,10 @@ def make_unknown(
     variable = resolved.variables[name]
     minimum = -inf if variable.minimum is None else variable.minimum
     maximum = inf if variable.maximum is None else variable.maximum
-    if limits is None:
+    size = table_size(name, resolved.request) if limits is None else 0.0
+    if size:
+        low, high = max(-RANGE_FACTOR * size, minimum), min(RANGE_FACTOR * size, maximum)
+    elif limits is None:
         middle = start if start is not None else variable.start
         if not middle:
             example = f"{max(minimum, -1.0):g}:{min(maximum, 1.0):g}"
@@ -257,6 +261,15 @@ def make_unknown(
     check_range(name, low, high, minimum, maximum, variable.unit)
     check_start(name, start, low, high)
     return Unknown(name, name, variable.unit, low, high, minimum, maximum, start=start)
+
+
+def table_size(name: str, request: FitRequest) -> float:
+    """Return the largest value at the start of the table that a parameter belongs to; 0 if it belongs to none.
+
+    It is the scale that all values of a table share, so that one of them may start at zero and change its sign.
+    """
+    tables = [table for table in read_tables(request.run.fmu) if name in table.parameters]
+    return max((abs(y) for table in tables for y in table.y_with({**request.run.values, **request.start})), default=0.0)
 
 
 def check_start(name: str, start: float | None, low: float, high: float) -> None:
