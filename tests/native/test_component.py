@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from commands import build
 from fmpy import read_model_description
+from model_text import CURVE
 from models import outputs
 from native_fmus import require_compiler
 from scipy.integrate import solve_ivp
@@ -245,6 +246,30 @@ def test_instances_and_results_are_released(host, description, instantiate, refe
     component = instantiate(CO_SIMULATION)
     for _ in range(12):
         component.get_float64([references["x"]] * 20_000)
+
+
+def test_values_of_a_table_are_a_list(tmp_path):
+    """They are read and set with those of scalars, and the adjoint derivative has one number for each."""
+    require_compiler()
+    (tmp_path / "curve.py").write_text(CURVE)
+    words = ("--fmi", "3", "--platform", "wasm32-wasip2")
+    fmu = build_cache.build_user_model(tmp_path / "curve.py", *words) / "native" / "fmi3" / "curve.fmu"
+    description = read_model_description(fmu)
+    force, m, a = (
+        next(v.valueReference for v in description.modelVariables if v.name == name) for name in ("force.y", "m", "a")
+    )
+    with ZipFile(fmu) as archive:
+        host = ComponentHost(archive.read("binaries/wasm32-wasip2/curve.wasm"), LARGEST_MEMORY)
+    component = host.instantiate(CO_SIMULATION, description.instantiationToken, False, False, [])
+    component.set_float64([m, force], [4.0, 3.0, 11.0, 7.0])
+    with pytest.raises(RefusedError, match="error"):
+        component.set_float64([force], [1.0])
+    component.enter_initialization_mode(None, 0.0, STOP)
+    component.exit_initialization_mode()
+    assert component.get_float64([force, m]) == [3.0, 11.0, 7.0, 4.0]
+    assert component.get_float64([a]) == [(0.75 * 3.0 + 0.25 * 11.0) / 4.0]
+    assert component.get_adjoint_derivative([a], [force], [1.0]) == [0.75 / 4.0, 0.25 / 4.0, 0.0]
+    assert component.get_directional_derivative([a], [force], [2.0, 2.0, 5.0]) == [0.5]
 
 
 def test_a_component_needs_fmi_3(tmp_path):

@@ -13,3 +13,18 @@ def is_unused(line, text):
     declaration = re.match(r"    (\w+) = (Parameter|Input|Table)\(", line)
     code = re.sub('"[^"]*"', "", text)
     return declaration is not None and len(re.findall(rf"\b{declaration[1]}\b", code)) == 1
+
+
+# a model with a table of forces, whose values are parameters
+CURVE = '''from fmus import Model, Output, Parameter, State, Table
+
+
+class Curve(Model):
+    """A body with a force given by points."""
+
+    m = Parameter(2.0, "kg", "mass", above=0.0)
+    force = Table([0.0, 1.0, 3.0], [1.0, 5.0, 7.0], "m", "N", values="tunable")
+    x = State("m", "position", start=0.25)
+    v = State("m/s", "speed", rate_of=x)
+    a = Output("m/s2", "acceleration", force(x) / m, rate_of=v)
+'''

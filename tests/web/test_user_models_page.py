@@ -3,6 +3,7 @@
 import pytest
 import web_page
 from build_cache import ROOT
+from model_text import CURVE
 from models import EXAMPLE_MODELS, LARGER_MODELS
 
 from fmus.packaging.model_lookup import find_model, more_model_names
@@ -57,9 +58,11 @@ def check_servo(page):
     )
 
 
-def test_user_models_run_on_a_page_of_their_own(quiet):
+def test_user_models_run_on_a_page_of_their_own(quiet, tmp_path):
     files = [ROOT / "tests" / "example_models" / name for name in ("rotor_brake.py", "larger/blocks.py")]
-    page = web_page.Page(quiet, web_page.build_page("users", *map(str, files), "--method", "ode45"))
+    curve = tmp_path / "curve.py"
+    curve.write_text(CURVE)
+    page = web_page.Page(quiet, web_page.build_page("users", *map(str, (*files, curve)), "--method", "ode45"))
     page.open()  # without the models of the stories, it opens with the panel
     assert page.run("document.getElementById('stories')") is None
     assert page.run("document.querySelector('h1').textContent") == "Dry friction, live"
@@ -70,10 +73,20 @@ def test_user_models_run_on_a_page_of_their_own(quiet):
         assert page.run("app.session.runs.main.events.length") > 2
         assert page.run("document.querySelectorAll('#mechanism .body').length") == count
         assert page.run("document.getElementById('body').parentElement.hidden") == (count == 1)
+    check_table_values(page)
+    page.open(".model=blocks")
     page.choose("body", 1)  # the plots of the motion come first here too
     shown = "[...document.querySelectorAll('figure')].filter(each => !each.hidden).map(each => each.id).slice(0, 3)"
     second = page.run("app.session.models.get('blocks').bodies[1]")
     assert page.when_done(shown) == [f"panel-{second[name]}" for name in ("position", "speed", "acceleration")]
+
+
+def check_table_values(page):
+    """A value of a table is among the parameters, not the settings of the solver, and a link sets it by its name."""
+    page.open(".model=curve&force.y[2]=4.5")
+    assert page.run("document.getElementById('field-force.y[2]').closest('#fields, #solver-fields').id") == "fields"
+    assert page.run("document.getElementById('field-force.y[2]').value") == "4.5"
+    assert page.run("app.session.runs.main.columns.a[0]") == (0.75 * 1.0 + 0.25 * 4.5) / 2.0
 
 
 def test_several_contacts_are_shaded_and_named_each(quiet):
