@@ -3,12 +3,14 @@
 import csv
 import json
 from importlib.util import find_spec
-from math import cos, sqrt
+from math import cos, cosh, sqrt
 from zipfile import ZipFile
 
+import build_cache
 import commands
 import external_fmus
 import pytest
+from model_text import CURVE
 from ssp_archives import (
     ARCHIVES,
     CONNECTION,
@@ -18,6 +20,7 @@ from ssp_archives import (
     SOURCE,
     UNIT_TABLE,
     bind,
+    bind_inline,
     component,
     parameter_set,
     structure,
@@ -79,6 +82,27 @@ def test_a_component_for_model_exchange_is_integrated(tmp_path):
     column = next(i for i, name in enumerate(heading.split(",")) if name.startswith("body.x"))
     assert float(rows[-1].split(",")[column]) == pytest.approx(cos(sqrt(40.0)), abs=1e-6)
     assert "Ecos does not support components for model exchange" in done.stdout
+
+
+def test_a_value_of_a_table_is_set_in_fmi_3(tmp_path):
+    """It is an element of an array there, which other engines leave at its start value."""
+    (tmp_path / "curve.py").write_text(CURVE)
+    words = ("--fmi", "3", "--platform", "linux64")
+    fmu = build_cache.build_user_model(tmp_path / "curve.py", *words) / "native" / "fmi3" / "curve.fmu"
+    value = bind_inline(parameter_set(**{"force.y[2]": 2.0}))
+    part = f'<ssd:Component name="body" source="resources/{fmu.name}">{value}</ssd:Component>'
+    with ZipFile(tmp_path / "one.ssp", "w") as archive:
+        archive.writestr("SystemStructure.ssd", structure(part, ""))
+        archive.write(fmu, f"resources/{fmu.name}")
+    done = commands.harness(tmp_path, "couple", "one.ssp")
+    assert (done.returncode, done.stderr) == (0, "")
+    heading, *rows = (tmp_path / "results/coupled/one/trajectory.csv").read_text().splitlines()
+    column = next(i for i, name in enumerate(heading.split(",")) if name.startswith("body.x"))
+    motion = ([float(row.split(",")[i]) for i in (0, column)] for row in rows)
+    *_, (time, x) = (point for point in motion if point[1] < 1.0)  # in the first piece, 2 x'' = 1 + x
+    assert time > 0.5
+    assert x == pytest.approx(1.25 * cosh(time / sqrt(2.0)) - 1.0, rel=1e-6)
+    assert "Ecos does not support values of elements of arrays" in done.stdout
 
 
 LINK = f"<ssd:Connection {CONNECTION}/>"

@@ -6,7 +6,18 @@ from ...errors import HarnessError, install_command
 from ...process.worker import WorkerCallError, WorkerDiedError, call_once
 from ...running import ssp
 from . import ecos, libcosim, master
-from .system import BOUND, EXCHANGE, MAPPED, NESTED, OUTER_VALUES, TRANSFORMED, UNITS, VERSION_2, ElementVariable
+from .system import (
+    BOUND,
+    ELEMENTS,
+    EXCHANGE,
+    MAPPED,
+    NESTED,
+    OUTER_VALUES,
+    TRANSFORMED,
+    UNITS,
+    VERSION_2,
+    ElementVariable,
+)
 
 ENGINE_TIMEOUT = 300.0  # s, for one run
 EXTRA = "coupled"
@@ -18,9 +29,9 @@ ENGINES: dict[str, Callable[[ssp.ArchiveRun, Sequence[ElementVariable], str], li
     "fmpy": ssp.run_archive,
 }
 UNSUPPORTED = {  # with these features an engine fails, or ignores them without a message (measured)
-    "Ecos": {NESTED, UNITS, MAPPED, OUTER_VALUES, VERSION_2, EXCHANGE},
-    "libcosim": {NESTED, UNITS, MAPPED, OUTER_VALUES, EXCHANGE},
-    "fmpy": {TRANSFORMED, UNITS, BOUND, OUTER_VALUES, VERSION_2, EXCHANGE},
+    "Ecos": {NESTED, UNITS, MAPPED, OUTER_VALUES, VERSION_2, EXCHANGE, ELEMENTS},
+    "libcosim": {NESTED, UNITS, MAPPED, OUTER_VALUES, EXCHANGE, ELEMENTS},
+    "fmpy": {TRANSFORMED, UNITS, BOUND, OUTER_VALUES, VERSION_2, EXCHANGE, ELEMENTS},
 }
 
 

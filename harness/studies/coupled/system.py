@@ -12,6 +12,7 @@ from typing import Any
 from xml.etree import ElementTree
 
 from ...errors import HarnessError
+from ...running.array_elements import ArrayElement
 from ...running.fmu_archive import read_description
 from ...running.variable_values import REAL_TYPES, parse_element, variable_unit
 
@@ -29,6 +30,7 @@ FMU_TYPE = "application/x-fmu-sharedlibrary"
 NESTED, TRANSFORMED, UNITS, MAPPED = "nested systems", "linear transformations", "unit conversions", "mapped parameters"
 VERSION_2, EXCHANGE = "SSP 2.0", "components for model exchange"
 BOUND, OUTER_VALUES = "parameter values outside of resources/parameters.ssv", "values of the system"
+ELEMENTS = "values of elements of arrays"
 ALL_PARAMETERS = "resources/parameters.ssv"  # all values of an archive of this project, for fmpy
 
 
@@ -176,6 +178,8 @@ class SystemReader:
                 if variable.type in REAL_TYPES:
                     to_node = self.conversion(unit, self.unit_of(node) or self.variable_unit(target), node)
                     value = to_node.then(convert)(float(value))
+                if isinstance(variable, ArrayElement):
+                    system.features.add(ELEMENTS)
                 system.values[target] = value
         return system
 
