@@ -159,10 +159,11 @@ static void warn_of_inconsistent_rate(Instance *self)
 /* Number of values that a value reference stands for; a constant where there are no arrays. */
 static uint32_t value_count(uint32_t reference) { return HAS_ARRAYS ? variables[reference].size : 1; }
 
-/* Loop over the values of n value references: `element` is the index of the variable, `k` that of the value. */
+/* Loop over the values of n value references: `element` is the index of the variable, `k` that of the value. An index of
+ * 64 bits cannot overflow, so that compilers drop the inner loop where there are no arrays. */
 #define FOR_EACH_VALUE(vr, n)               \
     for (size_t r = 0, k = 0; r < (n); r++) \
-        for (uint32_t element = vr[r], end = element + value_count(element); element < end; element++, k++)
+        for (uint64_t element = vr[r], end = element + value_count(vr[r]); element < end; element++, k++)
 
 static bool has_type(uint32_t reference, const FmiType *type)
 {
