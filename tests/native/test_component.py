@@ -22,9 +22,10 @@ from fmus.packaging.native.compiler import compile_and_link
 from fmus.packaging.native.component.encoder import parse_signature
 from fmus.packaging.native.component.interfaces import COMMIT, FUNCTIONS
 
-pytestmark = pytest.mark.slow  # the compiler builds the C library of WASI
 pytest.importorskip("wasmtime.component", reason="pip install wasmtime")
 from component_host import CO_SIMULATION, MODEL_EXCHANGE, ComponentHost, RefusedError
+
+pytestmark = pytest.mark.slow  # the compiler builds the C library of WASI
 
 STOP, STEP, STEPS = 16.0, 0.01, 1600
 LARGEST_MEMORY = 5 << 20
