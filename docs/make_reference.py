@@ -304,10 +304,9 @@ def record_formats() -> str:
 
 
 RECORD_OPTIONS = {
-    "names": "headings",
     "time_unit": "time-unit",
     "per_count": "per-count",
-}  # by the field of ColumnOptions
+}  # by the argument of read_record
 SAMPLES = (
     "run stickslip",
     "run --fmu fmus/pendulum.fmu",

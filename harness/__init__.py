@@ -15,13 +15,14 @@ if sys.argv[:1] == ["-m"]:  # python -m harness: no file of the working folder, 
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from .api import compare, describe, fit, identify_curve, identify_decay, load_result, simulate, sweep
+from .api import compare, describe, fit, identify_curve, identify_decay, load_result, read_record, simulate, sweep
 from .errors import HarnessError, SceneError
 
 if TYPE_CHECKING:
     from .analyses.curve.identification import CurveIdentification
     from .analyses.decay.identification import DecayIdentification
     from .analyses.fit.parameter_fit import ParameterFit
+    from .records.record import Record
     from .running.fmu_variables import FmuDescription
     from .running.signals import Signals
     from .running.trajectory import Trajectory
@@ -46,6 +47,7 @@ __all__ = [
     "FmuDescription",
     "HarnessError",
     "ParameterFit",
+    "Record",
     "SceneError",
     "Signals",
     "SweepResult",
@@ -57,6 +59,7 @@ __all__ = [
     "identify_curve",
     "identify_decay",
     "load_result",
+    "read_record",
     "simulate",
     "sweep",
 ]
@@ -72,6 +75,7 @@ TYPES = {
     "DecayIdentification": "harness.analyses.decay.identification",
     "DecayResult": "harness.studies.decay.result",
     "ParameterFit": "harness.analyses.fit.parameter_fit",
+    "Record": "harness.records.record",
     "Signals": "harness.running.signals",
     "SweepResult": "harness.studies.sweep.result",
     "Trajectory": "harness.running.trajectory",

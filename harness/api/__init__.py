@@ -7,8 +7,19 @@ from .curves import identify_curve
 from .decay import identify_decay
 from .descriptions import describe
 from .fits import fit
+from .records import read_record
 from .results import load_result
 from .runs import compare, simulate
 from .sweeps import sweep
 
-__all__ = ["compare", "describe", "fit", "identify_curve", "identify_decay", "load_result", "simulate", "sweep"]
+__all__ = [
+    "compare",
+    "describe",
+    "fit",
+    "identify_curve",
+    "identify_decay",
+    "load_result",
+    "read_record",
+    "simulate",
+    "sweep",
+]

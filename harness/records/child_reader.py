@@ -11,14 +11,12 @@ from typing import Any
 from ..errors import HarnessError, SceneError, first_line
 from ..process.temporary_directory import temporary_directory
 from ..process.worker import WorkerDiedError, WorkerTimeoutError, call_once
-from . import text_table
+from . import size_limits, text_table
 
-MAX_MEMORY = 4 << 30  # bytes
 MEMORY_PROBLEM = (
     "it is damaged, has cells far from its table, or needs more than "
-    f"{MAX_MEMORY >> 30} GB of memory; save its columns as .csv"
+    f"{size_limits.MAX_MEMORY >> 30} GB of memory; save its columns as .csv"
 )
-TIMEOUT = 120.0  # s
 
 
 @dataclass(frozen=True)
@@ -40,14 +38,15 @@ def read_in_child(data: bytes, name: str, file_format: str) -> dict[str, Any]:
     ImportError
         If the library for the format is not installed.
     """
+    timeout = size_limits.MAX_READING_TIME
     with temporary_directory("record-") as folder:
         path = folder / "record"
         path.write_bytes(data)
         try:
             request = ReadRequest(str(path), name, file_format)
-            contents: dict[str, Any] = call_once(read_file, request, timeout=TIMEOUT, memory=MAX_MEMORY)
+            contents: dict[str, Any] = call_once(read_file, request, timeout=timeout, memory=size_limits.MAX_MEMORY)
         except WorkerTimeoutError:
-            raise SceneError(f"{name} takes longer than {TIMEOUT:g} s to read: save its columns as .csv") from None
+            raise SceneError(f"{name} takes longer than {timeout:g} s to read: save its columns as .csv") from None
         except WorkerDiedError:
             raise SceneError(f"{name} cannot be read: {MEMORY_PROBLEM}") from None
     if "library" in contents:

@@ -16,14 +16,18 @@ MIN_DURATION = 1e-30  # s; the squares of frequencies are finite
 
 @dataclass(frozen=True)
 class Record:
-    """Measured values.
+    """Samples of a measured motion, as `read_record` returns them.
 
     Attributes
     ----------
+    name : str
+        Name of the record.
     t : numpy.ndarray
         Times (n,) in s, increasing.
     x : numpy.ndarray
         Values (n,) in `unit`.
+    unit : str
+        Unit of the values: an SI unit, or that of a sensor.
     order : int
         Order of the derivative of the position that was measured: 0, 1 or 2.
     base : str

@@ -1,4 +1,4 @@
-"""Limits on what a compressed file unpacks to, checked before or while it is unpacked."""
+"""Limits of the files that are read: what a compressed file unpacks to, lines, and memory and time of the reader."""
 
 import gzip
 import io
@@ -9,6 +9,9 @@ from zipfile import ZipFile
 from ..errors import SceneError
 
 MAX_UNPACKED = 200_000_000  # bytes; a record of a million samples has about 20 MB
+MAX_LINES = 5_000_000  # of a text file
+MAX_MEMORY = 4 << 30  # bytes of a process that reads a file
+MAX_READING_TIME = 120.0  # s of such a process
 CHUNK = 1 << 20  # bytes
 MAT_HEADER, MAT_COMPRESSED = 128, 15  # size of the header of a .mat file in bytes, and type of a compressed element
 

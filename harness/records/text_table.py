@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..errors import SceneError
+from . import size_limits
 from .headings import TIME_NAME, is_unit, order_from_name, split_heading
 from .units import COUNT_NAMES, time_unit_size, unit_size
 
@@ -35,7 +36,6 @@ SAMPLE_LINES = 200  # lines examined to detect the layout
 BEFORE_UNIT = re.compile(r"(?<=[^\s\])])\s+(?=[\[(])")  # the space in `t [s]`
 LONG_TABLE = 20_000  # lines above which numbers are read by numpy, if all cells are numbers
 MAX_LINE_LENGTH = 10_000  # characters; longer lines are not a table
-MAX_LINES = 5_000_000
 
 
 class TextTable(NamedTuple):
@@ -89,8 +89,9 @@ def parse_text_table(data: bytes, name: str) -> TextTable:
         If there is no table.
     """
     lines = decode_text(data, name).splitlines()
-    if len(lines) > MAX_LINES:
-        raise SceneError(f"{name} has {len(lines)} lines, and a record at most {MAX_LINES}: leave out every second one")
+    if len(lines) > size_limits.MAX_LINES:
+        limit = f"a record at most {size_limits.MAX_LINES}: leave out every second one"
+        raise SceneError(f"{name} has {len(lines)} lines, and {limit}")
     return parse_long_table(lines, name) or parse_lines(lines, name)
 
 

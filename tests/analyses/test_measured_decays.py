@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from measured_records import find_record, missing
 
+from harness import read_record
 from harness.analyses.decay.estimates import KnownParameters
 from harness.analyses.decay.identification import fit_decay
-from harness.records.columns import ColumnOptions, read_record
 
 RECORDS = ("pendulum_multiarm.csv", "bicycle_wheel.csv")
 LOSSES = ("zeta", "r", "b")
@@ -21,7 +21,7 @@ def fits(name):
     path = find_record(name)
     if path is None:
         pytest.skip(missing(name))
-    record = read_record(str(path), ColumnOptions(), path.stem)
+    record = read_record(path)
     whole = fit_decay(record, KnownParameters())
     parts = []
     for count in (2, 3):

@@ -80,6 +80,12 @@ ACCEPTED = {  # arguments by function, and the values that they may have; None a
         "progress": {"type"},
     },
     "load_result": {},
+    "read_record": {
+        "unit": {"'x'", "'8'", "long text"},
+        "rate": ABOVE_ZERO,
+        "begin": FINITE,
+        "end": ABOVE_ZERO,
+    },
     "describe": {},
 }
 

@@ -17,7 +17,7 @@ analyses.fit: feasible_region fit_problem fit_procedure law_comparison measured_
 analyses: slip steps
 commands: terminal
 process: interrupt interruptible_wait progress_bar subprocess_runner temporary_directory worker worker_process
-records: array_files child_reader columns headings record samples signal_table size_limits table_files text_table
+records: headings record samples signal_table size_limits text_table
 references: certification certified_reference models peer_solvers reference_trajectory single_model_reference
 references.models: pacejka
 report: page sections typeset verdicts

@@ -1,5 +1,6 @@
 """The same decay in every format of tests/support/record_formats.py gives the same values, or the message listed."""
 
+import json
 from importlib.util import find_spec
 
 import numpy as np
@@ -7,11 +8,9 @@ import pytest
 import record_formats
 from record_formats import FORMATS, LIBRARIES, OMEGA, ZETA, T
 
-from harness import SceneError
+from harness import SceneError, read_record
 from harness.analyses.decay.estimates import KnownParameters
 from harness.analyses.decay.identification import fit_decay
-from harness.records.array_files import columns_of_frame, list_columns
-from harness.records.columns import ColumnOptions, read_record
 from harness.records.record import Record
 
 X = record_formats.positions()
@@ -40,7 +39,7 @@ def fit(record):
 
 @pytest.mark.parametrize("form", [form for form in FORMATS if not form.refusal], ids=lambda form: form.file)
 def test_every_format_of_a_decay_gives_the_same_frequency_and_damping(tmp_path, form):
-    record = read_record(str(write(tmp_path, form)), ColumnOptions(**form.options), "record")
+    record = read_record(write(tmp_path, form), **form.options)
     assert record.t - record.t[0] == pytest.approx(T, abs=1e-6)
     scale = {"m": 1.0, "units": 1e-3}[record.base]
     assert scale * (record.x - record.x[0]) == pytest.approx(X - X[0], abs=1e-8)
@@ -55,7 +54,7 @@ def test_every_format_of_a_decay_gives_the_same_frequency_and_damping(tmp_path, 
 @pytest.mark.parametrize("form", [form for form in FORMATS if form.refusal], ids=lambda form: form.file)
 def test_a_refused_format_has_its_message(tmp_path, form):
     with pytest.raises(SceneError) as refusal:
-        read_record(str(write(tmp_path, form)), ColumnOptions(**form.options), "record")
+        read_record(write(tmp_path, form), **form.options)
     assert str(refusal.value) == form.refusal
 
 
@@ -83,30 +82,53 @@ def test_a_truncated_file_is_refused_in_one_sentence(tmp_path, file, share):
     path = write(tmp_path, next(form for form in FORMATS if form.file == file))
     path.write_bytes(path.read_bytes()[: int(share * path.stat().st_size)])
     with pytest.raises(SceneError) as refusal:
-        read_record(str(path), ColumnOptions(unit="m"), "record")
+        read_record(path, unit="m")
     assert file in str(refusal.value)
     assert "\n" not in str(refusal.value)
 
 
-def test_units_of_a_matlab_table_are_read():
-    frame = pytest.importorskip("pandas", reason="extra sweep").DataFrame({"t": T, "x": X})
-    for attribute in ("varUnits", "VariableUnits"):
-        frame.attrs = {attribute: ["s", "mm"]}
-        assert [column.heading("") for column in list_columns(columns_of_frame(frame))] == ["t [s]", "x [mm]"]
+FRAME = """
+import numpy, pandas
+
+def load_from_mat(path, add_table_attrs):
+    frame = pandas.DataFrame({"t": 10.0 * numpy.arange(50), "x": numpy.sin(numpy.arange(50))})
+    frame.attrs["ATTRIBUTE"] = ["ms", "mm"]
+    return {"TT": frame}
+"""
+
+
+@pytest.mark.parametrize("attribute", ["varUnits", "VariableUnits"])
+def test_units_of_a_matlab_table_are_read(tmp_path, monkeypatch, attribute):
+    """From a table with units as the library reads it, which cannot write one."""
+    path = write(tmp_path, next(form for form in FORMATS if form.file == "timetable.mat"))
+    (tmp_path / "matio.py").write_text(FRAME.replace("ATTRIBUTE", attribute))
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    record = read_record(path)
+    assert record.t == pytest.approx(0.01 * np.arange(50))
+    assert record.x == pytest.approx(1e-3 * np.sin(np.arange(50)))
 
 
 @pytest.mark.parametrize(
-    ("entry", "headings"),
+    ("entry", "scales"),
     [
-        ({"unit": ["s", "mm"]}, ["t [s]", "x [mm]"]),
-        ({"Units": np.array([b"s", b"mm"])}, ["t [s]", "x [mm]"]),
-        ({"units": {"x": "mm"}}, ["t", "x [mm]"]),
-        ({"units": ["mm"]}, ["t", "x"]),
-        ({"x_units": "mm", "t_unit": "ms"}, ["t [ms]", "x [mm]"]),
+        ({"unit": ["s", "mm"]}, (1.0, 1e-3)),
+        ({"Units": ["ms", "cm"]}, (1e-3, 1e-2)),
+        ({"units": {"x": "mm"}}, (1.0, 1e-3)),
+        ({"units": ["mm"]}, (1.0, 1.0)),
+        ({"x_units": "mm", "t_unit": "ms"}, (1e-3, 1e-3)),
     ],
 )
-def test_units_beside_arrays_are_read(entry, headings):
-    assert [column.heading("") for column in list_columns({"t": T, "x": X} | entry)] == headings
+def test_units_beside_arrays_are_read(tmp_path, entry, scales):
+    contents = {"t": T.tolist(), "x": X.tolist()} | entry
+    (tmp_path / "record.json").write_text(json.dumps(contents))
+    paths = [tmp_path / "record.json"]
+    if not any(isinstance(value, dict) for value in entry.values()):
+        paths.append(tmp_path / "record.npz")
+        np.savez(paths[-1], **{name: np.array(value) for name, value in contents.items()})
+    for path in paths:
+        record = read_record(path)
+        assert record.t == pytest.approx(scales[0] * T)
+        assert record.x == pytest.approx(scales[1] * X)
 
 
 @pytest.mark.parametrize(
@@ -123,10 +145,10 @@ def test_a_missing_library_is_named_with_its_installation(tmp_path, monkeypatch,
     (tmp_path / f"{library}.py").write_text(f"raise ModuleNotFoundError(name={library!r})")
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     with pytest.raises(SceneError, match=rf"{file} needs {library} to be read: .* 'friction-fmus\[records\]'"):
-        read_record(str(path), ColumnOptions(), "record")
+        read_record(path)
 
 
-@pytest.mark.parametrize("options", [{}, {"position": "x [mm] #2"}, {"time": "t [s] #2"}])
+@pytest.mark.parametrize("options", [{}, {"column": "x [mm] #2"}, {"time": "t [s] #2"}])
 def test_one_of_two_runs_side_by_side_is_read_and_the_other_named(tmp_path, options):
     """The second run is longer, so that the first has empty cells at its end."""
     longer = np.arange(800) / 100
@@ -134,7 +156,7 @@ def test_one_of_two_runs_side_by_side_is_read_and_the_other_named(tmp_path, opti
     cells += [f",,,{s},{s * s}" for s in longer[len(T) :]]
     path = tmp_path / "runs.csv"
     path.write_text("\n".join(["t [s],x [mm],,t [s],x [mm]", *cells]))
-    record = read_record(str(path), ColumnOptions(**options), "runs")
+    record = read_record(path, **options)
     assert record.x == pytest.approx(1e-3 * longer**2 if options else X, abs=1e-8)
     first, second = "t [s] with x [mm]", "t [s] #2 with x [mm] #2"
     if "time" in options:

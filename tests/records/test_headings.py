@@ -6,8 +6,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from harness import HarnessError
-from harness.records.columns import ColumnOptions, read_record
+from harness import HarnessError, read_record
 from harness.records.headings import split_heading
 
 PIECES = ("x", "t", "time", "mm", "m/s^2", "(", ")", "[", "]", "/", " in ", " ", "\t", "_", "µ", "Run #1", "aB", ",")
@@ -54,11 +53,11 @@ def test_any_headings_give_a_record_or_a_message(tmp_path_factory, first, second
     rows = "\n".join(f"{i / 10},{i % 7}" for i in range(20))
     path.write_text(f"{first},{second}\n{rows}", encoding="utf-8")
     with contextlib.suppress(HarnessError):
-        assert len(read_record(str(path), ColumnOptions(), "record").t) == 20
+        assert len(read_record(path).t) == 20
 
 
 @pytest.mark.parametrize("filling", [" " * 9000, "( " * 4000, "x_" * 4000])
 def test_a_heading_of_thousands_of_characters_is_read(tmp_path, filling):
     path = tmp_path / "record.csv"
     path.write_text(f"t [s],x{filling}y [mm]\n" + "\n".join(f"{i / 10},{i % 7}" for i in range(20)))
-    assert read_record(str(path), ColumnOptions(), "record").unit == "m"
+    assert read_record(path).unit == "m"

@@ -8,13 +8,12 @@ import numpy as np
 import pytest
 from decays import decay_record
 
-from harness import HarnessError, SceneError
+from harness import HarnessError, SceneError, compare, read_record
 from harness.analyses.decay.estimates import KnownParameters
 from harness.analyses.decay.identification import fit_decay
-from harness.records.columns import ColumnOptions, read_numeric, read_record
 from harness.records.headings import split_heading
-from harness.records.record import Record, check_record
-from harness.records.table_files import parse_table_file
+from harness.records.record import Record
+from harness.records.text_table import parse_text_table
 
 T = np.arange(600) / 100
 TRUTH = {"omega": 12.566, "zeta": 0.01, "r": 0.002}
@@ -123,7 +122,7 @@ FILES = {
     "status.csv": lambda: text_of("t [s],status,x [mm]\n" + rows(T, ["ok"] * len(T), 1e3 * X)),
 }  # fmt: skip
 OPTIONS = {
-    "no-heading.csv": {"names": "t [s],x [mm]"},
+    "no-heading.csv": {"headings": "t [s],x [mm]"},
     "encoder.csv": {"per_count": "0.001deg"},
 }
 PENDULUMS = ("stamps.csv", "gyroscope.csv", "encoder.csv")
@@ -167,7 +166,7 @@ def fit_record(record, pendulum):
 def test_a_common_file_format_gives_the_expected_parameters(tmp_path, name):
     path = tmp_path / name
     path.write_bytes(FILES[name]())
-    record = read_record(str(path), ColumnOptions(**OPTIONS.get(name, {})), path.stem)
+    record = read_record(path, **OPTIONS.get(name, {}))
     assert record.quantity == QUANTITIES.get(name, "position")
     fit = fit_record(record, name in PENDULUMS)
     values = {estimate.name: estimate for estimate in fit.estimates}
@@ -224,7 +223,7 @@ NOTATIONS = {  # and the options of its reader; all hold the same motion
     "empty cells": (lambda: "t [s];x [mm];;;;\n" + text_lines(lambda t, x, s: f"{t};{x:.6f};;;;"), {}),
     "settings beside": (
         lambda: "\n".join(scope(i, t, x) for i, (t, x) in enumerate(zip(T, MM, strict=True))),
-        {"names": "t [s],x [mm]"},
+        {"headings": "t [s],x [mm]"},
     ),
     "settings above": (
         lambda: (
@@ -273,7 +272,7 @@ def test_numbers_and_times_are_read_in_any_notation(tmp_path, name):
     path, (content, options) = tmp_path / "record", NOTATIONS[name]
     written = content()
     path.write_bytes(written.encode() if isinstance(written, str) else written)
-    record = read_record(str(path), ColumnOptions(**options), "record")
+    record = read_record(path, **options)
     assert record.t - record.t[0] == pytest.approx(T, abs=1e-6)
     assert record.x - record.x[0] == pytest.approx(X - X[0], abs=1e-6)
 
@@ -284,49 +283,49 @@ UNITS = "\n".join(f"{i} sec,{i % 5} {'cm' if i == 3 else 'mm'}" for i in range(2
 
 
 @pytest.mark.parametrize(
-    ("text", "columns", "sentence"),
+    ("text", "options", "sentence"),
     [
-        (f"t,x\n{ROWS}", ColumnOptions(), "t has integer or very large numbers and no unit"),
-        (f"millivolts,x [m]\n{ROWS}", ColumnOptions(), "millivolts has integer or very large numbers and no unit"),
-        (f"t,x [m]\n{ROWS.replace(',', '763770000123.5,')}", ColumnOptions(), "as in --time-unit ms, s, or 0.01s"),
-        (f"t [s],x [m]\n{ROWS}", ColumnOptions(position="y"), "unknown column 'y'"),
-        (f"t [h/m],x [m]\n{ROWS}", ColumnOptions(), "unknown unit of t 'h/m'"),
-        (f"t [s],x [m]\n{ROWS}\n20,abc", ColumnOptions(), "'abc' in row 22, column x [m], is not a number"),
+        (f"t,x\n{ROWS}", {}, "t has integer or very large numbers and no unit"),
+        (f"millivolts,x [m]\n{ROWS}", {}, "millivolts has integer or very large numbers and no unit"),
+        (f"t,x [m]\n{ROWS.replace(',', '763770000123.5,')}", {}, "as in --time-unit ms, s, or 0.01s"),
+        (f"t [s],x [m]\n{ROWS}", {"column": "y"}, "unknown column 'y'"),
+        (f"t [h/m],x [m]\n{ROWS}", {}, "unknown unit of t 'h/m'"),
+        (f"t [s],x [m]\n{ROWS}\n20,abc", {}, "'abc' in row 22, column x [m], is not a number"),
         (
             f"t [s],x [m]\n{ROWS}\n\nt [s],x [m]\n{ROWS}",
-            ColumnOptions(),
+            {},
             "row 22 repeats the headings: save each run in a separate file",
         ),
-        (f"t,x\n{UNITS}", ColumnOptions(), "'0 mm' in row 2, column x, is not a number"),  # not all are in mm
-        (f"t [s],x [m]\n{ROWS}\n20,1,2", ColumnOptions(), "row 22 has 3 cells where the heading has 2"),
-        (f"t [s],x [m]\n{ROWS}\n5,5", ColumnOptions(), "time does not rise after t = 19.0 s"),
-        (f"time,x [m]\n{CLOCK}\n10:00:05,5", ColumnOptions(), "time does not rise after t = 19.0 s"),
-        (f"t [s],x [m]\n{ROWS}\n20,1e200", ColumnOptions(), "which is not plausible"),
-        (f"t [s],x [m]\n{ROWS}", ColumnOptions(begin=15), "has 5 samples"),
+        (f"t,x\n{UNITS}", {}, "'0 mm' in row 2, column x, is not a number"),  # not all are in mm
+        (f"t [s],x [m]\n{ROWS}\n20,1,2", {}, "row 22 has 3 cells where the heading has 2"),
+        (f"t [s],x [m]\n{ROWS}\n5,5", {}, "time does not rise after t = 19.0 s"),
+        (f"time,x [m]\n{CLOCK}\n10:00:05,5", {}, "time does not rise after t = 19.0 s"),
+        (f"t [s],x [m]\n{ROWS}\n20,1e200", {}, "which is not plausible"),
+        (f"t [s],x [m]\n{ROWS}", {"begin": 15}, "has 5 samples"),
         (
             f"t [s],x [m]\n{ROWS.replace(',1', ',').replace(',3', ',')}\n20,\n21,\n22,\n23,",
-            ColumnOptions(),
+            {},
             "rows have no number",
         ),
-        (ROWS, ColumnOptions(), "--headings 't [s],x [mm]'"),
-        (ROWS, ColumnOptions(names="t"), "--headings names 1 columns, and record.csv has 2"),
-        ("", ColumnOptions(), "is empty"),
-        ("t [s]\n" + ROWS.replace(",", "."), ColumnOptions(), "only one column that is not empty, t [s]; time and pos"),
-        ('{"t": [0.1, 0.2, 0.3], "x": 1}', ColumnOptions(), "only one column that is not empty, t; time and position"),
-        ("Dear Sir,\nno table.\n", ColumnOptions(), "contains no table"),
-        (f"t [s],count [counts]\n{ROWS}", ColumnOptions(), "--per-count"),
-        (f"t [s],count [counts]\n{ROWS}", ColumnOptions(per_count="half a turn"), "give a number and a unit"),
-        (f"t [s],acceleration [mm]\n{ROWS}", ColumnOptions(), "the name of an acceleration and the unit of a position"),
-        (f"t [s],a [m/s^2]\n{ROWS}", ColumnOptions(quantity="position"), "measures an acceleration"),
-        ("2026-11-21T15:18:03,1\n2026-21-11T15:18:03,2\n" * 9, ColumnOptions(names="t,x [m]"), "is not a time stamp"),
-        ('t [s],"x [m]\n' + ROWS, ColumnOptions(), "contains no table"),
+        (ROWS, {}, "--headings 't [s],x [mm]'"),
+        (ROWS, {"headings": "t"}, "--headings names 1 columns, and record.csv has 2"),
+        ("", {}, "is empty"),
+        ("t [s]\n" + ROWS.replace(",", "."), {}, "only one column that is not empty, t [s]; time and pos"),
+        ('{"t": [0.1, 0.2, 0.3], "x": 1}', {}, "only one column that is not empty, t; time and position"),
+        ("Dear Sir,\nno table.\n", {}, "contains no table"),
+        (f"t [s],count [counts]\n{ROWS}", {}, "--per-count"),
+        (f"t [s],count [counts]\n{ROWS}", {"per_count": "half a turn"}, "give a number and a unit"),
+        (f"t [s],acceleration [mm]\n{ROWS}", {}, "the name of an acceleration and the unit of a position"),
+        (f"t [s],a [m/s^2]\n{ROWS}", {"quantity": "position"}, "measures an acceleration"),
+        ("2026-11-21T15:18:03,1\n2026-21-11T15:18:03,2\n" * 9, {"headings": "t,x [m]"}, "is not a time stamp"),
+        ('t [s],"x [m]\n' + ROWS, {}, "contains no table"),
     ],
 )
-def test_a_file_without_a_record_is_refused_in_one_sentence(tmp_path, text, columns, sentence):
+def test_a_file_without_a_record_is_refused_in_one_sentence(tmp_path, text, options, sentence):
     path = tmp_path / "record.csv"
     path.write_text(text)
     with pytest.raises(SceneError) as refusal:
-        read_record(str(path), columns, "record")
+        read_record(path, **options)
     assert sentence in str(refusal.value)
     assert "\n" not in str(refusal.value)
 
@@ -344,29 +343,29 @@ def test_no_file_content_ends_in_a_traceback(tmp_path):
             bytes_[position] = rng.integers(256)
         path.write_bytes(bytes_)
         with contextlib.suppress(HarnessError):
-            read_record(str(path), ColumnOptions(), "record")
+            read_record(path)
 
 
 def test_a_missing_file_error_names_the_nearest(tmp_path):
     (tmp_path / "swing.csv").write_text("t [s],x [m]\n" + ROWS)
     with pytest.raises(SceneError, match=r"cannot read .*No such file or directory \(nearest: 'swing.csv'\)"):
-        read_record(str(tmp_path / "swng.csv"), ColumnOptions(), "swng")
+        read_record(tmp_path / "swng.csv")
 
 
 def test_a_first_column_that_does_not_move_is_named_with_the_others(tmp_path):
     path = tmp_path / "record.csv"
     path.write_text("t [s],cart,arm\n" + rows(T, 0 * X, X))
     with pytest.raises(SceneError, match="cart does not move; select another column by --column: arm"):
-        read_record(str(path), ColumnOptions(), "record")
-    assert read_record(str(path), ColumnOptions(position="arm"), "record").x == pytest.approx(X, abs=1e-9)
+        read_record(path)
+    assert read_record(path, column="arm").x == pytest.approx(X, abs=1e-9)
 
 
 def test_a_heading_is_matched_literally(tmp_path):
     path = tmp_path / "record.csv"
     path.write_text("clock [s],x [mm],Laser 2 [mm]\n" + rows(T, 0 * X, 1e3 * X))
-    record = read_record(str(path), ColumnOptions(time="clock [s]", position="Laser 2 [mm]"), "record")
+    record = read_record(path, time="clock [s]", column="Laser 2 [mm]")
     assert record.x == pytest.approx(X, abs=1e-9)
-    assert read_record(str(path), ColumnOptions(position="laser 2"), "record").x == pytest.approx(X, abs=1e-9)
+    assert read_record(path, column="laser 2").x == pytest.approx(X, abs=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -393,7 +392,7 @@ def test_a_heading_is_matched_literally(tmp_path):
 def test_a_unit_identifies_the_quantity(tmp_path, written, order, base, size):
     path = tmp_path / "record.csv"
     path.write_text(f"t [s],x [{written}]\n" + rows(T, X))
-    record = read_record(str(path), ColumnOptions(), "record")
+    record = read_record(path)
     assert (record.order, record.unit) == (order, base + ("", "/s", "/s2")[order])
     assert record.x == pytest.approx(size * X, rel=1e-6, abs=1e-8 * size)
 
@@ -418,19 +417,18 @@ def test_a_heading_is_a_name_and_a_unit(heading, name, unit):
 def test_an_unknown_unit_is_kept_and_reported(tmp_path):
     path = tmp_path / "record.csv"
     path.write_text("t [s],sensor [V]\n" + rows(T, X))
-    record = read_record(str(path), ColumnOptions(), "record")
+    record = read_record(path)
     assert (record.unit, record.order) == ("V", 0)
     assert "assumed to be a position" in record.notes[0]
 
 
-def test_a_record_has_at_least_twelve_samples():
-    for count in (11, 12, 13):
-        record = Record("swing", np.arange(float(count)), np.sin(np.arange(count)))
-        if count < 12:
-            with pytest.raises(SceneError, match="swing has 11 samples in this interval; at least 12 are required"):
-                check_record(record)
-        else:
-            check_record(record)
+def test_a_record_has_at_least_twelve_samples(tmp_path):
+    path = tmp_path / "swing.csv"
+    path.write_text("t [s],x [m]\n" + rows(T[:13], X[:13]))
+    for end in (0.115, 0.125):
+        assert len(read_record(path, end=end).t) == round(100 * end + 0.5)
+    with pytest.raises(SceneError, match="swing has 11 samples in this interval; at least 12 are required"):
+        read_record(path, end=0.105)
 
 
 def test_a_selected_interval_includes_the_samples_at_both_ends():
@@ -461,23 +459,23 @@ def test_a_selected_interval_includes_the_samples_at_both_ends():
 )
 def test_headings_are_the_last_rows_of_the_width_of_the_numbers(preceding, width, headings):
     rows = [*preceding, *([f"{i + 0.5 * j}" for j in range(width)] for i in range(20))]
-    table = parse_table_file("".join("\t".join(row) + "\n" for row in rows).encode(), "record.txt")
-    assert list(table.column_headings) == (headings or [""] * width)
+    table = parse_text_table("".join("\t".join(row) + "\n" for row in rows).encode(), "record.txt")
+    assert list(table.headings) == headings
 
 
 def test_a_rate_replaces_the_times_and_the_column_of_times_is_not_the_signal(tmp_path):
     path = tmp_path / "record.csv"
     for head in ("", "t [ms],x [mm]\n", "n,x [mm]\n"):
         path.write_text(head + "\n".join(f"{10 * i},{x:.9g}" for i, x in enumerate(1e3 * X)))
-        record = read_record(str(path), ColumnOptions(rate=50.0, unit="mm"), "record")
+        record = read_record(path, rate=50.0, unit="mm")
         assert record.t == pytest.approx(2 * T)
         assert record.x == pytest.approx(X, abs=1e-8)
     path.write_text("t\n" + "\n".join(f"{x:.9g}" for x in X))
-    assert read_record(str(path), ColumnOptions(rate=100.0, unit="m"), "record").x == pytest.approx(X, abs=1e-8)
+    assert read_record(path, rate=100.0, unit="m").x == pytest.approx(X, abs=1e-8)
 
 
 def test_a_table_to_compare_needs_two_columns(tmp_path):
     path = tmp_path / "record.csv"
     path.write_text("x\n1\n2\n3\n")
     with pytest.raises(SceneError, match="only one column that is not empty; time and a variable are required"):
-        read_numeric(path)
+        compare(path, path)

@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 from decays import decay_record, random_record
 
-from harness import SceneError
+from harness import SceneError, read_record
 from harness.analyses.decay.estimates import KnownParameters
 from harness.analyses.decay.identification import fit_decay
-from harness.records.columns import ColumnOptions, read_record
 from harness.records.samples import find_saturated, leave_out_saturated, mark_dropouts, mark_sentinels, sort_times
 
 T = np.linspace(0.0, 12.0, 2401)
@@ -24,7 +23,7 @@ def read(folder, t, x):
     path = folder / "record.csv"
     rows = (f"{a:.6f},{b:.7g}" for a, b in zip(t, x, strict=True))
     path.write_text("t [s],x [mm]\n" + "\n".join(rows))
-    return read_record(str(path), ColumnOptions(), "record")
+    return read_record(path)
 
 
 def zeta(record):

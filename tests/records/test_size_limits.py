@@ -10,10 +10,8 @@ import numpy as np
 import pytest
 import record_formats
 
-from harness import HarnessError, SceneError
-from harness.records import array_files, child_reader, size_limits
-from harness.records.columns import ColumnOptions, read_record
-from harness.studies.compare.trajectory_files import read_signals
+from harness import HarnessError, SceneError, compare, read_record
+from harness.records import size_limits
 
 LIMIT = 100_000  # bytes, for these tests
 
@@ -27,29 +25,11 @@ def zipped(data):
     return file.getvalue()
 
 
-def compressed_hdf5():
-    h5py = pytest.importorskip("h5py", reason="extra records")
-    file = io.BytesIO()
-    with h5py.File(file, "w") as data:
-        data.create_dataset("t", (1_000_000,), "f8", chunks=(10_000,), compression="gzip")
-        data.create_dataset("x", (1_000_000,), "f8", chunks=(10_000,), compression="gzip")
-    return file.getvalue()
-
-
 def compressed_mat():
     from scipy.io import savemat
 
     file = io.BytesIO()
     savemat(file, {"t": np.zeros(50_000), "x": np.zeros(50_000)}, do_compression=True)
-    return file.getvalue()
-
-
-def compressed_parquet():
-    pyarrow = pytest.importorskip("pyarrow", reason="extra records")
-    from pyarrow import parquet
-
-    file = io.BytesIO()
-    parquet.write_table(pyarrow.table([np.zeros(50_000), np.zeros(50_000)], names=["t", "x"]), file)
     return file.getvalue()
 
 
@@ -72,17 +52,30 @@ def test_a_compressed_file_has_a_limit(tmp_path, monkeypatch, name):
     assert (tmp_path / name).stat().st_size < LIMIT
     monkeypatch.setattr(size_limits, "MAX_UNPACKED", LIMIT)
     with pytest.raises(SceneError, match=rf"{name} unpacks to more than .* MB, too much for a record"):
-        read_record(str(tmp_path / name), ColumnOptions(), "record")
+        read_record(tmp_path / name)
 
 
-@pytest.mark.parametrize(("file_format", "content"), [("hdf5", compressed_hdf5), ("parquet", compressed_parquet)])
-def test_a_compressed_data_set_has_a_limit(monkeypatch, file_format, content):
+def write_hdf5(path):
+    h5py = pytest.importorskip("h5py", reason="extra records")
+    with h5py.File(path, "w") as data:
+        for name in "tx":
+            data.create_dataset(name, (13_000_000,), "f8", chunks=(100_000,), compression="gzip")
+
+
+def write_parquet(path):
+    pyarrow = pytest.importorskip("pyarrow", reason="extra records")
+    from pyarrow import parquet
+
+    parquet.write_table(pyarrow.table([np.zeros(13_000_000, np.int8)] * 2, names=["t", "x"]), path)
+
+
+@pytest.mark.parametrize("write", [write_hdf5, write_parquet])
+def test_a_compressed_data_set_has_a_limit(tmp_path, write):
     """These are read in a child process, which does not share the limit of this test."""
-    data = content()
-    assert len(data) < LIMIT
-    monkeypatch.setattr(size_limits, "MAX_UNPACKED", LIMIT)
-    with pytest.raises(SceneError, match=r"record unpacks to more than .* MB, too much for a record"):
-        array_files.READERS[file_format](data, "record")
+    write(tmp_path / "record")
+    assert (tmp_path / "record").stat().st_size < LIMIT
+    with pytest.raises(SceneError, match="record unpacks to more than 200 MB, too much for a record"):
+        read_record(tmp_path / "record")
 
 
 def test_the_limit_is_that_of_the_whole_file(monkeypatch):
@@ -103,21 +96,13 @@ def test_a_cell_far_from_the_table_does_not_end_the_command(tmp_path):
         book.active.append(row)
     book.active["XFD1048576"] = 1
     book.save(tmp_path / "far.xlsx")
-    with pytest.raises(SceneError) as refusal:
-        read_record(str(tmp_path / "far.xlsx"), ColumnOptions(), "record")
-    assert str(refusal.value) == (
-        "far.xlsx cannot be read: it is damaged, has cells far from its table, or needs more than 4 GB of memory; save "
-        "its columns as .csv"
-    )
-
-
-def test_a_file_at_which_its_library_crashes_does_not_end_the_command(tmp_path, monkeypatch, make_module):
-    code = "import os\ndef read_file(request):\n    os.kill(os.getpid(), 9)"
-    monkeypatch.setattr(child_reader, "read_file", make_module("crashing_reader", code).read_file)
-    (tmp_path / "record.mat").write_bytes(record_formats.mat(t=record_formats.T, x=record_formats.MM))
-    for read in (lambda path: read_record(str(path), ColumnOptions(), "record"), read_signals):
-        with pytest.raises(SceneError, match=r"record.mat cannot be read: it is damaged"):
-            read(tmp_path / "record.mat")
+    for read in (read_record, lambda path: compare(path, path)):
+        with pytest.raises(SceneError) as refusal:
+            read(tmp_path / "far.xlsx")
+        assert str(refusal.value) == (
+            "far.xlsx cannot be read: it is damaged, has cells far from its table, or needs more than 4 GB of memory; "
+            "save its columns as .csv"
+        )
 
 
 def test_a_file_whose_library_reads_beyond_its_end_is_refused(tmp_path):
@@ -125,22 +110,24 @@ def test_a_file_whose_library_reads_beyond_its_end_is_refused(tmp_path):
     data = bytearray(record_formats.mat(t=record_formats.T, x=record_formats.MM))
     data[177] = 1
     (tmp_path / "damaged.mat").write_bytes(data)
-    for read in (lambda path: read_record(str(path), ColumnOptions(), "record"), read_signals):
+    for read in (read_record, lambda path: compare(path, path)):
         with pytest.raises(SceneError, match=r"damaged.mat cannot be read: "):
             read(tmp_path / "damaged.mat")
 
 
-def test_a_file_that_takes_too_long_is_refused(monkeypatch):
-    monkeypatch.setattr(child_reader, "TIMEOUT", 0.0)
-    with pytest.raises(SceneError, match="book takes longer than 0 s to read"):
-        child_reader.read_in_child(wide_sheet(), "book", "workbook")
-
-
-def test_the_memory_of_the_reader_is_limited(monkeypatch):
-    resource = pytest.importorskip("resource", reason="a module of POSIX")
-    monkeypatch.setattr(child_reader, "read_file", resource.getrlimit)
-    monkeypatch.setattr(child_reader, "ReadRequest", lambda *request: resource.RLIMIT_AS)
-    assert child_reader.read_in_child(b"", "record", "npy") == (child_reader.MAX_MEMORY,) * 2
+@pytest.mark.parametrize(
+    ("limit", "value", "message"),
+    [
+        ("MAX_READING_TIME", 0.0, "book.mat takes longer than 0 s to read"),
+        ("MAX_MEMORY", 100 << 20, "book.mat cannot be read: .*memory"),
+    ],
+)
+def test_the_reader_in_a_child_process_is_limited(tmp_path, monkeypatch, limit, value, message):
+    (tmp_path / "book.mat").write_bytes(record_formats.mat(t=record_formats.T, x=record_formats.MM))
+    assert len(read_record(tmp_path / "book.mat").t) == len(record_formats.T)
+    monkeypatch.setattr(size_limits, limit, value)
+    with pytest.raises(SceneError, match=message):
+        read_record(tmp_path / "book.mat")
 
 
 @pytest.mark.parametrize("name", ["record.npy", "record.npz"])
@@ -153,14 +140,14 @@ def test_an_array_of_a_size_that_the_file_does_not_have_is_refused(tmp_path, nam
         archive.writestr("t.npy", array)
     (tmp_path / name).write_bytes(array if name.endswith("npy") else file.getvalue())
     with pytest.raises(SceneError, match=rf"{name} cannot be read"):
-        read_record(str(tmp_path / name), ColumnOptions(), "record")
+        read_record(tmp_path / name)
 
 
 def test_a_file_with_too_many_lines_is_refused(tmp_path, monkeypatch):
-    monkeypatch.setattr("harness.records.text_table.MAX_LINES", 100)
+    monkeypatch.setattr(size_limits, "MAX_LINES", 100)
     (tmp_path / "long.csv").write_text("t [s],x [mm]\n" + "1.5,2\n" * 100)
     with pytest.raises(SceneError, match=r"long.csv has 101 lines, and a record at most 100"):
-        read_record(str(tmp_path / "long.csv"), ColumnOptions(), "record")
+        read_record(tmp_path / "long.csv")
 
 
 @pytest.mark.parametrize(
@@ -170,5 +157,5 @@ def test_a_file_with_too_many_lines_is_refused(tmp_path, monkeypatch):
 def test_json_without_a_record_is_refused_in_one_sentence(tmp_path, text):
     (tmp_path / "record.json").write_text(text)
     with pytest.raises(HarnessError) as refusal:
-        read_record(str(tmp_path / "record.json"), ColumnOptions(), "record")
+        read_record(tmp_path / "record.json")
     assert "\n" not in str(refusal.value)

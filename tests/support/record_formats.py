@@ -235,7 +235,7 @@ FORMATS = (
     ),
     Format("LabVIEW `.lvm`", "labview.lvm", lambda: lvm("X_Value", "{t:.6f}\t{x:.9f}")),
     Format("LabVIEW `.lvm` with `Delta_X` in place of times", "no-x.lvm", lambda: lvm("X_Value", "\t{x:.9f}")),
-    Format("Tektronix oscilloscope", "scope.csv", scope, {"names": "t [s],x [mm]"}),
+    Format("Tektronix oscilloscope", "scope.csv", scope, {"headings": "t [s],x [mm]"}),
     Format(
         "PASCO, two runs side by side",
         "pasco.csv",

@@ -1,0 +1,81 @@
+"""Measured records from Python: `read_record`."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ..arguments import FINITE, PATH, POSITIVE, QUANTITY, TEXT, check_arguments
+from .options import check_time_range
+
+if TYPE_CHECKING:
+    from ..records.record import Record
+
+
+@check_arguments(
+    source=PATH,
+    time=TEXT,
+    column=TEXT,
+    quantity=QUANTITY,
+    unit=TEXT,
+    time_unit=TEXT,
+    per_count=TEXT,
+    headings=TEXT,
+    rate=POSITIVE,
+    begin=FINITE,
+    end=FINITE,
+)
+def read_record(
+    source: "str | Path",
+    *,
+    time: str | None = None,
+    column: str | None = None,
+    quantity: str | None = None,
+    unit: str | None = None,
+    time_unit: str | None = None,
+    per_count: str | None = None,
+    headings: str | None = None,
+    rate: float | None = None,
+    begin: float | None = None,
+    end: float | None = None,
+) -> "Record":
+    """Read times and samples of a measured motion from a file, as the command `decay` does.
+
+    Parameters
+    ----------
+    source : str or path
+        A table in a text file, a spreadsheet, or a .mat, HDF5, Parquet, .npy, .npz or JSON file.
+    time, column : str, optional
+        Headings of the columns of times and samples, if the table has several.
+    quantity : {"position", "velocity", "acceleration"}, optional
+        Measured quantity, if it follows neither from the unit nor from the heading.
+    unit, time_unit : str, optional
+        Units of the samples and of the times, as ``"mm"`` and ``"ms"``, if the file lacks them.
+    per_count : str, optional
+        Size of one count of an encoder, as ``"0.36deg"``.
+    headings : str, optional
+        Headings of a file without any, separated by commas, as ``"t [s],x [mm]"``.
+    rate : float, optional
+        Sampling rate in Hz, which replaces the times of the file.
+    begin, end : float, optional
+        Start and end in s of the part to read.
+
+    Returns
+    -------
+    Record
+        Times `t` (n,) in s, samples `x` (n,) in `unit`, which is an SI unit, and `notes` on what was assumed and left
+        out.
+
+    Raises
+    ------
+    SceneError
+        If the file holds no record.
+
+    Examples
+    --------
+    >>> record = read_record("swing.csv", column="laser [mm]")  # doctest: +SKIP
+    >>> record.x.max(), record.unit, record.notes  # doctest: +SKIP
+    """
+    from ..records import columns
+
+    check_time_range(time, rate, begin, end)
+    options = columns.ColumnOptions(time, column, quantity, unit, time_unit, per_count, headings, rate, begin, end)
+    return columns.read_record(str(source), options, Path(source).stem)
