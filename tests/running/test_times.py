@@ -1,19 +1,23 @@
 """Runs are recorded at given times, and at no others."""
 
-from dataclasses import replace
-
 import commands
 import numpy as np
 import pytest
 from external_fmus import build_external_fmus
 from fmi3_fixtures import build_fmi3_fmus
-from spec_runs import run_spec
 
 import harness
-from harness.running.session import find_step_ends
-from harness.scenes.run_spec import RunSpec
 
 UNEVEN = np.sort(np.random.default_rng(2).uniform(0.01, 7.99, 40))
+
+
+def write_scene(folder, fmu, **keys):
+    """Write a scene with an FMU, and return its path."""
+    keys = {"outputs": ["x"], **keys}
+    lines = [f"{name} = {str(value).lower() if value in (True, False) else value}" for name, value in keys.items()]
+    path = folder / "scene.toml"
+    path.write_text("\n".join(['title = "a title"', f'fmu = "{fmu}"', "plots = []", *lines]))
+    return path
 
 
 def test_times_keep_the_points_of_another_grid(backend_fmus):
@@ -29,13 +33,15 @@ def test_times_keep_the_points_of_another_grid(backend_fmus):
     assert np.array_equal(run.steps.t, full.steps.t)
 
 
-@pytest.mark.parametrize("follow", [True, False])
-def test_a_run_stops_at_the_last_time(fmus, follow):
-    run = run_spec(RunSpec(fmus / "smd.fmu", times=UNEVEN, follow=follow))
-    assert np.array_equal(run.time, UNEVEN)
-    assert run.statistics.steps > 0
+def test_a_run_stops_at_the_last_time(fmus, tmp_path):
+    """Whether communication steps end at the ends of internal steps or not."""
+    run = harness.simulate(fmus / "smd.fmu", times=UNEVEN)
+    plain = harness.simulate(write_scene(tmp_path, fmus / "smd.fmu", times=UNEVEN.tolist(), follow=False))
     later = harness.simulate(fmus / "smd.fmu", times=UNEVEN, stop=20.0)
-    assert np.array_equal(later["x"], run["x"])
+    assert run.statistics.steps > 0
+    for other in (run, plain, later):
+        assert np.array_equal(other.time, UNEVEN)
+        assert np.array_equal(other["x"], run["x"])
 
 
 @pytest.mark.parametrize(
@@ -51,54 +57,60 @@ def test_an_external_fmu_is_recorded_at_times(name, interface):
     assert np.abs(position - np.cos(np.sqrt(50.0) * times)).max() < 2e-3
 
 
-def test_equal_steps_divide_the_time_from_start_to_stop(fmus):
-    spec = RunSpec(fmus / "smd.fmu", ("x",), start=2.0, stop=4.0, equal_steps=4, follow=False)
-    assert run_spec(spec).time.tolist() == [2.0, 2.5, 3.0, 3.5, 4.0]
-
-
-@pytest.mark.parametrize(("next_step", "ends"), [(2.0, [0, 1, 2]), (2.0 + 1e-12, [0, 1, 2]), (2.5, [0, 1])])
-def test_the_last_internal_step_may_end_a_rounding_after_the_stop(next_step, ends):
-    rows = find_step_ends(np.array([0.0, 1.0, 2.0]), np.array([1.0, next_step, 3.0]), 1e-9)
-    assert rows.tolist() == ends
+@pytest.mark.parametrize("stop", [0.3, 0.1 + 0.2, 1 / 3, 7.3])
+def test_the_internal_steps_cover_the_run(fmus, stop):
+    """The last one may end a rounding after the stop."""
+    run = harness.simulate(fmus / "smd.fmu", stop=stop, method="ode45")
+    assert run.steps.t[0] == 0.0
+    assert run.steps.t[-1] == pytest.approx(stop, rel=1e-9)
+    assert np.diff(run.steps.t) == pytest.approx(run.steps.h)
 
 
 def test_model_exchange_is_recorded_at_times(fmus):
     """At times of events as well, where the solver has two points."""
-    sled = RunSpec(build_fmi3_fmus() / "stickslip.fmu", ("x", "mode"), exchange=True, tolerance=1e-8, stop=8.0)
+    sled = build_fmi3_fmus() / "stickslip.fmu"
     reference = harness.simulate(fmus / "stickslip.fmu", stop=8.0)
     times = np.sort(np.append(UNEVEN, reference.events.t[1:]))
-    run = run_spec(replace(sled, times=times))
+    run = harness.simulate(sled, times=times, interface="ModelExchange", rtol=1e-8)
     expected = harness.simulate(fmus / "stickslip.fmu", times=times, stop=8.0)
     assert len(run.time) == len(times)
     assert np.abs(run["x"] - expected["x"]).max() < 1e-6
 
 
-def test_steps_without_refinement_end_at_the_times_and_at_rows_of_inputs():
-    spec = RunSpec(build_external_fmus() / "Midpoint.fmu", times=UNEVEN / 8.0, follow=False)
-    run = run_spec(spec)
+def test_steps_without_refinement_end_at_the_times(tmp_path):
+    midpoint = build_external_fmus() / "Midpoint.fmu"
+    run = harness.simulate(write_scene(tmp_path, midpoint, times=(UNEVEN / 8.0).tolist(), follow=False))
     assert np.array_equal(run.time, UNEVEN / 8.0)
     assert run.note == "requested communication times, error unknown"
 
 
-def test_a_ramp_of_an_input_follows_its_rows(fmus):
+def test_a_ramp_of_an_input_follows_its_rows(fmus, tmp_path):
     """Without a grid, steps end at the times and at the rows of the table: an input is the mean of a step."""
-    rows = np.linspace(0.0, 2.0, 2001)
-    spec = RunSpec(fmus / "smd.fmu", ("x",), stop=2.0, follow=False, times=(0.5, 2.0))
-    driven = run_spec(replace(spec, inputs={"time": rows, "F_ext": np.sin(rows)}))
-    grid = run_spec(replace(spec, grid=0.001, inputs={"time": rows[::200], "F_ext": np.sin(rows[::200])}))
+    rows, options = np.linspace(0.0, 2.0, 2001), {"stop": 2.0, "follow": False}
+    inputs = {"time": rows, "F_ext": np.sin(rows)}
+    smd, times = fmus / "smd.fmu", [0.5, 2.0]
+    driven = harness.simulate(write_scene(tmp_path, smd, **options, times=times), inputs=inputs)
+    scene = write_scene(tmp_path, smd, **options, times=times, grid=0.001)
+    grid = harness.simulate(scene, inputs={"time": rows[::200], "F_ext": np.sin(rows[::200])})
     assert len(driven.time) == len(grid.time) == 2
     assert np.abs(driven["x"] - grid["x"]).max() < 2e-3 * np.abs(driven["x"]).max()
-    full = run_spec(replace(spec, times=(), grid=0.001, inputs={"time": rows, "F_ext": np.sin(rows)}))
+    full = harness.simulate(write_scene(tmp_path, smd, **options, grid=0.001), inputs=inputs)
     assert np.abs(driven["x"] - full["x"][[500, -1]]).max() < 1e-12
 
 
-def test_an_aborted_run_keeps_the_times_that_it_reached():
-    crashing = RunSpec(build_external_fmus() / "Faulty.fmu", values={"kind": 2}, stop=1.0)  # after half of the run
-    run = run_spec(replace(crashing, times=(0.1, 0.2, 0.9)))
-    assert run.time.tolist() == [0.1, 0.2]
-    assert "crashed" in run.failure
-    late = run_spec(replace(crashing, times=(0.8, 0.9)))
-    assert 0.4 < late.time.item() < 0.8
+def test_an_aborted_run_keeps_the_times_that_it_reached(tmp_path):
+    """The FMU crashes after half of the run."""
+    for times in ([0.1, 0.2, 0.9], [0.8, 0.9]):
+        faulty = build_external_fmus() / "Faulty.fmu"
+        write_scene(tmp_path, faulty, times=times, stop=1.0, values="{kind = 2}")
+        done = commands.harness(tmp_path, "run", "scene.toml", "--quiet")
+        assert done.returncode == 1
+        assert "crashed" in done.stderr
+        reached = harness.load_result(tmp_path / "results/scene").time
+        if times[0] == 0.1:
+            assert reached.tolist() == [0.1, 0.2]
+        else:
+            assert 0.4 < reached.item() < 0.8
 
 
 def test_a_scene_is_recorded_at_times(workspace):

@@ -1,16 +1,15 @@
 """Scene files: valid contents, and errors of invalid ones."""
 
 import json
-from pathlib import Path
+import tomllib
 
+import commands
 import pytest
+from build_cache import ROOT
 
-from harness import SceneError
-from harness.results.files import to_json
-from harness.scenes.coupled.scene import CoupledKeys
-from harness.scenes.run_spec import RunSpec
-from harness.scenes.scene import load_scene, scene_from_provenance, shipped_scenes
-from harness.scenes.schema import parse_table
+import harness
+
+pytestmark = pytest.mark.usefixtures("in_workspace")
 
 GOOD = {"title": '"a title"', "model": '"stickslip"', "outputs": '["x", "v", "a"]'}
 
@@ -23,42 +22,58 @@ def write(folder, extra="", **keys):
     return path
 
 
+def run(scene):
+    """Run a scene without drawing, and return the folder of its result and its provenance."""
+    done = commands.harness(scene.parent, "run", scene, blank=True)
+    assert (done.returncode, done.stderr) == (0, "")
+    folder = scene.parent / "results" / scene.stem
+    return folder, json.loads((folder / "provenance.json").read_text())
+
+
 CITATION = "[citation]\nauthor = 'me'\ntitle = 'mine'\nyear = 2020\nlocation = 'table 1'"
 
 
-@pytest.mark.parametrize("path", shipped_scenes(), ids=lambda path: path.stem)
-def test_every_shipped_scene_loads_and_names_its_source(path):
-    scene = load_scene(path.stem)
-    assert scene == load_scene(path)
-    assert scene.known.values
-    assert bool(scene.known.citation) == (scene.known.kind == "published")
+@pytest.mark.parametrize("path", sorted((ROOT / "harness/scenes").glob("*.toml")), ids=lambda path: path.stem)
+def test_every_shipped_scene_has_known_values_of_one_kind(path):
+    """A publication is cited. The scenes run in other tests, by name."""
+    scene = tomllib.loads(path.read_text())
+    (kind,) = {"published", "reference", "parameter"} & {*scene}
+    assert ("citation" in scene) == (kind == "published")
 
 
-def test_omitted_keys_are_left_to_the_fmu(tmp_path):
-    scene = load_scene(write(tmp_path))
-    assert {scene.run.start, scene.run.stop, scene.run.grid} == {None}
-    assert (scene.analyses, scene.run.values, scene.run.follow) == ((), {}, True)
+def test_omitted_keys_are_left_to_the_fmu(workspace):
+    model = harness.simulate("stickslip")
+    scene = harness.simulate(write(workspace))
+    assert scene.time.tolist() == model.time.tolist()
+    assert scene["x"].tolist() == model["x"].tolist()
 
 
-def test_a_grid_follows_the_solver_only_on_request(tmp_path):
-    assert not load_scene(write(tmp_path, grid="0.1")).run.follow
-    assert load_scene(write(tmp_path, grid="0.1", follow="true")).run.follow
-    assert not load_scene(write(tmp_path, times="[0.0, 1.0]", follow="false")).run.follow
+def test_a_grid_follows_the_solver_only_on_request(workspace):
+    oscillator = {"model": '"smd"', "outputs": '["x"]', "method": '"ode23"', "stop": "2.0", "grid": "0.5"}
+    assert len(harness.simulate(write(workspace, **oscillator)).time) == 5
+    assert len(harness.simulate(write(workspace, **oscillator, follow="true")).time) > 5
+    assert harness.simulate(write(workspace, times="[0.0, 1.0]", follow="false")).time.tolist() == [0.0, 1.0]
 
 
 @pytest.mark.parametrize(
     ("outputs", "plots"),
     [
-        ('["x", "v", "a"]', ("position", "velocity", "acceleration", "phase")),
-        ('["x", "v", "mode"]', ("position", "velocity", "mode", "phase")),
-        ('["mode"]', ("mode",)),
-        ('["x", "v", "a", "mode", "energy", "F_spring", "F_friction"]', 6),
+        ('["x", "v", "a"]', ["position", "velocity", "acceleration", "phase"]),
+        ('["x", "v", "mode"]', ["position", "velocity", "mode", "phase"]),
+        ('["mode"]', ["mode"]),
+        ('["x", "v", "a", "mode", "energy", "F_spring", "F_friction"]', 7),
     ],
 )
-def test_a_scene_without_plots_shows_its_outputs(tmp_path, outputs, plots):
-    result = load_scene(write(tmp_path, outputs=outputs)).plots
-    assert result == plots if isinstance(plots, tuple) else len(result) == plots + 1
-    assert load_scene(write(tmp_path, outputs=outputs, plots="[]")).plots == ()
+def test_a_scene_without_plots_shows_its_outputs(workspace, outputs, plots):
+    _, provenance = run(write(workspace, outputs=outputs, stop="0.1", grid="0.05"))
+    shown = provenance["scene"]["plots"]
+    assert shown == plots if isinstance(plots, list) else len(shown) == plots
+
+
+def test_a_scene_may_show_nothing(workspace):
+    folder, provenance = run(write(workspace, plots="[]", stop="0.1", grid="0.05"))
+    assert provenance["scene"]["plots"] == []
+    assert not (folder / "figure.svg").exists()
 
 
 @pytest.mark.parametrize(
@@ -106,30 +121,47 @@ def test_a_scene_without_plots_shows_its_outputs(tmp_path, outputs, plots):
     ],
     ids=lambda value: value if isinstance(value, str) else "",
 )
-def test_an_invalid_scene_is_reported_in_one_sentence(tmp_path, keys, sentence):
-    with pytest.raises(SceneError) as caught:
-        load_scene(write(tmp_path, **keys))
+def test_an_invalid_scene_is_reported_in_one_sentence(workspace, keys, sentence):
+    with pytest.raises(harness.SceneError) as caught:
+        harness.simulate(write(workspace, **keys))
     assert str(caught.value).startswith("scene mine: ")
     assert sentence in str(caught.value)
     assert "\n" not in str(caught.value)
 
 
-def test_a_value_is_published_only_with_a_citation(tmp_path):
+def test_a_value_is_published_only_with_a_citation(workspace):
     """A table [published] without one, as in earlier versions, holds references. A stored scene keeps its table."""
     for citation, kind in ((CITATION, "published"), ("", "reference")):
-        scene = load_scene(write(tmp_path, extra=f"[published]\nsource = 'a method'\nperiod = 3\n{citation}"))
-        assert (scene.known.kind, scene.known.label) == (kind, f"{kind} (a method)")
-        stored = json.loads(to_json({"scene": scene.presentation, "run": scene.run}))
-        assert scene_from_provenance(stored).known == scene.known
+        extra = f"[published]\nsource = 'a method'\nslips = 3\n{citation}"
+        folder, _ = run(write(workspace, extra=extra, analyses='["slip"]'))
+        heads = (folder / "quantities.csv").read_text().splitlines()[0]
+        assert f"{kind} (a method)" in heads
+        assert "the same, bit for bit" in commands.harness(workspace, "run", folder, blank=True, COLUMNS="120").stdout
+        assert (folder / "quantities.csv").read_text().splitlines()[0] == heads
 
 
-def test_a_scene_of_an_earlier_version_holds_the_keys_of_its_run():
+def test_a_scene_of_an_earlier_version_holds_the_keys_of_its_run(workspace):
+    folder, provenance = run(write(workspace, model='"smd"', outputs='["x"]'))
     keys = {"name": "mine", "source": "mine.toml", "title": "a title", "decay": {"gives": None}, "stop": 2.0}
     keys |= {"file": "fmus/smd.fmu", "outputs": ["x"], "values": {"c": 3.0}, "grid": 0.01, "patience": 7.0}
-    expected = RunSpec(
-        Path("fmus/smd.fmu"), ("x",), {"c": 3.0}, stop=2.0, grid=0.01, follow=False, timeout=7.0, equal_steps=4096
+    del provenance["run"]
+    (folder / "provenance.json").write_text(json.dumps(provenance | {"scene": keys}))
+    repeated = harness.simulate(folder)
+    expected = harness.simulate(
+        write(workspace, "[values]\nc = 3.0", model='"smd"', outputs='["x"]', grid="0.01", stop="2")
     )
-    assert scene_from_provenance({"scene": keys}).run == expected
+    assert repeated.time.tolist() == expected.time.tolist()
+    assert repeated["x"].tolist() == expected["x"].tolist()
+    assert len(repeated.time) == 201
+
+
+def to_toml(value):
+    """Return a value as TOML, tables on one line."""
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{name} = {to_toml(part)}" for name, part in value.items()) + "}"
+    if isinstance(value, list):
+        return "[" + ", ".join(map(to_toml, value)) + "]"
+    return json.dumps(value)
 
 
 PAIR = {
@@ -162,18 +194,20 @@ PAIR = {
     ],
     ids=lambda value: value if isinstance(value, str) else "",
 )
-def test_an_error_names_its_location_at_any_depth(wrong, sentence):
-    parse_table(PAIR, CoupledKeys)
-    with pytest.raises(SceneError) as caught:
-        parse_table(PAIR | wrong, CoupledKeys)
-    assert str(caught.value).startswith(sentence)
+def test_an_error_names_its_location_at_any_depth(workspace, wrong, sentence):
+    scene = "".join(f"{name} = {to_toml(value)}\n" for name, value in (PAIR | wrong).items())
+    (workspace / "pair.toml").write_text(scene)
+    done = commands.harness(workspace, "couple", "pair.toml")
+    assert done.returncode == 2
+    assert sentence in done.stderr
 
 
-def test_an_unknown_scene_error_lists_the_shipped_names():
-    with pytest.raises(SceneError, match=r"unknown scene 'pendulm' \(nearest: 'pendulum'\); allowed: coulomb, "):
-        load_scene("pendulm")
+def test_an_unknown_scene_error_lists_the_shipped_names(workspace):
+    done = commands.harness(workspace, "run", "pendulm")
+    assert done.returncode == 2
+    assert "unknown scene 'pendulm' (nearest: 'pendulum'); allowed: coulomb, " in done.stderr
 
 
 def test_a_missing_file_is_reported():
-    with pytest.raises(SceneError, match=r"cannot read the scene nowhere\.toml: No such file"):
-        load_scene("nowhere.toml")
+    with pytest.raises(harness.SceneError, match=r"cannot read the scene nowhere\.toml: No such file"):
+        harness.simulate("nowhere.toml")
