@@ -23,7 +23,20 @@ SCENE = {"title": '"a title"', "model": '"smd"', "outputs": '["x", "v"]', "stop"
 TIMES = ("start", "stop", "follow", "h_max")
 PLOTS = '["position", "phase", "steps"]'
 KEYS = (
-    *("about", "analyses", "atol", "citation", "decay", "fmu", "h_max", "law", "method", "model", "outputs", "parameter"),
+    *(
+        "about",
+        "analyses",
+        "atol",
+        "citation",
+        "decay",
+        "fmu",
+        "h_max",
+        "law",
+        "method",
+        "model",
+        "outputs",
+        "parameter",
+    ),
     *("plots", "published", "reference", "remark", "rtol", "title"),
 )
 HUGE = "9" * 400

@@ -22,10 +22,10 @@ references: certification certified_reference models peer_solvers reference_traj
 references.models: pacejka
 report: page sections typeset verdicts
 results: files folder provenance quantity registry result style summary
-running: embedded_model event_mode fmu_archive fmu_instance native_equivalent recorder resolve runner session signals
-    solution ssp step_sequence stepping trajectory variable_values whole_run
-running.external: simulation step_refinement
-scenes: assignments run_spec scene schema
+running: embedded_model fmu_archive fmu_instance native_equivalent resolve runner signals
+    solution ssp step_sequence trajectory variable_values whole_run
+running.external: step_refinement
+scenes: run_spec scene
 scenes.coupled: scene
 studies.compare: difference trajectory_files
 studies.coupled: engine result study

@@ -1,70 +1,75 @@
 """Impossible results of an FMU are refused in one sentence, and never used."""
 
-import re
-from ctypes import byref, c_bool, c_double
 from pathlib import Path
 from types import SimpleNamespace
 
+import commands
 import numpy as np
 import pytest
-from fmpy.model_description import ModelVariable
-from spec_runs import ignore_progress
+from external_fmus import build_external_fmus, edited_copy
 
-from harness import HarnessError
-from harness.running.event_mode import update_discrete_states
+import harness
 from harness.running.external.step_refinement import RefinementRun, refine
-from harness.running.fmu_instance import FmuInstance, TerminatedError
-from harness.running.recorder import Recorder, StringTable, read_rows
-from harness.running.stepping import CoSimulation, TimeGrid, step_to_stop
 from harness.scenes.run_spec import RunSpec
 
-NAN, HUGE = float("nan"), 1e300
+EARLY, ENDS, NO_TEXT, BAD_TEXT = 1, 2, 3, 4  # faults of Ticking
+TERMINATES, UNSETTLED, NEXT_EVENT, IMMEDIATE = 1, 2, 3, 4  # faults of Bouncing
 
 
-def run_with_step(answer):
-    """Return the sample times of an FMU whose fmi3DoStep returns `answer`, and the exception."""
-
-    def do_step(instance, t, h, is_final, *results):
-        for result, value in zip(results, answer(t, h), strict=True):
-            result._obj.value = value
-        return 0
-
-    instance = FmuInstance.__new__(FmuInstance)  # without a library
-    instance.component, instance.do_step, instance.uses_event_mode = None, do_step, False
-    instance.step_results = (c_bool(), c_bool(), c_bool(), c_double())
-    instance.step_arguments = tuple(map(byref, instance.step_results))
-    times, grid = [], TimeGrid(0.0, 1.0, 0.25)
-    with pytest.raises((TerminatedError, HarnessError)) as caught:
-        step_to_stop(CoSimulation(instance, grid, only_grid=True), grid, times.append, ignore_progress)
-    return times, str(caught.value)
+def run_faulty(folder, name, fault, value=0.0, *options, fmu=None):
+    """Run an FMU with a fault; return the error message and what was recorded until then."""
+    fmu = fmu or build_external_fmus() / f"{name}.fmu"
+    settings = "--set", f"fault={fault}", "--set", f"value={value!r}"
+    done = commands.harness(folder, "run", "--fmu", fmu, *settings, *options, "--overwrite", blank=True)
+    assert (done.returncode, done.stderr.count("\n")) == (1, 1)
+    return done.stderr, harness.load_result(folder / "results" / name)
 
 
-def test_an_unauthorised_early_return_is_refused():
-    times, output = run_with_step(lambda t, h: (False, False, t > 0.3, t + h / 2))
-    assert times == [0.0, 0.25, 0.5]
-    assert output == "fmi3DoStep returned early without permission"
+def test_an_unauthorised_early_return_is_refused(tmp_path):
+    """Early returns are permitted in event mode."""
+    changes = {"modelDescription.xml": lambda text: text.replace(' hasEventMode="true"', "")}
+    fmu = edited_copy(build_external_fmus() / "Ticking.fmu", tmp_path / "Ticking.fmu", changes)
+    message, run = run_faulty(tmp_path, "Ticking", EARLY, 0.0, "--lenient", fmu=fmu)
+    assert "fmi3DoStep returned early without permission" in message
+    assert 0.3 < run.time[-1] < 0.32
 
 
-@pytest.mark.parametrize(
-    ("last_time", "last"), [(0.6, 0.6), (0.75, 0.75), (0.5, 0.5), (0.1, 0.5), (-1.0, 0.5), (NAN, 0.5), (HUGE, 0.5)]
-)
-def test_a_termination_time_lies_within_the_step(last_time, last):
-    times, output = run_with_step(lambda t, h: (False, t == 0.5, t == 0.5, last_time))
-    assert (times[-1], times) == (last, sorted(times))
-    assert output == "it terminated the simulation: fmi3DoStep returned terminateSimulation"
+@pytest.mark.parametrize(("last_time", "last"), [(0.5 + 1e-6, 0.5 + 1e-6), (-1.0, 0.5), (1e300, 0.5)])
+def test_a_termination_time_lies_within_the_step(tmp_path, last_time, last):
+    message, run = run_faulty(tmp_path, "Ticking", ENDS, last_time)
+    assert "it terminated the simulation: fmi3DoStep returned terminateSimulation" in message
+    assert run.time[-1] == pytest.approx(last, abs=1e-9)
+    assert (np.diff(run.time) >= 0.0).all()
 
 
-@pytest.mark.parametrize("next_time", [NAN, 1.9, -HUGE])
-def test_an_event_in_the_past_or_at_infinity_is_refused(next_time):
-    with pytest.raises(HarnessError, match=re.escape(f"sets its next event to {next_time:.9g} s, at t = 2 s")):
-        update_discrete_states(lambda: (False, False, False, False, True, next_time), 2.0)
+@pytest.mark.parametrize(("fault", "text"), [(0, "good"), (NO_TEXT, ""), (BAD_TEXT, "\ufffd bad")])
+def test_a_null_or_malformed_string_is_recorded(fault, text):
+    fmu = build_external_fmus() / "Ticking.fmu"
+    run = harness.simulate(fmu, {"fault": fault}, outputs=["said"], stop=0.04, rtol=1e-3)
+    assert {*run["said"]} == {text}
 
 
-def test_an_immediate_event_is_handled_at_once_and_not_forever():
-    answers = iter([(False, False, False, False, True, 2.0), (False, False, False, False, True, 3.0)])
-    assert update_discrete_states(lambda: next(answers), 2.0) == 3.0
-    with pytest.raises(HarnessError, match="do not settle at t = 2 s"):
-        update_discrete_states(lambda: (False, False, False, False, True, 2.0), 2.0)
+@pytest.mark.parametrize("next_time", [0.1, -1e300])
+def test_an_event_in_the_past_is_refused(tmp_path, next_time):
+    message, run = run_faulty(tmp_path, "Bouncing", NEXT_EVENT, next_time)
+    assert f"it sets its next event to {next_time:.9g} s, at t = 0.4515" in message
+    assert run.time[-1] == pytest.approx(np.sqrt(2 / 9.81), abs=1e-6)
+
+
+def test_an_immediate_event_is_handled_at_once_and_not_forever(tmp_path):
+    fmu = build_external_fmus() / "Bouncing.fmu"
+    plain, immediate = (harness.simulate(fmu, {"fault": fault}) for fault in (0, IMMEDIATE))
+    assert plain["h"].tolist() == immediate["h"].tolist()
+    message, _ = run_faulty(tmp_path, "Bouncing", UNSETTLED)
+    assert "its discrete states do not settle at t = 0.4515" in message
+
+
+def test_the_event_that_terminates_a_run_is_recorded(tmp_path):
+    message, run = run_faulty(tmp_path, "Bouncing", TERMINATES, 2.0)
+    assert "it returned terminateSimulation from an event" in message
+    assert run["bounces"].tolist() == sorted(run["bounces"])
+    assert run["bounces"][-1] == 2
+    assert run.time[-1] == run.time[-2]
 
 
 @pytest.mark.parametrize("declared", ["0", "-1", "inf", "a tenth"])
@@ -78,24 +83,3 @@ def test_an_impossible_step_size_is_treated_as_undeclared(declared):
     description = SimpleNamespace(coSimulation=SimpleNamespace(fixedInternalStepSize=declared), defaultExperiment=None)
     refine(RunSpec(Path("any.fmu"), start=0.0, stop=1.0), description, run)
     assert min(steps) > 0.0
-
-
-@pytest.mark.parametrize(("bytes_", "text"), [(None, '""'), (b"\xff bad", '"\\ufffd bad"'), (b"good", '"good"')])
-def test_a_null_or_malformed_string_is_recorded(tmp_path, bytes_, text):
-    def answer(component, references, count, values, size):
-        values[0] = bytes_
-        return 0
-
-    variable = ModelVariable("said", valueReference=7, type="String")
-    instance = SimpleNamespace(
-        ticks_clocks=False,
-        is_fmi2=False,
-        type_name=lambda variable: "String",
-        prepare_call=lambda name, *arguments: (name, answer, (None, *arguments)),
-    )
-    texts, rows = StringTable(tmp_path / "texts"), bytearray()
-    Recorder(instance, [(variable, ())], rows.extend, texts).record(0.0)
-    texts.file.close()
-    _, columns = read_rows(rows, [(variable, ())], is_fmi2=False)
-    assert columns["said"].tolist() == [0]
-    assert (tmp_path / "texts").read_text() == text + "\n"

@@ -1,19 +1,22 @@
-/* FMI 2.0, model exchange alone: a ball that bounces, h' = v, v' = -g; at h = 0 its speed is turned, e times as large. */
+/* FMI 2.0, model exchange alone: a ball that bounces, h' = v, v' = -g; at h = 0 its speed is turned, e times as large.
+   After a bounce it has a `fault`: TERMINATES at the bounce number `value`, is UNSETTLED, or has its NEXT_EVENT at the
+   time `value`; IMMEDIATE, an event at once, is none. */
 
 #include <stdlib.h>
 
 #include "fmi2Functions.h"
 
-enum { H, V, DER_H, DER_V, E, REALS };
+enum { H, V, DER_H, DER_V, E, FAULT, VALUE, REALS };
+enum { TERMINATES = 1, UNSETTLED, NEXT_EVENT, IMMEDIATE };
 
 typedef struct {
-    fmi2Real real[REALS];
+    fmi2Real real[REALS], time;
     fmi2Integer bounces;
 } Ball;
 
 fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, fmi2String resources,
                               const fmi2CallbackFunctions *functions, fmi2Boolean visible, fmi2Boolean logging) {
-    static const Ball start = {{1.0, 0.0, 0.0, 0.0, 0.7}, 0};
+    static const Ball start = {{1.0, 0.0, 0.0, 0.0, 0.7, 0.0, 0.0}, 0.0, 0};
     Ball *ball = type == fmi2ModelExchange ? malloc(sizeof *ball) : NULL;
     if (ball) *ball = start;
     return ball;
@@ -27,7 +30,10 @@ fmi2Status fmi2EnterInitializationMode(fmi2Component c) { return fmi2OK; }
 fmi2Status fmi2ExitInitializationMode(fmi2Component c) { return fmi2OK; }
 fmi2Status fmi2EnterEventMode(fmi2Component c) { return fmi2OK; }
 fmi2Status fmi2EnterContinuousTimeMode(fmi2Component c) { return fmi2OK; }
-fmi2Status fmi2SetTime(fmi2Component c, fmi2Real t) { return fmi2OK; }
+fmi2Status fmi2SetTime(fmi2Component c, fmi2Real t) {
+    ((Ball *)c)->time = t;
+    return fmi2OK;
+}
 fmi2Status fmi2Terminate(fmi2Component c) { return fmi2OK; }
 
 fmi2Status fmi2CompletedIntegratorStep(fmi2Component c, fmi2Boolean final, fmi2Boolean *event, fmi2Boolean *terminate) {
@@ -38,12 +44,18 @@ fmi2Status fmi2CompletedIntegratorStep(fmi2Component c, fmi2Boolean final, fmi2B
 fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo *info) {
     static const fmi2EventInfo settled;
     Ball *ball = c;
+    const int fault = (int)ball->real[FAULT], falls = ball->real[H] <= 0.0 && ball->real[V] < 0.0;
     *info = settled;
-    if (ball->real[H] <= 0.0 && ball->real[V] < 0.0) {
+    if (falls) {
         ball->real[V] *= -ball->real[E];
         ball->bounces += 1;
         info->valuesOfContinuousStatesChanged = fmi2True;
     }
+    if (!ball->bounces) return fmi2OK;
+    info->terminateSimulation = fault == TERMINATES && ball->bounces == ball->real[VALUE];
+    info->newDiscreteStatesNeeded = fault == UNSETTLED;
+    info->nextEventTimeDefined = fault == NEXT_EVENT || (fault == IMMEDIATE && falls);
+    info->nextEventTime = fault == NEXT_EVENT ? ball->real[VALUE] : ball->time;
     return fmi2OK;
 }
 

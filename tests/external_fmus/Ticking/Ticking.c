@@ -1,6 +1,8 @@
 /* FMI 3.0, model exchange and co-simulation in event mode: x' = -k x, and clocks: a periodic one, one that changes its
    interval, a countdown, and one that the FMU itself ticks. It returns Error if a clock ticks at another time than it
-   must, if a step passes a tick, or if a variable of a clock is read while the clock is not active. */
+   must, if a step passes a tick, or if a variable of a clock is read while the clock is not active. It has a `fault`:
+   after t = 0.3 it returns EARLY in the middle of a step, it ENDS at t = 0.5 and states `value` as the last time, or its
+   text `said` is NULL or not UTF-8. */
 
 #include <math.h>
 #include <stdlib.h>
@@ -9,12 +11,13 @@
 
 #define TOLERANCE 1e-9
 
-enum { TIME, X, DER_X, K, HELD, TIMED_OUT, FIFTH_X, SAMPLES, GROWTHS, SAMPLE, TIMEOUT, GROWING, FIFTH, VARIABLES };
+enum { TIME, X, DER_X, K, HELD, TIMED_OUT, FIFTH_X, SAMPLES, GROWTHS, SAMPLE, TIMEOUT, GROWING, FIFTH, FAULT, VALUE, SAID, VARIABLES };
+enum { EARLY = 1, ENDS, NO_TEXT, BAD_TEXT };
 enum mode { INITIALIZATION, FIRST_EVENT, EVENT, STEP };
 
 typedef struct {
     enum mode mode;
-    double real[SAMPLES], due[VARIABLES], growth;
+    double real[VARIABLES], due[VARIABLES], growth;
     int count[VARIABLES], active[VARIABLES], is_new[VARIABLES];
 } Instance;
 
@@ -42,7 +45,7 @@ fmi3Instance fmi3InstantiateCoSimulation(fmi3String name, fmi3String token, fmi3
                                          const fmi3ValueReference required[], size_t n,
                                          fmi3InstanceEnvironment environment, fmi3LogMessageCallback log,
                                          fmi3IntermediateUpdateCallback update) {
-    return event_mode ? instantiate() : NULL;
+    return instantiate();
 }
 
 void fmi3FreeInstance(fmi3Instance i) { free(i); }
@@ -139,6 +142,12 @@ fmi3Status fmi3GetInt32(fmi3Instance c, const fmi3ValueReference vr[], size_t n,
     return fmi3OK;
 }
 
+fmi3Status fmi3GetString(fmi3Instance c, const fmi3ValueReference vr[], size_t n, fmi3String values[], size_t m) {
+    const int fault = (int)((Instance *)c)->real[FAULT];
+    values[0] = fault == NO_TEXT ? NULL : fault == BAD_TEXT ? "\xff bad" : "good";
+    return fmi3OK;
+}
+
 fmi3Status fmi3SetFloat64(fmi3Instance i, const fmi3ValueReference vr[], size_t n, const fmi3Float64 values[],
                           size_t m) {
     for (size_t k = 0; k < n; k++) ((Instance *)i)->real[vr[k]] = values[k];
@@ -157,6 +166,15 @@ fmi3Status fmi3DoStep(fmi3Instance c, fmi3Float64 t, fmi3Float64 h, fmi3Boolean 
     Instance *i = c;
     *event = *terminate = *early = fmi3False;
     *last = t + h;
+    if (i->real[FAULT] == EARLY) { /* also without event mode, in which no step would succeed */
+        *early = t > 0.3;
+        *last = t + (*early ? h / 2.0 : h);
+        return fmi3OK;
+    }
+    if (i->real[FAULT] == ENDS && t >= 0.5 - TOLERANCE) {
+        *terminate = *early = fmi3True;
+        *last = i->real[VALUE];
+    }
     i->real[X] *= exp(-i->real[K] * h);
     return move_to(i, t + h);
 }
@@ -204,7 +222,7 @@ UNUSED(EvaluateDiscreteStates) UNUSED(ExitConfigurationMode) UNUSED(FreeFMUState
 UNUSED(GetBinary) UNUSED(GetBoolean) UNUSED(GetDirectionalDerivative) UNUSED(GetFMUState) UNUSED(GetFloat32)
 UNUSED(GetInt16) UNUSED(GetInt64) UNUSED(GetInt8) UNUSED(GetIntervalFraction) UNUSED(GetNumberOfContinuousStates)
 UNUSED(GetNumberOfEventIndicators) UNUSED(GetNumberOfVariableDependencies) UNUSED(GetOutputDerivatives)
-UNUSED(GetShiftDecimal) UNUSED(GetShiftFraction) UNUSED(GetString) UNUSED(GetUInt16) UNUSED(GetUInt32)
+UNUSED(GetShiftDecimal) UNUSED(GetShiftFraction) UNUSED(GetUInt16) UNUSED(GetUInt32)
 UNUSED(GetUInt64) UNUSED(GetUInt8) UNUSED(GetVariableDependencies) UNUSED(GetVersion)
 UNUSED(InstantiateScheduledExecution) UNUSED(Reset) UNUSED(SerializeFMUState) UNUSED(SerializedFMUStateSize)
 UNUSED(SetBinary) UNUSED(SetBoolean) UNUSED(SetDebugLogging) UNUSED(SetFMUState) UNUSED(SetFloat32) UNUSED(SetInt16)
