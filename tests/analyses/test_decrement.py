@@ -5,10 +5,9 @@ from math import cos, exp, pi, sin, sqrt
 import numpy as np
 import pytest
 
-from harness import HarnessError
+from harness import HarnessError, Signals
 from harness.analyses.decay.decrement import find_extrema_from_velocity, select_cycles
 from harness.analyses.decay.law import damping_ratio, friction_from_envelope
-from harness.running.signals import Signals
 
 
 def damped(zeta, n=4001):

@@ -1,29 +1,31 @@
-"""The analyses of step sizes and of slips, on arrays with known results."""
+"""The analyses of step sizes and of slips."""
 
+import json
+
+import commands
 import numpy as np
 import pytest
 
+import harness
 from harness.analyses.slip import peak_value, slips_from_modes, upward_crossings
-from harness.analyses.steps import step_collapse
-from harness.results.quantity import published_mean_step
 
 
-def test_the_published_mean_counts_the_last_step_twice():
-    assert published_mean_step(np.array([1.0, 2.0, 6.0])) == (1 + 2 + 6 + 6) / 4
-
-
-def test_step_collapse_compares_the_median_step_with_the_smallest_at_reversals():
-    h = np.full(60, 0.1)
-    h[[20, 40]] = 0.001
-    h[30] = 1e-6  # far from any reversal
-    ends = np.concatenate([[0.0], np.cumsum(h)])
-    v = np.cos(np.pi * np.arange(61) / 20 - np.pi / 2 + np.pi / 40)  # changes sign within steps 0, 20, 40
-    assert step_collapse(ends, h, ends, v) == pytest.approx(100.0)
-
-
-def test_a_motion_without_reversal_has_no_step_collapse():
-    ends = np.arange(5.0)
-    assert step_collapse(ends, np.diff(ends), ends, np.array([0.0, 1.0, 0.0, 0.0, 1.0])) is None
+@pytest.mark.parametrize("speed", [0.1, 0.0])
+def test_step_collapse_compares_the_median_step_with_the_smallest_at_reversals(workspace, speed):
+    """A body at rest has no reversal."""
+    scene = "title = 'a title'\nmodel = 'smd'\nmethod = 'ode23'\nstop = 4.0\noutputs = ['x', 'v']\nplots = []\n"
+    values = f"analyses = ['steps']\n[values]\nx0 = 0.0\nv0 = {speed}\n"
+    (workspace / "scene.toml").write_text(scene + values)
+    done = commands.harness(workspace, "run", "scene.toml", "--json")
+    quantities = {item["name"]: item["value"] for item in json.loads(done.stdout)["quantities"]}
+    run = harness.load_result(workspace / "results/scene")
+    turns = [t for t, before, after in zip(run.time[1:], run["v"], run["v"][1:], strict=False) if before * after < 0]
+    assert bool(turns) == ("collapse" in quantities) == bool(speed)
+    if turns:
+        steps = [np.searchsorted(run.steps.t, t) - 1 for t in turns]
+        smallest = [min(run.steps.h[max(i - 5, 0) : i + 6]) for i in steps]
+        expected = np.median(run.steps.h) / np.median(smallest)
+        assert quantities["collapse"] == pytest.approx(expected)
 
 
 @pytest.mark.parametrize(

@@ -5,13 +5,11 @@ import signal
 import subprocess
 import sys
 import time
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from functools import partial
 
 import pytest
 from build_cache import ROOT
-
-from harness.process.subprocess_runner import kill_process_group
 
 pytestmark = pytest.mark.slow
 
@@ -39,10 +37,16 @@ def start_build(environment):
                 command, env=environment, start_new_session=True, preexec_fn=reset_sigint, **streams
             )
             stack.enter_context(process)
-            stack.callback(kill_process_group, process)
+            stack.callback(kill_group, process)
             return process
 
         yield start
+
+
+def kill_group(process):
+    """Kill a process with its children, unless all have ended."""
+    with suppress(ProcessLookupError):
+        os.killpg(process.pid, signal.SIGKILL)
 
 
 def wait_for_directory(process, tmp_path):

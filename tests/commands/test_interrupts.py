@@ -14,11 +14,11 @@ from functools import partial
 from itertools import product
 from pathlib import Path
 
+import commands
 import pytest
 from build_cache import ROOT
 
 from benchmarks.__main__ import main as BENCHMARKS
-from harness.commands.terminal import progress
 from harness.process import interrupt, interruptible_wait
 from harness.process.interrupt import CommandInterruptedError, check_interrupt, defer_signals, interruptible
 from harness.process.interruptible_wait import wait_for_any
@@ -273,14 +273,12 @@ def test_the_interrupt_message_survives_cleanup(monkeypatch):
     assert ended.value.status == 143
 
 
-@pytest.mark.parametrize("quiet", [True, False])
-def test_progress_reporting_raises_a_swallowed_interrupt(monkeypatch, quiet):
-    monkeypatch.setattr(interrupt, "RECEIVED_SIGNALS", [])
-    with progress(quiet, 2) as report:
-        report("one", 0.5)
-        interrupt.RECEIVED_SIGNALS.append(signal.SIGINT)
-        with pytest.raises(KeyboardInterrupt):
-            report("one", 1.0)
+@pytest.mark.parametrize("options", [[], ["--quiet"]])
+def test_a_swallowed_interrupt_is_raised_at_the_next_report_of_progress(workspace, monkeypatch, options):
+    monkeypatch.setattr(interrupt, "RECEIVED_SIGNALS", [signal.SIGINT])
+    with pytest.raises(KeyboardInterrupt):
+        commands.harness(workspace, "run", "smd", *options)
+    assert not (workspace / "results").exists() or not list((workspace / "results").iterdir())
 
 
 @pytest.mark.parametrize("library", ["click", "numpy"])

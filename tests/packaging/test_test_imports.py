@@ -14,15 +14,14 @@ analyses.decay: decrement estimates extrema fit_problem identification intervals
 analyses.estimation: estimate figure
 analyses.fit: feasible_region fit_problem fit_procedure law_comparison measured_record noise parameter_fit
     profile_likelihood uncertainty unknowns validation
-analyses: slip steps
-commands: terminal
-process: interrupt interruptible_wait progress_bar subprocess_runner temporary_directory worker worker_process
+analyses: slip
+process: interrupt interruptible_wait progress_bar subprocess_runner temporary_directory worker
 records: headings record samples signal_table size_limits text_table
-references: certification certified_reference models peer_solvers reference_trajectory single_model_reference
+references: certified_reference models peer_solvers reference_trajectory single_model_reference
 references.models: pacejka
 report: page sections typeset verdicts
 results: files folder provenance quantity registry result style summary
-running: embedded_model fmu_archive fmu_instance native_equivalent resolve runner signals
+running: embedded_model fmu_archive native_equivalent resolve runner signals
     solution ssp step_sequence trajectory variable_values whole_run
 running.external: step_refinement
 scenes: run_spec scene

@@ -23,7 +23,8 @@ from harness.process.worker import (
     WorkerTimeoutError,
     call_once,
 )
-from harness.process.worker_process import MAX_OUTPUT_BYTES
+
+MAX_OUTPUT_BYTES = 1_000_000  # that are kept of what a process prints
 
 FUNCTIONS = """
 import atexit, os, signal, sys, time

@@ -5,7 +5,7 @@ from math import inf, nan
 import numpy as np
 import pytest
 
-from harness.results.quantity import Quantity, format_interval, step_size_quantities
+from harness.results.quantity import Quantity, format_interval, published_mean_step, step_size_quantities
 
 
 def test_quantities_change_their_unit_but_not_their_dimension():
@@ -38,3 +38,7 @@ def test_the_digits_of_a_value_follow_from_its_interval(value, low, high, text):
 def test_the_share_of_refused_steps_counts_all_attempts():
     quantities = {quantity.name: quantity.value for quantity in step_size_quantities(np.array([1.0, 2.0, 6.0]), 1)}
     assert quantities["refused"] == 0.25
+
+
+def test_the_published_mean_counts_the_last_step_twice():
+    assert published_mean_step(np.array([1.0, 2.0, 6.0])) == (1 + 2 + 6 + 6) / 4

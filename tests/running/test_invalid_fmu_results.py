@@ -13,7 +13,7 @@ from harness.running.external.step_refinement import RefinementRun, refine
 from harness.scenes.run_spec import RunSpec
 
 EARLY, ENDS, NO_TEXT, BAD_TEXT = 1, 2, 3, 4  # faults of Ticking
-TERMINATES, UNSETTLED, NEXT_EVENT, IMMEDIATE = 1, 2, 3, 4  # faults of Bouncing
+TERMINATES, UNSETTLED, NEXT_EVENT, IMMEDIATE, LOGS = 1, 2, 3, 4, 5  # faults of Bouncing
 
 
 def run_faulty(folder, name, fault, value=0.0, *options, fmu=None):
@@ -70,6 +70,11 @@ def test_the_event_that_terminates_a_run_is_recorded(tmp_path):
     assert run["bounces"].tolist() == sorted(run["bounces"])
     assert run["bounces"][-1] == 2
     assert run.time[-1] == run.time[-2]
+
+
+def test_a_later_warning_does_not_hide_an_error(tmp_path):
+    message, _ = run_faulty(tmp_path, "Bouncing", LOGS)
+    assert "its rubber is torn" in message
 
 
 @pytest.mark.parametrize("declared", ["0", "-1", "inf", "a tenth"])

@@ -8,10 +8,10 @@ from zipfile import ZipFile
 import pytest
 from build_cache import ROOT
 from commands import harness, run_process
+from external_fmus import build_external_fmus
 
-from harness import HarnessError
-from harness.process.temporary_directory import has_plain_uri, remove_abandoned_directories, temporary_directory
-from harness.running import fmu_archive
+from harness import HarnessError, simulate
+from harness.process import temporary_directory
 
 ODD = "a#b'+(,&@[{;=!$^%20 é\u3042`~)"
 
@@ -46,15 +46,12 @@ def test_paths_of_temporary_files_fmus_and_results_may_contain_any_character(odd
 
 
 def test_without_a_plain_folder_a_python_fmu_is_refused_and_others_run(odd_folder, fmus, monkeypatch):
-    monkeypatch.setattr("harness.process.temporary_directory.FALLBACK_DIRECTORIES", ())
+    monkeypatch.setattr(temporary_directory, "FALLBACK_DIRECTORIES", ())
     monkeypatch.setattr(tempfile, "tempdir", str(odd_folder))
-    refused = pytest.raises(HarnessError, match=r"smd\.fmu is a Python FMU, which cannot be run from .*TMPDIR")
-    with refused, fmu_archive.unpack(fmus / "smd.fmu"):
-        pass
-    compiled = copy_without(fmus / "smd.fmu", odd_folder / "c.fmu", lambda name: name.startswith("binaries/"))
-    with fmu_archive.unpack(compiled) as folder:
-        assert folder.parent == odd_folder
-    assert sorted(file.name for file in odd_folder.iterdir()) == ["c.fmu", "fmus"]
+    with pytest.raises(HarnessError, match=r"smd\.fmu is a Python FMU, which cannot be run from .*TMPDIR"):
+        simulate(fmus / "smd.fmu")
+    assert simulate(build_external_fmus() / "Bouncing.fmu", stop=0.1, rtol=1e-3).time[-1] == 0.1
+    assert [file.name for file in odd_folder.iterdir()] == ["fmus"]
 
 
 @pytest.mark.parametrize("part", ["resources/", "resources/slavemodule.txt", "_fmu.py"])
@@ -67,25 +64,17 @@ def test_a_python_fmu_without_the_files_of_its_library_is_refused(fmus, tmp_path
     assert "broken.fmu lacks resources/" in done.stderr
 
 
-def test_a_directory_in_use_is_not_taken_for_an_abandoned_one(tmp_path, monkeypatch):
-    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
-    with temporary_directory() as used:
-        (tmp_path / "friction-fmus-abandoned").mkdir()
-        remove_abandoned_directories.__wrapped__(tmp_path)  # without its cache, as in another process
-        assert list(tmp_path.iterdir()) == [used]
-
-
-def test_an_unwritable_temporary_folder_is_reported(tmp_path, monkeypatch):
+def test_an_unwritable_temporary_folder_is_reported(fmus, tmp_path, monkeypatch):
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "gone"))
-    with pytest.raises(HarnessError, match="cannot write to the temporary directory"), temporary_directory():
-        pass
+    with pytest.raises(HarnessError, match="cannot write to the temporary directory"):
+        simulate(fmus / "smd.fmu")
 
 
 @pytest.mark.parametrize(
     ("path", "expected"), [("/a b/c-d.e_~", True), ("/a/%20", False), ("/é", False), ("/+", False)]
 )
 def test_a_plain_path_is_one_whose_uri_escapes_only_blanks(path, expected):
-    assert has_plain_uri(Path(path)) is expected
+    assert temporary_directory.has_plain_uri(Path(path)) is expected
 
 
 def copy_without(fmu, copy, left_out):

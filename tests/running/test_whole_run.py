@@ -7,11 +7,11 @@ import commands
 import numpy as np
 import pytest
 from external_fmus import build_external_fmus
+from fmpy import read_model_description
 from native_fmus import build_native_fmus, require_compiler
 from scipy.integrate import solve_ivp
 from spec_runs import run_spec
 
-from harness.running.fmu_archive import read_description
 from harness.running.native_equivalent import native_equivalent
 from harness.running.whole_run import open_simulator
 from harness.scenes.run_spec import RunSpec
@@ -84,7 +84,7 @@ def test_a_whole_run_is_that_of_simulate(sled, fmus, described):
 
 
 def interpolates_inputs(fmu):
-    return read_description(fmu).coSimulation.canInterpolateInputs
+    return read_model_description(fmu).coSimulation.canInterpolateInputs
 
 
 def test_an_input_is_linear_in_a_step_if_the_fmu_interpolates_inputs():

@@ -1,24 +1,27 @@
 /* FMI 2.0, model exchange alone: a ball that bounces, h' = v, v' = -g; at h = 0 its speed is turned, e times as large.
    After a bounce it has a `fault`: TERMINATES at the bounce number `value`, is UNSETTLED, or has its NEXT_EVENT at the
-   time `value`; IMMEDIATE, an event at once, is none. */
+   time `value`, or LOGS an error and then a warning; IMMEDIATE, an event at once, is no fault. */
 
 #include <stdlib.h>
 
 #include "fmi2Functions.h"
 
 enum { H, V, DER_H, DER_V, E, FAULT, VALUE, REALS };
-enum { TERMINATES = 1, UNSETTLED, NEXT_EVENT, IMMEDIATE };
+enum { TERMINATES = 1, UNSETTLED, NEXT_EVENT, IMMEDIATE, LOGS };
 
 typedef struct {
     fmi2Real real[REALS], time;
     fmi2Integer bounces;
+    fmi2CallbackLogger log;
 } Ball;
 
 fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, fmi2String resources,
                               const fmi2CallbackFunctions *functions, fmi2Boolean visible, fmi2Boolean logging) {
-    static const Ball start = {{1.0, 0.0, 0.0, 0.0, 0.7, 0.0, 0.0}, 0.0, 0};
+    static const Ball start = {{1.0, 0.0, 0.0, 0.0, 0.7, 0.0, 0.0}, 0.0, 0, NULL};
     Ball *ball = type == fmi2ModelExchange ? malloc(sizeof *ball) : NULL;
-    if (ball) *ball = start;
+    if (!ball) return NULL;
+    *ball = start;
+    ball->log = functions->logger;
     return ball;
 }
 
@@ -52,6 +55,11 @@ fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo *info) {
         info->valuesOfContinuousStatesChanged = fmi2True;
     }
     if (!ball->bounces) return fmi2OK;
+    if (fault == LOGS) {
+        ball->log(NULL, "ball", fmi2Error, "", "its rubber is torn");
+        ball->log(NULL, "ball", fmi2Warning, "", "the step is long");
+        return fmi2Error;
+    }
     info->terminateSimulation = fault == TERMINATES && ball->bounces == ball->real[VALUE];
     info->newDiscreteStatesNeeded = fault == UNSETTLED;
     info->nextEventTimeDefined = fault == NEXT_EVENT || (fault == IMMEDIATE && falls);
