@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from itertools import product
 from zipfile import ZipFile
 
 import commands
@@ -41,8 +42,14 @@ def built(path, kind):
     return build_user_model(path, *KINDS[kind], *method_option) / kind / f"{path.stem}.fmu"
 
 
-@EVERY_FILE
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize(
+    ("path", "kind"),
+    [  # one FMU of FMI 3.0: its numerics are those of the native one
+        pytest.param(path, kind, id=f"{kind}-{path.stem}")
+        for path, kind in product(EXAMPLE_MODELS, KINDS)
+        if kind != "native/fmi3" or path.stem == "rotor_brake"
+    ],
+)
 def test_it_is_built_beside_its_file_for_every_backend_and_is_valid(path, kind):
     fmu = built(path, kind)
     assert validate_fmu(str(fmu)) == []
@@ -313,7 +320,7 @@ def puck(tmp_path):
     return tmp_path / "puck.py"
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", ["", "native"])
 def test_a_model_may_have_one_state(puck, kind):
     """It slows by f / m, and comes to rest after m / f."""
     run = simulate_fmu(

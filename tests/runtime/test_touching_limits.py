@@ -60,7 +60,7 @@ TOUCHES = [  # the force is constant, or zero where the limit is zero, or touche
     {"p": 0.01, "push": -0.01, "q": -4.99, "angle0": 1.0},
 ]
 OUTPUTS = ["x", "v", "mode", "events.count"]
-POINTS = [STOP * i / 400 for i in range(401)]
+POINTS = [STOP * i / 100 for i in range(101)]
 
 
 @pytest.fixture
@@ -103,13 +103,13 @@ def test_a_contact_at_rest_stays_stuck_where_its_limit_touches_the_load(worker, 
     fmu.free()
 
 
-@pytest.mark.parametrize("solver", ["CVode", "Euler"])
+@pytest.mark.parametrize(("solver", "tolerances"), [("CVode", (1e-3, 1e-9)), ("Euler", (1e-3,))])
 @pytest.mark.parametrize("name", ["touching_block", "touching_stack"])
-def test_it_stays_stuck_in_model_exchange(worker, built, name, solver):
+def test_it_stays_stuck_in_model_exchange(worker, built, name, solver, tolerances):
     path = built(name, "native")
     for values in TOUCHES:
-        for rtol in TOLERANCES:
-            options = {"solver": solver, "step_size": 1e-3, "output_interval": 5e-3, "relative_tolerance": rtol}
+        for rtol in tolerances:
+            options = {"solver": solver, "step_size": 1e-3, "output_interval": 2e-2, "relative_tolerance": rtol}
             columns = worker.simulate(
                 path, "ModelExchange", stop_time=STOP, start_values=values, output=OUTPUTS, **options
             )
@@ -142,7 +142,7 @@ def test_a_limit_that_falls_below_the_load_releases_the_contact(worker, built, d
     assert len(expected) >= 10
     fmu = worker.instantiate(built("touching_block", kind))
     for method in METHODS:
-        for rtol in TOLERANCES:
+        for rtol in TOLERANCES if kind == "native" else (1e-3, 1e-6):  # the bits are the same
             events = changes(fmu, values, method, rtol)
             assert [mode for _, mode in events] == [mode for _, mode in expected]
             times = np.array([t for t, _ in events]) - [t for t, _ in expected]
