@@ -23,9 +23,8 @@ KINDS = {
     "native": ("--native", "--platform", "linux64"),
     "native/fmi3": ("--fmi", "3", "--platform", "linux64"),
 }
-EVERY_KIND = pytest.mark.parametrize(
-    "kind",
-    ["", pytest.param("native", marks=pytest.mark.slow), pytest.param("native/fmi3", marks=pytest.mark.campaign)],
+EVERY_KIND = pytest.mark.parametrize(  # in CI, model exchange shows the messages of native FMUs
+    "kind", ["", *(pytest.param(kind, marks=pytest.mark.campaign) for kind in ("native", "native/fmi3"))]
 )
 STOP, K, F, GAP, T_ON, MU = 2.0, 100.0, 5.0, 0.1, 0.3, 0.5  # SI, as in the models
 MODEL = '''from fmus import (
@@ -193,7 +192,7 @@ def test_the_error_is_proportional_to_the_tolerance(launch, name):
     (x, _), changes = piecewise_solution(name)
     assert changes
     for method in METHODS:
-        for rtol in (1e-6, 1e-11):
+        for rtol in (1e-5, 1e-9):
             fmu = launch(name, method=method, rtol=rtol)
             fmu.step(0.0, STOP)
             assert abs(fmu.get("x") - x) < 30.0 * rtol
@@ -289,9 +288,9 @@ def test_conditions_on_inputs_with_derivatives_change_within_steps(launch):
 def test_results_do_not_depend_on_backend_and_communication_steps(launch, name):
     """Bit for bit, with a parameter changed within a step, and a state restored in mid-step and at an event."""
     names = ["x", "v", "F", "a", "solver.steps", "solver.evaluations"]
-    for method in METHODS:
+    for method in METHODS if name == "nested" else (ODE45, RODAS):
         rows = []
-        for kind, refinement in ("", 1), ("native", 1), ("native", 50):
+        for kind, refinement in ("", 1), ("native", 1), ("native", 20):
             fine = [STOP * i / (20 * refinement) for i in range(20 * refinement + 1)]
             fmu = launch(name, kind, method=method, rtol=1e-4)
             rows.append(fmu.run_with_changes(fine, names, {1.0: {"k": 80.0}})[::refinement])
