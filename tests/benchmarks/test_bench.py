@@ -236,7 +236,14 @@ LATE = [scene for scene in model_exchange.LATE_SCENARIOS if scene.has_ramps and 
 
 
 @pytest.mark.skipif(c_host.COMPILER is None, reason="there is no C compiler on this machine: install gcc")
-@pytest.mark.parametrize("scene", [*model_exchange.DEFAULT_SCENARIOS, *EXPLICIT_EVENTS, *LATE], ids=str)
+@pytest.mark.parametrize(
+    "scene",
+    [
+        *model_exchange.DEFAULT_SCENARIOS,
+        *(pytest.param(scene, marks=pytest.mark.campaign) for scene in (*EXPLICIT_EVENTS, *LATE)),
+    ],
+    ids=str,
+)
 def test_model_exchange_errors_match_cvode_with_explicit_events(scene, both_backends):
     """At most three times as large, also with jumps and ramps of the input and a late start: the error is that of
     the solver."""

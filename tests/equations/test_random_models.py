@@ -108,11 +108,12 @@ def test_slips_and_rests_of_the_sled_have_their_closed_form(ratio):
     assert 0.01 < depth / (w * lead / v) ** 2 * 4.0 < 20.0 or ratio == 1.5
 
 
-STRUCTURES, VALUES = (6, 22), range(2, 4)
+VALUES = (2,)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("number", STRUCTURES)
+@pytest.mark.parametrize(
+    "number", [pytest.param(6, marks=pytest.mark.slow), pytest.param(22, marks=pytest.mark.campaign)]
+)
 def test_random_models_agree_with_an_independent_solver(worker, number):
     """Modes, events and states by every method at two tolerances, and all backends bit for bit."""
     require_compiler()
