@@ -10,10 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from harness.analyses.decay.estimates import KnownParameters
-from harness.analyses.decay.identification import fit_decay
-from harness.errors import HarnessError
-from harness.records.columns import ColumnOptions, read_record
+from harness import HarnessError, identify_decay
 from harness.results.quantity import format_interval
 
 NAMES = ("omega", "zeta", "r", "b")
@@ -23,8 +20,7 @@ LOSSES = NAMES[1:]
 def table_row(path: Path) -> list[str]:
     """Return the row of a record: values, or the sentence that refuses it, and windows that disagree."""
     try:
-        record = read_record(str(path), ColumnOptions(), path.stem)
-        whole = fit_decay(record, KnownParameters())
+        whole = identify_decay(path)
     except HarnessError as refusal:
         return [path.stem, str(refusal)]
     disagreements: set[str] = set()
@@ -33,7 +29,7 @@ def table_row(path: Path) -> list[str]:
         fits = []
         for begin, end in pairwise(edges):
             try:
-                fits.append(fit_decay(record.select(begin, end), KnownParameters()))
+                fits.append(identify_decay(path, begin=begin, end=end))
             except HarnessError:
                 disagreements.add(f"refused from {begin:.3g} to {end:.3g} s")
         for one, other in combinations(fits, 2):

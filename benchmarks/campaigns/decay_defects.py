@@ -10,14 +10,11 @@ without a remark.  Ctrl-C prints the results so far.
 import sys
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import suppress
-from dataclasses import replace
 
 import numpy as np
-from decays import random_record
+from decays import identify, random_record
 
-from harness.analyses.decay.estimates import KnownParameters
-from harness.analyses.decay.identification import fit_decay
-from harness.errors import HarnessError
+from harness import HarnessError
 
 NAMES = ("omega", "zeta", "r", "b")
 DEFECTS = ("none", "quantised", "uneven", "drift", "clock", "rest", "outliers", "hum", "loss")
@@ -58,7 +55,7 @@ def add_defect(record, true_values, defect, rng):
         knots = np.linspace(t[0], t[-1], 7)
         wander = np.interp(t, knots, 0.02 * np.cumsum(rng.standard_normal(7)) / np.sqrt(7))
         x = true_values["rest"] + (x - true_values["rest"]) * (1 + wander)
-    return replace(record, t=t, x=x)
+    return record._replace(t=t, x=x)
 
 
 def check_record(task):
@@ -69,7 +66,7 @@ def check_record(task):
     record, true_values, _ = random_record((seed, number), None, sine, defect == "quantised", SAMPLES, 0)
     record = add_defect(record, true_values, defect, np.random.default_rng((seed, number, 5)))
     try:
-        fit = fit_decay(record, KnownParameters(pendulum=sine))
+        fit = identify(record, pendulum=sine)
     except HarnessError as refusal:
         return number, defect, None, 0.0, str(refusal)
     by_name = {one.name: one for one in fit.estimates}

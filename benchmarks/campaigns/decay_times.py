@@ -10,12 +10,9 @@ from time import process_time
 from unittest.mock import patch
 
 import numpy as np
-from decays import decay_record
+from decays import decay_record, identify
 
 from harness.analyses.decay import thresholds
-from harness.analyses.decay.estimates import KnownParameters
-from harness.analyses.decay.identification import fit_decay
-from harness.records.record import Record
 
 PERIODS, REST = 100.0, 6.0  # of 1 s; the rests are as long as some of them
 MOST_UNTHINNED = 100_000
@@ -25,14 +22,14 @@ def experiment(samples):
     """Return the record of a rest, a release, a decay and a rest."""
     t = np.linspace(0.0, PERIODS + 2 * REST, samples)
     record = decay_record(0.002, 0.0003, omega=2 * np.pi, turn=REST, t=t, noise=1e-5)
-    return Record("experiment", t, np.where(t > PERIODS + REST, 0.02, record.x))
+    return record._replace(x=np.where(t > PERIODS + REST, 0.02, record.x))
 
 
 def processor_time(record, densest):
     """Return the processor time in s of a fit that averages records of more than `densest` samples."""
     with patch.object(thresholds, "MAX_DENSE_SAMPLES", densest):
         start = process_time()
-        fit_decay(record, KnownParameters())
+        identify(record)
         return process_time() - start
 
 

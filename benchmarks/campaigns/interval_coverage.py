@@ -11,14 +11,11 @@ from contextlib import suppress
 from itertools import product
 
 import numpy as np
-from decays import random_record
+from decays import LAWS, identify, random_record
 
-from harness.analyses.decay.estimates import KnownParameters
-from harness.analyses.decay.identification import fit_decay
-from harness.analyses.decay.law import LAWS
-from harness.errors import HarnessError
-from harness.records.record import QUANTITIES
+from harness import HarnessError
 
+QUANTITIES = ("position", "velocity", "acceleration")
 NAMES = ("omega", "zeta", "r", "b", "rest")
 SAMPLES = 600
 FAR = 5.0  # standard errors
@@ -32,7 +29,7 @@ def check_record(number):
     law, sine, quantised, order = CASES[number % len(CASES)]
     record, truth, _ = random_record(number, law, sine, quantised, SAMPLES, order)
     try:
-        fit = fit_decay(record, KnownParameters(pendulum=sine))
+        fit = identify(record, pendulum=sine)
     except HarnessError as refusal:
         return [], str(refusal)
     by_name = {one.name: one for one in fit.estimates}

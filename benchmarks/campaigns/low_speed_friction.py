@@ -14,10 +14,7 @@ from itertools import product
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from harness.analyses.decay.estimates import KnownParameters
-from harness.analyses.decay.identification import fit_decay
-from harness.errors import HarnessError
-from harness.records.record import Record
+from harness import HarnessError, identify_decay
 
 AMPLITUDE = 0.05  # m
 DURATION, SAMPLES = 40.0, 1500  # periods
@@ -68,7 +65,7 @@ def check_record(task):
     t, x = decay(zeta, r, rise, speed)
     x = AMPLITUDE * (x + noise * np.random.default_rng((number, int(1e6 * noise))).standard_normal(len(t)))
     try:
-        fit = fit_decay(Record("decay", t / (2 * np.pi), x), KnownParameters())
+        fit = identify_decay((t / (2 * np.pi), x), unit="m", progress=False)
     except HarnessError:
         return None
     contained = [fit[name].low <= value <= fit[name].high for name, value in (("zeta", zeta), ("r", AMPLITUDE * r))]

@@ -13,8 +13,9 @@ from harness.analyses.decay.intervals import (
     nonnegative_interval,
     quasirandom_normal,
 )
-from harness.analyses.decay.law import OMEGA, REST, UNKNOWNS, ZETA
 from harness.analyses.estimation.estimate import NORMAL_QUANTILE, Estimate
+
+REST, OMEGA, ZETA = 2, 4, 5  # in the order of the unknowns
 
 
 def test_nonnegative_intervals_cover_95_percent():
@@ -82,7 +83,7 @@ def test_the_draws_are_those_of_the_additive_recurrence_of_roberts():
 
 
 def test_unconstrained_values_are_those_of_least_squares_with_a_negative_loss():
-    t, unknowns, p = np.linspace(0.0, 10.0, 200), np.array([REST, ZETA]), np.zeros(len(UNKNOWNS))
+    t, unknowns, p = np.linspace(0.0, 10.0, 200), np.array([REST, ZETA]), np.zeros(8)
     columns, p[OMEGA] = np.stack([np.ones_like(t), t], axis=1), 2.0
     y = 1.0 - 0.3 * t + np.random.default_rng(1).normal(size=len(t))
     problem = SimpleNamespace(

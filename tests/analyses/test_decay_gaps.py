@@ -7,13 +7,9 @@ from math import pi, sqrt
 import numpy as np
 import pytest
 from commands import harness
+from decays import Signal, identify
 
 from harness import HarnessError
-from harness.analyses.decay.estimates import KnownParameters
-from harness.analyses.decay.extrema import find_extrema
-from harness.analyses.decay.fit_problem import prepare_problem
-from harness.analyses.decay.identification import fit_decay
-from harness.records.record import Record
 
 HALF, RATE = 0.25, 0.3  # s, a half cycle; 1/s, the decay rate
 OMEGA = sqrt((pi / HALF) ** 2 + RATE**2)
@@ -24,7 +20,7 @@ def paused(begin, share, noise=0.0):
     t = 0.004 * np.arange(1000)
     t = t[(t <= begin) | (t >= begin + share * HALF)]
     x = 0.1 * np.exp(-RATE * t) * np.cos(pi * t / HALF)
-    return Record("paused", t, x + noise * np.random.default_rng(1).standard_normal(len(t)))
+    return Signal(t, x + noise * np.random.default_rng(1).standard_normal(len(t)))
 
 
 SHARES, BEGINS = [0.45, 0.95, 1.3, 3.3], [0.1, 0.3, 1.2, 2.2]
@@ -37,9 +33,7 @@ SHARES, BEGINS = [0.45, 0.95, 1.3, 3.3], [0.1, 0.3, 1.2, 2.2]
 def test_a_pause_of_any_length_does_not_bias_the_fit(begin, share, noise):
     """Without the laws with drag, which take most of the time of a fit and follow the pause handling; some tests
     below include them."""
-    estimates = {
-        item.name: item for item in fit_decay(paused(begin, share, noise), KnownParameters(), drag=False).estimates
-    }
+    estimates = {item.name: item for item in identify(paused(begin, share, noise), drag=False).estimates}
     for name, truth in {"omega": OMEGA, "zeta": RATE / OMEGA}.items():
         assert abs(estimates[name].value - truth) < 1e-7 * truth + 5 * estimates[name].error
     assert estimates["omega"].error < 1e-3 * OMEGA
@@ -47,13 +41,13 @@ def test_a_pause_of_any_length_does_not_bias_the_fit(begin, share, noise):
 
 @pytest.mark.parametrize("share", [0.35, 0.55, 0.7])
 def test_a_pause_without_a_turning_point_costs_no_other_samples(share):
-    fit = fit_decay(paused(0.55, share), KnownParameters())
+    fit = identify(paused(0.55, share))
     assert fit.t[0] == 0.0
     assert fit.remarks == ()
 
 
 def test_half_cycles_before_a_pause_are_skipped_and_reported_if_too_few():
-    fit = fit_decay(paused(0.55, 1.3), KnownParameters())
+    fit = identify(paused(0.55, 1.3))
     assert fit.t[0] > 0.55
     assert "The record before the gap that ends at t = 0.8760 s has too few cycles" in " ".join(fit.remarks)
 
@@ -79,7 +73,6 @@ def test_the_command_line_uses_both_sides_of_a_pause(tmp_path):
 )
 def test_a_window_with_too_few_samples_is_reported(n_samples, sentence):
     """Whatever removed the other samples."""
-    record = paused(2.03, 0.95)
-    problem, _ = prepare_problem(record, find_extrema(record, False), False, False)
+    problem = identify(paused(2.03, 0.95), drag=False).problem
     with pytest.raises(HarnessError, match=sentence):
         problem.subset(slice(n_samples))

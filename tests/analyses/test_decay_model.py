@@ -2,11 +2,12 @@
 
 import numpy as np
 import pytest
+from decays import UNKNOWNS
 from scipy.integrate import solve_ivp
 
-from harness.analyses.decay.law import TERMS, unknown_indices
 from harness.analyses.decay.signal_model import SignalModel
-from harness.records.record import QUANTITIES
+
+QUANTITIES = ("position", "velocity", "acceleration")
 
 
 @pytest.mark.parametrize(
@@ -43,7 +44,7 @@ def test_the_model_agrees_with_an_integrator_restarted_at_every_turning_point(ze
             expected[:, times > begin] = [[position], [0], [0]]
     for order in range(3):
         model = SignalModel(1.0, order, sine, 0.0, 1e-9 * a)
-        samples, _ = model(np.array([0, a, 0, 0, 2.0, zeta, r, b]), unknown_indices(TERMS, False), times / 2)
+        samples, _ = model(np.array([0, a, 0, 0, 2.0, zeta, r, b]), UNKNOWNS, times / 2)
         assert samples == pytest.approx(expected[order] * 2.0**order, abs=3e-9 * 5**order * a)
 
 
@@ -52,7 +53,7 @@ def test_the_model_agrees_with_an_integrator_restarted_at_every_turning_point(ze
 def test_the_jacobian_agrees_with_finite_differences(order, sine):
     """Between samples in the same half swing; the acceleration jumps at a reversal."""
     model, p = SignalModel(1.0, order, sine, 1.0, 1e-9), np.array([0.05, 1.0, 0.01, 0.02, 5.0, 0.01, 0.02, 0.05])
-    unknowns, t = unknown_indices(TERMS, True), np.linspace(0.0, 4.0, 500)
+    unknowns, t = np.arange(8), np.linspace(0.0, 4.0, 500)
     _, jacobian = model(p, unknowns, t)
     for column, parameter in zip(jacobian.T, unknowns, strict=True):
         up, down = (p + sign * 1e-5 * (np.arange(8) == parameter) for sign in (1, -1))
@@ -64,7 +65,7 @@ def test_the_jacobian_agrees_with_finite_differences(order, sine):
 def test_a_body_held_by_friction_does_not_move(sine, r):
     """Nor does a pendulum from an angle below arcsin r, which is larger than r."""
     model, p = SignalModel(1.0, 0, sine, 0.0, 1e-9), np.array([0, 0.5, 0, 0, 1.0, 0.0, r, 0])
-    assert set(model(p, unknown_indices(TERMS, False), np.linspace(-1.0, 10.0, 20))[0]) == {0.5}
+    assert set(model(p, UNKNOWNS, np.linspace(-1.0, 10.0, 20))[0]) == {0.5}
 
 
 @pytest.mark.parametrize("sine", [False, True])
@@ -72,7 +73,5 @@ def test_a_body_held_by_friction_does_not_move(sine, r):
 def test_the_model_is_continuous_in_drag(b, sine):
     """A segment that begins just before a turning point once lost half a cycle."""
     t, model = np.linspace(0, 60, 3000), SignalModel(1.0, 0, sine, 0.0, 1e-9)
-    near = [
-        model(np.array([0, 1.0, 0, 0, 1.0, 0.01, 0.001, b + h]), unknown_indices(TERMS, False), t)[0] for h in (0, 1e-7)
-    ]
+    near = [model(np.array([0, 1.0, 0, 0, 1.0, 0.01, 0.001, b + h]), UNKNOWNS, t)[0] for h in (0, 1e-7)]
     assert np.abs(near[1] - near[0]).max() < 1e-5

@@ -6,8 +6,12 @@ import numpy as np
 import pytest
 
 from harness import HarnessError, Signals
-from harness.analyses.decay.decrement import find_extrema_from_velocity, select_cycles
-from harness.analyses.decay.law import damping_ratio, friction_from_envelope
+from harness.analyses.decay.decrement import (
+    damping_ratio,
+    find_extrema_from_velocity,
+    friction_from_envelope,
+    select_cycles,
+)
 
 
 def damped(zeta, n=4001):
@@ -86,6 +90,11 @@ def test_too_few_turning_points_are_refused(first, cycles, sentence):
     times, positions = find_extrema_from_velocity(*damped(0.05))
     with pytest.raises(HarnessError, match=sentence):
         select_cycles(times[:13], positions[:13], first, cycles)
+
+
+def test_the_published_peaks_give_the_published_values():
+    assert damping_ratio(0.06031, 0.01323, 3) == pytest.approx(0.0802, abs=5e-5)
+    assert friction_from_envelope(0.08703, 0.04837, 3, 157.9) == pytest.approx(0.509, abs=5e-4)
 
 
 @pytest.mark.parametrize(("x_0", "x_n"), [(1.0, 1.0), (1.0, 1.1), (1.0, 0.0), (0.0, 0.0)])

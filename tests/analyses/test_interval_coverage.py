@@ -2,10 +2,7 @@
 
 import numpy as np
 import pytest
-from decays import random_record
-
-from harness.analyses.decay.estimates import KnownParameters
-from harness.analyses.decay.identification import fit_decay
+from decays import identify, random_record
 
 pytestmark = pytest.mark.slow
 
@@ -17,7 +14,7 @@ def test_intervals_cover_95_percent_and_standard_errors_match_the_scatter():
     widths, misses = [], []
     for seed in range(RECORDS):
         record, truth, _ = random_record(seed, ("zeta", "r"), False, False, 600)
-        for item in fit_decay(record, KnownParameters(), drag=False).estimates:
+        for item in identify(record, drag=False).estimates:
             if item.name in ("omega", "zeta", "r") and item.low > 0.0:
                 widths.append((item.high - item.low) / (2.0 * item.error))
                 misses.append((truth[item.name] - (item.high + item.low) / 2) / item.error)

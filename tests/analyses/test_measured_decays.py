@@ -7,9 +7,7 @@ import numpy as np
 import pytest
 from measured_records import find_record, missing
 
-from harness import read_record
-from harness.analyses.decay.estimates import KnownParameters
-from harness.analyses.decay.identification import fit_decay
+from harness import identify_decay
 
 RECORDS = ("pendulum_multiarm.csv", "bicycle_wheel.csv")
 LOSSES = ("zeta", "r", "b")
@@ -21,13 +19,12 @@ def fits(name):
     path = find_record(name)
     if path is None:
         pytest.skip(missing(name))
-    record = read_record(path)
-    whole = fit_decay(record, KnownParameters())
+    whole = identify_decay(path)
     parts = []
     for count in (2, 3):
         edges = np.linspace(whole.t[0], whole.t[-1], count + 1)
         windows = pairwise(edges)
-        parts.append([fit_decay(record.select(begin, end), KnownParameters()) for begin, end in windows])
+        parts.append([identify_decay(path, begin=begin, end=end) for begin, end in windows])
     return whole, parts
 
 

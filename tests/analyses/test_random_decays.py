@@ -2,12 +2,9 @@
 
 import numpy as np
 import pytest
-from decays import random_record
+from decays import LAWS, identify, random_record
 
 from benchmarks.campaigns.interval_coverage import FAR
-from harness.analyses.decay.estimates import KnownParameters
-from harness.analyses.decay.identification import fit_decay
-from harness.analyses.decay.law import LAWS
 
 pytestmark = pytest.mark.slow
 
@@ -21,7 +18,7 @@ def of_each_law(request):
     """A record of at least 200 samples for each law, of random amplitude, rate and noise: true parameters and fit."""
     sine, quantised, order = request.param
     records = [random_record(100 + i, law, sine, quantised, 200, order) for i, law in enumerate(LAWS)]
-    return [(truth, fit_decay(record, KnownParameters(pendulum=sine))) for record, truth, _ in records]
+    return [(truth, identify(record, pendulum=sine)) for record, truth, _ in records]
 
 
 def test_no_estimate_is_far_off_without_a_remark(of_each_law):

@@ -2,11 +2,7 @@
 
 import numpy as np
 import pytest
-from decays import decay_record, values
-
-from harness.analyses.decay.estimates import KnownParameters
-from harness.analyses.decay.identification import fit_decay
-from harness.records.record import Record
+from decays import Signal, decay_record, identify, values
 
 T = np.linspace(0.0, 8.0, 1600)
 TRUTH = {"zeta": 0.004, "r": 4e-4, "b": 0.0}
@@ -15,7 +11,7 @@ TRUTH = {"zeta": 0.004, "r": 4e-4, "b": 0.0}
 def swung(change=lambda t: t, gain=lambda t: 1.0):
     """Return the fit of a decay of which the sensor changes times or gain."""
     record = decay_record(**TRUTH, turn=-0.1, t=change(T), noise=2e-5, rest=0.0)
-    return fit_decay(Record("swung", T, record.x * gain(T)), KnownParameters(k=100.0))
+    return identify(Signal(T, record.x * gain(T)), k=100.0)
 
 
 def test_the_swings_give_the_law_of_a_clean_record():
@@ -46,7 +42,7 @@ def test_forces_have_the_widened_intervals_of_their_losses():
     """The damping rises during the record, so that its halves disagree, and the swings with every law."""
     record = decay_record(0.004, 4e-4, turn=-0.1, t=T, noise=2e-5, rest=0.0)
     x = record.x * np.exp(-0.005 * np.maximum(T - 3.0, 0.0))
-    fit = fit_decay(Record("swung", T, x), KnownParameters(k=100.0), drag=False)
+    fit = identify(Signal(T, x), k=100.0, drag=False)
     remarks = " ".join(fit.remarks)
     assert "in the first half of the record" in remarks
     assert "departs from every law" in remarks
@@ -56,10 +52,10 @@ def test_forces_have_the_widened_intervals_of_their_losses():
 
 
 def test_few_swings_give_no_second_estimate():
-    assert fit_decay(decay_record(0.01, t=np.linspace(0, 2, 400), noise=1e-4), KnownParameters()).swing_estimates == ()
+    assert identify(decay_record(0.01, t=np.linspace(0, 2, 400), noise=1e-4)).swing_estimates == ()
 
 
 def test_swings_that_do_not_determine_the_losses_give_no_second_estimate():
     """Their equations were singular, and the search for the ends of the intervals failed."""
     record = decay_record(0.0, 1e-6, 0.0, turn=-0.1, t=T, noise=1e-9, rest=0.0)
-    assert fit_decay(record.select(0.0, 3.2), KnownParameters()).swing_estimates == ()
+    assert identify(record.select(0.0, 3.2)).swing_estimates == ()

@@ -2,19 +2,12 @@
 
 import numpy as np
 import pytest
-from decays import decay_record, remarks_text, values
-
-from harness.analyses.decay.estimates import KnownParameters
-from harness.analyses.decay.extrema import find_reversals
-from harness.analyses.decay.identification import fit_decay
-from harness.analyses.decay.law import TERMS, damping_ratio, friction_from_envelope
+from decays import TERMS, decay_record, identify, remarks_text, values
 
 
 @pytest.mark.parametrize(("sine", "a"), [(False, 0.1), (True, 0.1), (True, 2.0)])
 def test_turning_points_alone_give_the_same_estimates(sine, a):
-    fit = fit_decay(
-        decay_record(0.02, 0.003, 0.02, sine, a=a, t=np.linspace(0, 5, 2001)), KnownParameters(pendulum=sine)
-    )
+    fit = identify(decay_record(0.02, 0.003, 0.02, sine, a=a, t=np.linspace(0, 5, 2001)), pendulum=sine)
     expected = {"zeta": 0.02, "r": 0.003, "b": 0.02, "rest": 0.02}
     tolerance = {"rel": 0.02, "abs": 0.01 if a < 1 else 1e-3}
     assert values(fit.extrema_estimates) == pytest.approx(
@@ -27,20 +20,13 @@ def test_turning_points_alone_give_the_same_estimates(sine, a):
 @pytest.mark.parametrize("term", TERMS)
 def test_two_peaks_of_a_pendulum_identify_a_single_loss(term, a):
     truth = {term: {"zeta": 0.01, "r": 0.003, "b": 0.05}[term]}
-    fit = fit_decay(
-        decay_record(**truth, sine=True, a=a, t=np.linspace(0, 4, 401), noise=1e-5 * a), KnownParameters(pendulum=True)
-    )
+    fit = identify(decay_record(**truth, sine=True, a=a, t=np.linspace(0, 4, 401), noise=1e-5 * a), pendulum=True)
     assert values(fit.two_peak_estimates)[term] == pytest.approx(truth[term], rel=5e-3)
     assert set(fit.best.terms) == {term}
 
 
-def test_the_published_peaks_give_the_published_values():
-    assert damping_ratio(0.06031, 0.01323, 3) == pytest.approx(0.0802, abs=5e-5)
-    assert friction_from_envelope(0.08703, 0.04837, 3, 157.9) == pytest.approx(0.509, abs=5e-4)
-
-
 def test_an_inapplicable_column_states_the_reason():
-    fit = fit_decay(decay_record(0.02, 0.003, order=1), KnownParameters(), drag=False)
+    fit = identify(decay_record(0.02, 0.003, order=1), drag=False)
     assert fit.extrema_estimates == fit.two_peak_estimates == ()
     assert "No turning points: a record of velocity shows no turning points of the position." in remarks_text(fit)
 
@@ -48,19 +34,6 @@ def test_an_inapplicable_column_states_the_reason():
 def test_two_peaks_of_a_mixed_law_report_the_assumed_loss():
     assert (
         "The values from two peaks are rough checks: each attributes the whole loss to one mechanism"
-        in remarks_text(fit_decay(decay_record(0.02, 0.003, noise=1e-4), KnownParameters()))
+        in remarks_text(identify(decay_record(0.02, 0.003, noise=1e-4)))
     )
-    assert "two peaks" not in remarks_text(fit_decay(decay_record(0.02, noise=1e-4), KnownParameters()))
-
-
-def test_of_equal_extremes_the_first_is_the_reversal():
-    x = np.array([0.0, 2.0, 2.0, 1.0, -2.0, -2.0, -1.0, 0.5, 0.5, -1.0, -1.0])
-    for sign in (1.0, -1.0):
-        assert find_reversals(sign * x, 1.0).tolist() == [0, 1, 4, 7]
-
-
-def test_a_reversal_of_exactly_the_threshold_counts():
-    x = np.array([0.0, 1.0, 0.0, 1.0])
-    for sign in (1.0, -1.0):
-        assert find_reversals(sign * x, 1.0).tolist() == [0, 1, 2]
-        assert find_reversals(sign * x, 1.5).tolist() == []
+    assert "two peaks" not in remarks_text(identify(decay_record(0.02, noise=1e-4)))

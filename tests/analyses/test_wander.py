@@ -1,13 +1,8 @@
 """Slow departures from the law that no residual shows by itself are reported, and the intervals cover them."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
-from decays import decay_record
-
-from harness.analyses.decay.estimates import KnownParameters
-from harness.analyses.decay.identification import fit_decay
+from decays import decay_record, identify
 
 T = np.linspace(0.0, 30.0, 1800)
 TRUTH = {"omega": 12.566, "zeta": 0.001, "r": 1e-4, "b": 0.0}
@@ -20,8 +15,8 @@ def swung(seed, clock=0.0, gain=0.0):
     knots = np.linspace(T[0], T[-1], 9)
     walk = np.interp(T, knots, np.cumsum(np.random.default_rng(seed).standard_normal(9)))
     bridge = walk - np.polyval(np.polyfit(T, walk, 1), T)
-    record = replace(clean, t=T + clock / TRUTH["omega"] * bridge, x=clean.x * (1 + gain * walk))
-    return fit_decay(record, KnownParameters())
+    record = clean._replace(t=T + clock / TRUTH["omega"] * bridge, x=clean.x * (1 + gain * walk))
+    return identify(record)
 
 
 def errors(fit):

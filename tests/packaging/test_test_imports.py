@@ -9,14 +9,13 @@ from build_cache import ROOT
 # Remove a module when its last import goes; add none: test a new function through `harness` or a command.
 ALLOWED = """
 .: __main__ commands
-analyses.decay: decrement estimates extrema fit_problem identification intervals law return_map signal_model
-    thinning window
+analyses.decay: decrement fit_problem intervals signal_model
 analyses.estimation: estimate figure
 analyses.fit: feasible_region fit_problem fit_procedure law_comparison measured_record noise parameter_fit
     profile_likelihood uncertainty unknowns validation
 analyses: slip
 process: interrupt interruptible_wait progress_bar subprocess_runner temporary_directory worker
-records: headings record samples signal_table size_limits text_table
+records: headings samples signal_table size_limits text_table
 references: certified_reference models peer_solvers reference_trajectory single_model_reference
 references.models: pacejka
 report: page sections typeset verdicts
@@ -28,7 +27,6 @@ scenes: run_spec scene
 scenes.coupled: scene
 studies.compare: difference trajectory_files
 studies.coupled: engine result study
-studies.decay: table
 studies.fit: laws options request study
 studies.precision: advice figure law_deviations method_choice result study table
 studies.run: study table

@@ -6,12 +6,10 @@ from importlib.util import find_spec
 import numpy as np
 import pytest
 import record_formats
+from decays import Signal, identify
 from record_formats import FORMATS, LIBRARIES, OMEGA, ZETA, T
 
 from harness import SceneError, read_record
-from harness.analyses.decay.estimates import KnownParameters
-from harness.analyses.decay.identification import fit_decay
-from harness.records.record import Record
 
 X = record_formats.positions()
 FITS = {}
@@ -31,8 +29,7 @@ def fit(record):
     """Return the values of a fit by name; of records equal to eight digits only the first is fitted."""
     key = np.round(record.x, 8).tobytes(), record.base
     if key not in FITS:
-        plain = Record("record", T, record.x, record.unit, record.order, record.base)
-        estimates = fit_decay(plain, KnownParameters(), drag=False).estimates
+        estimates = identify(Signal(T, record.x, record.unit), drag=False).estimates
         FITS[key] = {estimate.name: estimate.value for estimate in estimates}
     return FITS[key]
 

@@ -1,15 +1,11 @@
 """Samples that are no measurements are named and left out: marks of missing samples, and a saturated sensor."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
-from decays import decay_record, random_record
+from decays import Signal, decay_record, identify, random_record
 
 from harness import SceneError, read_record
-from harness.analyses.decay.estimates import KnownParameters
-from harness.analyses.decay.identification import fit_decay
-from harness.records.samples import find_saturated, leave_out_saturated, mark_dropouts, mark_sentinels, sort_times
+from harness.records.samples import find_saturated, mark_dropouts, mark_sentinels, sort_times
 
 T = np.linspace(0.0, 12.0, 2401)
 ZETA = 0.0119
@@ -26,8 +22,8 @@ def read(folder, t, x):
     return read_record(path)
 
 
-def zeta(record):
-    return fit_decay(record, KnownParameters(), drag=False)["zeta"].value
+def fit(record):
+    return identify(Signal(record.t, record.x), drag=False)
 
 
 @pytest.mark.parametrize("mark", [-9999.0, 9999.0, -32768.0, 1e30])
@@ -38,9 +34,9 @@ def test_marks_of_missing_samples_are_named_and_left_out(tmp_path, mark):
     record = read(tmp_path, T, x)
     assert f"24 of 2401 values of x are {mark:.15g}, far from all others" in record.notes[0]
     assert len(record.t) == len(x) - len(missing)
-    fit = fit_decay(record, KnownParameters(), drag=False)
-    assert fit["zeta"].value == pytest.approx(ZETA, rel=0.02)
-    assert len(fit.t) > 0.98 * len(record.t)
+    result = fit(record)
+    assert result["zeta"].value == pytest.approx(ZETA, rel=0.02)
+    assert len(result.t) > 0.98 * len(record.t)
 
 
 @pytest.mark.parametrize("mark", [0.0, -30.0, 59.0])
@@ -53,7 +49,7 @@ def test_a_mark_within_the_range_of_the_signal_is_left_out(tmp_path, mark):
     count = len({*missing.tolist(), *range(500, 510)})
     assert f"{count} of 2401 values of x are {mark:.15g}, several times far from the samples" in record.notes[0]
     assert len(record.t) == len(x) - count
-    assert zeta(record) == pytest.approx(ZETA, rel=0.02)
+    assert fit(record)["zeta"].value == pytest.approx(ZETA, rel=0.02)
 
 
 def test_two_marks_and_a_mark_among_the_times_are_left_out(tmp_path):
@@ -133,7 +129,7 @@ def test_a_saturated_sensor_is_named_and_does_not_change_the_damping(tmp_path, l
     levels = f"{0.06 * level:g} or {-0.06 * level:g} m" if sides == 2 else f"{0.06 * level:g} m"
     assert f"are exactly {levels}. They are left out" in record.notes[-1]
     assert np.abs(record.x).max() < 0.06 * level or sides == 1
-    assert zeta(record) == pytest.approx(ZETA, rel=0.03)
+    assert fit(record)["zeta"].value == pytest.approx(ZETA, rel=0.03)
 
 
 @pytest.mark.parametrize("order", [0, 1, 2])
@@ -145,7 +141,7 @@ def test_a_rounded_or_held_motion_has_no_defects(order):
         damping, times = 10 ** rng.uniform(-4, -1.3), np.linspace(0, rng.uniform(2, 40), 1000)
         record = decay_record(damping, a=0.1, step=step, t=times, turn=turn, noise=noise, seed=seed, order=order)
         for motion in (record, random_record(seed, order=order)[0]):
-            assert leave_out_saturated(motion) is motion
+            assert find_saturated(motion.x)[1] == 0
             assert mark_sentinels(motion.x, "x") == mark_dropouts(motion.x, "x") == []
 
 
@@ -175,10 +171,8 @@ def test_saturation_is_long_stays_at_one_value_that_is_seldom_approached(stays, 
 
 def test_the_largest_value_of_one_peak_or_of_no_motion_is_not_saturation():
     record = swing()
-    held = replace(record, x=np.concatenate([np.full(400, record.x.max()), record.x[:-400]]))
-    assert leave_out_saturated(held) is held
-    still = replace(record, x=np.ones_like(record.x))
-    assert leave_out_saturated(still) is still
+    held = np.concatenate([np.full(400, record.x.max()), record.x[:-400]])
+    assert find_saturated(held)[1] == find_saturated(np.ones_like(record.x))[1] == 0
 
 
 def test_rows_in_no_order_are_sorted_and_reported():

@@ -2,19 +2,14 @@
 
 import csv
 import json
-from dataclasses import replace
 
 import commands
 import numpy as np
 import pytest
 from build_cache import ROOT
-from decays import decay_record
+from decays import LAWS, decay_record, identify
 from shared_keys import check_shared_keys
 
-from harness import DecayResult
-from harness.analyses.decay.estimates import KnownParameters
-from harness.analyses.decay.identification import fit_decay
-from harness.analyses.decay.law import LAWS
 from harness.analyses.estimation.figure import MAX_POINTS, extremes
 
 
@@ -32,7 +27,7 @@ def test_the_table_fits_into_80_columns_and_its_first_values_are_those_to_use(fm
 
 
 def test_the_quantities_keep_their_names():
-    fit = DecayResult(**vars(fit_decay(decay_record(0.02, 0.003, noise=1e-4), KnownParameters()))).as_json()
+    fit = identify(decay_record(0.02, 0.003, noise=1e-4)).as_json()
     assert {"fit", "remarks", "laws", "sentence", "turning_points", "published"} <= set(fit)
     check_shared_keys(fit)
     assert {item["name"] for item in fit["fit"]} == {"omega", "zeta", "r", "b", "rest"}
@@ -45,8 +40,8 @@ def test_a_figure_shows_angles_in_degrees_and_marks_only_excluded_samples():
     """Of a record whose clock counts from 1970."""
     t = np.linspace(0.0, 9.0, 3001)
     record = decay_record(0.02, sine=True, a=1.0, turn=0.0, rest=0.0, t=t, noise=1e-3)
-    fit = fit_decay(replace(record, t=record.t + 1.7e9), KnownParameters(pendulum=True))
-    signal, residuals, shares = DecayResult(**vars(fit)).plot()
+    fit = identify(record._replace(t=record.t + 1.7e9), pendulum=True)
+    signal, residuals, shares = fit.plot()
     assert [axes.get_ylabel() for axes in (signal, residuals)] == ["x [deg]", "record - fit [deg]"]
     assert shares.get_xlabel() == "amplitude [deg]"
     curves = {line.get_label(): line.get_data() for line in signal.lines}
@@ -109,16 +104,13 @@ def test_a_record_needs_no_fmu_modules_and_one_drawing(tmp_path):
 import sys
 from matplotlib.figure import Figure
 from pathlib import Path
-from decays import decay_record
-from harness.analyses.decay.estimates import KnownParameters
-from harness.analyses.decay.identification import fit_decay
-from harness import DecayResult
+from decays import decay_record, identify
 
 draws, draw = [], Figure.draw
 Figure.draw = lambda *arguments: draws.append(draw(*arguments))
-DecayResult(**vars(fit_decay(decay_record(0.02), KnownParameters()))).write(Path.cwd())
+identify(decay_record(0.02)).write(Path.cwd())
 unnecessary = ("fmpy", "cattrs", "scipy.stats", "scipy.signal")
-unnecessary += ("harness.running", "harness.scenes.run_spec", "harness.scenes.scene")
+unnecessary += ("harness.running.runner", "harness.running.session", "harness.scenes.run_spec", "harness.scenes.scene")
 print(len(draws), [name for name in unnecessary if name in sys.modules])
 """
     done = commands.run_python(tmp_path, "-c", program)

@@ -1,14 +1,36 @@
 """Simulated decays with known parameters: `decay_record` for given ones, `random_record` for random ones."""
 
+from itertools import combinations
+from typing import NamedTuple
+
 import numpy as np
 
-from harness.analyses.decay.law import LAWS, TERMS, unknown_indices
+from harness import identify_decay
 from harness.analyses.decay.signal_model import SignalModel
-from harness.records.record import Record
-from harness.studies.decay.table import summary_lines
 
+TERMS = ("zeta", "r", "b")
+LAWS = tuple(law for size in (3, 2, 1) for law in combinations(TERMS, size))
+UNKNOWNS = np.array([0, 1, 2, 4, 5, 6, 7])  # start, amplitude, rest, omega, zeta, r and b of the model, without drift
 T = np.linspace(0.0, 4.0, 1000)
 OMEGA = 12.566
+
+
+class Signal(NamedTuple):
+    """Samples x over times t in s."""
+
+    t: np.ndarray
+    x: np.ndarray
+    unit: str = "m"
+
+    def select(self, begin, end):
+        """Return the samples from `begin` to `end` in s."""
+        keep = (self.t >= begin) & (self.t <= end)
+        return self._replace(t=self.t[keep], x=self.x[keep])
+
+
+def identify(signal, **options):
+    """Return the identified decay of a signal."""
+    return identify_decay((signal.t, signal.x), unit=signal.unit, progress=False, **options)
 
 
 def values(estimates):
@@ -16,7 +38,7 @@ def values(estimates):
 
 
 def remarks_text(fit):
-    return " ".join(summary_lines(fit))
+    return " ".join(block for block in fit.blocks() if isinstance(block, str))
 
 
 def decay_record(
@@ -36,19 +58,19 @@ def decay_record(
     drift=0.0,
     seed=6,
 ):
-    """Return the record of a decay that starts at rest with amplitude `a` at time `turn`, with white noise, rounded
+    """Return the signal of a decay that starts at rest with amplitude `a` at time `turn`, with white noise, rounded
     to `step`."""
     model = SignalModel(side, order, sine, 0.0, 1e-7 * a)
-    x, _ = model(np.array([turn, a, rest, drift, omega, zeta, r, b]), unknown_indices(TERMS, False), t)
+    x, _ = model(np.array([turn, a, rest, drift, omega, zeta, r, b]), UNKNOWNS, t)
     if order:
         x[t < turn] = rest  # held at rest
     x = x + noise * np.random.default_rng(seed).standard_normal(len(t))
     base = "rad" if sine else "m"
-    return Record("swung", t, step * np.round(x / step) if step else x, base + ("", "/s", "/s2")[order], order, base)
+    return Signal(t, step * np.round(x / step) if step else x, base + ("", "/s", "/s2")[order])
 
 
 def random_record(seed, law=None, sine=None, quantised=None, samples=None, order=0):
-    """Return a random record, its true parameters, and whether it is a pendulum.
+    """Return a random signal, its true parameters, and whether it is a pendulum.
 
     Law, amplitude, rate and noise are random; a third of the records are quantised and half are pendulums. The record
     is the derivative of the position of the given order.

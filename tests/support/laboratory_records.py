@@ -1,10 +1,8 @@
 """Simulated laboratory records: decays with what happens before and after them, and motions that are no decays."""
 
 import numpy as np
-from decays import decay_record
+from decays import Signal, decay_record
 from scipy.integrate import solve_ivp
-
-from harness.records.record import Record
 
 A = 0.05  # m, amplitude of the release
 
@@ -61,7 +59,7 @@ def laboratory_record(scene, seed, rate=200.0):
     lengths = np.cumsum([0, *(len(part) for part in parts)])
     at = {"lift": 2, "hold": 3, "push": 1, "two": 2, "stopped": 0, "driven": 1}[scene]
     x = np.concatenate(parts) + 0.02 + 2e-4 * a * rng.standard_normal(lengths[-1])
-    record = Record(scene, np.arange(len(x)) / rate, x)
+    record = Signal(np.arange(len(x)) / rate, x)
     return record, law, (lengths[at] / rate, lengths[at + 1] / rate)
 
 
@@ -103,7 +101,7 @@ def other_motion(kind, seed, rate=200.0):
             method="LSODA",
         )
         x = a * done.y[0]
-    return Record(kind, t, x + 2e-4 * a * rng.standard_normal(len(t)))
+    return Signal(t, x + 2e-4 * a * rng.standard_normal(len(t)))
 
 
 OTHERS = ("growing", "constant", "beating", "sawtooth", "noise", "relaxation")

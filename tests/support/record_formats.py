@@ -13,9 +13,7 @@ from typing import Any, NamedTuple
 from zipfile import ZipFile
 
 import numpy as np
-
-from harness.analyses.decay.law import TERMS, unknown_indices
-from harness.analyses.decay.signal_model import SignalModel
+from decays import decay_record
 
 T = np.arange(600) / 100  # s
 ZETA, OMEGA, R = 0.01, 12.566, 0.002
@@ -23,8 +21,7 @@ ZETA, OMEGA, R = 0.01, 12.566, 0.002
 
 def positions() -> np.ndarray:
     """Return the positions (600,) in m of a decay with viscous damping and dry friction, released at 0.1 m."""
-    p = np.array([0.0, 0.1, 0.0, 0.0, OMEGA, ZETA, R, 0.0])
-    return SignalModel(1.0, 0, False, 0.0, 1e-8)(p, unknown_indices(TERMS, False), T)[0]
+    return decay_record(ZETA, R, omega=OMEGA, turn=0.0, a=0.1, rest=0.0, t=T).x
 
 
 MM = 1e3 * positions() + 500  # mm; the offset avoids numbers that begin with 0

@@ -1,12 +1,9 @@
 """Energy lost in each half cycle: starting values of the losses, and the loss as a function of the amplitude.
 
-Between turning points of amplitudes a_i and a_(i+1), whose mean is a, the potential energy (divided by k) falls by
-
-    V(a_i) - V(a_(i+1)) = 2 zeta I2(a) + 2 a r + b I3(a),      I2 = int y'^2 dtheta,  I3 = int |y'|^3 dtheta
-
-which is linear in the losses zeta, r and b.  The integrals are those of the undamped motion, so that noise enters on
-the left side only: for a spring I2 = pi a^2/2 and I3 = 4 a^3/3; for a pendulum by Gaussian quadrature, with
-sin(y/2) = sin(a/2) sin(phi).
+Between turning points of amplitudes a_i and a_(i+1), whose mean is a, the potential energy of a spring, divided by k,
+falls by a (a_i - a_(i+1)) = pi zeta a^2 + 2 r a + 4/3 b a^3 (integrals over the undamped motion, so that noise enters
+on the left side only), which is linear in the losses.  A pendulum is taken for the spring with the same energies, whose
+amplitude is 2 sin(a/2): its losses are starting values of fits only.
 
 The shape of the loss over the amplitude shows which law holds.  As a fraction of the energy, viscous damping takes the
 same at every amplitude, dry friction takes more of small amplitudes (1/a) and drag more of large ones (a).
@@ -18,14 +15,11 @@ balance).  The division by the mean slope, which weights all half cycles alike, 
 """
 
 from dataclasses import dataclass
-from functools import cache
 
 import numpy as np
 from scipy import optimize
 
 from .law import TERMS, Terms
-
-QUADRATURE_POINTS = 40
 
 
 @dataclass(frozen=True)
@@ -49,30 +43,14 @@ class EnergyLoss:
 
 def estimate_losses(a: np.ndarray, terms: Terms, is_pendulum: bool) -> np.ndarray:
     """Return nonnegative zeta, r and b (3,) from successive amplitudes a (n,); those not in `terms` are zero."""
+    a = 2 * np.sin(a / 2) if is_pendulum else a
     mean = (a[:-1] + a[1:]) / 2
-    if is_pendulum:
-        nodes, weights = gauss_nodes()
-        phi, weights = (nodes + 1) * np.pi / 4, weights * np.pi / 4
-        k = np.sin(mean / 2)[:, None]
-        speed = 2 * k * np.cos(phi)
-        stretch = 1 / np.sqrt(1 - (k * np.sin(phi)) ** 2)  # dtheta = stretch dphi
-        squared, cubed = 2 * (speed**2 * stretch) @ weights, 2 * (speed**3 * stretch) @ weights
-        energy_loss, slope = np.cos(a[1:]) - np.cos(a[:-1]), np.maximum(np.sin(mean), 1e-2)
-    else:
-        squared, cubed = np.pi / 2 * mean**2, 4 / 3 * mean**3
-        energy_loss, slope = mean * (a[:-1] - a[1:]), mean
-    columns = np.stack([2 * squared, 2 * mean, cubed], axis=1) / slope[:, None]
+    columns = np.stack([np.pi * mean, np.full_like(mean, 2.0), 4 / 3 * mean**2], axis=1)
     indices = [TERMS.index(term) for term in terms]
     scale = np.linalg.norm(columns[:, indices], axis=0)
     losses = np.zeros(len(TERMS))
-    losses[indices] = optimize.nnls(columns[:, indices] / scale, energy_loss / slope)[0] / scale
+    losses[indices] = optimize.nnls(columns[:, indices] / scale, a[:-1] - a[1:])[0] / scale
     return losses
-
-
-@cache
-def gauss_nodes() -> tuple[np.ndarray, np.ndarray]:
-    """Return nodes and weights (QUADRATURE_POINTS,) of Gauss-Legendre quadrature."""
-    return np.polynomial.legendre.leggauss(QUADRATURE_POINTS)
 
 
 def loss_fractions(a: np.ndarray, is_pendulum: bool) -> tuple[np.ndarray, np.ndarray]:

@@ -11,7 +11,7 @@ From the first and the last turning point: the single loss that leads from the f
 spring this is the textbook's logarithmic decrement or linear envelope; for a pendulum it comes from the return map.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy import optimize
@@ -173,23 +173,14 @@ def estimate_from_extrema(
     if len(extrema.x) <= len(unknowns):
         return (), f"{len(extrema.x)} turning points leave no degrees of freedom for {len(unknowns)} values"
     positions = (extrema.x - problem.offset) / problem.scale
-    start = law.p.copy()
-    amplitudes, _ = problem.half_cycles(start, max_count=len(cycles_before_first_extremum(problem, extrema, start)))
-    model = problem.model
-    before = len(amplitudes) - 1
-    start[AMPLITUDE] = amplitudes[-1]
-    model = replace(model, initial_sign=model.initial_sign * (-1) ** before)
+    later, start = problem.start_near(law.p, float(extrema.t[0]) - problem.time_origin)
+    sign = later.model.initial_sign * (-1.0) ** np.arange(len(positions))
 
     def residuals(p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        laws, changed, changes = model.perturbed_laws(p, unknowns)
-        sequence = iterate_return_map(laws, model.is_pendulum, model.min_amplitude, len(positions) - 1)
-        sizes = np.pad(sequence.amplitudes, ((0, len(positions) - len(sequence.amplitudes)), (0, 0)), mode="edge")
-        sign = model.initial_sign * (-1.0) ** np.arange(len(positions))
-        jacobian = np.ones((len(positions), len(unknowns)))
-        for i, unknown in enumerate(changed.tolist()):
-            slope = sign * (sizes[:, 1 + i] - sizes[:, 0]) / changes[i]
-            jacobian[:, np.flatnonzero(unknowns == unknown)[0]] = slope
-        return p[REST] + sign * sizes[:, 0] - positions, jacobian
+        sizes, jacobian = later.model.predict_amplitudes(p, unknowns, len(positions) - 1)
+        jacobian = sign[:, None] * jacobian
+        jacobian[:, 1] = 1.0  # of the rest position
+        return p[REST] + sign * sizes - positions, jacobian
 
     p, cost = least_squares(residuals, start, unknowns)
     _, jacobian = residuals(p)
@@ -205,12 +196,6 @@ def estimate_from_extrema(
                 record, problem, unknown, float(p[unknown]), float(errors[i]), low, high
             )
     return (*estimates.values(), *force_estimates(record, omega, estimates, parameters)), ""
-
-
-def cycles_before_first_extremum(problem: FitProblem, extrema: Extrema, p: np.ndarray) -> np.ndarray:
-    """Return the end times of the fitted half cycles that end at about the first turning point, or before it."""
-    _, starts = problem.half_cycles(p)
-    return starts[1:][starts[1:] < extrema.t[0] - problem.time_origin + extrema.half_period / 2]
 
 
 def estimate_from_two_peaks(

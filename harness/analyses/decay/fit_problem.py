@@ -143,12 +143,17 @@ class FitProblem:
         model = replace(self.model, initial_sign=self.model.initial_sign * (-1) ** count)
         return replace(self, model=model), p
 
+    def start_near(self, p: np.ndarray, t: float) -> tuple[Self, np.ndarray]:
+        """Return the problem and its values p for the same motion started at the turning point nearest to t, in s."""
+        _, starts = self.half_cycles(p)
+        return self.skip_half_cycles(p, int(np.argmin(np.abs(starts - t))))
+
 
 def prepare_problem(record: Record, extrema: Extrema, pendulum: bool, drift: bool) -> tuple[FitProblem, np.ndarray]:
     """Return the fit problem of a record, and the values of the full law that fit its turning points best."""
     time_origin = float(record.t[0])
     times, first = extrema.t - time_origin, extrema.t_start - time_origin
-    rest = rest_positions(times, extrema.x, drift or record.order > 0)
+    rest = extrema.rest_positions(drift or record.order > 0)
     initial_sign = -float(np.sign(extrema.x[0] - rest[0]))
     a = np.abs(extrema.x - rest)
     scale = 1.0 if pendulum else float(a.max())
@@ -180,16 +185,6 @@ def prepare_problem(record: Record, extrema: Extrema, pendulum: bool, drift: boo
         t, x, model, time_origin, offset, scale, noise, drift, extrema.half_period, extrema.quantiser_step
     )
     return problem, p
-
-
-def rest_positions(times: np.ndarray, positions: np.ndarray, may_drift: bool) -> np.ndarray:
-    """Return the rest position at each turning point (n,): one for all, or on a straight line if it may drift."""
-    if len(positions) < 3:
-        return np.full(len(positions), np.mean(positions))
-    middles = (positions[:-2] + 2 * positions[1:-1] + positions[2:]) / 4
-    if not may_drift or len(middles) < 3:
-        return np.full(len(positions), np.median(middles))
-    return np.polyval(np.polyfit(times[1:-1], middles, 1), times)
 
 
 def fit_numbered_extrema(

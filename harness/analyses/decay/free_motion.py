@@ -13,9 +13,10 @@ import numpy as np
 from ...records.record import MIN_SAMPLES, Record
 from ..estimation.noise import robust_std
 from . import thresholds
-from .extrema import Extrema, estimate_noise
+from .extrema import Extrema
 from .fit_problem import FitProblem, prepare_problem
 from .law import OMEGA, T0, TERMS, UNKNOWNS, Terms
+from .sample_noise import estimate_noise
 
 
 @dataclass(frozen=True)
@@ -38,6 +39,8 @@ class FreeMotion:
         Sum of squares of their residuals.
     outliers : int
         Number of samples left out as outliers.
+    whole : tuple of FitProblem and numpy.ndarray, optional
+        Samples and values before a part that departs from the law was left out.
     notes : tuple of str
         Sentences on other samples left out.
     """
@@ -50,6 +53,7 @@ class FreeMotion:
     p: np.ndarray
     sum_of_squares: float = np.inf
     outliers: int = 0
+    whole: tuple[FitProblem, np.ndarray] | None = None
     notes: tuple[str, ...] = ()
 
     def fit(self, problem: FitProblem, p: np.ndarray | None = None) -> Self:
@@ -230,7 +234,7 @@ def truncate_at_disturbance(motion: FreeMotion) -> FreeMotion:
         if level * problem.scale < rms / thresholds.DEPARTED and departure < problem.t[-1]:
             early = remove_outliers(early)
             at = early.format_time(early.problem.t[-1])
-            return early.add_note(
+            return replace(early, whole=(selection, motion.p)).add_note(
                 f"The record follows the law until t = {at} s and then departs from it; the rest is left out."
             )
     return motion

@@ -35,7 +35,7 @@ from .estimates import (
     make_estimates,
     to_record_units,
 )
-from .extrema import Extrema, estimate_noise, find_extrema, remove_spikes
+from .extrema import Extrema, find_extrema
 from .fit_problem import FitError, FitProblem
 from .free_motion import select_free_motion
 from .intervals import FitUncertainty, estimate_uncertainty
@@ -43,6 +43,7 @@ from .law import DRIFT, OMEGA, REST, TERMS, Terms
 from .low_speed_friction import LowSpeedRise, find_low_speed_rise, widen_losses
 from .model_selection import FittedLaw, fit_all_laws, select_reported_law
 from .remarks import check_fit, compare_halves, compare_swings, make_remarks, rise_remark
+from .sample_noise import estimate_noise, remove_spikes
 from .swing_fit import fit_swings
 from .thinning import block_size, thin, thinning_error
 from .window import select_decay
@@ -152,12 +153,12 @@ class DecayIdentification:
 
     @property
     def undetected_rise(self) -> float:
-        """Rise of friction at low speed that is not excluded, relative to the dry friction; NaN if one is shown, or if
-        there is no dry friction."""
+        """Rise of friction at low speed that is not excluded, relative to the dry friction; infinite if none is
+        excluded, NaN if one is shown or there is no dry friction."""
         r = self["r"] if self.rise is not None and not self.rise.is_shown else None
         if r is None or self.rise is None or not r.low > 0:
             return np.nan
-        return self.rise.limit * self.problem.scale / r.value
+        return self.rise.limit / r.value
 
     @property
     def sentence(self) -> str:
@@ -245,7 +246,7 @@ def identify_record(
     decay, half_period = select_decay(record, parameters.pendulum)
     _, quantiser_step = estimate_noise(decay.t, decay.x)
     record, decay = thin_around(record, decay, half_period)
-    extrema = replace(find_extrema(decay, parameters.pendulum), quantiser_step=quantiser_step)
+    extrema = find_extrema(decay, half_period, quantiser_step, parameters.pendulum)
     unknowns = 5 + len(terms) + drift
     if len(decay.t) <= unknowns:
         raise HarnessError(
@@ -255,7 +256,7 @@ def identify_record(
     free_motion = select_free_motion(decay, extrema, terms, parameters.pendulum, drift)
     problem, extrema = free_motion.problem, free_motion.extrema
     report(0.5)
-    amplitudes = amplitudes_of(extrema) / problem.scale
+    amplitudes = np.abs(extrema.x - extrema.rest_positions(drift)) / problem.scale
     fit = free_motion.p, free_motion.sum_of_squares
     laws = fit_all_laws(problem, fit, terms, amplitudes, lambda share: report(0.5 + 0.4 * share))
     full = next(law for law in laws if law.terms == terms)
@@ -282,10 +283,13 @@ def identify_record(
         )
         estimates, disagreements = compare_swings(estimates, from_swings, swing_fit.departure)
         remarks += disagreements
-    rise = find_low_speed_rise(problem, full, uncertainty)
+    rise = find_low_speed_rise(problem, full.p, terms)
+    if rise is not None and free_motion.whole is not None:  # the part left out may be where friction rises
+        of_whole = find_low_speed_rise(*free_motion.whole, terms)
+        rise = of_whole if of_whole is not None and of_whole.is_shown else replace(rise, limit=np.inf)
     if rise is not None and rise.is_shown:
-        estimates = widen_losses(estimates, problem, rise)
-        remarks.append(rise_remark(record, problem, rise))
+        estimates = widen_losses(estimates, rise)
+        remarks.append(rise_remark(record, rise))
     by_unknown = dict(zip(by_unknown, estimates, strict=True))
     omega = by_unknown[OMEGA]
     estimates += force_estimates(record, omega, by_unknown, parameters)  # of the widened intervals
@@ -323,10 +327,3 @@ def thin_around(record: Record, decay: Record, half_period: float) -> tuple[Reco
     parts = [thin(replace(record, t=record.t[part], x=record.x[part]), size) for part in (before, after)]
     t, x = (np.concatenate([getattr(part, name) for part in (parts[0], thinned, parts[1])]) for name in ("t", "x"))
     return replace(record, t=t, x=x), thinned
-
-
-def amplitudes_of(extrema: Extrema) -> np.ndarray:
-    """Return the amplitudes (n,) at the turning points, about the median rest position."""
-    x = extrema.x
-    middles = (x[:-2] + 2 * x[1:-1] + x[2:]) / 4 if len(x) > 3 else x
-    return np.abs(x - np.median(middles))

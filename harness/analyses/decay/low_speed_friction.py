@@ -17,15 +17,12 @@ from ..estimation.noise import block_scores
 from . import thresholds
 from .estimates import unit_scales
 from .fit_problem import FitProblem, column_norms
-from .intervals import FitUncertainty
-from .law import AMPLITUDE, UNKNOWNS, ZETA
-from .model_selection import FittedLaw
-from .return_map import iterate_return_map
+from .law import AMPLITUDE, UNKNOWNS, ZETA, R, Terms
 
 
 @dataclass(frozen=True)
 class LowSpeedRise:
-    """A rise of friction at low speed, in the units of the problem.
+    """A rise of friction at low speed, in the units of the record.
 
     Attributes
     ----------
@@ -40,7 +37,7 @@ class LowSpeedRise:
     intervals : dict
         95 % intervals of the losses by name, over all speeds for which the record shows a rise.
     limit : float
-        Rise with a v_s of LIMIT_SPEED that the record would show in five of six cases.
+        Rise with a v_s of LIMIT_SPEED that the record would show in five of six cases; infinite if any may be hidden.
     """
 
     speed: float
@@ -65,76 +62,82 @@ def signal_changes(problem: FitProblem, p: np.ndarray, slope: np.ndarray, speeds
         Derivative (n,) of the signal by the first amplitude.
     """
     amplitudes, starts = problem.half_cycles(p)
-    laws, _, changes = problem.model.perturbed_laws(p, np.array([AMPLITUDE]))
     is_pendulum = problem.model.is_pendulum
-    both = iterate_return_map(laws, is_pendulum, problem.model.min_amplitude, len(amplitudes) - 1).amplitudes
-    sensitivity = np.maximum((both[:, 1] - both[:, 0]) / changes[0], thresholds.MIN_SENSITIVITY)
+    _, sensitivity = problem.model.predict_amplitudes(p, np.array([AMPLITUDE]), len(amplitudes) - 1)
+    sensitivity = np.maximum(sensitivity[1:], thresholds.MIN_SENSITIVITY)
     peak = 2 * np.sin(amplitudes / 2) if is_pendulum else amplitudes
     phi = np.linspace(0.0, np.pi, 65)
     u = (peak[:-1] / peak[0])[:, None, None] / speeds[:, None]
     share = 0.5 * np.trapezoid(np.exp(-u * np.sin(phi)) * np.sin(phi), phi, axis=-1)
     middle = (amplitudes[:-1] + amplitudes[1:]) / 2
     force = np.sinc(middle / np.pi) if is_pendulum else np.ones_like(middle)  # sin a/a
-    lost = 2 * share / force[:, None] / sensitivity[1:, None]
+    lost = 2 * share / force[:, None] / sensitivity
     total = np.concatenate([np.zeros((1, len(speeds))), -np.cumsum(lost, axis=0)])
     return np.stack([slope * np.interp(problem.t, starts, column) for column in total.T], axis=1)
 
 
-def find_low_speed_rise(problem: FitProblem, full: FittedLaw, uncertainty: FitUncertainty) -> LowSpeedRise | None:
-    """Return the rise that fits best to the residuals of the full law; None if there are too few half cycles."""
-    p, unknowns = full.p, uncertainty.unknowns
-    if "r" not in full.terms or len(problem.half_cycles(p)[0]) < thresholds.MIN_RISE_HALF_CYCLES:
+def find_low_speed_rise(problem: FitProblem, p: np.ndarray, terms: Terms) -> LowSpeedRise | None:
+    """Return the rise that fits best to the residuals of a law with the values p; None if there are too few half
+    cycles."""
+    if "r" not in terms or len(problem.half_cycles(p)[0]) < thresholds.MIN_RISE_HALF_CYCLES:
         return None
-    e, jacobian = problem.residuals(p, full.terms)
+    unknowns = problem.unknowns(terms)
+    _, jacobian = problem.residuals(p, terms)
     speeds = np.array(thresholds.RISE_SPEEDS)
     changes = signal_changes(problem, p, jacobian[:, np.flatnonzero(unknowns == AMPLITUDE)[0]], speeds)
-    n, floor = len(e), len(e) * problem.residual_floor**2
-    low = np.append(np.where(unknowns >= ZETA, -p[unknowns], -np.inf), 0.0)
-    rises = []
-    for speed, change in zip(speeds.tolist(), changes.T, strict=True):
-        columns = np.column_stack([jacobian, change])
-        scale = column_norms(columns)
-        columns = columns / scale
-        triangle = np.asarray(np.linalg.qr(np.column_stack([columns, e]), mode="r"))
-        step = optimize.lsq_linear(triangle[:, :-1], -triangle[:, -1], (low * scale, np.inf)).x
-        rest = e + columns @ step
-        squares = max(float(rest @ rest), floor)
-        alone = columns[:, -1] - columns[:, :-1] @ np.linalg.lstsq(columns[:, :-1], columns[:, -1], rcond=None)[0]
-        white = squares / n * float(alone @ alone)
-        variance = white  # of the score of the rise
-        for count in thresholds.RISE_BLOCKS:
-            scores, factor = block_scores(alone[:, None], rest, count, len(unknowns) + 1)
-            variance = max(variance, float((scores**2).sum()) * factor)
-        deviance = n * float(np.log(max(float(e @ e), floor) / squares)) * white / variance
-        error = np.sqrt(variance) / float(alone @ alone) / scale[-1]
-        limit = (np.sqrt(thresholds.SHOWN_RISE) + 1) * error
-        spread = np.diag(np.linalg.pinv(columns.T @ columns)) * squares / n * variance / white
-        margins = NORMAL_QUANTILE * np.sqrt(spread) / scale
-        values = {UNKNOWNS[at]: i for i, at in enumerate(unknowns.tolist()) if at >= ZETA}
-        losses = {name: float(p[unknowns[i]] + step[i] / scale[i]) for name, i in values.items()}
-        intervals = {
-            name: (losses[name] - float(margins[i]), losses[name] + float(margins[i])) for name, i in values.items()
-        }
-        rises.append(LowSpeedRise(speed, float(step[-1] / scale[-1]), deviance, losses, intervals, limit))
+    rises = [
+        fit_rise(problem, p, terms, speed, change) for speed, change in zip(speeds.tolist(), changes.T, strict=True)
+    ]
     best = max(rises, key=lambda rise: (rise.is_shown, rise.deviance))
     shown = [rise.intervals for rise in rises if rise.is_shown]
     intervals = {
-        name: (min(each[name][0] for each in shown), max(each[name][1] for each in shown))
-        for name in full.terms
-        if shown
+        name: (min(each[name][0] for each in shown), max(each[name][1] for each in shown)) for name in terms if shown
     }
-    limit = rises[thresholds.RISE_SPEEDS.index(thresholds.LIMIT_SPEED)].limit
-    return replace(best, intervals=intervals, limit=limit)
+    return replace(best, intervals=intervals, limit=rises[thresholds.RISE_SPEEDS.index(thresholds.LIMIT_SPEED)].limit)
 
 
-def widen_losses(estimates: tuple[Estimate, ...], problem: FitProblem, rise: LowSpeedRise) -> tuple[Estimate, ...]:
+def fit_rise(problem: FitProblem, p: np.ndarray, terms: Terms, speed: float, change: np.ndarray) -> LowSpeedRise:
+    """Fit the law and a rise at one relative speed, which changes the signal by `change` (n,), by one linear step."""
+    e, jacobian = problem.residuals(p, terms)
+    unknowns, n, floor = problem.unknowns(terms), len(e), len(e) * problem.residual_floor**2
+    columns = np.column_stack([jacobian, change])
+    scale = column_norms(columns)
+    columns = columns / scale
+    triangle = np.asarray(np.linalg.qr(np.column_stack([columns, e]), mode="r"))
+    low = np.append(np.where(unknowns >= ZETA, -p[unknowns], -np.inf), 0.0) * scale
+    law_step = optimize.lsq_linear(triangle[:, :-2], -triangle[:, -1], (low[:-1], np.inf)).x
+    step = optimize.lsq_linear(triangle[:, :-1], -triangle[:, -1], (low, np.inf)).x
+    law_rest, rest = e + columns[:, :-1] @ law_step, e + columns @ step
+    law_squares = max(min(float(e @ e), float(law_rest @ law_rest)), floor)
+    squares = max(float(rest @ rest), floor)
+    alone = columns[:, -1] - columns[:, :-1] @ np.linalg.lstsq(columns[:, :-1], columns[:, -1], rcond=None)[0]
+    information = float(alone @ alone)
+    white = squares / n * information
+    variance = white  # of the score of the rise
+    for count in thresholds.RISE_BLOCKS:
+        scores, factor = block_scores(alone[:, None], rest, count, len(unknowns) + 1)
+        variance = max(variance, float((scores**2).sum()) * factor)
+    deviance = n * float(np.log(law_squares / squares)) * white / variance
+    limit = (np.sqrt(thresholds.SHOWN_RISE) + 1) * np.sqrt(variance) / information / scale[-1]
+    spread = np.diag(np.linalg.pinv(columns.T @ columns)) * squares / n * variance / white
+    values = np.append(p[unknowns], 0.0) + step / scale
+    margins = NORMAL_QUANTILE * np.sqrt(spread) / scale
+    units = unit_scales(problem)
+    at = {UNKNOWNS[unknown]: (i, units[unknown]) for i, unknown in enumerate(unknowns.tolist()) if unknown >= ZETA}
+    losses = {name: float(unit * values[i]) for name, (i, unit) in at.items()}
+    intervals = {
+        name: (losses[name] - float(unit * margins[i]), losses[name] + float(unit * margins[i]))
+        for name, (i, unit) in at.items()
+    }
+    return LowSpeedRise(speed, float(units[R] * values[-1]), deviance, losses, intervals, float(units[R] * limit))
+
+
+def widen_losses(estimates: tuple[Estimate, ...], rise: LowSpeedRise) -> tuple[Estimate, ...]:
     """Return the estimates; the intervals of the losses cover those with the rise too."""
     widened = list(estimates)
     for i, estimate in enumerate(estimates):
         if estimate.name in rise.intervals:
-            scale = unit_scales(problem)[UNKNOWNS.index(estimate.name)]
-            below, above = (value * scale for value in rise.intervals[estimate.name])
-            error = max(estimate.error, abs(rise.losses[estimate.name] * scale - estimate.value))
-            low, high = min(estimate.low, max(below, 0.0)), max(estimate.high, above)
-            widened[i] = replace(estimate, error=error, low=low, high=high)
+            low, high = rise.intervals[estimate.name]
+            error = abs(rise.losses[estimate.name] - estimate.value)
+            widened[i] = estimate.widen(error, max(low, 0.0), high)
     return tuple(widened)

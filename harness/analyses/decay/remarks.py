@@ -166,14 +166,13 @@ def ambiguity_remark(problem: FitProblem, laws: tuple[FittedLaw, ...]) -> tuple[
     )
 
 
-def rise_remark(record: Record, problem: FitProblem, rise: LowSpeedRise) -> str:
+def rise_remark(record: Record, rise: LowSpeedRise) -> str:
     """Return the remark on friction that rises at low speed."""
-    size, friction = (value * problem.scale for value in (rise.size, rise.losses["r"]))
     return (
-        f"Friction that rises at low speed fits better: it is {size:.2g} {record.base} (over stiffness) larger at "
-        f"standstill than the {friction:.2g} {record.base} above about {rise.speed:g} of the first peak speed. No law "
-        "of decay has such a rise. The intervals of the losses are widened, and may still miss the true values: fit a "
-        "model with Stribeck friction by friction-fmus fit."
+        f"Friction that rises at low speed fits better: it is {rise.size:.2g} {record.base} (over stiffness) larger at "
+        f"standstill than the {rise.losses['r']:.2g} {record.base} above about {rise.speed:g} of the first peak speed. "
+        "No law of decay has such a rise. The intervals of the losses are widened, and may still miss the true values: "
+        "fit a model with Stribeck friction by friction-fmus fit."
     )
 
 
@@ -212,9 +211,7 @@ def compare_halves(
         first, second = (float(p[unknown]) * scale for p, _ in fits)
         error = float(np.hypot(*(uncertainty.standard_errors[at] * scale for _, uncertainty in fits)))
         if abs(first - second) > thresholds.DISAGREEMENT * error:
-            low, high = min(estimate.low, first, second), max(estimate.high, first, second)
-            error = max(estimate.error, abs(first - second) / 2)
-            widened[i] = replace(estimate, error=error, low=low, high=high)
+            widened[i] = estimate.widen(abs(first - second) / 2, first, second)
             remarks.append(
                 f"{estimate.text}, {estimate.name}: {first:.4g} in the first half of the record, "
                 f"{second:.4g} in the second."
@@ -258,8 +255,7 @@ def compare_swings(
         )
         if not (departure or differs):
             continue
-        low, high = min(estimate.low, other.low), max(estimate.high, other.high)
-        widened[i] = replace(estimate, error=max(estimate.error, other.error), low=low, high=high)
+        widened[i] = estimate.widen(other.error, other.low, other.high)
         if differs:
             remarks.append(
                 f"{estimate.text}, {estimate.name}: {estimate.value:.4g} from the whole signal, {other.value:.4g} "

@@ -104,6 +104,16 @@ class SignalModel:
             jacobian[:, jacobian_column[DRIFT]] = t - self.t_mid
         return signal + p[REST] + p[DRIFT] * (t - self.t_mid), jacobian
 
+    def predict_amplitudes(self, p: np.ndarray, unknowns: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
+        """Return amplitudes (count + 1,), repeated after the end of the motion, and their Jacobian (count + 1, k)."""
+        laws, changed, changes = self.perturbed_laws(p, unknowns)
+        sizes = iterate_return_map(laws, self.is_pendulum, self.min_amplitude, count).amplitudes
+        sizes = np.pad(sizes, ((0, count + 1 - len(sizes)), (0, 0)), mode="edge")
+        jacobian = np.zeros((count + 1, len(unknowns)))
+        for i, (unknown, change) in enumerate(zip(changed, changes, strict=True), 1):
+            jacobian[:, np.flatnonzero(unknowns == unknown)[0]] = (sizes[:, i] - sizes[:, 0]) / change
+        return sizes[:, 0], jacobian
+
     def predict_extrema(
         self, p: np.ndarray, unknowns: np.ndarray, count: int
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -23,8 +23,7 @@ from . import thresholds
 from .extrema import Extrema
 from .fit_problem import FitError, FitProblem, column_norms, least_squares
 from .intervals import confidence_interval, to_correlation
-from .law import AMPLITUDE, OMEGA, T0, UNKNOWNS, Terms
-from .return_map import iterate_return_map
+from .law import AMPLITUDE, UNKNOWNS, Terms
 
 
 @dataclass(frozen=True)
@@ -59,22 +58,12 @@ def fit_swings(problem: FitProblem, extrema: Extrema, p: np.ndarray, terms: Term
     unknowns = np.array([AMPLITUDE, *(UNKNOWNS.index(term) for term in terms)])
     if count < max(thresholds.MIN_FITTED_SWINGS, 2 * len(unknowns)):
         return None
-    size, start = size[:count], p.copy()
-    skipped = int(np.round(p[OMEGA] * (times[is_used][0] - p[T0]) / np.pi))
-    amplitudes, _ = problem.half_cycles(p, max_count=max(skipped, 0))
-    start[AMPLITUDE] = amplitudes[-1]
+    size = size[:count]
+    problem, start = problem.start_near(p, float(times[is_used][0]))
     model = replace(problem.model, min_amplitude=0.0)
 
-    def predict(q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return amplitudes (count + 1,) and their Jacobian (count + 1, k)."""
-        laws, changed, changes = model.perturbed_laws(q, unknowns)
-        sizes = iterate_return_map(laws, model.is_pendulum, 0.0, count).amplitudes
-        sizes = np.pad(sizes, ((0, max(count + 1 - len(sizes), 0)), (0, 0)))
-        order = [int(np.flatnonzero(changed == unknown)[0]) for unknown in unknowns]
-        return sizes[:, 0], ((sizes[:, 1:] - sizes[:, :1]) / changes)[:, order]
-
     def residuals(q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        a, jacobian = predict(q)
+        a, jacobian = model.predict_amplitudes(q, unknowns, count)
         return a[:-1] + a[1:] - size, jacobian[:-1] + jacobian[1:]
 
     try:
@@ -82,7 +71,7 @@ def fit_swings(problem: FitProblem, extrema: Extrema, p: np.ndarray, terms: Term
     except FitError:
         return None
     e, jacobian = residuals(p)
-    a, slopes = predict(p)
+    a, slopes = model.predict_amplitudes(p, unknowns, count)
     if not (np.isfinite(jacobian).all() and (a[:-1] > 0).all() and (slopes[:, 0] > 0).all()):
         return None
     scale = column_norms(jacobian)

@@ -4,7 +4,7 @@ They are in the order of the steps of identification.py.  Numbers of the numeric
 interpolation) are with the code that they belong to, because they decide about accuracy only.
 """
 
-# --- Noise of the samples (extrema.py) ---
+# --- Noise of the samples (sample_noise.py) ---
 OUTLIER = 8.0  # times the noise: white noise exceeds it in one of 1e15 samples
 MIN_SPIKE = 0.02  # of the range: a smaller spike hides no turning point
 MAX_SPIKE_ROUNDS = 40  # each round removes the outermost samples of a run of outliers
@@ -13,32 +13,27 @@ COARSE_STEP = 1.5  # times the noise: a larger step between values comes from a 
 FINE_NOISE = 1 / 3  # of a step of the values: noise below it cannot be seen through the quantiser
 MIN_NOISE = 1e-13  # relative to the amplitude: no record is more precise than rounding
 
-# --- Turning points (extrema.py) ---
+# --- Smoothed position (smooth_motion.py) ---
 MIN_REVERSAL = 8.0  # times the noise, in the record itself: no pair of noisy samples differs by as much
+MIN_REVERSALS = 4  # of the record itself that give its half period
 MIN_SMOOTH_REVERSAL = 18.0  # times the noise in the smoothed record, whose noise is correlated within the window
 MIN_RELATIVE_REVERSAL = 1e-6  # of the range: a record without noise has rounding errors
-MIN_NOISY_RANGE = 12.0  # times the noise: a record with a smaller range is all noise
 CLEAN = 1e-4  # of the range: a record with less noise needs no smoothing
+SPECTRUM_SAMPLES = 65_536  # of the spectrum that suggests half periods
+MIN_SAMPLES_PER_PERIOD = 8.0  # of a half period from the spectrum: faster ones are noise
+SAME_PERIOD = 0.1  # relative difference below which two half periods are one
 SMOOTHING_WINDOW = 0.35  # half periods: a polynomial of degree 4 over it follows a sine to 3e-5 of its amplitude
 MAX_SAMPLES_PER_HALF_PERIOD = 200  # more add no precision to a turning point: a denser record is averaged
 GAP = 0.8  # of a half period without a sample may hide a turning point
 MIN_GAP_SAMPLES = 3.0  # median intervals: a sparse record has no gaps between all of its samples
+MIN_SEGMENT = 8  # samples between gaps
 MIN_TURNING_POINTS = 3  # two amplitudes and the rest position
-ENOUGH_TURNING_POINTS = 6  # a segment before a gap is used if it has as many
-MIN_HALF_PERIOD = 0.5  # of the median: faster reversals are ringing of the smoothed copy at a release
 MIN_SPACING, MAX_SPACING = 0.65, 1.5  # times the interval before: outside, the motion is lost in noise or disturbed
-LATE_RELEASE = 1.2  # half periods before the first turning point: the body was held before
-EARLY_RELEASE = 0.9  # half periods before the first turning point: released shortly before
-PARTIAL_SWING = 0.25  # of a half cycle: a record that begins farther from a turning point begins within the motion
-MIN_EXTRAPOLATED = 2.0  # rad: the start of a pendulum beyond it, near its upper rest, is not extrapolated
-GROWTH_ERRORS, GROWTH = 8.0, 1.001  # standard errors and ratio of the last amplitude to the first: it is driven
 
 # --- Free decay within a record (window.py) ---
-SPECTRUM_SAMPLES = 65_536  # of the spectrum that suggests half periods
-MIN_SAMPLES_PER_PERIOD = 8.0  # of a half period from the spectrum: faster ones are noise
-SAME_PERIOD = 0.1  # relative difference below which two half periods are one
 MIN_SELECTED_TURNS = 7  # turning points: with fewer, a decay cannot be distinguished from other motions
 MIN_SWINGS = 4  # of a decay
+GROWTH_ERRORS, GROWTH = 8.0, 1.001  # standard errors and ratio of the last amplitude to the first: it is driven
 SMALL_GROWTH = 1.02  # ratio of neighbouring swings: the scatter of a disturbed decay
 SIGNIFICANT_LOSS = 4.0  # standard errors of the loss of all swings
 MIN_STEADY_SWINGS = 6  # of a drive before the decay
@@ -69,6 +64,15 @@ MIN_THINNED_SAMPLES = 5_000  # of a thinned record
 MIN_THINNED_PER_PERIOD = 64.0  # samples: their means differ by 1.3e-6 of the amplitude
 EVEN_INTERVALS = 1.05  # ratio of long to short intervals: with a larger one the times are uneven
 MAX_BLOCK_SPAN = 1.5  # times the median span of neighbouring blocks: a longer one has a gap
+
+# --- Turning points of the decay (extrema.py) ---
+ENOUGH_TURNING_POINTS = 6  # a segment before a gap is used if it has as many
+MIN_NOISY_RANGE = 12.0  # times the noise: a record with a smaller range is all noise
+MIN_HALF_PERIOD = 0.5  # of the median: faster reversals are ringing of the smoothed copy at a release
+LATE_RELEASE = 1.2  # half periods before the first turning point: the body was held before
+EARLY_RELEASE = 0.9  # half periods before the first turning point: released shortly before
+PARTIAL_SWING = 0.25  # of a half cycle: a record that begins farther from a turning point begins within the motion
+MIN_EXTRAPOLATED = 2.0  # rad: the start of a pendulum beyond it, near its upper rest, is not extrapolated
 
 # --- Fit of the signal (fit_problem.py) ---
 MODEL_ACCURACY = 1e-9  # relative to the motion: truncation error of the series, below which no fit is better

@@ -13,7 +13,8 @@ import numpy as np
 from ...errors import HarnessError
 from ...records.record import Record
 from . import thresholds
-from .extrema import estimate_half_period, estimate_noise, gapless_slices, remove_spikes, smooth_motion
+from .sample_noise import estimate_noise, remove_spikes
+from .smooth_motion import are_regular, half_periods, smooth_segments
 
 
 @dataclass(frozen=True)
@@ -53,8 +54,7 @@ class Swings:
     @property
     def is_regular(self) -> np.ndarray:
         """Whether each swing (n,) but the first takes about as long as the one before."""
-        ratio = self.duration[1:] / self.duration[:-1]
-        return np.concatenate([[True], (ratio > thresholds.MIN_SPACING) & (ratio < thresholds.MAX_SPACING)])
+        return are_regular(self.duration)
 
     def loss(self, first: int, last: int) -> tuple[float, float]:
         """Return the share that the swings lose from the first to the last, and its standard error."""
@@ -88,6 +88,11 @@ class Decay:
         return float(self.swings.t[self.last + 1])
 
     @property
+    def half_period(self) -> float:
+        """Half period in s."""
+        return float(np.median(self.swings.duration[self.first : self.last + 1]))
+
+    @property
     def weight(self) -> float:
         """How much the decay says about the losses: long, large and deep decays say most."""
         first, last = float(self.swings.size[self.first]), float(self.swings.size[self.last])
@@ -102,16 +107,16 @@ def select_decay(record: Record, pendulum: bool) -> tuple[Record, float]:
     Raises
     ------
     HarnessError
-        If the turning points are those of another motion.
+        If the record does not move, or its turning points are those of another motion.
     """
     if not np.ptp(record.x) > 0:
-        return record, 0.0
+        raise HarnessError(f"{record.name} does not move: every value is {record.x[0]:.6g} {record.unit}")
     measured = remove_spikes(record)
     noise, _ = estimate_noise(measured.t, measured.x)
     periods = half_periods(measured, noise)
     # the angular acceleration of a pendulum has two peaks per half cycle at large amplitudes: no window is searched
     if pendulum and record.order == 2:
-        return record, min(periods)
+        return record, periods[0]
     best: Decay | None = None
     motions: list[Swings] = []
     for period in periods:
@@ -124,42 +129,18 @@ def select_decay(record: Record, pendulum: bool) -> tuple[Record, float]:
             break
     if motions:
         check_motion(record, motions[0] if best is None else best.swings, best, pendulum)
-    return (record, min(periods)) if best is None else (crop(record, best), best.swings.half_period)
-
-
-def half_periods(record: Record, noise: float) -> list[float]:
-    """Return different half periods that the record may have: of its reversals, and of its slow and fast spectrum."""
-    result = [estimate_half_period(record, noise, float(np.ptp(record.x)))]
-    n = min(len(record.t), thresholds.SPECTRUM_SAMPLES)
-    t = np.linspace(record.t[0], record.t[-1], n)
-    x = np.interp(t, record.t, record.x)
-    x = (x - np.polyval(np.polyfit(t - t[0], x, 1), t - t[0])) * np.hanning(n)
-    frequencies, power = np.fft.rfftfreq(4 * n, t[1] - t[0]), np.abs(np.fft.rfft(x, 4 * n)) ** 2
-    power[frequencies < 2 / (t[-1] - t[0])] = 0.0
-    for derivative in range(3):
-        peak = float(frequencies[np.argmax(power * frequencies ** (2 * derivative))])
-        if (
-            thresholds.MIN_SAMPLES_PER_PERIOD * peak * (t[-1] - t[0]) < len(record.t)
-            and peak > 0
-            and all(abs(2 * peak * other - 1) > thresholds.SAME_PERIOD for other in result)
-        ):
-            result.append(0.5 / peak)
-    return result
+    return (record, periods[0]) if best is None else (crop(record, best), best.half_period)
 
 
 def measure_swings(record: Record, half_period: float, noise: float, pendulum: bool) -> Swings | None:
     """Return the swings of a record with this half period; None if it has too few turning points."""
-    span = float(np.ptp(record.x))
     motions = []
-    for part in gapless_slices(record, half_period):
-        motion = smooth_motion(record, part, half_period, noise, span, pendulum)
-        if motion is not None:
-            i, edge = motion.reversals, motion.width // 2  # at a gap, a swing is cut
-            is_whole = ((i > edge) | (part.start == 0)) & (
-                (i < len(motion.y) - 1 - edge) | (part.stop == len(record.t))
-            )
-            motions.append(replace(motion, reversals=i[is_whole]))
-    motions = [motion for motion in motions if len(motion.reversals) > 1]
+    for motion in smooth_segments(record, half_period, noise, pendulum):
+        i, edge = motion.reversals, motion.width // 2  # at a gap, a swing is cut
+        is_after = (i > edge) | (motion.begin == record.t[0])
+        is_before = (i < len(motion.y) - 1 - edge) | (motion.end == record.t[-1])
+        if (is_after & is_before).sum() > 1:
+            motions.append(replace(motion, reversals=i[is_after & is_before]))
     if sum(len(motion.reversals) for motion in motions) < thresholds.MIN_SELECTED_TURNS:
         return None
     turns = [motion.refine(motion.reversals) for motion in motions]

@@ -1,7 +1,7 @@
 """Estimates of `decay` and of `fit`: values with standard errors and 95 % intervals, and the JSON that both share."""
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -38,6 +38,10 @@ class Estimate:
     high: float
     unit: str
     text: str
+
+    def widen(self, error: float, *values: float) -> "Estimate":
+        """Return this estimate with at least this standard error, and with an interval that contains the values."""
+        return replace(self, error=max(self.error, error), low=min(self.low, *values), high=max(self.high, *values))
 
     def multiply(self, factor: float, name: str, unit: str, text: str, relative_error: float = 0.0) -> "Estimate":
         """Return this estimate multiplied by a `factor` that has a relative standard error of its own."""

@@ -78,9 +78,9 @@ class DecayResult(Result, DecayIdentification):
             "swings": [asdict(estimate) for estimate in self.swing_estimates],
             "low_speed_rise": {
                 "shown": self.rise.is_shown,
-                "size": self.rise.size * problem.scale,
+                "size": self.rise.size,
                 "relative_speed": self.rise.speed,
-                "limit": self.rise.limit * problem.scale,
+                "limit": self.rise.limit if np.isfinite(self.rise.limit) else None,
                 "unit": record.base,
             }
             if self.rise
