@@ -87,7 +87,7 @@ def decay(
       a phone on a spring:    friction-fmus decay "Raw Data.csv" --m 0.35
       a spreadsheet:          friction-fmus decay swing.xlsx --column "laser (mm)" --k 157.9
       a pendulum's encoder:   friction-fmus decay swing.txt --pendulum --per-count 0.36deg --headings t,count
-      standard input:         zcat swing.gz | friction-fmus decay - --unit mm --from 2.5
+      standard input:         zcat swing.gz | friction-fmus decay - --unit mm --begin 2.5
       a scene:                friction-fmus decay coulomb
     """
     from ..analyses.decay.estimates import KnownParameters

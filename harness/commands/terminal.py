@@ -151,8 +151,12 @@ TIME_UNIT_OPTION = click.option(
 RATE_OPTION = click.option(
     "--rate", type=POSITIVE, metavar="HZ", help="Sampling rate in Hz, which replaces the times in the file."
 )
-BEGIN_OPTION = click.option("--from", "begin", type=FINITE, help="Ignore samples before this time in s.")
-END_OPTION = click.option("--until", "end", type=FINITE, help="Ignore samples after this time in s.")
+BEGIN_OPTION = click.option(
+    *("--begin", "--from", "begin"), cls=RenamedOption, type=FINITE, help="Ignore samples before this time in s."
+)
+END_OPTION = click.option(
+    *("--end", "--until", "end"), cls=RenamedOption, type=FINITE, help="Ignore samples after this time in s."
+)
 RUN_OPTIONS = (
     click.option("--stop", type=FINITE, help="Stop time in s. Default: that of the FMU."),
     click.option(

@@ -122,7 +122,7 @@ def parse_curve(table: Table, columns: CurveColumns, name: str) -> CurveRecord:
     if is_position and t is None:
         raise SceneError(f"{motion.heading} is a position: {no_time_message(table)}")
     if t is None and columns.time.interval != (-np.inf, np.inf):
-        raise SceneError("begin and end (--from and --until) have no effect on points without times")
+        raise SceneError("begin and end have no effect on points without times")
     complete = np.isfinite(x) & np.isfinite(y) & (np.isfinite(t) if t is not None else True)
     rows = np.flatnonzero(complete)
     missing = len(x) - len(rows)

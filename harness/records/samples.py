@@ -219,7 +219,7 @@ def leave_out_saturated(record: Record) -> Record:
         return record
     note = (
         f"The sensor was saturated: {int(is_saturated.sum())} of {len(x)} samples, in {peaks} peaks, are exactly "
-        f"{' or '.join(levels)} {record.unit}. They are left out; --from selects the record after them."
+        f"{' or '.join(levels)} {record.unit}. They are left out; --begin selects the record after them."
     )
     return replace(record, t=record.t[~is_saturated], x=x[~is_saturated], notes=(*record.notes, note))
 

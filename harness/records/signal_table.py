@@ -231,7 +231,7 @@ def check_input(table: Table, signal: str, heading: str, t: np.ndarray, x: np.nd
         row, lacking = table.line + 1 + first + int(gaps[0]), "value" if np.isfinite(t[gaps[0]]) else "time"
         raise SceneError(
             f"{table.name}: {heading}, the input {signal}, has no {lacking} in row {row}: fill the gap, or select a "
-            "part without gaps by --from and --until"
+            "part without gaps by --begin and --end"
         )
     doubled = np.flatnonzero((np.diff(t) == 0) & (np.diff(x) != 0))
     if len(doubled):

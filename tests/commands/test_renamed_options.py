@@ -16,6 +16,8 @@ RENAMED = [  # a command with its arguments, an option and its former spellings
     ("sweep m --vary c=1,2", "--samples=7", "--random=7"),
     ("sweep m --vary c=1,2", "--measures=final", "--measure=final"),
     ("fit m a.csv", "--set=k=3", "--fixed=k=3"),
+    *((command, "--begin=2", "--from=2") for command in ("fit m a.csv", "decay a.csv", "curve a.csv")),
+    *((command, "--end=2", "--until=2") for command in ("fit m a.csv", "decay a.csv", "curve a.csv")),
     *((command, "--headings=t,x", "--columns=t,x") for command in ("fit m a.csv", "decay a.csv")),
     ("decay a.csv", "--column=laser", "--position=laser"),
 ]

@@ -27,7 +27,7 @@ COMMANDS = {  # that take seconds, and the folders of their results
     "run": (("run", "coulomb"), "coulomb"),
     "run --fmu": (("run", "--fmu", "fmus/coulomb.fmu", "--set", "f=0.25"), "coulomb"),
     "compare": (("compare", "fmus/coulomb.fmu", "fmus/smd.fmu"), "compare/coulomb-smd"),
-    "decay": (("decay", "coulomb", "--no-drag", "--until", "2"), "decay/coulomb"),
+    "decay": (("decay", "coulomb", "--no-drag", "--end", "2"), "decay/coulomb"),
     "sweep": (("sweep", "coulomb", "--vary", "f=0.25,0.5", "--workers", "1", "--name", "f"), "sweep/f"),
 }
 DRAWN = "decay/coulomb"  # the others are not drawn; test_figures.py checks that the same drawing gives the same file
@@ -246,7 +246,7 @@ def test_a_result_with_other_values_is_not_replaced_silently(workspace):
     ("arguments", "older", "newer", "had"),
     [
         (("run", "--fmu", "fmus/coulomb.fmu"), ("--set", "f=0.25"), ("--set", "f=0.5"), "f = 0.25 N"),
-        (("decay", "swing.csv"), (), ("--no-drag", "--until", "1.5"), "drag, no end"),
+        (("decay", "swing.csv"), (), ("--no-drag", "--end", "1.5"), "drag, no end"),
         (("compare", "fmus/coulomb.fmu", "smd"), ("--stop", "2"), (), "stop = 2.0"),
         (("sweep", "smd", *ONCE), ("--set", "m=2"), (), "m = 2.0 kg"),
     ],

@@ -15,7 +15,7 @@ ROOT = Path(__file__).parents[2]
 VARIABLE = "FRICTION_FMUS_RECORDS"
 RECORD = "pendulum_multiarm.csv"
 ORIGINAL = "SingleDataFreeSwing_1_Dt_0_0001.mat"
-COMMAND = f"decay {ORIGINAL} --time Theta1.time --column Theta1.signals --unit rad --until 68"
+COMMAND = f"decay {ORIGINAL} --time Theta1.time --column Theta1.signals --unit rad --end 68"
 
 
 def missing(name):

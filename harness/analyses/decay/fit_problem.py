@@ -89,7 +89,7 @@ class FitProblem:
             raise FitError(
                 f"has only {len(problem.t)} samples in a row that follow the free decay of one oscillator, and "
                 f"{MIN_SAMPLES} are needed",
-                "sample finer, or select the free decay with --from and --until",
+                "sample finer, or select the free decay with --begin and --end",
             )
         return problem
 
@@ -229,7 +229,7 @@ class FitError(HarnessError):
     The text continues a sentence that starts with the name of the record; `advice` says what to do.
     """
 
-    def __init__(self, text: str, advice: str = "select the free decay with --from and --until") -> None:
+    def __init__(self, text: str, advice: str = "select the free decay with --begin and --end") -> None:
         super().__init__(text)
         self.advice = advice
 

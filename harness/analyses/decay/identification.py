@@ -219,7 +219,7 @@ def suggest_remedy(record: Record, parameters: KnownParameters, drag: bool, drif
     if parameters.pendulum and record.order == 2:
         return (
             "beyond 90 degrees the angular acceleration of a pendulum has two peaks per half cycle: record the angle "
-            "or the angular velocity, or leave out the large amplitudes with --from"
+            "or the angular velocity, or leave out the large amplitudes with --begin"
         )
     if not drift:
         with suppress(HarnessError):

@@ -22,7 +22,7 @@ def check_fit(
     e, _ = problem.residuals(full.p, full.terms)
     share = uncertainty.rms / problem.signal_rms
     if share > thresholds.NOT_A_DECAY and uncertainty.rms > thresholds.NOT_NOISE * problem.noise:
-        advice = "cut the record there with --from or --until"
+        advice = "cut the record there with --begin or --end"
         if record.base == "rad" and not pendulum:
             advice = "add --pendulum if it is a pendulum, or " + advice
         raise FitError(

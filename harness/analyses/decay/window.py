@@ -251,7 +251,7 @@ def check_motion(record: Record, swings: Swings, best: Decay | None, pendulum: b
                 f"{name} beats: its swings fall to {size[rise[0]]:.3g} {unit} at "
                 f"t = {record.format_time(swings.t[rise[0]])} s and rise again to {size[rise[1]]:.3g} {unit} at "
                 f"t = {record.format_time(swings.t[rise[1]])} s, as those of two modes or of a drive do; fit a model "
-                "with both by friction-fmus fit, or select a decay of one mode with --from and --until"
+                "with both by friction-fmus fit, or select a decay of one mode with --begin and --end"
             )
         return
     if len(regular) < thresholds.MANY_SWINGS:
@@ -293,19 +293,19 @@ def describe_shape(record: Record, swings: Swings, part: slice, shape: float) ->
         slow, fast = ("rises", "falls") if up > down else ("falls", "rises")
         return (
             f"{record.name} {slow} {ratio:.1f} times as long as it {fast}, as in stick-slip, and is no decay: use "
-            "friction-fmus fit stickslip, or select a free decay with --from and --until"
+            "friction-fmus fit stickslip, or select a free decay with --begin and --end"
         )
     spread = 100 * duration_spread(duration)
     if spread > 100 * thresholds.IRREGULAR:
         return (
             f"{record.name} is not one oscillation: the times between its turning points vary by {spread:.0f} %, as in "
-            "noise or stick-slip; filter the record, select a free decay with --from and --until, or use "
+            "noise or stick-slip; filter the record, select a free decay with --begin and --end, or use "
             "friction-fmus fit stickslip"
         )
     return (
         f"{record.name} is no free decay: {100 * shape:.0f} % of the power of its cycles is no wave, as in relaxation "
         "oscillations, stick-slip or several modes; use friction-fmus fit stickslip for a driven motion, or select a "
-        "free decay with --from and --until"
+        "free decay with --begin and --end"
     )
 
 
@@ -348,6 +348,6 @@ def crop(record: Record, best: Decay) -> Record:
     others = [other for other in find_decays(swings) if other.first > best.last or other.last < best.first]
     if rivals := [other for other in others if other.weight > thresholds.RIVAL * best.weight]:
         spans = ", ".join(f"{t(other.begin)} to {t(other.end)}" for other in rivals)
-        note += f" The record also decays from t = {spans} s: select a part with --from and --until."
+        note += f" The record also decays from t = {spans} s: select a part with --begin and --end."
     cropped = record.select(begin, end)
     return replace(cropped, notes=(*record.notes, note))
