@@ -24,13 +24,16 @@ if TYPE_CHECKING:
     from .analyses.fit.parameter_fit import ParameterFit
     from .records.record import Record
     from .running.fmu_variables import FmuDescription
-    from .running.signals import Signals
+    from .running.signals import ModeChanges, Signals
     from .running.trajectory import Trajectory
     from .studies.compare.difference import Comparison
     from .studies.compare.result import ComparisonResult
+    from .studies.coupled.result import CoupledResult
     from .studies.curve.result import CurveResult
     from .studies.decay.result import DecayResult
     from .studies.fit.result import FitResult
+    from .studies.precision.result import PrecisionResult
+    from .studies.stability.result import StabilityResult
     from .studies.sweep.result import SweepResult
 
     __version__: str
@@ -39,6 +42,7 @@ if TYPE_CHECKING:
 __all__ = [
     "Comparison",
     "ComparisonResult",
+    "CoupledResult",
     "CurveIdentification",
     "CurveResult",
     "DecayIdentification",
@@ -46,10 +50,13 @@ __all__ = [
     "FitResult",
     "FmuDescription",
     "HarnessError",
+    "ModeChanges",
     "ParameterFit",
+    "PrecisionResult",
     "Record",
     "SceneError",
     "Signals",
+    "StabilityResult",
     "SweepResult",
     "Trajectory",
     "__version__",
@@ -68,15 +75,19 @@ __all__ = [
 TYPES = {
     "Comparison": "harness.studies.compare.difference",
     "ComparisonResult": "harness.studies.compare.result",
+    "CoupledResult": "harness.studies.coupled.result",
     "CurveIdentification": "harness.analyses.curve.identification",
     "CurveResult": "harness.studies.curve.result",
     "FitResult": "harness.studies.fit.result",
     "FmuDescription": "harness.running.fmu_variables",
     "DecayIdentification": "harness.analyses.decay.identification",
     "DecayResult": "harness.studies.decay.result",
+    "ModeChanges": "harness.running.signals",
     "ParameterFit": "harness.analyses.fit.parameter_fit",
+    "PrecisionResult": "harness.studies.precision.result",
     "Record": "harness.records.record",
     "Signals": "harness.running.signals",
+    "StabilityResult": "harness.studies.stability.result",
     "SweepResult": "harness.studies.sweep.result",
     "Trajectory": "harness.running.trajectory",
 }

@@ -25,13 +25,12 @@ running: embedded_model fmu_archive native_equivalent resolve runner signals
 running.external: step_refinement
 scenes: run_spec scene
 scenes.coupled: scene
-studies.compare: difference trajectory_files
+studies.compare: trajectory_files
 studies.coupled: engine result study
 studies.fit: laws options request study
 studies.precision: advice figure law_deviations method_choice result study table
 studies.run: study table
 studies.stability: cases outcomes result study table
-studies.sweep: boundaries checkpoint figure measures result_files runner sampling study worker
 """
 
 

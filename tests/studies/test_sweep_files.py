@@ -1,56 +1,60 @@
 """The file of a sweep, the scales of its map, and its boundaries."""
 
 import ast
+import re
+import tomllib
 import tracemalloc
-from pathlib import Path
+from types import SimpleNamespace
 from zipfile import ZipFile
 
+import external_fmus
 import numpy as np
 import pytest
 from build_cache import ROOT
+from matplotlib.figure import Figure
 from models import MODELS
-from sweep_results import open_sweep, xarray
+from sweep_results import open_sweep
 
-from harness import HarnessError
-from harness.running.fmu_archive import read_description
-from harness.scenes.run_spec import RunSpec
-from harness.studies.sweep import figure
-from harness.studies.sweep import result_files as writing
-from harness.studies.sweep.boundaries import Boundary, read_boundaries
-from harness.studies.sweep.checkpoint import RunBlock
-from harness.studies.sweep.runner import SweepSpec
-from harness.studies.sweep.sampling import SweepPoints, parse_axis
-from harness.studies.sweep.study import Sweep
+import harness
+
+BOUNDARIES = "documentation/boundaries.toml"
 
 
-def test_memory_use_does_not_grow_with_the_number_of_runs(monkeypatch, tmp_path):
-    """The parts of a sweep that handle every run, with ten times as many of them."""
-    monkeypatch.setattr(figure, "draw", lambda *arguments: None)
-    monkeypatch.setattr(writing, "CHUNK_SIZE", "40 KiB")
-    peaks = []
-    for n_points in (20, 200):
-        axes = parse_axis(f"a=0:1:{n_points}", False), parse_axis("b=0:1:100", False)
-        sweep = Sweep(SweepSpec(RunSpec(Path("many.fmu")), ("a", "b")), SweepPoints(axes), b"", 1)
-        labels = dict.fromkeys(("a", "b"), ("m", ""))
-        about = writing.SweepDescription(labels, (writing.MeasureColumn("c", "s", "some"),), {}, 1.0, ())
-        folder = tmp_path / str(n_points)
-        folder.mkdir()
-        tracemalloc.start()
-        checkpoint = sweep.checkpoint(folder)
-        with checkpoint.open():
-            for first in range(0, len(sweep.points), 200):
-                checkpoint.add(
-                    RunBlock(first, sweep.points.coordinates(first, first + 200)[:, :1], {3: f"failed at {first}"})
-                )
-        (failure,) = writing.write_files(sweep, checkpoint, about, folder)
+def fake_runs(points, runs, digest, fmu):
+    """Return the points as values of their runs, the last of which fails."""
+    messages = {len(points) - 1: f"failed at {points[0, 0]}"}
+    return SimpleNamespace(values=points[:, [0, 0, 1]], messages=messages, seconds=1e-3 * len(points))
+
+
+def test_memory_use_does_not_grow_with_the_number_of_runs(fmus, monkeypatch, tmp_path):
+    """The parts of a sweep that handle every run, with ten times as many of them; the data are not loaded."""
+    monkeypatch.setattr("harness.studies.sweep.result_files.CHUNK_SIZE", "40 KiB")
+    monkeypatch.setattr("harness.studies.sweep.study.run_block", fake_runs)
+    monkeypatch.setattr("harness.studies.sweep.result.SweepResult.data", None)
+    peaks, k = [], np.linspace(1.0, 2.0, 100)
+    for n_points in (2, 20, 200):
+        if n_points > 2:  # the first one imports packages
+            tracemalloc.start()
+        m = np.linspace(1.0, 2.0, n_points)
+        result = harness.sweep(fmus / "smd.fmu", {"m": m, "k": k}, stop=0.01, folder=tmp_path / f"{n_points}")
         peaks.append(tracemalloc.get_traced_memory()[1])
         tracemalloc.stop()
-        assert failure.runs == len(sweep.points) // 200
-        data = open_sweep(folder)
-        assert (data["c"] == data["a"]).all()
-        assert (data["error"] != "").sum() == failure.runs
-        assert data["error"].to_numpy().ravel()[203] == "failed at 200"
-    assert peaks[1] < 1.5 * peaks[0]
+        data = open_sweep(result.folder)
+        assert (data["final_x"] == data["m"]).all()
+        assert (data["error"] != "").sum() == result.failed > 1
+        assert result.runs == 100 * n_points
+    assert peaks[2] < 1.5 * peaks[1]
+
+
+@pytest.fixture(autouse=True)
+def no_figure(monkeypatch):
+    """Save sweeps without their figure, which takes most of the time of a short one."""
+    monkeypatch.setattr("harness.studies.sweep.figure.draw", lambda *arguments: None)
+
+
+@pytest.fixture(scope="module")
+def short_sweep(fmus):
+    return harness.sweep(fmus / "smd.fmu", {"m": [1.0, 2.0, 3.0]}, stop=0.01)
 
 
 @pytest.mark.parametrize(
@@ -61,34 +65,56 @@ def test_memory_use_does_not_grow_with_the_number_of_runs(monkeypatch, tmp_path)
         ((1.0, 50.0, 99.0), "linear", "linear"),
         ((0.0, 1.0, 1000.0), "linear", "linear"),
         ((np.nan, 1.0, 1000.0), "linear", "log"),
-        ((np.nan, np.nan), "linear", "linear"),
+        ((np.nan, np.nan, np.nan), "linear", "linear"),
     ],
 )
-def test_an_axis_spanning_decades_is_logarithmic(values, spread, kind):
-    data = xarray.Dataset({"a": ("n", np.array(values), {"scale": spread})})
-    assert figure.axis_scale(data, "a") == kind
+def test_an_axis_spanning_decades_is_logarithmic(short_sweep, values, spread, kind):
+    """That of a parameter, and that of a measure."""
+    replaced = {"final_x": ("m", np.array(values), short_sweep["final_x"].attrs | {"scale": spread})}
+    if np.isfinite(values).all():
+        replaced |= {"m": ("m", np.array(values), short_sweep["m"].attrs | {"scale": spread})}
+    short_sweep.dataset = short_sweep.data.assign(replaced)
+    axes = Figure().subplots()
+    short_sweep.draw_panel(axes)
+    assert axes.get_yscale() == kind
+    assert "m" not in replaced or axes.get_xscale() == kind
 
 
 @pytest.mark.parametrize("name", MODELS)
 def test_known_boundaries_are_packed_in_the_fmu_and_depend_on_its_parameters(fmus, name):
-    """At its own values each quantity is a number, and its dependencies are declared."""
-    values = {
-        variable.name: float(variable.start)
-        for variable in read_description(fmus / f"{name}.fmu").modelVariables
-        if variable.causality == "parameter" and variable.type == "Real"
-    }
-    boundaries = read_boundaries(fmus / f"{name}.fmu", tuple(values), {})
-    assert boundaries
-    for item in boundaries:
-        assert item.parameters <= set(values)
+    """At its own values each quantity is a number; a sweep of one of its parameters shows it."""
+    fmu = fmus / f"{name}.fmu"
+    values = {item.name: item.start for item in harness.describe(fmu).variables if item.causality == "parameter"}
+    with ZipFile(fmu) as archive:
+        packed = tomllib.loads(archive.read(BOUNDARIES).decode())["boundaries"]
+    shown = {}
+    for table in packed:
+        name = next(name for name in re.findall(r"[A-Za-z]\w*", table["quantity"]) if name in values)
+        if table["text"] not in shown:
+            grid = {name: [0.99 * values[name]]}
+            shown |= {item.text: item for item in harness.sweep(fmu, grid, stop=0.01).boundaries}
+    assert {*shown} == {table["text"] for table in packed}
+    for item in shown.values():
+        assert item.parameters <= {*values}
         assert np.isfinite(item.evaluate(values, 1.0))
 
 
-def test_the_quantity_of_a_boundary_has_the_value_of_its_arithmetic():
-    values = {"c": np.array([1.0, 2.0]), "k": 9.0, "m": 4.0}
-    quantity = Boundary("", " -(c - 5e-1) / (2*sqrt(k*m)) + abs(-3)*cos(0)*t", "")
-    assert quantity.parameters == {"c", "k", "m"}
-    assert quantity.evaluate(values, 7.0) == pytest.approx([21 - 0.5 / 12, 21 - 1.5 / 12], rel=1e-15)
+def bounded(fmus, folder, quantity):
+    """Return an FMU with one boundary."""
+    text = f'[[boundaries]]\ntext = "a boundary"\nbelow = "below"\nquantity = "{quantity}"\n'
+    return external_fmus.edited_copy(fmus / "smd.fmu", folder / "odd.fmu", {BOUNDARIES: text})
+
+
+def test_a_boundary_is_drawn_where_its_arithmetic_is_1(fmus, tmp_path):
+    """It is 3 t - (c - 1/2)/12, which is 1 at c = 2.9 and less above."""
+    fmu = bounded(fmus, tmp_path, " -(c - 5e-1) / (2*sqrt(k*m)) + abs(-3)*cos(0)*t")
+    sweep = harness.sweep(fmu, {"c": [0.0, 1.0, 4.0]}, values={"k": 9.0, "m": 4.0}, stop=0.4)
+    axes = Figure().subplots()
+    sweep.draw_panel(axes)
+    ((at, _),) = [line.get_xdata() for line in axes.lines if line.get_label() == "a boundary"]
+    assert at == pytest.approx(2.9, abs=4.0 / 399)
+    (shade,) = axes.collections
+    assert shade.get_paths()[0].get_extents().intervalx == pytest.approx([at, 4.0])
 
 
 def test_no_text_is_run_as_python():
@@ -129,9 +155,6 @@ BEYOND += [
 
 
 @pytest.mark.parametrize("quantity", BEYOND)
-def test_a_boundary_beyond_arithmetic_is_refused(tmp_path, quantity):
-    with ZipFile(tmp_path / "odd.fmu", "w") as archive:
-        table = f'[[boundaries]]\ntext = "a"\nbelow = "b"\nquantity = "{quantity}"\n'
-        archive.writestr("documentation/boundaries.toml", table)
-    with pytest.raises(HarnessError, match=r"odd\.fmu: documentation/boundaries\.toml is invalid"):
-        read_boundaries(tmp_path / "odd.fmu", ("m",), {})
+def test_a_boundary_beyond_arithmetic_is_refused(fmus, tmp_path, quantity):
+    with pytest.raises(harness.HarnessError, match=r"odd\.fmu: documentation/boundaries\.toml is invalid"):
+        harness.sweep(bounded(fmus, tmp_path, quantity), {"m": [1.0]}, stop=0.01)

@@ -13,12 +13,12 @@ import sys
 import tempfile
 import warnings
 from pathlib import Path
+from unittest.mock import patch
 
 import numpy as np
 import pandas
 
 import harness
-from harness.studies.fit import study
 
 VALUES = {
     "0": 0,
@@ -111,7 +111,8 @@ def answer(folder, connection):
     os.chdir(tempfile.mkdtemp(dir=folder))
     Path("fmus").symlink_to(Path(folder) / "fmus")
     os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
-    study.fit_records, study.native_equivalent = begin_search, lambda fmu: fmu
+    patch("harness.studies.fit.study.fit_records", begin_search).start()
+    patch("harness.studies.fit.study.native_equivalent", lambda fmu: fmu).start()
     while True:
         connection.send(call(*connection.recv()))
 
