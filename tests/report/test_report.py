@@ -11,9 +11,6 @@ import web_page
 from build_cache import ROOT, build_user_model, run_published_cases
 from commands import harness
 
-from harness import HarnessError
-from harness.report.sections import read_picture
-
 EMPTY = {"meta", "link", "img", "br"}
 
 
@@ -150,11 +147,15 @@ def test_a_report_with_only_users_models_begins_with_them(tmp_path):
     assert "the checks of this project" not in page
 
 
-@pytest.mark.parametrize("text", ["", "<svg><g>", "<svg></svg><g>", "</svg>"])
-def test_a_figure_that_is_cut_off_is_not_shown(tmp_path, text):
-    (tmp_path / "figure.svg").write_text(text)
-    with pytest.raises(HarnessError, match=r"figure\.svg is not a complete SVG drawing"):
-        read_picture(tmp_path / "figure.svg")
+def test_a_figure_that_is_cut_off_is_not_shown(tmp_path, report_run):
+    texts = "", "<svg><g>", "<svg></svg><g>", "</svg>"
+    (source,) = (report_run[0] / "results/compare").iterdir()
+    for i, text in enumerate(texts):
+        shutil.copytree(source, tmp_path / f"results/{i}")
+        (tmp_path / f"results/{i}/figure.svg").write_text(text)
+    assert harness(tmp_path, "report", "--quiet").returncode == 0
+    page = (tmp_path / "results/report.html").read_text(encoding="utf-8")
+    assert page.count("cannot be shown: figure.svg is not a complete SVG drawing") == len(texts)
 
 
 def test_without_results_there_is_no_report(tmp_path):

@@ -1,5 +1,6 @@
 """Work-precision diagrams: measurements, gaps and advice."""
 
+import json
 from dataclasses import replace
 from functools import partial
 from itertools import cycle
@@ -8,23 +9,20 @@ from pathlib import Path
 from time import sleep
 
 import commands
-import numpy as np
 import pytest
 from build_cache import build_user_model
 from matplotlib.figure import Figure
 from models import EXAMPLE_MODELS
-from precision_points import make_point
+from precision_points import make_point, make_study
 from spec_runs import ignore_progress
 
 from benchmarks.references import event_located
-from harness import HarnessError
+from harness import HarnessError, PrecisionResult
 from harness.references import peer_solvers
 from harness.references.certified_reference import compute_errors, load_reference, relative_errors
 from harness.references.models import CASES
-from harness.results.provenance import write_provenance
 from harness.running.embedded_model import EmbeddedModel, load_model_class, load_more_model, method_numbers
 from harness.studies.precision import advice, law_deviations
-from harness.studies.precision.figure import OTHER, draw
 from harness.studies.precision.study import (
     FMI3_TOOLS,
     FMPY,
@@ -32,7 +30,6 @@ from harness.studies.precision.study import (
     FULL,
     QUICK,
     SolverJob,
-    Study,
     SweepSettings,
     solver_jobs,
     study_model,
@@ -151,13 +148,12 @@ def test_the_advice_is_derived_from_the_points():
         make_point("ode23", 4e-3, 1e-9, FMPY),
         make_point("ode23", 1e-3, 1e-3, case="stickslip-threshold", beside_dry=5e-3),
     )
-    study = Study("stickslip", (CASE["stickslip"], CASE["stickslip-threshold"]), points)
+    study = make_study(*points, cases=("stickslip", "stickslip-threshold"))
     assert advice.recommend(study, []) == (
         "stickslip: use ode45: error 1e-6 in 2 ms at rtol 1e-6 (hybrid; relative run time at error 1e-6: ode23 4, "
         "scipy RK45 140); the law 'threshold' does not get below an error of 0.005 against stick and slip."
     )
-    empty_study = Study("stickslip", (CASE["stickslip"],), points[:1])
-    assert advice.recommend(empty_study, []) == "stickslip: no method of the FMU reaches an error of 1e-6."
+    assert advice.recommend(make_study(points[0]), []) == "stickslip: no method of the FMU reaches an error of 1e-6."
 
 
 def test_a_figure_labels_three_solvers_per_case_and_draws_the_others_in_grey():
@@ -172,7 +168,7 @@ def test_a_figure_labels_three_solvers_per_case_and_draws_the_others_in_grey():
         make_point("ode23", 1e-3, 1e-3, case="stickslip-threshold", beside_dry=5e-3),
     )
     figure = Figure()
-    draw(Study("stickslip", (CASE["stickslip"], CASE["stickslip-threshold"]), points), [], figure)
+    PrecisionResult(make_study(*points, cases=("stickslip", "stickslip-threshold")), (), "").draw(figure)
     panels = figure.get_axes()
     assert [text.get_text() for text in panels[1].get_legend().get_texts()] == [
         "FMU: ode45",
@@ -183,7 +179,7 @@ def test_a_figure_labels_three_solvers_per_case_and_draws_the_others_in_grey():
         labelled = {line.get_color() for line in axes.lines if not line.get_label().startswith("_")}
         others = {line.get_color() for line in axes.lines if line.get_label().startswith("_")}
         assert len(labelled) == 3
-        assert others == {OTHER["color"]}
+        assert others == {"#cccccc"}
     assert [len(axes.lines) for axes in panels] == [7, 6]  # fmpy evaluates as often as the FMU itself
 
 
@@ -192,19 +188,21 @@ def test_no_advice_is_given_without_sufficient_evidence():
     own, slower = make_point("rodas", 2e-3, 1e-7), make_point("ode23", 4e-3, 1e-7)
     message = "stickslip: no recommendation from a quick run; use `friction-fmus precision stickslip`."
     for peer, carried in ((1.7e-3, False), (2.5e-3, False), (4e-3, True)):
-        study = Study("stickslip", (CASE["stickslip"],), (own, slower, make_point("LSODA", peer, 1e-7, "scipy")))
+        study = make_study(own, slower, make_point("LSODA", peer, 1e-7, "scipy"))
         quick, complete = (advice.recommend(study, [], clear) for clear in (QUICK.min_ratio, FULL.min_ratio))
         assert (quick == complete) == carried
         assert carried or quick == message
         assert complete.startswith("stickslip: use rodas: ")
         assert ("scipy LSODA 0.85, not a method of the FMU" in complete) == (peer < own.seconds)
-    assert advice.recommend(Study("stickslip", (CASE["stickslip"],), ()), [], QUICK.min_ratio) == message
+    assert advice.recommend(make_study(), [], QUICK.min_ratio) == message
 
 
 def test_a_quick_run_does_not_replace_a_full_one(user_folder, tmp_path):
     folder = tmp_path / "precision/smd"
     folder.mkdir(parents=True)
-    write_provenance(folder, [])
+    origin = {"command": "precision smd", "date": "2026-11-27", "files": {}, "parameters": {}, "scene": None}
+    origin["source"] = ""
+    (folder / "provenance.json").write_text(json.dumps(origin))
     done = command(user_folder, "smd", "--quick", "--out", tmp_path)
     assert done.returncode == 1
     assert "choose another --out, or replace it with --overwrite" in done.stderr
@@ -242,13 +240,6 @@ def test_bristles_creep_and_each_law_has_a_smaller_integration_than_model_error(
         assert 1e-3 < deviation.rms < 0.1
         assert 0.0 < deviation.integration < 1e-4
         assert deviation.period == pytest.approx(dry.events[2][0] - dry.events[0][0], rel=0.02)
-
-
-def test_stuck_points_lie_between_a_stop_and_the_next_breakaway():
-    truth = load_reference("stickslip")
-    stuck = law_deviations.stuck_points(truth)
-    assert np.array_equal(stuck, truth.states[:, 1] == 0.0)
-    assert not law_deviations.stuck_points(load_reference("coulomb"))[1:].any()
 
 
 @pytest.mark.parametrize(

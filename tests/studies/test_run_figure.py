@@ -3,10 +3,7 @@
 import re
 import shutil
 import tomllib
-from contextlib import chdir
-from dataclasses import replace
 from functools import cache
-from pathlib import Path
 from unittest.mock import patch
 
 import commands
@@ -15,12 +12,8 @@ import pytest
 from build_cache import ROOT, build_user_model
 from matplotlib.figure import Figure
 from matplotlib.text import Text
-from spec_runs import ignore_progress
 
 import harness
-from harness.running import runner
-from harness.scenes.scene import load_scene
-from harness.studies.run.study import run_scene
 
 SCENES = {path.stem: tomllib.loads(path.read_text()) for path in sorted((ROOT / "harness/scenes").glob("*.toml"))}
 for name in "coulomb-stop", "pacejka-0.001":  # its figure is that of coulomb; it takes seconds
@@ -36,20 +29,15 @@ def draw(fmus, tmp_path_factory):
 
     @cache
     def draw(name):
-        figures, runs, run = [], [], runner.run
-
-        def save(figure, file, **options):
-            figures.append(figure)
-
-        def record(spec, report):
-            runs.append(run(spec, report))
-            return runs[-1]
-
-        scene = load_scene(name)
-        with chdir(folder), patch.object(Figure, "savefig", save), patch.object(runner, "run", record):
-            run_scene(replace(scene, run=replace(scene.run, repeat=1)), Path("results"), ignore_progress)
+        figures = []
+        scene = (ROOT / f"harness/scenes/{name}.toml").read_text()
+        (folder / f"{name}.toml").write_text(re.sub("repeat = .*", "", scene))
+        with patch.object(Figure, "savefig", lambda figure, *_, **__: figures.append(figure)):
+            done = commands.harness(folder, "run", f"{name}.toml")
+        assert (done.returncode, done.stderr) == (0, "")
         figures[0].draw_without_rendering()
-        return runs[0], {axes.get_title(loc="left"): axes for axes in figures[0].get_axes()}
+        run = harness.load_result(folder / "results" / name)
+        return run, {axes.get_title(loc="left"): axes for axes in figures[0].get_axes()}
 
     return draw
 
