@@ -1,11 +1,13 @@
 """Confidence intervals of nonnegative quantities, and of few samples."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scipy.stats import norm
 
+import harness
 from harness.analyses.decay.intervals import (
     N_DRAWS,
     confidence_interval,
@@ -13,7 +15,6 @@ from harness.analyses.decay.intervals import (
     nonnegative_interval,
     quasirandom_normal,
 )
-from harness.analyses.estimation.estimate import NORMAL_QUANTILE, Estimate
 
 REST, OMEGA, ZETA = 2, 4, 5  # in the order of the unknowns
 
@@ -99,7 +100,10 @@ def test_unconstrained_values_are_those_of_least_squares_with_a_negative_loss():
 
 
 def test_the_product_of_a_loss_and_an_uncertain_factor_is_not_negative():
-    force = Estimate("r", 1.0, 0.4, 0.2, 1.8, "m", "").multiply(2.0, "f", "N", "", relative_error=0.5)
+    t = np.linspace(0.0, 10.0, 301)
+    decay = harness.identify_decay(t, np.exp(-0.2 * t) * np.cos(6.0 * t), unit="m")
+    loss = replace(decay["zeta"], value=1.0, error=0.4, low=0.2, high=1.8)
+    force = loss.multiply(2.0, "f", "N", "", relative_error=0.5)
     assert (force.value, force.low) == (2.0, 0.0)
-    assert force.high == pytest.approx(2.0 + np.hypot(1.6, NORMAL_QUANTILE))
+    assert force.high == pytest.approx(2.0 + np.hypot(1.6, norm.ppf(0.975)))
     assert force.error == pytest.approx(np.hypot(0.8, 1.0))

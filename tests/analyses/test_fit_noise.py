@@ -1,16 +1,33 @@
 """Noise of measured records: the scatter, and the step of a quantiser."""
 
-from pathlib import Path
+from dataclasses import dataclass
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from harness.analyses.fit.measured_record import MeasuredRecord, RecordData
+from harness.analyses.fit.fit_problem import FitProblem, Unknown
+from harness.analyses.fit.fit_procedure import MeasuredRecord, RecordData, subdivide_inputs
 from harness.analyses.fit.noise import correlation_length, estimate_noise, significant_correlation
-from harness.scenes.run_spec import RunSpec
 
-SIMULATOR = SimpleNamespace(spec=RunSpec(Path()), prepare=lambda spec: None)  # is not run
+
+@dataclass
+class Spec:
+    """Settings of runs, of which a record changes all but the outputs."""
+
+    outputs: tuple[str, ...] = ("x",)
+    inputs: dict[str, np.ndarray] | None = None
+    start: float = 0.0
+    stop: float = 0.0
+    times: np.ndarray | None = None
+
+
+def prepare(spec):
+    """Return a function that returns a sine of 1 Hz with a given size."""
+    return lambda values: values["size"] * np.sin(2 * np.pi * spec.times)[:, None]
+
+
+SIMULATOR = SimpleNamespace(spec=Spec(), prepare=prepare)
 
 
 @pytest.mark.parametrize("levels", [[0, 151, 860, 909, 935], [0, 7, 8, 30]])
@@ -62,3 +79,14 @@ def test_the_known_noise_of_a_sample_is_that_of_a_mean_times_the_root_of_their_n
     record = MeasuredRecord(SIMULATOR, RecordData("record", t, np.sin(t)[:, None], {}, (0.3,)), binned=True)
     assert record.width > 1
     assert record.noise == pytest.approx(0.3 / record.width**0.5)
+
+
+def test_inputs_pass_through_all_samples_after_their_error_has_been_estimated():
+    t = np.linspace(0.0, 6.0, 6001)
+    force = np.random.default_rng(1).normal(size=len(t))
+    data = RecordData("record", t, np.sin(2 * np.pi * t)[:, None], {"F": force}, (1e-4,))
+    record = MeasuredRecord(SIMULATOR, data, binned=False)
+    problem = FitProblem([record], ["x"], [Unknown("size", "size", "m", 0.5, 2.0)], {})
+    subdivide_inputs(problem, np.zeros(1))
+    assert record.subdivision > 1
+    assert record.driven["F"][:: record.subdivision] == pytest.approx(force, abs=1e-9)

@@ -6,12 +6,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from harness.analyses.fit.feasible_region import FeasibleRegion
-from harness.analyses.fit.fit_problem import EXACT_STEPS, FitProblem
-from harness.analyses.fit.fit_procedure import extend_ends, starting_points
+from harness.analyses.fit.fit_problem import EXACT_STEPS, FeasibleRegion, FitProblem, Unknown
+from harness.analyses.fit.fit_procedure import Uncertainty, estimate_uncertainty, extend_ends, starting_points
 from harness.analyses.fit.profile_likelihood import depends_on_limits, profile_bound, search_bound
-from harness.analyses.fit.uncertainty import Uncertainty, estimate_uncertainty
-from harness.analyses.fit.unknowns import Unknown
 
 QUANTILE = 1.96  # for many residuals
 MINIMUM = np.array([1.0, 1.0])

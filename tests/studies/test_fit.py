@@ -1,14 +1,14 @@
 """fit: parameters of FMUs from drawn records and what a record does not determine."""
 
 import json
+from dataclasses import replace
 from math import isfinite
-from pathlib import Path
-from types import SimpleNamespace
 
 import build_cache
 import commands
 import numpy as np
 import pytest
+from fmpy import read_model_description
 from native_fmus import build_native_fmus, require_compiler
 from shared_keys import check_shared_keys
 
@@ -16,18 +16,8 @@ import harness
 from benchmarks.campaigns.drawn_records import GROUPS, draw_record
 from benchmarks.campaigns.fit_campaign import SOURCES
 from harness import HarnessError, SceneError
-from harness.analyses.fit.law_comparison import compare_laws
-from harness.analyses.fit.measured_record import RecordData
-from harness.analyses.fit.parameter_fit import information_criterion
-from harness.results.files import to_json
-from harness.running.fmu_archive import read_description
-from harness.running.variable_values import enumeration_labels
 from harness.running.whole_run import open_simulator
 from harness.scenes.run_spec import RunSpec
-from harness.studies.fit import study
-from harness.studies.fit.laws import resolve_laws
-from harness.studies.fit.options import parse_starts
-from harness.studies.fit.request import FitRequest, make_unknowns, resolve_request
 
 pytestmark = pytest.mark.usefixtures("in_workspace")
 
@@ -47,9 +37,8 @@ def native(model):
 def pull(outputs=("x",), values=TRUTH, t=T, noise=0.01, seed=1):
     """Return a DataFrame with a run of stickslip and white noise, a share of the range of each column."""
     pandas = pytest.importorskip("pandas")
-    with open_simulator(RunSpec(native("stickslip"), tuple(outputs), times=t, follow=False)) as simulator:
-        y = simulator.prepare(simulator.spec)(values)
-        units = {name: simulator.variables[name].unit for name in outputs}
+    run = harness.simulate(native("stickslip"), values, times=t, outputs=[*outputs])
+    y, units = np.stack([run[name] for name in outputs], axis=1), {name: run.units[name] for name in outputs}
     y = y + noise * np.ptp(y, axis=0) * np.random.default_rng(seed).normal(size=y.shape)
     frame = pandas.DataFrame({"t": t, **dict(zip(outputs, y.T, strict=True))})
     frame.attrs["units"] = {"t": "s"} | units
@@ -155,6 +144,34 @@ def test_several_records_share_parameters_and_have_some_of_their_own():
         assert holds(fit[f"v_driver[{number}]"], speed)
 
 
+def read_method(fmu):
+    """Return the variable of the solver's method."""
+    variables = read_model_description(str(fmu)).modelVariables
+    return next(variable for variable in variables if variable.name == "solver.method")
+
+
+class SearchBeganError(Exception):
+    """A fit has checked its request and its records."""
+
+
+@pytest.fixture
+def search_of(monkeypatch):
+    """Return search_of(argument, ...): the specification of the runs, the unknowns and the fixed values of a fit that
+    would begin to search."""
+
+    def begin_search(simulator, records, unknowns, fixed, *options):
+        raise SearchBeganError(simulator.spec, {unknown.name: unknown for unknown in unknowns}, fixed)
+
+    def search_of(*arguments, **options):
+        with pytest.raises(SearchBeganError) as began:
+            harness.fit(*arguments, **options)
+        return began.value.args
+
+    monkeypatch.setattr("harness.studies.fit.study.fit_records", begin_search)
+    monkeypatch.setattr("harness.studies.fit.study.native_equivalent", lambda fmu: fmu)
+    return search_of
+
+
 @pytest.mark.parametrize(
     ("free", "each", "started"),
     [
@@ -162,42 +179,34 @@ def test_several_records_share_parameters_and_have_some_of_their_own():
         (("mu_s", "mu_d"), (), ("mu_s",)),
     ],
 )
-def test_a_fit_starts_from_an_earlier_one(tmp_path, monkeypatch, free, each, started):
+def test_a_fit_starts_from_an_earlier_one(tmp_path, search_of, free, each, started):
+    """From its folder, its file or the result, from Python and in the command; an assignment takes precedence."""
     values = {"mu_s": 0.7, "v_driver[1]": 0.031, "v_driver[2]": 0.052}
     estimates = [{"name": name, "value": value} for name, value in values.items()]
     (tmp_path / "fit.json").write_text(json.dumps({"fit": estimates}))
-    requests = []
-    monkeypatch.setattr(study, "fit_laws", lambda laws, *_: requests.append(laws.requests[0]))
     frames = [pull(), pull(seed=2)]
-    harness.fit("stickslip", frames, free, observe="x", each=each, start=tmp_path)
-    records = [
-        RecordData(f"record {i}", frame["t"].to_numpy(), frame[["x"]].to_numpy(), {}, (None,))
-        for i, frame in enumerate(frames)
-    ]
-    starts = {unknown.name: unknown.start for unknown in make_unknowns(requests[0], records)}
-    assert {name: start for name, start in starts.items() if start is not None} == {
-        name: values[name] for name in started
-    }
-    for paths in ([str(tmp_path)], [str(tmp_path / "fit.json")]):
-        assert parse_starts(paths, free, each) == requests[0].request.start
-    assert parse_starts([str(tmp_path), "mu_s=0.6"], free, each)["mu_s"] == 0.6
+
+    def starts_of(unknowns):
+        return {name: unknown.start for name, unknown in unknowns.items() if unknown.start is not None}
+
+    expected = {name: values[name] for name in started}
+    _, unknowns, _ = search_of("stickslip", frames, free, observe="x", each=each, start=tmp_path)
+    assert starts_of(unknowns) == expected
+    for i, frame in enumerate(frames):
+        frame.rename(columns={"t": "t [s]", "x": "x [m]"}).to_csv(f"{i}.csv", index=False)
+    words = ["fit", "stickslip", "0.csv", "1.csv", "--free", ",".join(free), *(f"--each={name}" for name in each)]
+    for paths in ([tmp_path], [tmp_path / "fit.json"], [tmp_path, "mu_s=0.6"]):
+        with pytest.raises(SearchBeganError) as began:
+            commands.harness(tmp_path, *words, *(word for path in paths for word in ("--start", path)))
+        assert starts_of(began.value.args[1]) == (expected | {"mu_s": 0.6} if len(paths) > 1 else expected)
 
 
-def test_a_range_that_is_not_given_lies_around_the_start_value():
+def test_a_range_that_is_not_given_lies_around_the_start_value(search_of):
     """Otherwise around that of the FMU, which is 742.5."""
     t = np.linspace(0.0, 1.0, 50)
-    record = RecordData("record", t, np.sin(t)[:, None], {}, (None,))
     for start, middle in (({"k": 5000.0}, 5000.0), ({}, 742.5)):
-        request = FitRequest(RunSpec(Path("fmus/stickslip.fmu")), free={"k": None}, observe={"x": "x"}, start=start)
-        (unknown,) = make_unknowns(resolve_request(request), [record])
-        assert (unknown.low, unknown.high) == (middle / 4.0, middle * 4.0)
-
-
-def test_a_law_starts_from_the_values_of_its_own_parameters():
-    fmus = [Path(f"fmus/{name}.fmu") for name in ("stickslip", "coulomb")]
-    start = {"mu_s": 0.8, "k": 700.0}
-    request = FitRequest(RunSpec(fmus[0]), dict.fromkeys(start), {"x": "x"}, start=start, against=(fmus[1],))
-    assert [law.request.start for law in resolve_laws(request).requests] == [start, {"k": 700.0}]
+        _, unknowns, _ = search_of("stickslip", {"t": t, "x": np.sin(t)}, ["k"], observe="x", start=start)
+        assert (unknowns["k"].low, unknowns["k"].high) == (middle / 4.0, middle * 4.0)
 
 
 def test_a_sensor_with_offset_and_gain_is_identified():
@@ -214,8 +223,7 @@ def test_the_delay_of_a_sensor_is_identified(delay):
     """The delayed signal is interpolated from a run with 20 times as many samples."""
     fine = np.linspace(0.0, 8.0, 4001)
     inputs = {"time": fine, "F_ext": shaker(fine)}
-    with open_simulator(RunSpec(native("coulomb"), ("x",), inputs=inputs, times=fine, follow=False)) as simulator:
-        x = simulator.prepare(simulator.spec)({"x0": 0.0, "f": 2.0})[:, 0]
+    x = harness.simulate(native("coulomb"), {"x0": 0.0, "f": 2.0}, times=fine, inputs=inputs, outputs=["x"])["x"]
     t = fine[:-200:20]
     y = np.interp(t - delay, fine, x) + 0.003 * np.ptp(x) * np.random.default_rng(3).normal(size=len(t))
     frame = pytest.importorskip("pandas").DataFrame({"t [s]": t, "x [m]": y, "F": shaker(t)})
@@ -254,6 +262,34 @@ def test_the_values_predict_a_record_that_was_not_fitted():
     arguments |= {"free": {"mu_s": None, "x0": (-0.1, 0.1)}}
     with pytest.raises(SceneError, match="x0 has a value of its own for each record, and none for the validation"):
         harness.fit(native("stickslip"), [same, same], validate=same, each=["x0"], **arguments)
+
+
+def test_a_validation_record_is_averaged_only_where_its_means_are_those_of_the_outputs():
+    """Means of two samples hold an oscillation of 2 Hz where they are 1 ms apart, and smooth it where they are 10 ms
+    apart."""
+    noise, frames = 4e-5, []
+    for stop in (6.0, 60.0):
+        t = np.linspace(0.0, stop, 6001)
+        x = harness.simulate(native("smd"), {"c": 0.0}, times=t, outputs=["x"])["x"]
+        frames.append({"t [s]": t, "x [m]": x + noise * np.random.default_rng(1).normal(size=len(t))})
+    fit = harness.fit(native("smd"), frames[0], {"k": (100.0, 200.0)}, values={"c": 0.0}, observe="x", validate=frames)
+    assert fit.records[0].width == 2
+    assert [record.width for record in fit.validation.records] == [2, 1]
+    apart = harness.fit(
+        native("smd"), frames[0], {"k": (100.0, 200.0)}, values={"c": 0.0}, observe="x", validate=frames[1]
+    )
+    assert apart.validation.columns[0].residual == pytest.approx(noise, rel=0.1)
+    assert apart.validation.remarks == ()
+
+
+def test_a_driven_record_that_is_fitted_and_validated_has_one_prediction():
+    """Its inputs are as fine between the samples in both."""
+    t = np.linspace(0.0, 4.0, 201)
+    run = harness.simulate(native("coulomb"), {"f": 2.0}, times=t, inputs={"time": t, "F_ext": shaker(t)})
+    x = run["x"] + 1e-5 * np.random.default_rng(1).normal(size=len(t))
+    frame = {"t [s]": t, "x [m]": x, "F [N]": shaker(t)}
+    fit = harness.fit(native("coulomb"), frame, ["f"], observe="x", inputs={"F_ext": "F"}, validate=frame)
+    np.testing.assert_allclose(fit.validation.predictions[0], fit.predictions[0], rtol=0, atol=1e-12)
 
 
 def test_a_profile_crosses_its_limit_where_the_interval_ends():
@@ -306,7 +342,8 @@ def test_the_command_writes_what_it_prints(tmp_path):
     check_shared_keys(stored)
     assert estimates["k"]["low"] < 900.0 < estimates["k"]["high"]
     assert estimates["mu_s"]["low"] < 0.8 < estimates["mu_s"]["high"]
-    assert json.loads(to_json(harness.load_result(folder).as_json())) == stored
+    harness.load_result(folder).save(tmp_path / "again")
+    assert json.loads((tmp_path / "again/fit.json").read_text()) == stored
 
 
 @pytest.mark.parametrize(
@@ -317,20 +354,20 @@ def test_the_command_writes_what_it_prints(tmp_path):
         ({"solver.method": "ode45"}, 1e-8, "ode45"),
     ],
 )
-def test_runs_are_accurate_and_fast_unless_the_user_fixes_other_settings(fixed, rtol, method):
-    request = FitRequest(RunSpec(native("stribeck_sled"), values=fixed), {"k": None}, {"x": "x"})
-    variables = {variable.name: variable for variable in read_description(request.run.fmu).modelVariables}
-    method_variable = variables["solver.method"]
-    labels, resolved = enumeration_labels(method_variable), resolve_request(request)
-    assert labels[int(method_variable.start)] == "ode45"
-    assert resolved.fixed["solver.rtol"] == rtol
-    assert labels[resolved.shared.values["solver.method"]] == method
+def test_runs_are_accurate_and_fast_unless_the_user_fixes_other_settings(search_of, fixed, rtol, method):
+    fmu, t = native("stribeck_sled"), np.linspace(0.0, 1.0, 50)
+    spec, _, values = search_of(fmu, {"t": t, "x": np.sin(t)}, {"k": (1.0, 2.0)}, observe="x", values=fixed)
+    assert harness.describe(fmu)["solver.method"].start == "ode45"
+    assert values["solver.rtol"] == rtol
+    labels = {int(item.value): item.name for item in read_method(fmu).declaredType.items}
+    assert labels[int(spec.values["solver.method"])] == method
 
 
 @pytest.mark.parametrize("model", ["stickslip", "pacejka"])
-def test_fast_and_stiff_methods_are_kept(model):
-    request = FitRequest(RunSpec(Path(f"fmus/{model}.fmu")), {"k": None}, {"x": "x"})
-    assert "solver.method" not in resolve_request(request).shared.values
+def test_fast_and_stiff_methods_are_kept(search_of, model):
+    t = np.linspace(0.0, 1.0, 50)
+    spec, _, _ = search_of(model, {"t": t, "x": np.sin(t)}, ["k"], observe="x")
+    assert "solver.method" not in spec.values
 
 
 @pytest.mark.parametrize(("motion", "is_described"), [(0.0, True), (1e-3, False)])
@@ -394,8 +431,7 @@ def test_the_law_that_made_the_record_has_the_lowest_bic(record_of, v_s):
     frame = pull(noise=0.003)
     if v_s:
         values = {"f_s": 100.0, "f_d": 40.0, "k": 900.0, "v_driver": 0.04, "v_s": v_s}
-        with open_simulator(RunSpec(fmus[1], ("x",), times=T, follow=False)) as simulator:
-            x = simulator.prepare(simulator.spec)(values)[:, 0]
+        x = harness.simulate(fmus[1], values, times=T, outputs=["x"])["x"]
         frame["x"] = x + 0.003 * np.ptp(x) * np.random.default_rng(2).normal(size=len(T))
     fit = harness.fit(fmus[0], frame, observe="x", against=fmus[1], **LAWS)
     assert fit.comparison.laws[0].fmu == record_of
@@ -407,24 +443,30 @@ def test_the_law_that_made_the_record_has_the_lowest_bic(record_of, v_s):
     assert "stribeck_sled has no mu_s, mu_d: its fit leaves them out." in fit.against[0].notes
 
 
-def test_the_bic_of_white_residuals_is_that_of_a_linear_model():
+@pytest.fixture(scope="module")
+def compared():
+    """Fits of the law that made a record and of a wrong one, each of them first."""
+    frame, fmus = pull(t=T[:81]), (native("stickslip"), native("stribeck_sled"))
+    options = {"observe": "x", "values": {"k": 900.0, "v_driver": 0.04, "mu_d": 0.5}, "start": {"mu_s": 0.7}}
+    return [harness.fit(one, frame, ["mu_s", "f_s"], against=two, **options) for one, two in (fmus, fmus[::-1])]
+
+
+def test_a_bic_is_that_of_white_residuals_of_a_linear_model(compared):
     """For n residuals of variance s2 and k unknowns, BIC = n ln(s2) + k ln(n)."""
-    assert information_criterion(200.0, 100, 3, 100.0) == pytest.approx(100 * np.log(2.0) + 3 * np.log(100))
-    assert information_criterion(200.0, 100, 3, 25.0) == pytest.approx(25 * np.log(2.0) + 3 * np.log(25))
+    fit = compared[0]
+    assert (fit.n_samples, len(fit.estimates)) == (81, 1)
+    assert replace(fit, squares=162.0).bic == pytest.approx(81 * np.log(2.0) + np.log(81))
 
 
-def test_residuals_count_as_those_of_the_law_with_the_smallest():
-    """Those of a wrong law are correlated because it is wrong."""
-
-    def fitted(squares, n_independent, n_unknowns):
-        counts = {"n_samples": 1000, "n_independent": n_independent, "estimates": (None,) * n_unknowns}
-        return SimpleNamespace(fmu=f"{squares}", squares=squares, describes_record=True, **counts)
-
-    right, wrong = fitted(900.0, 500.0, 3), fitted(1800.0, 50.0, 2)
-    for fits in ((right, wrong), (wrong, right)):
-        compared = compare_laws(fits)
-        assert [law.fmu for law in compared.laws] == ["900.0", "1800.0"]
-        assert compared.laws[1].difference == pytest.approx(500 * np.log(2.0) - np.log(500))
+def test_residuals_count_as_those_of_the_law_with_the_smallest(compared):
+    """Those of a wrong law are correlated because it is wrong; each law starts from the values that it has."""
+    for fit in compared:
+        right, wrong = sorted((fit, *fit.against), key=lambda law: law.squares)
+        assert [law.fmu for law in fit.comparison.laws] == [right.fmu, wrong.fmu] == ["stickslip", "stribeck_sled"]
+        assert wrong.n_independent < 0.5 * right.n_independent
+        for law, compared_law in zip((right, wrong), fit.comparison.laws, strict=True):
+            n = right.n_independent
+            assert compared_law.bic == pytest.approx(n * np.log(law.squares / 81) + len(law.estimates) * np.log(n))
 
 
 def test_the_command_writes_the_compared_laws(tmp_path):

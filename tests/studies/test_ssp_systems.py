@@ -27,8 +27,7 @@ from ssp_archives import (
 )
 from ssp_archives import write_archive as write
 
-from harness.studies.coupled.engine import ENGINES
-
+ENGINES = {"own master", "Ecos", "libcosim", "fmpy"}
 HAS_ENGINES = all(map(find_spec, ("pyssp_standard", "ecospy", "libcosimpy")))
 pytestmark = pytest.mark.skipif(not HAS_ENGINES, reason="the extras 'coupled' and 'importers' are not installed")
 
