@@ -114,7 +114,7 @@ def test_a_run_starts_at_a_given_time():
 
 def test_a_decay_is_identified_from_any_source(tmp_path):
     pandas = pytest.importorskip("pandas")
-    run = harness.simulate("coulomb", stop=3.0, interval=0.005, outputs=["x"])
+    run = harness.simulate("coulomb", stop=2.0, interval=0.02, outputs=["x"])
     lines = ["t [s],x [m]", *(f"{t!r},{x!r}" for t, x in zip(run.time.tolist(), run["x"].tolist(), strict=True))]
     (tmp_path / "record.csv").write_text("\n".join(lines))
     sources = {
@@ -122,10 +122,10 @@ def test_a_decay_is_identified_from_any_source(tmp_path):
         "run": {"record": run},
         "frame": {"record": run.to_pandas()},
         "columns": {"record": pandas.DataFrame({"t [s]": run.time, "x [m]": run["x"]})},
-        "positions": {"record": pandas.DataFrame({"x [m]": run["x"]}), "rate": 200.0},
+        "positions": {"record": pandas.DataFrame({"x [m]": run["x"]}), "rate": 50.0},
         "arrays": {"record": run.time, "x": run["x"], "unit": "m"},
         "pair": {"record": (run.time, run["x"]), "unit": "m"},
-        "samples": {"record": run["x"], "unit": "m", "rate": 200.0},
+        "samples": {"record": run["x"], "unit": "m", "rate": 50.0},
         "mapping": {"record": {"t [s]": run.time, "x [mm]": 1000 * run["x"]}},
         "series": {"record": pandas.Series(run["x"], run.time, name="x [m]")},
         "deltas": {"record": pandas.Series(run["x"], pandas.to_timedelta(run.time, unit="s"), name="x [m]")},
@@ -133,7 +133,7 @@ def test_a_decay_is_identified_from_any_source(tmp_path):
         "millimetres": {"record": run.time, "x": 1000 * run["x"], "unit": "mm"},
     }
     for name, arguments in sources.items():
-        identification = harness.identify_decay(**arguments, k=157.9)
+        identification = harness.identify_decay(**arguments, k=157.9, drag=False)
         assert identification["f"].value == pytest.approx(0.5, rel=1e-6), name
         assert identification["zeta"].value == pytest.approx(0.0, abs=1e-9), name
     assert len(repr(identification)) < 300
@@ -186,7 +186,7 @@ def test_a_sweep_takes_enumerations_by_label(in_workspace):
 def test_the_tolerance_of_a_sweep_is_that_of_its_runs():
     pytest.importorskip("xarray")
     fmu = build_external_fmus() / "Midpoint.fmu"
-    for rtol in (1e-2, 1e-4):
+    for rtol in (1e-2, 1e-3):
         data = harness.sweep(fmu, {"k": [40.0]}, rtol=rtol)
         assert float(data["final_x"][0]) == harness.simulate(fmu, {"k": 40.0}, rtol=rtol)["x"][-1]
 

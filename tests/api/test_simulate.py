@@ -69,12 +69,12 @@ def test_a_scene_and_a_stored_result_run():
 @pytest.mark.parametrize("interface", ["CoSimulation", "ModelExchange"])
 @pytest.mark.parametrize("folder", [native_fmus.build_native_fmus, fmi3_fixtures.build_fmi3_fmus], ids=["fmi2", "fmi3"])
 def test_input_signals_drive_every_interface(folder, interface):
-    time = np.linspace(0.0, 2.0, 2001)
+    time = np.linspace(0.0, 2.0, 201)
     table = {"time": time, "F_ext": np.sin(pi * time)}
     start = {"x0": 0.0, "v0": 0.0}
     options = {"interface": interface, "rtol": 1e-6, "interval": 0.02}
     run = harness.simulate(folder() / "smd.fmu", start, stop=2.0, inputs=table, **options)
-    expected = driven(run.time, lambda t: np.sin(pi * t))
+    expected = driven(run.time, lambda t: np.interp(t, *table.values()))
     assert np.abs(run["x"] - expected).max() < 1e-5 * np.abs(expected).max()
 
 

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 from decays import decay_record
 from matplotlib.figure import Figure
+from native_fmus import build_native_fmus
 
 import harness
 from harness.references.reference_trajectory import CommunicationGrid
@@ -52,7 +53,7 @@ def compared_runs():
 
 def fitted_parameters():
     run = harness.simulate("coulomb", stop=2.0, interval=0.04, outputs=["x"])
-    return harness.fit("coulomb", run, ["f", "k"])
+    return harness.fit(build_native_fmus() / "coulomb.fmu", run, ["f", "k"])
 
 
 def swept_parameters():

@@ -5,6 +5,7 @@ import json
 import commands
 import numpy as np
 import pytest
+from native_fmus import build_native_fmus
 
 import harness
 from harness import SceneError
@@ -12,6 +13,11 @@ from harness import SceneError
 pytestmark = pytest.mark.usefixtures("in_workspace")
 
 T = np.linspace(0.0, 8.0, 401)
+
+
+def native(model):
+    """Return the native FMU of a model; that of a Python FMU would be built in each test."""
+    return build_native_fmus() / f"{model}.fmu"
 
 
 def frame(columns, units):
@@ -24,7 +30,7 @@ def frame(columns, units):
 def driven_record(lost=()):
     """Return a record of coulomb, pushed by pulses with pauses at exactly 0; x lacks the samples `lost`."""
     force = np.where(T % 2 < 0.6, np.round(20 * np.sin(np.pi * (T % 2) / 0.6) ** 2, 3), 0.0)
-    run = harness.simulate("coulomb", times=T, inputs={"time": T, "F_ext": force})
+    run = harness.simulate(native("coulomb"), times=T, inputs={"time": T, "F_ext": force})
     x = run["x"] + 1e-5 * np.random.default_rng(1).normal(size=len(T))
     x[[*lost]] = np.nan
     return frame({"t": T, "x": x, "force": force}, {"t": "s", "x": "m", "force": "N"})
@@ -33,23 +39,25 @@ def driven_record(lost=()):
 def test_missing_samples_of_a_signal_take_none_of_the_input():
     """Half of a pulse lies where x is missing."""
     options = {"free": {"k": (50.0, 200.0), "f": (0.1, 2.0)}, "observe": "x", "inputs": {"F_ext": "force"}}
-    complete = harness.fit("coulomb", driven_record(), **options)
+    complete = harness.fit(native("coulomb"), driven_record(), **options)
     record = driven_record(lost=range(205, 225))
-    incomplete = harness.fit("coulomb", record, **options)
+    incomplete = harness.fit(native("coulomb"), record, **options)
     assert "20 of 401 rows have a missing cell" in " ".join(incomplete.notes)
     for result in (complete, incomplete):
         assert result["k"].value == pytest.approx(157.9, rel=1e-4)
         assert result["f"].value == pytest.approx(0.5, rel=5e-2)
     record.loc[300, "force"] = np.nan
     with pytest.raises(SceneError, match=r"force, the input F_ext, has no value in row 301"):
-        harness.fit("coulomb", record, **options)
+        harness.fit(native("coulomb"), record, **options)
 
 
 def test_a_sample_that_occurs_twice_does_not_shift_the_values():
     """The times of all samples were spread over the record, which moved k far outside its interval."""
-    x = harness.simulate("smd", times=T)["x"] + 1e-4 * np.random.default_rng(1).normal(size=len(T))
+    x = harness.simulate(native("smd"), times=T)["x"] + 1e-4 * np.random.default_rng(1).normal(size=len(T))
     rows = np.append(0, np.arange(len(T)))
-    fits = [harness.fit("smd", frame({"t": T[i], "x": x[i]}, {"t": "s", "x": "m"}), ["k"]) for i in (rows, rows[1:])]
+    fits = [
+        harness.fit(native("smd"), frame({"t": T[i], "x": x[i]}, {"t": "s", "x": "m"}), ["k"]) for i in (rows, rows[1:])
+    ]
     assert fits[0]["k"].value == pytest.approx(fits[1]["k"].value, rel=1e-9)
     assert "The time 0 s occurs more than once" in " ".join(fits[0].notes)
 
@@ -57,8 +65,8 @@ def test_a_sample_that_occurs_twice_does_not_shift_the_values():
 @pytest.mark.parametrize(("model", "free"), [("smd", {"c": (0.1, 5.0)}), ("stickslip", ["mu_s", "mu_d"])])
 def test_a_record_without_noise_is_fitted(model, free):
     """The squares are 0 if the search meets the values exactly."""
-    fit = harness.fit(model, harness.simulate(model, times=T, outputs=["x"]), free, observe="x")
-    truth = harness.simulate(model, stop=0.1).parameters
+    fit = harness.fit(native(model), harness.simulate(native(model), times=T, outputs=["x"]), free, observe="x")
+    truth = harness.simulate(native(model), stop=0.1).parameters
     for estimate in fit.estimates:
         assert estimate.value == pytest.approx(truth[estimate.name], rel=1e-6)
         assert estimate.low < estimate.value < estimate.high
@@ -73,14 +81,14 @@ def test_a_record_without_noise_is_fitted(model, free):
     ],
 )
 def test_a_column_that_fits_is_observed_and_named(tmp_path, columns, units, sentence):
-    x = harness.simulate("smd", times=T)["x"]
+    x = harness.simulate(native("smd"), times=T)["x"]
     record = frame({"t": T, **{name: factor * x for name, factor in columns.items()}}, {"t": "s"} | units)
-    fit = harness.fit("smd", record, {"k": (50.0, 400.0)})
-    assert fit["k"].value == pytest.approx(harness.simulate("smd", stop=0.1).parameters["k"], rel=1e-6)
+    fit = harness.fit(native("smd"), record, {"k": (50.0, 400.0)})
+    assert fit["k"].value == pytest.approx(harness.simulate(native("smd"), stop=0.1).parameters["k"], rel=1e-6)
     assert fit.notes[0].startswith(sentence)
     record.columns = ["t [s]", *(f"{name} [{units[name]}]" for name in columns)]
     record.to_csv(tmp_path / "pull.csv", index=False)
-    done = commands.harness(tmp_path, "fit", "smd", "pull.csv", "--free", "k=50:400", "--json", blank=True)
+    done = commands.harness(tmp_path, "fit", native("smd"), "pull.csv", "--free", "k=50:400", "--json", blank=True)
     assert (done.returncode, done.stderr) == (0, "")
     assert json.loads(done.stdout)["notes"][0] == fit.notes[0]
 
@@ -96,6 +104,6 @@ def test_a_column_that_fits_is_observed_and_named(tmp_path, columns, units, sent
 def test_a_choice_between_columns_is_left_to_the_user(model, units, words):
     record = frame({"t": T, **{name: np.sin(T) for name in units}}, {"t": "s"} | units)
     with pytest.raises(SceneError) as refused:
-        harness.fit(model, record, {"k": (1.0, 2.0)})
+        harness.fit(native(model), record, {"k": (1.0, 2.0)})
     for text in ("nothing is observed", *words):
         assert text in str(refused.value)
