@@ -10,27 +10,18 @@ from build_cache import ROOT
 ALLOWED = """
 .: __main__ commands
 analyses.decay: decrement fit_problem intervals signal_model
-analyses.estimation: estimate figure
-analyses.fit: feasible_region fit_problem fit_procedure law_comparison measured_record noise parameter_fit
-    profile_likelihood uncertainty unknowns validation
+analyses.estimation: figure
+analyses.fit: fit_problem fit_procedure noise profile_likelihood
 analyses: slip
 process: interrupt interruptible_wait progress_bar subprocess_runner temporary_directory worker
 records: headings samples signal_table size_limits text_table
 references: certified_reference models peer_solvers reference_trajectory single_model_reference
-references.models: pacejka
-report: page sections typeset verdicts
-results: files folder provenance quantity registry result style summary
-running: embedded_model fmu_archive native_equivalent resolve runner signals
-    solution ssp step_sequence trajectory variable_values whole_run
+results: folder provenance quantity registry style
+running: embedded_model fmu_archive native_equivalent runner whole_run
 running.external: step_refinement
-scenes: run_spec scene
-scenes.coupled: scene
-studies.compare: trajectory_files
-studies.coupled: engine result study
-studies.fit: laws options request study
-studies.precision: advice figure law_deviations method_choice result study table
-studies.run: study table
-studies.stability: cases outcomes result study table
+scenes: run_spec
+studies.precision: advice law_deviations study
+studies.stability: study
 """
 
 
