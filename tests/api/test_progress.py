@@ -1,11 +1,7 @@
 """Progress bars of functions: in a terminal, for what takes longer than two seconds, unless switched off."""
 
-import sys
-
 import commands
 import pytest
-
-from harness.process import progress_bar
 
 SCRIPT = """
 import sys, time
@@ -31,16 +27,10 @@ def test_a_bar_is_shown_in_a_terminal_for_long_calls(workspace, terminal, delay,
     assert is_shown or done.stderr == ""
 
 
-def test_a_bar_ends_with_its_call(monkeypatch, capfd):
-    monkeypatch.setattr(progress_bar, "DELAY", 0.0)
-    monkeypatch.setattr(sys.stderr, "isatty", lambda: True, raising=False)
-    monkeypatch.setenv("TERM", "xterm")
-
-    def fail():
-        with progress_bar.show_progress("call") as report:
-            report(0.5)
-            raise ZeroDivisionError
-
-    with pytest.raises(ZeroDivisionError):
-        fail()
-    assert "call" in capfd.readouterr().err
+def test_a_bar_ends_with_a_call_that_fails(workspace):
+    script = SCRIPT.format(terminal=True, delay=0.0, options=", inputs={'time': [0.0, 1.0], 'F_ext': [1e308, 1e308]}")
+    done = commands.run_python(workspace, "-c", script, TERM="xterm", COLUMNS="80")
+    assert done.returncode == 1
+    bar, _, error = done.stderr.partition("Traceback")
+    assert "simulate" in bar
+    assert "HarnessError" in error

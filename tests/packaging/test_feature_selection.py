@@ -14,7 +14,6 @@ from fmus.packaging import archive
 from fmus.packaging.lowering import LAWS, METHODS, lowered_files
 from fmus.packaging.lowering.feature_selection import FeatureSelection
 from harness import describe, simulate
-from harness.running.fmu_archive import read_fixed_choices
 
 LABELS = {"solver.method": "--method", "friction": "--law"}
 
@@ -54,8 +53,7 @@ def test_a_reduced_fmu_carries_one_method_and_runs_alike(lean, launch, worker, c
         *declared(name)
     }  # whose characters are allowed
     assert not LABELS.keys() & {variable.name for variable in description.modelVariables}
-    chosen = {variable: (options[word], values[variable]) for variable, word in LABELS.items() if word in options}
-    assert read_fixed_choices(path) == chosen
+    assert describe(path).fixed == {variable: options[word] for variable, word in LABELS.items() if word in options}
     with ZipFile(path) as archive:
         files = {entry.rsplit("/", 1)[1] for entry in archive.namelist() if "/runtime/" in entry}
         assert {entry.split("/")[1] for entry in archive.namelist() if entry.startswith("binaries")} == {"linux64"}

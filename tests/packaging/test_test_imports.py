@@ -10,14 +10,13 @@ from build_cache import ROOT
 ALLOWED = """
 .: __main__ commands
 analyses.decay: decrement fit_problem intervals signal_model
-analyses.estimation: figure
 analyses.fit: fit_problem fit_procedure noise profile_likelihood
 analyses: slip
-process: interrupt interruptible_wait progress_bar subprocess_runner temporary_directory worker
+process: interrupt interruptible_wait subprocess_runner temporary_directory worker
 records: headings samples signal_table size_limits text_table
 references: certified_reference models peer_solvers reference_trajectory single_model_reference
-results: folder provenance quantity registry style
-running: embedded_model fmu_archive native_equivalent runner whole_run
+results: folder quantity registry style
+running: embedded_model native_equivalent runner whole_run
 running.external: step_refinement
 scenes: run_spec
 studies.precision: advice law_deviations study

@@ -10,8 +10,6 @@ from build_cache import ROOT
 from decays import LAWS, decay_record, identify
 from shared_keys import check_shared_keys
 
-from harness.analyses.estimation.figure import MAX_POINTS, extremes
-
 
 @pytest.mark.parametrize("arguments", [("coulomb",), (ROOT / "docs/records/spring.csv", "--m", "0.35")])
 def test_the_table_fits_into_80_columns_and_its_first_values_are_those_to_use(fmus, tmp_path, arguments):
@@ -50,14 +48,18 @@ def test_a_figure_shows_angles_in_degrees_and_marks_only_excluded_samples():
     assert fit.record.format_time(1.7e9 + 0.0125) == "1700000000.0125"
 
 
-@pytest.mark.parametrize("count", [3000, 120_000])
-def test_downsampling_keeps_the_extremes(count):
-    x = np.sin(np.arange(count)) + np.random.default_rng(1).standard_normal(count)
-    selection, wide = extremes(x), -(-2 * count // MAX_POINTS)
-    assert len(selection) <= min(count, 3 * MAX_POINTS // 2)
-    for begin in range(0, count, 100 * wide):
-        block = x[selection[(selection >= begin) & (selection < begin + 10 * wide)]]
-        assert (block.min(), block.max()) == (x[begin : begin + 10 * wide].min(), x[begin : begin + 10 * wide].max())
+def test_the_figure_of_a_long_record_shows_fewer_samples_and_the_extremes_of_each_turn():
+    fit = identify(decay_record(0.01, t=np.linspace(0.0, 20.0, 20_001), noise=1e-3))
+    signal, *_ = fit.plot()
+    times, shown = next(line.get_data() for line in signal.lines if line.get_label() == "record")
+    assert len(times) < 0.8 * len(fit.t)
+    (omega,) = (estimate.value for estimate in fit.estimates if estimate.name == "omega")
+    turn = 2 * np.pi / omega
+    begins = np.arange(fit.t[0] + turn / 4, fit.t[-1] - turn, turn)
+    assert len(begins) > 10
+    for begin in begins:
+        whole, drawn = (x[(begin <= t) & (t < begin + turn)] for t, x in ((fit.t, fit.x), (times, shown)))
+        assert (drawn.min(), drawn.max()) == (whole.min(), whole.max())
 
 
 def harness(folder, *arguments, text=""):
