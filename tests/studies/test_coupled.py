@@ -14,6 +14,7 @@ import commands
 import numpy as np
 import pytest
 from build_cache import ROOT, build_user_model, cached_folder
+from fmi3_fixtures import build_fmi3_fmus
 from fmpy.ssp.ssd import read_ssd
 from native_fmus import build_native_fmus
 from prescribed_motion import solve_block
@@ -95,6 +96,19 @@ def test_two_equal_coupled_masses_agree_with_their_closed_form(couple, tmp_path)
     expected = [0.1 * cos(sqrt(157.9 + 80.0) * t) for t in table[:, 0]]
     assert table[:, 3] == pytest.approx(expected, abs=1e-9)
     assert table[:, 4] == pytest.approx([-x for x in expected], abs=1e-9)
+
+
+@pytest.mark.slow
+def test_values_of_parts_are_set_in_fmi3(couple, tmp_path):
+    """They have another type than in FMI 2.0; libcosim and fmpy do not couple FMUs of FMI 3.0."""
+    scene = PAIR.replace('"smd"', f'"{build_fmi3_fmus() / "smd.fmu"}"').replace("stop = 1.0", "stop = 0.1")
+    done = couple(scene)
+    assert (done.returncode, done.stderr) == (0, "")
+    folder = tmp_path / "results/coupled/mine"
+    _, *start = np.loadtxt(folder / "trajectory.csv", delimiter=",", skiprows=1)[0]
+    assert start[:2] == [0.1, -0.1]
+    for name in ("own master", "Ecos"):
+        assert engines(folder)[name][1] == ""
 
 
 def test_a_connection_with_a_factor_pushes_in_its_direction(couple, tmp_path):
@@ -195,7 +209,7 @@ EVERY_SCENE = pytest.mark.parametrize(
 def engines(folder):
     with (folder / "engines.csv").open(newline="") as file:
         _, *rows = csv.reader(file)
-    return {name: ([float(number) for number in numbers], why) for name, *numbers, why in rows}
+    return {name: ([float(number) for number in numbers if number], why) for name, *numbers, why in rows}
 
 
 @EVERY_SCENE

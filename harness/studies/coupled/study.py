@@ -19,6 +19,7 @@ from ...results.folder import replace_folder
 from ...results.provenance import describe_sources, write_provenance
 from ...results.registry import find_study
 from ...results.summary import write_summary
+from ...running.array_elements import ArrayElement
 from ...running.fmu_archive import read_description
 from ...running.session import ProgressCallback
 from ...running.ssp import ArchiveRun
@@ -80,7 +81,9 @@ def check_values(scene: CoupledScene, defaults: Starts) -> None:
     for name, part in scene.parts.items():
         unknown = sorted(set(part.values) - set(defaults[part.model]))
         if unknown:
-            raise HarnessError(f"scene {scene.name}: part {name} ({part.model}) has no parameter {unknown[0]}")
+            raise HarnessError(
+                f"scene {scene.name}: part {name} ({part.model}) has no parameter {unknown[0]} that is one real number"
+            )
 
 
 def check_connections(scene: CoupledScene) -> None:
@@ -112,11 +115,11 @@ def has_reference(scene: CoupledScene) -> bool:
 
 
 def start_values(fmu: Path) -> dict[str, float]:
-    """Return the start values of the Real parameters of an FMU."""
+    """Return the start values of the Real parameters of an FMU; engines do not set elements of arrays."""
     return {
         variable.name: float(variable.start)
         for variable in read_description(fmu).modelVariables
-        if variable.causality == "parameter" and variable.type == "Real"
+        if variable.causality == "parameter" and variable.type in REAL_TYPES and not isinstance(variable, ArrayElement)
     }
 
 
