@@ -66,7 +66,7 @@ COMMAND_LINES = [  # arguments, exit status, words of the sentence
     (["run", "nosuch"], 2, "unknown scene 'nosuch'"),
     *((arguments, 2, f"{option} has no effect ") for arguments, option in OPTIONS_WITHOUT_EFFECT),
     (["compare", "fmus", OWN], 2, "trajectory.csv is missing"),
-    (["decay", "stickslip"], 1, "not a free decay of one oscillator"),
+    (["decay", "stickslip"], 1, "as in stick-slip, and is no decay"),
     (["decay", "line.csv", "--k", 1, "--m", 1], 2, "--k and --m"),
     (["decay", "line.csv", "--velocity", "v", "--position", "x"], 2, "--velocity: only one column is fitted"),
     ([*FIT, "--free", "k=3"], 2, "--free k=3: give a range, as in k=0.1:2, or fix it by --set k=3"),
