@@ -4,7 +4,7 @@ import commands
 import pytest
 
 SCRIPT = """
-import sys, time
+import sys
 import harness
 from harness.process import progress_bar
 

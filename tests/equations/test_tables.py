@@ -428,8 +428,8 @@ def test_values_of_a_file_become_parameters_that_keep_their_kind(tmp_path):
     text = MODEL.format(friction='"mu.csv", values="fixed", low=0.125', spring=points(SPRING, '"m", "N"'))
     (tmp_path / "bench.py").write_text(text)
     declared = [d for d in declarations(find_model(tmp_path / "bench.py").model) if d.name.startswith("mu_")]
-    found = [(d.element, d.start, d.unit, d.low, d.variability, d.text) for d in declared]
-    assert found == [
+    elements = [(d.element, d.start, d.unit, d.low, d.variability, d.text) for d in declared]
+    assert elements == [
         ("mu.y[1]", 0.5, "1", 0.125, "fixed", "value at 0 m/s"),
         ("mu.y[2]", 0.25, "1", 0.125, "fixed", "value at 1 m/s"),
     ]

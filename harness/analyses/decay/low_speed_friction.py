@@ -82,11 +82,12 @@ def find_low_speed_rise(problem: FitProblem, p: np.ndarray, terms: Terms) -> Low
     if "r" not in terms or len(problem.half_cycles(p)[0]) < thresholds.MIN_RISE_HALF_CYCLES:
         return None
     unknowns = problem.unknowns(terms)
-    _, jacobian = problem.residuals(p, terms)
+    e, jacobian = problem.residuals(p, terms)
     speeds = np.array(thresholds.RISE_SPEEDS)
     changes = signal_changes(problem, p, jacobian[:, np.flatnonzero(unknowns == AMPLITUDE)[0]], speeds)
     rises = [
-        fit_rise(problem, p, terms, speed, change) for speed, change in zip(speeds.tolist(), changes.T, strict=True)
+        fit_rise(problem, p, unknowns, e, jacobian, speed, change)
+        for speed, change in zip(speeds.tolist(), changes.T, strict=True)
     ]
     best = max(rises, key=lambda rise: (rise.is_shown, rise.deviance))
     shown = [rise.intervals for rise in rises if rise.is_shown]
@@ -96,10 +97,29 @@ def find_low_speed_rise(problem: FitProblem, p: np.ndarray, terms: Terms) -> Low
     return replace(best, intervals=intervals, limit=rises[thresholds.RISE_SPEEDS.index(thresholds.LIMIT_SPEED)].limit)
 
 
-def fit_rise(problem: FitProblem, p: np.ndarray, terms: Terms, speed: float, change: np.ndarray) -> LowSpeedRise:
-    """Fit the law and a rise at one relative speed, which changes the signal by `change` (n,), by one linear step."""
-    e, jacobian = problem.residuals(p, terms)
-    unknowns, n, floor = problem.unknowns(terms), len(e), len(e) * problem.residual_floor**2
+def fit_rise(
+    problem: FitProblem,
+    p: np.ndarray,
+    unknowns: np.ndarray,
+    e: np.ndarray,
+    jacobian: np.ndarray,
+    speed: float,
+    change: np.ndarray,
+) -> LowSpeedRise:
+    """Fit the law and a rise at one relative speed by one linear step.
+
+    Parameters
+    ----------
+    p, unknowns : numpy.ndarray
+        Values of the law, and the positions (m,) of those that are fitted.
+    e, jacobian : numpy.ndarray
+        Residuals (n,) of the law, and their derivatives (n, m).
+    speed : float
+        Relative speed v_s.
+    change : numpy.ndarray
+        Change (n,) of the signal by a unit rise.
+    """
+    n, floor = len(e), len(e) * problem.residual_floor**2
     columns = np.column_stack([jacobian, change])
     scale = column_norms(columns)
     columns = columns / scale
