@@ -107,7 +107,7 @@ def sweep(
     Raises
     ------
     HarnessError
-        If xarray, dask or netCDF4 is not installed, or no run can be done.
+        If xarray or netCDF4 is not installed, or no run can be done.
     """
     from contextlib import nullcontext
 
@@ -119,7 +119,7 @@ def sweep(
     from ..studies.sweep.runner import SweepSpec
     from ..studies.sweep.sampling import SweepPoints, axis_from_numbers
 
-    for package in ("xarray", "dask", "netCDF4"):
+    for package in ("xarray", "netCDF4"):
         import_optional(package, "a sweep", "sweep")
     if not grid:
         raise SceneError("grid is empty: name at least one parameter and its values, as in {'mu_d': [0.3, 0.6]}")

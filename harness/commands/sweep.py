@@ -86,7 +86,7 @@ def sweep(
         refuse_options(context, "without --samples", "seed")
     if scheduler is not None:
         refuse_options(context, "with --scheduler: the cluster has its own workers", "workers")
-    for package in ("xarray", "dask", "netCDF4"):  # checked before the runs: they write the results
+    for package in ("xarray", "netCDF4"):  # checked before the runs: they write the results
         if find_spec(package) is None:
             raise HarnessError(f"a sweep needs {package}: {install_command('sweep')}")
     from ..running.resolve import set_rtol

@@ -28,7 +28,6 @@ def fake_runs(points, runs, digest, fmu):
 
 def test_memory_use_does_not_grow_with_the_number_of_runs(fmus, monkeypatch, tmp_path):
     """The parts of a sweep that handle every run, with ten times as many of them; the data are not loaded."""
-    monkeypatch.setattr("harness.studies.sweep.result_files.CHUNK_SIZE", "40 KiB")
     monkeypatch.setattr("harness.studies.sweep.study.run_block", fake_runs)
     monkeypatch.setattr("harness.studies.sweep.result.SweepResult.data", None)
     peaks, k = [], np.linspace(1.0, 2.0, 100)

@@ -144,7 +144,6 @@ def run(folder, values):
 
 
 if __name__ == "__main__":
-    import dask
     import fmpy
     import matplotlib.figure
     import netCDF4
@@ -152,7 +151,7 @@ if __name__ == "__main__":
     import scipy.optimize
     import xarray
 
-    IMPORTED = dask, fmpy, matplotlib.figure, netCDF4, scipy.integrate, scipy.optimize, xarray  # once, before the forks
+    IMPORTED = fmpy, matplotlib.figure, netCDF4, scipy.integrate, scipy.optimize, xarray  # once, before the forks
     root, *chosen = sys.argv[1:]
     for result in run(root, chosen or VALUES):
         print(json.dumps(result), flush=True)

@@ -1,24 +1,23 @@
-"""Checkpoint of a sweep: one memory-mapped array with a status per run, so that an interrupted sweep can resume.
+"""Checkpoint of a sweep: a SQLite database of its finished runs, so that an interrupted sweep can resume.
 
-Values are written to the disk before the status that declares them valid. So every run with a status has its values,
-even after a loss of power.
+Blocks of runs are written in one transaction each, so a block that a kill or a loss of power cuts off is not in it.
 """
 
-import json
-import os
+import sqlite3
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
+from typing import Self
 
 import numpy as np
 
 from ...errors import HarnessError
-from ...process.temporary_directory import lock_path
 
-MISSING, FINISHED, FAILED = 0, 1, 2  # status; a failed run has FAILED plus the position of its error message in bytes
-BLOCK_SIZE = 1000  # runs read or written at a time
+TABLES = (
+    "CREATE TABLE IF NOT EXISTS blocks (first INTEGER PRIMARY KEY, size INTEGER NOT NULL, content BLOB NOT NULL)",
+    "CREATE TABLE IF NOT EXISTS failures (run INTEGER PRIMARY KEY, message TEXT NOT NULL)",
+)
 
 
 @dataclass(frozen=True)
@@ -46,165 +45,118 @@ class RunBlock:
 
 
 class Checkpoint:
-    """Values, status and error messages of `runs` runs, each with `columns` values, in two files.
+    """Values and error messages of the finished runs of a sweep.
 
     Parameters
     ----------
     path : pathlib.Path
-        File of values and status. The error messages are in a file of the same name with the suffix ``.messages``.
+        File of the database.
     runs, columns : int
         Number of runs, and of values per run.
 
-    Raises
-    ------
-    HarnessError
-        If a file cannot be read.
-
     Attributes
     ----------
-    damaged : bool
-        Whether existing files were damaged, so that they are not used.
     n_done : int
         Number of finished and failed runs.
+    damaged : bool
+        Whether an existing file was damaged, so that its runs are not used.
     """
 
     def __init__(self, path: Path, runs: int, columns: int) -> None:
-        self.path, self.message_path, self.runs = path, path.with_suffix(".messages"), runs
-        self.dtype = np.dtype([("status", "<i8"), ("values", "<f8", (columns,))])
-        self.damaged, self.n_done = False, 0
-        self.read()
-
-    def read(self) -> None:
-        """Read how many runs are done."""
-        with self.convert_os_errors():
-            self.unmap()
-            exists = self.path.exists()
-            is_intact = exists and self.is_intact()
-            self.damaged |= exists and not is_intact
-            self.n_done = int(np.count_nonzero(self.array["status"])) if is_intact else 0
+        self.path, self.runs, self.columns = path, runs, columns
+        self.n_done, self.damaged = 0, False
 
     @contextmanager
-    def convert_os_errors(self) -> Iterator[None]:
-        """Convert OSError to HarnessError."""
+    def open(self) -> Iterator[Self]:
+        """Open the database, and lock it until the end; delete it then if no run is done.
+
+        Raises
+        ------
+        HarnessError
+            If another command has it open, or it cannot be used.
+        """
+        with self.convert_errors():
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            try:
+                self.connection = self.connect()
+            except sqlite3.DatabaseError as error:
+                if isinstance(error, sqlite3.OperationalError):
+                    raise
+                self.damaged = True
+                self.delete()
+                self.connection = self.connect()
+        try:
+            with closing(self.connection):
+                yield self
+        finally:
+            if not self.n_done:
+                self.delete()
+
+    def connect(self) -> sqlite3.Connection:
+        """Return a connection that has locked the database; sqlite3.DatabaseError if its content is damaged."""
+        connection = sqlite3.connect(self.path, timeout=0)
+        try:
+            connection.execute("PRAGMA locking_mode = EXCLUSIVE")
+            connection.execute("BEGIN EXCLUSIVE")
+            for table in TABLES:
+                connection.execute(table)
+            connection.commit()
+            (state,) = connection.execute("PRAGMA quick_check(1)").fetchone()
+            blocks = connection.execute("SELECT first, size, length(content) FROM blocks ORDER BY first").fetchall()
+            end = 0
+            for first, size, length in blocks:
+                if first < end or length != size * self.columns * 8:
+                    state = "invalid blocks"
+                end = first + size
+            if state != "ok" or end > self.runs:
+                raise sqlite3.DatabaseError(state)
+        except BaseException:
+            connection.close()
+            raise
+        self.n_done = sum(size for _, size, _ in blocks)
+        return connection
+
+    @contextmanager
+    def convert_errors(self) -> Iterator[None]:
+        """Convert errors of the database and of its file to HarnessError."""
         try:
             yield
-        except OSError as error:
-            raise HarnessError(f"cannot use the checkpoint {self.path}: {error.strerror}") from None
-
-    def is_intact(self) -> bool:
-        """Return whether the files have the size of this sweep, and the messages of all failed runs."""
-        if self.path.stat().st_size != self.runs * self.dtype.itemsize:
-            return False
-        message_size = self.message_path.stat().st_size if self.message_path.exists() else 0
-        return all(
-            block["status"].min() >= MISSING and block["status"].max() < FAILED + message_size
-            for block in self.array_blocks()
-        )
-
-    @cached_property
-    def array(self) -> np.memmap:
-        """Map the file: status and values of every run, (runs,)."""
-        return np.memmap(self.path, self.dtype, "r+", shape=(self.runs,))
-
-    def unmap(self) -> None:
-        """Close the map, without which Windows neither deletes nor replaces the file."""
-        self.__dict__.pop("array", None)
-
-    def array_blocks(self) -> Iterator[np.ndarray]:
-        """Yield parts of the array."""
-        for first in range(0, self.runs, BLOCK_SIZE):
-            yield self.array[first : first + BLOCK_SIZE]
+        except (OSError, sqlite3.Error) as error:
+            if getattr(error, "sqlite_errorcode", None) == sqlite3.SQLITE_BUSY:
+                raise HarnessError("another command runs this sweep; wait until it has finished") from None
+            reason = error.strerror if isinstance(error, OSError) else error
+            raise HarnessError(f"cannot use the checkpoint {self.path}: {reason}") from None
 
     @property
     def missing_spans(self) -> list[tuple[int, int]]:
         """Return the ranges of runs (first, end) that are not finished."""
-        if not self.n_done:
-            return [(0, self.runs)]
-        missing = np.zeros(self.runs + 2, bool)  # runs before the first and after the last one are not missing
-        missing[1:-1] = self.array["status"] == MISSING
-        edges = np.flatnonzero(np.diff(missing)).tolist()
-        return list(zip(edges[::2], edges[1::2], strict=True))
-
-    @contextmanager
-    def open(self) -> Iterator[None]:
-        """Open the files for writing; create them if there are none that can be used.
-
-        At the end they are deleted if no run is done.  Raises HarnessError if another command has them open.
-        """
-        with ExitStack() as files:
-            with self.convert_os_errors():
-                self.path.parent.mkdir(parents=True, exist_ok=True)
-                self.message_file = files.enter_context(self.message_path.open("ab"))
-                try:
-                    files.enter_context(lock_path(self.message_path))
-                except BlockingIOError:
-                    raise HarnessError("another command runs this sweep; wait until it has finished") from None
-                self.read()  # again: another command may have finished runs meanwhile
-                if not self.n_done:
-                    self.create()
-            try:
-                yield
-            finally:
-                if not self.n_done:
-                    self.message_file.close()
-                    self.delete()
-
-    def create(self) -> None:
-        """Create the array, with the status MISSING for each run, and remove all messages.
-
-        The file is filled with zeros: a full disk is an error here, but would end the process at a write to the map.
-        """
-        self.unmap()
-        self.message_file.seek(0)
-        self.message_file.truncate()
-        try:
-            with self.path.open("wb") as file:
-                for first in range(0, self.runs, BLOCK_SIZE):
-                    file.write(bytes(min(BLOCK_SIZE, self.runs - first) * self.dtype.itemsize))
-        except OSError:
-            self.delete()
-            raise
+        spans, end = [], 0
+        with self.convert_errors():
+            for first, size in self.connection.execute("SELECT first, size FROM blocks ORDER BY first"):
+                spans += [(end, first)] if first > end else []
+                end = first + size
+        return spans + ([(end, self.runs)] if end < self.runs else [])
 
     def add(self, block: RunBlock) -> None:
-        """Write the runs of a block: messages and values first, then the status."""
-        runs = self.array[block.first : block.last]
-        status = np.full(len(runs), FINISHED)
-        with self.convert_os_errors():
-            for index, message in block.messages.items():
-                status[index] = FAILED + self.message_file.tell()
-                self.message_file.write(json.dumps(message).encode() + b"\n")
-            if block.messages:
-                self.message_file.flush()
-                os.fsync(self.message_file.fileno())
-            self.n_done += int(np.count_nonzero(runs["status"] == MISSING))
-            runs["values"] = block.values
-            self.array.flush()
-            runs["status"] = status
-
-    def messages(self, status: np.ndarray) -> list[str]:
-        """Return the error message for each status, empty if the run did not fail."""
-        failed = np.flatnonzero(status >= FAILED)
-        sentences = [""] * len(status)
-        if len(failed):
-            try:
-                with self.convert_os_errors(), self.message_path.open("rb") as file:
-                    for index in failed:
-                        file.seek(int(status[index]) - FAILED)
-                        sentences[index] = json.loads(file.readline())
-            except ValueError:
-                raise HarnessError(f"{self.message_path} is damaged; delete it and repeat the sweep") from None
-        return sentences
+        """Write the runs of a block."""
+        content = np.ascontiguousarray(block.values, "<f8").tobytes()
+        failures = [(block.first + index, message) for index, message in block.messages.items()]
+        with self.convert_errors(), self.connection:
+            self.connection.execute("INSERT INTO blocks VALUES (?, ?, ?)", (block.first, len(block.values), content))
+            self.connection.executemany("INSERT INTO failures VALUES (?, ?)", failures)
+        self.n_done += len(block.values)
 
     def blocks(self) -> Iterator[RunBlock]:
         """Yield all runs in order."""
-        first = 0
-        for block in self.array_blocks():
-            messages = {i: message for i, message in enumerate(self.messages(block["status"])) if message}
-            yield RunBlock(first, np.array(block["values"]), messages)
-            first += len(block)
+        with self.convert_errors():
+            for first, size, content in self.connection.execute("SELECT * FROM blocks ORDER BY first"):
+                failures = self.connection.execute(
+                    "SELECT run, message FROM failures WHERE run >= ? AND run < ?", (first, first + size)
+                )
+                values = np.frombuffer(content, "<f8").reshape(size, self.columns)
+                yield RunBlock(first, values, {run - first: message for run, message in failures})
 
     def delete(self) -> None:
-        """Delete the files."""
-        self.unmap()
-        self.path.unlink(missing_ok=True)
-        self.message_path.unlink(missing_ok=True)
+        """Delete the closed database, and the journal that a killed command may have left."""
+        for path in (self.path, self.path.with_name(f"{self.path.name}-journal")):
+            path.unlink(missing_ok=True)

@@ -51,7 +51,7 @@ def connect_cluster(address: str, unload: Callable[[], None]) -> Iterator[DaskCl
     try:
         from distributed import Client
     except ImportError:
-        raise HarnessError(f"a sweep over a cluster needs Dask: {install_command('sweep')}") from None
+        raise HarnessError(f"a sweep over a cluster needs Dask: {install_command('cluster')}") from None
     for name in ("distributed", "distributed.client"):  # do not log lost workers
         logging.getLogger(name).setLevel(logging.ERROR)
     try:

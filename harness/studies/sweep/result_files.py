@@ -1,6 +1,6 @@
 """Study that runs a sweep and writes its files: sweep.nc for xarray, sweep.csv with the same content, and the figure.
 
-Values are read from the checkpoint and written in parts, so that memory does not grow with the number of runs.
+Values are read from the checkpoint and written block by block, so that memory does not grow with the number of runs.
 Contents of sweep.nc:
 
     <parameter>     values of a varied parameter: a dimension on a grid, over `run` in a sample; units, long_name, scale
@@ -17,14 +17,14 @@ import csv
 import json
 import re
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from ...errors import HarnessError, SceneError, check_names
+from ...errors import HarnessError, SceneError, check_names, import_optional
 from ...results.files import column_heading
 from ...results.folder import replace_folder
 from ...results.provenance import describe_sources, write_provenance
@@ -42,11 +42,6 @@ from .runner import SweepSpec, open_runner
 from .sampling import SweepPoints
 from .study import Sweep, run_pending
 
-if TYPE_CHECKING:
-    import dask.array
-    import xarray
-
-CHUNK_SIZE = "8 MiB"  # of the values read and written at a time
 NOT_NUMBERS = ("String", "Binary", "Clock")
 NUMBER = re.compile(r"-?\b\d+\.?\d*(e[-+]?\d+)?")
 
@@ -78,6 +73,13 @@ class SweepDescription:
     boundaries: tuple[Boundary, ...]
     tables: tuple[LookupTable, ...] = ()
 
+    @property
+    def headings(self) -> list[str]:
+        """Return the headings of the varied parameters and of the columns, with units."""
+        units = {name: unit for name, (unit, _) in self.varied.items()}
+        units |= {column.name: column.unit for column in self.columns}
+        return [column_heading(name, "" if unit == "1" else unit) for name, unit in units.items()]
+
 
 def run_sweep(
     runs: SweepSpec,
@@ -93,8 +95,6 @@ def run_sweep(
     check_built(file)
     about = describe(runs, points)
     sweep = Sweep(runs, points, file.read_bytes(), len(about.columns))
-    checkpoint = sweep.checkpoint(out / STUDY.name)
-    n_resumed = checkpoint.n_done
     folder = out / STUDY.name / (name or "-".join((runs.run.model, *runs.varied, sweep.key[:8])))
     source = describe_sources(str(file))
     options = runs.run.options | {
@@ -103,13 +103,12 @@ def run_sweep(
         "seed": points.seed,
         "measures": runs.measures,
     }
+    checkpoint = sweep.checkpoint(out / STUDY.name)
     # opened before the runs, so that conflicts are reported at once
-    with replace_folder(folder, STUDY.files, source) as new_folder:
+    with checkpoint.open(), replace_folder(folder, STUDY.files, source) as new_folder:
+        n_resumed = checkpoint.n_done
         seconds = run_pending(sweep, checkpoint, scheduler, workers, report)
         failures = write_files(sweep, checkpoint, about, new_folder)
-        units = {name: unit for name, (unit, _) in about.varied.items()}
-        units |= {column.name: column.unit for column in about.columns}
-        columns = ", ".join(column_heading(name, "" if unit == "1" else unit) for name, unit in units.items())
         result = SweepResult(
             folder.name,
             len(points),
@@ -119,7 +118,7 @@ def run_sweep(
             failures,
             seconds,
             about.boundaries,
-            columns,
+            ", ".join(about.headings),
         )
         result.write(new_folder)
         write_provenance(new_folder, [file], about.constants, options, source=source)
@@ -171,84 +170,97 @@ def write_files(
     sweep: Sweep, checkpoint: Checkpoint, about: SweepDescription, folder: Path
 ) -> tuple[FailureGroup, ...]:
     """Write the netCDF file and the table; return the failures."""
-    import dask
-
     failures, longest = group_failures(sweep, checkpoint)
-    with dask.config.set({"scheduler": "synchronous", "array.chunk-size": CHUNK_SIZE}):
-        dataset = build_dataset(sweep, checkpoint, about, longest)
-        dataset.to_netcdf(folder / DATASET_FILE, engine="netcdf4", format="NETCDF3_64BIT")
+    write_dataset(sweep, checkpoint, about, longest, folder / DATASET_FILE)
     with (folder / TABLE_FILE).open("w", encoding="utf-8", newline="") as text:
         table = csv.writer(text, lineterminator="\n")
-        units = {name: str(variable.attrs.get("units", "1")) for name, variable in dataset.variables.items()}
-        names = [*sweep.runs.varied, *(column.name for column in about.columns), "error"]
-        table.writerow([column_heading(name, "" if units[name] == "1" else units[name]) for name in names])
+        table.writerow([*about.headings, "error"])
         for block in checkpoint.blocks():
             table.writerows(csv_rows(sweep.points.coordinates(block.first, block.last), block))
     return failures
 
 
-class ArrayOnDisk:
-    """A mapped array for Dask, which copies arrays that can be copied."""
-
-    def __init__(self, values: np.ndarray) -> None:
-        self.values, self.shape, self.dtype, self.ndim = values, values.shape, values.dtype, values.ndim
-
-    def __getitem__(self, index: Any) -> np.ndarray:
-        return np.array(self.values[index])
-
-
-def build_dataset(sweep: Sweep, checkpoint: Checkpoint, about: SweepDescription, longest: int) -> "xarray.Dataset":
-    """Return the results as an xarray.Dataset, whose values stay on the disk.
+def write_dataset(sweep: Sweep, checkpoint: Checkpoint, about: SweepDescription, longest: int, path: Path) -> None:
+    """Write the netCDF file, block by block.
 
     `longest` is the length in bytes of the longest error message.
     """
-    import dask.array
-    import xarray
+    netcdf = import_optional("netCDF4", "to write a sweep", "sweep")
+    points = sweep.points
+    shape = tuple(len(axis.values) for axis in points.axes) if points.random is None else (len(points),)
+    with netcdf.Dataset(path, "w", format="NETCDF3_64BIT_OFFSET") as file:
+        columns, errors = declare_variables(file, sweep, about, longest)
+        for block in checkpoint.blocks():
+            messages = np.zeros(len(block.values), f"S{longest}")
+            for i, message in block.messages.items():
+                messages[i] = message.encode()
+            letters = messages.view("S1").reshape(-1, longest)
+            for index, part in split_by_rows(shape, block.first, block.last):
+                for variable, values in zip(columns, block.values.T, strict=True):
+                    variable[index] = values[part]
+                errors[index] = letters[part]
 
+
+def declare_variables(file: Any, sweep: Sweep, about: SweepDescription, longest: int) -> tuple[list[Any], Any]:
+    """Declare the content of the netCDF file and write the parameters; return the variables of values and errors."""
     points, names = sweep.points, sweep.runs.varied
     is_grid = points.random is None
-    dimensions = names if is_grid else ("run",)
-    shape = tuple(len(axis.values) for axis in points.axes) if is_grid else (len(points),)
-
-    def lazy(values: np.ndarray) -> "dask.array.Array":
-        on_disk = ArrayOnDisk(values.reshape(shape))
-        return dask.array.from_array(on_disk, chunks="auto", name=False)  # type: ignore[no-untyped-call]
-
-    def encode_messages(status: np.ndarray) -> np.ndarray:
-        sentences = [sentence.encode() for sentence in checkpoint.messages(status.ravel())]
-        return np.array(sentences, f"S{longest}").reshape(status.shape)
-
-    values, status = checkpoint.array["values"], lazy(checkpoint.array["status"])
-    attributes_of = axis_attributes(sweep, about)
-    coordinates = {}
-    for i, axis in enumerate(points.axes):
-        dimension, coordinate = (axis.name, np.array(axis.values)) if is_grid else ("run", points.sample[:, i])
-        coordinates[axis.name] = dimension, coordinate, attributes_of[axis.name]
-    variables = {
-        column.name: (dimensions, lazy(values[:, i]), {"units": column.unit or "1", "long_name": column.text})
-        for i, column in enumerate(about.columns)
-    }
-    variables["error"] = (
-        dimensions,
-        dask.array.map_blocks(  # type: ignore[no-untyped-call]
-            encode_messages, status, dtype=f"S{longest}"
-        ),
-        {"long_name": "error message of a failed run, otherwise empty", "_Encoding": "utf-8"},
+    dimensions = {axis.name: len(axis.values) for axis in points.axes} if is_grid else {"run": len(points)}
+    file.set_fill_off()  # every value is written
+    file.setncatts(
+        {
+            "title": f"{sweep.runs.run.model} over {', '.join(names)}",
+            "model": sweep.runs.run.model,
+            "fmu_sha256": sweep.digest,
+            "stop_time": about.stop,
+            "parameters": json.dumps({name: value for name, (value, _) in about.constants.items()}, sort_keys=True),
+            "sample": "grid" if is_grid else f"Latin hypercube, seed {points.seed}",
+        }
     )
-    attributes = {
-        "title": f"{sweep.runs.run.model} over {', '.join(names)}",
-        "model": sweep.runs.run.model,
-        "fmu_sha256": sweep.digest,
-        "stop_time": about.stop,
-        "parameters": json.dumps({name: value for name, (value, _) in about.constants.items()}, sort_keys=True),
-        "sample": "grid" if is_grid else f"Latin hypercube, seed {points.seed}",
-    }
     if about.tables:
-        attributes["tables"] = json.dumps([vars(table) for table in about.tables])
-    dataset = xarray.Dataset(variables, coordinates, attributes)
-    for name in (*names, *(column.name for column in about.columns)):
-        dataset[name].encoding["_FillValue"] = None  # a failed run has NaN, which needs no declaration
-    return dataset
+        file.tables = json.dumps([vars(table) for table in about.tables])
+    text_dimension = f"string{longest}"
+    for name, size in (dimensions | {text_dimension: longest}).items():
+        file.createDimension(name, size)
+
+    def declare(name: str, kind: str, shape: tuple[str, ...], attributes: dict[str, str]) -> Any:
+        variable = file.createVariable(name, kind, shape)
+        variable.set_auto_maskandscale(False)
+        variable.set_auto_chartostring(False)
+        variable.setncatts(attributes)
+        return variable
+
+    attributes_of = axis_attributes(sweep, about)
+    for i, axis in enumerate(points.axes):
+        variable = declare(axis.name, "f8", (axis.name if is_grid else "run",), attributes_of[axis.name])
+        variable[:] = axis.values if is_grid else points.sample[:, i]
+    shared = {} if is_grid else {"coordinates": " ".join(names)}
+    columns = [
+        declare(column.name, "f8", (*dimensions,), {"units": column.unit or "1", "long_name": column.text} | shared)
+        for column in about.columns
+    ]
+    about_errors = {"long_name": "error message of a failed run, otherwise empty", "_Encoding": "utf-8"}
+    return columns, declare("error", "S1", (*dimensions, text_dimension), about_errors | shared)
+
+
+def split_by_rows(
+    shape: tuple[int, ...], first: int, last: int
+) -> Iterator[tuple[tuple[int | slice, ...], np.ndarray]]:
+    """Split the elements from number `first` to before `last` of an array into parts that are of one row or whole rows.
+
+    Yields the index of each part, and the numbers of its elements counted from `first`, in the shape of the part.
+    """
+    row, start = shape[-1], first
+    while start < last:
+        *outer, column = (int(i) for i in np.unravel_index(start, shape))
+        n_rows = min((last - start) // row, shape[-2] - outer[-1]) if outer and column == 0 else 0
+        end = start + (n_rows * row or min(row - column, last - start))
+        numbers, columns = np.arange(start - first, end - first), slice(column, column + end - start)
+        if n_rows:
+            yield (*outer[:-1], slice(outer[-1], outer[-1] + n_rows), slice(row)), numbers.reshape(n_rows, row)
+        else:
+            yield (*outer, columns), numbers
+        start = end
 
 
 def axis_attributes(sweep: Sweep, about: SweepDescription) -> dict[str, dict[str, str]]:

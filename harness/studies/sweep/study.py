@@ -66,15 +66,14 @@ def run_pending(
 ) -> float:
     """Do the missing runs and write them to the checkpoint; return the elapsed time in s."""
     start = perf_counter()
-    if not checkpoint.missing_spans:
+    pending = checkpoint.missing_spans
+    if not pending:
         return 0.0
     try:
-        with checkpoint.open():
-            pending = checkpoint.missing_spans
-            with open_workers(scheduler, workers, sum(last - first for first, last in pending)) as pool:
-                for block in Dispatcher(sweep, pool, pending).completed_blocks():
-                    checkpoint.add(block)
-                    report(checkpoint.n_done / len(sweep.points))
+        with open_workers(scheduler, workers, sum(last - first for first, last in pending)) as pool:
+            for block in Dispatcher(sweep, pool, pending).completed_blocks():
+                checkpoint.add(block)
+                report(checkpoint.n_done / len(sweep.points))
     except BaseException as error:  # an interrupt may cause any exception
         if not (RECEIVED_SIGNALS or isinstance(error, KeyboardInterrupt)):
             raise
