@@ -56,7 +56,7 @@ def test_the_command_line_uses_both_sides_of_a_pause(tmp_path):
     record = paused(2.03, 0.95)
     rows = [f"{t!r},{x!r}" for t, x in zip(record.t.tolist(), record.x.tolist(), strict=True)]
     (tmp_path / "paused.csv").write_text("\n".join(["time [s],x [m]", *rows]))
-    done = harness(tmp_path, "decay", "paused.csv", "--json", blank=True)
+    done = harness(tmp_path, "decay", "paused.csv", "--json")
     assert done.returncode == 0, done.stderr
     data = json.loads(done.stdout)
     assert {item["name"]: item["value"] for item in data["fit"]}["omega"] == pytest.approx(OMEGA, rel=1e-8)

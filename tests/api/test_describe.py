@@ -60,12 +60,12 @@ def test_a_description_is_one_line_a_table_and_html(fmus):
 @pytest.mark.parametrize("name", ["Arrays", "Midpoint", "ModelExchangeOnly", "Fmi3Midpoint"])
 def test_the_command_describes_any_fmu(tmp_path, name):
     path = external_fmus.build_external_fmus() / f"{name}.fmu"
-    done = commands.harness(tmp_path, "info", path, "--json", blank=True)
+    done = commands.harness(tmp_path, "info", path, "--json")
     assert (done.returncode, done.stderr) == (0, "")
     data, description = json.loads(done.stdout), harness.describe(path)
     assert [item["name"] for item in data["variables"]] == [item.name for item in description.variables]
     assert data["interfaces"] == list(description.interfaces)
-    text = commands.harness(tmp_path, "info", path, blank=True, COLUMNS="80").stdout
+    text = commands.harness(tmp_path, "info", path, COLUMNS="80").stdout
     assert max(map(len, text.splitlines())) <= 80
     assert all(item.name in text for item in description.variables)
     assert not (tmp_path / "results").exists()
@@ -78,7 +78,7 @@ def test_what_is_no_model_and_no_fmu_is_refused_in_one_sentence(tmp_path):
         ("none.fmu", "none.fmu"),
         ("text.fmu", "cannot be read"),
     ):
-        done = commands.harness(tmp_path, "info", source, blank=True)
+        done = commands.harness(tmp_path, "info", source)
         assert done.returncode in (1, 2)
         assert words in done.stderr
         assert done.stderr.count("\n") == 1

@@ -101,7 +101,7 @@ def test_an_invalid_command_line_is_one_sentence_and_leaves_no_result(workspace,
 
 def test_an_option_that_applies_to_one_of_two_fmus_is_accepted(workspace):
     other = external_fmus.build_external_fmus() / "Midpoint.fmu"
-    done = commands.harness(workspace, "compare", OWN, other, "--timeout", 30, "--stop", 0.1, blank=True)
+    done = commands.harness(workspace, "compare", OWN, other, "--timeout", 30, "--stop", 0.1)
     assert (done.returncode, done.stderr) == (0, "")
 
 
@@ -121,7 +121,7 @@ def test_a_command_for_the_solver_refuses_an_external_fmu(tmp_path, command):
 def test_the_decay_of_a_scene_of_an_external_fmu_is_identified(tmp_path):
     fmu = fmi3_fixtures.build_fmi3_fmus() / "smd.fmu"
     (tmp_path / "mine.toml").write_text(SCENE.format(fmu=fmu, more="[values]\nc = 0.4\nk = 100"))
-    done = commands.harness(tmp_path, "decay", "mine.toml", blank=True, COLUMNS="120")
+    done = commands.harness(tmp_path, "decay", "mine.toml", COLUMNS="120")
     assert (done.returncode, done.stderr) == (0, "")
     assert "zeta" in done.stdout
     fmu = external_fmus.build_external_fmus() / "Midpoint.fmu"

@@ -19,7 +19,7 @@ BASE = 'title = "a title"\nmodel = "stickslip"\noutputs = ["x", "v"]\n'
 
 TIME = r'"name": "run_time",\s+"value": [^,]+'
 NUMBER = r"-?\b\d+\.?\d*(?:e[-+]\d+)?"
-harness = partial(commands.harness, blank=True, PATH="", COLUMNS="100")  # published cases are drawn elsewhere
+harness = partial(commands.harness, PATH="", COLUMNS="100")  # published cases are drawn elsewhere
 
 
 @pytest.fixture
@@ -351,5 +351,5 @@ def test_a_run_that_hardly_advances_ends_at_its_time_limit(workspace):
     (line,) = done.stderr.splitlines()
     assert line.startswith("Error: stickslip.fmu is at t = ")
     assert line.endswith("advances by less than 1/4096 of the run in 0.5 s: choose an earlier stop or a longer timeout")
-    done = commands.harness(workspace, "run", "--fmu", "fmus/stickslip.fmu", "--stop", 20, "--timeout", 5, blank=True)
+    done = commands.harness(workspace, "run", "--fmu", "fmus/stickslip.fmu", "--stop", 20, "--timeout", 5)
     assert (done.returncode, done.stderr) == (0, "")

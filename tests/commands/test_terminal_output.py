@@ -6,7 +6,6 @@ import json
 import os
 import re
 import tomllib
-from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 
@@ -27,7 +26,7 @@ SCENES = {file.stem: tomllib.loads(file.read_text()) for file in sorted((ROOT / 
 COUPLED = sorted(file.stem for file in (ROOT / "harness/scenes/coupled").glob("*.toml"))
 WIDTH = 80
 PLAIN = {"COLUMNS": str(WIDTH), "PATH": ""}
-harness = partial(processes.harness, blank=True)
+harness = processes.harness
 
 
 def assert_fits(output, *headings):

@@ -38,7 +38,7 @@ def test_a_certified_result_has_all_states_and_precision_accepts_it(tmp_path):
     assert heads == "t [s],x [m],v [m/s],z [m]"
     table = np.array([row.split(",") for row in rows], float)
     assert np.abs(table[-1, 1:] - solve_lugre(table[-1, 0])).max() < 1e-9
-    done = commands.harness(tmp_path, "precision", "lugre.py", "--quick", blank=True)
+    done = commands.harness(tmp_path, "precision", "lugre.py", "--quick")
     assert (done.returncode, done.stderr) == (0, "")
     assert [file.name for file in (tmp_path / "results/precision").iterdir()] == ["lugre"]
     expected_files = {"data.npz", "points.csv", "figure.svg", "provenance.json", "summary.json"}

@@ -202,7 +202,7 @@ def test_a_model_file_may_be_named_like_a_python_module(oil):
 
 def harness(*arguments, cwd):
     """A harness command in a user's folder, without figures."""
-    return commands.harness(cwd, *arguments, blank=True)
+    return commands.harness(cwd, *arguments)
 
 
 def test_a_result_is_certified_by_two_agreeing_methods_and_packed_by_the_next_build(oil):

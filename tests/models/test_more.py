@@ -152,6 +152,6 @@ def test_commands_know_the_models_by_name(tmp_path):
     assert "no fmus/more/belt.fmu: build it with `friction-fmus build belt`" in done.stderr
     (tmp_path / "fmus" / "more").mkdir(parents=True)
     (tmp_path / "fmus" / "more" / "belt.fmu").write_bytes(built("belt").read_bytes())
-    done = commands.harness(tmp_path, "run", "belt", blank=True)
+    done = commands.harness(tmp_path, "run", "belt")
     assert (done.returncode, done.stderr) == (0, "")
     assert "sticks for" in done.stdout

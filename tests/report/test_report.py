@@ -25,7 +25,7 @@ def report_run(fmus, tmp_path_factory):
         ("decay", "coulomb"),
         ("compare", "results/coulomb", "results/coulomb-sign"),
     ):
-        assert harness(folder, *command, "--quiet").returncode == 0
+        assert harness(folder, *command, "--quiet", figures=True).returncode == 0
     return folder, harness(folder, "report")
 
 

@@ -5,7 +5,6 @@ import json
 import re
 import shutil
 from contextlib import suppress
-from functools import partial
 from hashlib import sha256
 from zipfile import ZipFile
 
@@ -28,7 +27,7 @@ COMMANDS = {  # that take seconds, and the folders of their results
     "sweep": (("sweep", "coulomb", "--vary", "f=0.25,0.5", "--workers", "1", "--name", "f"), "sweep/f"),
 }
 DRAWN = "decay/coulomb"  # the others are not drawn; test_figures.py checks that the same drawing gives the same file
-harness = partial(commands.harness, blank=True)  # each of these is drawn by a test of its study
+harness = commands.harness
 
 
 @pytest.fixture(scope="module", params=COMMANDS)
@@ -36,7 +35,7 @@ def example_run(request, fmus, tmp_path_factory):
     """A folder in which one of the commands was run, its arguments, and its result."""
     workspace, (arguments, folder) = tmp_path_factory.mktemp("made"), COMMANDS[request.param]
     (workspace / "fmus").symlink_to(fmus)
-    done = commands.harness(workspace, *arguments, blank=folder != DRAWN)
+    done = commands.harness(workspace, *arguments, figures=folder == DRAWN)
     assert (done.returncode, done.stderr) == (0, "")
     return workspace, arguments, workspace / "results" / folder
 
@@ -128,7 +127,7 @@ def test_a_result_is_reproduced_from_its_folder_bit_for_bit(example_run, tmp_pat
     workspace = shutil.copytree(original, tmp_path / "copy", symlinks=True)  # a repetition replaces the result
     folder = workspace / folder.relative_to(original)
     before, provenance = files(folder), read_provenance(folder)
-    done = commands.harness(workspace, "run", folder.relative_to(workspace), blank=not folder.match(DRAWN))
+    done = commands.harness(workspace, "run", folder.relative_to(workspace), figures=folder.match(DRAWN))
     assert (done.returncode, done.stderr) == (0, "")
     assert files(folder) == before
     for key in ("files", "parameters", "run", "scene", "source"):

@@ -30,9 +30,9 @@ def run(external_fmu_folder, tmp_path):
     """Return run(name, ...): the finished `run --fmu`, and the result by column; each FMU is plotted once in this
     file."""
 
-    def run(name, *arguments, blank=True):
+    def run(name, *arguments, figures=False):
         fmu = name if name.endswith(".fmu") else external_fmu_folder / f"{name}.fmu"
-        done = commands.harness(tmp_path, "run", "--fmu", fmu, *arguments, COLUMNS="120", blank=blank)
+        done = commands.harness(tmp_path, "run", "--fmu", fmu, *arguments, COLUMNS="120", figures=figures)
         assert "Traceback" not in done.stderr
         assert "np." not in done.stdout + done.stderr
         return done, table(tmp_path / "results" / name.removesuffix(".fmu") / "trajectory.csv")
@@ -67,7 +67,7 @@ def assert_refused(done, status, *sentences):
 @pytest.mark.parametrize("name", ["Midpoint", "Fmi3Midpoint", "ModelExchangeOnly"])
 @pytest.mark.parametrize("tolerance", [1e-3, pytest.param(1e-5, marks=pytest.mark.slow)])
 def test_an_fmu_with_hidden_steps_is_refined_until_two_results_agree(run, name, tolerance):
-    done, rows = run(name, "--set", "k=50", "--tolerance", tolerance, blank=True)
+    done, rows = run(name, "--set", "k=50", "--tolerance", tolerance)
     assert_succeeded(done)
     assert "changes no output by more than" in done.stdout
     time, position, *_ = rows.values()
@@ -78,7 +78,7 @@ def test_an_fmu_with_hidden_steps_is_refined_until_two_results_agree(run, name, 
 def test_a_state_that_jumps_at_events_agrees_with_its_closed_form(run):
     """FMI 2.0: after bounce n the ball rises with e^n times the speed of its first fall."""
     e, g = 0.8, 9.81
-    done, rows = run("Bouncing", "--set", f"e={e}", blank=True)
+    done, rows = run("Bouncing", "--set", f"e={e}")
     assert_succeeded(done)
     fall = sqrt(2 / g)
     bounces = fall + 2 * fall * np.cumsum([0, *(e**n for n in (1, 2))])
@@ -121,12 +121,12 @@ def test_clocks_that_cannot_tick_are_refused(run, external_fmu_folder, tmp_path)
     done, _ = run_edited('intervalDecimal="0.1"', 'intervalDecimal="0"')
     assert_refused(done, 1, "its clock sample has an interval of 0.0 s; it must be positive")
     (tmp_path / "x.csv").write_text("time,x\n" + "".join(f"{0.1 * i},{exp(-0.2 * i)}\n" for i in range(21)))
-    done = commands.harness(tmp_path, "fit", external_fmu_folder / "Ticking.fmu", "x.csv", "--free", "k", blank=True)
+    done = commands.harness(tmp_path, "fit", external_fmu_folder / "Ticking.fmu", "x.csv", "--free", "k")
     assert_refused(done, 1, "it has clocks (sample, timeout, growing, fifth), which only run, compare and sweep tick")
 
 
 def test_an_fmu_with_a_fixed_internal_step_is_reported_as_such_also_in_its_result(run, tmp_path):
-    done, rows = run("FixedStep", blank=True)
+    done, rows = run("FixedStep")
     assert_succeeded(done)
     note = "fixed internal step of 0.1 s, error unknown"
     assert note in done.stdout
@@ -136,7 +136,7 @@ def test_an_fmu_with_a_fixed_internal_step_is_reported_as_such_also_in_its_resul
 
 
 def test_booleans_integers_and_strings_are_recorded_drawn_and_set(run, tmp_path):
-    done, rows = run("Switching", "--set", "enabled=true", "--set", "most=3", "--set", "name=007", blank=False)
+    done, rows = run("Switching", "--set", "enabled=true", "--set", "most=3", "--set", "name=007", figures=True)
     assert_succeeded(done)
     assert (tmp_path / "results/Switching/figure.svg").is_file()
     assert {*rows["on"]} == {0, 1}
@@ -180,7 +180,7 @@ def test_a_scene_may_use_any_fmu(external_fmu_folder, tmp_path, name, outputs, m
         SCENE.format(fmu=external_fmu_folder / f"{name}.fmu", outputs=outputs, more=more)
     )
     without_strings = name != "Arrays"  # whose strings and elements are drawn
-    done = commands.harness(tmp_path, "run", "mine.toml", blank=without_strings, COLUMNS="120")
+    done = commands.harness(tmp_path, "run", "mine.toml", figures=not without_strings, COLUMNS="120")
     assert_succeeded(done)
     rows = table(tmp_path / "results/mine/trajectory.csv")
     turn = [f"turn[{i},{j}]" for i in (1, 2) for j in (1, 2)]
@@ -190,9 +190,7 @@ def test_a_scene_may_use_any_fmu(external_fmu_folder, tmp_path, name, outputs, m
         assert rows["place[2]"][-1] == pytest.approx(2 * cos(3))
     assert (tmp_path / "results/mine/figure.svg").is_file()
     assert "error unknown" in done.stdout or "changes no output by more than" in done.stdout
-    assert (
-        "the same, bit for bit" in commands.harness(tmp_path, "run", "results/mine", blank=True, COLUMNS="120").stdout
-    )
+    assert "the same, bit for bit" in commands.harness(tmp_path, "run", "results/mine", COLUMNS="120").stdout
 
 
 @pytest.mark.parametrize(
@@ -213,7 +211,7 @@ def test_a_scene_may_use_any_fmu(external_fmu_folder, tmp_path, name, outputs, m
     ],
 )
 def test_an_fmu_that_terminates_is_reported_by_status_and_keeps_its_samples(run, name, arguments, end, message):
-    done, rows = run(name, *arguments, blank=True)
+    done, rows = run(name, *arguments)
     assert_refused(
         done,
         1,
@@ -237,7 +235,7 @@ def test_an_fmu_that_terminates_is_reported_by_status_and_keeps_its_samples(run,
     ],
 )
 def test_a_hang_crash_exception_or_nan_is_one_sentence_and_keeps_its_samples(run, kind, message):
-    done, rows = run("Faulty", "--set", f"kind={kind}", "--timeout", "4", blank=True)
+    done, rows = run("Faulty", "--set", f"kind={kind}", "--timeout", "4")
     assert_refused(done, 1, f"Faulty.fmu: {message}")
     assert done.stderr.count("\n") == 1
     assert rows["t [s]"][-1] == 0.5
@@ -247,7 +245,7 @@ def test_a_hang_crash_exception_or_nan_is_one_sentence_and_keeps_its_samples(run
 def test_a_scene_that_fails_keeps_its_stop_time_for_a_repetition(external_fmu_folder, tmp_path):
     scene = SCENE.format(fmu=external_fmu_folder / "Faulty.fmu", outputs=["x"], more="stop = 0.9\nvalues.kind = 5")
     (tmp_path / "mine.toml").write_text(scene)
-    assert_refused(commands.harness(tmp_path, "run", "mine.toml", blank=True), 1, "x is nan at t = 0.5")
+    assert_refused(commands.harness(tmp_path, "run", "mine.toml"), 1, "x is nan at t = 0.5")
     assert json.loads((tmp_path / "results/mine/provenance.json").read_text())["run"]["stop"] == 0.9
 
 
@@ -470,7 +468,7 @@ def test_unicode_names_and_missing_units_are_supported(run, external_fmu_folder,
         tmp_path / "\u03c9.fmu",
         edited_description(lambda text: text.replace('name="x"', 'name="\u03c6, \u3042"')),
     )
-    done, _ = run("\u03c9.fmu", "--tolerance", "1e-3", blank=True)
+    done, _ = run("\u03c9.fmu", "--tolerance", "1e-3")
     assert_succeeded(done)
     assert re.search("^\u03c6, \u3042 +1 +0.99", done.stdout, re.M)
 

@@ -24,7 +24,7 @@ def write(folder, extra="", **keys):
 
 def run(scene):
     """Run a scene without drawing, and return the folder of its result and its provenance."""
-    done = commands.harness(scene.parent, "run", scene, blank=True)
+    done = commands.harness(scene.parent, "run", scene)
     assert (done.returncode, done.stderr) == (0, "")
     folder = scene.parent / "results" / scene.stem
     return folder, json.loads((folder / "provenance.json").read_text())
@@ -136,7 +136,7 @@ def test_a_value_is_published_only_with_a_citation(workspace):
         folder, _ = run(write(workspace, extra=extra, analyses='["slip"]'))
         heads = (folder / "quantities.csv").read_text().splitlines()[0]
         assert f"{kind} (a method)" in heads
-        assert "the same, bit for bit" in commands.harness(workspace, "run", folder, blank=True, COLUMNS="120").stdout
+        assert "the same, bit for bit" in commands.harness(workspace, "run", folder, COLUMNS="120").stdout
         assert (folder / "quantities.csv").read_text().splitlines()[0] == heads
 
 

@@ -26,7 +26,7 @@ def external_fmu_folder():
 @pytest.fixture
 def harness(workspace):
     """Return harness(argument, ...): the finished process, in a folder with the built FMUs."""
-    return partial(commands.harness, workspace, blank=True, COLUMNS="120")
+    return partial(commands.harness, workspace, COLUMNS="120")
 
 
 def test_a_project_fmu_is_run_at_its_internal_steps(harness, tmp_path):
@@ -51,7 +51,7 @@ def test_two_fmus_differ_as_their_closed_forms_do(harness, external_fmu_folder, 
     stiffer = {"resources/Midpoint.py": lambda text: text.replace("40.0", "40.4")}
     other = external_fmus.edited_copy(external_fmu_folder / "Midpoint.fmu", tmp_path / "Other.fmu", stiffer)
     arguments = (external_fmu_folder / "Midpoint.fmu", other, "--tolerance", 1e-4)
-    done = harness("compare", *arguments, "--json", blank=False)
+    done = harness("compare", *arguments, "--json", figures=True)
     assert (done.returncode, done.stderr) == (0, "")
     comparison = json.loads(done.stdout)
     times = np.linspace(0, 1, 1001)
@@ -89,7 +89,7 @@ def results(tmp_path):
 
 
 def test_a_result_agrees_with_a_new_run_of_its_fmu_including_events(harness, results):
-    done = harness("compare", "results/stickslip", "fmus/stickslip.fmu", "--within", 1e-12, blank=False)
+    done = harness("compare", "results/stickslip", "fmus/stickslip.fmu", "--within", 1e-12, figures=True)
     assert (done.returncode, done.stderr) == (0, "")
     assert "8 changes of mode in both, at most 0 s apart" in done.stdout
 
@@ -425,7 +425,7 @@ def test_strings_are_compared_as_strings(tmp_path):
 def test_within_and_atol_set_the_allowed_difference(tmp_path, bounds, status):
     (tmp_path / "one.csv").write_text("t [s],x [m]\n0,1\n1,4\n2,3\n")
     (tmp_path / "two.csv").write_text("t [s],x [m]\n0,1\n1,3.75\n2,3\n")
-    done = commands.harness(tmp_path, "compare", "one.csv", "two.csv", *bounds, "--quiet", blank=True)
+    done = commands.harness(tmp_path, "compare", "one.csv", "two.csv", *bounds, "--quiet")
     assert (done.returncode, done.stdout) == (status, "")
     assert ("x differs by 0.25 m at t = 1 s, more than" in done.stderr) == bool(status)
 
@@ -505,7 +505,7 @@ def test_within_fails_on_nan(tmp_path):
     (tmp_path / "good.csv").write_text("t [s],x [m]\n0,1\n1,2\n2,3\n")
     (tmp_path / "bad.csv").write_text("t [s],x [m]\n0,1\n1,nan\n2,3\n")
     for pair in (("good.csv", "bad.csv"), ("bad.csv", "good.csv"), ("bad.csv", "bad.csv")):
-        done = commands.harness(tmp_path, "compare", *pair, "--within", "1e9", blank=True, COLUMNS="120")
+        done = commands.harness(tmp_path, "compare", *pair, "--within", "1e9", COLUMNS="120")
         assert done.returncode == 1
         assert "x is not a finite number at t = 1 s" in done.stdout
         assert done.stderr.count("\n") == 1

@@ -42,7 +42,7 @@ def couple(workspace):
         if "\n" in scene:
             (workspace / "mine.toml").write_text(scene)
             scene = "mine.toml"
-        return commands.harness(workspace, "couple", scene, *options, blank=True)
+        return commands.harness(workspace, "couple", scene, *options)
 
     return run
 
@@ -191,7 +191,7 @@ def run():
     def run(scene):
         def make(folder):
             (folder / "fmus").symlink_to(fmus)
-            done = commands.harness(folder, "couple", scene, blank=scene != "two-masses")
+            done = commands.harness(folder, "couple", scene, figures=scene == "two-masses")
             assert (done.returncode, done.stderr) == (0, "")
 
         return cached_folder(f"coupled-{scene}", make) / "results/coupled" / scene
@@ -244,7 +244,7 @@ def test_an_archive_avoids_factors_inline_values_and_unusual_names(run, scene):
 @pytest.mark.slow
 def test_an_external_archive_is_compared_with_its_finest_run(run, user_folder):
     done = commands.harness(
-        user_folder, "couple", run("driven") / "driven.ssp", "--stop", "0.5", "--out", "theirs", "--json", blank=True
+        user_folder, "couple", run("driven") / "driven.ssp", "--stop", "0.5", "--out", "theirs", "--json"
     )
     assert (done.returncode, done.stderr) == (0, "")
     result = json.loads(done.stdout)

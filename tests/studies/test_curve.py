@@ -29,7 +29,7 @@ def write_points(file, headings, backward, v=V):
 )
 def test_the_fmu_of_the_model_file_has_the_friction_of_the_best_law(tmp_path, headings, backward, speed, force):
     write_points(tmp_path / "bench.csv", headings, backward)
-    done = commands.harness(tmp_path, "curve", "bench.csv", "--velocity", headings[:1], blank=True)
+    done = commands.harness(tmp_path, "curve", "bench.csv", "--velocity", headings[:1])
     assert done.returncode == 0, done.stderr
     curve = harness.load_result(tmp_path / "results" / "curve" / "bench")
     assert curve.best.law.is_symmetric == (backward is FORWARD)
@@ -45,7 +45,7 @@ def test_the_fmu_of_the_model_file_has_the_friction_of_the_best_law(tmp_path, he
 
 def test_a_result_goes_on_to_models_and_tables(tmp_path):
     write_points(tmp_path / "bench.csv", "v [m/s],F [N]", FORWARD)
-    done = commands.harness(tmp_path, "curve", "bench.csv", "--mass", "2", "--json", blank=True)
+    done = commands.harness(tmp_path, "curve", "bench.csv", "--mass", "2", "--json")
     result = json.loads(done.stdout)
     values = {item["name"]: item["value"] for item in result["fit"]}
     assert values["F_s"] == pytest.approx(16.0, rel=0.02)
@@ -68,7 +68,7 @@ def test_a_result_goes_on_to_models_and_tables(tmp_path):
 def test_the_fmu_of_the_table_has_the_friction_of_the_points(tmp_path, backward):
     """It sticks and slips in both directions, and slides with the friction of the points, less their mean bias."""
     write_points(tmp_path / "bench.csv", "v [m/s],F [N]", backward)
-    done = commands.harness(tmp_path, "curve", "bench.csv", blank=True)
+    done = commands.harness(tmp_path, "curve", "bench.csv")
     assert done.returncode == 0, done.stderr
     folder = tmp_path / "results" / "curve" / "bench"
     built = commands.build("results/curve/bench/measured_table.py", folder=tmp_path)

@@ -14,7 +14,7 @@ from shared_keys import check_shared_keys
 @pytest.mark.parametrize("arguments", [("coulomb",), (ROOT / "docs/records/spring.csv", "--m", "0.35")])
 def test_the_table_fits_into_80_columns_and_its_first_values_are_those_to_use(fmus, tmp_path, arguments):
     (tmp_path / "fmus").symlink_to(fmus)
-    done = commands.harness(tmp_path, "decay", *arguments, blank=True, COLUMNS="80")
+    done = commands.harness(tmp_path, "decay", *arguments, COLUMNS="80")
     assert (done.returncode, done.stderr) == (0, "")
     values, checks, *_ = done.stdout.split("\n\n")
     lines = [line for table in (values, checks) for line in table.splitlines()]
@@ -64,7 +64,7 @@ def test_the_figure_of_a_long_record_shows_fewer_samples_and_the_extremes_of_eac
 
 def harness(folder, *arguments, text=""):
     """Run the harness in `folder` and return the finished process."""
-    return commands.harness(folder, *arguments, text=text, blank=True, COLUMNS="120")
+    return commands.harness(folder, *arguments, text=text, COLUMNS="120")
 
 
 def test_the_csv_of_another_program_gives_the_parameters_of_its_run(fmus, tmp_path):

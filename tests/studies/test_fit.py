@@ -324,7 +324,7 @@ def test_the_command_writes_what_it_prints(tmp_path):
     frame = frame.assign(x=1e3 * frame["x"]).rename(columns={"t": "t [s]", "x": "laser [mm]"})
     frame.to_csv("pull.csv", index=False)
     words = ("fit", native("stickslip"), "pull.csv", "--free", "mu_s=0.3:1.5,k", "--fixed", "mu_d=0.5,v_driver=0.04")
-    done = commands.harness(tmp_path, *words, "--observe", "x=laser", "--json", blank=True)
+    done = commands.harness(tmp_path, *words, "--observe", "x=laser", "--json")
     assert (done.returncode, done.stderr) == (0, "")
     printed = json.loads(done.stdout)
     folder = tmp_path / "results" / "fit" / "pull"
@@ -475,7 +475,7 @@ def test_the_command_writes_the_compared_laws(tmp_path):
     frame.iloc[:60].to_csv("later.csv", index=False)
     words = ("fit", native("stickslip"), "pull.csv", "--free", "mu_s,f_s", "--fixed", "k=900,v_driver=0.04")
     words += ("--observe", "x=x", "--against", native("stribeck_sled"), "--validate", "later.csv")
-    done = commands.harness(tmp_path, *words, "--json", blank=True)
+    done = commands.harness(tmp_path, *words, "--json")
     assert (done.returncode, done.stderr) == (0, "")
     printed = json.loads(done.stdout)
     assert [law["fmu"] for law in printed["against"]] == ["stribeck_sled"]
@@ -486,7 +486,7 @@ def test_the_command_writes_the_compared_laws(tmp_path):
         assert lines[0].split(",")[2:5] == ["x [m]", "x fit [m]", "x residual [m]"]
         assert lines[0].split(",")[5:] == ["x fit stribeck_sled [m]", "x residual stribeck_sled [m]"]
         assert len(lines) == 1 + count
-    table = commands.harness(tmp_path, *words, blank=True).stdout
+    table = commands.harness(tmp_path, *words).stdout
     assert "above the best" in table
     assert printed["comparison"]["verdict"] in " ".join(table.split())
 

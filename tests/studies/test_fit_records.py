@@ -88,7 +88,7 @@ def test_a_column_that_fits_is_observed_and_named(tmp_path, columns, units, sent
     assert fit.notes[0].startswith(sentence)
     record.columns = ["t [s]", *(f"{name} [{units[name]}]" for name in columns)]
     record.to_csv(tmp_path / "pull.csv", index=False)
-    done = commands.harness(tmp_path, "fit", native("smd"), "pull.csv", "--free", "k=50:400", "--json", blank=True)
+    done = commands.harness(tmp_path, "fit", native("smd"), "pull.csv", "--free", "k=50:400", "--json")
     assert (done.returncode, done.stderr) == (0, "")
     assert json.loads(done.stdout)["notes"][0] == fit.notes[0]
 

@@ -146,7 +146,7 @@ def test_a_failure_is_one_sentence(both, tmp_path, exchange, capfd):
 
 def harness(folder, *arguments):
     """Run a command in a folder, without figures, and return the finished process."""
-    return commands.harness(folder, *arguments, blank=True, PATH="", COLUMNS="100")
+    return commands.harness(folder, *arguments, PATH="", COLUMNS="100")
 
 
 @pytest.fixture(scope="module")

@@ -33,7 +33,7 @@ def draw(fmus, tmp_path_factory):
         scene = (ROOT / f"harness/scenes/{name}.toml").read_text()
         (folder / f"{name}.toml").write_text(re.sub("repeat = .*", "", scene))
         with patch.object(Figure, "savefig", lambda figure, *_, **__: figures.append(figure)):
-            done = commands.harness(folder, "run", f"{name}.toml")
+            done = commands.harness(folder, "run", f"{name}.toml", figures=True)
         assert (done.returncode, done.stderr) == (0, "")
         figures[0].draw_without_rendering()
         run = harness.load_result(folder / "results" / name)
@@ -145,7 +145,7 @@ def blocks_run(tmp_path_factory):
     """The run of a model of two contacts, by itself, with its result folder."""
     folder = tmp_path_factory.mktemp("blocks")
     fmu = build_fmu(CONTACTS / "blocks.py")
-    done = commands.harness(folder, "run", "--fmu", str(fmu))
+    done = commands.harness(folder, "run", "--fmu", str(fmu), figures=True)
     assert done.returncode == 0, done.stderr
     return done.stdout, folder / "results/blocks"
 
@@ -230,7 +230,7 @@ def test_an_output_takes_precedence_over_the_panel_of_its_name(tmp_path):
         (("named.toml",), {"another length", "phase angle", "a length of steps", "its rate"}),
         (("--fmu", str(fmu)), {"another length", "phase angle", "a length of steps", "its rate", "a length"}),
     ):
-        done = commands.harness(tmp_path, "run", *words)
+        done = commands.harness(tmp_path, "run", *words, figures=True)
         assert done.returncode == 0, done.stderr
         figure = (tmp_path / "results/named/figure.svg").read_text(encoding="utf-8")
         labels = {*re.findall(r">([^<>]+)</text>", figure)}

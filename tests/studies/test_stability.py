@@ -297,7 +297,7 @@ def test_a_model_without_position_and_speed_is_refused_by_stability_but_not_by_p
     assert (done.returncode, done.stdout) == (1, "")
     output = "no state is the rate of another one; the cases need a position and a speed"
     assert done.stderr == f"Error: relax.py: {output}\n"
-    done = commands.harness(tmp_path, "precision", "relax.py", "--quick", blank=True)
+    done = commands.harness(tmp_path, "precision", "relax.py", "--quick")
     assert (done.returncode, done.stderr) == (0, "")
     assert (tmp_path / "results/precision/relax/points.csv").is_file()
 

@@ -39,7 +39,7 @@ sys.addaudithook(note)
 @pytest.fixture
 def harness(workspace):
     """Return harness(argument, ...): the finished process, in a folder with the built FMUs."""
-    return partial(commands.harness, workspace, blank=True)
+    return partial(commands.harness, workspace)
 
 
 @pytest.fixture
@@ -48,7 +48,7 @@ def undisturbed(fmus):
 
     def make(folder):
         (folder / "fmus").symlink_to(fmus)
-        assert commands.harness(folder, *LONG, blank=True).returncode == 0
+        assert commands.harness(folder, *LONG).returncode == 0
 
     return files(build_cache.cached_folder("swept", make))
 

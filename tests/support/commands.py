@@ -36,12 +36,13 @@ HARNESS, BUILD = Program(commands, "python -m harness"), Program(build_fmus.main
 BENCHMARKS = Program(benchmark_commands, "python -m benchmarks")
 
 
-def harness(folder, *arguments, text="", blank=False, **environment):
+def harness(folder, *arguments, text="", figures=False, **environment):
     """Run `python -m harness` in this process, in a folder, and return its exit status and output.
 
-    It reads `text` from standard input. With `blank`, its figures are empty files, because drawing takes most of a run.
+    It reads `text` from standard input. Its figures are empty files unless `figures` is true, because saving them takes
+    most of a run.
     """
-    with blank_figures() if blank else nullcontext():
+    with nullcontext() if figures else blank_figures():
         return _run_here(HARNESS, folder, arguments, text, environment)
 
 

@@ -27,7 +27,7 @@ def measure(folder, name):
     fmu = native_fmus.build_native_fmus() / f"{tomllib.loads(SCENES[name])['model']}.fmu"
     text = re.sub("^model = .*", f'fmu = "{fmu}"', SCENES[name], flags=re.M)
     (folder / f"{name}.toml").write_text(re.sub("repeat = .*", "", text))
-    done = commands.harness(folder, "run", f"{name}.toml", "--json", blank=True)
+    done = commands.harness(folder, "run", f"{name}.toml", "--json")
     assert (done.returncode, done.stderr) == (0, "")
     texts = {item["name"]: item["text"] for item in json.loads(done.stdout)["quantities"]}
     with (folder / f"results/{name}/quantities.csv").open(encoding="utf-8", newline="") as file:
