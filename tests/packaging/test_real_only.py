@@ -1,4 +1,8 @@
-"""FMUs with Reals only, for hosts that read or set every variable as a Real."""
+"""FMUs with Reals only, for hosts that read or set every variable as a Real.
+
+The variables are chosen before any translation, so that native FMUs are built of two models only, with and without
+friction modes.
+"""
 
 from math import isnan
 
@@ -24,6 +28,7 @@ EVERYTHING = {
     "FMI 3.0": fmi3_fixtures.build_fmi3_fmus,
 }
 REAL = {"python": "Real", "native": "Real", "FMI 3.0": "Float64"}
+NATIVE_MODELS = ("coulomb", "pacejka")
 STEP, STEPS = 0.05, 40
 FMI2 = pytest.mark.parametrize("backend", ["python", "native"], indirect=True, scope="module")  # with internal steps
 
@@ -38,8 +43,9 @@ def folders(backend):
     """Return the folders with the FMUs that have all variables, and with those that have Reals only."""
     if backend != "python":
         native_fmus.require_compiler()
-    name, options = backend.replace(" ", ""), OPTIONS[backend]
-    return EVERYTHING[backend](), build_cache.build_once(f"reals-{name}", "--real-only", *options, timeout=1200)
+    models = NATIVE_MODELS if OPTIONS[backend] else ()
+    name, options = backend.replace(" ", ""), ("--real-only", *OPTIONS[backend])
+    return EVERYTHING[backend](), build_cache.build_once(f"reals-{name}", *models, *options)
 
 
 def motion(fmu, names):
@@ -52,7 +58,12 @@ def motion(fmu, names):
     return rows
 
 
-@pytest.mark.parametrize("name", MODELS)
+@pytest.mark.parametrize(
+    ("backend", "name"),
+    [(backend, name) for backend in OPTIONS for name in (NATIVE_MODELS if OPTIONS[backend] else MODELS)],
+    indirect=["backend"],
+    scope="module",
+)
 def test_the_variables_are_reals_and_have_the_same_values(folders, backend, worker, name):
     everything, reals = (folder / f"{name}.fmu" for folder in folders)
     description = read_model_description(reals)

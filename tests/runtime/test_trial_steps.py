@@ -1,6 +1,6 @@
 """A step whose stages leave the domain of the equations is repeated with a smaller size."""
 
-from math import acos, asin, cosh, exp, log, sinh, sqrt
+from math import exp, log, sqrt
 
 import pytest
 from build_cache import build_user_model
@@ -9,14 +9,10 @@ from native_fmus import require_compiler
 from scipy.integrate import solve_ivp
 
 STOP, T_ON, END = 4.0, 1.0, 1.02
-RATES = {  # function -> start value and rate, as the model and as Python write it
+RATES = {  # of each kind of exception: start value and rate, as the model and as Python write it
     "sqrt": (1.0, "-60.0 * sqrt(z)", lambda z: -60.0 * sqrt(z)),
     "log": (1.0, "-30.0 * log(1.0 + z)", lambda z: -30.0 * log(1.0 + z)),
-    "asin": (0.9, "-30.0 * asin(z)", lambda z: -30.0 * asin(z)),
-    "acos": (0.0, "30.0 * (acos(z) - 1.0)", lambda z: 30.0 * (acos(z) - 1.0)),
     "exp": (1.0, "60.0 * (exp(-100.0 * z) - 1.0)", lambda z: 60.0 * (exp(-100.0 * z) - 1.0)),
-    "sinh": (1.0, "-30.0 * sinh(5.0 * z)", lambda z: -30.0 * sinh(5.0 * z)),
-    "cosh": (1.0, "-30.0 * z * cosh(5.0 * z)", lambda z: -30.0 * z * cosh(5.0 * z)),
     "division": (0.0, "20.0 / (1.0 + z)", lambda z: 20.0 / (1.0 + z)),
 }
 MODEL = '''from fmus import *
@@ -49,7 +45,7 @@ def test_a_trial_step_outside_the_domain_of_a_function_is_repeated(worker, tmp_p
         require_compiler()
         words += ["--native", "--platform", "linux64"]
     path = build_user_model(file, *words) / kind / "late.fmu"
-    true = solve_ivp(lambda t, z: [function(*z)], (T_ON, END), [start], "DOP853", rtol=1e-12, atol=1e-14, max_step=1e-5)
+    true = solve_ivp(lambda t, z: [function(*z)], (T_ON, END), [start], "DOP853", rtol=1e-12, atol=1e-14, max_step=1e-4)
     for method in (ODE23, ODE45, DOP853, RODAS, RADAU9):
         fmu = worker.instantiate(path).begin({"solver.method": method, "solver.rtol": 1e-9}, stop=STOP)
         fmu.step(0.0, END)
