@@ -28,7 +28,7 @@ SHARES, BEGINS = [0.45, 0.95, 1.3, 3.3], [0.1, 0.3, 1.2, 2.2]
 
 @pytest.mark.parametrize(  # each share and each begin with noise and without
     ("share", "begin", "noise"),
-    [(s, b, (0.0, 1e-4)[(i + j) % 2]) for i, s in enumerate(SHARES) for j, b in enumerate(BEGINS)],
+    [(s, BEGINS[(i + j) % 4], noise) for i, s in enumerate(SHARES) for j, noise in enumerate((0.0, 1e-4))],
 )
 def test_a_pause_of_any_length_does_not_bias_the_fit(begin, share, noise):
     """Without the laws with drag, which take most of the time of a fit and follow the pause handling; some tests

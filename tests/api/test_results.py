@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from commands import harness as harness_command
 from external_fmus import build_external_fmus
+from native_fmus import build_native_fmus
 
 import harness
 
@@ -85,6 +86,7 @@ def test_compare_takes_runs_folders_and_fmus():
 
 def test_a_fit_and_a_comparison_take_any_record():
     pandas = pytest.importorskip("pandas")
+    fmu = build_native_fmus() / "coulomb.fmu"  # for speed
     run = harness.simulate("coulomb", stop=2.0, interval=0.01, outputs=["x"])
     deltas = pandas.to_timedelta(run.time, unit="s")
     named = {
@@ -101,9 +103,9 @@ def test_a_fit_and_a_comparison_take_any_record():
     unnamed = {"pair": {"records": (run.time, run["x"])}, "samples": {"records": run["x"], "rate": 100.0}}
     calls = {name: {"records": record} for name, record in named.items()} | unnamed
     for name, arguments in calls.items():
-        result = harness.fit("coulomb", free=["f"], observe="x", **arguments)
+        result = harness.fit(fmu, free=["f"], observe="x", **arguments)
         assert result["f"].value == pytest.approx(0.5, rel=1e-3), name
-    both = harness.fit("coulomb", [(run.time, run["x"]), named["series"]], ["f"], observe="x")
+    both = harness.fit(fmu, [(run.time, run["x"]), named["series"]], ["f"], observe="x")
     assert len(both.records) == 2
 
 
