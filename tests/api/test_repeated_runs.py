@@ -9,6 +9,7 @@ import fmi3_fixtures
 import native_fmus
 import numpy as np
 import pytest
+from commands import blank_figures
 
 import harness
 
@@ -42,8 +43,10 @@ CALLS = {  # arguments of harness.simulate
 
 @pytest.fixture(autouse=True)
 def scene(in_workspace):
-    """Work in a folder with the built FMUs and a scene."""
+    """Work in a folder with the built FMUs and a scene, and save no figures."""
     (in_workspace / "mine.toml").write_text(SCENE)
+    with blank_figures():
+        yield
 
 
 @pytest.mark.parametrize("call", CALLS)

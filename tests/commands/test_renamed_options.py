@@ -1,7 +1,6 @@
 """Options that were renamed: the former names work, help shows the new ones."""
 
 from functools import partial
-from itertools import combinations
 
 import commands
 import external_fmus
@@ -41,13 +40,11 @@ def test_a_former_name_has_the_same_effect_and_is_not_in_the_help(command, prese
 def test_former_options_with_another_form_still_work(tmp_path):
     """--exchange is --interface ModelExchange, and --velocity names a column and its quantity."""
     run = partial(commands.harness, tmp_path, "--json", "--overwrite")
-    results = [
+    former, present = (
         run("run", "--fmu", external_fmus.build_external_fmus() / "ModelExchangeOnly.fmu", *words)
-        for words in (["--exchange"], ["--interface", "ModelExchange"], ["--interface", "modelexchange"])
-    ]
-    assert {done.returncode for done in results} == {0}
-    for one, two in combinations(results, 2):
-        assert one.stdout == two.stdout
+        for words in (["--exchange"], ["--interface", "modelexchange"])
+    )
+    assert (former.returncode, former.stdout) == (0, present.stdout)
     rows = "".join(f"{0.01 * i},{(1 - 0.004 * i) * (-1) ** (i // 25)}\n" for i in range(200))
     (tmp_path / "record.csv").write_text("t [s],speed [m/s]\n" + rows)
     answers = [run("decay", "record.csv", *words) for words in (["--velocity", "speed"], ["--column", "speed"])]

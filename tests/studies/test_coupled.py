@@ -140,6 +140,8 @@ def write_page_files(folder, *models):
 def test_a_belt_carries_a_block_of_another_fmu(couple, workspace):
     """Position, speed and acceleration are connected; the reference is scipy with events."""
     write_page_files(workspace, "belt.py", "block.py")
+    scene = workspace / "carried.toml"
+    scene.write_text(scene.read_text().replace("0.02, 0.005, 0.00125", "0.02, 0.0025"))
     done = couple("carried.toml", "--stop", "5", "--json")
     assert (done.returncode, done.stderr) == (0, "")
     folder = workspace / "results/coupled/carried"
@@ -150,10 +152,10 @@ def test_a_belt_carries_a_block_of_another_fmu(couple, workspace):
 
     events, motion = solve_block(belt, 5.0, k=30.0, hold=12.0, slide=8.0)
     assert [mode for _, mode in events] == [-1, 0, 1, 0]
-    assert np.abs(x - [motion(t)[0] for t in times]).max() < 3e-4
+    assert np.abs(x - [motion(t)[0] for t in times]).max() < 6e-4
     for numbers, why in engines(folder).values():
         assert why == ""
-        assert numbers[1] == pytest.approx(motion(5.0)[0], abs=3e-4)
+        assert numbers[1] == pytest.approx(motion(5.0)[0], abs=6e-4)
 
 
 def test_a_controller_of_another_fmu_lets_the_axis_hunt(couple, workspace):
@@ -162,7 +164,8 @@ def test_a_controller_of_another_fmu_lets_the_axis_hunt(couple, workspace):
     servo = build_user_model(ROOT / "fmus/more/servo.py") / "servo.fmu"
     (workspace / "servo.fmu").symlink_to(servo)
     scene = workspace / "controlled.toml"
-    scene.write_text(scene.read_text().replace('"servo"', '"servo.fmu"'))
+    text = scene.read_text().replace('"servo"', '"servo.fmu"')
+    scene.write_text(text.replace("0.004, 0.002, 0.001]", "0.004, 0.002]"))
     done = couple("controlled.toml", "--json")
     assert (done.returncode, done.stderr) == (0, "")
     folder = workspace / "results/coupled/controlled"
@@ -177,10 +180,10 @@ def test_a_controller_of_another_fmu_lets_the_axis_hunt(couple, workspace):
     expected = np.interp(middles, single.time, single["x"])
     assert len(expected) >= 4
     assert (np.diff(np.sign(expected[1:] - 0.01)) != 0).all()
-    np.testing.assert_allclose(np.interp(middles, times, x), expected, atol=4e-5)
+    np.testing.assert_allclose(np.interp(middles, times, x), expected, atol=1e-4)
     for name, ((_, _, error), why) in engines(folder).items():
         assert why == ""
-        assert error < (1e-3 if name == "fmpy" else 1e-6)
+        assert error < (2e-3 if name == "fmpy" else 1e-6)
 
 
 @pytest.fixture

@@ -636,31 +636,6 @@ def touches(number=40, seed=1):
     return [random_touch(draw) for _ in range(number)]
 
 
-def first_difference(motion, events, period, bound=0.0):
-    """Return the first event that differs from the motion, as (kind, depth of the dip); None if all agree.
-
-    The kinds are "missed" (an event of the reference is missing), "false" (an event too much) and "mode". Events agree
-    if their modes agree and their times differ by less than a fifth of a period. Only the events before the first dip
-    whose |depth| is below `bound` count.
-    """
-    limit = min((dip.t for dip in motion.dips if abs(dip.depth) < bound), default=float("inf")) - 0.3 * period
-    true = [event for event in motion.events if event[0] < limit]
-    for n in range(max(len(true), len(events))):
-        t_true = true[n][0] if n < len(true) else float("inf")
-        t_found = events[n][0] if n < len(events) else float("inf")
-        if min(t_true, t_found) >= limit:
-            return None
-        if abs(t_true - t_found) > 0.2 * period:
-            kind = "missed" if t_true < t_found else "false"
-        elif true[n][1:] != events[n][1:]:
-            kind = "mode"
-        else:
-            continue
-        nearest = min(motion.dips, key=lambda dip: abs(dip.t - min(t_true, t_found)), default=None)
-        return kind, nearest.depth if nearest else float("nan")
-    return None
-
-
 def checkpoints(motion, period, bound):
     """Return (t, number of events, modes) in the middle of every long phase, up to the first dip whose |depth| is below
     `bound`. Modes are None before the first event.
