@@ -2,11 +2,11 @@
 
 from dataclasses import replace
 
-import build_cache
 import commands
 import numpy as np
 import pytest
 from external_fmus import build_external_fmus
+from fmi3_fixtures import build_fmi3_fmus
 from fmpy import read_model_description
 from native_fmus import build_native_fmus, require_compiler
 from scipy.integrate import solve_ivp
@@ -26,9 +26,7 @@ def sled(request, fmus):
         return fmus / "stickslip.fmu"
     if request.param == "native":
         return build_native_fmus() / "stickslip.fmu"
-    require_compiler()
-    options = ("stickslip", "--fmi", "3", "--platform", "linux64")
-    return build_cache.build_once("fmi3-stickslip", *options) / "stickslip.fmu"
+    return build_fmi3_fmus() / "stickslip.fmu"
 
 
 @pytest.fixture

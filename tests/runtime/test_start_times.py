@@ -11,7 +11,7 @@ from worker_client import FmiError
 
 from fmus.packaging.model_lookup import find_model
 
-STARTS = (1.0, 1e3, 1e5, 1e6, -1e3)
+STARTS = (1.0, 1e6, -1e3)
 PLACES = 4  # units in the last place of the time
 KINDS = {"python": (), "native": ("--native", "--platform", "linux64")}
 
@@ -52,7 +52,7 @@ def test_events_are_the_same_from_any_start_time(worker, name, kind):
 def test_every_period_of_a_long_run_has_the_same_events(worker):
     """The motor of the joint comes to rest in every period, however late in the run."""
     require_compiler()
-    period, stop = 2.0, 900.0
+    period, stop = 2.0, 300.0
     events = follow_events(worker.instantiate(built("joint", "native")), 0.0, stop, ["mode_m", "mode_l"])
     counts = Counter(t // period for t, *_ in events)
     assert {counts[n] for n in range(2, int(stop / period) - 1)} == {8}
