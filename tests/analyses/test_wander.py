@@ -26,12 +26,12 @@ def errors(fit):
 
 @pytest.mark.parametrize(("defect", "cause"), [("clock", "a clock whose rate varies"), ("gain", "another law")])
 def test_a_wander_near_the_noise_is_reported_and_covered(defect, cause):
-    fits = [swung(seed, **{defect: 2e-4}) for seed in range(6)]
-    assert sum(cause in " ".join(fit.remarks) for fit in fits) >= 5
+    fits = [swung(seed, **{defect: 2e-4}) for seed in range(4)]
+    assert sum(cause in " ".join(fit.remarks) for fit in fits) >= 3
     assert np.mean([np.array(errors(fit)) < 2 for fit in fits]) > 0.8
     assert max(max(errors(fit)) for fit in fits) < 4
 
 
 def test_white_noise_is_no_wander():
-    fits = [swung(seed) for seed in range(6)]
+    fits = [swung(seed) for seed in range(4)]
     assert not any("departs slowly" in " ".join(fit.remarks) for fit in fits)

@@ -247,13 +247,8 @@ class ModelExchange(CoSimulation):
 
     def update_discrete_states(self):
         """Update the discrete states and return the names of the flags that are set."""
-        *flags, timed, due = self.slave.updateDiscreteStates()
-        self.ahead = due if timed else None
+        flags = self.slave.updateDiscreteStates()[: len(FLAGS)]
         return [name for name, flag in zip(FLAGS, flags, strict=True) if flag]
-
-    def next_event_time(self):
-        """Return the time of the next event from the last update, or None."""
-        return self.ahead
 
     def enter_continuous_time(self):
         self.slave.enterContinuousTimeMode()
