@@ -254,7 +254,7 @@ def test_values_of_a_table_are_a_list(tmp_path):
     require_compiler()
     (tmp_path / "curve.py").write_text(CURVE)
     words = ("--fmi", "3", "--platform", "wasm32-wasip2")
-    fmu = build_cache.build_user_model(tmp_path / "curve.py", *words) / "native" / "fmi3" / "curve.fmu"
+    fmu = build_cache.build_user_model(tmp_path / "curve.py", *words, optimised=True) / "native/fmi3/curve.fmu"
     description = read_model_description(fmu)
     force, m, a = (
         next(v.valueReference for v in description.modelVariables if v.name == name) for name in ("force.y", "m", "a")

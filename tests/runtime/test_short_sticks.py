@@ -23,7 +23,7 @@ def native_fmu(model, folder):
         return build_native_fmus() / "stickslip.fmu"
     file = folder / f"short_{model}.py"
     file.write_text({"belt": short_sticks.BELT, "stack": short_sticks.STACK}[model])
-    return build_user_model(file, *NATIVE, *METHODS) / "native" / f"short_{model}.fmu"
+    return build_user_model(file, *NATIVE, *METHODS, optimised=True) / "native" / f"short_{model}.fmu"
 
 
 @cache
