@@ -6,6 +6,7 @@
     resources/<entry>.py                    imports the class (see runtime/pythonfmu_workarounds.py)
     resources/tables.json                   points of lookup tables, if the model has any
     resources/contacts.json                 names of contacts and modes, if the model has any
+    resources/input_rates.json              inputs in the rates of inputs, if the model has any
     resources/<package>/                    the model and the modules it needs (embedded_modules.py)
     documentation/                          page, licences, requirements on the host
     model.png                               icon
@@ -86,7 +87,7 @@ def build(
     sources = embedded_files(source, texts)
     code = digest(sources, ENTRY_SCRIPT)
     package = f"{name}_{code[:12]}"
-    entries = extra_files(cls, source.path, declared_variables(cls), source.analysis.tables, use=USAGE_NOTE)
+    entries = extra_files(cls, source.path, declared_variables(cls), source.analysis, use=USAGE_NOTE)
     entries |= {f"resources/{package}/{path}": text.encode() for path, text in sources.items()}
     entries |= {
         "documentation/externalDependencies.txt": HOST_REQUIREMENTS.encode(),

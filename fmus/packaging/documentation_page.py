@@ -11,6 +11,7 @@ from ..runtime.variable_access import SETTABLE_CAUSALITIES
 from ..runtime.variable_declarations import VariableDeclaration, VariableOwner, exported_name
 from . import __version__
 from .certified_result import RESULT_FOLDER, CertifiedResult, find_certified_result, result_files
+from .equations.model_analysis import ModelAnalysis
 from .equations.tables import PCHIP, Table
 from .fmi_variables import Variables, fixed_choices, integrated_states, mode_names
 from .svg_chart import draw_chart
@@ -19,6 +20,7 @@ from .units import unit_of
 GREEK = {"theta": "theta", "omega": "omega", "alpha": "alpha", "mu": "mu", "eps": "epsilon", "phi": "phi", "pi": "pi"}
 TABLES_FILE = "resources/tables.json"  # points of the tables, which harness/running/fmu_tables.py reads
 CONTACTS_FILE = "resources/contacts.json"  # harness/running/fmu_contacts.py reads it
+INPUT_RATES_FILE = "resources/input_rates.json"  # harness/running/input_rates.py reads it
 CURVE_POINTS = 200  # of a table that is not linear
 STYLE = Path(__file__).with_name("documentation_page.css")
 USAGE = """\
@@ -193,16 +195,18 @@ def extra_files(
     model: type[VariableOwner],
     path: Path,
     declared: Variables,
-    tables: Sequence[Table],
+    analysis: ModelAnalysis,
     icon: str = "model.png",
     use: str = "",
 ) -> dict[str, bytes]:
     """Return the content of these files by path in the FMU.
 
-    The names of contacts and modes are in resources/contacts.json.  Icon (.png), known boundaries (.toml, see
+    The names of contacts and modes are in resources/contacts.json, the inputs on which the rates of inputs depend in
+    resources/input_rates.json.  Icon (.png), known boundaries (.toml, see
     harness/studies/sweep) and certified result (.csv) are optional and stand next to the model file at `path`, under
     the same name.  `icon` is the path of the icon in the FMU; `use` is a paragraph of the page on how to run the FMU.
     """
+    tables, rates = analysis.tables, analysis.rate_inputs
     name, picture, boundaries = path.stem, path.with_suffix(".png"), path.with_suffix(".toml")
     certified = find_certified_result(path, model, declared)
     icon_path = icon if picture.is_file() else ""
@@ -211,6 +215,8 @@ def extra_files(
         entries[TABLES_FILE] = (json.dumps([table.as_json() for table in tables], indent=1) + "\n").encode()
     if contacts := mode_names(model, declared):
         entries[CONTACTS_FILE] = (json.dumps(contacts, indent=1) + "\n").encode()
+    if rates:
+        entries[INPUT_RATES_FILE] = (json.dumps(rates, indent=1) + "\n").encode()
     if certified is not None:
         entries |= result_files(name, certified, declared)
     if picture.is_file():

@@ -93,7 +93,8 @@ def simulate(
     inputs : mapping or DataFrame, optional
         Input signals: the column ``time`` in s and a column for each input. Values between two rows are interpolated;
         a time that occurs twice is a jump. In co-simulation an input is constant within a communication step and has
-        its value at the middle of the step.
+        its value at the middle of the step; an input whose rate the model declares starts with its value and is
+        continued by the rate, which needs a column as well.
     timeout : float, optional
         Seconds allowed for one call of an FMU that is not of this project, or for 1/4096 of the run of an FMU of this
         project; 60 by default.

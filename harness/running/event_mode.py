@@ -229,7 +229,7 @@ class EventCoSimulation:
     clocks : Clocks
         Clocks of the instance.
     signals : InputSignals, optional
-        An input is constant during a step, at its value in the middle.
+        Set for each step.
     """
 
     def __init__(
@@ -247,7 +247,7 @@ class EventCoSimulation:
         jump = self.signals.next_jump(t) if self.signals else inf
         target = self.clocks.limit(min(target, self.next_event, jump))
         if self.signals:
-            self.signals.apply(0.5 * (t + target))
+            self.signals.apply_in_step(t, target)
         is_whole = abs(target - t - self.grid.h) <= self.grid.tolerance
         self.instance.step(t, self.grid.h if is_whole else target - t)
         needs_event, _, is_early, last_time = (result.value for result in self.instance.step_results)

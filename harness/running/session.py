@@ -24,7 +24,7 @@ from .fmu_contacts import read_contacts
 from .fmu_instance import CALL_FAILURES, FmuInstance, call_all
 from .recorder import Columns, Recorder, ShapedVariable, c_type, read_rows
 from .signals import ModeChanges
-from .stepping import CoSimulation, TimeGrid, check_inputs, input_signals, make_grid, step_to_stop
+from .stepping import CoSimulation, TimeGrid, check_inputs, check_rates, input_signals, make_grid, step_to_stop
 from .trajectory import SolverSteps, Statistics, Trajectory
 from .variable_values import REAL_TYPES, convert_value, effective_value, enumeration_labels, variable_unit
 
@@ -192,7 +192,7 @@ class Session:
         report = ProgressMonitor(spec, grid, report)
         self.rows.seek(0)
         self.rows.truncate()
-        signals = input_signals(spec.inputs, instance)
+        signals = input_signals(spec, instance)
         if spec.exchange:
             from .model_exchange import ModelExchange  # loads CVode
 
@@ -272,6 +272,7 @@ def plan_grid(spec: RunSpec, instance: FmuInstance) -> TimeGrid:
     """Return the communication points of a run; SceneError if its inputs or its grid are not valid."""
     start, stop = resolve_time_span(spec, instance.description)
     check_inputs(spec.inputs, instance.variables)
+    check_rates(spec)
     grid = make_grid(spec, start, stop)
     if (points := grid.duration / grid.h) > MAX_POINTS:
         sentence = f"grid = {grid.h!r} s makes {points:.6g} points from {start!r} s to {stop!r} s"

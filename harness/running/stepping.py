@@ -5,7 +5,7 @@ of this project ends its internal step. In model exchange (model_exchange.py) it
 signals are a table over time, linear between its rows.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from ctypes import c_double
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -17,6 +17,7 @@ import numpy as np
 from ..errors import HarnessError, SceneError, check_names
 from ..scenes.run_spec import RunSpec
 from .fmu_instance import FmuInstance, TerminatedError
+from .input_rates import read_rate_inputs
 from .variable_values import REAL_TYPES
 
 Inputs = Mapping[str, Sequence[float] | np.ndarray]  # "time" in s, and the values of each input at these times
@@ -241,8 +242,20 @@ def check_inputs(inputs: Inputs, variables: Mapping[str, Any]) -> None:
         raise SceneError("inputs: the time falls; sort the rows by time")
 
 
-def values_of_steps(inputs: Inputs, points: np.ndarray) -> np.ndarray:
-    """Return the inputs (n, inputs) of a run: those at the start, and the means of the two ends of each step.
+def check_rates(spec: RunSpec) -> None:
+    """Check that an input that varies between jumps has the inputs of its declared rate; raise SceneError otherwise."""
+    time = np.asarray(spec.inputs.get(TIME, ()), dtype=float)
+    for name, rate_inputs in read_rate_inputs(spec.fmu).items() if spec.inputs else ():
+        missing = [one for one in rate_inputs if one not in spec.inputs and one not in spec.values]
+        if name in spec.inputs and missing and (np.diff(spec.inputs[name])[np.diff(time) > 0] != 0).any():
+            raise SceneError(
+                f"inputs: {name} varies, but {missing[0]} is missing, the rate by which the FMU continues it: add a "
+                f"column for {missing[0]}, or let {name} jump at times that occur twice"
+            )
+
+
+def values_of_steps(inputs: Inputs, points: np.ndarray, continued: Collection[str] = ()) -> np.ndarray:
+    """Return the inputs (n, inputs) of a run: those at the start, and one row for each step.
 
     Parameters
     ----------
@@ -250,9 +263,13 @@ def values_of_steps(inputs: Inputs, points: np.ndarray) -> np.ndarray:
         The table, as `check_inputs` describes it.
     points : numpy.ndarray
         Communication points (n,) in s; all times of the table in between are among them.
+    continued : collection of str
+        Inputs that the FMU continues by their rate from the value at the start of a step; others have the mean of both
+        ends.
     """
     begin, end = ends_of_steps(inputs, points)
-    return np.concatenate([begin[:1], 0.5 * (begin + end)])
+    is_continued = np.array([name in continued for name in inputs if name != TIME], dtype=bool)
+    return np.concatenate([begin[:1], np.where(is_continued, begin, 0.5 * (begin + end))])
 
 
 def ramps_of_steps(inputs: Inputs, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -286,16 +303,18 @@ def interpolate(time: np.ndarray, column: np.ndarray, points: np.ndarray, side: 
     return interpolated
 
 
-def input_signals(inputs: Inputs, instance: FmuInstance) -> "InputSignals | None":
+def input_signals(spec: RunSpec, instance: FmuInstance) -> "InputSignals | None":
     """Return what sets the inputs of an instance, None without input signals."""
-    return InputSignals(inputs, instance) if any(name != TIME for name in inputs) else None
+    has_signals = any(name != TIME for name in spec.inputs)
+    return InputSignals(spec.inputs, instance, read_rate_inputs(spec.fmu)) if has_signals else None
 
 
 class InputSignals:
     """Sets the inputs of an FMU instance from a table.
 
     In co-simulation an input is constant within a communication step; its value in the middle of the step makes the
-    error of second order in the step.
+    error of second order in the step. An input whose rate the model declares is continued by the FMU, from its value at
+    the start of the step.
 
     Parameters
     ----------
@@ -303,6 +322,8 @@ class InputSignals:
         The table, as `check_inputs` describes it.
     instance : FmuInstance
         The instance.
+    continued : collection of str
+        Inputs with a declared rate.
 
     Raises
     ------
@@ -310,7 +331,7 @@ class InputSignals:
         If the inputs are of several types.
     """
 
-    def __init__(self, inputs: Inputs, instance: FmuInstance) -> None:
+    def __init__(self, inputs: Inputs, instance: FmuInstance, continued: Collection[str] = ()) -> None:
         variables = [instance.variables[name] for name in inputs if name != TIME]
         kinds = {variable.type for variable in variables}
         if len(kinds) > 1:
@@ -319,6 +340,7 @@ class InputSignals:
         self.references = [variable.valueReference for variable in variables]
         self.time = np.asarray(inputs[TIME], dtype=float)
         self.columns = [np.asarray(column, dtype=float) for name, column in inputs.items() if name != TIME]
+        self.is_continued = [name in continued for name in inputs if name != TIME]
         self.jumps = self.time[1:][np.diff(self.time) == 0]
 
     def apply(self, time: float, continuous: bool = True, discrete: bool = True, after_event: bool = False) -> None:
@@ -328,6 +350,20 @@ class InputSignals:
         """
         i = int(np.searchsorted(self.time, time, side="right" if after_event else "left"))
         self.set_values(self.references, [self.value(column, i, time) for column in self.columns])
+
+    def apply_in_step(self, start: float, end: float) -> None:
+        """Set the inputs for a step in s: one with a declared rate to its value at the start, others in the middle."""
+        middle = 0.5 * (start + end)
+        first = int(np.searchsorted(self.time, start, side="right"))
+        i = int(np.searchsorted(self.time, middle, side="left"))
+        pairs = zip(self.columns, self.is_continued, strict=True)
+        self.set_values(
+            self.references,
+            [
+                self.value(column, first, start) if at_start else self.value(column, i, middle)
+                for column, at_start in pairs
+            ],
+        )
 
     def value(self, column: np.ndarray, i: int, time: float) -> float:
         """Interpolate a column at a time in s, which lies between the rows i - 1 and i."""
@@ -351,7 +387,7 @@ class CoSimulation:
     instance : FmuInstance
     grid : TimeGrid
     signals : InputSignals, optional
-        An input is constant during a step, at its value in the middle.
+        Set for each step.
     next_step : c_double, optional
         Holds the recorded end of the internal step of the FMU in s, to follow it.
     only_grid : bool
@@ -388,7 +424,7 @@ class CoSimulation:
                 name = self.instance.description.modelName
                 raise HarnessError(f"{name}: solver.t_next = {target!r} s is not after t = {t!r} s")
         if self.signals:
-            self.signals.apply(0.5 * (t + target))
+            self.signals.apply_in_step(t, target)
         self.instance.step(t, self.size or target - t)
         if self.signals:
             self.signals.apply(target, after_event=True)

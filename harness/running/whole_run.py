@@ -11,7 +11,7 @@ import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from ctypes import CDLL, Structure, addressof, byref, c_double, c_int, c_size_t, c_void_p, cast
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, lru_cache
 from importlib.util import find_spec
 from pathlib import Path
@@ -34,7 +34,8 @@ from .fmu_archive import (
     unpack_once,
 )
 from .fmu_instance import CALL_FAILURES, FmuInstance, capture_stderr
-from .stepping import TIME, make_grid, ramps_of_steps, values_of_steps
+from .input_rates import read_rate_inputs
+from .stepping import TIME, check_rates, make_grid, ramps_of_steps, values_of_steps
 from .variable_values import REAL_TYPES, effective_value, find_bound, variable_unit
 
 SOURCE = Path(__file__).with_name("whole_run.c")
@@ -122,7 +123,8 @@ class CompiledLoop:
         if simulator.interpolates_inputs and spec.inputs:
             self.u, self.slopes = ramps_of_steps(spec.inputs, self.t)
         else:
-            self.u = values_of_steps(spec.inputs, self.t)
+            check_rates(replace(spec, fmu=simulator.spec.fmu))
+            self.u = values_of_steps(spec.inputs, self.t, read_rate_inputs(simulator.spec.fmu))
         self.y = np.empty((np.count_nonzero(self.is_recorded), len(spec.outputs)))
         self.outputs, self.inputs = spec.outputs, tuple(name for name in spec.inputs if name != TIME)
         self.names: tuple[str, ...] | None = None

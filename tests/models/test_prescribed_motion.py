@@ -13,8 +13,11 @@ from fmpy.validation import validate_fmu
 from native_fmus import require_compiler
 from prescribed_motion import BLOCK, belt_rising, belt_shaking, solve_block
 
+import harness
 from fmus.packaging import BuildError
 from fmus.packaging.model_lookup import find_model
+from harness.running.whole_run import open_simulator
+from harness.scenes.run_spec import RunSpec
 
 RISING = {"k": 60.0, "f_s": 10.0, "f_d": 6.0}  # parameters with several phases of stick and slip
 SHAKING = {"k": 30.0, "f_s": 12.0, "f_d": 8.0}
@@ -217,6 +220,40 @@ def test_a_speed_with_the_rate_zero_is_constant_between_jumps(worker, backend):
         assert fmu.get("v", "x_belt") == pytest.approx([n + 1.0, (n + 1.0) * (n + 2.0)], abs=1e-12)
     assert not [message for message in fmu.messages() if message[0]]
     fmu.free()
+
+
+TABLE = {"time": (times := np.linspace(0.0, 5.0, 11))} | dict(
+    zip(INPUTS, np.array([belt_rising(t)[:3] for t in times]).T, strict=True)
+)
+
+
+@pytest.mark.parametrize("interface", ["CoSimulation", "ModelExchange", "whole runs of a fit"])
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_a_table_with_the_rates_drives_the_block_as_the_belt_does(backend, interface):
+    """The inputs are continued from the start of a step: set to their means, the belt would jump at each step."""
+    if (backend, interface) == ("python", "ModelExchange"):
+        return  # it has none
+    _, motion = solve_block(belt_rising, 5.0, k=60.0, hold=10.0, slide=6.0)
+    fmu, values = build(BLOCK, backend), RISING | {"v0": belt_rising(0.0)[1]}
+    if interface in ("CoSimulation", "ModelExchange"):
+        run = harness.simulate(fmu, values, inputs=TABLE, interval=0.5, stop=5.0, interface=interface, rtol=1e-5)
+        time, found = run.time, np.stack([run["x"], run["v"]], axis=1)
+    else:
+        time = np.linspace(0.0, 5.0, 501)
+        spec = RunSpec(fmu, ("x", "v"), values=values, inputs=TABLE, times=time, follow=False)
+        with open_simulator(spec) as simulator:
+            found = simulator.prepare(spec)({"k": 60.0})
+    expected = np.array([motion(t) for t in time])
+    assert np.abs(found - expected).max() < 1e-4
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_a_table_without_the_rate_of_an_input_that_varies_is_refused(backend):
+    table = {name: column for name, column in TABLE.items() if name in ("time", "v_belt")}
+    with pytest.raises(harness.SceneError, match="v_belt varies, but a_belt is missing"):
+        harness.simulate(build(BLOCK, backend), inputs=table)
+    harness.simulate(build(BLOCK, backend), {"a_belt": 0.1}, inputs=table, stop=0.1)
+    harness.simulate(build(BLOCK, backend), inputs={"time": [0.0, 1.0, 1.0], "v_belt": [0.0, 0.0, 1.0]}, stop=0.1)
 
 
 @pytest.mark.parametrize("method", ["RK45", "Radau"])

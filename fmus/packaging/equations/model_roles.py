@@ -163,6 +163,15 @@ class ModelRoles:
             )
 
     @property
+    def rate_inputs(self) -> dict[str, list[str]]:
+        """Names of the inputs on which the declared rate of each input depends; without inputs of constant rate 0."""
+        return {
+            e.label: [one.label for one in variables_in(e.declared_rate) if isinstance(one, Input)]
+            for e in self.prescribed_inputs
+            if not is_same_expression(e.declared_rate, 0.0)
+        }
+
+    @property
     def input_derivatives(self) -> dict[Expression, Operand]:
         """Derivatives of inputs, and of the rates of those with a declared rate."""
         return self.input_rates | {self.input_rates[e]: second for e, second in self.input_second_rates.items()}

@@ -5,6 +5,7 @@ binaries/<platform>/<name>.{so,dll,dylib,wasm}
 sources/                                  the C sources, for any other platform
 resources/tables.json                     points of lookup tables, if the model has any
 resources/contacts.json                   names of contacts and modes, if the model has any
+resources/input_rates.json                inputs in the rates of inputs, if the model has any
 documentation/, extra/                    documentation, licence and certified result
 model.png                                 the icon; in FMI 3.0 terminalsAndIcons/, with the terminal
 """
@@ -82,7 +83,7 @@ def build(
     name, cls = source.name, lowered_model(source, select_features(source, methods, laws, real_only))
     files, description = generate_c_sources(cls, name, date, fmi, has_intermediate_update=not has_component)
     declared = declared_variables(cls)
-    entries = extra_files(cls, source.path, declared, source.analysis.tables, ICON_PATHS[fmi], USAGE_NOTE)
+    entries = extra_files(cls, source.path, declared, source.analysis, ICON_PATHS[fmi], USAGE_NOTE)
     if fmi == "3":
         entries |= terminals(declared)
     entries |= {"modelDescription.xml": description, LICENSE: license_files()[LICENSE]}

@@ -106,7 +106,7 @@ class ExternalFmu:
         instance.enter_initialization(self.settings, grid.start, grid.stop, tolerance)
         clocks = Clocks(instance, self.folder, grid.start, grid.tolerance) if instance.ticks_clocks else None
         instance.fmu.exitInitializationMode()
-        signals = input_signals(self.spec.inputs, instance)
+        signals = input_signals(self.spec, instance)
         stepper: Stepper
         if self.spec.exchange:
             stepper = ModelExchange(instance, grid, tolerance, self.report_progress, signals, clocks=clocks)

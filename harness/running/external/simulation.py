@@ -24,7 +24,7 @@ from ..event_mode import check_clocks
 from ..fmu_archive import resolve_time_span, unpack
 from ..recorder import Columns, ShapedVariable, array_shape, element_names, read_rows, select_variables
 from ..session import QUIET
-from ..stepping import check_inputs
+from ..stepping import check_inputs, check_rates
 from ..trajectory import Trajectory
 from ..variable_values import convert_value, effective_value, variable_unit
 from .fmu_process import run_unpacked_fmu
@@ -98,6 +98,7 @@ class ChildSession:
         self.check_interface()
         values = convert_values(spec, self.variables)
         check_inputs(spec.inputs, self.variables)
+        check_rates(spec)
         selection = select_variables(spec, self.variables, values)
         start, stop = check_time_span(spec, self.description)
         report(0.0)
