@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from functools import wraps
 from inspect import signature
 from math import inf, isfinite
+from numbers import Number
 from operator import index
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
@@ -222,11 +223,23 @@ def names_with(entry: Rule, values: str, default: Callable[[str], Any]) -> Rule:
     return Rule(f"a name, a sequence of names, or {of_mapping.text}", convert)
 
 
-def row(value: Any) -> "np.ndarray":
-    """Return a row (n,) of at least one number as floats; NaN is a missing number."""
+def to_array(value: Any) -> "np.ndarray":
+    """Return a value as an array; masked numbers are NaN, time deltas seconds, and numbers as objects floats."""
     import numpy as np
 
-    numbers = np.asarray(value)
+    if np.ma.is_masked(value):
+        return np.ma.filled(value.astype(float), np.nan)  # numpy.asarray would return what the mask hides
+    array = np.asarray(value)
+    if array.dtype.kind == "m":
+        return array / np.timedelta64(1, "s")
+    if array.dtype.kind == "O" and all(isinstance(item, Number) and not is_boolean(item) for item in array.flat):
+        return array.astype(float)
+    return array
+
+
+def row(value: Any) -> "np.ndarray":
+    """Return a row (n,) of at least one number as floats; NaN is a missing number."""
+    numbers = to_array(value)
     if numbers.ndim != 1 or numbers.dtype.kind not in "fiu" or not len(numbers):
         raise TypeError
     return numbers.astype(float)
@@ -240,6 +253,15 @@ def finite_row(value: Any) -> "np.ndarray":
     if not np.isfinite(numbers).all():
         i = int(np.argmin(np.isfinite(numbers)))
         raise SceneError(f"{numbers[i]} at index {i} is not a finite number")
+    return numbers
+
+
+def increasing_row(value: Any) -> "np.ndarray":
+    """Return a row (n,) of at least one finite number as floats, which increase."""
+    numbers = finite_row(value)
+    for i in range(1, len(numbers)):
+        if not numbers[i] > numbers[i - 1]:
+            raise SceneError(f"{numbers[i]} at index {i} is not after {numbers[i - 1]}: give increasing numbers")
     return numbers
 
 
@@ -288,7 +310,7 @@ FLAG = Rule("True or False", flag)
 TEXT = Rule("a text that is not empty", text)
 NAMES = Rule("a name, or a sequence of names", names)
 SOME_NAMES = Rule("a name, or a sequence of names that is not empty", some_names)
-ROW = Rule("a row of finite numbers, at least one", finite_row)
+INCREASING_ROW = Rule("a row of finite numbers, at least one, which increase", increasing_row)
 PATH = Rule("a name or a path", path)
 PATHS = Rule("a name, a path, or a sequence of these", paths)
 SETTINGS = mapping(Rule("a finite number or a text", setting), "numbers or texts")

@@ -8,16 +8,17 @@ from typing import TYPE_CHECKING, Any
 
 from ..arguments import (
     FINITE,
+    INCREASING_ROW,
     INTERFACE,
     METHOD,
     PATH,
     POSITIVE,
     PROGRESS,
-    ROW,
     SETTINGS,
     SOME_NAMES,
     Progress,
     check_arguments,
+    to_array,
 )
 from ..errors import HarnessError, SceneError, format_value
 from .options import apply_options, reporter, with_progress_bar
@@ -39,7 +40,7 @@ if TYPE_CHECKING:
     start=FINITE,
     stop=FINITE,
     interval=POSITIVE,
-    times=ROW,
+    times=INCREASING_ROW,
     outputs=SOME_NAMES,
     method=METHOD,
     rtol=POSITIVE,
@@ -226,14 +227,20 @@ def read_input_columns(inputs: Any) -> dict[str, tuple[float, ...]]:
     columns = {str(name): inputs[name] for name in names}
     if "time" not in columns and getattr(getattr(inputs, "index", None), "name", None) == "time":
         columns = {"time": inputs.index} | columns
-    return {name: tuple(to_finite_row(f"inputs: {name}", column).tolist()) for name, column in columns.items()}
+    rows = {name: tuple(to_finite_row(f"inputs: {name}", column).tolist()) for name, column in columns.items()}
+    if rows and not any(rows.values()):
+        raise SceneError("inputs has no rows: give at least one time, and the values at it")
+    return rows
 
 
 def to_finite_row(name: str, numbers: "ArrayLike") -> "np.ndarray":
     """Return numbers as an array (n,) of floats; raise SceneError unless they are a row of finite numbers."""
     import numpy as np
 
-    row = np.atleast_1d(np.asarray(numbers))
+    try:
+        row = np.atleast_1d(to_array(numbers))
+    except (OverflowError, TypeError, ValueError):
+        raise SceneError(f"{name} must be a row of numbers, not {format_value(numbers)}") from None
     if row.ndim != 1 or row.dtype.kind not in "fiub":
         raise SceneError(f"{name} must be a row of numbers, not {format_value(numbers)}")
     row = row.astype(float)

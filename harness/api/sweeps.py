@@ -114,7 +114,7 @@ def sweep(
     from ..process.temporary_directory import temporary_directory
     from ..scenes.fmu_files import find_fmu
     from ..scenes.run_spec import RunSpec
-    from ..studies.sweep.labels import read_labels, replace_labels
+    from ..studies.sweep.labels import list_labels, read_labels, replace_labels
     from ..studies.sweep.result_files import run_sweep
     from ..studies.sweep.runner import SweepSpec
     from ..studies.sweep.sampling import SweepPoints, axis_from_numbers
@@ -129,7 +129,7 @@ def sweep(
     run = apply_options(run, stop=stop, rtol=rtol, interface=interface, timeout=timeout)
     if twice := set(grid) & set(run.values):
         raise SceneError(f"{min(twice)} is varied by grid and has a value for all runs: remove one")
-    labels = read_labels(run) if any(isinstance(column, str | list | tuple) for column in grid.values()) else {}
+    labels = read_labels(run) if any(map(list_labels, grid.values())) else {}
     columns = {name: replace_labels(name, column, labels) for name, column in grid.items()}
     axes = tuple(axis_from_numbers(name, column, samples is not None) for name, column in columns.items())
     points = SweepPoints(axes, samples, seed)

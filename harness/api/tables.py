@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..arguments import PATH, Rule, row
+from ..arguments import PATH, Rule, row, to_array
 from ..errors import SceneError, format_value
 
 if TYPE_CHECKING:
@@ -50,7 +50,9 @@ def record_source(value: Any) -> Any:
         return PATH.convert(value)
     if has_columns(value):
         return value
-    return tuple(map(row, value)) if is_pair(value) else row(value)
+    if is_pair(value):
+        return tuple(NUMBERS.check(name, item) for name, item in zip(("t", "x"), value, strict=True))
+    return row(value)
 
 
 def record_sources(value: Any) -> list[Any]:
@@ -65,6 +67,7 @@ def side(value: Any) -> Any:
     return record_source(value)
 
 
+NUMBERS = Rule("a row of numbers, at least one", row)
 RECORD = Rule(f"{KINDS}, or a row of values with their rate", record_source)
 RECORDS = Rule(f"{KINDS}, or a list of these", record_sources)
 SIDE = Rule("a name, a file, a DataFrame, a Series, a mapping of columns, or a trajectory", side)
@@ -95,15 +98,15 @@ def convert_to_table(source: Any, heading: str = SIGNAL, rate: float | None = No
     if is_series(source):
         name = heading if source.name is None else str(source.name)
         units = {"t": "s", name: unit_of(source, name)}
-        return build_table({"t": index_times(source.index), name: np.asarray(source)}, units)
+        return build_table({"t": to_array(source.index), name: to_array(source)}, units)
     if is_frame(source):
-        columns = {str(name): np.asarray(source[name]) for name in source.columns}
+        columns = {str(name): to_column(str(name), source[name]) for name in source.columns}
         units = {name: unit_of(source, name) for name in columns}
         if is_time_delta(source.index):
-            columns, units = {"t": index_times(source.index), **columns}, {"t": "s", **units}
+            columns, units = {"t": to_array(source.index), **columns}, {"t": "s", **units}
         elif source.index.name is not None:
             index = str(source.index.name)
-            columns, units = {index: np.asarray(source.index), **columns}, {index: unit_of(source, index), **units}
+            columns, units = {index: to_array(source.index), **columns}, {index: unit_of(source, index), **units}
         return build_table(columns, units)
     if isinstance(source, Mapping):
         return build_table({str(name): to_column(str(name), column) for name, column in source.items()}, {})
@@ -120,26 +123,21 @@ def unit_of(source: Any, name: str) -> str:
     return str(units.get(name, "")) if isinstance(units, Mapping) else str(units)
 
 
-def is_time_delta(index: Any) -> bool:
-    """Return whether an index of pandas holds time deltas."""
-    return bool(getattr(index, "dtype", None) is not None and index.dtype.kind == "m")
-
-
-def index_times(index: Any) -> "np.ndarray":
-    """Return the times (n,) in s of an index of pandas."""
-    import numpy as np
-
-    return np.asarray(index.total_seconds()) if is_time_delta(index) else np.asarray(index)
+def is_time_delta(values: Any) -> bool:
+    """Return whether an array, an index or a column of pandas holds time deltas."""
+    return getattr(getattr(values, "dtype", None), "kind", "") == "m"
 
 
 def to_column(name: str, values: Any) -> "np.ndarray":
-    """Return a column (n,); SceneError if the values are none."""
-    import numpy as np
+    """Return a column (n,), time deltas in the unit of its heading or in s; SceneError if the values are none."""
+    from ..records.headings import split_heading
+    from ..records.units import TIMES
 
     try:
-        return np.asarray(values)
-    except (TypeError, ValueError):
+        column = to_array(values)
+    except (OverflowError, TypeError, ValueError):
         raise SceneError(f"{name} = {format_value(values)} must be a row of numbers") from None
+    return column / TIMES.get(split_heading(name)[1] or "s", 1.0) if is_time_delta(values) else column
 
 
 def build_table(columns: "dict[str, np.ndarray]", units: dict[str, str]) -> "Table":
@@ -149,6 +147,8 @@ def build_table(columns: "dict[str, np.ndarray]", units: dict[str, str]) -> "Tab
 
     if not columns:
         raise SceneError("the record has no columns")
+    if not len(next(iter(columns.values()))):
+        raise SceneError("the record has no rows")
     cells = []
     for name, column in columns.items():
         if column.ndim != 1 or len(column) != len(next(iter(columns.values()))):
@@ -179,8 +179,14 @@ def convert_to_signals(source: Any) -> "Signals":
     numbers = [np.asarray(cells) for cells in table.columns]
     at = next((i for i, (name, _) in enumerate(headings) if TIME_NAME.search(name)), 0)
     unit = headings[at][1] or "s"
-    if unit not in TIMES or any(column.dtype.kind not in "fiub" for column in numbers):
-        raise SceneError(f"the record must have a time in {', '.join(TIMES)} and columns of numbers")
+    if unit not in TIMES:
+        raise SceneError(f"the times of the record are in {unit}: give them in {', '.join(TIMES)}")
+    for heading, column in zip(table.column_headings, numbers, strict=True):
+        if column.dtype.kind not in "fiub":
+            text = format_value(column.tolist()[0])
+            raise SceneError(
+                f"the column {heading} of the record holds texts, as {text}: give numbers, or leave it out"
+            )
     time = numbers[at] * TIMES[unit]
     if len(time) < 2 or not (np.isfinite(time).all() and (np.diff(time) >= 0).all()):
         raise SceneError("the times of the record must be at least two finite numbers that do not fall")

@@ -68,6 +68,8 @@ def convert_number(variable: Any, value: Any) -> float | int:
     if isinstance(value, str):
         hint = "; write it without quotes" if isinstance(parse_element(value), float) else ""
         raise SceneError(f"{variable.name} = {format_value(value)} is a text, not a number{hint}")
+    if not isinstance(value, int | float) or isinstance(value, bool):
+        raise SceneError(f"{variable.name} = {format_value(value)} must be one number")
     low, high = find_bound(variable, "min"), find_bound(variable, "max")
     if is_integer:
         limits = np.iinfo({"Integer": "int32"}.get(variable.type, variable.type.lower()))

@@ -16,7 +16,7 @@ SIMULATE = [  # changes of harness.simulate("smd"), and words of the sentence
     ({"stop": "8"}, "stop = '8' must be a finite number"),
     ({"stop": -1.0}, "stop = -1.0 s is not after start"),
     ({"interval": 0.0}, "interval = 0.0 must be a finite number above 0"),
-    ({"times": [0.0, 2.0, 1.0]}, "times must increase"),
+    ({"times": [0.0, 2.0, 1.0]}, "times: 1.0 at index 2 is not after 2.0"),
     ({"times": [0.0, float("nan")]}, "times: nan at index 1 is not a finite number"),
     ({"times": ["soon"]}, "times = ['soon'] must be a row of finite numbers"),
     ({"times": []}, "times = [] must be a row of finite numbers, at least one"),

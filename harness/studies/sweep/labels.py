@@ -20,8 +20,8 @@ def read_labels(run: RunSpec) -> Labels:
 
 def replace_labels(name: str, values: Any, labels: Labels) -> Any:
     """Return the values of a parameter with the numbers of its labels; SceneError for an unknown label."""
-    items = [values] if isinstance(values, str) else values
-    if not isinstance(items, list | tuple) or not any(isinstance(item, str) for item in items):
+    items = list_labels(values)
+    if not any(isinstance(item, str) for item in items):
         return values
     if name not in labels:
         raise SceneError(f"grid: {name} = {values!r} must be numbers, because {name} is no enumeration")
@@ -30,6 +30,16 @@ def replace_labels(name: str, values: Any, labels: Labels) -> Any:
         if isinstance(item, str) and item not in numbers:
             raise SceneError(unknown_name_message(f"label of {name}", item, numbers))
     return [numbers[item] if isinstance(item, str) else item for item in items]
+
+
+def list_labels(values: Any) -> list[Any]:
+    """Return a label, or the items of a sequence or of an array of texts; empty for other values."""
+    if isinstance(values, str):
+        return [values]
+    if isinstance(values, list | tuple):
+        return list(values)
+    kind = getattr(getattr(values, "dtype", None), "kind", "")
+    return list(values) if kind in ("U", "O", "T") and getattr(values, "ndim", 0) == 1 else []
 
 
 def replace_labels_in_text(text: str, labels: Labels) -> str:

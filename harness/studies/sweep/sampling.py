@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ...arguments import MAX_RUNS
+from ...arguments import MAX_RUNS, to_array
 from ...errors import MAX_VALUE_LENGTH, SceneError, format_value
 
 VARY_HELP = "as in m=1:2:11, k=10:1000:31:log, mu=0.1,0.2,0.4 or, with --samples, m=1:2"
@@ -55,8 +55,8 @@ def parse_axis(text: str, random: bool) -> SweepAxis:
 def axis_from_numbers(name: str, column: Any, random: bool) -> SweepAxis:
     """Return the axis of a parameter from an array of its values; SceneError if it is invalid."""
     try:
-        numbers = np.atleast_1d(np.asarray(column))
-    except ValueError:  # nested sequences of different lengths
+        numbers = np.atleast_1d(to_array(column))
+    except (OverflowError, TypeError, ValueError):  # nested sequences of different lengths
         numbers = np.zeros((0, 0))
     if numbers.ndim != 1 or (len(numbers) and numbers.dtype.kind not in "fiu"):
         raise SceneError(f"grid: {name} = {format_value(column)} must be numbers, one or a row")

@@ -1,0 +1,88 @@
+"""Arrays and columns of any type hold the numbers that their library shows: none that a mask hides."""
+
+from decimal import Decimal
+
+import numpy as np
+import pytest
+
+import harness
+
+pandas = pytest.importorskip("pandas")
+
+T = np.linspace(0.0, 0.25, 5)
+F = 3.0 * np.sin(9.0 * T)
+KINDS = {
+    "big-endian and strided": lambda x: np.repeat(x.astype(">f4"), 2)[::2],
+    "objects": lambda x: [Decimal(x[0]), *x[1:].astype(object)],
+    "masked": lambda x: np.ma.array(x, mask=False),
+    "nullable": lambda x: pandas.array(x, dtype="Float64"),
+    "another index": lambda x: pandas.Series(x, index=range(len(x), 0, -1)),
+}
+
+
+def each_function(convert):
+    """Return numbers from each function that takes rows of numbers, which `convert` makes of arrays."""
+    run = harness.simulate("coulomb", times=convert(T), inputs={"time": convert(T), "F_ext": convert(F)})
+    difference = harness.compare(run, {"t": convert(T), "x": convert(F)}).to_pandas()
+    frame = harness.compare(run, pandas.DataFrame({"t": convert(T), "x": convert(F)})).to_pandas()
+    return run["x"].tolist(), difference.to_csv(), frame.to_csv()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_numbers_of_any_type_are_taken_as_they_are(user_folder, monkeypatch, kind):
+    monkeypatch.chdir(user_folder)
+    convert = KINDS[kind]
+    assert each_function(convert) == each_function(lambda x: np.array([float(number) for number in convert(x)]))
+
+
+def test_numbers_that_a_mask_hides_are_missing(user_folder, monkeypatch):
+    monkeypatch.chdir(user_folder)
+    hidden = np.ma.array([0.0, 0.1, 9e36], mask=[False, False, True])
+    for function, arguments in (
+        (harness.simulate, {"times": hidden}),
+        (harness.simulate, {"inputs": {"time": [0.0, 0.1, 0.2], "F_ext": hidden}}),
+        (harness.sweep, {"grid": {"f": hidden}}),
+    ):
+        with pytest.raises(harness.SceneError, match=r"nan at index 2|not a finite number"):
+            function("coulomb", **arguments)
+    run = harness.simulate("coulomb", times=[0.0, 0.1, 0.2])
+    result = harness.compare(run, {"t": [0.0, 0.1, 0.2], "x": hidden})
+    assert "x is not a finite number at t = 0.2 s" in str(result)
+    t = np.linspace(0.0, 6.0, 121)
+    x = np.ma.array(np.exp(-0.1 * t) * np.cos(6.0 * t), mask=np.arange(121) % 20 == 7)
+    x.data[x.mask] = 0.5
+    assert "6 of 121 rows have a missing cell" in str(harness.identify_decay((t, x), unit="m", drag=False))
+
+
+def test_time_deltas_are_seconds_and_labels_may_be_an_array(user_folder, monkeypatch):
+    monkeypatch.chdir(user_folder)
+    delta = pandas.to_timedelta(T, unit="s")
+    expected = harness.simulate("coulomb", times=T, inputs={"time": T, "F_ext": F})
+    frame = pandas.DataFrame({"F_ext": F}, index=delta.rename("time"))
+    for inputs in ({"time": delta, "F_ext": F}, frame):
+        run = harness.simulate("coulomb", times=delta.to_numpy(), inputs=inputs)
+        assert run["x"].tolist() == expected["x"].tolist()
+    for heading in ("t", "t [s]", "t [ms]"):
+        table = pandas.DataFrame({heading: delta, "x": expected["x"]})
+        assert "Compared at 5 times (common to both)" in str(harness.compare(expected, table))
+    assert harness.sweep("coulomb", {"friction": np.array(["hybrid"])}, stop=0.1)["friction"].values.tolist() == [1.0]
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: harness.simulate("coulomb", times=[0.2, 0.1]), "0.1 at index 1 is not after 0.2"),
+        (lambda: harness.simulate("coulomb", inputs={"time": [], "F_ext": []}), "inputs has no rows"),
+        (lambda: harness.simulate("coulomb", {"m": [1.1]}), r"m = \[1.1\] must be one number"),
+        (lambda: harness.identify_decay((T, ["a"] * 5)), r"record: x = \['a', .* must be a row of numbers"),
+        (lambda: harness.identify_decay({"t": [], "x": []}), "the record has no rows"),
+        (
+            lambda: harness.compare("coulomb", pandas.DataFrame({"t": T, "x": T, "note": "a"})),
+            "the column note of the record holds texts, as 'a'",
+        ),
+    ],
+)
+def test_a_refusal_names_what_is_wrong(user_folder, monkeypatch, call, message):
+    monkeypatch.chdir(user_folder)
+    with pytest.raises(harness.SceneError, match=message):
+        call()
