@@ -131,13 +131,13 @@ def repeat_call(context: click.Context, folder: Path, provenance: dict[str, Any]
 def run_fmu_file(path: Path, values: tuple[str, ...], options: dict[str, Any], terminal: Terminal) -> None:
     """Run one FMU and print the first, last, smallest and largest value of each output."""
     from ..running.resolve import set_rtol
-    from ..scenes.assignments import parse_assignment
+    from ..scenes.assignments import parse_assignments
     from ..scenes.run_spec import DEFAULT_EQUAL_STEPS, RunSpec
     from ..studies.run.study import run_fmu
 
     rtol = options.pop("tolerance")
     with terminal.progress(1) as report:
-        spec = RunSpec(path, values=dict(map(parse_assignment, values)), equal_steps=DEFAULT_EQUAL_STEPS, **options)
+        spec = RunSpec(path, values=parse_assignments(values), equal_steps=DEFAULT_EQUAL_STEPS, **options)
         if rtol is not None:
             spec = set_rtol(spec, rtol)
         trajectory, folder = run_fmu(spec, terminal.out, partial(report, path.stem))

@@ -90,7 +90,7 @@ def sweep(
         if find_spec(package) is None:
             raise HarnessError(f"a sweep needs {package}: {install_command('sweep')}")
     from ..running.resolve import set_rtol
-    from ..scenes.assignments import parse_assignment
+    from ..scenes.assignments import parse_assignments
     from ..scenes.fmu_files import check_built, find_fmu
     from ..scenes.run_spec import RunSpec
     from ..studies.sweep.labels import read_labels, replace_labels_in_text
@@ -101,7 +101,7 @@ def sweep(
     refuse_ignored_options(context, [find_fmu(model)], timeout_is_ignored=True)
     measures = tuple(dict.fromkeys(word.strip() for word in measure.split(","))) if measure is not None else ()
     rtol = options.pop("tolerance")
-    run = RunSpec(find_fmu(model), values=dict(map(parse_assignment, values)), follow=False, **options)
+    run = RunSpec(find_fmu(model), values=parse_assignments(values), follow=False, **options)
     run = run if rtol is None else set_rtol(run, rtol)
     check_built(run.fmu)
     labels = read_labels(run)

@@ -1,5 +1,7 @@
 """Assignments on the command line: NAME=VALUE."""
 
+from collections.abc import Iterable
+
 from ..errors import MAX_VALUE_LENGTH, SceneError
 
 
@@ -12,6 +14,16 @@ class NumberWithText(float):
         return number
 
     text: str
+
+
+def parse_assignments(texts: Iterable[str]) -> dict[str, float | str]:
+    """Return the values by name of assignments; raise SceneError if one name has several."""
+    values = dict[str, float | str]()
+    for name, value in map(parse_assignment, texts):
+        if name in values:
+            raise SceneError(f"--set names {name[:MAX_VALUE_LENGTH]} twice: give it one value")
+        values[name] = value
+    return values
 
 
 def parse_assignment(text: str) -> tuple[str, float | str]:

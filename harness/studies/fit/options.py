@@ -36,6 +36,8 @@ def parse_values(option: str, texts: Iterable[str]) -> dict[str, Any]:
         name, separator, value = (part.strip() for part in item.partition("="))
         if not separator or not name or not value:
             raise SceneError(f"{option} {format_value(item)} is not an assignment; write it as in m=3")
+        if name in values:
+            raise SceneError(f"{option} names {name} twice: give it one value")
         try:
             values[name] = float(value)
         except ValueError:
