@@ -53,6 +53,15 @@ def test_set_up_commands_come_first():
     assert "python -m pytest" in second
 
 
+def test_the_readme_and_the_first_page_count_the_models_of_fmus_more():
+    names = sorted(path.stem for path in (ROOT / "fmus/more").glob("*.py"))
+    count = {9: "nine", 10: "ten", 11: "eleven"}[len(names)]
+    readme = " ".join((ROOT / "README.md").read_text(encoding="utf-8").split())
+    (listed,) = re.findall(rf"`friction-fmus build --more` builds {count} more models \((.*?)\)", readme)
+    assert sorted(re.findall("`(.*?)`", listed)) == names
+    assert f"`fmus/more` has {count} more models" in (ROOT / "docs/index.md").read_text(encoding="utf-8")
+
+
 def test_links_of_the_readme_exist():
     text = README.read_text(encoding="utf-8")
     for link in re.findall(r"\]\(([^)#:]+)\)|src(?:set)?=\"([^\"]+)\"", text):
