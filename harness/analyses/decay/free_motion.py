@@ -15,7 +15,8 @@ from ..estimation.noise import robust_std
 from . import thresholds
 from .extrema import Extrema
 from .fit_problem import FitProblem, prepare_problem
-from .law import OMEGA, T0, TERMS, UNKNOWNS, Terms
+from .hum import Hum, find_hum
+from .law import AMPLITUDE, OMEGA, T0, TERMS, UNKNOWNS, Terms
 from .sample_noise import estimate_noise
 
 
@@ -72,6 +73,14 @@ class FreeMotion:
     def residuals(self) -> np.ndarray:
         """Return the residuals (n,) of the selected samples."""
         return self.problem.residuals(self.p, self.terms)[0]
+
+    def find_hum(self) -> Hum | None:
+        """Return the hum in the residuals, or None."""
+        problem = self.problem
+        t, e = problem.t + problem.time_origin, -self.residuals() * problem.scale
+        hum = find_hum(t, e, float(self.p[OMEGA]) / (2 * np.pi))
+        is_large = hum is not None and abs(hum.amplitude) > thresholds.EXACT * problem.scale * self.p[AMPLITUDE]
+        return hum if is_large else None
 
     def add_note(self, note: str) -> Self:
         return replace(self, notes=(*self.notes, note))

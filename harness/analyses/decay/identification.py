@@ -246,14 +246,20 @@ def identify_record(
     decay, half_period = select_decay(record, parameters.pendulum)
     _, quantiser_step = estimate_noise(decay.t, decay.x)
     record, decay = thin_around(record, decay, half_period)
-    extrema = find_extrema(decay, half_period, quantiser_step, parameters.pendulum)
     unknowns = 5 + len(terms) + drift
     if len(decay.t) <= unknowns:
         raise HarnessError(
             f"{record.name} has {len(decay.t)} samples, too few to fit {unknowns} unknowns: sample finer"
         )
     report(0.1)
-    free_motion = select_free_motion(decay, extrema, terms, parameters.pendulum, drift)
+    for _ in range(thresholds.MAX_HUMS + 1):
+        extrema = find_extrema(decay, half_period, quantiser_step, parameters.pendulum)
+        free_motion = select_free_motion(decay, extrema, terms, parameters.pendulum, drift)
+        hum = free_motion.find_hum()
+        if hum is None:
+            break
+        decay = hum.subtract_from(decay)
+    report(0.5)
     problem, extrema = free_motion.problem, free_motion.extrema
     report(0.5)
     amplitudes = np.abs(extrema.x - extrema.rest_positions(drift)) / problem.scale

@@ -102,6 +102,16 @@ MAX_EXTENSIONS = 6  # of the samples before a disturbance: each fit is valid a l
 DEPARTED = 4.0  # times the noise: residual of a half cycle that departs from the law
 PARTLY_DEPARTED = 0.05  # fraction of departed samples in the half cycle before it, from which on it departs as well
 
+# --- Hum (hum.py) ---
+MAX_HUMS = 4  # lines that are subtracted: hum has harmonics
+MAX_EMPTY_PLACES = 8  # times the samples: in a sparser record no line is sought
+BACKGROUND_FREQUENCIES = 50  # whose median is the power around a line
+HUM_LINE = 30.0  # times the median power: white noise exceeds it in one of 1e9 frequencies
+STEADY_HUM = 0.3  # of the amplitude: the halves of a record differ by less
+MIN_HUM_FREQUENCY = 2.5  # times that of the motion: slower residuals belong to the motion
+MAX_HARMONIC = 7  # of the motion that its residuals may have
+HARMONIC_WIDTH = 2.0  # resolutions of the spectrum: width of a harmonic of a decay
+
 # --- Selection of the law (model_selection.py) ---
 MAX_REFITS = 2  # passes over all pairs of laws: each improves the fits of the one before
 EQUAL_DEVIANCE = 1.0  # of n ln(squares): no value of two such laws differs by more than a standard error
