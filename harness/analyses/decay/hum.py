@@ -37,8 +37,8 @@ class Hum:
         """Return the record without the hum, with a note."""
         hum = (self.amplitude * np.exp(-2j * np.pi * self.frequency * (record.t - self.origin))).real
         note = (
-            f"The record has a hum, a steady sinusoid of {abs(self.amplitude):.2g} {record.unit}, at "
-            f"{self.frequency:.4g} Hz or at a frequency that these samples cannot tell from it; it is subtracted."
+            f"Hum is subtracted: a steady sinusoid with an amplitude of {abs(self.amplitude):.2g} {record.unit} at "
+            f"{self.frequency:.4g} Hz, or at a frequency of which this is an alias."
         )
         return replace(record, x=record.x - hum, notes=(*record.notes, note))
 
@@ -72,6 +72,7 @@ def find_hum(t: np.ndarray, e: np.ndarray, motion_frequency: float) -> Hum | Non
             lambda f: -abs(fit_amplitude(t - origin, e, f)),
             bounds=(frequencies[largest] - spacing, frequencies[largest] + spacing),
             method="bounded",
+            options={"xatol": 1e-6 * spacing},
         ).x
     )
     amplitude, half = fit_amplitude(t - origin, e, frequency), len(t) // 2

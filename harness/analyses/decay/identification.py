@@ -3,7 +3,8 @@
 1. Find the free decay within the record (window.py) and thin it (thinning.py); locate and number its turning points
    (extrema.py).
 2. Estimate the losses from the energy lost per half cycle (energy_loss.py), then fit the numbered turning points.
-3. Fit the law (law.py) to every sample of the free motion (signal_model.py, free_motion.py).
+3. Fit the law (law.py) to every sample of the free motion (signal_model.py, free_motion.py).  If the residuals show
+   hum (hum.py), subtract it and repeat steps 2 and 3.
 4. Fit and rank the seven laws (model_selection.py); the full law gives the uncertainty (intervals.py).
 5. Fit the law to the swings alone, as a second opinion (swing_fit.py).
 6. Look for friction that rises at low speed (low_speed_friction.py).
