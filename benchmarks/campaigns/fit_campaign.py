@@ -13,25 +13,23 @@ import os
 from math import isfinite
 from pathlib import Path
 
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+import numpy as np
+from spec_runs import ignore_progress
+
+from harness.errors import HarnessError
+from harness.process.subprocess_runner import run_module
+from harness.process.temporary_directory import temporary_directory
+from harness.records.columns import ColumnOptions
+from harness.records.signal_table import parse_signals
+from harness.records.table_files import Table
+from harness.running.whole_run import open_simulator
+from harness.scenes.run_spec import RunSpec
+from harness.studies.fit.request import FitRequest, resolve_request
+from harness.studies.fit.study import fit_tables
+
+from .drawn_records import GROUPS, draw_record
+
 ROOT = Path(__file__).parents[2]
-
-import numpy as np  # noqa: E402
-from spec_runs import ignore_progress  # noqa: E402
-
-from harness.errors import HarnessError  # noqa: E402
-from harness.process.subprocess_runner import run_module  # noqa: E402
-from harness.process.temporary_directory import temporary_directory  # noqa: E402
-from harness.records.columns import ColumnOptions  # noqa: E402
-from harness.records.signal_table import parse_signals  # noqa: E402
-from harness.records.table_files import Table  # noqa: E402
-from harness.running.whole_run import open_simulator  # noqa: E402
-from harness.scenes.run_spec import RunSpec  # noqa: E402
-from harness.studies.fit.request import FitRequest, resolve_request  # noqa: E402
-from harness.studies.fit.study import fit_tables  # noqa: E402
-
-from .drawn_records import GROUPS, draw_record  # noqa: E402
-
 EXAMPLES = ROOT / "tests" / "example_models"
 SOURCES = {
     "stribeck_sled": EXAMPLES / "fit" / "stribeck_sled.py",

@@ -17,7 +17,6 @@ import contextlib
 import inspect
 import io
 import json
-import os
 import platform
 import resource
 import signal
@@ -31,8 +30,6 @@ from importlib.metadata import PackageNotFoundError, version
 from math import exp, isfinite, tanh
 from multiprocessing import get_context
 from pathlib import Path
-
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 import pandas
