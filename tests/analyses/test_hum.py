@@ -62,3 +62,14 @@ def test_a_residual_that_belongs_to_the_motion_is_no_hum(motion):
         "ringing": 1e-3 * np.exp(-T / 2) * np.sin(2 * np.pi * 31.0 * T),
     }
     assert "Hum" not in remarks_text(identify(record._replace(x=record.x + added[motion])))
+
+
+def test_hum_of_a_dense_record_has_its_own_frequency():
+    """Not that of the averages over samples, to which the law is fitted."""
+    record = decay_record(**(LAW | {"t": np.arange(0.0, 30.0, 0.001)}))
+    fit = identify(with_hum(record, 2e-3, 60.0))
+    text = remarks_text(fit)
+    assert "are averaged over" in text
+    assert "at 60 Hz" in text
+    assert "correlated" not in text
+    assert fit["r"].low <= 2e-4 <= fit["r"].high

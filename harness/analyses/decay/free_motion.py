@@ -15,7 +15,7 @@ from ..estimation.noise import robust_std
 from . import thresholds
 from .extrema import Extrema
 from .fit_problem import FitProblem, prepare_problem
-from .hum import Hum, find_hum
+from .hum import Hum, find_hums
 from .law import AMPLITUDE, OMEGA, T0, TERMS, UNKNOWNS, Terms
 from .sample_noise import estimate_noise
 
@@ -74,13 +74,17 @@ class FreeMotion:
         """Return the residuals (n,) of the selected samples."""
         return self.problem.residuals(self.p, self.terms)[0]
 
-    def find_hum(self) -> Hum | None:
-        """Return the hum in the residuals, or None."""
+    def find_hums(self, decay: Record) -> list[Hum]:
+        """Return the hums in samples of the decay."""
         problem = self.problem
-        t, e = problem.t + problem.time_origin, -self.residuals() * problem.scale
-        hum = find_hum(t, e, float(self.p[OMEGA]) / (2 * np.pi))
-        is_large = hum is not None and abs(hum.amplitude) > thresholds.EXACT * problem.scale * self.p[AMPLITUDE]
-        return hum if is_large else None
+        t = decay.t - problem.time_origin
+        is_free = (t >= problem.t[0]) & (t <= problem.t[-1])
+        signal, _ = problem.model(self.p, problem.unknowns(()), t[is_free])
+        e = decay.x[is_free] - problem.offset - problem.scale * signal
+        is_certain = np.abs(e) <= thresholds.OUTLIER * robust_std(e)
+        smallest = thresholds.EXACT * problem.scale * float(self.p[AMPLITUDE])
+        frequency = float(self.p[OMEGA]) / (2 * np.pi)
+        return find_hums(decay.t[is_free][is_certain], e[is_certain], frequency, smallest)
 
     def add_note(self, note: str) -> Self:
         return replace(self, notes=(*self.notes, note))

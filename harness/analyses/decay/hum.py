@@ -33,18 +33,21 @@ class Hum:
     amplitude: complex
     origin: float
 
+    def values(self, t: np.ndarray) -> np.ndarray:
+        """Return the values (n,) at times t (n,) in s."""
+        return np.asarray((self.amplitude * np.exp(-2j * np.pi * self.frequency * (t - self.origin))).real)
+
     def subtract_from(self, record: Record) -> Record:
         """Return the record without the hum, with a note."""
-        hum = (self.amplitude * np.exp(-2j * np.pi * self.frequency * (record.t - self.origin))).real
         note = (
             f"Hum is subtracted: a steady sinusoid with an amplitude of {abs(self.amplitude):.2g} {record.unit} at "
             f"{self.frequency:.4g} Hz, or at a frequency of which this is an alias."
         )
-        return replace(record, x=record.x - hum, notes=(*record.notes, note))
+        return replace(record, x=record.x - self.values(record.t), notes=(*record.notes, note))
 
 
-def find_hum(t: np.ndarray, e: np.ndarray, motion_frequency: float) -> Hum | None:
-    """Return the largest hum in residuals, or None.
+def find_hums(t: np.ndarray, e: np.ndarray, motion_frequency: float, smallest: float) -> list[Hum]:
+    """Return the hums in residuals.
 
     Parameters
     ----------
@@ -52,7 +55,21 @@ def find_hum(t: np.ndarray, e: np.ndarray, motion_frequency: float) -> Hum | Non
         Times (n,) in s and residuals (n,), samples minus model.
     motion_frequency : float
         Frequency of the motion in Hz.
+    smallest : float
+        Amplitude below which hum does not matter.
     """
+    hums: list[Hum] = []
+    while len(hums) < thresholds.MAX_HUMS:
+        hum = find_largest_hum(t, e, motion_frequency)
+        if hum is None or abs(hum.amplitude) < smallest:
+            break
+        hums.append(hum)
+        e = e - hum.values(t)
+    return hums
+
+
+def find_largest_hum(t: np.ndarray, e: np.ndarray, motion_frequency: float) -> Hum | None:
+    """Return the hum in residuals that exceeds the spectrum around it most, or None."""
     origin, step = float(t[0]), float(np.median(np.diff(t)))
     places = np.rint((t - origin) / step).astype(int)
     if places[-1] > thresholds.MAX_EMPTY_PLACES * len(t):

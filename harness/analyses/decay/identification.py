@@ -4,7 +4,7 @@
    (extrema.py).
 2. Estimate the losses from the energy lost per half cycle (energy_loss.py), then fit the numbered turning points.
 3. Fit the law (law.py) to every sample of the free motion (signal_model.py, free_motion.py).  If the residuals show
-   hum (hum.py), subtract it and repeat steps 2 and 3.
+   hum (hum.py), subtract it from the record and begin again.
 4. Fit and rank the seven laws (model_selection.py); the full law gives the uncertainty (intervals.py).
 5. Fit the law to the swings alone, as a second opinion (swing_fit.py).
 6. Look for friction that rises at low speed (low_speed_friction.py).
@@ -57,7 +57,7 @@ class DecayIdentification:
     Attributes
     ----------
     record : Record
-        The record, without spikes.
+        The record, without spikes and hum.
     extrema : Extrema
         Its turning points.
     problem : FitProblem
@@ -244,22 +244,26 @@ def identify_record(
             "--pendulum"
         )
     terms: Terms = TERMS if drag else ("zeta", "r")
-    decay, half_period = select_decay(record, parameters.pendulum)
-    _, quantiser_step = estimate_noise(decay.t, decay.x)
-    record, decay = thin_around(record, decay, half_period)
     unknowns = 5 + len(terms) + drift
-    if len(decay.t) <= unknowns:
-        raise HarnessError(
-            f"{record.name} has {len(decay.t)} samples, too few to fit {unknowns} unknowns: sample finer"
-        )
-    report(0.1)
-    for _ in range(thresholds.MAX_HUMS + 1):
+    for _ in range(thresholds.HUM_PASSES):
+        whole_decay, half_period = select_decay(record, parameters.pendulum)
+        _, quantiser_step = estimate_noise(whole_decay.t, whole_decay.x)
+        thinned_record, decay = thin_around(record, whole_decay, half_period)
         extrema = find_extrema(decay, half_period, quantiser_step, parameters.pendulum)
+        if len(decay.t) <= unknowns:
+            raise HarnessError(
+                f"{record.name} has {len(decay.t)} samples, too few to fit {unknowns} unknowns: sample finer"
+            )
+        report(0.1)
         free_motion = select_free_motion(decay, extrema, terms, parameters.pendulum, drift)
-        hum = free_motion.find_hum()
-        if hum is None:
+        hums = free_motion.find_hums(decay)
+        if hums and len(decay.t) < len(whole_decay.t):  # averages show another frequency
+            hums = free_motion.find_hums(whole_decay)
+        if not hums:
             break
-        decay = hum.subtract_from(decay)
+        for hum in hums:
+            record = hum.subtract_from(record)
+    record = thinned_record
     report(0.5)
     problem, extrema = free_motion.problem, free_motion.extrema
     report(0.5)
