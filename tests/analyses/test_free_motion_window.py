@@ -42,6 +42,37 @@ def test_a_motion_stopped_from_outside_is_cut_and_reported():
     assert "follows the law until t = " in remarks_text(fit)
 
 
+def held_in_mid_swing(swings, noise, zeta=0.015, end=2.0, hold=1e-5, rng=4):
+    """Return a record of a decay that is held after so many half cycles, with less noise than before, and that time."""
+    stop = swings * np.pi / OMEGA
+    t = np.linspace(0, end * stop, 3000)
+    rng = np.random.default_rng(rng)
+    x = decay_record(zeta, turn=0.0, t=t).x + noise * rng.standard_normal(len(t))
+    held = t > stop
+    x[held] = x[held][0] + hold * rng.standard_normal(held.sum())
+    return Signal(t, x), stop
+
+
+@pytest.mark.parametrize("swings", [9.4, 45.4])
+def test_a_motion_held_in_mid_swing_is_cut_and_reported(swings):
+    """The noise of the whole record is that of the hold, and a short motion has few turning points before it."""
+    record, stop = held_in_mid_swing(swings, 1e-3)
+    fit = identify(record)
+    assert fit.t[-1] <= stop
+    assert fit["zeta"].low <= 0.015 <= fit["zeta"].high
+    assert "follows the law until t = " in remarks_text(fit)
+
+
+def test_a_half_without_motion_is_reported():
+    """No departure of its phase or amplitude can be measured; an error ended the command."""
+    rng = np.random.default_rng(27)
+    rng.random(5)
+    record, _ = held_in_mid_swing(
+        43.37549190622319, 6.513497821427983e-4, 0.028280296634390842, 2.106056260519557, 1.7474075e-5, rng
+    )
+    assert "do not rely on these values" in remarks_text(identify(record))
+
+
 @pytest.mark.parametrize("drag", [True, False])
 def test_repeated_samples_before_and_after_the_motion_are_excluded(drag):
     """They are longer than the motion and interrupt it in mid-swing."""

@@ -41,7 +41,7 @@ def test_a_loss_that_departs_from_the_law_is_reported_and_covered():
 def test_forces_have_the_widened_intervals_of_their_losses():
     """The damping rises during the record, so that its halves disagree, and the swings with every law."""
     record = decay_record(0.004, 4e-4, turn=-0.1, t=T, noise=2e-5, rest=0.0)
-    x = record.x * np.exp(-0.005 * np.maximum(T - 3.0, 0.0))
+    x = record.x * np.exp(-0.003 * T**2)
     fit = identify(Signal(T, x), k=100.0, drag=False)
     remarks = " ".join(fit.remarks)
     assert "in the first half of the record" in remarks

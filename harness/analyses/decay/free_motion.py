@@ -244,7 +244,9 @@ def truncate_at_disturbance(motion: FreeMotion) -> FreeMotion:
         if np.searchsorted(problem.t, last, "right") < MIN_SAMPLES:
             return motion
         early, level, departure = extend_to_departure(replace(motion, available=problem, p=p), last)
-        if level * problem.scale < rms / thresholds.DEPARTED and departure < problem.t[-1]:
+        noise, _ = estimate_noise(early.problem.t, early.problem.x)
+        better = thresholds.BETTER_PART if level < thresholds.ROUGH * noise else thresholds.BETTER_ROUGH_PART
+        if better * level * problem.scale < rms and departure < problem.t[-1]:
             early = remove_outliers(early)
             at = early.format_time(early.problem.t[-1])
             return replace(early, whole=(selection, motion.p)).add_note(

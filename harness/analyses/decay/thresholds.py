@@ -96,10 +96,12 @@ DISTURBED_START = 2.0  # times the noise and the other residuals: a first half c
 BETTER_START = 0.5  # of the mean square of the residuals: a start is left out only if that halves it at least
 MAX_OUTLIERS = 0.001  # fraction of the samples, in addition to two: a record with more does not follow the law
 DISTURBED = 2.0  # times the noise: residuals of a record that departs from the law somewhere
-UNDISTURBED_PARTS = (0.6, 0.35)  # fractions of the turning points that are tried as undisturbed
+UNDISTURBED_PARTS = (0.8, 0.6, 0.35)  # fractions of the turning points that are tried as undisturbed
 MIN_UNDISTURBED = 6  # turning points before a disturbance, to know the law that it departs from
 MAX_EXTENSIONS = 6  # of the samples before a disturbance: each fit is valid a little farther than its samples
 DEPARTED = 4.0  # times the noise: residual of a half cycle that departs from the law
+BETTER_PART = 1.4  # ratio of the residuals of the whole record to those of an undisturbed part that are noise
+BETTER_ROUGH_PART = 4.0  # the same if the part departs from the law as well
 PARTLY_DEPARTED = 0.05  # fraction of departed samples in the half cycle before it, from which on it departs as well
 
 # --- Hum (hum.py) ---
