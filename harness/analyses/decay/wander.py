@@ -72,7 +72,7 @@ def walk_variance(effect: np.ndarray, e: np.ndarray, jacobian: np.ndarray) -> fl
     size, scores = size[is_seen], (axes.T @ (seen.T @ e))[is_seen]
     freedom = len(e) - others.shape[1] - len(size)
     noise = max(float(e @ e - (scores**2 / size).sum()), 0.0) / max(freedom, 1)
-    if not noise > 0 or freedom < 1:
+    if not is_seen.any() or not noise > 0 or freedom < 1:
         return 0.0
     ratios = np.concatenate([[0.0], np.logspace(-3, 6, 46) / size.max()])  # of the variance to that of the noise
     spread = 1 + ratios[:, None] * size
