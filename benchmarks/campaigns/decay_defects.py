@@ -30,9 +30,10 @@ def add_defect(record, true_values, defect, rng):
         x = x + 0.003 * size * np.cumsum(rng.standard_normal(len(t))) / np.sqrt(len(t))
     elif defect == "clock":  # its rate wanders by 0.1 %
         knots = np.linspace(t[0], t[-1], 9)
-        error = 3e-4 / true_values["omega"] * np.cumsum(rng.standard_normal(9))
-        error -= np.polyval(np.polyfit(knots, error, 1), knots)  # a wrong mean rate is a wrong frequency
-        t = t + np.interp(t, knots, error)
+        error = np.interp(t, knots, 3e-4 / true_values["omega"] * np.cumsum(rng.standard_normal(9)))
+        stop = np.flatnonzero(np.abs(x - x[-1]) > 0.02 * size)[-1]
+        error -= np.polyval(np.polyfit(t[:stop], error[:stop], 1), t)  # a wrong mean rate is a wrong frequency
+        t = t + error
     elif defect == "uneven":
         keep = np.sort(rng.choice(len(t), int(0.7 * len(t)), replace=False))
         t, x = t[keep], x[keep]
