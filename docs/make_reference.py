@@ -223,7 +223,7 @@ def result_files(fmus: Path) -> str:
         folder = Path(name)
         (folder / "fmus").symlink_to(fmus.resolve())
         for command in SAMPLES:
-            run(Block("sh", "", f"cd {folder} && python -m harness {command} --quiet", 0, "", (0, 0), ""), folder, {})
+            run(Block("sh", "", f"cd {folder} && friction-fmus {command} --quiet", 0, "", (0, 0), ""), folder, {})
         for file in sorted(folder.glob("results/**/*.csv")):
             headings = next(line for line in file.read_text().splitlines() if not line.startswith("#"))
             columns = ", ".join(f"`{heading.strip()}`" for heading in headings.split(",") if heading.strip())

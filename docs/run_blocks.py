@@ -6,7 +6,8 @@
     text, after sh or python    the output of that block, where "..." matches anything
 
 A block after the comment <!-- not run: REASON --> is skipped.  `python docs/run_blocks.py --write FOLDER PAGE...` runs
-pages in a folder and rewrites the outputs that differ.
+pages in a folder and rewrites the outputs that differ. The programs are those beside Python, or those of the folder in
+the environment variable PROGRAMS.
 """
 
 import os
@@ -135,8 +136,8 @@ def main() -> None:
     """Run pages in a folder; exit with status 1 if a block fails."""
     arguments = [argument for argument in sys.argv[1:] if argument != "--write"]
     folder, *pages = (Path(argument).resolve() for argument in arguments)
-    bin = str(Path(sys.executable).parent)
-    os.environ.update(PATH=f"{bin}{os.pathsep}{os.environ['PATH']}", MPLBACKEND="agg", COLUMNS="80")
+    programs = os.environ.get("PROGRAMS", str(Path(sys.executable).parent))
+    os.environ.update(PATH=f"{programs}{os.pathsep}{os.environ['PATH']}", MPLBACKEND="agg", COLUMNS="80")
     os.chdir(folder)
     sys.path.insert(0, str(folder))
     failures = [failure for page in pages for failure in run_page(page, "--write" in sys.argv)]

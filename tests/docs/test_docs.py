@@ -10,6 +10,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from commands import run_process
 
 import harness
 
@@ -39,13 +40,36 @@ def runnable(page):
 scripts = load("run_blocks")
 
 
+def run_page(page, folder, environment):
+    """Run the blocks of a page in a folder."""
+    (folder / "docs").symlink_to(DOCS)
+    command = [Path(environment["PROGRAMS"], "run_blocks"), folder, page]
+    done = subprocess.run(command, capture_output=True, text=True, env=environment, timeout=600)
+    assert done.returncode == 0, done.stderr
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("page", [page for page in PAGES if runnable(page)])
-def test_code_blocks_run(page, workspace):
-    (workspace / "docs").symlink_to(DOCS)
-    command = [sys.executable, str(DOCS / "run_blocks.py"), str(workspace), str(DOCS / page)]
-    done = subprocess.run(command, capture_output=True, text=True, env=ENVIRONMENT, timeout=300)
-    assert done.returncode == 0, done.stderr
+def test_code_blocks_run(page, workspace, environment):
+    run_page(DOCS / page, workspace, environment)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("words", ["list", "run nosuch", "run smd --nosuch"])
+def test_a_forked_command_prints_and_ends_as_a_fresh_one(environment, workspace, words):
+    program = [Path(environment["PROGRAMS"], "friction-fmus"), *words.split()]
+    forked = subprocess.run(program, cwd=workspace, env=environment, capture_output=True, text=True)
+    fresh = run_process(workspace, *words.split())
+    expected = [text.replace("python -m harness", "friction-fmus") for text in (fresh.stdout, fresh.stderr)]
+    assert (forked.returncode, [forked.stdout, forked.stderr]) == (fresh.returncode, expected)
+
+
+@pytest.mark.slow
+def test_a_page_fails_with_a_block(environment, tmp_path):
+    page = tmp_path / "page.md"
+    page.write_text("```sh\nfriction-fmus run nosuch\n```\n")
+    with pytest.raises(AssertionError, match="exit status 2"):
+        run_page(page, tmp_path, environment)
 
 
 @pytest.mark.parametrize("source", [str(file.relative_to(ROOT)) for file in SOURCES if ">>> " in file.read_text()])
@@ -62,7 +86,8 @@ def test_each_python_or_sh_block_that_is_not_run_has_a_reason():
 
 
 @pytest.mark.slow
-def test_generated_tables_are_up_to_date(fmus):
+def test_generated_tables_are_up_to_date(fmus, environment, monkeypatch):
+    monkeypatch.setenv("PATH", environment["PATH"])
     reference = load("make_reference")
     for page in sorted((DOCS / "reference").glob("*.md")):
         text = page.read_text(encoding="utf-8")
@@ -89,13 +114,12 @@ def test_each_picture_is_used_and_small():
 
 
 @pytest.mark.slow
-def test_notebook_runs(workspace):
+def test_notebook_runs(workspace, environment):
     nbclient = pytest.importorskip("nbclient", reason="extra docs")
     nbformat = pytest.importorskip("nbformat", reason="extra docs")
     notebook = nbformat.read(DOCS / "tutorials" / "python_api.ipynb", as_version=4)
     client = nbclient.NotebookClient(notebook, timeout=120, resources={"metadata": {"path": str(workspace)}})
-    path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"  # has friction-fmus
-    client.execute(env={**ENVIRONMENT, "PATH": path})
+    client.execute(env=environment)
 
 
 @pytest.mark.slow

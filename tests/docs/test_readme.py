@@ -1,8 +1,6 @@
 """README.md is short, its code blocks run, its links lead somewhere."""
 
 import re
-import subprocess
-import sys
 from doctest import ELLIPSIS, NORMALIZE_WHITESPACE, OutputChecker
 
 import measured_records
@@ -10,7 +8,7 @@ import numpy as np
 import pytest
 from commands import run_process
 
-from tests.docs.test_docs import DOCS, ENVIRONMENT, ROOT, scripts
+from tests.docs.test_docs import ROOT, run_page, scripts
 
 README = ROOT / "README.md"
 
@@ -20,11 +18,8 @@ def test_readme_is_short():
 
 
 @pytest.mark.slow
-def test_readme_code_blocks_run(workspace):
-    (workspace / "docs").symlink_to(DOCS)
-    command = [sys.executable, str(DOCS / "run_blocks.py"), str(workspace), str(README)]
-    done = subprocess.run(command, capture_output=True, text=True, env=ENVIRONMENT, timeout=600)
-    assert done.returncode == 0, done.stderr
+def test_readme_code_blocks_run(workspace, environment):
+    run_page(README, workspace, environment)
 
 
 @pytest.mark.slow
