@@ -202,7 +202,14 @@ def random_tables(seed):
     return friction, (tuple(lengths), tuple((rise - rise.mean()).tolist()))
 
 
-@pytest.mark.parametrize("seed", [1, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(2, 21))])
+@pytest.mark.parametrize(
+    "seed",
+    [
+        1,
+        *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(2, 7)),
+        *(pytest.param(seed, marks=pytest.mark.campaign) for seed in range(7, 21)),
+    ],
+)
 def test_random_tables_give_the_motion_of_an_event_located_solution(worker, tmp_path, seed):
     tables = random_tables(seed)
     x, events = reference(*tables)

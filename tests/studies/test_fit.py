@@ -67,11 +67,12 @@ def fit_drawn(name, seed, max_samples):
     return record, fit
 
 
-LONG_FITS = ("forced", "position, 4 free", "Stribeck", "belt")
+SLOW = {"position, 4 free": pytest.mark.slow, "Stribeck": pytest.mark.slow}
+CAMPAIGN = {"forced": pytest.mark.campaign, "belt": pytest.mark.campaign}
 
 
 @pytest.mark.parametrize(
-    "name", ["force", "pendulum", *(pytest.param(name, marks=pytest.mark.slow) for name in LONG_FITS)]
+    "name", ["force", "pendulum", *(pytest.param(name, marks=mark) for name, mark in (SLOW | CAMPAIGN).items())]
 )
 def test_the_parameters_of_a_drawn_record_are_found(name):
     """The seed was drawn once; benchmarks/campaigns/fit_campaign.py fits hundreds of others."""
@@ -92,7 +93,7 @@ def test_means_of_samples_do_not_shift_the_values_of_a_long_record():
         assert holds(fit[parameter], truth)
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_a_long_curved_valley_does_not_hide_the_best_values():
     """Runs with the default tolerance scattered so much that fits of this record ended halfway along the valley."""
     record, fit = fit_drawn("Stribeck", [8101, 6, 65], max_samples=20_000)
