@@ -2,8 +2,8 @@
 type checkers find the packages."""
 
 import re
-import shutil
 import sys
+from math import cos
 
 import pytest
 from build_cache import ROOT
@@ -17,19 +17,31 @@ WORK = {  # by command; all run in one folder, in this order
     "build": ["build smd coulomb stickslip"],
     "list": ["list"],
     "info": ["info stickslip"],
-    "run": ["run stickslip", "build belt.py", "run --fmu belt.fmu"],
+    "run": ["run stickslip", "build block.py --method dop853 --method rodas", "run --fmu block.fmu"],
     "curve": ["curve bench.csv --mass 2"],
     "decay": ["decay docs/records/spring.csv --m 0.35", "decay coulomb"],
     "compare": ["compare smd coulomb"],
-    "fit": [
-        "fit stickslip docs/records/pulled_block.csv --free mu_s,mu_d,k=50:1000 --fixed m=1.25,v_driver=0.02"
-        " --observe F_spring=force"
-    ],
+    "fit": ["fit block.fmu swing.csv --free k=50:200 --fixed f=0"],
     "precision": ["precision smd --quick"],
-    "stability": ["stability smd"],
-    "references": ["references belt.py"],
+    "stability": ["stability block.py"],
+    "references": ["references block.py"],
     "report": ["report"],
 }
+BLOCK = '''from fmus import Contact, Mode, Model, Output, Parameter, State
+
+class Block(Model):
+    """Block on a spring, with dry friction."""
+
+    f = Parameter(1.5, "N", "dry friction force", low=0.0)
+    m = Parameter(1.0, "kg", "mass", above=0.0)
+    k = Parameter(100.0, "N/m", "stiffness of the spring", low=0.0)
+    x = State("m", "position", start=0.1)
+    v = State("m/s", "speed", rate_of=x)
+    mode = Mode()
+    F_friction = Contact("N", "friction force", mode=mode, slip=v, slide=f)
+    a = Output("m/s2", "acceleration", (-k * x - F_friction) / m, rate_of=v)
+    stop_time = 2.0
+'''
 EXTRAS = {"sweep smd --vary c=1,2": "sweep", "couple two-masses": "coupled", "build --native smd": "native"}
 
 
@@ -49,9 +61,11 @@ def without_extras(wheel, tmp_path_factory):
 
 @pytest.fixture
 def user(tmp_path):
-    """The folder of a user with the records of the pages, points of friction, and a model file."""
+    """The folder of a user with the records of the pages, points of friction, and a model file with a record."""
     (tmp_path / "docs").symlink_to(ROOT / "docs")
-    shutil.copy(ROOT / "fmus" / "more" / "belt.py", tmp_path)
+    (tmp_path / "block.py").write_text(BLOCK)
+    swing = "".join(f"{0.02 * i},{0.1 * cos(0.2 * i)}\n" for i in range(51))
+    (tmp_path / "swing.csv").write_text("t [s],x [m]\n" + swing)
     points = "".join(f"{sign * v},{sign * (1.3 + 2 * v)}\n" for v in (0.01, 0.03, 0.1, 0.2, 0.3) for sign in (1, -1))
     (tmp_path / "bench.csv").write_text("v [m/s],F [N]\n" + points)
     return tmp_path
