@@ -113,13 +113,23 @@ def test_each_picture_is_used_and_small():
         assert picture.name in names_in_pages or picture.name == "stick-dark.svg", f"no page shows {picture.name}"
 
 
+def count_endings(notebook):
+    """Return how many cases of stability ended as expected, and of how many, by the output of the notebook."""
+    outputs = [str(output) for cell in notebook.cells for output in cell.get("outputs", ())]
+    return {*re.findall(r"(\d+) of (\d+) ended as expected", "".join(outputs))}
+
+
 @pytest.mark.slow
 def test_notebook_runs(workspace, environment):
+    """All cases of stability end as expected, and are as many as in the shown output."""
     nbclient = pytest.importorskip("nbclient", reason="extra docs")
     nbformat = pytest.importorskip("nbformat", reason="extra docs")
     notebook = nbformat.read(DOCS / "tutorials" / "python_api.ipynb", as_version=4)
+    ((passed, total),) = shown = count_endings(notebook)
+    assert passed == total
     client = nbclient.NotebookClient(notebook, timeout=120, resources={"metadata": {"path": str(workspace)}})
-    client.execute(env=environment)
+    client.execute(env={**environment, "MPLBACKEND": "agg"})  # the figures are drawn, but not painted
+    assert count_endings(notebook) == shown
 
 
 @pytest.mark.slow

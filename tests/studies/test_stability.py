@@ -245,9 +245,10 @@ def test_a_part_of_the_table_ends_as_expected(user_folder, tmp_path, monkeypatch
 
 @pytest.mark.parametrize(
     "name",
-    [pytest.param(name, marks=SLOW if name in ("smd", "stickslip") else pytest.mark.campaign) for name in MODELS],
+    [pytest.param(name, marks=pytest.mark.campaign) for name in MODELS],
 )
 def test_every_case_of_a_shipped_model_ends_as_expected(user_folder, tmp_path, monkeypatch, name):
+    """In CI, README.md runs those of the sled, and the notebook of the documentation those of smd."""
     monkeypatch.chdir(user_folder)
     monkeypatch.setattr(study, "LIMIT", 1200.0)  # a loaded machine needs minutes until a run is refused
     rows = run_stability(tmp_path, ignore_progress, grouped_cases(models=[name])).outcomes
