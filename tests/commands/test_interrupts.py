@@ -29,7 +29,7 @@ COMMANDS = {  # and a file or folder that exists once it has started
     "main": ([], "out/.*"),
     "run": (["run", "slow.toml"], "temporary/friction-fmus-fmu-*"),
     "precision": (["precision", "pacejka"], "out/precision/.pacejka-*"),
-    "stability": (["stability"], "temporary/friction-fmus-child-*"),
+    "stability": (["stability", "stickslip"], "temporary/friction-fmus-child-*"),
     "bench": (["bench"], "out/.bench-*"),
     "importers": (["importers"], "temporary/friction-fmus-child-*"),
     "sweep": (["sweep", "pacejka", "--vary", "x_m=0.001:0.1:3000", "--workers", "1"], "out/sweep/.*.checkpoint"),
