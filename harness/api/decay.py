@@ -74,7 +74,7 @@ def identify_decay(
 
     Parameters
     ----------
-    record : str, path, DataFrame, Series, mapping, Trajectory, tuple or array_like
+    record : str, path, DataFrame, Series, Dataset, mapping, Trajectory, tuple or array_like
         A file with columns; a table, as a DataFrame or a mapping; a Series over time in s or time deltas; a trajectory;
         times and samples, as in ``(t, x)``; or the samples (n,), with their `rate`.
     x : array_like, optional

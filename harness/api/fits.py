@@ -95,7 +95,7 @@ def fit(
     ----------
     source : str or path
         The name of a model or the path of an FMU for co-simulation, FMI 2.0 or 3.0.
-    records : path, DataFrame, Series, mapping, Trajectory, tuple, array or sequence of these
+    records : path, DataFrame, Series, Dataset, mapping, Trajectory, tuple, array or sequence of these
         Measured records: files, tables, Series over time, trajectories, times and values as in ``(t, x)``, or values
         with their `rate`. Values without a name are those of the observed output. Units in headings,
         as in ``x [mm]``, are converted to those of the FMU; a DataFrame or a Series may have them in

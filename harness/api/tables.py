@@ -1,4 +1,4 @@
-"""Records from Python: DataFrames, Series, mappings, arrays and trajectories as tables, which records are read from."""
+"""Records from Python: tables of pandas and xarray, mappings, arrays and trajectories, which records are read from."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from ..records.table_files import Table
     from ..running.signals import Signals
 
-KINDS = "a file, a DataFrame, a Series, a mapping of columns, a trajectory, or times and values as in (t, x)"
+KINDS = "a file, a table of pandas or xarray, a mapping of columns, a trajectory, or times and values as in (t, x)"
 SIGNAL = "signal"  # heading of values without a name
 
 
@@ -34,6 +34,11 @@ def is_signals(value: Any) -> bool:
     return isinstance(value, Signals)
 
 
+def is_xarray(value: Any) -> bool:
+    """Return whether a value is a Dataset or a DataArray of xarray."""
+    return hasattr(value, "coords") and hasattr(value, "to_dataframe")
+
+
 def is_pair(value: Any) -> bool:
     """Return whether a value is a tuple of times and values, not of two records."""
     return isinstance(value, tuple) and len(value) == 2 and not any(map(has_columns, value))
@@ -41,7 +46,9 @@ def is_pair(value: Any) -> bool:
 
 def has_columns(value: Any) -> bool:
     """Return whether a value is a record by itself: a file, or a table whose columns have names."""
-    return isinstance(value, str | Path | Mapping) or is_frame(value) or is_series(value) or is_signals(value)
+    return isinstance(value, str | Path | Mapping) or any(
+        is_kind(value) for is_kind in (is_frame, is_series, is_signals, is_xarray)
+    )
 
 
 def record_source(value: Any) -> Any:
@@ -70,7 +77,7 @@ def side(value: Any) -> Any:
 NUMBERS = Rule("a row of numbers, at least one", row)
 RECORD = Rule(f"{KINDS}, or a row of values with their rate", record_source)
 RECORDS = Rule(f"{KINDS}, or a list of these", record_sources)
-SIDE = Rule("a name, a file, a DataFrame, a Series, a mapping of columns, or a trajectory", side)
+SIDE = Rule("a name, a file, a table of pandas or xarray, a mapping of columns, or a trajectory", side)
 
 
 def convert_to_table(source: Any, heading: str = SIGNAL, rate: float | None = None) -> "Table":
@@ -78,9 +85,9 @@ def convert_to_table(source: Any, heading: str = SIGNAL, rate: float | None = No
 
     Parameters
     ----------
-    source : DataFrame, Series, mapping, Trajectory, tuple or numpy.ndarray
-        A DataFrame or a Series has units in ``attrs["units"]``. A named index is a column; an index of time deltas is
-        the time in s, and so is the index of a Series.
+    source : DataFrame, Series, Dataset, DataArray, mapping, Trajectory, tuple or numpy.ndarray
+        Variables of xarray have their unit in ``attrs["units"]``, and a DataFrame or a Series has those of its columns
+        there. A named index is a column; an index of time deltas is the time in s, and so is the index of a Series.
     heading : str
         Heading of values without a name.
     rate : float, optional
@@ -108,6 +115,15 @@ def convert_to_table(source: Any, heading: str = SIGNAL, rate: float | None = No
             index = str(source.index.name)
             columns, units = {index: to_array(source.index), **columns}, {index: unit_of(source, index), **units}
         return build_table(columns, units)
+    if is_xarray(source):
+        dataset = source if hasattr(source, "data_vars") else source.to_dataset(name=source.name or heading)
+        if len(dataset.dims) != 1:
+            dimensions = ", ".join(map(str, dataset.dims)) or "none"
+            raise SceneError(f"the record has the dimensions {dimensions}: select one, the time")
+        variables = {str(name): dataset[name] for name in (*dataset.coords, *dataset.data_vars)}
+        units = {name: str(variable.attrs.get("units", "")) for name, variable in variables.items()}
+        columns = {name: to_column(name, variable.to_numpy()) for name, variable in variables.items()}
+        return build_table(columns, {name: "" if unit == "1" else unit for name, unit in units.items()})
     if isinstance(source, Mapping):
         return build_table({str(name): to_column(str(name), column) for name, column in source.items()}, {})
     if isinstance(source, tuple):

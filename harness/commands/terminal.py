@@ -76,7 +76,11 @@ def result_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
     @wraps(command)
     def wrapper(out: Path, quiet: bool, as_json: bool, **others: Any) -> Any:
-        record_call(click.get_current_context())
+        context = click.get_current_context()
+        for argument in context.command.params:
+            if isinstance(argument, click.Argument) and others.get(argument.name or "") == "":
+                raise click.UsageError(f"{argument.make_metavar(context).strip('[]')} is empty: give a name or a path")
+        record_call(context)
         return command(terminal=Terminal(quiet, as_json, out), **others)
 
     return default_out_option(overwrite_option(quiet_option(json_option(wrapper))))

@@ -68,6 +68,19 @@ def test_time_deltas_are_seconds_and_labels_may_be_an_array(user_folder, monkeyp
     assert harness.sweep("coulomb", {"friction": np.array(["hybrid"])}, stop=0.1)["friction"].values.tolist() == [1.0]
 
 
+def test_tables_of_xarray_are_records(user_folder, monkeypatch):
+    pytest.importorskip("xarray")
+    monkeypatch.chdir(user_folder)
+    run = harness.simulate("smd")
+    dataset = run.to_xarray()
+    assert {row["largest"] for row in harness.compare(run, dataset).rows()[0]} == {0.0}
+    expected = harness.identify_decay(run).as_json()["fit"]
+    for record in (dataset, dataset["x"]):
+        assert harness.identify_decay(record).as_json()["fit"] == expected
+    with pytest.raises(harness.SceneError, match="the record has the dimensions time, case: select one, the time"):
+        harness.identify_decay(dataset["x"].expand_dims("case", 1))
+
+
 @pytest.mark.parametrize(
     ("call", "message"),
     [

@@ -41,7 +41,7 @@ SIMULATE = [  # changes of harness.simulate("smd"), and words of the sentence
 DECAY = np.linspace(0.0, 10.0, 101), np.exp(-0.1 * np.linspace(0.0, 10.0, 101)) * np.cos(6.0 * np.linspace(0, 10, 101))
 COMPARE = [  # changes of harness.compare("smd.fmu", "smd.fmu")
     ({"rtol": 0.0}, "rtol = 0.0 must be a finite number above 0"),
-    ({"a": 3}, "a = 3 must be a name, a file, a DataFrame, a Series, a mapping of columns, or a trajectory"),
+    ({"a": 3}, "a = 3 must be a name, a file, a table of pandas or xarray, a mapping of columns, or a trajectory"),
 ]
 IDENTIFY_DECAY = [
     ({"record": [0.0, 1.0]}, "x is missing"),
@@ -98,7 +98,10 @@ FIT = [  # changes of a fit of mu_s of the sled to its position
         "6 unknowns need at least 24 samples, and there are",
     ),
     ({"records": "missing.csv"}, "missing.csv"),
-    ({"records": 3}, "records = 3 must be a file, a DataFrame, a Series, a mapping of columns, a trajectory, or times"),
+    (
+        {"records": 3},
+        "records = 3 must be a file, a table of pandas or xarray, a mapping of columns, a trajectory, or times",
+    ),
     ({"against": "stickslip"}, "stickslip is to be compared with itself: give another FMU"),
     ({"against": "pendulum", "free": ["m"]}, "unknown output of pendulum 'x'"),
     ({"against": "coulomb"}, "coulomb has none of the free parameters mu_s: free some of its own as well"),

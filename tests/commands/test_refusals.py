@@ -30,6 +30,12 @@ def assert_one_sentence(done, status, sentence):
     assert "Traceback" not in done.stderr
 
 
+@pytest.mark.parametrize("name", ["run", "decay", "curve", "compare"])
+def test_an_empty_source_is_called_so(workspace, name):
+    """Its path would be the current folder."""
+    assert_one_sentence(commands.harness(workspace, name, "", *["coulomb"] * (name == "compare")), 2, "is empty")
+
+
 @pytest.mark.parametrize("command", COMMANDS, ids=" ".join)
 def test_a_source_that_does_not_exist_is_called_so(workspace, command):
     for source in NO_SUCH:
