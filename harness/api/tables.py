@@ -163,13 +163,16 @@ def build_table(columns: "dict[str, np.ndarray]", units: dict[str, str]) -> "Tab
 
     if not columns:
         raise SceneError("the record has no columns")
-    if not len(next(iter(columns.values()))):
-        raise SceneError("the record has no rows")
-    cells = []
+    shape = next(iter(columns.values())).shape
     for name, column in columns.items():
-        if column.ndim != 1 or len(column) != len(next(iter(columns.values()))):
+        if column.ndim != 1 or column.shape != shape:
             raise SceneError(f"{name} has the shape {column.shape}: times and samples must be rows of the same length")
-        cells.append(column.astype(float) if column.dtype.kind in "fiub" else [str(cell) for cell in column])
+    if not shape[0]:
+        raise SceneError("the record has no rows")
+    cells = [
+        column.astype(float) if column.dtype.kind in "fiub" else [str(cell) for cell in column]
+        for column in columns.values()
+    ]
     return Table("the record", tuple(column_heading(name, units.get(name, "")) for name in columns), tuple(cells))
 
 
