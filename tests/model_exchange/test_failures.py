@@ -4,7 +4,7 @@ from math import inf, isnan, nan
 
 import pytest
 from model_exchange_client import DRIVEN, handle_event_at, single_error
-from models import MODELS, PUSHED, declared, model_class, outputs, push, runtime
+from models import MODELS, declared, model_class, outputs, push, runtime
 from worker_client import FmiError
 
 from fmus.packaging.lowering import model_exchange_run
@@ -76,7 +76,7 @@ def bad_settings(name):
         yield {"mu_d": 2.0}, "mu_d"
 
 
-BAD = [(name, *bad) for name in PUSHED for bad in bad_settings(name)]
+BAD = [(name, *bad) for name in MODELS for bad in bad_settings(name)]
 
 
 @pytest.mark.parametrize("in_event", [True, False], ids=["event mode", "continuous time"])

@@ -46,15 +46,6 @@ def outputs(name):
     return [v for v, d in declared(name).items() if isinstance(d, Output)]
 
 
-def is_pushed(name):
-    """Return whether a model has an input, a mass m, and start values of position and speed."""
-    x, v, *_ = outputs(name)
-    return {"m", f"{x}0", f"{v}0"} <= {*declared(name)} and any(isinstance(d, Input) for d in declared(name).values())
-
-
-PUSHED = [name for name in MODELS if is_pushed(name)]
-
-
 def parameters(name):
     """Return names and declarations of the numeric parameters and inputs (no choices)."""
     kinds = (Parameter, Input)
