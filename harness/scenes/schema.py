@@ -1,24 +1,19 @@
 """Validation of TOML files: converts a table to a dataclass, or reports the first error in one sentence.
 
-The dataclass is the schema. Types carry constraints, as in `Annotated[float, POSITIVE]`. cattrs converts the table: its
-errors include the keys of nested tables, which those of msgspec do not, and pydantic is about forty times larger. It is
-imported with the first table that is read, because many commands read none and its import takes 40 ms.
+The dataclass is the schema. Types carry constraints, as in `Annotated[float, POSITIVE]`.
 """
 
 import tomllib
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, fields, is_dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import MISSING, dataclass, fields, is_dataclass
 from functools import cache
 from itertools import pairwise
 from math import isfinite
 from pathlib import Path
-from types import GenericAlias
-from typing import TYPE_CHECKING, Any, TypeVar, get_args, get_origin
+from types import NoneType
+from typing import Any, TypeVar, get_args, get_origin, get_type_hints
 
 from ..errors import SceneError, format_value, unknown_name_message
-
-if TYPE_CHECKING:
-    from cattrs import Converter
 
 LIST_HINT = "`friction-fmus list` lists the available scenes"
 MAX_TITLE_LENGTH = 200  # letters
@@ -78,25 +73,80 @@ FLAG = Constraint(lambda value: isinstance(value, bool), "true or false")
 TABLE = Constraint(lambda value: isinstance(value, dict), "a table")
 LIST = Constraint(lambda value: isinstance(value, list), "a list")
 
-Hook = Callable[[Any, Any], Any]
+PLAIN = {  # constraints of types without any
+    str: Constraint(lambda value: isinstance(value, str), "a text"),
+    bool: FLAG,
+    int: Constraint(lambda value: isinstance(value, int) and not isinstance(value, bool), "a whole number"),
+    float: NUMBER,
+}
+
+Faults = list[tuple[int, str]]  # rank and message
+
+
+def parse_table(table: Mapping[str, Any], schema: type[Schema]) -> Schema:
+    """Convert a table to its schema; raise SceneError with the most helpful error if it does not fit."""
+    faults: Faults = []
+    result: Schema = convert(table, schema, "", faults)
+    if faults:
+        raise SceneError(min(faults)[1])
+    return result
+
+
+def convert(value: Any, annotation: Any, path: str, faults: Faults) -> Any:
+    """Return a value as its annotated type; a list becomes a tuple.
+
+    What is wrong is added to `faults`. Rank 0, an unknown key, is the most helpful.
+    """
+    constraint, origin, arguments = find_constraint(annotation), get_origin(annotation), get_args(annotation)
+    if constraint is None and NoneType in arguments:
+        (required,) = (one for one in arguments if one is not NoneType)
+        return None if value is None else convert(value, required, path, faults)
+    if constraint is None:
+        is_table = is_dataclass(annotation) or origin in (dict, Mapping)
+        constraint = TABLE if is_table else LIST if origin is tuple else PLAIN[annotation]
+    if not constraint.accepts(value):
+        faults.append((1, f"{path} = {format_value(value)} is not {constraint.description}"))
+        return None
+    if is_dataclass(annotation):
+        return convert_table(value, annotation, path, faults)
+    if origin in (dict, Mapping):
+        return {key: convert(item, arguments[1], join_key_path(path, key), faults) for key, item in value.items()}
+    if origin is tuple:
+        return tuple(convert(item, arguments[0], join_key_path(path, i), faults) for i, item in enumerate(value))
+    if annotation is float or Path in arguments:
+        return (Path if Path in arguments else float)(value)
+    return tuple(value) if isinstance(value, list) else value
+
+
+def convert_table(table: Mapping[str, Any], schema: Any, path: str, faults: Faults) -> Any:
+    """Return a table whose keys are the fields of a dataclass; the field `from_` holds the key `from`."""
+    names = {name.rstrip("_"): name for name in field_names(schema)}
+    if unknown := table.keys() - names:
+        faults.append((0, unknown_name_message(f"key in [{path}]" if path else "key", min(unknown), names)))
+    required = {one.name for one in fields(schema) if one.default is MISSING and one.default_factory is MISSING}
+    faults += [
+        (2, f"the key '{join_key_path(path, key)}' is missing")
+        for key, name in names.items()
+        if name in required and key not in table
+    ]
+    types, n_faults = type_hints(schema), len(faults)
+    values = {
+        name: convert(table[key], types[name], join_key_path(path, key), faults)
+        for key, name in names.items()
+        if key in table
+    }
+    if faults[n_faults:] or required - values.keys():
+        return None
+    try:
+        return schema(**values)
+    except ValueError as error:
+        faults.append((1, f"{path} = {error}"))
 
 
 @cache
-def converter() -> "Converter":
-    """Return the converter from tables to dataclasses."""
-    from cattrs import Converter
-
-    hooks: tuple[tuple[Any, Any], ...] = (
-        (is_dataclass, make_table_hook),
-        (has_origin(dict), make_mapping_hook),
-        (has_origin(Mapping), make_mapping_hook),
-        (has_origin(tuple), make_list_hook),
-        (find_constraint, make_value_hook),
-    )
-    result = Converter(forbid_extra_keys=True)
-    for is_responsible, make_hook in hooks:
-        result.register_structure_hook_factory(is_responsible, make_hook)
-    return result
+def type_hints(schema: Any) -> dict[str, Any]:
+    """Return the annotated types of the fields of a dataclass."""
+    return get_type_hints(schema, include_extras=True)
 
 
 def find_constraint(annotation: Any) -> Constraint | None:
@@ -104,91 +154,9 @@ def find_constraint(annotation: Any) -> Constraint | None:
     return next((item for item in getattr(annotation, "__metadata__", ()) if isinstance(item, Constraint)), None)
 
 
-def make_checked_hook(constraint: Constraint, convert: Hook) -> Hook:
-    """Return a hook that checks a constraint before it converts."""
-
-    def hook(value: Any, annotation: Any) -> Any:
-        if not constraint.accepts(value):
-            raise ValueError(f"{format_value(value)} is not {constraint.description}")
-        return convert(value, annotation)
-
-    return hook
-
-
-def make_value_hook(annotation: Any) -> Hook:
-    """Return a hook that keeps a value; a list becomes a tuple, and a text becomes a path if the type is a path."""
-    constraint = find_constraint(annotation)
-    assert constraint is not None
-    if get_args(annotation)[0] is Path:
-        return make_checked_hook(constraint, lambda value, _: Path(value))
-    return make_checked_hook(constraint, lambda value, _: tuple(value) if isinstance(value, list) else value)
-
-
-def make_table_hook(annotation: Any) -> Hook:
-    """Return a hook for a table whose keys are the fields of a dataclass; the field `from_` holds the key `from`."""
-    from cattrs.gen import make_dict_structure_fn, override
-
-    renamed: Any = {name: override(rename=name.rstrip("_")) for name in field_names(annotation) if name.endswith("_")}
-    return make_checked_hook(TABLE, make_dict_structure_fn(annotation, converter(), **renamed))
-
-
 def field_names(schema: Any) -> list[str]:
     """Return the names of the fields of a dataclass."""
     return [field.name for field in fields(schema)]
-
-
-def make_mapping_hook(annotation: Any) -> Hook:
-    """Return a hook for a table with arbitrary keys and values of one type."""
-    from cattrs.gen import make_mapping_structure_fn
-
-    table_type: Any = GenericAlias(dict, get_args(annotation))
-    return make_checked_hook(TABLE, make_mapping_structure_fn(table_type, converter()))
-
-
-def make_list_hook(annotation: Any) -> Hook:
-    """Return a hook for a list with items of one type."""
-    list_type: Any = GenericAlias(list, get_args(annotation)[:1])
-    return make_checked_hook(LIST, lambda value, _: tuple(converter().structure(value, list_type)))
-
-
-def has_origin(container: Any) -> Callable[[Any], bool]:
-    """Return a predicate for generic types of a container."""
-    return lambda annotation: get_origin(annotation) is container
-
-
-def parse_table(table: dict[str, Any], schema: type[Schema]) -> Schema:
-    """Convert a table to its schema; raise SceneError with the most helpful error if it does not fit."""
-    from cattrs.errors import BaseValidationError
-
-    try:
-        return converter().structure(table, schema)
-    except BaseValidationError as error:
-        raise SceneError(min(find_faults(error))[1]) from None
-
-
-def find_faults(error: Exception, path: str = "") -> Iterator[tuple[int, str]]:
-    """Yield (rank, message) for each error in a table; rank 0, an unknown key, is the most helpful."""
-    from cattrs.errors import (
-        ClassValidationError,
-        ForbiddenExtraKeysError,
-        IterableValidationError,
-        IterableValidationNote,
-    )
-
-    if isinstance(error, ClassValidationError | IterableValidationError):
-        with_notes, without_notes = error.group_exceptions()
-        for nested, note in with_notes:
-            key = note.index if isinstance(note, IterableValidationNote) else note.name.rstrip("_")
-            yield from find_faults(nested, join_key_path(path, key))
-        for nested in without_notes:
-            yield from find_faults(nested, path)
-    elif isinstance(error, ForbiddenExtraKeysError):
-        allowed = [name.rstrip("_") for name in field_names(error.cl)]
-        yield 0, unknown_name_message(f"key in [{path}]" if path else "key", min(error.extra_fields), allowed)
-    elif isinstance(error, KeyError):
-        yield 2, f"the key '{path}' is missing"
-    else:
-        yield 1, f"{path} = {error}"
 
 
 def join_key_path(path: str, key: str | int) -> str:

@@ -111,7 +111,7 @@ from decays import decay_record, identify
 draws, draw = [], Figure.draw
 Figure.draw = lambda *arguments: draws.append(draw(*arguments))
 identify(decay_record(0.02)).write(Path.cwd())
-unnecessary = ("fmpy", "cattrs", "scipy.stats", "scipy.signal")
+unnecessary = ("fmpy", "scipy.stats", "scipy.signal")
 unnecessary += ("harness.running.runner", "harness.running.session", "harness.scenes.run_spec", "harness.scenes.scene")
 print(len(draws), [name for name in unnecessary if name in sys.modules])
 """
