@@ -259,9 +259,8 @@ def finite_row(value: Any) -> "np.ndarray":
 def increasing_row(value: Any) -> "np.ndarray":
     """Return a row (n,) of at least one finite number as floats, which increase."""
     numbers = finite_row(value)
-    for i in range(1, len(numbers)):
-        if not numbers[i] > numbers[i - 1]:
-            raise SceneError(f"{numbers[i]} at index {i} is not after {numbers[i - 1]}: give increasing numbers")
+    for i in (numbers[1:] <= numbers[:-1]).nonzero()[0].tolist()[:1]:
+        raise SceneError(f"{numbers[i + 1]} at index {i + 1} is not after {numbers[i]}: give increasing numbers")
     return numbers
 
 
