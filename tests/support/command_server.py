@@ -22,7 +22,9 @@ from traceback import print_exc
 ROOT = Path(__file__).parents[2]
 PROGRAMS = {"friction-fmus": "harness.__main__", "run_blocks": "run_blocks"}  # and the module with their main()
 CLIENT = """\
-#!{python} -IS
+#!/bin/sh
+'''exec' "{python}" -IS "$0" "$@"
+' ''' # the path of Python may have blanks, which a first line of Python does not allow
 import json, os, socket, sys
 
 connection = socket.socket(socket.AF_UNIX)
