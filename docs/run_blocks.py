@@ -6,8 +6,8 @@
     text, after sh or python    the output of that block, where "..." matches anything
 
 A block after the comment <!-- not run: REASON --> is skipped.  `python docs/run_blocks.py --write FOLDER PAGE...` runs
-pages in a folder and rewrites the outputs that differ. The programs are those beside Python, or those of the folder in
-the environment variable PROGRAMS.
+pages in a folder and rewrites the outputs that differ. The programs are those in the folder of Python, or in the
+folder that the environment variable PROGRAMS names.
 """
 
 import os

@@ -145,7 +145,7 @@ def is_time_delta(values: Any) -> bool:
 
 
 def to_column(name: str, values: Any) -> "np.ndarray":
-    """Return a column (n,), time deltas in the unit of its heading or in s; SceneError if the values are none."""
+    """Return a column (n,), time deltas in the unit of its heading or in s; SceneError if they are no numbers."""
     from ..records.headings import split_heading
     from ..records.units import TIMES
 

@@ -272,7 +272,7 @@ def plan_grid(spec: RunSpec, instance: FmuInstance) -> TimeGrid:
     """Return the communication points of a run; SceneError if its inputs or its grid are not valid."""
     start, stop = resolve_time_span(spec, instance.description)
     check_inputs(spec.inputs, instance.variables)
-    check_rates(spec)
+    check_rates(spec.fmu, spec.inputs, spec.values)
     grid = make_grid(spec, start, stop)
     if (points := grid.duration / grid.h) > MAX_POINTS:
         sentence = f"grid = {grid.h!r} s makes {points:.6g} points from {start!r} s to {stop!r} s"

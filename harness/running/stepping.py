@@ -10,6 +10,7 @@ from ctypes import c_double
 from dataclasses import dataclass, field
 from functools import cached_property
 from math import inf
+from pathlib import Path
 from typing import Any, Literal, Protocol
 
 import numpy as np
@@ -242,12 +243,18 @@ def check_inputs(inputs: Inputs, variables: Mapping[str, Any]) -> None:
         raise SceneError("inputs: the time falls; sort the rows by time")
 
 
-def check_rates(spec: RunSpec) -> None:
-    """Check that an input that varies between jumps has the inputs of its declared rate; raise SceneError otherwise."""
-    time = np.asarray(spec.inputs.get(TIME, ()), dtype=float)
-    for name, rate_inputs in read_rate_inputs(spec.fmu).items() if spec.inputs else ():
-        missing = [one for one in rate_inputs if one not in spec.inputs and one not in spec.values]
-        if name in spec.inputs and missing and (np.diff(spec.inputs[name])[np.diff(time) > 0] != 0).any():
+def check_rates(fmu: Path, inputs: Inputs, values: Mapping[str, Any]) -> None:
+    """Check that the inputs or values of a run have the declared rate of each input that varies between jumps.
+
+    Raises
+    ------
+    SceneError
+        If a rate is missing.
+    """
+    time = np.asarray(inputs.get(TIME, ()), dtype=float)
+    for name, rate_inputs in read_rate_inputs(fmu).items() if inputs else ():
+        missing = [rate for rate in rate_inputs if rate not in inputs and rate not in values]
+        if name in inputs and missing and (np.diff(inputs[name])[np.diff(time) > 0] != 0).any():
             raise SceneError(
                 f"inputs: {name} varies, but {missing[0]} is missing, the rate by which the FMU continues it: add a "
                 f"column for {missing[0]}, or let {name} jump at times that occur twice"

@@ -11,7 +11,7 @@ import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from ctypes import CDLL, Structure, addressof, byref, c_double, c_int, c_size_t, c_void_p, cast
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache, lru_cache
 from importlib.util import find_spec
 from pathlib import Path
@@ -123,7 +123,7 @@ class CompiledLoop:
         if simulator.interpolates_inputs and spec.inputs:
             self.u, self.slopes = ramps_of_steps(spec.inputs, self.t)
         else:
-            check_rates(replace(spec, fmu=simulator.spec.fmu))
+            check_rates(simulator.spec.fmu, spec.inputs, spec.values)
             self.u = values_of_steps(spec.inputs, self.t, read_rate_inputs(simulator.spec.fmu))
         self.y = np.empty((np.count_nonzero(self.is_recorded), len(spec.outputs)))
         self.outputs, self.inputs = spec.outputs, tuple(name for name in spec.inputs if name != TIME)

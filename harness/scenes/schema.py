@@ -113,8 +113,10 @@ def convert(value: Any, annotation: Any, path: str, faults: Faults) -> Any:
         return {key: convert(item, arguments[1], join_key_path(path, key), faults) for key, item in value.items()}
     if origin is tuple:
         return tuple(convert(item, arguments[0], join_key_path(path, i), faults) for i, item in enumerate(value))
-    if annotation is float or Path in arguments:
-        return (Path if Path in arguments else float)(value)
+    if Path in arguments:
+        return Path(value)
+    if annotation is float:
+        return float(value)
     return tuple(value) if isinstance(value, list) else value
 
 

@@ -71,11 +71,11 @@ def find_hums(t: np.ndarray, e: np.ndarray, motion_frequency: float, smallest: f
 def find_largest_hum(t: np.ndarray, e: np.ndarray, motion_frequency: float) -> Hum | None:
     """Return the hum in residuals that exceeds the spectrum around it most, or None."""
     origin, step = float(t[0]), float(np.median(np.diff(t)))
-    places = np.rint((t - origin) / step).astype(int)
-    if places[-1] > thresholds.MAX_EMPTY_PLACES * len(t):
+    slots = np.rint((t - origin) / step).astype(int)
+    if slots[-1] > thresholds.MAX_EMPTY_SLOTS * len(t):
         return None
-    samples = np.zeros(places[-1] + 1)
-    samples[places] = e - e.mean()
+    samples = np.zeros(slots[-1] + 1)
+    samples[slots] = e - e.mean()
     size = PADDING * len(samples)
     power, frequencies = np.abs(np.fft.rfft(samples, size)) ** 2, np.fft.rfftfreq(size, step)
     spacing = float(frequencies[1])

@@ -105,9 +105,9 @@ BETTER_ROUGH_PART = 4.0  # the same if the part departs from the law as well
 PARTLY_DEPARTED = 0.05  # fraction of departed samples in the half cycle before it, from which on it departs as well
 
 # --- Hum (hum.py) ---
-HUM_PASSES = 3  # fits: the first one finds hum, and the next one may show a rest of it
+HUM_PASSES = 3  # fits: the first one finds hum, and the next one may show what is left of it
 MAX_HUMS = 4  # in the residuals of a fit: hum has harmonics
-MAX_EMPTY_PLACES = 8  # times the samples: in a sparser record no line is sought
+MAX_EMPTY_SLOTS = 8  # times the samples: in a sparser record no line is sought
 BACKGROUND_FREQUENCIES = 50  # whose median is the power around a line
 HUM_LINE = 30.0  # times the median power: white noise exceeds it in one of 1e9 frequencies
 STEADY_HUM = 0.3  # of the amplitude: the halves of a record differ by less

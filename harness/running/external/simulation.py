@@ -98,7 +98,7 @@ class ChildSession:
         self.check_interface()
         values = convert_values(spec, self.variables)
         check_inputs(spec.inputs, self.variables)
-        check_rates(spec)
+        check_rates(spec.fmu, spec.inputs, spec.values)
         selection = select_variables(spec, self.variables, values)
         start, stop = check_time_span(spec, self.description)
         report(0.0)
