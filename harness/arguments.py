@@ -25,6 +25,7 @@ MAX_WORKERS = 1024  # processes of a sweep
 MAX_RUNS = 10_000_000  # of a sweep
 INTERFACES = CO_SIMULATION, MODEL_EXCHANGE = ("CoSimulation", "ModelExchange")
 QUANTITIES = ("position", "velocity", "acceleration")  # by the order of the derivative
+INVALID = (AttributeError, OverflowError, RecursionError, TypeError, ValueError)  # raised for a value that is not valid
 
 Progress = Callable[[float], None]  # takes the finished share, from 0 to 1
 P = ParamSpec("P")
@@ -60,12 +61,20 @@ class Rule:
         """Return a value in its own type; raise SceneError, which names the argument, if it is not valid."""
         try:
             return self.convert(value)
-        except (AttributeError, OverflowError, RecursionError, TypeError, ValueError):
+        except INVALID:
             raise SceneError(f"{name} = {format_value(value)} must be {self.text}") from None
         except UnknownNameError:
             raise
         except SceneError as error:  # of a part of the value
             raise SceneError(f"{name}: {error}") from None
+
+    def accepts(self, value: Any) -> bool:
+        """Return whether a value is valid."""
+        try:
+            self.convert(value)
+        except (*INVALID, SceneError):
+            return False
+        return True
 
 
 def check_arguments(**rules: Rule) -> Callable[[Callable[P, R]], Callable[P, R]]:

@@ -18,8 +18,9 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Annotated, Any
 
+from ..arguments import Rule, text
 from ..errors import HarnessError, SceneError
-from ..scenes.schema import Constraint, field_names, parse_table
+from ..scenes.schema import field_names, parse_table
 from .files import to_json
 
 FILE = "provenance.json"
@@ -42,10 +43,30 @@ def is_shallow(value: object, depth: int = MAX_DEPTH) -> bool:
     return items is None or (depth > 0 and all(is_shallow(item, depth - 1) for item in items))
 
 
-STRING = Constraint(lambda value: isinstance(value, str), "a text")
-DIGEST = Constraint(lambda value: isinstance(value, str) and len(value) == 64, "a SHA-256 digest")
-VALUE = Constraint(lambda value: is_shallow(value, 3) and not isinstance(value, dict), "a value")
-SETTINGS = Constraint(lambda value: isinstance(value, dict | None) and is_shallow(value), "a table, or null")
+def digest(value: Any) -> str:
+    """Return a SHA-256 digest in hexadecimal digits."""
+    if len(value) != 64:
+        raise ValueError
+    return text(value)
+
+
+def value_or_list(value: Any) -> Any:
+    """Return a value or a list with few levels."""
+    if isinstance(value, dict) or not is_shallow(value, 3):
+        raise ValueError
+    return value
+
+
+def settings(value: Any) -> dict[str, Any] | None:
+    """Return a table with few levels, or None."""
+    if not isinstance(value, dict | None) or not is_shallow(value):
+        raise ValueError
+    return value
+
+
+DIGEST = Rule("a SHA-256 digest", digest)
+VALUE = Rule("a value", value_or_list)
+SETTINGS = Rule("a table, or null", settings)
 
 
 @dataclass(frozen=True)
@@ -53,14 +74,14 @@ class StoredParameter:
     """Effective value and unit of a parameter."""
 
     value: Annotated[Any, VALUE]
-    unit: Annotated[str, STRING]
+    unit: str
 
 
 @dataclass(frozen=True)
 class StoredCall:
     """Name of the command that wrote a result, and the values of its arguments and options."""
 
-    name: Annotated[str, STRING]
+    name: str
     options: dict[str, Annotated[Any, VALUE]]
 
 
@@ -68,16 +89,16 @@ class StoredCall:
 class ProvenanceKeys:
     """Keys of a provenance file; those with a default are missing in files of earlier versions."""
 
-    command: Annotated[str, STRING]
-    date: Annotated[str, STRING]
+    command: str
+    date: str
     files: dict[str, Annotated[str, DIGEST]]
     parameters: dict[str, StoredParameter]
     scene: Annotated[Any, SETTINGS]
-    source: Annotated[str, STRING] = ""
-    platform: Annotated[str, STRING] = ""
-    versions: dict[str, Annotated[str, STRING]] = field(default_factory=dict)
+    source: str = ""
+    platform: str = ""
+    versions: dict[str, str] = field(default_factory=dict)
     run: Annotated[Any, SETTINGS] = None
-    replaced: Annotated[str, STRING] = ""
+    replaced: str = ""
     call: StoredCall | None = None
 
 

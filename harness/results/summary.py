@@ -31,7 +31,7 @@ class SummaryTable:
 
     def __post_init__(self) -> None:
         if any(len(row) != len(self.headings) for row in self.rows):
-            raise ValueError("a table whose rows are not as long as its headings")  # follows "tables[0] = "
+            raise ValueError("a row is not as long as the headings")
 
 
 @dataclass(frozen=True)
@@ -133,7 +133,7 @@ class Summary:
     def __post_init__(self) -> None:
         outside = [name for name in self.files if Path(name).name != name]
         if outside:
-            raise ValueError(f"{outside[0]}, which is not the name of a file in the folder")  # follows "files = "
+            raise ValueError(f"{outside[0]} is not the name of a file in the folder")
 
 
 def make_table(headings: Iterable[str], rows: Iterable[Iterable[object]], title: str = "") -> tuple[SummaryTable, ...]:

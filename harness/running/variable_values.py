@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from ..arguments import FINITE
 from ..errors import SceneError, format_value, unknown_name_message
 from ..scenes.assignments import NumberWithText
-from ..scenes.schema import is_number
 
 REAL_TYPES = ("Real", "Float64", "Float32")
 BOOLEANS = {"true": True, "false": False, 1: True, 0: False}
@@ -36,7 +36,7 @@ def convert_value(variable: Any, value: Any, shape: tuple[int, ...] = ()) -> Any
         items = enumeration_labels(variable)
         numbers = {label: number for number, label in items.items()}
         number = numbers.get(value) if isinstance(value, str) else value
-        if not is_number(number) or number not in items:
+        if not FINITE.accepts(number) or number not in items:
             raise SceneError(unknown_name_message(f"value of {variable.name}", value, numbers))
         return int(number)
     if variable.type == "Boolean":
@@ -79,7 +79,7 @@ def convert_number(variable: Any, value: Any) -> float | int:
         )
         text = getattr(value, "text", "")
         value = int(text) if text.lstrip("+-").isdecimal() else value  # a float holds 53 bits only
-    in_range = is_number(value) and (low is None or low <= value) and (high is None or value <= high)
+    in_range = FINITE.accepts(value) and (low is None or low <= value) and (high is None or value <= high)
     if not in_range or (is_integer and not float(value).is_integer()):
         bounds = [f"{word} {limit!r}" for word, limit in (("at least", low), ("at most", high)) if limit is not None]
         allowed = " and ".join(bounds) + (f" {variable_unit(variable)}" if variable_unit(variable) else "")

@@ -2,24 +2,30 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+from ..arguments import NAMES, POSITIVE, Rule, increasing_row, whole
 from .roles import find_roles
-from .schema import FLAG, NAMES, NUMBER, POSITIVE, TABLE, TEXT, TIMES, Constraint, field_names, is_whole, parse_table
+from .schema import TABLE, field_names, parse_table
 
 DEFAULT_EQUAL_STEPS = 4096  # communication steps of a run that sets neither `grid` nor `follow`
 DEFAULT_TOLERANCE = 1e-6
 MAX_REPEATS = 1000
-NATURAL_NUMBER = Constraint(lambda value: is_whole(value, 0, inf), "a whole number of at least 0")
-REPEAT_COUNT = Constraint(lambda value: is_whole(value, 1, MAX_REPEATS), f"a whole number from 1 to {MAX_REPEATS}")
 if TYPE_CHECKING:
     import numpy as np
 
     Numbers = tuple[float, ...] | np.ndarray
 else:
-    Numbers = tuple[Annotated[float, NUMBER], ...]  # in files; importing numpy would take time in every command
+    Numbers = tuple[float, ...]  # in files; importing numpy would take time in every command
+
+
+def increasing_times(value: Any) -> tuple[float, ...]:
+    """Return increasing finite numbers, or none."""
+    return tuple(increasing_row(value).tolist()) if value != [] else ()
+
+
+TIMES = Rule("a list of increasing finite numbers", increasing_times)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,17 +66,17 @@ class RunOptions:
     """
 
     inputs: Mapping[str, Numbers] = field(default_factory=dict)
-    start: Annotated[float | None, NUMBER] = None
-    stop: Annotated[float | None, NUMBER] = None
+    start: float | None = None
+    stop: float | None = None
     grid: Annotated[float | None, POSITIVE] = None
     times: Annotated[Numbers, TIMES] = ()
-    equal_steps: Annotated[int, NATURAL_NUMBER] = 0
+    equal_steps: int = 0
     interval: Annotated[float | None, POSITIVE] = None
-    follow: Annotated[bool, FLAG] = True
-    repeat: Annotated[int, REPEAT_COUNT] = 1
+    follow: bool = True
+    repeat: Annotated[int, whole(1, MAX_REPEATS)] = 1
     tolerance: Annotated[float | None, POSITIVE] = None
-    exchange: Annotated[bool, FLAG] = False
-    lenient: Annotated[bool, FLAG] = False
+    exchange: bool = False
+    lenient: bool = False
     timeout: Annotated[float, POSITIVE] = 60.0
 
     @property
@@ -88,7 +94,7 @@ class RunSpec(RunOptions):
 
     Attributes
     ----------
-    fmu : Annotated[Path, TEXT]
+    fmu : pathlib.Path
         Path of the FMU.
     outputs : tuple of str
         Outputs to record.
@@ -96,7 +102,7 @@ class RunSpec(RunOptions):
         Values to set by variable name; enumerations by label or number.
     """
 
-    fmu: Annotated[Path, TEXT]
+    fmu: Path
     outputs: Annotated[tuple[str, ...], NAMES] = ()
     values: Annotated[dict[str, Any], TABLE] = field(default_factory=dict)
 

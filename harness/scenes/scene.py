@@ -39,23 +39,12 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any
 
+from ..arguments import NAMES, POSITIVE, TEXT, Rule, above_zero, choice, real, text, whole
 from ..errors import SceneError, check_names, format_value, unknown_name_message, unknown_source_message
 from .fmu_files import find_fmu
 from .roles import ROLES, find_roles
-from .run_spec import DEFAULT_EQUAL_STEPS, NATURAL_NUMBER, SCENE_KEYS, RunSpec
-from .schema import (
-    NAMES,
-    POSITIVE,
-    TEXT,
-    TITLE,
-    Constraint,
-    field_names,
-    is_number,
-    is_text,
-    is_whole,
-    parse_table,
-    read_toml,
-)
+from .run_spec import DEFAULT_EQUAL_STEPS, SCENE_KEYS, RunSpec
+from .schema import TITLE, field_names, parse_table, read_toml
 
 SHIPPED = Path(__file__).parent
 MAX_DEFAULT_PLOTS = 6  # time plots by default
@@ -78,28 +67,34 @@ PLOTS: dict[str, tuple[str, ...]] = {
 }
 
 
-def is_known_value(value: Any) -> bool:
-    """Return whether a value is a number, [number, "unit"] or a text."""
-    pair = isinstance(value, list) and len(value) == 2 and is_number(value[0]) and is_text(value[1])
-    return pair or is_number(value) or is_text(value)
+def known_value(value: Any) -> float | tuple[float, str] | str:
+    """Return a number, a pair of a number and a unit, or a text."""
+    if isinstance(value, list):
+        number, unit = value
+        return real(number), text(unit)
+    return text(value) if isinstance(value, str) else real(value)
+
+
+def cycle_count(value: Any) -> float:
+    """Return a number above 0 that is whole or half."""
+    if (2.0 * above_zero(value)) % 1:
+        raise ValueError
+    return float(value)
 
 
 KINDS = ("published", "reference", "parameter")  # of known values, by the name of their table
 LAST_YEAR = 9999  # of a publication
-YEAR = Constraint(lambda value: is_whole(value, 1, LAST_YEAR), "a year")
-DECAY_RESULT = Constraint(lambda value: value in ("zeta", "f", "T_f"), "'zeta', 'f' or 'T_f'")
-CYCLE_COUNT = Constraint(
-    lambda value: POSITIVE.accepts(value) and (2.0 * value) % 1 == 0, "a whole or half number above 0"
-)
-KNOWN_VALUE = Constraint(is_known_value, "a number, [number, 'unit'] or a text")
+DECAY_QUANTITIES = ("zeta", "f", "T_f")
+CYCLE_COUNT = Rule("a whole or half number above 0", cycle_count)
+KNOWN_VALUE = Rule("a number, [number, 'unit'] or a text", known_value)
 
 
 @dataclass(frozen=True)
 class DecayOptions:
     """Table [decay]: the quantity to compute, the number of peaks to skip, and the cycles to use (None for all)."""
 
-    gives: Annotated[str | None, DECAY_RESULT] = None
-    first: Annotated[int, NATURAL_NUMBER] = 0
+    gives: Annotated[str | None, choice("value of decay.gives", DECAY_QUANTITIES)] = None
+    first: int = 0
     cycles: Annotated[float | None, CYCLE_COUNT] = None
 
 
@@ -109,7 +104,7 @@ class Citation:
 
     author: Annotated[str, TITLE]
     title: Annotated[str, TITLE]
-    year: Annotated[int, YEAR]
+    year: Annotated[int, whole(1, LAST_YEAR)]
     location: Annotated[str, TITLE]
 
     def __str__(self) -> str:
@@ -303,7 +298,7 @@ def find_known_values(keys: SceneKeys) -> KnownValues | None:
         return None
     ((name, table),) = tables.items()
     source, values = table.get("source", ""), {name: value for name, value in table.items() if name != "source"}
-    if name != "parameter" and not is_text(source):
+    if name != "parameter" and not TEXT.accepts(source):
         raise SceneError(f"[{name}] needs a source, as in source = 'MATLAB ode23'")
     return KnownValues(name, source, values, keys.citation)
 

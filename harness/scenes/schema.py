@@ -1,18 +1,17 @@
 """Validation of TOML files: converts a table to a dataclass, or reports the first error in one sentence.
 
-The dataclass is the schema. Types carry constraints, as in `Annotated[float, POSITIVE]`.
+The dataclass is the schema. Types may carry a rule of `harness.arguments`, as in `Annotated[float, POSITIVE]`.
 """
 
 import tomllib
-from collections.abc import Callable, Mapping
-from dataclasses import MISSING, dataclass, fields, is_dataclass
+from collections.abc import Mapping
+from dataclasses import MISSING, fields, is_dataclass
 from functools import cache
-from itertools import pairwise
-from math import isfinite
 from pathlib import Path
 from types import NoneType
 from typing import Any, TypeVar, get_args, get_origin, get_type_hints
 
+from ..arguments import FINITE, FLAG, NATURAL, Rule, path, text
 from ..errors import SceneError, format_value, unknown_name_message
 
 LIST_HINT = "`friction-fmus list` lists the available scenes"
@@ -21,64 +20,45 @@ MAX_FILE_BYTES = 1_000_000  # bytes
 Schema = TypeVar("Schema")
 
 
-@dataclass(frozen=True)
-class Constraint:
-    """Condition for a value, and its description."""
-
-    accepts: Callable[[Any], bool]
-    description: str
-
-
-def is_text(value: object) -> bool:
-    """Return whether a value is a non-empty string."""
-    return isinstance(value, str) and bool(value)
+def title(value: Any) -> str:
+    """Return a text of a single line and of limited length."""
+    if len(text(value)) > MAX_TITLE_LENGTH or value.splitlines() != [value]:
+        raise ValueError
+    return str(value)
 
 
-def is_title(value: object) -> bool:
-    """Return whether a value is a single line of limited length."""
-    text = str(value)
-    return is_text(value) and len(text) <= MAX_TITLE_LENGTH and text.splitlines() == [text] and "\0" not in text
+def string(value: Any) -> str:
+    """Return a text, which may be empty."""
+    if not isinstance(value, str):
+        raise TypeError
+    return value
 
 
-def is_number(value: object) -> bool:
-    """Return whether a value is a finite number."""
-    try:
-        return isinstance(value, int | float) and not isinstance(value, bool) and isfinite(value)
-    except OverflowError:  # an integer beyond the range of floats
-        return False
+def table(value: Any) -> dict[str, Any]:
+    """Return a table."""
+    if not isinstance(value, dict):
+        raise TypeError
+    return value
 
 
-def is_whole(value: object, minimum: float, maximum: float) -> bool:
-    """Return whether a value is an integer within limits."""
-    return isinstance(value, int) and not isinstance(value, bool) and minimum <= value <= maximum
+def array(value: Any) -> list[Any]:
+    """Return an array of TOML or JSON."""
+    if not isinstance(value, list):
+        raise TypeError
+    return value
 
 
-def is_names(value: object) -> bool:
-    """Return whether a value is a list of distinct non-empty strings."""
-    return isinstance(value, list) and all(map(is_text, value)) and len(set(value)) == len(value)
+def file_path(value: Any) -> Path:
+    """Return a path."""
+    return Path(path(value))
 
 
-def is_increasing(value: object) -> bool:
-    """Return whether a value is a list of increasing finite numbers."""
-    return isinstance(value, list) and all(map(is_number, value)) and all(a < b for a, b in pairwise(value))
-
-
-TITLE = Constraint(is_title, f"a text of one line and at most {MAX_TITLE_LENGTH} characters")
-TEXT = Constraint(is_text, "a text")
-NUMBER = Constraint(is_number, "a finite number")
-POSITIVE = Constraint(lambda value: is_number(value) and value > 0, "a finite number above 0")
-NAMES = Constraint(is_names, "a list of distinct names")
-TIMES = Constraint(is_increasing, "a list of increasing finite numbers")
-FLAG = Constraint(lambda value: isinstance(value, bool), "true or false")
-TABLE = Constraint(lambda value: isinstance(value, dict), "a table")
-LIST = Constraint(lambda value: isinstance(value, list), "a list")
-
-PLAIN = {  # constraints of types without any
-    str: Constraint(lambda value: isinstance(value, str), "a text"),
-    bool: FLAG,
-    int: Constraint(lambda value: isinstance(value, int) and not isinstance(value, bool), "a whole number"),
-    float: NUMBER,
-}
+TITLE = Rule(f"a text of one line and at most {MAX_TITLE_LENGTH} characters", title)
+STRING = Rule("a text", string)
+TABLE = Rule("a table", table)
+ARRAY = Rule("a list", array)
+FILE_PATH = Rule("a path", file_path)
+PLAIN = {str: STRING, bool: FLAG, int: NATURAL, float: FINITE, Path: FILE_PATH}  # rules of types that state none
 
 Faults = list[tuple[int, str]]  # rank and message
 
@@ -97,15 +77,16 @@ def convert(value: Any, annotation: Any, path: str, faults: Faults) -> Any:
 
     What is wrong is added to `faults`. Rank 0, an unknown key, is the most helpful.
     """
-    constraint, origin, arguments = find_constraint(annotation), get_origin(annotation), get_args(annotation)
-    if constraint is None and NoneType in arguments:
+    origin, arguments = get_origin(annotation), get_args(annotation)
+    if NoneType in arguments:
         (required,) = (one for one in arguments if one is not NoneType)
         return None if value is None else convert(value, required, path, faults)
-    if constraint is None:
-        is_table = is_dataclass(annotation) or origin in (dict, Mapping)
-        constraint = TABLE if is_table else LIST if origin is tuple else PLAIN[annotation]
-    if not constraint.accepts(value):
-        faults.append((1, f"{path} = {format_value(value)} is not {constraint.description}"))
+    is_table = is_dataclass(annotation) or origin in (dict, Mapping)
+    rule = find_rule(annotation) or (TABLE if is_table else ARRAY if origin is tuple else PLAIN[annotation])
+    try:
+        value = rule.check(path, value)
+    except SceneError as error:
+        faults.append((1, str(error)))
         return None
     if is_dataclass(annotation):
         return convert_table(value, annotation, path, faults)
@@ -113,11 +94,7 @@ def convert(value: Any, annotation: Any, path: str, faults: Faults) -> Any:
         return {key: convert(item, arguments[1], join_key_path(path, key), faults) for key, item in value.items()}
     if origin is tuple:
         return tuple(convert(item, arguments[0], join_key_path(path, i), faults) for i, item in enumerate(value))
-    if Path in arguments:
-        return Path(value)
-    if annotation is float:
-        return float(value)
-    return tuple(value) if isinstance(value, list) else value
+    return value
 
 
 def convert_table(table: Mapping[str, Any], schema: Any, path: str, faults: Faults) -> Any:
@@ -142,7 +119,7 @@ def convert_table(table: Mapping[str, Any], schema: Any, path: str, faults: Faul
     try:
         return schema(**values)
     except ValueError as error:
-        faults.append((1, f"{path} = {error}"))
+        faults.append((1, f"{path}: {error}" if path else str(error)))
 
 
 @cache
@@ -151,9 +128,9 @@ def type_hints(schema: Any) -> dict[str, Any]:
     return get_type_hints(schema, include_extras=True)
 
 
-def find_constraint(annotation: Any) -> Constraint | None:
-    """Return the constraint of an annotated type, or None."""
-    return next((item for item in getattr(annotation, "__metadata__", ()) if isinstance(item, Constraint)), None)
+def find_rule(annotation: Any) -> Rule | None:
+    """Return the rule of an annotated type, or None."""
+    return next((item for item in getattr(annotation, "__metadata__", ()) if isinstance(item, Rule)), None)
 
 
 def field_names(schema: Any) -> list[str]:

@@ -101,9 +101,9 @@ def store_run(**changes):
     ("changes", "sentence"),
     [
         ({"fmu": None}, "the key 'fmu' is missing"),
-        ({"stop": "soon"}, "stop = 'soon' is not a finite number"),
+        ({"stop": "soon"}, "stop = 'soon' must be a finite number"),
         ({"stopp": 1.0}, "unknown key 'stopp' (nearest: 'stop')"),
-        ({"inputs": {"time": [0, "x"]}}, "inputs.time[1] = 'x' is not a finite number"),
+        ({"inputs": {"time": [0, "x"]}}, "inputs.time[1] = 'x' must be a finite number"),
     ],
 )
 def test_an_invalid_stored_specification_is_one_sentence(changes, sentence):

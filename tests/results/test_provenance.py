@@ -335,7 +335,7 @@ def test_an_edited_provenance_file_ends_a_repetition_in_one_sentence(workspace, 
     provenance = read_provenance(file.parent)
     edits = [("files", "fmus/smd.fmu", 5), ("files", "fmus/smd.fmu", "0" * 64), ("date", []), ("call", "options", 5)]
     if arguments == ("run", "smd"):
-        edits += [("scene", "title", ""), ("run", "outputs", "x"), ("scene", "name", ".."), ("run", "stop", [])]
+        edits += [("scene", "title", ""), ("run", "outputs", 5), ("scene", "name", ".."), ("run", "stop", [])]
     else:
         edits += [("call", "name", "build"), ("call", "options", {"nosuch": 1}), ("call", "options", {"fmu": [[1]]})]
         edits += [("call", "options", {"scene": "--quiet"})]  # a source, although it looks like an option

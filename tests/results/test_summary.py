@@ -21,11 +21,11 @@ REFUSED = [  # the content of summary.json, and the reason
     (text_with(version=2), "is of version 2, and this program reads version 1"),
     ('{"version": 1, "title": "a title"}', "is not valid (the key 'study' is missing)"),
     (text_with(colour="red"), "is not valid ("),
-    (text_with(sentences="one"), "is not valid (sentences = 'one' is not a list)"),
+    (text_with(sentences="one"), "is not valid (sentences = 'one' must be a list)"),
     (text_with(outcome={"value": "1", "text": "", "is_good": True, "deviation": "x"}), "is not valid (outcome"),
     (
         text_with(tables=[{"headings": ["a"], "rows": [["b", "c"]]}]),
-        "is not valid (tables[0] = a table whose rows are not as long as its headings)",
+        "is not valid (tables[0]: a row is not as long as the headings)",
     ),
     (text_with(files=["../../secret"]), "is not valid ("),
     (

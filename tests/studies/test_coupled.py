@@ -277,8 +277,8 @@ def test_an_invalid_archive_is_reported(couple, tmp_path):
         (PAIR.replace('"b"]', '"c"]'), 2, "unknown part 'c'"),
         (PAIR.replace("stop", "stopp"), 2, "unknown key 'stopp'"),
         (PAIR.replace("x0 =", "xx ="), 1, "part b (smd) has no parameter xx"),
-        (PAIR.replace("k = 40.0", "k = -1"), 2, "springs[0].k = -1 is not a finite number above 0"),
-        (PAIR.replace("k = 40.0", "k = 40.0, c = -1"), 2, "springs[0].c = -1 is not a finite number, at least 0"),
+        (PAIR.replace("k = 40.0", "k = -1"), 2, "springs[0].k = -1 must be a finite number above 0"),
+        (PAIR.replace("k = 40.0", "k = 40.0, c = -1"), 2, "springs[0].c = -1 must be a finite number of at least 0"),
         (
             PAIR.replace("springs", "connections").replace(
                 '{ between = ["a", "b"], k = 40.0 }', '{ from = "a.F_spring", to = "b", factor = 2.0 }'

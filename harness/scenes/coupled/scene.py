@@ -27,12 +27,13 @@ import re
 from collections.abc import Collection
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
+from ...arguments import NONNEGATIVE, POSITIVE, TEXT, Rule, above_zero, items, some_names
 from ...errors import SceneError, format_value, unknown_name_message, unknown_source_message
 from ..fmu_files import find_fmu
 from ..run_spec import RunSpec
-from ..schema import NUMBER, POSITIVE, TEXT, TITLE, Constraint, is_names, is_number, parse_table, read_toml
+from ..schema import TITLE, parse_table, read_toml
 
 FOLDER = Path(__file__).parent
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
@@ -41,12 +42,21 @@ MODEL_FILES = (".fmu", ".py")
 SOURCES = ("x", "v", "F_spring")  # outputs that can be connected
 
 
-NOT_NEGATIVE = Constraint(lambda value: is_number(value) and value >= 0, "a finite number, at least 0")
-PAIR = Constraint(lambda value: is_names(value) and len(value) == 2, "a list of two distinct names")
-STEPS = Constraint(
-    lambda value: isinstance(value, list) and bool(value) and all(map(POSITIVE.accepts, value)),
-    "a list of finite numbers above 0",
-)
+def pair(value: Any) -> tuple[str, str]:
+    """Return two distinct names."""
+    first, second = some_names(value)
+    return first, second
+
+
+def steps(value: Any) -> tuple[float, ...]:
+    """Return at least one number above 0."""
+    if not items(value):
+        raise ValueError
+    return tuple(map(above_zero, items(value)))
+
+
+PAIR = Rule("a list of two distinct names", pair)
+STEPS = Rule("a list of finite numbers above 0", steps)
 
 
 @dataclass(frozen=True)
@@ -54,7 +64,7 @@ class PartKeys:
     """A table in [parts]."""
 
     model: Annotated[str, TEXT]
-    values: dict[str, Annotated[float, NUMBER]] = field(default_factory=dict)
+    values: dict[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -63,7 +73,7 @@ class SpringKeys:
 
     between: Annotated[tuple[str, str], PAIR]
     k: Annotated[float, POSITIVE]
-    c: Annotated[float, NOT_NEGATIVE] = 0.0
+    c: Annotated[float, NONNEGATIVE] = 0.0
 
 
 @dataclass(frozen=True)
@@ -72,7 +82,7 @@ class ConnectionKeys:
 
     from_: Annotated[str, TEXT]
     to: Annotated[str, TEXT]
-    factor: Annotated[float, NUMBER] = 1.0
+    factor: float = 1.0
 
 
 @dataclass(frozen=True)
