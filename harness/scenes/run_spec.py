@@ -5,9 +5,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from ..arguments import NAMES, POSITIVE, Rule, increasing_row, whole
+from ..arguments import NAMES, POSITIVE, SETTINGS, Rule, increasing_row, whole
 from .roles import find_roles
-from .schema import TABLE, field_names, parse_table
+from .schema import field_names, parse_table
 
 DEFAULT_EQUAL_STEPS = 4096  # communication steps of a run that sets neither `grid` nor `follow`
 DEFAULT_TOLERANCE = 1e-6
@@ -104,7 +104,7 @@ class RunSpec(RunOptions):
 
     fmu: Path
     outputs: Annotated[tuple[str, ...], NAMES] = ()
-    values: Annotated[dict[str, Any], TABLE] = field(default_factory=dict)
+    values: Annotated[dict[str, Any], SETTINGS] = field(default_factory=dict)
 
     @classmethod
     def from_json(cls, stored: Mapping[str, Any]) -> "RunSpec":
