@@ -106,13 +106,20 @@ def fresh_worker():
 
 
 @pytest.fixture(scope="session")
-def browser():
+def browser_process():
     """A browser with the size of a screen."""
     if CHROMIUM is None:
         pytest.skip("there is no chromium here")
     browser = Browser()
     yield browser
     browser.close()
+
+
+@pytest.fixture(scope="module")
+def browser(browser_process):
+    """The same browser, which shows an empty page after a module: an animation takes half a core."""
+    yield browser_process
+    browser_process.open("about:blank")
 
 
 @pytest.fixture(scope="session")

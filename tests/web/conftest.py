@@ -4,7 +4,7 @@ import pytest
 import web_page
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def page_in_browser(browser):
     return web_page.Page(browser, web_page.build_page("web"))
 
