@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import MISSING, fields, is_dataclass
 from inspect import cleandoc
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any, get_args, get_origin
 
 DOCS = Path(__file__).parent
 PART = re.compile(r"(<!-- generated: ([\w-]+) -->\n).*?(<!-- end -->)", re.S)
@@ -170,10 +170,16 @@ def declaration_options() -> str:
     return format_table(("option", "value", "meaning"), rows)
 
 
-def constraints(annotation: Any) -> list[str]:
-    """Return the constraints of a type as texts, which its annotations contain."""
-    markers = getattr(annotation, "__metadata__", ())
-    return [text for marker in markers for text in vars(marker).values() if isinstance(text, str)]
+def describe_values(annotation: Any) -> str:
+    """Return what a value of a type must be, and what each value of its table must be."""
+    from harness.scenes.schema import ARRAY, find_rule
+
+    rule = find_rule(annotation)
+    if rule is ARRAY:
+        return "a list of tables"
+    if get_origin(annotation) is dict and not is_dataclass(get_args(annotation)[1]):
+        return f"{rule.text}; each value is {find_rule(get_args(annotation)[1]).text}"
+    return rule.text
 
 
 def schema_within(schema: Any, key: str) -> Any:
@@ -188,12 +194,6 @@ def keys(texts: dict[str, str], *schemas: Any) -> str:
     rows = []
     for name, text in texts.items():
         field = declared[name]
-        constraint = next(iter(constraints(field.type)), "a table")
-        item_constraints = [text for part in get_args(field.type) for text in constraints(part)]
-        if constraint == "a table" and item_constraints:
-            constraint = f"a table; each value is {item_constraints[0]}"
-        if constraint == "a table" and str(field.type).startswith("tuple"):
-            constraint = "a list of tables"
         is_required = field.default is MISSING and field.default_factory is MISSING
         default = field.default
         if is_required:
@@ -202,7 +202,7 @@ def keys(texts: dict[str, str], *schemas: Any) -> str:
             default_text = ""
         else:
             default_text = f"`{str(default).lower() if isinstance(default, bool) else default}`"
-        rows.append((f"`{name}`", constraint, default_text, text))
+        rows.append((f"`{name}`", describe_values(field.type), default_text, text))
     return format_table(("key", "value", "default", "meaning"), rows)
 
 

@@ -229,7 +229,7 @@ def names_with(entry: Rule, values: str, default: Callable[[str], Any]) -> Rule:
             return dict(of_mapping.convert(value))
         return {name: default(name) for name in names(value)}
 
-    return Rule(f"a name, a sequence of names, or {of_mapping.text}", convert)
+    return Rule(f"a name, a list of names, or {of_mapping.text}", convert)
 
 
 def to_array(value: Any) -> "np.ndarray":
@@ -314,10 +314,10 @@ POSITIVE = Rule("a finite number above 0", above_zero, float, "x>0")
 NONNEGATIVE = Rule("a finite number of at least 0", at_least_zero, float, "x>=0")
 COUNT, NATURAL = whole(1), whole(0)
 WORKERS, RUNS = whole(1, MAX_WORKERS), whole(1, MAX_RUNS)
-FLAG = Rule("True or False", flag)
+FLAG = Rule("true or false", flag)
 TEXT = Rule("a text that is not empty", text)
-NAMES = Rule("a name, or a sequence of names", names)
-SOME_NAMES = Rule("a name, or a sequence of names that is not empty", some_names)
+NAMES = Rule("a name, or a list of names", names)
+SOME_NAMES = Rule("a name, or a list of names that is not empty", some_names)
 INCREASING_ROW = Rule("a row of finite numbers, at least one, which increase", increasing_row)
 PATH = Rule("a name or a path", path)
 PATHS = Rule("a name, a path, or a sequence of these", paths)

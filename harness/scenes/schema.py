@@ -81,10 +81,8 @@ def convert(value: Any, annotation: Any, path: str, faults: Faults) -> Any:
     if NoneType in arguments:
         (required,) = (one for one in arguments if one is not NoneType)
         return None if value is None else convert(value, required, path, faults)
-    is_table = is_dataclass(annotation) or origin in (dict, Mapping)
-    rule = find_rule(annotation) or (TABLE if is_table else ARRAY if origin is tuple else PLAIN[annotation])
     try:
-        value = rule.check(path, value)
+        value = find_rule(annotation).check(path, value)
     except SceneError as error:
         faults.append((1, str(error)))
         return None
@@ -128,9 +126,16 @@ def type_hints(schema: Any) -> dict[str, Any]:
     return get_type_hints(schema, include_extras=True)
 
 
-def find_rule(annotation: Any) -> Rule | None:
-    """Return the rule of an annotated type, or None."""
-    return next((item for item in getattr(annotation, "__metadata__", ()) if isinstance(item, Rule)), None)
+def find_rule(annotation: Any) -> Rule:
+    """Return the rule of a type, which it is annotated with or which follows from it; None is not considered."""
+    if stated := [item for item in getattr(annotation, "__metadata__", ()) if isinstance(item, Rule)]:
+        return stated[0]
+    origin, arguments = get_origin(annotation), get_args(annotation)
+    if NoneType in arguments:
+        return find_rule(*(one for one in arguments if one is not NoneType))
+    if is_dataclass(annotation) or origin in (dict, Mapping):
+        return TABLE
+    return ARRAY if origin is tuple else PLAIN[annotation]
 
 
 def field_names(schema: Any) -> list[str]:

@@ -229,7 +229,7 @@ def test_the_grid_does_not_change_the_solver_steps(scene):
         ),
         (BASE + 'law = "sgn"', 2, "unknown value of friction 'sgn'; allowed: hybrid, threshold"),
         (BASE.replace("stickslip", "smd") + 'law = "sign"', 2, "law = 'sign': smd has no such choice"),
-        (BASE + "stop = -1", 2, "stop = -1 s is not after start = 0.0 s"),
+        (BASE + "stop = -1", 2, "stop = -1.0 s is not after start = 0.0 s"),
         (BASE + "[values]\nmu_d = 0.95", 1, "mu_d is 0.95, above mu_s = 0.9"),
         (BASE + 'law = "threshold"\nmethod = "exact"', 1, "closed form"),
         (
@@ -241,7 +241,7 @@ def test_the_grid_does_not_change_the_solver_steps(scene):
         (
             BASE + "analyses = ['slip']\n[parameter]\nperiod = 3",
             2,
-            "period = 3 in [parameter] is not what the run sets",
+            "period = 3.0 in [parameter] is not what the run sets",
         ),
         (BASE.replace("model", "fmu"), 1, "there is no "),
     ],

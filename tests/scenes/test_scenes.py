@@ -90,7 +90,7 @@ def test_a_scene_may_show_nothing(workspace):
         ({"outputs": None}, "outputs is empty"),
         ({"equal_steps": "10"}, "unknown key 'equal_steps'"),
         ({"method": "'ode23'", "extra": "[values]\n'solver.method' = 'ode45'"}, "solver.method is set twice"),
-        ({"outputs": "[1]"}, "outputs = [1] must be a name, or a sequence of names"),
+        ({"outputs": "[1]"}, "outputs = [1] must be a name, or a list of names"),
         ({"stop": '"soon"'}, "stop = 'soon' must be a finite number"),
         ({"stop": "inf"}, "stop = inf must be a finite number"),
         ({"rtol": "0"}, "rtol = 0 must be a finite number above 0"),
