@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from .errors import HarnessError
+from .errors import COMMAND_LINE, HarnessError
 from .process.interrupt import interruptible
 
 if TYPE_CHECKING:  # imported below, where signals are handled
@@ -55,6 +55,7 @@ def run_command(load: "Callable[[], click.Command]", name: str) -> None:
 
 def run_arguments(command: "click.Command", name: str, arguments: list[str]) -> None:
     """Run a command with these arguments; `name` is the one by which the user called it."""
+    COMMAND_LINE.set(True)
     try:
         with command.make_context(name, arguments) as context:
             command.invoke(context)

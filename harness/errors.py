@@ -1,6 +1,8 @@
 """Exceptions with an exit status, and texts of error messages."""
 
-from collections.abc import Collection, Iterable
+import shlex
+from collections.abc import Collection, Iterable, Mapping
+from contextvars import ContextVar
 from difflib import get_close_matches
 from importlib import import_module
 from os.path import basename, exists, splitext
@@ -8,6 +10,10 @@ from typing import Any
 
 MAX_VALUE_LENGTH = 100  # characters of a value in a message
 MAX_LISTED_NAMES = 100  # names listed in a message
+COMMAND_LINE = ContextVar("command_line", default=False)  # whether a command runs, whose options messages name
+OPTIONS = {"values": "set", "folder": "out"}  # by the argument, where the names differ
+FUNCTIONS = {"curve": "identify_curve", "decay": "identify_decay"}  # by the command, where the names differ
+OF_READ_RECORD = ("headings", "per_count", "time_unit")  # arguments that no other function of the Python API has
 
 
 class HarnessError(Exception):
@@ -80,6 +86,40 @@ def check_names(category: str, names: Iterable[str], allowed: Collection[str]) -
     for name in names:
         if name not in allowed:
             raise SceneError(unknown_name_message(category, name, allowed))
+
+
+def option_text(name: str, value: object = None) -> str:
+    """Return an option as the user writes it: as in `--rate 100` for a command, or `rate=100` for the Python API.
+
+    Parameters
+    ----------
+    name : str
+        Name of the argument of the Python API.
+    value : object
+        Its value: a number, a text, True for a flag, names, or a mapping to headings or ranges; by default only the
+        option is named.
+    """
+    if not COMMAND_LINE.get():
+        text = f"`{name}`" if value is None else f"{name}={value!r}"
+        return f"{text} of read_record" if name in OF_READ_RECORD else text
+    text = f"--{OPTIONS.get(name, name).replace('_', '-')}"
+    if value is None or value is True:
+        return text
+    if isinstance(value, Mapping):
+        ranges = {key: "{:g}:{:g}".format(*item) if isinstance(item, tuple) else item for key, item in value.items()}
+        value = [f"{key}={item}" for key, item in ranges.items()]
+    return f"{text} {shlex.quote(','.join(value) if isinstance(value, list) else str(value))}"
+
+
+def by_interface(command: str, python: str) -> str:
+    """Return the first text while a command runs, and the second one otherwise, in the Python API."""
+    return command if COMMAND_LINE.get() else python
+
+
+def command_text(name: str, model: str = "") -> str:
+    """Return a command, or the function of the Python API that does the same; `model` is its first argument."""
+    function = f"harness.{FUNCTIONS.get(name, name)}"
+    return by_interface(f"friction-fmus {name} {model}".rstrip(), f"{function}({model!r}, ...)" if model else function)
 
 
 def install_command(extra: str) -> str:

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from ..arguments import QUANTITIES
-from ..errors import SceneError, unknown_name_message
+from ..errors import SceneError, command_text, option_text, unknown_name_message
 from .headings import DATE_NAME, FORCE_NAME, MAGNITUDE_NAME, TIME_NAME, order_from_name, split_heading
 from .record import Record, check_record
 from .samples import (
@@ -33,7 +33,7 @@ MAX_PLAUSIBLE_TIME = 1e11  # s: the year 5138
 EXPONENT = re.compile("[dD](?=[-+0-9])")  # Fortran
 MAX_MISSING_SHARE = 0.2  # share of the samples
 NO_UNIT = "units"  # of a position without a unit
-EXAMPLE_UNITS = ("mm or deg", "mm/s or deg/s", "m/s2 or g")  # by the order of the derivative
+EXAMPLE_UNITS = (("mm", "deg"), ("mm/s", "deg/s"), ("m/s2", "g"))  # by the order of the derivative
 RATE_SUFFIXES = ("", "/s", "/s2")  # appended to the unit of the position
 
 
@@ -131,7 +131,9 @@ def parse_record(table: Table, columns: ColumnOptions, name: str) -> Record:
     if not any(table.column_headings) and len(candidates) > 1:
         times = "" if time_column is None or interval else f"{time_column.heading} is used as time in s and "
         notes.insert(
-            0, f"The file has no headings: {times}{motion_column.heading} is the signal; --headings names them."
+            0,
+            f"The file has no headings: {times}{motion_column.heading} is the signal; "
+            f"{option_text('headings')} names them.",
         )
     elif time_column is not None and columns.time is None:
         notes += describe_further_runs(candidates, time_column, motion_column)
@@ -140,7 +142,7 @@ def parse_record(table: Table, columns: ColumnOptions, name: str) -> Record:
     others = [column.heading for column in candidates if column not in (time_column, motion_column)]
     if others and columns.position is None and len(np.unique(x[np.isfinite(x)])) == 1:
         raise SceneError(
-            f"{table.name}: {motion_column.heading} does not move; select another column by --column: "
+            f"{table.name}: {motion_column.heading} does not move; select another column by {option_text('column')}: "
             f"{', '.join(others)}"
         )
     order, base, size, assumption = resolve_unit(label, unit, columns, table.name)
@@ -149,7 +151,7 @@ def parse_record(table: Table, columns: ColumnOptions, name: str) -> Record:
     else:
         t, time_label = read_times(table, time_column, columns), time_column.heading
         if columns.time is None and any(table.column_headings) and not is_time_column(time_column):
-            notes.append(f"{time_column.heading} is used as time; --time selects another column.")
+            notes.append(f"{time_column.heading} is used as time; {option_text('time')} selects another column.")
     is_complete, gaps = find_complete_rows(t, x, (time_label, label), table.name)
     t, rounding = undo_time_rounding(t[: len(is_complete)])
     notes += filter(None, (*gaps, rounding, assumption))
@@ -217,7 +219,7 @@ def refuse_friction_curve(table: Table, candidates: Sequence[Column], time_colum
     if velocity and force:
         raise SceneError(
             f"{table.name} has no times but a force over a velocity, {force.heading} over {velocity.heading}, and is "
-            "no decay: use friction-fmus curve, or name the column of times, as in --time t"
+            f"no decay: use {command_text('curve')}, or name the column of times, as in {option_text('time', 't')}"
         )
 
 
@@ -227,16 +229,17 @@ def no_time_message(table: Table) -> str:
     if len(table.column_headings) == 1:
         return (
             f"{table.name} has one column of numbers{f', {names},' if names else ''} and no times: set the sampling "
-            "rate in Hz, as in --rate 100"
+            f"rate in Hz, as in {option_text('rate', 100)}"
         )
     if not names:
         return (
-            f"{table.name} has no heading; give the names of its columns, as in --headings 't [s],x [mm]', or the "
-            "sampling rate in Hz, as in --rate 100"
+            f"{table.name} has no heading; give the names of its columns, as in "
+            f"{option_text('headings', 't [s],x [mm]')}, or the sampling rate in Hz, as in {option_text('rate', 100)}"
         )
     return (
-        f"{table.name} has no column of times (it has {names}): name it, as in --time {table.column_headings[0]!r}, or "
-        "set the sampling rate in Hz, as in --rate 100"
+        f"{table.name} has no column of times (it has {names}): name it, as in "
+        f"{option_text('time', table.column_headings[0])}, or set the sampling rate in Hz, as in "
+        f"{option_text('rate', 100)}"
     )
 
 
@@ -325,7 +328,8 @@ def describe_further_runs(candidates: Sequence[Column], time_column: Column, mot
     selected = next(part for part, _ in runs if part is not time_column)
     return [
         f"The table has {len(others) + 1} runs side by side: {time_column.heading} with {motion_column.heading} is "
-        f"used, and {', '.join(others)} is not; --time '{selected.heading}' selects another."
+        f"used, and {', '.join(others)} is not; {option_text('time', selected.heading)} selects "
+        "another."
     ]
 
 
@@ -358,7 +362,9 @@ def find_signal_column(
     deviations = [np.nanstd(parse_numbers(table, part.index, strict=False)) for part in same_unit]
     most_varying = same_unit[int(np.argmax(deviations))]
     names = ", ".join(part.heading for part in same_unit)
-    note = f"Of {names}, {most_varying.heading} is used, because it varies most; --column selects another."
+    note = (
+        f"Of {names}, {most_varying.heading} is used, because it varies most; {option_text('column')} selects another."
+    )
     return most_varying, [note]
 
 
@@ -366,39 +372,39 @@ def resolve_unit(name: str, unit: str | None, columns: ColumnOptions, file: str)
     """Return the order, base unit and SI factor of a column, and a note on an assumption."""
     requested = None if columns.quantity is None else QUANTITIES.index(columns.quantity)
     order_of_name, size = order_from_name(name), 1.0
+    assumption = f"is assumed to be a position; {option_text('quantity', 'velocity')} or acceleration overrides this."
     if columns.per_count is not None:
         size, unit = parse_per_count(columns.per_count)
     if unit is None:
         order = requested if requested is not None else order_of_name or 0
+        example, alternative = EXAMPLE_UNITS[order]
         note = (
             f"{name} has no unit in {file}: omega and zeta need none, the other values are in its own units, and "
-            f"forces are left out; set it, as in --unit {EXAMPLE_UNITS[order]}."
+            f"forces are left out; set it, as in {option_text('unit', example)} or {alternative}."
         )
         if requested is None and order_of_name is None:
-            note += f" {name} is assumed to be a position; --quantity velocity or acceleration overrides this."
+            note += f" {name} {assumption}"
         return order, NO_UNIT, size, note
     if unit.lower() in COUNT_NAMES:
-        raise SceneError(f"{name} is in {unit}; set the size of one count, as in --per-count 0.36deg or 0.001mm")
+        example = option_text("per_count", "0.36deg")
+        raise SceneError(f"{name} is in {unit}; set the size of one count, as in {example}")
     known_unit = find_unit(unit)
     if known_unit is None:
         indicated = next((order for order in (requested, order_of_name) if order is not None), None)
         order, rate = indicated or 0, RATE_SUFFIXES[indicated or 0]
         base = unit.removesuffix(rate) if unit.endswith(rate) else f"{unit}.s{order if order > 1 else ''}"
-        assumption = (
-            f"{name} in {unit} is assumed to be a position; --quantity velocity or acceleration overrides this."
-        )
-        return order, base, 1.0, assumption if indicated is None else ""
+        return order, base, 1.0, f"{name} in {unit} {assumption}" if indicated is None else ""
     order = known_unit.order if requested is None else requested
     if requested is not None and requested != known_unit.order:
         raise SceneError(
-            f"--quantity {columns.quantity}: {unit}, the unit of {name}, measures "
+            f"{option_text('quantity', columns.quantity)}: {unit}, the unit of {name}, measures "
             f"{with_article(QUANTITIES[known_unit.order])}"
         )
     if order_of_name is not None and known_unit.order < order_of_name and requested is None and columns.unit is None:
         raise SceneError(
             f"{name} has the name of {with_article(QUANTITIES[order_of_name])} and the unit of "
-            f"{with_article(QUANTITIES[known_unit.order])}, {unit}: set --quantity, and --unit if "
-            "that in the file is wrong"
+            f"{with_article(QUANTITIES[known_unit.order])}, {unit}: set {option_text('quantity')}, and "
+            f"{option_text('unit')} if that in the file is wrong"
         )
     return order, known_unit.base, size * known_unit.size, ""
 
@@ -422,8 +428,9 @@ def read_times(table: Table, time_column: Column, columns: ColumnOptions) -> np.
     finite = t[np.isfinite(t)]
     if unit is None and len(finite) and ((finite == np.round(finite)).all() or finite.max() > MAX_PLAUSIBLE_TIME):
         raise SceneError(
-            f"{table.name}: {time_column.name} has integer or very large numbers and no unit: set one, as in "
-            "--time-unit ms, s, or 0.01s for sample numbers"
+            f"{table.name}: {time_column.name} has integer or very large numbers and no unit: set one in "
+            f"its heading, as in {time_column.name} [ms], or as in {option_text('time_unit', 'ms')}, or 0.01s for "
+            "sample numbers"
         )
     return t * size
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..errors import SceneError, format_value
+from ..errors import SceneError, format_value, option_text
 from .columns import (
     Column,
     ColumnOptions,
@@ -108,7 +108,8 @@ def parse_curve(table: Table, columns: CurveColumns, name: str) -> CurveRecord:
     velocity_unit, motion_size, note = resolve_motion(motion, motion_unit, is_position)
     notes += note
     if columns.constant is not None and not is_current:
-        raise SceneError(f"constant has no effect, because {force.heading} is no current: name it, as in --current i")
+        name = option_text("current", "i")
+        raise SceneError(f"constant has no effect, because {force.heading} is no current: name it, as in {name}")
     unit, force_size, note = resolve_force(force, force_unit, is_current, velocity_unit, columns.constant)
     notes += note
     x, y = (parse_numbers(table, column.index).copy() for column in (motion, force))
@@ -151,7 +152,8 @@ def check_options(columns: CurveColumns) -> None:
         if getattr(columns, one) is not None and getattr(columns, other) is not None:
             raise SceneError(f"{one} and {other} are both given: leave one of them out")
     if columns.current is not None and columns.constant is None:
-        raise SceneError("a current needs the constant of the motor, as in --constant '0.12 N.m/A'")
+        example = option_text("constant", "0.12 N.m/A")
+        raise SceneError(f"a current needs the constant of the motor, as in {example}")
     if columns.position is not None and columns.is_points:
         raise SceneError("points need a column of velocities, not of positions")
 
@@ -188,7 +190,8 @@ def find_motion(table: Table, candidates: Sequence[Column], columns: CurveColumn
             if part not in times and part.order == order and not FORCE_NAME.search(part.name):
                 return part, part.unit, order == 0
     names = ", ".join(filter(None, (part.heading for part in candidates)))
-    raise SceneError(f"{table.name} has no column of velocities (it has {names}): name it, as in --velocity v")
+    example = option_text("velocity", "v")
+    raise SceneError(f"{table.name} has no column of velocities (it has {names}): name it, as in {example}")
 
 
 def find_force(
@@ -209,7 +212,8 @@ def find_force(
             if CURRENT_NAME.search(part.name) or (part.unit and conversion_factor(part.unit, "A")):
                 return part, part.unit, True
     names = ", ".join(filter(None, (part.heading for part in candidates)))
-    raise SceneError(f"{table.name} has no column of forces (it has {names}): name it, as in --force F")
+    example = option_text("force", "F")
+    raise SceneError(f"{table.name} has no column of forces (it has {names}): name it, as in {example}")
 
 
 def resolve_motion(column: Column, unit: str | None, is_position: bool) -> tuple[str, float, list[str]]:
@@ -247,7 +251,7 @@ def resolve_force(
         raise SceneError(
             f"{column.name} is in {unit}, and {motion}: give a force with a velocity in m/s, or a torque with one in "
             "rad/s, or set the right unit, as in "
-            f"--force '{column.name} [{base}]'"
+            f"{option_text('force', f'{column.name} [{base}]')}"
         )
     return base, size, []
 

@@ -6,7 +6,7 @@ from typing import Self
 import numpy as np
 
 from ..arguments import QUANTITIES
-from ..errors import SceneError
+from ..errors import SceneError, option_text
 
 SYMBOLS = ("x", "v", "a")
 MIN_SAMPLES = 12  # samples
@@ -62,6 +62,11 @@ class Record:
         """Return the samples from `begin` to `end` in s."""
         in_range = (self.t >= begin) & (self.t <= end)
         return replace(self, t=self.t[in_range], x=self.x[in_range])
+
+
+def selection_text() -> str:
+    """Return the options that select a part of a record."""
+    return f"{option_text('begin')} and {option_text('end')}"
 
 
 def check_record(record: Record) -> None:

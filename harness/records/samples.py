@@ -12,7 +12,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from ..errors import SceneError
+from ..errors import SceneError, option_text
 from .record import Record
 
 DAY = 86400.0
@@ -219,7 +219,8 @@ def leave_out_saturated(record: Record) -> Record:
         return record
     note = (
         f"The sensor was saturated: {int(is_saturated.sum())} of {len(x)} samples, in {peaks} peaks, are exactly "
-        f"{' or '.join(levels)} {record.unit}. They are left out; --begin selects the record after them."
+        f"{' or '.join(levels)} {record.unit}. They are left out; {option_text('begin')} selects the record after "
+        "them."
     )
     return replace(record, t=record.t[~is_saturated], x=x[~is_saturated], notes=(*record.notes, note))
 

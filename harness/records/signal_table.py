@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ..errors import SceneError
+from ..errors import SceneError, option_text
 from .columns import (
     Column,
     ColumnOptions,
@@ -19,7 +19,7 @@ from .columns import (
     read_times,
 )
 from .headings import split_heading
-from .record import MIN_SAMPLES, Record, check_record
+from .record import MIN_SAMPLES, Record, check_record, selection_text
 from .samples import find_repeated_times, find_saturated, mark_dropouts, mark_sentinels, undo_time_rounding
 from .table_files import Table, load_table
 from .units import conversion_factor
@@ -104,7 +104,7 @@ def parse_signals(table: Table, sources: Mapping[str, SignalSource], options: Co
         t = read_times(table, time_column, options).copy()
         notes += mark_sentinels(t, time_column.heading)
         if options.time is None and any(table.column_headings) and not is_time_column(time_column):
-            notes.append(f"{time_column.heading} is used as time; --time selects another column.")
+            notes.append(f"{time_column.heading} is used as time; {option_text('time')} selects another column.")
         if options.time is None:
             notes += describe_further_runs(candidates, time_column, first)
     columns = {}
@@ -160,9 +160,10 @@ def unit_factor(column: Column, unit: str | None, target: str, signal: str, file
         return 1.0, [note] if target else []
     factor = conversion_factor(unit, target or "1")
     if factor is None:
+        example = option_text("observe", {signal: f"{column.name} [{target or '1'}]"})
         raise SceneError(
             f"{column.name} is in {unit}, and {signal} of the FMU in {target or '1'}: give a column of the same "
-            f"quantity, or the right unit, as in --observe '{signal}={column.name} [{target or '1'}]'"
+            f"quantity, or the right unit, as in {example}"
         )
     return factor, []
 
@@ -231,7 +232,7 @@ def check_input(table: Table, signal: str, heading: str, t: np.ndarray, x: np.nd
         row, lacking = table.line + 1 + first + int(gaps[0]), "value" if np.isfinite(t[gaps[0]]) else "time"
         raise SceneError(
             f"{table.name}: {heading}, the input {signal}, has no {lacking} in row {row}: fill the gap, or select a "
-            "part without gaps by --begin and --end"
+            f"part without gaps by {selection_text()}"
         )
     doubled = np.flatnonzero((np.diff(t) == 0) & (np.diff(x) != 0))
     if len(doubled):

@@ -15,7 +15,7 @@ from zipfile import ZipFile
 
 import numpy as np
 
-from ..errors import HarnessError, SceneError, first_line, format_value, install_command
+from ..errors import HarnessError, SceneError, first_line, format_value, install_command, option_text
 from . import array_files, text_table
 from .child_reader import read_in_child
 from .size_limits import check_mat, check_zip, unpack_gzip
@@ -89,9 +89,8 @@ def load_table(source: str, headings: str | None = None) -> Table:
         return table
     names = tuple(part.strip() for part in headings.split(","))
     if len(names) != len(table.columns):
-        raise SceneError(
-            f"--headings names {len(names)} columns, and {name} has {len(table.columns)} that are not empty"
-        )
+        names_text = f"{option_text('headings')} names {len(names)} columns"
+        raise SceneError(f"{names_text}, and {name} has {len(table.columns)} that are not empty")
     return replace(table, column_headings=names)
 
 

@@ -20,7 +20,7 @@ from pathlib import Path
 from secrets import token_hex
 from shutil import rmtree
 
-from ..errors import HarnessError
+from ..errors import HarnessError, option_text
 from ..process.interrupt import defer_signals
 from ..process.temporary_directory import create_locked_folder, lock_path
 from .provenance import FILE, load_provenance, note_replaced_result
@@ -59,7 +59,7 @@ def replace_folder(folder: Path, own_files: Sequence[str], source: str = "") -> 
     if repeated is not None and folder.absolute() != repeated.absolute():
         raise HarnessError(
             f"{repeated} names the result of another folder, {folder}: it was renamed, or its {FILE} was edited; "
-            "choose a folder by --out"
+            f"choose a folder by {option_text('folder')}"
         )
     try:
         own_files = (*own_files, DATA_FILE, FILE, SUMMARY_FILE)
@@ -69,7 +69,9 @@ def replace_folder(folder: Path, own_files: Sequence[str], source: str = "") -> 
         folder.parent.mkdir(parents=True, exist_ok=True)
         clean_up(folder, own_files)
     except OSError as error:
-        raise HarnessError(f"cannot write below {folder.parent}: {error.strerror}; choose another --out") from None
+        raise HarnessError(
+            f"cannot write below {folder.parent}: {error.strerror}; choose another {option_text('folder')}"
+        ) from None
     new_folder, resources = None, ExitStack()
     try:
         with defer_signals():
@@ -78,7 +80,9 @@ def replace_folder(folder: Path, own_files: Sequence[str], source: str = "") -> 
         note_replaced_result(folder, new_folder, own_files[0])
         swap_in(new_folder, folder)
     except OSError as error:
-        raise HarnessError(f"cannot write {folder}: {error.strerror or error}; choose another --out") from None
+        raise HarnessError(
+            f"cannot write {folder}: {error.strerror or error}; choose another {option_text('folder')}"
+        ) from None
     finally:
         with defer_signals():
             if new_folder:
@@ -92,13 +96,16 @@ def replace_folder(folder: Path, own_files: Sequence[str], source: str = "") -> 
 def check_replaceable(folder: Path, own_files: Collection[str]) -> None:
     """Raise HarnessError if `folder` is not a result."""
     if folder.is_symlink():
-        raise HarnessError(f"{folder} is a link and is not replaced; remove it or choose another --out")
+        raise HarnessError(
+            f"{folder} is a link and is not replaced; remove it or choose another {option_text('folder')}"
+        )
     if folder.exists():
         names = [file.name for file in folder.iterdir()] if folder.is_dir() else ["a file of that name"]
         other_files = sorted(set(names) - set(own_files))
         if other_files:
             raise HarnessError(
-                f"{folder} holds {other_files[0]}, which is not part of a result; move it or choose another --out"
+                f"{folder} holds {other_files[0]}, which is not part of a result; move it or choose another "
+                f"{option_text('folder')}"
             )
 
 
@@ -108,7 +115,8 @@ def check_same_source(folder: Path, source: str) -> None:
     if old.get("source", source) != source and not OVERWRITE.get():
         origin = f"`{old['command']}`" + (f", from {old['source']}" if old.get("source") else "")
         raise HarnessError(
-            f"{folder} holds the result of {origin}; choose another --out, or replace it with --overwrite"
+            f"{folder} holds the result of {origin}; choose another {option_text('folder')}, or replace it with "
+            f"{option_text('overwrite', True)}"
         )
 
 

@@ -14,8 +14,8 @@ from typing import Any
 
 from lxml import etree
 
-from ..errors import HarnessError
-from .fmu_archive import DESCRIPTION_FILE
+from ..errors import HarnessError, option_text
+from .fmu_archive import DESCRIPTION_FILE, describe_lenient
 from .fmu_instance import FmuInstance, TerminatedError, clocks_of
 from .stepping import InputSignals, TimeGrid
 
@@ -48,10 +48,10 @@ def check_clocks(description: Any, exchange: bool, lenient: bool) -> None:
     clocks = clocks_of(description)
     if not clocks or lenient:
         return
-    remedy = "to run it without their ticks, use --lenient"
+    remedy = f"to run it without their ticks, {describe_lenient()}"
     names = ", ".join(clock.name for clock in clocks)
     if not exchange and not description.coSimulation.hasEventMode:
-        other = "use --interface ModelExchange, or, " if description.modelExchange else ""
+        other = f"use {option_text('interface', 'ModelExchange')}, or, " if description.modelExchange else ""
         raise HarnessError(f"{description.modelName} has clocks ({names}), but no event mode; {other}{remedy}")
     triggered = [
         clock.name for clock in clocks if clock.causality == "input" and clock.intervalVariability == TRIGGERED

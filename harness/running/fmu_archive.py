@@ -21,7 +21,7 @@ import fmpy
 from fmpy.model_description import SimpleType, ValidationError
 from lxml import etree
 
-from ..errors import HarnessError, SceneError, first_line
+from ..errors import HarnessError, SceneError, by_interface, first_line, option_text
 from ..process.temporary_directory import has_plain_uri, temporary_directory
 from ..scenes.fmu_files import check_built
 from ..scenes.run_spec import RunSpec
@@ -79,6 +79,12 @@ def read_description(path: Path, lenient: bool = False) -> Any:
     return validate_description(path, lenient)
 
 
+def describe_lenient() -> str:
+    """Return how to run an FMU that violates the standard; the Python API has no option for it."""
+    in_scene = "lenient = true in a scene"
+    return by_interface(f"use --lenient, or {in_scene}", f"set {in_scene}")
+
+
 @cached_by_mtime
 def validate_description(path: Path, lenient: bool) -> Any:
     """Read and validate the model description of an existing file."""
@@ -94,8 +100,7 @@ def validate_description(path: Path, lenient: bool) -> Any:
         )
         count = "1 place" if len(violations) == 1 else f"{len(violations)} places"
         raise HarnessError(
-            f"{path.name} violates the FMI standard in {count}:\n- {listed}\n"
-            "to try to run it, use --lenient (run, compare) or lenient = true (in a scene)"
+            f"{path.name} violates the FMI standard in {count}:\n- {listed}\nto try to run it, {describe_lenient()}"
         ) from None
     except (AttributeError, IndexError, TypeError) as error:  # fmpy reads elements and attributes that are missing
         problem = f"its modelDescription.xml lacks a required element or the FMI version ({first_line(error)})"
@@ -235,7 +240,7 @@ def resolve_time_span(spec: RunSpec, description: Any) -> tuple[float, float]:
     if start is None:
         start = float(experiment.startTime or 0.0) if experiment else 0.0
     if stop is None:
-        raise SceneError(f"{spec.fmu.name} has no default stop time; set one, as in --stop 10")
+        raise SceneError(f"{spec.fmu.name} has no default stop time; set one, as in {option_text('stop', 10)}")
     if not stop > start:
         raise SceneError(f"stop = {stop!r} s is not after start = {start!r} s")
     return start, stop

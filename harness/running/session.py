@@ -275,8 +275,9 @@ def plan_grid(spec: RunSpec, instance: FmuInstance) -> TimeGrid:
     check_rates(spec.fmu, spec.inputs, spec.values)
     grid = make_grid(spec, start, stop)
     if (points := grid.duration / grid.h) > MAX_POINTS:
-        sentence = f"grid = {grid.h!r} s makes {points:.6g} points from {start!r} s to {stop!r} s"
-        raise SceneError(f"{sentence}; the limit is {MAX_POINTS}: choose a larger grid")
+        key, step = ("grid", grid.h) if spec.interval is None else ("interval", spec.interval)
+        sentence = f"{key} = {step!r} s makes {points:.6g} points from {start!r} s to {stop!r} s"
+        raise SceneError(f"{sentence}; the limit is {MAX_POINTS}: choose a larger {key}")
     return grid
 
 

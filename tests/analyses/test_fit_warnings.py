@@ -11,7 +11,7 @@ from harness import HarnessError, identify_decay
 
 def test_drift_is_reported_and_fitted_on_request():
     record = decay_record(0.01, 0.001, drift=0.002, noise=1e-4)
-    assert "--drift" in remarks_text(identify(record))
+    assert "drift=True fits" in remarks_text(identify(record))
     fit = identify(record, drift=True)
     by_name = {one.name: one for one in fit.estimates}
     assert by_name["drift"].value == pytest.approx(0.002, rel=2e-2)
@@ -94,7 +94,7 @@ def test_a_drift_too_large_to_fit_is_reported_with_a_remedy(sine, order, drift, 
     record = decay_record(
         0.01, sine=sine, drift=drift * size, noise=1e-3 * size, order=order, turn=0.0, t=np.linspace(0, 5, 450)
     )
-    with pytest.raises(HarnessError, match="over the record: add --drift") as refusal:
+    with pytest.raises(HarnessError, match="over the record: add drift=True") as refusal:
         identify(record, pendulum=sine, drag=drag)
     over = float(str(refusal.value).split("drifts by ")[1].split()[0])
     assert over == pytest.approx(5 * drift * size, rel=0.02)
@@ -121,12 +121,12 @@ def test_double_peaks_of_angular_acceleration_are_fitted_if_their_cycles_are_fou
 
 def test_a_probable_pendulum_is_suggested():
     record = decay_record(0.005, 0.001, sine=True, a=1.5, noise=1e-3, t=np.linspace(0, 5, 700))
-    with pytest.raises(HarnessError, match="add --pendulum"):
+    with pytest.raises(HarnessError, match="add pendulum=True"):
         identify(record)
 
 
 def test_a_pendulum_is_identified_from_its_angle():
-    with pytest.raises(HarnessError, match="--pendulum needs an angle"):
+    with pytest.raises(HarnessError, match="pendulum=True needs an angle"):
         identify(decay_record(0.02), pendulum=True)
 
 

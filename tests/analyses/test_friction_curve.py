@@ -131,7 +131,7 @@ def test_a_force_against_the_motion_is_reversed():
 
 def test_one_direction_needs_a_known_bias():
     force = stribeck(SPEEDS, **TRUTH)
-    with pytest.raises(SceneError, match=r"only forward motion, .* as in --bias 0"):
+    with pytest.raises(SceneError, match=r"only forward motion, .* as in bias=0"):
         harness.identify_curve((SPEEDS, force))
     for sign in (1, -1):
         curve = harness.identify_curve((SPEEDS, sign * force), bias=sign * 0.3)

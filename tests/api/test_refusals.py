@@ -15,6 +15,10 @@ SIMULATE = [  # changes of harness.simulate("smd"), and words of the sentence
     ({"values": {"m": float("nan")}}, "m = nan"),
     ({"stop": "8"}, "stop = '8' must be a finite number"),
     ({"stop": -1.0}, "stop = -1.0 s is not after start"),
+    (
+        {"interval": 1e-12},
+        "interval = 1e-12 s makes 4e+12 points from 0.0 s to 4.0 s; the limit is 10000000: choose a larger interval",
+    ),
     ({"interval": 0.0}, "interval = 0.0 must be a finite number above 0"),
     ({"times": [0.0, 2.0, 1.0]}, "times: 1.0 at index 2 is not after 2.0"),
     ({"times": [0.0, float("nan")]}, "times: nan at index 1 is not a finite number"),
@@ -39,6 +43,7 @@ SIMULATE = [  # changes of harness.simulate("smd"), and words of the sentence
     ({"inputs": [1.0, 2.0]}, "inputs must be a mapping or a DataFrame"),
 ]
 DECAY = np.linspace(0.0, 10.0, 101), np.exp(-0.1 * np.linspace(0.0, 10.0, 101)) * np.cos(6.0 * np.linspace(0, 10, 101))
+SWING = np.cos(DECAY[0])
 COMPARE = [  # changes of harness.compare("smd.fmu", "smd.fmu")
     ({"rtol": 0.0}, "rtol = 0.0 must be a finite number above 0"),
     ({"a": 3}, "a = 3 must be a name, a file, a table of pandas or xarray, a mapping of columns, or a trajectory"),
@@ -60,6 +65,33 @@ IDENTIFY_DECAY = [
     ({"record": DECAY[0], "x": DECAY[1], "unit": "m", "column": "x"}, "column = 'x' has no effect on arrays"),
     ({"record": "nowhere.csv", "x": DECAY[1]}, "x has no effect, because the record has columns"),
     ({"record": "nowhere.csv", "begin": 2.0, "end": 1.0}, "begin = 2.0 s must be before end = 1.0 s"),
+    ({"record": {"t": range(20), "x [m]": range(20)}}, "as in t [ms], or as in time_unit='ms' of read_record"),
+    (
+        {"record": {"x [m]": SWING, "y [m]": SWING}},
+        "name it, as in time='x [m]', or set the sampling rate in Hz, as in rate=",
+    ),
+    (
+        {"record": {"v [m/s]": SWING, "F [N]": SWING}},
+        "use harness.identify_curve, or name the column of times, as in time='t'",
+    ),
+    ({"record": {"t [s]": DECAY[0], "n [counts]": DECAY[1]}}, "as in per_count='0.36deg' of read_record"),
+    (
+        {"record": {"t [s]": DECAY[0], "x [m]": DECAY[1]}, "quantity": "velocity"},
+        "quantity='velocity': m, the unit of x",
+    ),
+    ({"record": {"t [s]": DECAY[0], "x [m]": 0.0 * DECAY[0], "y [m]": DECAY[1]}}, "by `column`: y [m]"),
+    ({"record": DECAY[0], "x": DECAY[1], "unit": "m", "pendulum": True}, "pendulum=True needs an angle"),
+    (
+        {"record": DECAY[0], "x": DECAY[0] % 3.0, "unit": "m"},
+        "use harness.fit('stickslip', ...), or select a free decay",
+    ),
+]
+CURVE = [  # changes of harness.identify_curve of forces over velocities
+    ({"record": (range(1, 9), range(2, 10))}, "as in bias=0"),
+    ({"record": {"v [m/s]": SWING, "i [A]": SWING}, "current": "i [A]"}, "as in constant='0.12 N.m/A'"),
+    ({"record": {"F [N]": SWING}}, "no column of velocities (it has F [N]): name it, as in velocity='v'"),
+    ({"record": {"v [m/s]": SWING}}, "no column of forces (it has v [m/s]): name it, as in force='F'"),
+    ({"record": {"v [m/s]": SWING, "F [N.m]": SWING}}, "or set the right unit, as in force='F [N]'"),
 ]
 SWEEP = [  # changes of harness.sweep("smd", {"k": [1.0]})
     ({"grid": {}}, "grid is empty"),
@@ -74,13 +106,13 @@ SWEEP = [  # changes of harness.sweep("smd", {"k": [1.0]})
 ]
 FIT = [  # changes of a fit of mu_s of the sled to its position
     ({"free": ["mu_z"]}, "unknown parameter 'mu_z' (nearest: 'mu_s')"),
-    ({"free": []}, "nothing is free"),
+    ({"free": []}, "nothing is free: name the parameters to fit, as in free=["),
     ({"free": {"mu_s": (-1.0, 1.0)}}, "mu_s = -1.0:1.0 is outside the range of the FMU; allowed: at least 0.0"),
     ({"free": {"mu_s": (1.0, 0.5)}}, "mu_s = 1.0:0.5 is not a range"),
-    ({"free": ["x0"]}, "x0 has no start value other than 0: give the range to search, as in x0=-1:1"),
+    ({"free": ["x0"]}, "x0 has no start value other than 0: give the range to search, as in free={'x0': (-1.0, 1.0)}"),
     ({"observe": {"y": "x"}}, "unknown output 'y'"),
     ({"observe": {"x": "laser"}}, "laser"),
-    ({"observe": {"F_spring": "x"}}, "x is in m, and F_spring of the FMU in N"),
+    ({"observe": {"F_spring": "x"}}, "quantity, or the right unit, as in observe={'F_spring': 'x [N]'}"),
     ({"inputs": {"x0": "x"}}, "unknown input 'x0'; allowed: F_ext"),
     ({"fixed": {"mu_s": 0.5}}, "mu_s is fixed, and free: remove one"),
     ({"fixed": {"m": -1.0}}, "m = -1.0 is outside its range"),
@@ -104,7 +136,10 @@ FIT = [  # changes of a fit of mu_s of the sled to its position
     ),
     ({"against": "stickslip"}, "stickslip is to be compared with itself: give another FMU"),
     ({"against": "pendulum", "free": ["m"]}, "unknown output of pendulum 'x'"),
-    ({"against": "coulomb"}, "coulomb has none of the free parameters mu_s: free some of its own as well"),
+    (
+        {"against": "coulomb"},
+        "coulomb has none of the free parameters mu_s: free some of its own as well, as in free=['mu_s', ",
+    ),
     ({"against": "coulomb", "free": ["mu_s", "mu_z"]}, "unknown parameter 'mu_z' (nearest: 'mu_s')"),
     ({"against": ["coulomb", "coulomb"]}, "coulomb is to be compared with itself"),
     ({"against": "missing.fmu"}, "missing.fmu"),
@@ -113,6 +148,7 @@ CALLS = [
     *((harness.simulate, {"source": "smd"}, *row) for row in SIMULATE),
     *((harness.compare, {"a": "fmus/smd.fmu", "b": "fmus/smd.fmu"}, *row) for row in COMPARE),
     *((harness.identify_decay, {}, *row) for row in IDENTIFY_DECAY),
+    *((harness.identify_curve, {}, *row) for row in CURVE),
     *((harness.sweep, {"source": "smd", "grid": {"k": [1.0]}}, *row) for row in SWEEP),
     *((harness.fit, {"source": "stickslip", "free": ["mu_s"], "observe": "x"}, *row) for row in FIT),
 ]
@@ -135,3 +171,19 @@ def test_an_invalid_argument_is_one_sentence(user_folder, record, monkeypatch, f
         function(**(arguments | records | changes))
     assert message in str(refused.value)
     assert "\n" not in str(refused.value)
+    assert "--" not in str(refused.value)
+
+
+def test_remarks_name_arguments_of_the_function(tmp_path):
+    """The options of the command line have other names."""
+    times = np.linspace(0.0, 20.0, 2001)
+    swing = np.exp(-0.05 * times) * np.cos(6.0 * times) + 0.0005 * times
+    decay = harness.identify_decay({"t [s]": times, "x": swing})
+    speeds = np.repeat(np.linspace(0.01, 0.3, 8), 2) * np.tile([1.0, -1.0], 8)
+    curve = harness.identify_curve((speeds, np.sign(speeds) * 1.2 + 2.0 * speeds))
+    for words, text in (("drift=True fits", str(decay)), ("unit='mm'", str(decay)), ("values={'", str(curve))):
+        assert words in text
+        assert "--" not in text
+    (tmp_path / "notes.txt").touch()
+    with pytest.raises(harness.HarnessError, match="move it or choose another `folder`"):
+        decay.save(tmp_path)

@@ -281,7 +281,7 @@ UNITS = "\n".join(f"{i} sec,{i % 5} {'cm' if i == 3 else 'mm'}" for i in range(2
     [
         (f"t,x\n{ROWS}", {}, "t has integer or very large numbers and no unit"),
         (f"millivolts,x [m]\n{ROWS}", {}, "millivolts has integer or very large numbers and no unit"),
-        (f"t,x [m]\n{ROWS.replace(',', '763770000123.5,')}", {}, "as in --time-unit ms, s, or 0.01s"),
+        (f"t,x [m]\n{ROWS.replace(',', '763770000123.5,')}", {}, "as in time_unit='ms' of read_record, or 0.01s"),
         (f"t [s],x [m]\n{ROWS}", {"column": "y"}, "unknown column 'y'"),
         (f"t [h/m],x [m]\n{ROWS}", {}, "unknown unit of t 'h/m'"),
         (f"t [s],x [m]\n{ROWS}\n20,abc", {}, "'abc' in row 22, column x [m], is not a number"),
@@ -301,13 +301,13 @@ UNITS = "\n".join(f"{i} sec,{i % 5} {'cm' if i == 3 else 'mm'}" for i in range(2
             {},
             "rows have no number",
         ),
-        (ROWS, {}, "--headings 't [s],x [mm]'"),
-        (ROWS, {"headings": "t"}, "--headings names 1 columns, and record.csv has 2"),
+        (ROWS, {}, "as in headings='t [s],x [mm]' of read_record, or"),
+        (ROWS, {"headings": "t"}, "`headings` of read_record names 1 columns, and record.csv has 2"),
         ("", {}, "is empty"),
         ("t [s]\n" + ROWS.replace(",", "."), {}, "only one column that is not empty, t [s]; time and pos"),
         ('{"t": [0.1, 0.2, 0.3], "x": 1}', {}, "only one column that is not empty, t; time and position"),
         ("Dear Sir,\nno table.\n", {}, "contains no table"),
-        (f"t [s],count [counts]\n{ROWS}", {}, "--per-count"),
+        (f"t [s],count [counts]\n{ROWS}", {}, "as in per_count='0.36deg'"),
         (f"t [s],count [counts]\n{ROWS}", {"per_count": "half a turn"}, "give a number and a unit"),
         (f"t [s],acceleration [mm]\n{ROWS}", {}, "the name of an acceleration and the unit of a position"),
         (f"t [s],a [m/s^2]\n{ROWS}", {"quantity": "position"}, "measures an acceleration"),
@@ -349,7 +349,7 @@ def test_a_missing_file_error_names_the_nearest(tmp_path):
 def test_a_first_column_that_does_not_move_is_named_with_the_others(tmp_path):
     path = tmp_path / "record.csv"
     path.write_text("t [s],cart,arm\n" + rows(T, 0 * X, X))
-    with pytest.raises(SceneError, match="cart does not move; select another column by --column: arm"):
+    with pytest.raises(SceneError, match="cart does not move; select another column by `column`: arm"):
         read_record(path)
     assert read_record(path, column="arm").x == pytest.approx(X, abs=1e-9)
 

@@ -75,7 +75,7 @@ def test_a_record_without_noise_is_fitted(model, free):
 @pytest.mark.parametrize(
     ("columns", "units", "sentence"),
     [
-        ({"laser": 0.5, "x": 1.0}, {"x": "m", "laser": "m"}, "x is observed, because a column has its name; --observe"),
+        ({"laser": 0.5, "x": 1.0}, {"x": "m", "laser": "m"}, "x is observed, because a column has its name; `observe`"),
         ({"v": 1.0, "x": 1.0}, {"x": "m", "v": "m/s"}, "x is observed, because a column has its name, and v not;"),
         ({"laser": 1e3, "load": 1.0}, {"laser": "mm", "load": "kg"}, "x is observed in laser [mm], the only column"),
     ],
@@ -90,14 +90,14 @@ def test_a_column_that_fits_is_observed_and_named(tmp_path, columns, units, sent
     record.to_csv(tmp_path / "pull.csv", index=False)
     done = commands.harness(tmp_path, "fit", native("smd"), "pull.csv", "--free", "k=50:400", "--json")
     assert (done.returncode, done.stderr) == (0, "")
-    assert json.loads(done.stdout)["notes"][0] == fit.notes[0]
+    assert json.loads(done.stdout)["notes"][0] == fit.notes[0].replace("`observe`", "--observe")
 
 
 @pytest.mark.parametrize(
     ("model", "units", "words"),
     [
-        ("stickslip", {"laser": "mm"}, ["several units fit", "--observe 'x=laser [mm]'"]),  # x and x_driver
-        ("smd", {"laser": "mm", "camera": "mm"}, ["several units fit", "--observe 'x=laser [mm]'"]),
+        ("stickslip", {"laser": "mm"}, ["several units fit", "observe={'x': 'laser [mm]'}"]),  # x and x_driver
+        ("smd", {"laser": "mm", "camera": "mm"}, ["several units fit", "observe={'x': 'laser [mm]'}"]),
         ("smd", {"laser": "V"}, ["no unit fits", "name an output and its column"]),
     ],
 )

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import HarnessError, SceneError, check_names
+from ...errors import HarnessError, SceneError, check_names, option_text
 from ..estimation.estimate import Estimate
 from .law_fit import LawFit, count_speeds, fit_law, group_speeds
 from .laws import LAWS
@@ -173,7 +173,7 @@ def check_points(points: CurvePoints, bias: float | None) -> tuple[CurvePoints, 
         direction = "forward" if is_forward[0] else "backward"
         raise SceneError(
             f"{name} has only {direction} motion, so that a constant bias cannot be separated from friction: "
-            "measure both directions, or give the known bias, as in --bias 0"
+            f"measure both directions, or give the known bias, as in {option_text('bias', 0)}"
         )
     if float(np.ptp(force)) == 0.0:
         raise HarnessError(f"{name}: the force is {force[0]:.4g} {points.force_unit} at all points")

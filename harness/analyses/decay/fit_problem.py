@@ -14,7 +14,7 @@ import numpy as np
 from scipy import optimize
 
 from ...errors import HarnessError
-from ...records.record import MIN_SAMPLES, Record
+from ...records.record import MIN_SAMPLES, Record, selection_text
 from . import thresholds
 from .energy_loss import estimate_losses
 from .extrema import Extrema
@@ -89,7 +89,7 @@ class FitProblem:
             raise FitError(
                 f"has only {len(problem.t)} samples in a row that follow the free decay of one oscillator, and "
                 f"{MIN_SAMPLES} are needed",
-                "sample finer, or select the free decay with --begin and --end",
+                f"sample finer, or select the free decay with {selection_text()}",
             )
         return problem
 
@@ -229,9 +229,9 @@ class FitError(HarnessError):
     The text continues a sentence that starts with the name of the record; `advice` says what to do.
     """
 
-    def __init__(self, text: str, advice: str = "select the free decay with --begin and --end") -> None:
+    def __init__(self, text: str, advice: str = "") -> None:
         super().__init__(text)
-        self.advice = advice
+        self.advice = advice or f"select the free decay with {selection_text()}"
 
 
 def least_squares(

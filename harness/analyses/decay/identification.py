@@ -23,7 +23,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ...errors import HarnessError, check_names
+from ...errors import HarnessError, check_names, option_text
 from ...records.record import Record
 from ..estimation.estimate import Estimate
 from . import thresholds
@@ -220,7 +220,7 @@ def suggest_remedy(record: Record, parameters: KnownParameters, drag: bool, drif
     if parameters.pendulum and record.order == 2:
         return (
             "beyond 90 degrees the angular acceleration of a pendulum has two peaks per half cycle: record the angle "
-            "or the angular velocity, or leave out the large amplitudes with --begin"
+            f"or the angular velocity, or leave out the large amplitudes with {option_text('begin')}"
         )
     if not drift:
         with suppress(HarnessError):
@@ -229,7 +229,8 @@ def suggest_remedy(record: Record, parameters: KnownParameters, drag: bool, drif
                 record.t
             )
             if not with_drift.problem.exceeds_noise(with_drift.best.sum_of_squares):
-                return f"the rest position drifts by {total:.3g} {record.unit} over the record: add --drift"
+                remedy = f"add {option_text('drift', True)}"
+                return f"the rest position drifts by {total:.3g} {record.unit} over the record: {remedy}"
     return ""
 
 
@@ -239,9 +240,9 @@ def identify_record(
     """Identify a decay as `fit_decay` does, without its attempts to recover; FitError if no law fits."""
     if parameters.pendulum and record.base != "rad":
         raise HarnessError(
-            f"--pendulum needs an angle or an angular velocity, and {record.name} is in {record.unit} (an "
-            "accelerometer on a pendulum also measures gravity): set --unit to rad, deg, rad/s or deg/s, or leave out "
-            "--pendulum"
+            f"{option_text('pendulum', True)} needs an angle or an angular velocity, and {record.name} is in "
+            f"{record.unit} (an accelerometer on a pendulum also measures gravity): set {option_text('unit')} to rad, "
+            f"deg, rad/s or deg/s, or leave out {option_text('pendulum')}"
         )
     terms: Terms = TERMS if drag else ("zeta", "r")
     unknowns = 5 + len(terms) + drift
@@ -280,7 +281,7 @@ def identify_record(
     if record.base not in ("m", "rad") and (parameters.k or parameters.m):
         remarks.append(
             f"The forces f, c and q need a position in m or rad, and that of {record.name} is in {record.base}: "
-            "they are left out; --unit sets the unit."
+            f"they are left out; {option_text('unit')} sets the unit."
         )
     if uncertainty.is_correlated and uncertainty.rms > thresholds.ROUGH * problem.noise:
         estimates, disagreements = compare_halves(problem, full, estimates)

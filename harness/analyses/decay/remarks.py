@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ...errors import command_text, option_text
 from ...records.record import Record
 from ..estimation.estimate import Estimate
 from . import thresholds
@@ -22,9 +23,9 @@ def check_fit(
     e, _ = problem.residuals(full.p, full.terms)
     share = uncertainty.rms / problem.signal_rms
     if share > thresholds.NOT_A_DECAY and uncertainty.rms > thresholds.NOT_NOISE * problem.noise:
-        advice = "cut the record there with --begin or --end"
+        advice = f"cut the record there with {option_text('begin')} or {option_text('end')}"
         if record.base == "rad" and not pendulum:
-            advice = "add --pendulum if it is a pendulum, or " + advice
+            advice = f"add {option_text('pendulum', True)} if it is a pendulum, or " + advice
         raise FitError(
             f"is not a free decay of one oscillator: the residuals of the best fit are {100 * min(share, 1.0):.0f} % "
             f"of the motion and largest near t = {record.format_time(time_of_largest_residuals(problem, full.p, e))} s",
@@ -140,7 +141,8 @@ def drift_remark(record: Record, problem: FitProblem, full: FittedLaw) -> str:
     if not (is_significant or squares < thresholds.BETTER_WITH_DRIFT * full.sum_of_squares):
         return ""
     total = float(p[DRIFT] * (problem.t[-1] - problem.t[0]) * problem.scale)
-    return f"The rest position drifts by {total:.3g} {record.unit} over the record: --drift fits the drift as well."
+    remedy = f"{option_text('drift', True)} fits the drift as well."
+    return f"The rest position drifts by {total:.3g} {record.unit} over the record: {remedy}"
 
 
 def ambiguity_remark(problem: FitProblem, laws: tuple[FittedLaw, ...]) -> tuple[str, ...]:
@@ -172,7 +174,7 @@ def rise_remark(record: Record, rise: LowSpeedRise) -> str:
         f"Friction that rises at low speed fits better: it is {rise.size:.2g} {record.base} (over stiffness) larger at "
         f"standstill than the {rise.losses['r']:.2g} {record.base} above about {rise.speed:g} of the first peak speed. "
         "No law of decay has such a rise. The intervals of the losses are widened, and may still miss the true values: "
-        "fit a model with Stribeck friction by friction-fmus fit."
+        f"fit a model with Stribeck friction by {command_text('fit')}."
     )
 
 

@@ -10,8 +10,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from ...errors import HarnessError
-from ...records.record import Record
+from ...errors import HarnessError, command_text
+from ...records.record import Record, selection_text
 from . import thresholds
 from .sample_noise import estimate_noise, remove_spikes
 from .smooth_motion import are_regular, half_periods, smooth_segments
@@ -251,7 +251,7 @@ def check_motion(record: Record, swings: Swings, best: Decay | None, pendulum: b
                 f"{name} beats: its swings fall to {size[rise[0]]:.3g} {unit} at "
                 f"t = {record.format_time(swings.t[rise[0]])} s and rise again to {size[rise[1]]:.3g} {unit} at "
                 f"t = {record.format_time(swings.t[rise[1]])} s, as those of two modes or of a drive do; fit a model "
-                "with both by friction-fmus fit, or select a decay of one mode with --begin and --end"
+                f"with both by {command_text('fit')}, or select a decay of one mode with {selection_text()}"
             )
         return
     if len(regular) < thresholds.MANY_SWINGS:
@@ -260,13 +260,13 @@ def check_motion(record: Record, swings: Swings, best: Decay | None, pendulum: b
     if loss < -thresholds.SIGNIFICANT_LOSS * error and regular[-1] > thresholds.GROWTH * regular[0]:
         raise HarnessError(
             f"{name} grows, from {regular[0]:.4g} to {regular[-1]:.4g} {unit} peak to peak: it is driven or "
-            "gains energy, and has no decay to measure; fit a model with its drive by friction-fmus fit"
+            f"gains energy, and has no decay to measure; fit a model with its drive by {command_text('fit')}"
         )
     if abs(loss) < thresholds.SIGNIFICANT_LOSS * error and error < thresholds.CONSTANT:
         raise HarnessError(
             f"{name} has a constant amplitude: over {len(regular)} half cycles its swings change by "
             f"{-100 * loss:+.2g} % +- {200 * error:.1g} %, so it is driven or loses less than that; make a longer "
-            "record, or fit a model with its drive by friction-fmus fit"
+            f"record, or fit a model with its drive by {command_text('fit')}"
         )
 
 
@@ -293,19 +293,19 @@ def describe_shape(record: Record, swings: Swings, part: slice, shape: float) ->
         slow, fast = ("rises", "falls") if up > down else ("falls", "rises")
         return (
             f"{record.name} {slow} {ratio:.1f} times as long as it {fast}, as in stick-slip, and is no decay: use "
-            "friction-fmus fit stickslip, or select a free decay with --begin and --end"
+            f"{command_text('fit', 'stickslip')}, or select a free decay with {selection_text()}"
         )
     spread = 100 * duration_spread(duration)
     if spread > 100 * thresholds.IRREGULAR:
         return (
             f"{record.name} is not one oscillation: the times between its turning points vary by {spread:.0f} %, as in "
-            "noise or stick-slip; filter the record, select a free decay with --begin and --end, or use "
-            "friction-fmus fit stickslip"
+            f"noise or stick-slip; filter the record, select a free decay with {selection_text()}, or use "
+            f"{command_text('fit', 'stickslip')}"
         )
     return (
         f"{record.name} is no free decay: {100 * shape:.0f} % of the power of its cycles is no wave, as in relaxation "
-        "oscillations, stick-slip or several modes; use friction-fmus fit stickslip for a driven motion, or select a "
-        "free decay with --begin and --end"
+        f"oscillations, stick-slip or several modes; use {command_text('fit', 'stickslip')} for a driven motion, or "
+        f"select a free decay with {selection_text()}"
     )
 
 
@@ -348,6 +348,6 @@ def crop(record: Record, best: Decay) -> Record:
     others = [other for other in find_decays(swings) if other.first > best.last or other.last < best.first]
     if rivals := [other for other in others if other.weight > thresholds.RIVAL * best.weight]:
         spans = ", ".join(f"{t(other.begin)} to {t(other.end)}" for other in rivals)
-        note += f" The record also decays from t = {spans} s: select a part with --begin and --end."
+        note += f" The record also decays from t = {spans} s: select a part with {selection_text()}."
     cropped = record.select(begin, end)
     return replace(cropped, notes=(*record.notes, note))

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...errors import HarnessError
+from ...errors import HarnessError, option_text
 from ...running.whole_run import Simulator
 from .fit_problem import FitProblem, Selection
 from .measured_record import MAX_AVERAGING_ERROR, MeasuredRecord, RecordData
@@ -122,7 +122,8 @@ def search_and_refine(
     selection = thin_selection(problem)
     result = search(problem, selection, starts, lambda share: report(0.5 * share))
     if result.best is None:
-        raise HarnessError("the FMU refuses all values that were tried: give other ranges, as in --free k=10:1000")
+        example = option_text("free", {"k": (10, 1000)})
+        raise HarnessError(f"the FMU refuses all values that were tried: give other ranges, as in {example}")
     doubts = []
     if not result.is_agreed:
         doubts.append(

@@ -15,7 +15,7 @@ from typing import Any, Self
 import fmpy
 import numpy as np
 
-from ...errors import MAX_VALUE_LENGTH, HarnessError, SceneError, check_names
+from ...errors import MAX_VALUE_LENGTH, HarnessError, SceneError, check_names, option_text
 from ...process.temporary_directory import temporary_directory
 from ...process.worker import Worker, WorkerDiedError, WorkerTimeoutError
 from ...scenes.run_spec import RunSpec
@@ -144,7 +144,7 @@ class ChildSession:
                 self.worker.kill()
             return result, self.worker.messages.splitlines()
         except WorkerTimeoutError as error:
-            message = f"a call did not return within {spec.timeout:g} s (--timeout sets the limit)"
+            message = f"a call did not return within {spec.timeout:g} s ({option_text('timeout')} sets the limit)"
             return RefinementResult(None, "", message), error.messages.splitlines()
         except WorkerDiedError as error:
             message = f"its binary exited with status {error.status}"
@@ -164,7 +164,9 @@ def check_time_span(spec: RunSpec, description: Any) -> tuple[float, float]:
     start, stop = resolve_time_span(spec, description)
     if not np.spacing(max(abs(start), abs(stop))) * MAX_STEPS <= stop - start < inf:
         interval = f"between start = {start!r} s and stop = {stop!r} s"
-        raise SceneError(f"{spec.fmu.name}: {interval} there are too few floating-point times; choose another --stop")
+        raise SceneError(
+            f"{spec.fmu.name}: {interval} there are too few floating-point times; choose another {option_text('stop')}"
+        )
     return start, stop
 
 

@@ -7,6 +7,7 @@ from rich.table import Table
 from ...analyses.curve.identification import CurveIdentification
 from ...analyses.curve.law_fit import LawFit
 from ...analyses.estimation.estimate import Estimate
+from ...errors import option_text
 from ...results.quantity import format_interval
 from ...results.summary import Summary, make_terminal_table, read_cells
 from .model_file import LAW_MODEL
@@ -80,7 +81,7 @@ def describe_models(identification: CurveIdentification) -> list[str]:
             "the best law."
         )
     if identification.mass is None:
-        lines.append("stickslip needs the mass for its coefficients of friction: give it by --mass.")
+        lines.append(f"stickslip needs the mass for its coefficients of friction: give it by {option_text('mass')}.")
     return lines
 
 

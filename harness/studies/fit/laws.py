@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
 
-from ...errors import SceneError, check_names
+from ...errors import SceneError, check_names, option_text
 from ...running.fmu_archive import read_description
 from .request import (
     READABLE,
@@ -79,7 +79,7 @@ def resolve_laws(request: FitRequest) -> ResolvedLaws:
         if request.free and not law.free:
             raise SceneError(
                 f"{name} has none of the free parameters {', '.join(request.free)}: free some of its own as well, as "
-                f"in --free {','.join([*request.free, *available[:1]])}"
+                f"in {option_text('free', [*request.free, *available[:1]])}"
             )
         missing = [
             parameter
@@ -94,7 +94,8 @@ def resolve_laws(request: FitRequest) -> ResolvedLaws:
     for name in request.sigma:
         units = {law.variables[name].unit or "1" for law in laws}
         if len(units) > 1:
-            raise SceneError(f"--sigma {name} has no single unit: it is in {' and '.join(sorted(units))}; leave it out")
+            where = f"{option_text('sigma')} of {name} has no single unit"
+            raise SceneError(f"{where}: it is in {' and '.join(sorted(units))}; leave it out")
     return ResolvedLaws(tuple(laws), tuple(notes))
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import replace
 
-from ...errors import SceneError
+from ...errors import SceneError, option_text
 from ...records.columns import Column, find_time_column, list_columns
 from ...records.table_files import Table
 from ...records.units import conversion_factor
@@ -44,22 +44,22 @@ def choose_observed(request: FitRequest, table: Table) -> tuple[FitRequest, str]
         output = next((roles[role] for role in ROLES if roles.get(role) in named), next(iter(named)))
         others = ", ".join(name for name in named if name != output)
         return replace(request, observe={output: named[output].heading}), (
-            f"{output} is observed, because a column has its name{f', and {others} not' if others else ''}; --observe "
-            "selects other outputs."
+            f"{output} is observed, because a column has its name{f', and {others} not' if others else ''}; "
+            f"{option_text('observe')} selects other outputs."
         )
     fits = list(fit_units(columns, outputs))
     if len(fits) != 1:
         headings = ", ".join(column.heading for column in columns if column.heading)
-        example = f"{fits[0][0] if fits else next(iter(outputs), 'x')}={(headings or 'position').split(',')[0]}"
+        example = {fits[0][0] if fits else next(iter(outputs), "x"): (headings or "position").split(",")[0]}
         raise SceneError(
             f"nothing is observed: {table.name} has no column with the name of an output ({', '.join(outputs)}), and "
             f"{'several units fit' if fits else 'no unit fits'}; name an output and its column, as in "
-            f"--observe '{example}'"
+            f"{option_text('observe', example)}"
         )
     ((output, column),) = fits
     return replace(request, observe={output: column.heading}), (
-        f"{output} is observed in {column.heading}, the only column with a unit of this output; --observe selects "
-        "another."
+        f"{output} is observed in {column.heading}, the only column with a unit of this output; "
+        f"{option_text('observe')} selects another."
     )
 
 

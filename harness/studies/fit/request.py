@@ -10,7 +10,7 @@ import numpy as np
 
 from ...analyses.fit.measured_record import RecordData
 from ...analyses.fit.unknowns import DELAY, GAIN, OFFSET, RANGE_FACTOR, SENSOR, Unknown
-from ...errors import SceneError, check_names, format_value
+from ...errors import SceneError, check_names, format_value, option_text
 from ...records.columns import ColumnOptions
 from ...records.record import MIN_SAMPLES
 from ...records.signal_table import SignalSource, SignalTable
@@ -118,9 +118,10 @@ def resolve_request(request: FitRequest) -> ResolvedRequest:
     inputs = variable_names(description, ("input",))
     readable = variable_names(description, READABLE)
     if not request.free:
-        raise SceneError(f"nothing is free: name the parameters to fit, as in --free {','.join(parameters[:2])}")
+        raise SceneError(f"nothing is free: name the parameters to fit, as in {option_text('free', parameters[:2])}")
     if not request.observe:
-        raise SceneError(f"nothing is observed: name a variable and its column, as in --observe {readable[0]}=position")
+        example = option_text("observe", {readable[0]: "position"})
+        raise SceneError(f"nothing is observed: name a variable and its column, as in {example}")
     check_names("output", request.observe, readable)
     check_names("input", request.inputs, inputs)
     check_names("parameter", request.free, parameters)
@@ -250,10 +251,8 @@ def make_unknown(
     elif limits is None:
         middle = start if start is not None else variable.start
         if not middle:
-            example = f"{max(minimum, -1.0):g}:{min(maximum, 1.0):g}"
-            raise SceneError(
-                f"{name} has no start value other than 0: give the range to search, as in {name}={example}"
-            )
+            example = option_text("free", {name: (max(minimum, -1.0), min(maximum, 1.0))})
+            raise SceneError(f"{name} has no start value other than 0: give the range to search, as in {example}")
         low, high = sorted((middle / RANGE_FACTOR, middle * RANGE_FACTOR))
         low, high = max(low, minimum), min(high, maximum)
     else:
@@ -311,5 +310,6 @@ def span_remarks(resolved: ResolvedRequest, records: Sequence[RecordData]) -> It
             if 1 / SPAN_RATIO < ratio / factor < SPAN_RATIO:
                 yield (
                     f"{record.name} lasts {duration:.4g} s, about {how} a run of the FMU ({stop:g} s): if its times "
-                    f"are in {unit}, state that in their heading, as in t [{unit}], or by --time-unit {unit}."
+                    f"are in {unit}, state that in their heading, as in t [{unit}], or by "
+                    f"{option_text('time_unit', unit)}."
                 )

@@ -13,7 +13,7 @@ from ...analyses.fit.law_comparison import compare_laws
 from ...analyses.fit.parameter_fit import ParameterFit
 from ...analyses.fit.slips import irregular_slips
 from ...analyses.fit.validation import validate
-from ...errors import HarnessError, SceneError, format_value
+from ...errors import HarnessError, SceneError, format_value, option_text
 from ...records.signal_table import SignalTable, parse_signals
 from ...records.table_files import Table, load_table
 from ...results import provenance
@@ -176,7 +176,7 @@ def fit_tables(
     if validation and request.each and len(tables) > 1:
         raise SceneError(
             f"{', '.join(request.each)} has a value of its own for each record, and none for the validation record: "
-            "leave out --each or --validate"
+            f"leave out {option_text('each')} or {option_text('validate')}"
         )
     data = [record_data(resolved, table) for table in tables]
     units = {name: resolved.variables[name].unit for name in request.observe}
