@@ -271,7 +271,7 @@ class Session:
 def plan_grid(spec: RunSpec, instance: FmuInstance) -> TimeGrid:
     """Return the communication points of a run; SceneError if its inputs or its grid are not valid."""
     start, stop = resolve_time_span(spec, instance.description)
-    check_inputs(spec.inputs, instance.variables)
+    check_inputs(spec.inputs, instance.variables, spec.values)
     check_rates(spec.fmu, spec.inputs, spec.values)
     grid = make_grid(spec, start, stop)
     if (points := grid.duration / grid.h) > MAX_POINTS:

@@ -15,7 +15,7 @@ from typing import Any, Literal, Protocol
 
 import numpy as np
 
-from ..errors import HarnessError, SceneError, check_names
+from ..errors import HarnessError, SceneError, check_names, format_value
 from ..scenes.run_spec import RunSpec
 from .fmu_instance import FmuInstance, TerminatedError
 from .input_rates import read_rate_inputs
@@ -210,7 +210,7 @@ def call_recorded(handle: Callable[[float], object], t: float, record: Callable[
         raise
 
 
-def check_inputs(inputs: Inputs, variables: Mapping[str, Any]) -> None:
+def check_inputs(inputs: Inputs, variables: Mapping[str, Any], values: Mapping[str, Any]) -> None:
     """Check a table of input signals against the variables of an FMU.
 
     Parameters
@@ -219,11 +219,13 @@ def check_inputs(inputs: Inputs, variables: Mapping[str, Any]) -> None:
         The column ``time`` in s, which does not fall, and a column for each input. A time that occurs twice is a jump.
     variables : mapping
         The variables of the model description by name.
+    values : mapping
+        The values of the run, which set no input that has a column.
 
     Raises
     ------
     SceneError
-        If a column is missing, unknown, not finite or of another length.
+        If a column is missing, unknown, not finite or of another length, or an input has a value as well.
     """
     if not inputs:
         return
@@ -235,6 +237,8 @@ def check_inputs(inputs: Inputs, variables: Mapping[str, Any]) -> None:
     check_names("input", [name for name in inputs if name != TIME], [name for name in names if name != TIME])
     rows = len(inputs[TIME])
     for name, column in inputs.items():
+        if name in values and name != TIME:
+            raise SceneError(f"{name} = {format_value(values[name])} and inputs has a column {name}: remove one")
         if len(column) != rows or not rows:
             raise SceneError(f"inputs: {name} has {len(column)} values for {rows} times; give one for each time")
         if not np.isfinite(np.asarray(column, dtype=float)).all():

@@ -97,7 +97,7 @@ class ChildSession:
         spec = replace(self.spec, values={**self.spec.values, **dict(zip(self.varied, point, strict=True))})
         self.check_interface()
         values = convert_values(spec, self.variables)
-        check_inputs(spec.inputs, self.variables)
+        check_inputs(spec.inputs, self.variables, spec.values)
         check_rates(spec.fmu, spec.inputs, spec.values)
         selection = select_variables(spec, self.variables, values)
         start, stop = check_time_span(spec, self.description)
