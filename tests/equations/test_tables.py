@@ -1,5 +1,6 @@
 """Lookup tables in model files: values against numpy and scipy, motions against scipy from point to point."""
 
+import re
 from bisect import bisect_right
 from contextlib import contextmanager
 from random import Random
@@ -509,8 +510,19 @@ def test_a_table_is_called(tmp_path, lines, message):
         find_model(tmp_path / "wrong.py").model  # noqa: B018
 
 
-def test_a_file_without_units_is_refused(tmp_path):
-    (tmp_path / "mu.csv").write_text("slip,mu\n0,1\n")
-    (tmp_path / "wrong.py").write_text(f'{HEAD}    T = Table("mu.csv")\n')
-    with pytest.raises(BuildError, match=r"mu\.csv must begin with the names and units of two columns"):
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ("slip,mu\n0,1", "mu.csv must begin with the names and units of two columns"),
+        ("v [m/s],mu [1]\n0,1", "mu.csv: a table needs at least two points, got 1"),
+        ("v [m/s],mu [1]\n0,1\n1,nan", "mu.csv: y of a table must be finite numbers, got nan as point 2"),
+        ("v [m/s],mu [1]\n0,1\n0,2", "mu.csv: x of a table must rise, but point 2 has 0.0 after 0.0"),
+        ("v [mm/s],mu [1]\n0,1\n1,2", "mu.csv: the column v [mm/s], x of the table T, has the unit 'mm/s': convert"),
+        ("v (m/s), F [lbf]\n0,1\n1,2", "mu.csv: the column F [lbf], y of the table T, has the unit 'lbf'"),
+    ],
+)
+def test_a_refusal_of_a_file_names_the_file(tmp_path, content, message):
+    (tmp_path / "mu.csv").write_text(content)
+    (tmp_path / "wrong.py").write_text(f'{HEAD}    T = Table("mu.csv")\n    F = Output("N", "force", T(clock))\n')
+    with pytest.raises(BuildError, match=re.escape(message)):
         find_model(tmp_path / "wrong.py").generated_source  # noqa: B018

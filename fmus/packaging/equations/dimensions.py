@@ -266,8 +266,12 @@ def axes(table: Table) -> tuple[tuple[str, str], tuple[str, str]]:
 def unit_dimensions(table: Table, word: str, unit: str) -> Dimensions:
     """Return the exponents of the unit of one axis of a table."""
     if (parsed := parse_unit(unit)) is None:
-        hint = unit_hint(unit, "") or "write a product or a quotient of SI units"
-        raise ModelError(f"{word} of the table {table} has the unit {unit!r}: {hint}", table.location)
+        hint = unit_hint(unit, "") or "convert its numbers to a product or a quotient of SI units"
+        axis = f"{word} of the table {table}"
+        if table.file:
+            heading = table.headings[("x", "y").index(word)]
+            axis = f"{table.file.name}: the column {heading}, {axis},"
+        raise ModelError(f"{axis} has the unit {unit!r}: {hint}", table.location)
     return tuple(Fraction(getattr(parsed, base)) for base in DIMENSIONS)
 
 

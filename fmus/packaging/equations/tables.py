@@ -76,12 +76,15 @@ class Table(Expression):
     ) -> None:
         self.location = author_location()
         self.file: Path | None = None
+        self.headings: tuple[str, ...] = ()  # of x and y in the file
+        source = ""  # begin of messages about points
         if isinstance(x, str):
             if y is not None or unit_x or unit_y:
                 raise ModelError(f"a table of the file {x} has its points and units from there: write Table({x!r})")
             self.file = Path(self.location[0]).parent / x
             self.file_content = read_content(self.file)
-            x, y, unit_x, unit_y = read_points(self.file.name, self.file_content)
+            x, y, unit_x, unit_y, self.headings = read_points(self.file.name, self.file_content)
+            source = f"{self.file.name}: "
         choices = (
             ("interpolation", interpolation, INTERPOLATIONS),
             ("ends", ends, ENDS),
@@ -93,7 +96,7 @@ class Table(Expression):
         for word, unit in ("unit_x", unit_x), ("unit_y", unit_y):
             if not isinstance(unit, str) or not unit:
                 raise ModelError(f'a table needs its units: {word} is {describe(unit)}; a pure number has the unit "1"')
-        self.x, self.y = checked_points(x, y)
+        self.x, self.y = checked_points(x, y, source)
         if values != CONSTANT and interpolation != LINEAR:
             raise ModelError(
                 f'the values of a table with interpolation="{interpolation}" are constant: leave out `values`, or '
@@ -361,8 +364,11 @@ def end_slope(h: float, k: float, a: float, b: float) -> float:
     return 3.0 * a if a * b <= 0.0 and abs(slope) > 3.0 * abs(a) else slope
 
 
-def checked_points(x: object, y: object) -> tuple[tuple[float, ...], tuple[Any, ...]]:
-    """Return the points as floats, or as parameters of y; raise ModelError for points that are no table."""
+def checked_points(x: object, y: object, source: str) -> tuple[tuple[float, ...], tuple[Any, ...]]:
+    """Return the points as floats, or as parameters of y; raise ModelError for points that are no table.
+
+    The message begins with `source`.
+    """
     columns: list[tuple[Any, ...]] = []
     for word, values in ("x", x), ("y", y):
         try:
@@ -373,16 +379,17 @@ def checked_points(x: object, y: object) -> tuple[tuple[float, ...], tuple[Any, 
             if word == "y" and isinstance(number, (Parameter, Fixed)):
                 continue
             if not is_number(number) or not math.isfinite(number):
-                raise ModelError(f"{word} of a table must be finite numbers, got {describe(number)} as point {n}")
+                got = f"got {describe(number)} as point {n}"
+                raise ModelError(f"{source}{word} of a table must be finite numbers, {got}")
         columns.append(tuple(one if isinstance(one, Expression) else float(one) for one in numbers))
     first, second = columns
     if len(first) != len(second):
         raise ModelError(f"a table needs as many values of y as of x, got {len(second)} and {len(first)}")
     if len(first) < 2:
-        raise ModelError(f"a table needs at least two points, got {len(first)}")
+        raise ModelError(f"{source}a table needs at least two points, got {len(first)}")
     for n, (a, b) in enumerate(pairwise(first), 2):
         if not a < b:
-            raise ModelError(f"x of a table must rise, but point {n} has {b!r} after {a!r}")
+            raise ModelError(f"{source}x of a table must rise, but point {n} has {b!r} after {a!r}")
     return first, second
 
 
@@ -395,8 +402,8 @@ def read_content(file: Path) -> str:
         raise ModelError(f"the table {file.name} beside the model file cannot be read: {reason}") from error
 
 
-def read_points(name: str, content: str) -> tuple[list[float], list[float], str, str]:
-    """Return both columns of a CSV file and their units."""
+def read_points(name: str, content: str) -> tuple[list[float], list[float], str, str, tuple[str, ...]]:
+    """Return both columns of a CSV file, their units and their headings."""
     rows = [row for row in csv.reader(content.splitlines()) if any(cell.strip() for cell in row)]
     titles = rows[0] if rows else []
     units = [match[1] or match[2] for match in map(UNIT_OF_HEADING.search, titles) if match]
@@ -413,4 +420,4 @@ def read_points(name: str, content: str) -> tuple[list[float], list[float], str,
             raise ModelError(f"{name}, row {n}: {','.join(row)!r} is not two numbers") from None
         columns[0].append(x)
         columns[1].append(y)
-    return *columns, *units  # type: ignore[return-value]
+    return *columns, *units, tuple(title.strip() for title in titles)  # type: ignore[return-value]
