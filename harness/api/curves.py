@@ -136,6 +136,6 @@ def identify_curve(
 def to_table(record: Any) -> "Table":
     """Return the table in columns or rows of numbers."""
     if has_columns(record):
-        table = convert_to_table(record)
+        table = convert_to_table(record, needs_times=False)
         return replace(table, name=record.name) if is_signals(record) else table
     return build_table(dict(zip(("v", "F"), record, strict=True)), {"v": "m/s", "F": "N"})

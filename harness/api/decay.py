@@ -75,8 +75,9 @@ def identify_decay(
     Parameters
     ----------
     record : str, path, DataFrame, Series, Dataset, mapping, Trajectory, tuple or array_like
-        A file with columns; a table, as a DataFrame or a mapping; a Series over time in s or time deltas; a trajectory;
-        times and samples, as in ``(t, x)``; or the samples (n,), with their `rate`.
+        A file with columns; a table, as a DataFrame, whose index may be the time in s, or a mapping; a Series over
+        time in s or time deltas; a trajectory; times and samples, as in ``(t, x)``; or the samples (n,), with their
+        `rate`.
     x : array_like, optional
         The samples (n,), if `record` holds their times (n,) in s.
     unit : str, optional

@@ -1,6 +1,7 @@
 """Records from Python: tables of pandas and xarray, mappings, arrays and trajectories, which records are read from."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -80,7 +81,9 @@ RECORDS = Rule(f"{KINDS}, or a list of these", record_sources)
 SIDE = Rule("a name, a file, a table of pandas or xarray, a mapping of columns, or a trajectory", side)
 
 
-def convert_to_table(source: Any, heading: str = SIGNAL, rate: float | None = None) -> "Table":
+def convert_to_table(
+    source: Any, heading: str = SIGNAL, rate: float | None = None, needs_times: bool = True
+) -> "Table":
     """Return the table in a record that is not a file, with units in its headings.
 
     Parameters
@@ -88,10 +91,13 @@ def convert_to_table(source: Any, heading: str = SIGNAL, rate: float | None = No
     source : DataFrame, Series, Dataset, DataArray, mapping, Trajectory, tuple or numpy.ndarray
         Variables of xarray have their unit in ``attrs["units"]``, and a DataFrame or a Series has those of its columns
         there. A named index is a column; an index of time deltas is the time in s, and so is the index of a Series.
+        With `needs_times`, an unnamed index of floats that increase is the time in s if no column has times.
     heading : str
         Heading of values without a name.
     rate : float, optional
         Sampling rate in Hz of a row of values.
+    needs_times : bool
+        Whether the table is a record over time.
 
     Raises
     ------
@@ -99,6 +105,8 @@ def convert_to_table(source: Any, heading: str = SIGNAL, rate: float | None = No
         If a column is not a row of numbers or texts.
     """
     import numpy as np
+
+    from ..records.columns import find_time_columns, list_columns
 
     if is_signals(source):
         return build_table({"t": source.time, **source.columns}, {"t": "s", **source.units})
@@ -114,7 +122,13 @@ def convert_to_table(source: Any, heading: str = SIGNAL, rate: float | None = No
         elif source.index.name is not None:
             index = str(source.index.name)
             columns, units = {index: to_array(source.index), **columns}, {index: unit_of(source, index), **units}
-        return build_table(columns, units)
+        table = build_table(columns, units)
+        if needs_times and has_increasing_floats(source.index) and not find_time_columns(list_columns(table)):
+            columns, units = {"t": to_array(source.index), **columns}, {"t": "s", **units}
+            return replace(
+                build_table(columns, units), notes=("The index of the table is taken as the column t in s.",)
+            )
+        return table
     if is_xarray(source):
         dataset = source if hasattr(source, "data_vars") else source.to_dataset(name=source.name or heading)
         if len(dataset.dims) != 1:
@@ -142,6 +156,14 @@ def unit_of(source: Any, name: str) -> str:
 def is_time_delta(values: Any) -> bool:
     """Return whether an array, an index or a column of pandas holds time deltas."""
     return getattr(getattr(values, "dtype", None), "kind", "") == "m"
+
+
+def has_increasing_floats(index: Any) -> bool:
+    """Return whether an index of pandas has no name, and floats that increase, none of them NaN."""
+    import numpy as np
+
+    is_float = index.name is None and getattr(index.dtype, "kind", "") == "f"
+    return is_float and len(index) > 1 and bool((np.diff(to_array(index)) > 0).all())
 
 
 def to_column(name: str, values: Any) -> "np.ndarray":

@@ -68,6 +68,24 @@ def test_time_deltas_are_seconds_and_labels_may_be_an_array(user_folder, monkeyp
     assert harness.sweep("coulomb", {"friction": np.array(["hybrid"])}, stop=0.1)["friction"].values.tolist() == [1.0]
 
 
+def test_an_index_without_a_name_is_the_time_if_no_column_is(user_folder, monkeypatch):
+    monkeypatch.chdir(user_folder)
+    run = harness.simulate("smd", times=np.linspace(0.0, 4.0, 401), outputs=["x"])
+    table = pandas.DataFrame({"t": run.time, "x": run["x"]})
+    frame, series = (table.set_index(run.time)["x"].to_frame(), table.set_index(run.time)["x"])
+    functions = (
+        lambda record: harness.identify_decay(record, unit="m", column="x").as_json()["fit"],
+        lambda record: harness.fit("smd", record, "k")["k"],
+        lambda record: str(harness.compare(run, record)),
+    )
+    for function in functions:
+        assert function(frame) == function(series) == function(table) == function(table.set_index(run.time + 1.0))
+    assert "The index of the table is taken as the column t in s." in str(harness.identify_decay(frame))
+    for index in (range(401), run.time[::-1]):
+        with pytest.raises(harness.SceneError, match="the record has one column of numbers, x, and no times"):
+            harness.identify_decay(frame.set_index(pandas.Index(index)))
+
+
 def test_tables_of_xarray_are_records(user_folder, monkeypatch):
     pytest.importorskip("xarray")
     monkeypatch.chdir(user_folder)
