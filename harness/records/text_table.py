@@ -108,13 +108,20 @@ def parse_long_table(lines: list[str], name: str) -> TextTable | None:
         sample = parse_lines([line for part in parts for line in part], name)
         if sample.line > SAMPLE_LINES:
             return None
-        delimiter = None if sample.delimiter == " " else sample.delimiter
-        numbers = np.loadtxt(lines[sample.line :], delimiter=delimiter, comments=None, ndmin=2)
+        delimiter, rows = None if sample.delimiter == " " else sample.delimiter, lines[sample.line :]
+        if delimiter != "," and all(map(has_decimal_comma, zip(*sample.rows, strict=False))):
+            rows = [line.replace(",", ".") for line in rows]
+        numbers = np.loadtxt(rows, delimiter=delimiter, comments=None, ndmin=2)
     except (SceneError, ValueError):
         return None
     if numbers.shape[1] != len(sample.rows[0]):
         return None
     return sample._replace(rows=numbers)
+
+
+def has_decimal_comma(cells: Sequence[str]) -> bool:
+    """Return whether a cell of a column has a comma that separates no thousands, so that none in the column does."""
+    return any("," in cell and (not GROUPED_NUMBER.match(cell) or cell.lstrip("+-")[0] == "0") for cell in cells)
 
 
 def parse_lines(lines: list[str], name: str) -> TextTable:

@@ -8,6 +8,7 @@ from harness.records import text_table
 
 ROWS = 3000
 T, X = 1e-3 * np.arange(ROWS), np.cos(0.01 * np.arange(ROWS))
+SWAP = str.maketrans(",.", ".,")
 PLAIN = [f"{t:.9g},{x:.17g}" for t, x in zip(T, X, strict=True)]
 
 
@@ -22,6 +23,10 @@ TABLES = {
     "tabs": ["t\tx", "s\tmm", *(row.replace(",", "\t") for row in PLAIN)],
     "blanks": ["  t   x", *("  " + row.replace(",", "   ") for row in PLAIN)],
     "decimal commas": ["t;x", *(row.replace(",", ";").replace(".", ",") for row in PLAIN)],
+    "tabs and decimal commas": ["t\tx", *(row.replace(",", "\t").replace(".", ",") for row in PLAIN)],
+    "commas in one column": ["t;x", *(f"{t:.3f};{x:.6f}".replace(".", ",", 1) for t, x in zip(T, X, strict=True))],
+    "commas of thousands": ["t;x", *(f"{i / 1000:.3f};{500 + i:,}".replace(".", ",") for i in range(ROWS))],
+    "thousands and decimal commas": ["t;x", *(f"{i},5;{1 + i / 10:,.1f}".translate(SWAP) for i in range(ROWS))],
     "one column with decimal commas": ["x [mm]", *(f"{x:.6f}".replace(".", ",") for x in X)],
     "a comment among the rows": insert(["t,x", *PLAIN], "# paused"),
     "an empty line": insert(["t,x", *PLAIN], ""),
@@ -56,7 +61,8 @@ def test_a_long_table_is_read_as_a_short_one(tmp_path, name, monkeypatch):
     assert read(path) == short
 
 
-def test_a_long_table_of_numbers_is_not_split_into_cells(monkeypatch):
+@pytest.mark.parametrize("name", ["headings", "decimal commas", "tabs and decimal commas"])
+def test_a_long_table_of_numbers_is_not_split_into_cells(name, monkeypatch):
     monkeypatch.setattr(text_table, "LONG_TABLE", 2000)
-    table = text_table.parse_text_table("\n".join(TABLES["headings"]).encode(), "record.csv")
+    table = text_table.parse_text_table("\n".join(TABLES[name]).encode(), "record.csv")
     assert isinstance(table.rows, np.ndarray)
