@@ -88,7 +88,7 @@ def describe(model: Any, name: str, code: str, date: datetime, nominals: Sequenc
     add_units(root, declared)
     _add_types(root, declared)
     add_log_categories_and_experiment(root, model, "fmi2")
-    add_fixed_choices(root, model, "VendorAnnotations", "Tool", "name")
+    add_annotation(root, model, declared, "VendorAnnotations", "Tool", "name")
     scalars = SubElement(root, "ModelVariables")
     positions = {variable: str(number) for number, (variable, _) in enumerate(declared, 1)}
     for reference, (variable, meaning) in enumerate(declared):
@@ -112,18 +112,28 @@ def create_root(model: Any, name: str, version: str, key: str) -> Element:
     return root
 
 
-def add_fixed_choices(root: Element, model: Any, group: str, element: str, key: str) -> None:
-    """Add an annotation with the method, law or other enumeration that the build fixed, and that is no variable.
+def add_annotation(root: Element, model: Any, declared: Variables, group: str, element: str, key: str) -> None:
+    """Add an annotation with what FMI has no attributes for, if there is any.
 
-    `group` and `element` are the elements of annotations, and `key` is the attribute with the name of the tool.
+    It has the method, law or other enumeration that the build fixed, and that is no variable; and the bounds that are
+    exclusive. `group` and `element` are the elements of annotations, and `key` is the attribute with the name of the
+    tool.
     """
     fixed = fixed_choices(model)
-    if not fixed:
+    bounds = [
+        (exported_name(name, meaning), attribute)
+        for name, meaning in declared
+        for attribute, is_open in (("min", meaning.above >= meaning.low), ("max", meaning.below <= meaning.high))
+        if is_open and attribute in type_attributes(name, meaning)
+    ]
+    if not fixed and not bounds:
         return
-    choices = SubElement(SubElement(SubElement(root, group), element, {key: ANNOTATION}), "FixedChoices")
+    annotation = SubElement(SubElement(SubElement(root, group), element, {key: ANNOTATION}), "Declarations")
     for name, meaning in fixed:
         for label, value, _ in meaning.items:
-            SubElement(choices, "Choice", name=name, label=label, value=str(value))
+            SubElement(annotation, "FixedChoice", name=name, label=label, value=str(value))
+    for name, attribute in bounds:
+        SubElement(annotation, "ExclusiveBound", name=name, attribute=attribute)
 
 
 def serialize(root: Element, key: str, code: str, date: datetime) -> bytes:

@@ -26,9 +26,14 @@ class ArrayElement:
         return getattr(self.array, name)
 
 
+def is_own(description: Any) -> bool:
+    """Return whether an FMU is one of this project."""
+    return (description.generationTool or "").startswith(OWN_TOOL)
+
+
 def split_own_arrays(description: Any) -> Any:
     """Replace the parameter arrays of an FMU of this project by their elements; return the description."""
-    if (description.generationTool or "").startswith(OWN_TOOL):
+    if is_own(description):
         description.modelVariables[:] = [
             element for variable in description.modelVariables for element in elements_of(variable)
         ]

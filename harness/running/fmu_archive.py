@@ -25,8 +25,8 @@ from ..errors import HarnessError, SceneError, by_interface, first_line, option_
 from ..process.temporary_directory import has_plain_uri, temporary_directory
 from ..scenes.fmu_files import check_built
 from ..scenes.run_spec import RunSpec
-from .array_elements import split_own_arrays
-from .variable_values import effective_value, variable_unit
+from .array_elements import is_own, split_own_arrays
+from .variable_values import ExclusiveBound, effective_value, variable_unit
 
 Result = TypeVar("Result")
 
@@ -92,6 +92,8 @@ def validate_description(path: Path, lenient: bool) -> Any:
         fmi_version = read_fmi_version(path)
         read = read_leniently if lenient else fmpy.read_model_description
         description = None if fmi_version.startswith("1.") else split_own_arrays(read(path))
+        if description and is_own(description):
+            mark_exclusive_bounds(description, path)
     except ValidationError as error:
         violations = [" ".join(fault.split()) for fault in error.problems]
         listed = "\n- ".join(
@@ -135,10 +137,24 @@ def read_fixed_choices(path: Path) -> dict[str, tuple[str, int]]:
 
     The build fixed them, by `--method`, `--law` or `--real-only`, and states them in an annotation.
     """
+    return {
+        choice.attrib["name"]: (choice.attrib["label"], int(choice.attrib["value"]))
+        for choice in read_root(path).iter("FixedChoice")
+    }
+
+
+def mark_exclusive_bounds(description: Any, path: Path) -> None:
+    """Mark those of the attributes `min` and `max` that the annotation of an FMU of this project excludes."""
+    variables = {variable.name: variable for variable in description.modelVariables}
+    for bound in read_root(path).iter("ExclusiveBound"):
+        variable, attribute = variables[bound.attrib["name"]], bound.attrib["attribute"]
+        setattr(variable, attribute, ExclusiveBound(getattr(variable, attribute)))
+
+
+def read_root(path: Path) -> ElementTree.Element:
+    """Return the root element of the model description of an FMU."""
     with ZipFile(path) as archive, archive.open(DESCRIPTION_FILE) as file:
-        root = ElementTree.parse(file).getroot()
-    choices = (choice for group in root.iter("FixedChoices") for choice in group)
-    return {choice.attrib["name"]: (choice.attrib["label"], int(choice.attrib["value"])) for choice in choices}
+        return ElementTree.parse(file).getroot()
 
 
 def read_leniently(path: Path) -> Any:

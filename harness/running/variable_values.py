@@ -14,6 +14,10 @@ REAL_TYPES = ("Real", "Float64", "Float32")
 BOOLEANS = {"true": True, "false": False, 1: True, 0: False}
 
 
+class ExclusiveBound(str):
+    """The attribute `min` or `max` of a variable whose value is excluded. FMI itself has inclusive bounds only."""
+
+
 def convert_value(variable: Any, value: Any, shape: tuple[int, ...] = ()) -> Any:
     """Convert a value for an FMU variable; for an array return a list in row-major order.
 
@@ -71,6 +75,7 @@ def convert_number(variable: Any, value: Any) -> float | int:
     if not isinstance(value, int | float) or isinstance(value, bool):
         raise SceneError(f"{variable.name} = {format_value(value)} must be one number")
     low, high = find_bound(variable, "min"), find_bound(variable, "max")
+    excludes_low, excludes_high = (isinstance(bound, ExclusiveBound) for bound in (variable.min, variable.max))
     if is_integer:
         limits = np.iinfo({"Integer": "int32"}.get(variable.type, variable.type.lower()))
         low, high = (
@@ -80,8 +85,10 @@ def convert_number(variable: Any, value: Any) -> float | int:
         text = getattr(value, "text", "")
         value = int(text) if text.lstrip("+-").isdecimal() else value  # a float holds 53 bits only
     in_range = FINITE.accepts(value) and (low is None or low <= value) and (high is None or value <= high)
+    in_range = in_range and not (excludes_low and value == low) and not (excludes_high and value == high)
     if not in_range or (is_integer and not float(value).is_integer()):
-        bounds = [f"{word} {limit!r}" for word, limit in (("at least", low), ("at most", high)) if limit is not None]
+        low_word, high_word = "above" if excludes_low else "at least", "below" if excludes_high else "at most"
+        bounds = [f"{word} {limit!r}" for word, limit in ((low_word, low), (high_word, high)) if limit is not None]
         allowed = " and ".join(bounds) + (f" {variable_unit(variable)}" if variable_unit(variable) else "")
         if is_integer or not bounds:
             allowed = ", ".join([f"any {'whole' if is_integer else 'finite'} number", *([allowed] if bounds else [])])

@@ -2,6 +2,7 @@
 
 import sys
 from math import pi
+from pathlib import Path
 
 import fmi3_fixtures
 import native_fmus
@@ -64,6 +65,23 @@ def test_a_scene_and_a_stored_result_run():
     run = harness.simulate("pacejka-0.01", stop=1.0)
     run.save("saved")
     assert np.array_equal(harness.simulate("saved")["x"], run["x"])
+
+
+@pytest.mark.parametrize(
+    "folder",
+    [lambda: Path("fmus"), native_fmus.build_native_fmus, fmi3_fixtures.build_fmi3_fmus],
+    ids=["python", "fmi2", "fmi3"],
+)
+def test_a_refusal_states_whether_a_bound_is_excluded(folder):
+    for values, allowed in (
+        ({"m": 0.0}, "m = 0.0 is outside its range; allowed: above 0.0 kg"),
+        ({"m": -1.0}, "m = -1.0 is outside its range; allowed: above 0.0 kg"),
+        ({"k": -1.0}, "k = -1.0 is outside its range; allowed: at least 0.0 N/m"),
+        ({"solver.rtol": 1.0}, "solver.rtol = 1.0 is outside its range; allowed: at least 0.0 and below 1.0"),
+    ):
+        with pytest.raises(harness.SceneError) as refused:
+            harness.simulate(folder() / "smd.fmu", values)
+        assert str(refused.value) == allowed
 
 
 @pytest.mark.parametrize("interface", ["CoSimulation", "ModelExchange"])
