@@ -11,7 +11,7 @@ from typing import Any
 MAX_VALUE_LENGTH = 100  # characters of a value in a message
 MAX_LISTED_NAMES = 100  # names listed in a message
 COMMAND_LINE = ContextVar("command_line", default=False)  # whether a command runs, whose options messages name
-OPTIONS = {"values": "set", "folder": "out"}  # by the argument, where the names differ
+OPTIONS = {"inputs": "input", "values": "set", "folder": "out"}  # by the argument, where the names differ
 FUNCTIONS = {"curve": "identify_curve", "decay": "identify_decay"}  # by the command, where the names differ
 OF_READ_RECORD = ("headings", "per_count", "time_unit")  # arguments that no other function of the Python API has
 

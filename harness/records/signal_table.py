@@ -113,7 +113,7 @@ def parse_signals(table: Table, sources: Mapping[str, SignalSource], options: Co
         if not sources[signal].is_input:
             x, remarks = mark_missing(x, column.heading)
             notes += remarks
-        factor, note = unit_factor(column, unit, sources[signal].unit, signal, table.name)
+        factor, note = unit_factor(column, unit, sources[signal], signal, table.name)
         notes += note
         columns[signal] = factor * x
     return select_rows(table, name, t, columns, sources, options, notes)
@@ -153,14 +153,17 @@ def find_signal(heading: str, table: Table, candidates: list[Column]) -> tuple[C
     return column, column.unit
 
 
-def unit_factor(column: Column, unit: str | None, target: str, signal: str, file: str) -> tuple[float, list[str]]:
+def unit_factor(
+    column: Column, unit: str | None, source: SignalSource, signal: str, file: str
+) -> tuple[float, list[str]]:
     """Return the factor from the unit of a column to that of the FMU, and a note if the unit is assumed."""
+    target = source.unit
     if not unit:
         note = f"{column.heading} has no unit in {file}: {target} is assumed, the unit of {signal} in the FMU."
         return 1.0, [note] if target else []
     factor = conversion_factor(unit, target or "1")
     if factor is None:
-        example = option_text("observe", {signal: f"{column.name} [{target or '1'}]"})
+        example = option_text("inputs" if source.is_input else "observe", {signal: f"{column.name} [{target or '1'}]"})
         raise SceneError(
             f"{column.name} is in {unit}, and {signal} of the FMU in {target or '1'}: give a column of the same "
             f"quantity, or the right unit, as in {example}"

@@ -117,6 +117,7 @@ FIT = [  # changes of a fit of mu_s of the sled to its position
     ({"observe": {"y": "x"}}, "unknown output 'y'"),
     ({"observe": {"x": "laser"}}, "laser"),
     ({"observe": {"F_spring": "x"}}, "quantity, or the right unit, as in observe={'F_spring': 'x [N]'}"),
+    ({"inputs": {"F_ext": "x"}}, "quantity, or the right unit, as in inputs={'F_ext': 'x [N]'}"),
     ({"inputs": {"x0": "x"}}, "unknown input 'x0'; allowed: F_ext"),
     ({"fixed": {"mu_s": 0.5}}, "mu_s is fixed, and free: remove one"),
     ({"fixed": {"m": -1.0}}, "m = -1.0 is outside its range"),
