@@ -221,7 +221,7 @@ def test_the_grid_does_not_change_the_solver_steps(scene):
         (BASE.replace('"v"', '"vv"'), 2, "unknown output 'vv' (nearest: 'v'); allowed: F_friction, "),
         (BASE + "[values]\nmuu_d = 1", 2, "unknown name in [values] 'muu_d' (nearest: 'mu_d')"),
         (BASE + "[values]\nm = -1", 2, "m = -1 is outside its range; allowed: above 0.0 kg"),
-        (BASE + "[values]\nm = nan", 2, "m = nan is outside its range"),
+        (BASE + "[values]\nm = nan", 2, "values: m = nan must be a finite number or a text"),
         (
             BASE + "[values]\nx = 1",
             2,
