@@ -68,11 +68,15 @@ PLOTS: dict[str, tuple[str, ...]] = {
 
 
 def known_value(value: Any) -> float | tuple[float, str] | str:
-    """Return a number, a pair of a number and a unit, or a text."""
+    """Return a number, a pair of a number and a unit, or a text; integers are shown as they are written."""
     if isinstance(value, list):
         number, unit = value
-        return real(number), text(unit)
-    return text(value) if isinstance(value, str) else real(value)
+        real(number)
+        return number, text(unit)
+    if isinstance(value, str):
+        return text(value)
+    real(value)
+    return value
 
 
 def cycle_count(value: Any) -> float:

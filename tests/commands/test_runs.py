@@ -241,7 +241,7 @@ def test_the_grid_does_not_change_the_solver_steps(scene):
         (
             BASE + "analyses = ['slip']\n[parameter]\nperiod = 3",
             2,
-            "period = 3.0 in [parameter] is not what the run sets",
+            "period = 3 in [parameter] is not what the run sets",
         ),
         (BASE.replace("model", "fmu"), 1, "there is no "),
     ],
