@@ -10,7 +10,7 @@ from ..arguments import CO_SIMULATION, MODEL_EXCHANGE
 from ..errors import import_optional
 from .fmu_archive import read_description, read_fixed_choices
 from .fmu_tables import LookupTable, read_tables
-from .variable_values import effective_value, enumeration_labels, find_bound, variable_unit
+from .variable_values import ExclusiveBound, effective_value, enumeration_labels, find_bound, variable_unit
 
 if TYPE_CHECKING:
     import pandas
@@ -40,6 +40,8 @@ class VariableInfo:
         Range of a number; None without a bound.
     choices : tuple of str
         Labels of an enumeration.
+    excludes_low, excludes_high : bool
+        Whether the bound itself is excluded.
     """
 
     name: str
@@ -52,16 +54,17 @@ class VariableInfo:
     low: float | None
     high: float | None
     choices: tuple[str, ...]
+    excludes_low: bool = False
+    excludes_high: bool = False
 
     @property
     def range(self) -> str:
         """Return the range or the choices as text; empty without any."""
         if self.choices:
             return ", ".join(self.choices)
-        if self.low is None or self.high is None:
-            bounds = ((self.low, "from"), (self.high, "to"))
-            return " ".join(f"{word} {bound:g}" for bound, word in bounds if bound is not None)
-        return f"{self.low:g} to {self.high:g}"
+        low = "" if self.low is None else f"{'above' if self.excludes_low else 'from'} {self.low:g}"
+        high = "" if self.high is None else f"{'to below' if self.excludes_high else 'to'} {self.high:g}"
+        return f"{low} {high}".strip()
 
     @property
     def cells(self) -> tuple[str, ...]:
@@ -250,4 +253,5 @@ def describe_variable(variable: Any) -> VariableInfo:
         low,
         high,
         tuple(enumeration_labels(variable).values()),
+        *(isinstance(bound, ExclusiveBound) for bound in (variable.min, variable.max)),
     )

@@ -30,7 +30,8 @@ def test_a_description_has_every_variable_of_the_fmu_with_its_unit_and_default(f
             assert found.start == float(item.start)
     text = description.summary()
     assert all(f"\n{item.name} " in text for item in expected.modelVariables)
-    assert description["solver.rtol"].range == "0 to 1"
+    assert description["solver.rtol"].range == "from 0 to below 1"
+    assert description["m"].range == "above 0"
 
 
 def test_laws_and_methods_are_those_of_the_contract(fmus):
