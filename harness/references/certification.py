@@ -5,6 +5,7 @@ second file has the changes of mode.  Shipped models get more accurate results f
 """
 
 from dataclasses import dataclass, replace
+from math import isnan
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,7 @@ from ..results.files import column_heading, write_csv_rows
 from ..running.embedded_model import EmbeddedModel, load_model_class, method_numbers
 from ..running.solution import Solution
 from ..scenes.fmu_files import find_fmu
-from .certified_reference import ERROR_LABEL, FOLDER, POINTS, max_relative_difference
+from .certified_reference import ERROR_LABEL, FOLDER, POINTS, event_time_error, max_relative_difference
 from .reference_trajectory import CommunicationGrid
 from .segments import ParameterSpan, ParameterValues
 
@@ -80,17 +81,36 @@ def compute_by_two_methods(model: str, spans: list[ParameterSpan], grid: Communi
     file, ((_, _, values),) = find_fmu(model), spans
     model_class: Any = load_model_class(file)
     times = grid.times(())
-    reference = certify_default_run(model_class, file, values, times)
+    reference = solve_by_two_methods(model_class, file, values, times)
     rates = list(model_class.states.values())
     position = next(i for i, rate in enumerate(rates) if rate in model_class.states)
     velocity = list(model_class.states).index(rates[position])
     return replace(reference, states=reference.states[:, [position, velocity]])
 
 
-def certify_default_run(
+def certify_default_run(model: Any, file: Path) -> Solution:
+    """Return the default run of a model by two methods, in this process.
+
+    Raises
+    ------
+    HarnessError
+        If the FMU does not offer both methods, or they disagree on the motion or on the changes of mode.
+    """
+    reference = solve_by_two_methods(model, file)
+    if reference.events is None:
+        raise HarnessError(
+            f"{file.name}: {reference.method} find different changes of mode, so the result is not certified: a load "
+            "equals the holding force up to rounding; change a start value or a parameter a little"
+        )
+    return reference
+
+
+def solve_by_two_methods(
     model: Any, file: Path, values: ParameterValues | None = None, times: list[float] | None = None
 ) -> Solution:
     """Return a run of a model by two methods, in this process.
+
+    The events are None if a load equals the holding force up to rounding, which decides whether the contact sticks.
 
     Parameters
     ----------
@@ -106,7 +126,7 @@ def certify_default_run(
     Raises
     ------
     HarnessError
-        If the FMU does not offer both methods, or they disagree.
+        If the FMU does not offer both methods, or they disagree on the motion.
     """
     if missing := METHODS.keys() - method_numbers(model):
         methods = ", ".join(sorted(missing))
@@ -120,4 +140,8 @@ def certify_default_run(
             f"{file.name}: {methods} differ by {difference:.1e}, more than {AGREEMENT_TOLERANCE:g}, so the result is "
             "not certified: shorten the default run, or smooth a discontinuous law"
         )
-    return replace(solutions[0], events=solutions[0].events or [], method=methods, estimated_error=difference)
+    reference = replace(solutions[0], method=methods, estimated_error=difference)
+    events, other_events = (solution.events or [] for solution in solutions)
+    if isnan(event_time_error(events, other_events)):
+        return replace(reference, events=None, start_mode=None)
+    return replace(reference, events=events)

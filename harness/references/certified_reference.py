@@ -108,7 +108,7 @@ def load_reference(name: str, folder: Path = FOLDER) -> Solution:
 def compute_errors(answer: Solution, reference: Solution) -> SolutionErrors:
     """Return the errors of a solution at the times of a reference."""
     error = relative_errors(answer.states, reference.states)
-    has_events = answer.events is not None
+    has_events = answer.events is not None and reference.events is not None
     return SolutionErrors(
         final=float(error[-1]),
         rms=float(np.sqrt(np.mean(error * error))),

@@ -149,15 +149,20 @@ REST = SimpleNamespace(  # a reference
 GOOD = {"x": np.ones(3), "v": np.zeros(3), "energy": np.zeros(3)}
 
 
-def judge(case, counts, columns=None, **changes):
+def judge(case, counts, columns=None, reference=REST, **changes):
     """Return the outcome of the correct motion with other columns or other counts."""
     statistics = replace(counts, **changes)
     motion = harness.Trajectory(REST.times, GOOD | (columns or {}), {}, spec=case.run, statistics=statistics)
-    return study.judge_solution(case, motion, REST)
+    return study.judge_solution(case, motion, reference)
 
 
 def test_a_correct_motion_is_finished(case, counts):
     assert judge(case, counts).ended == FINISHED
+
+
+def test_events_that_rounding_decides_are_not_judged(case, counts):
+    undecided = SimpleNamespace(**{**vars(REST), "events": None})
+    assert judge(case, counts, reference=undecided, events=2).ended == FINISHED
 
 
 @pytest.mark.parametrize(

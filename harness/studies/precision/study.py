@@ -18,7 +18,7 @@ import numpy as np
 
 from ...errors import HarnessError
 from ...references import peer_solvers
-from ...references.certification import certify_default_run
+from ...references.certification import solve_by_two_methods
 from ...references.certified_reference import ReferenceCase, compute_errors, load_reference
 from ...references.models import CASES
 from ...references.ode_problem import UnspecifiedProblem
@@ -182,7 +182,7 @@ def study_model(model: str, settings: SweepSettings, report: Callable[[float], N
 def default_case(model: str, file: Path, model_class: Any) -> ReferenceCase:
     """Return the default run of a user model, with its certified result or the solution on which two methods agree."""
     has_reference = file.with_suffix(".csv").is_file()
-    truth = load_reference(file.stem, file.parent) if has_reference else certify_default_run(model_class, file)
+    truth = load_reference(file.stem, file.parent) if has_reference else solve_by_two_methods(model_class, file)
     law, outputs = "default run", tuple(model_class.states)
     return ReferenceCase(file.stem, RunSpec(file, outputs), law, truth, UnspecifiedProblem(float(truth.times[-1])))
 

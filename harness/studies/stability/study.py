@@ -174,8 +174,8 @@ def judge_solution(case: StabilityCase, motion: Trajectory, reference: Solution)
     for energy in energies if conserves else ():
         energy_rise = float((energy - np.minimum.accumulate(energy)).max() / (energy.max() or 1.0))
     reasons = []
-    if case.events == "all" or case.events == case.method:
-        events = reference.events or []
+    if reference.events is not None and case.events in ("all", case.method):
+        events = reference.events
         if statistics.events != len(events):
             reasons.append(f"{statistics.events} events, not {len(events)}")
         elif events:
