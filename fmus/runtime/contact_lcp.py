@@ -117,12 +117,13 @@ def resolve_after_event(model, step, h, ends: ContactVector, tie_tolerance) -> t
     y = step.y1
     for i in contact_indices:
         status[i], new_modes[i] = SLIPPING, step.modes0[i]
+        size = terms[i] + step.event_location.peaks[i]
         if new_modes[i] == STUCK:
             status[i] = AT_LIMIT if ends[i] <= h else AT_REST
         elif not (force[i] == 0.0 and limit[i] == 0.0):
-            if new_modes[i] * slips[i] < -REVERSED_SHARE * (terms[i] + floors[i] + step.event_location.peaks[i]):
+            if new_modes[i] * slips[i] < -REVERSED_SHARE * (size + floors[i]):
                 new_modes[i] = sign(slips[i])  # it reversed without friction, which has returned
-            elif ends[i] <= h or new_modes[i] * slips[i] <= SIMULTANEITY_MARGIN * terms[i]:
+            elif ends[i] <= h or new_modes[i] * slips[i] <= SIMULTANEITY_MARGIN * size:
                 depth = inf
                 if fabs(force[i]) >= EQUAL_SHARE * limit[i]:
                     depth = reversal_depth(model, t, y, step.modes0, delta, limit[i], i)

@@ -84,6 +84,19 @@ def test_simultaneous_equal_events_are_one_event(custom_model):
     assert all(x1 == x2 and v1 == v2 for _, (x1, v1, x2, v2), _ in rows)
 
 
+@pytest.mark.parametrize("method", [ODE23, ODE45, DOP853, RODAS])
+def test_mirrored_blocks_stop_together(custom_model, method):
+    """Apart from rounding errors, as those of a linear solver that takes the blocks in turn."""
+    (one, a), (two, b) = (
+        body("1", "-k * x1 + 0.4 * k * (x2 - x1) - F1", 1.0),
+        body("2", "-k * x2 + 0.4 * k * (x1 - x2) - F2", 1.0),
+    )
+    one[0], two[0] = (line[:-1] + f", start={x})" for line, x in ((one[0], 0.1), (two[0], -0.1)))
+    lines = contact("1", "v1", 6.0, 7.5) + contact("2", "v2", 6.0, 7.5)
+    changes, _rows = events(custom_model(*one, *two, *lines, a, b, methods=NAMES), method, 1e-6, 3.0)
+    assert [(first, second) for _, first, second in changes] == [(1, -1), (-1, 1), (1, -1), (0, 0)]
+
+
 def test_two_riders_on_one_carrier_break_away_and_stop_together(custom_model):
     (carrier, a), (one, b) = body("0", "F1 + F2 - 3.0 * k * x0", 3.0), body("1", "k * (p - x1) - F1", 1.3)
     two, c = body("2", "k * (p - x2) - F2", 1.3)
