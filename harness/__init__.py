@@ -5,7 +5,13 @@ is printed. An error that a user can cause raises a subclass of `HarnessError`.
 """
 
 import os
+import signal
 import sys
+
+if signal.getsignal(signal.SIGINT) == signal.default_int_handler and (
+    sys.orig_argv[1:3] == ["-m", "harness"] or "".join(sys.orig_argv[1:2]).endswith("friction-fmus")
+):  # a command handles Ctrl-C after these imports, in `interruptible`; no traceback before that
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 if sys.argv[:1] == ["-m"]:  # python -m harness: no file of the working folder, such as a model math.py, is imported
     HERE = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))

@@ -88,8 +88,8 @@ def exit_after_signal() -> None:
 @contextmanager
 def interruptible() -> Iterator[None]:
     """Handle both signals in the block, unless they are ignored, and raise CommandInterruptedError."""
-    for number, default in zip(SIGNALS, (default_int_handler, SIG_DFL), strict=True):
-        if signal.getsignal(number) == default:
+    for number in SIGNALS:
+        if signal.getsignal(number) in (default_int_handler, SIG_DFL):
             signal.signal(number, handle_signal)
     sys.unraisablehook = ignore_unraisable_interrupt
     atexit.register(exit_after_signal)  # registered first, called last

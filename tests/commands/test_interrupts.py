@@ -279,22 +279,32 @@ def test_a_swallowed_interrupt_is_raised_at_the_next_report_of_progress(workspac
     assert not (workspace / "results").exists() or not list((workspace / "results").iterdir())
 
 
-@pytest.mark.parametrize("library", ["click", "numpy"])
-@pytest.mark.parametrize(
-    "arguments", [["-m", "harness", "run", "smd"], ["-m", "benchmarks", "bench"], [str(ROOT / "build_fmus.py"), "smd"]]
-)
-def test_a_signal_while_a_library_is_imported_ends_a_command_like_any_other(tmp_path, arguments, library):
-    """The library of that name interrupts the process that imports it."""
-    (tmp_path / f"{library}.py").write_text(
+def interrupt_import(folder, library, arguments):
+    """Return exit status, output and messages of a command in which an imported library interrupts the process."""
+    (folder / f"{library}.py").write_text(
         "import os, signal, time\nos.kill(os.getpid(), signal.SIGINT)\ntime.sleep(60)\n"
     )
     done = subprocess.run(
         [sys.executable, *arguments],
-        cwd=tmp_path,
-        env=os.environ | {"PYTHONPATH": f"{tmp_path}{os.pathsep}{ROOT}"},
+        cwd=folder,
+        env=os.environ | {"PYTHONPATH": f"{folder}{os.pathsep}{ROOT}"},
         capture_output=True,
         text=True,
         timeout=100,
         preexec_fn=partial(signal.signal, signal.SIGINT, signal.SIG_DFL),
     )
-    assert (done.returncode, done.stdout, done.stderr) == (130, "", "Error: interrupted\n")
+    return done.returncode, done.stdout, done.stderr
+
+
+@pytest.mark.parametrize("library", ["click", "numpy"])
+@pytest.mark.parametrize(
+    "arguments", [["-m", "harness", "run", "smd"], ["-m", "benchmarks", "bench"], [str(ROOT / "build_fmus.py"), "smd"]]
+)
+def test_a_signal_while_a_library_is_imported_ends_a_command_like_any_other(tmp_path, arguments, library):
+    assert interrupt_import(tmp_path, library, arguments) == (130, "", "Error: interrupted\n")
+
+
+@pytest.mark.parametrize("arguments", [["-m", "harness"], ["friction-fmus"]])
+def test_ctrl_c_before_a_command_handles_it_prints_no_traceback(tmp_path, arguments):
+    (tmp_path / "friction-fmus").write_text("from harness.__main__ import main\nmain()\n")
+    assert interrupt_import(tmp_path, "dataclasses", arguments) == (-signal.SIGINT, "", "")
