@@ -74,6 +74,8 @@ def write_report(results: Path, scenes: Sequence[ComparedScene]) -> ReportPage:
         temporary.replace(path)
     except OSError as error:
         raise HarnessError(f"cannot write {path}: {error.strerror}") from None
+    finally:
+        temporary.unlink(missing_ok=True)
     return ReportPage(path, tuple(missing))
 
 

@@ -158,6 +158,15 @@ def test_a_figure_that_is_cut_off_is_not_shown(tmp_path, report_run):
     assert page.count("cannot be shown: figure.svg is not a complete SVG drawing") == len(texts)
 
 
+def test_a_report_that_cannot_be_written_leaves_no_file(tmp_path, report_run):
+    results = tmp_path / "results"
+    shutil.copytree(report_run[0] / "results/coulomb", results / "coulomb")
+    (results / "report.html").mkdir()
+    done = harness(tmp_path, "report")
+    assert (done.returncode, done.stderr) == (1, "Error: cannot write results/report.html: Is a directory\n")
+    assert sorted(path.name for path in results.iterdir()) == ["coulomb", "report.html"]
+
+
 def test_without_results_there_is_no_report(tmp_path):
     done = harness(tmp_path, "report")
     assert done.returncode == 1
