@@ -7,6 +7,8 @@ from dataclasses import dataclass
 def reverse_declarations(text: str) -> str:
     """Return a model file with its declarations in reverse, as far as one does not need the other.
 
+    The text is empty if they need each other, as two loops with the same variable do.
+
     Parameters
     ----------
     text : str
@@ -15,7 +17,7 @@ def reverse_declarations(text: str) -> str:
     tree = ast.parse(text)
     (model,) = (node for node in tree.body if isinstance(node, ast.ClassDef))
     model.body = order_last_first([part for node in model.body for part in split_assignment(node)])
-    return ast.unparse(tree) + "\n"
+    return ast.unparse(tree) + "\n" if model.body else ""
 
 
 @dataclass(frozen=True)
@@ -124,17 +126,23 @@ def split_assignment(node: ast.stmt) -> list[ast.stmt]:
 
 
 def order_last_first(statements: list[ast.stmt]) -> list[ast.stmt]:
-    """Return statements in an order in which each follows those that it needs; of several, the last one first."""
+    """Return statements in an order in which each follows those that it needs; of several, the last one first.
+
+    There are none if statements need each other.
+    """
     assigned = [find_names(statement, ast.Store) for statement in statements]
     needed = [find_names(statement, ast.Load) for statement in statements]
     ordered = [statement for statement in statements[:1] if is_docstring(statement)]
     remaining = list(range(len(ordered), len(statements)))
     while remaining:
-        i = max(
+        ready = [
             i
             for i in remaining
             if not any(j != i and (assigned[j] & needed[i] or (j < i and assigned[i] & needed[j])) for j in remaining)
-        )
+        ]
+        if not ready:
+            return []
+        i = max(ready)
         remaining.remove(i)
         ordered.append(statements[i])
     return ordered

@@ -43,6 +43,7 @@ STIFF = ("rodas", "radau9")  # methods for stiff problems
 TIME_UNIT = 2.0**-30  # s; the sum of a multiple and a start time is exact
 LONG_RUN_TOLERANCE = 0.01  # of the relative tolerance of other runs
 MAX_CUTS = 8  # of a run that needs too many steps
+UNCHANGEABLE = {ORDER: "declarations need each other", FRAME: "no state is a velocity"}
 ROUNDING = 1e-12  # relative tolerance of the closed form
 
 
@@ -192,7 +193,7 @@ class Model:
         self.others: dict[str, FmuRuns | str] = {}
         for kind in (kind for kind in texts if kind in kinds):
             if not texts[kind]:
-                self.others[kind] = "no state is a velocity" if is_source else f"{source.name} is no model file"
+                self.others[kind] = UNCHANGEABLE[kind] if is_source else f"{source.name} is no model file"
                 continue
             variant = folder / kind / source.name
             variant.parent.mkdir()

@@ -192,6 +192,12 @@ def test_another_order_has_the_same_declarations(path):
     assert sum(a != b for a, b in zip(*names, strict=True)) > len(names[0]) // 2
 
 
+def test_declarations_that_need_each_other_have_no_other_order():
+    loop = "    for i in range(2):\n        vars()[f'a{i}'] = i\n"
+    assert reverse_declarations(f"class Loops(Model):\n{loop}") != ""
+    assert reverse_declarations(f"class Loops(Model):\n{loop}{loop}") == ""
+
+
 def is_stored(node):
     return isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)
 
