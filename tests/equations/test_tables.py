@@ -453,6 +453,14 @@ WRONG = {
         'Table([0.0, 1.0], [1.0, float("nan")], "s", "1")',
         "y of a table must be finite numbers, got nan as point 2",
     ),
+    "a large number": (
+        'Table([0.0, 1.0], [1.0, -1e308], "s", "1")',
+        "y of a table must be between -1e+60 and 1e+60, got -1e+308 as point 2",
+    ),
+    "points that almost coincide": (
+        'Table([0.0, 5e-324], [1.0, 2.0], "s", "1")',
+        "x of a table must rise by 1e-60 or more, but point 2 has 5e-324 after 0.0",
+    ),
     "other lengths": ('Table([0.0, 1.0], [1.0], "s", "1")', "a table needs as many values of y as of x, got 1 and 2"),
     "no unit": ("Table([0.0, 1.0], [1.0, 2.0])", "a table needs its units: unit_x is ''"),
     "an unknown unit": (

@@ -28,6 +28,7 @@ INTERPOLATIONS, ENDS = (LINEAR, PCHIP), (HOLD, CONTINUE, REFUSE)
 CONSTANT, VALUE_KINDS = "constant", {"fixed": Fixed, "tunable": Parameter}
 # Where a piece has no end; states beyond this value are treated as divergence
 UNBOUNDED = 1e100
+LARGEST, SMALLEST_STEP = 1e60, 1e-60  # of the numbers of a table and of x, so that its coefficients are finite
 OVERLAP, OVERLAP_OF_PIECE = 1e-9, 1e-4  # of pieces, as shares of the largest argument and of the shortest piece
 VARIABLE_KINDS = ("value", "slope")  # columns that depend on the values at the points
 UNIT_OF_HEADING = re.compile(r"\[([^][]+)\]\s*$|\(((?:[^()]|\([^()]*\))+)\)\s*$")  # x [m], or k (N/(m.s))
@@ -381,6 +382,9 @@ def checked_points(x: object, y: object, source: str) -> tuple[tuple[float, ...]
             if not is_number(number) or not math.isfinite(number):
                 got = f"got {describe(number)} as point {n}"
                 raise ModelError(f"{source}{word} of a table must be finite numbers, {got}")
+            if abs(number) > LARGEST:
+                limits = f"between {-LARGEST:g} and {LARGEST:g}"
+                raise ModelError(f"{source}{word} of a table must be {limits}, got {describe(number)} as point {n}")
         columns.append(tuple(one if isinstance(one, Expression) else float(one) for one in numbers))
     first, second = columns
     if len(first) != len(second):
@@ -390,6 +394,9 @@ def checked_points(x: object, y: object, source: str) -> tuple[tuple[float, ...]
     for n, (a, b) in enumerate(pairwise(first), 2):
         if not a < b:
             raise ModelError(f"{source}x of a table must rise, but point {n} has {b!r} after {a!r}")
+        if b - a < SMALLEST_STEP:
+            rise = f"rise by {SMALLEST_STEP} or more"
+            raise ModelError(f"{source}x of a table must {rise}, but point {n} has {b!r} after {a!r}")
     return first, second
 
 
