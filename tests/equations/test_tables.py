@@ -400,8 +400,9 @@ def test_a_sweep_varies_an_element_of_an_array(tunable_fmus):
     assert sweep.data["final_x"].to_numpy() == pytest.approx(ends, abs=1e-6)
 
 
-def test_an_argument_beyond_the_ends_is_refused_where_the_table_says_so(worker, tmp_path):
-    text = remove_unused(MODEL).format(friction=points(FRICTION, '"m/s", "1"'), spring=points(SPRING, '"m", "N"'))
+@pytest.mark.parametrize("spring", [SPRING, ((-0.2, 0.2), (-40.0, 40.0))], ids=["four points", "two points"])
+def test_an_argument_beyond_the_ends_is_refused_where_the_table_says_so(worker, tmp_path, spring):
+    text = remove_unused(MODEL).format(friction=points(FRICTION, '"m/s", "1"'), spring=points(spring, '"m", "N"'))
     (tmp_path / "bench.py").write_text(text.replace('ends="continue"', 'ends="refuse"'))
     fmu = worker.instantiate(build_user_model(tmp_path / "bench.py") / "bench.fmu").begin({"x0": 0.2}, stop=STOP)
     fmu.step(0.0, STOP)

@@ -8,7 +8,7 @@ from .codegen_context import CodegenContext, method_source, rule_status
 from .expression_printer import INDENT, ExpressionPrinter
 from .expressions import Expression, Operand, Term, is_among
 from .model_declaration import Input
-from .tables import EDGE, VARIABLE_KINDS, Table, array_name
+from .tables import EDGE, VARIABLE_KINDS, Table, array_name, table_of
 
 
 def setup_methods(context: CodegenContext) -> list[str]:
@@ -30,6 +30,9 @@ def init_method(context: CodegenContext) -> list[str]:
     lines = []
     if context.analysis.conditions:
         lines.append(f"self.condition_sides = [1.0] * {len(context.analysis.conditions)}")
+        for n, condition in enumerate(context.analysis.conditions):
+            if condition.piece is not None and len(table_of(condition.piece).edges) == 2:
+                lines.append(f"self.condition_sides[{n}] = 0.0")  # the only piece of a table
         lines.append("self.violation_time = self.violation_value = 0.0")
     if context.analysis.has_pieces:
         lines.append(f"self.condition_pieces = [-1.0] * {len(context.analysis.conditions)}")
