@@ -148,7 +148,8 @@ def mark_exclusive_bounds(description: Any, path: Path) -> None:
     variables = {variable.name: variable for variable in description.modelVariables}
     for bound in read_root(path).iter("ExclusiveBound"):
         variable, attribute = variables[bound.attrib["name"]], bound.attrib["attribute"]
-        setattr(variable, attribute, ExclusiveBound(getattr(variable, attribute)))
+        if (value := getattr(variable, attribute)) is not None:
+            setattr(variable, attribute, ExclusiveBound(value))
 
 
 def read_root(path: Path) -> ElementTree.Element:
