@@ -32,7 +32,7 @@ FEATURES = {
     "growing": "grows, from .* peak to peak: it is driven or gains energy",
     "constant": "has a constant amplitude: over [0-9]+ half cycles its swings change by",
     "beating": "beats: its swings fall to .* and rise again",
-    "sawtooth": "stick-slip.*friction-fmus fit stickslip",
+    "sawtooth": r"stick-slip.*harness\.fit\('stickslip'",
     "noise": "all noise|is not one oscillation",
     "relaxation": "no wave|is not one oscillation",
 }
