@@ -1,5 +1,6 @@
 """Fixtures: the FMUs, built once, and a process that runs them."""
 
+import gc
 import os
 import sys
 from importlib import import_module
@@ -18,6 +19,7 @@ from worker_client import Worker
 
 def pytest_configure(config):
     """Create the folders shared by all test processes, or use those created by the main process."""
+    gc.set_threshold(20_000, 50, 50)  # builds of models allocate much and free it by reference counts
     if hasattr(config, "workerinput"):
         build_cache.shared_folder = Path(config.workerinput["shared_folder"])
         build_cache.kept_folder = Path(config.workerinput["kept_folder"])
