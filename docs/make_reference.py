@@ -172,10 +172,10 @@ def declaration_options() -> str:
 
 def describe_values(annotation: Any) -> str:
     """Return what a value of a type must be, and what each value of its table must be."""
-    from harness.scenes.schema import ARRAY, find_rule
+    from harness.scenes.schema import LIST, find_rule
 
     rule = find_rule(annotation)
-    if rule is ARRAY:
+    if rule is LIST:
         return "a list of tables"
     if get_origin(annotation) is dict and not is_dataclass(get_args(annotation)[1]):
         return f"{rule.text}; each value is {find_rule(get_args(annotation)[1]).text}"

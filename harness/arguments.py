@@ -267,8 +267,12 @@ def finite_row(value: Any) -> "np.ndarray":
 
 def increasing_row(value: Any) -> "np.ndarray":
     """Return a row (n,) of at least one finite number as floats, which increase."""
+    import numpy as np
+
     numbers = finite_row(value)
-    for i in (numbers[1:] <= numbers[:-1]).nonzero()[0].tolist()[:1]:
+    falls = np.diff(numbers) <= 0
+    if falls.any():
+        i = int(np.argmax(falls))
         raise SceneError(f"{numbers[i + 1]} at index {i + 1} is not after {numbers[i]}: give increasing numbers")
     return numbers
 
@@ -320,7 +324,7 @@ NAMES = Rule("a name, or a list of names", names)
 SOME_NAMES = Rule("a name, or a list of names that is not empty", some_names)
 INCREASING_ROW = Rule("a row of finite numbers, at least one, which increase", increasing_row)
 PATH = Rule("a name or a path", path)
-PATHS = Rule("a name, a path, or a sequence of these", paths)
+PATHS = Rule("a name, a path, or a list of these", paths)
 SETTINGS = mapping(Rule("a finite number or a text", setting), "numbers or texts")
 NUMBERS = mapping(FINITE, "finite numbers")
 POSITIVES = mapping(POSITIVE, "finite numbers above 0")

@@ -108,8 +108,8 @@ def parse_curve(table: Table, columns: CurveColumns, name: str) -> CurveRecord:
     velocity_unit, motion_size, note = resolve_motion(motion, motion_unit, is_position)
     notes += note
     if columns.constant is not None and not is_current:
-        name = option_text("current", "i")
-        raise SceneError(f"constant has no effect, because {force.heading} is no current: name it, as in {name}")
+        example = option_text("current", "i")
+        raise SceneError(f"constant has no effect, because {force.heading} is no current: name it, as in {example}")
     unit, force_size, note = resolve_force(force, force_unit, is_current, velocity_unit, columns.constant)
     notes += note
     x, y = (parse_numbers(table, column.index).copy() for column in (motion, force))

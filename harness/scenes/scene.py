@@ -81,9 +81,10 @@ def known_value(value: Any) -> float | tuple[float, str] | str:
 
 def cycle_count(value: Any) -> float:
     """Return a number above 0 that is whole or half."""
-    if (2.0 * above_zero(value)) % 1:
+    number = above_zero(value)
+    if (2.0 * number) % 1:
         raise ValueError
-    return float(value)
+    return number
 
 
 KINDS = ("published", "reference", "parameter")  # of known values, by the name of their table

@@ -11,7 +11,7 @@ from pathlib import Path
 from types import NoneType
 from typing import Any, TypeVar, get_args, get_origin, get_type_hints
 
-from ..arguments import FINITE, FLAG, NATURAL, Rule, path, text
+from ..arguments import FINITE, FLAG, NATURAL, PATH, Rule, text
 from ..errors import SceneError, format_value, unknown_name_message
 
 LIST_HINT = "`friction-fmus list` lists the available scenes"
@@ -20,44 +20,44 @@ MAX_FILE_BYTES = 1_000_000  # bytes
 Schema = TypeVar("Schema")
 
 
-def title(value: Any) -> str:
+def as_title(value: Any) -> str:
     """Return a text of a single line and of limited length."""
     if len(text(value)) > MAX_TITLE_LENGTH or value.splitlines() != [value]:
         raise ValueError
     return str(value)
 
 
-def string(value: Any) -> str:
+def as_string(value: Any) -> str:
     """Return a text, which may be empty."""
     if not isinstance(value, str):
         raise TypeError
     return value
 
 
-def table(value: Any) -> dict[str, Any]:
+def as_table(value: Any) -> dict[str, Any]:
     """Return a table."""
     if not isinstance(value, dict):
         raise TypeError
     return value
 
 
-def array(value: Any) -> list[Any]:
-    """Return an array of TOML or JSON."""
+def as_list(value: Any) -> list[Any]:
+    """Return a list."""
     if not isinstance(value, list):
         raise TypeError
     return value
 
 
-def file_path(value: Any) -> Path:
+def as_path(value: Any) -> Path:
     """Return a path."""
-    return Path(path(value))
+    return Path(PATH.convert(value))
 
 
-TITLE = Rule(f"a text of one line and at most {MAX_TITLE_LENGTH} characters", title)
-STRING = Rule("a text", string)
-TABLE = Rule("a table", table)
-ARRAY = Rule("a list", array)
-FILE_PATH = Rule("a path", file_path)
+TITLE = Rule(f"a text of one line and at most {MAX_TITLE_LENGTH} characters", as_title)
+STRING = Rule("a text", as_string)
+TABLE = Rule("a table", as_table)
+LIST = Rule("a list", as_list)
+FILE_PATH = Rule("a path", as_path)
 PLAIN = {str: STRING, bool: FLAG, int: NATURAL, float: FINITE, Path: FILE_PATH}  # rules of types that state none
 
 Faults = list[tuple[int, str]]  # rank and message
@@ -97,6 +97,7 @@ def convert(value: Any, annotation: Any, path: str, faults: Faults) -> Any:
 
 def convert_table(table: Mapping[str, Any], schema: Any, path: str, faults: Faults) -> Any:
     """Return a table whose keys are the fields of a dataclass; the field `from_` holds the key `from`."""
+    n_faults = len(faults)
     names = {name.rstrip("_"): name for name in field_names(schema)}
     if unknown := table.keys() - names:
         faults.append((0, unknown_name_message(f"key in [{path}]" if path else "key", min(unknown), names)))
@@ -106,13 +107,13 @@ def convert_table(table: Mapping[str, Any], schema: Any, path: str, faults: Faul
         for key, name in names.items()
         if name in required and key not in table
     ]
-    types, n_faults = type_hints(schema), len(faults)
+    types = type_hints(schema)
     values = {
         name: convert(table[key], types[name], join_key_path(path, key), faults)
         for key, name in names.items()
         if key in table
     }
-    if faults[n_faults:] or required - values.keys():
+    if len(faults) > n_faults:
         return None
     try:
         return schema(**values)
@@ -127,15 +128,16 @@ def type_hints(schema: Any) -> dict[str, Any]:
 
 
 def find_rule(annotation: Any) -> Rule:
-    """Return the rule of a type, which it is annotated with or which follows from it; None is not considered."""
+    """Return the rule that annotates a type, or that follows from it; an optional type has that of its values."""
     if stated := [item for item in getattr(annotation, "__metadata__", ()) if isinstance(item, Rule)]:
         return stated[0]
     origin, arguments = get_origin(annotation), get_args(annotation)
     if NoneType in arguments:
-        return find_rule(*(one for one in arguments if one is not NoneType))
+        (required,) = (one for one in arguments if one is not NoneType)
+        return find_rule(required)
     if is_dataclass(annotation) or origin in (dict, Mapping):
         return TABLE
-    return ARRAY if origin is tuple else PLAIN[annotation]
+    return LIST if origin is tuple else PLAIN[annotation]
 
 
 def field_names(schema: Any) -> list[str]:

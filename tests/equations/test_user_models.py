@@ -11,6 +11,7 @@ import pytest
 from build_cache import ROOT, build_user_model
 from fmpy import read_model_description, simulate_fmu
 from fmpy.validation import validate_fmu
+from model_text import BLOCK
 from models import EXAMPLE_MODELS, model_class
 from row_comparison import assert_identical
 from scipy.integrate import solve_ivp
@@ -242,21 +243,7 @@ class Duffing(Model):
     a = Output("1/s2", "acceleration", u * (u * (x - x * x * x + 0.5 * cos(phase)) - 0.3 * v), rate_of=v)
     stop_time, method = 250.0, "dop853"
 '''
-LIMIT = '''
-from fmus import Contact, Mode, Model, Output, Parameter, State
-
-class Limit(Model):
-    """Block on a spring, which stops where the spring pulls with the friction force."""
-
-    m = Parameter(1.0, "kg", "mass", above=0.0)
-    k = Parameter(100.0, "N/m", "stiffness of the spring", low=0.0)
-    f = Parameter(2.0, "N", "friction force", low=0.0)
-    x = State("m", "position", start=0.1)
-    v = State("m/s", "speed", rate_of=x)
-    mode = Mode()
-    F_friction = Contact("N", "friction force", mode=mode, slip=v, slide=f)
-    a = Output("m/s2", "acceleration", (-k * x - F_friction) / m, rate_of=v)
-'''
+LIMIT = BLOCK.replace('1.5, "N"', '2.0, "N"')  # it stops where the spring pulls with the friction force
 
 
 @pytest.mark.parametrize(

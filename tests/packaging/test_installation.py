@@ -8,6 +8,7 @@ from math import cos
 import pytest
 from build_cache import ROOT
 from environments import build_wheel, call, install, make_environment
+from model_text import BLOCK
 
 from harness.commands import commands
 
@@ -27,21 +28,6 @@ WORK = {  # by command; all run in one folder, in this order
     "references": ["references block.py"],
     "report": ["report"],
 }
-BLOCK = '''from fmus import Contact, Mode, Model, Output, Parameter, State
-
-class Block(Model):
-    """Block on a spring, with dry friction."""
-
-    f = Parameter(1.5, "N", "dry friction force", low=0.0)
-    m = Parameter(1.0, "kg", "mass", above=0.0)
-    k = Parameter(100.0, "N/m", "stiffness of the spring", low=0.0)
-    x = State("m", "position", start=0.1)
-    v = State("m/s", "speed", rate_of=x)
-    mode = Mode()
-    F_friction = Contact("N", "friction force", mode=mode, slip=v, slide=f)
-    a = Output("m/s2", "acceleration", (-k * x - F_friction) / m, rate_of=v)
-    stop_time = 2.0
-'''
 EXTRAS = {"sweep smd --vary c=1,2": "sweep", "couple two-masses": "coupled", "build --native smd": "native"}
 
 

@@ -28,3 +28,20 @@ class Curve(Model):
     v = State("m/s", "speed", rate_of=x)
     a = Output("m/s2", "acceleration", force(x) / m, rate_of=v)
 '''
+
+# a block that stops within the limit of its friction
+BLOCK = '''from fmus import Contact, Mode, Model, Output, Parameter, State
+
+class Block(Model):
+    """Block on a spring, with dry friction."""
+
+    f = Parameter(1.5, "N", "dry friction force", low=0.0)
+    m = Parameter(1.0, "kg", "mass", above=0.0)
+    k = Parameter(100.0, "N/m", "stiffness of the spring", low=0.0)
+    x = State("m", "position", start=0.1)
+    v = State("m/s", "speed", rate_of=x)
+    mode = Mode()
+    F_friction = Contact("N", "friction force", mode=mode, slip=v, slide=f)
+    a = Output("m/s2", "acceleration", (-k * x - F_friction) / m, rate_of=v)
+    stop_time = 2.0
+'''

@@ -50,9 +50,9 @@ def pair(value: Any) -> tuple[str, str]:
 
 def steps(value: Any) -> tuple[float, ...]:
     """Return at least one number above 0."""
-    if not items(value):
+    if not (numbers := tuple(map(above_zero, items(value)))):
         raise ValueError
-    return tuple(map(above_zero, items(value)))
+    return numbers
 
 
 PAIR = Rule("a list of two distinct names", pair)
