@@ -82,7 +82,7 @@ def read_description(path: Path, lenient: bool = False) -> Any:
 def describe_lenient() -> str:
     """Return how to run an FMU that violates the standard; the Python API has no option for it."""
     in_scene = "lenient = true in a scene"
-    return by_interface(f"use --lenient, or {in_scene}", f"set {in_scene}")
+    return by_interface(f"use --lenient (run, compare, sweep), or {in_scene}", f"set {in_scene}")
 
 
 @cached_by_mtime
