@@ -49,12 +49,13 @@ def test_the_files_of_a_killed_sweep_are_removed_by_its_workers_or_by_the_next_c
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
     )
-    while process.poll() is None and not list(temporary.glob("friction-fmus-child-*")):
+    workers = []  # a worker starts after its files
+    while process.poll() is None and not workers:
         time.sleep(0.01)
+        files = Path(f"/proc/{process.pid}/task").glob("*/children")
+        workers = [worker for file in files for worker in file.read_text().split()]
     assert process.poll() is None
-    files = Path(f"/proc/{process.pid}/task").glob("*/children")
-    workers = [worker for file in files for worker in file.read_text().split()]
-    assert workers
+    assert list(temporary.glob("friction-fmus-child-*"))
     process.kill()
     process.wait()
     while any(map(is_running, workers)):  # they end once their parent is dead
