@@ -1,4 +1,4 @@
-"""Writes the files for users in FMUs of all kinds: documentation page, icon, known boundaries, certified result."""
+"""Writes the files for users in FMUs of all kinds: documentation page, icon, certified result."""
 
 import json
 import re
@@ -202,12 +202,12 @@ def extra_files(
     """Return the content of these files by path in the FMU.
 
     The names of contacts and modes are in resources/contacts.json, the inputs on which the rates of inputs depend in
-    resources/input_rates.json.  Icon (.png), known boundaries (.toml, see
-    harness/studies/sweep) and certified result (.csv) are optional and stand next to the model file at `path`, under
-    the same name.  `icon` is the path of the icon in the FMU; `use` is a paragraph of the page on how to run the FMU.
+    resources/input_rates.json.  Icon (.png) and certified result (.csv) are optional and stand next to the model file
+    at `path`, under the same name.  `icon` is the path of the icon in the FMU; `use` is a paragraph of the page on how
+    to run the FMU.
     """
     tables, rates = analysis.tables, analysis.rate_inputs
-    name, picture, boundaries = path.stem, path.with_suffix(".png"), path.with_suffix(".toml")
+    name, picture = path.stem, path.with_suffix(".png")
     certified = find_certified_result(path, model, declared)
     icon_path = icon if picture.is_file() else ""
     entries = {"documentation/index.html": documentation_page(model, name, declared, certified, tables, icon_path, use)}
@@ -221,6 +221,4 @@ def extra_files(
         entries |= result_files(name, certified, declared)
     if picture.is_file():
         entries[icon] = picture.read_bytes()
-    if boundaries.is_file():
-        entries["documentation/boundaries.toml"] = boundaries.read_bytes()
     return entries

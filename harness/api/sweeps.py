@@ -107,7 +107,7 @@ def sweep(
     Raises
     ------
     HarnessError
-        If xarray or netCDF4 is not installed, or no run can be done.
+        If xarray is not installed, or no run can be done.
     """
     from contextlib import nullcontext
 
@@ -115,12 +115,11 @@ def sweep(
     from ..scenes.fmu_files import find_fmu
     from ..scenes.run_spec import RunSpec
     from ..studies.sweep.labels import list_labels, read_labels, replace_labels
-    from ..studies.sweep.result_files import run_sweep
     from ..studies.sweep.runner import SweepSpec
     from ..studies.sweep.sampling import SweepPoints, axis_from_numbers
+    from ..studies.sweep.study import run_sweep
 
-    for package in ("xarray", "netCDF4"):
-        import_optional(package, "a sweep", "sweep")
+    import_optional("xarray", "a sweep", "sweep")
     if not grid:
         raise SceneError("grid is empty: name at least one parameter and its values, as in {'mu_d': [0.3, 0.6]}")
     if workers is not None and scheduler is not None:

@@ -86,17 +86,16 @@ def sweep(
         refuse_options(context, "without --samples", "seed")
     if scheduler is not None:
         refuse_options(context, "with --scheduler: the cluster has its own workers", "workers")
-    for package in ("xarray", "netCDF4"):  # checked before the runs: they write the results
-        if find_spec(package) is None:
-            raise HarnessError(f"a sweep needs {package}: {install_command('sweep')}")
+    if find_spec("xarray") is None:  # checked before the runs
+        raise HarnessError(f"a sweep needs xarray: {install_command('sweep')}")
     from ..running.resolve import set_rtol
     from ..scenes.assignments import parse_assignments
     from ..scenes.fmu_files import check_built, find_fmu
     from ..scenes.run_spec import RunSpec
     from ..studies.sweep.labels import read_labels, replace_labels_in_text
-    from ..studies.sweep.result_files import run_sweep
     from ..studies.sweep.runner import SweepSpec
     from ..studies.sweep.sampling import SweepPoints, parse_axis
+    from ..studies.sweep.study import run_sweep
 
     refuse_ignored_options(context, [find_fmu(model)], timeout_is_ignored=True)
     measures = tuple(dict.fromkeys(word.strip() for word in measure.split(","))) if measure is not None else ()

@@ -3,6 +3,7 @@
 A worker imports the functions that it calls by their names, so they are defined in modules, not in scripts.
 """
 
+import logging
 import pickle
 import subprocess
 import sys
@@ -24,6 +25,7 @@ from .subprocess_runner import POLL_INTERVAL, kill_process_group, place_temporar
 from .temporary_directory import temporary_directory
 from .worker_process import ERROR, FAILURE, PROGRESS, READY
 
+LOG = logging.getLogger(__name__)
 START_TIMEOUT = 60.0  # s until a process that was started is ready
 EXIT_TIMEOUT = 5.0  # s until a process that closes its standard output has ended
 
@@ -134,7 +136,9 @@ class WorkerProcess:
             died = WorkerDiedError(self.wait(), self.read_output())
             raise died if self.is_ready else WorkerStartError(died)
         kind, content = pickle.loads(reply)
-        self.is_ready |= kind == READY
+        if kind == READY:
+            self.is_ready = True
+            LOG.debug("worker process %d is ready", self.process.pid)
         return (ERROR, WorkerCallError(content, self.read_output())) if kind == FAILURE else (kind, content)
 
     def read_output(self) -> str:

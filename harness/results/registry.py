@@ -123,7 +123,7 @@ STUDIES = (
         "studies.sweep.result:SweepResult",
         ("sweep.nc", "sweep.csv", PICTURE),
         "Sweeps",
-        "Parameter sweeps; known boundaries are dashed.",
+        "Parameter sweeps.",
         (
             "a sweep",
             "sweep stickslip --vary mu_d=0.3:0.9:60 --vary v_driver=0.01:0.1:60 --measures slips",

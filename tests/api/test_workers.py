@@ -1,10 +1,10 @@
 """Worker processes of harness.sweep, in scripts of their own."""
 
 import os
+import re
+import select
 import subprocess
 import sys
-import time
-from pathlib import Path
 
 import commands
 import pytest
@@ -28,38 +28,37 @@ def test_a_script_without_a_main_guard_sweeps_twice_and_leaves_no_files(workspac
     assert list((workspace / "temporary").iterdir()) == []
 
 
-def is_running(process):
-    """Return whether a process has not ended; one that nobody waits for is a zombie."""
-    try:
-        return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
-    except OSError:
-        return False
+SWEEP_WITH_LOG = """
+import logging, sys
+import harness
+
+logging.basicConfig(stream=sys.stdout, format="%(message)s")
+logging.getLogger("harness").setLevel("DEBUG")
+harness.sweep("pacejka", {"x_m": [0.001 + 3e-5 * n for n in range(3000)]}, workers=2)
+"""
 
 
-@pytest.mark.skipif(not Path("/proc/self/task").is_dir(), reason="the system does not list processes as files")
+@pytest.mark.skipif(not hasattr(os, "pidfd_open"), reason="the system cannot wait for the end of a grandchild")
 def test_the_files_of_a_killed_sweep_are_removed_by_its_workers_or_by_the_next_command(workspace):
     temporary = workspace / "temporary"
     temporary.mkdir()
     environment = {"PYTHONPATH": str(ROOT), "TMPDIR": str(temporary)}
-    sweep = ["sweep", "pacejka", "--vary", "x_m=0.001:0.1:3000", "--workers", "2"]
-    process = subprocess.Popen(
-        [sys.executable, "-m", "harness", *sweep],
+    with subprocess.Popen(
+        [sys.executable, "-u", "-c", SWEEP_WITH_LOG],
         cwd=workspace,
         env=os.environ | environment,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-    )
-    workers = []  # a worker starts after its files
-    while process.poll() is None and not workers:
-        time.sleep(0.01)
-        files = Path(f"/proc/{process.pid}/task").glob("*/children")
-        workers = [worker for file in files for worker in file.read_text().split()]
-    assert process.poll() is None
-    assert list(temporary.glob("friction-fmus-child-*"))
-    process.kill()
-    process.wait()
-    while any(map(is_running, workers)):  # they end once their parent is dead
-        time.sleep(0.05)
+        stdout=subprocess.PIPE,
+        text=True,
+    ) as process:
+        try:
+            ready = filter(None, (re.match(r"worker process (\d+) is ready", line) for line in process.stdout))
+            workers = [os.pidfd_open(int(next(ready)[1])) for _ in range(2)]
+            assert list(temporary.glob("friction-fmus-child-*"))
+        finally:
+            process.kill()
+    for worker in workers:  # they end once their parent is dead
+        select.select([worker], [], [])
+        os.close(worker)
     done = commands.run_process(workspace, "run", "smd", **environment)
     assert (done.returncode, done.stderr) == (0, "")
     assert sorted(temporary.iterdir()) == []

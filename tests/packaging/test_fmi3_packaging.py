@@ -236,7 +236,6 @@ def test_the_files_are_those_of_fmi3(fmu, name):
         b"2-Clause BSD License" in content[f"sources/{file}"] for file in FMI_HEADERS["3"]
     )  # the licence is packed
     assert set(content) == {
-        "documentation/boundaries.toml",
         "documentation/index.html",
         "documentation/licenses/license.txt",
         "modelDescription.xml",

@@ -1,8 +1,8 @@
 """The checkpoint of an interrupted sweep: resuming from it, its identity, and damaged ones."""
 
+import json
 import shutil
-import sqlite3
-from contextlib import closing
+from contextlib import contextmanager
 from pathlib import Path
 
 import external_fmus
@@ -11,6 +11,8 @@ import pytest
 
 import harness
 from harness import HarnessError
+from harness.studies.sweep.checkpoint import Checkpoint
+from harness.studies.sweep.result import SweepResult
 
 pytest.importorskip("xarray", reason="the extra 'sweep' is not installed")
 
@@ -67,32 +69,49 @@ def test_an_interrupted_sweep_is_resumed(undisturbed):
     assert [bool(text) for text in undisturbed["error"].to_numpy()] == [mass < 0 for mass in MASSES]
 
 
-def change(file, statement):
-    """Run a statement of SQL on a checkpoint, and return the number of rows that it changed."""
-    with closing(sqlite3.connect(file)) as connection, connection:
-        return connection.execute(statement).rowcount
-
-
 def test_missing_runs_are_found_in_every_part():
     masses = np.linspace(1.0, 2.0, 2100)
     expected = sweep("there", masses=masses)["final_x"].to_numpy()
     file, _ = interrupted("here", 1.0, masses=masses)
-    blocks = "SELECT first FROM blocks ORDER BY first"
-    lost = f"({blocks} LIMIT 1), ({blocks} LIMIT 1 OFFSET 3), ({blocks} DESC LIMIT 1)"
-    assert change(file, f"DELETE FROM blocks WHERE first IN ({lost})") == 3
+    lines = file.read_text().splitlines(keepends=True)
+    assert len(lines) > 4
+    file.write_text("".join(line for i, line in enumerate(lines) if i not in (0, 3, len(lines) - 1)))
     result = sweep("here", masses=masses)
     assert (0 < result.n_resumed < 2100, result.damaged) == (True, False)
     assert np.array_equal(result["final_x"], expected)
 
 
+def edit(text, other):
+    """Return a function that replaces the first `text` in a file."""
+
+    def change(file):
+        content = file.read_text()
+        assert text in content
+        file.write_text(content.replace(text, other, 1))
+
+    return change
+
+
 DAMAGE = {
-    "cut": lambda file: file.write_bytes(file.read_bytes()[:5000]),
-    "of other columns": lambda file: change(file, "UPDATE blocks SET content = zeroblob(length(content) + 8)"),
-    "of more runs": lambda file: change(file, "UPDATE blocks SET first = first + 8"),
-    "with runs twice": lambda file: change(file, "UPDATE blocks SET size = 2, content = zeroblob(48) WHERE first = 0"),
-    "random": lambda file: file.write_bytes(np.random.default_rng(1).bytes(file.stat().st_size)),
-    "with a damaged page": lambda file: file.write_bytes(file.read_bytes()[:4096] + bytes(8192)),
+    "of other columns": edit("[[", "[[0.0, "),
+    "of more columns": edit("[[", "[[0.0, 0.0, 0.0, 0.0], ["),
+    "of more runs": edit("[0, ", "[10, "),
+    "of runs below the first": edit("[0, ", "[-1, "),
+    "with runs twice": lambda file: file.write_text(2 * file.read_text()),
+    "with a text": edit("[[", '[["a", '),
+    "random": lambda file: file.write_bytes(np.random.default_rng(1).bytes(file.stat().st_size) + b"\n"),
+    "no blocks": edit("[0,", "{0,"),
+    "deep": lambda file: file.write_text("[" * 100_000 + "\n"),
 }
+
+
+@pytest.mark.parametrize("cut", [1, 5])
+def test_a_checkpoint_that_is_cut_off_resumes_from_its_complete_blocks(undisturbed, cut):
+    """Of the last block, its line break or more is missing."""
+    file, n_done = interrupted("here")
+    _, last_block, _ = json.loads(file.read_text().splitlines()[-1])
+    file.write_bytes(file.read_bytes()[:-cut])
+    assert_resumed("here", n_done - len(last_block), undisturbed)
 
 
 @pytest.mark.parametrize("damage", DAMAGE.values(), ids=DAMAGE)
@@ -123,7 +142,7 @@ def test_a_checkpoint_that_cannot_be_used_is_reported():
     file, _ = interrupted("here")
     file.unlink()
     file.mkdir()
-    with pytest.raises(HarnessError, match=r"cannot use the checkpoint .*\.checkpoint: unable to open database file$"):
+    with pytest.raises(HarnessError, match=r"cannot use the checkpoint .*\.checkpoint: Is a directory$"):
         sweep("here")
 
 
@@ -141,16 +160,49 @@ def test_a_second_command_with_the_same_sweep_is_refused(undisturbed):
     assert refusals
 
 
-@pytest.mark.parametrize("pages", [2, 12])
-def test_a_full_disk_is_one_sentence(pages, monkeypatch):
-    """At the start of the sweep, and later."""
-    connect = sqlite3.connect
+@contextmanager
+def limited_files(size):
+    """Let the system refuse what exceeds a size of a file in bytes, as it does on a full disk."""
+    resource = pytest.importorskip("resource", reason="the system has no such limit")
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, limits[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
 
-    def connect_on_full_disk(path, **options):
-        connection = connect(path, **options)
-        connection.execute(f"PRAGMA max_page_count = {pages}")
-        return connection
 
-    monkeypatch.setattr(sqlite3, "connect", connect_on_full_disk)
-    with pytest.raises(HarnessError, match=r"^cannot use the checkpoint \S*: database or disk is full$"):
-        sweep("here", masses=np.linspace(1.0, 2.0, 2000))
+@pytest.mark.parametrize("size", [0, 10, 1000])
+def test_a_sweep_on_a_full_disk_ends_in_one_sentence_and_resumes(size, monkeypatch):
+    """The disk is full from the start, within the first block, or later."""
+    masses, add = np.linspace(1.0, 2.0, 200), Checkpoint.add
+    expected = sweep("there", masses=masses).data
+
+    def add_on_full_disk(*arguments):
+        with limited_files(size):
+            add(*arguments)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Checkpoint, "add", add_on_full_disk)
+        with pytest.raises(HarnessError, match=r"^cannot use the checkpoint \S*: File too large$"):
+            sweep("here", masses=masses)
+    result = sweep("here", masses=masses)
+    assert (0 < result.n_resumed < 200) == (size == 1000)
+    assert not result.damaged
+    assert result.data.equals(expected)
+
+
+@pytest.mark.parametrize("size", [1000, 10_000])
+def test_results_that_do_not_fit_on_the_disk_are_one_sentence_and_no_run_is_lost(size, monkeypatch):
+    """The disk is full before the data, or before the table."""
+    masses, write = np.linspace(1.0, 2.0, 200), SweepResult.write
+
+    def write_on_full_disk(*arguments):
+        with limited_files(size):
+            write(*arguments)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(SweepResult, "write", write_on_full_disk)
+        with pytest.raises(HarnessError, match=r"^cannot write \S*: File too large; choose another `folder`$"):
+            sweep("here", masses=masses)
+    assert sweep("here", masses=masses).n_resumed == 200

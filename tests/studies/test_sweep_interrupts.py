@@ -1,15 +1,15 @@
 """Sweeps that are killed or lose their workers."""
 
+import json
+import logging
 import os
+import re
+import select
 import signal
-import sqlite3
 import subprocess
 import sys
-import threading
-import time
-from contextlib import closing
+from contextlib import contextmanager
 from functools import partial
-from pathlib import Path
 from zipfile import ZipFile
 
 import build_cache
@@ -20,6 +20,7 @@ import pytest
 from sweep_results import sweep_folder
 
 from harness import HarnessError, sweep
+from harness.studies.sweep.dispatch import LOG
 
 distributed = pytest.importorskip("distributed", reason="the extra 'cluster' is not installed")
 
@@ -27,8 +28,11 @@ pytestmark = pytest.mark.slow
 
 SWEEP = ("sweep", "stickslip", "--vary", "mu_d=0.3:0.8:100", "--measure", "peak_speed")
 LONG = (*SWEEP, "--workers", "1")
+RUNS = "of 100 runs are finished\n"
 NOTE = """
-import sys
+import logging, sys
+logging.getLogger('harness').addHandler(logging.StreamHandler())
+logging.getLogger('harness').setLevel('DEBUG')
 def note(event, arguments):
     if event in ('socket.bind', 'socket.connect'):
         print(event, type(arguments[1]).__name__, file=open('bound', 'a'))
@@ -63,25 +67,20 @@ def checkpoint_file(folder):
 
 
 def finished_runs(folder):
-    """Return the number of finished runs in the checkpoint, which the sweep may be writing."""
-    path = checkpoint_file(folder)
-    if path is None:
-        return 0
-    with closing(sqlite3.connect(f"{path.as_uri()}?immutable=1", uri=True)) as connection:
-        try:
-            return connection.execute("SELECT total(size) FROM blocks").fetchone()[0]
-        except sqlite3.DatabaseError:
-            return 0
+    """Return the number of finished runs in the checkpoint of a sweep that has ended."""
+    lines = checkpoint_file(folder).read_text().splitlines(keepends=True)
+    return sum(len(json.loads(line)[1]) for line in lines if line.endswith("\n"))
 
 
-def start_sweep(folder):
-    """Start the long sweep in a child process and wait for two more finished runs.
+@contextmanager
+def started_sweep(folder):
+    """Start the long sweep in a child process and wait until two of its runs are finished; kill it at the end.
 
-    Its environment marks its processes, and the file `bound` lists the addresses at which they listen.
+    The file `bound` lists the addresses at which its processes listen.
     """
-    reset_sigint, before = partial(signal.signal, signal.SIGINT, signal.SIG_DFL), finished_runs(folder)
+    reset_sigint = partial(signal.signal, signal.SIGINT, signal.SIG_DFL)
     (folder / "sitecustomize.py").write_text(NOTE)
-    process = subprocess.Popen(
+    with subprocess.Popen(
         [sys.executable, "-m", "harness", *LONG],
         cwd=folder,
         env=os.environ | {"PYTHONPATH": f"{folder}{os.pathsep}{build_cache.ROOT}"},
@@ -89,56 +88,43 @@ def start_sweep(folder):
         text=True,
         start_new_session=True,
         preexec_fn=reset_sigint,  # a test run in the background ignores it
-    )
-    while process.poll() is None:
-        if finished_runs(folder) > before + 1:
-            return process
-        time.sleep(0.02)
-    raise AssertionError(process.communicate()[1])
-
-
-def sweep_processes(folder):
-    """Return the processes of the sweeps started there."""
-    processes, mark = [], f"{folder}{os.pathsep}".encode()
-    for file in Path("/proc").glob("[0-9]*/environ"):
+    ) as process:
         try:
-            processes += [file.parent.name] if mark in file.read_bytes() else []
-        except OSError:  # of another user, or gone
-            continue
-    return processes
+            (worker,) = re.findall(r"worker process (\d+) is ready", next(process.stderr))
+            assert [next(process.stderr).endswith(RUNS) for _ in range(2)] == [True, True]
+            yield process, os.pidfd_open(int(worker))
+        finally:
+            process.kill()
 
 
+@pytest.mark.skipif(not hasattr(os, "pidfd_open"), reason="the system cannot wait for the end of a grandchild")
 def test_a_killed_sweep_resumes_and_leaves_no_worker(harness, undisturbed, tmp_path):
     """A kill reaches only the sweep, Ctrl-C in a terminal also its workers."""
-    process = start_sweep(tmp_path)
-    assert len(sweep_processes(tmp_path)) == 2 or not Path("/proc/self/environ").exists()
-    process.kill()
-    process.communicate(timeout=60)
-    late = time.monotonic() + 60
-    while sweep_processes(tmp_path) and time.monotonic() < late:
-        time.sleep(0.05)
-    assert sweep_processes(tmp_path) == []
+    with started_sweep(tmp_path) as (process, worker):
+        process.kill()
+        process.wait()
+        select.select([worker], [], [])  # returns when the worker has ended
     first = finished_runs(tmp_path)
 
-    process = start_sweep(tmp_path)
-    os.killpg(process.pid, signal.SIGINT)
-    stderr = process.communicate(timeout=60)[1]
-    assert process.returncode == 130
-    assert stderr.startswith("Error: interrupted: ")
-    assert stderr.count("\n") == 1
+    with started_sweep(tmp_path) as (process, worker):
+        os.killpg(process.pid, signal.SIGINT)
+        (error,) = (line for line in process.stderr if not line.endswith(RUNS))
+        select.select([worker], [], [])
+        assert process.wait() == 130
+    assert error.startswith("Error: interrupted: ")
     done_runs = finished_runs(tmp_path)
     assert 0 < first < done_runs < 100
 
     done = harness(*LONG)
     assert (done.returncode, done.stderr) == (0, "")
-    assert f"100 runs, {done_runs:.0f} of them resumed" in done.stdout
+    assert f"100 runs, {done_runs} of them resumed" in done.stdout
     assert files(tmp_path) == undisturbed
     assert checkpoint_file(tmp_path) is None
     bound = tmp_path / "bound"  # workers use pipes; a socket whose address is a file is no port
     assert "tuple" not in (bound.read_text() if bound.exists() else "")
 
 
-def test_a_cluster_with_a_killed_worker_finishes(harness, undisturbed, tmp_path):
+def test_a_cluster_with_a_killed_worker_finishes(harness, undisturbed, tmp_path, caplog):
     """One worker is in this process, the other in a separate one, until the first blocks are finished."""
     words = ("--no-dashboard", "--nthreads", "2", "--no-nanny")
     options = {"processes": False, "n_workers": 1, "threads_per_worker": 2, "dashboard_address": None}
@@ -148,23 +134,25 @@ def test_a_cluster_with_a_killed_worker_finishes(harness, undisturbed, tmp_path)
         pipe = subprocess.PIPE
         with subprocess.Popen(command, cwd=tmp_path, env=environment, stderr=pipe, text=True) as worker:
             next(line for line in worker.stderr if "Registered to" in line)
-            before = []
 
-            def end():
-                while finished_runs(tmp_path) < 2 and worker.poll() is None:
-                    time.sleep(0.02)
-                before.append(finished_runs(tmp_path))
-                worker.kill()
+            kill_times = []
 
-            thread = threading.Thread(target=end)
-            thread.start()
+            def kill_worker(record):
+                n_done, _ = record.args
+                if n_done >= 2:
+                    kill_times.append(n_done)
+                    worker.kill()
+                return True
+
+            caplog.set_level(logging.DEBUG, LOG.name)
+            LOG.addFilter(kill_worker)
             try:
                 done = harness(*SWEEP, "--scheduler", cluster.scheduler_address)
             finally:
+                LOG.removeFilter(kill_worker)
                 worker.kill()
-                thread.join()
     assert (done.returncode, done.stderr) == (0, "")
-    assert 0 < before[0] < 100
+    assert kill_times[0] < 100
     assert files(tmp_path) == undisturbed
 
 

@@ -146,12 +146,11 @@ def run(folder, values):
 if __name__ == "__main__":
     import fmpy
     import matplotlib.figure
-    import netCDF4
     import scipy.integrate
     import scipy.optimize
     import xarray
 
-    IMPORTED = fmpy, matplotlib.figure, netCDF4, scipy.integrate, scipy.optimize, xarray  # once, before the forks
+    IMPORTED = fmpy, matplotlib.figure, scipy.integrate, scipy.optimize, xarray  # once, before the forks
     root, *chosen = sys.argv[1:]
     for result in run(root, chosen or VALUES):
         print(json.dumps(result), flush=True)

@@ -1,47 +1,19 @@
-"""Checkpoint of a sweep: a SQLite database of its finished runs, so that an interrupted sweep can resume.
+"""Finished runs of a sweep, in memory and in a file from which an interrupted sweep resumes.
 
-Blocks of runs are written in one transaction each, so a block that a kill or a loss of power cuts off is not in it.
+The file has a line of JSON for each block of runs: the number of its first run, the values of its runs, and the error
+messages by index in the block. A kill or a full disk may cut off the last line, whose runs are then repeated.
 """
 
-import sqlite3
+import json
 from collections.abc import Iterator
-from contextlib import closing, contextmanager
-from dataclasses import dataclass
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Self
 
 import numpy as np
 
 from ...errors import HarnessError
-
-TABLES = (
-    "CREATE TABLE IF NOT EXISTS blocks (first INTEGER PRIMARY KEY, size INTEGER NOT NULL, content BLOB NOT NULL)",
-    "CREATE TABLE IF NOT EXISTS failures (run INTEGER PRIMARY KEY, message TEXT NOT NULL)",
-)
-
-
-@dataclass(frozen=True)
-class RunBlock:
-    """Block of consecutive runs.
-
-    Attributes
-    ----------
-    first : int
-        Number of the first run.
-    values : numpy.ndarray
-        Values (runs, columns); NaN for failed runs.
-    messages : dict
-        Error messages by index in the block.
-    """
-
-    first: int
-    values: np.ndarray
-    messages: dict[int, str]
-
-    @property
-    def last(self) -> int:
-        """Return the number after that of the last run."""
-        return self.first + len(self.values)
+from ...process.temporary_directory import lock_path
 
 
 class Checkpoint:
@@ -50,113 +22,107 @@ class Checkpoint:
     Parameters
     ----------
     path : pathlib.Path
-        File of the database.
+        File of the finished runs.
     runs, columns : int
         Number of runs, and of values per run.
 
     Attributes
     ----------
-    n_done : int
-        Number of finished and failed runs.
+    values : numpy.ndarray
+        Values (runs, columns); NaN for runs that failed or are not finished.
+    messages : dict
+        Error messages by the number of the run.
+    is_done : numpy.ndarray
+        Whether each run (runs,) is finished.
     damaged : bool
         Whether an existing file was damaged, so that its runs are not used.
     """
 
     def __init__(self, path: Path, runs: int, columns: int) -> None:
-        self.path, self.runs, self.columns = path, runs, columns
-        self.n_done, self.damaged = 0, False
+        self.path, self.shape, self.damaged = path, (runs, columns), False
+        self.clear()
+
+    def clear(self) -> None:
+        """Discard all runs."""
+        self.values = np.full(self.shape, np.nan)
+        self.messages: dict[int, str] = {}
+        self.is_done = np.zeros(self.shape[0], bool)
+
+    @property
+    def n_done(self) -> int:
+        """Return the number of finished and failed runs."""
+        return int(np.count_nonzero(self.is_done))
+
+    @property
+    def missing_spans(self) -> list[tuple[int, int]]:
+        """Return the ranges of runs (first, end) that are not finished."""
+        edges = np.flatnonzero(np.diff(np.concatenate([[0], ~self.is_done, [0]])))
+        return [(int(first), int(end)) for first, end in edges.reshape(-1, 2)]
 
     @contextmanager
     def open(self) -> Iterator[Self]:
-        """Open the database, and lock it until the end; delete it then if no run is done.
+        """Read the finished runs, and lock the file until the end; delete it then if no run is finished.
 
         Raises
         ------
         HarnessError
             If another command has it open, or it cannot be used.
         """
-        with self.convert_errors():
-            self.path.parent.mkdir(parents=True, exist_ok=True)
-            try:
-                self.connection = self.connect()
-            except sqlite3.DatabaseError as error:
-                if isinstance(error, sqlite3.OperationalError):
-                    raise
-                self.damaged = True
-                self.delete()
-                self.connection = self.connect()
-        try:
-            with closing(self.connection):
-                yield self
-        finally:
-            if not self.n_done:
-                self.delete()
-
-    def connect(self) -> sqlite3.Connection:
-        """Return a connection that has locked the database; sqlite3.DatabaseError if its content is damaged."""
-        connection = sqlite3.connect(self.path, timeout=0)
-        try:
-            connection.execute("PRAGMA locking_mode = EXCLUSIVE")
-            connection.execute("BEGIN EXCLUSIVE")
-            for table in TABLES:
-                connection.execute(table)
-            connection.commit()
-            (state,) = connection.execute("PRAGMA quick_check(1)").fetchone()
-            blocks = connection.execute("SELECT first, size, length(content) FROM blocks ORDER BY first").fetchall()
-            end = 0
-            for first, size, length in blocks:
-                if first < end or length != size * self.columns * 8:
-                    state = "invalid blocks"
-                end = first + size
-            if state != "ok" or end > self.runs:
-                raise sqlite3.DatabaseError(state)
-        except BaseException:
-            connection.close()
-            raise
-        self.n_done = sum(size for _, size, _ in blocks)
-        return connection
+        with ExitStack() as resources:
+            with self.convert_errors():
+                self.path.parent.mkdir(parents=True, exist_ok=True)
+                self.file = resources.enter_context(self.path.open("ab", buffering=0))
+                resources.enter_context(lock_path(self.path))
+                resources.callback(self.delete_if_empty)
+                self.read()
+            yield self
 
     @contextmanager
     def convert_errors(self) -> Iterator[None]:
-        """Convert errors of the database and of its file to HarnessError."""
+        """Convert errors of the file to HarnessError."""
         try:
             yield
-        except (OSError, sqlite3.Error) as error:
-            if getattr(error, "sqlite_errorcode", None) == sqlite3.SQLITE_BUSY:
-                raise HarnessError("another command runs this sweep; wait until it has finished") from None
-            reason = error.strerror if isinstance(error, OSError) else error
-            raise HarnessError(f"cannot use the checkpoint {self.path}: {reason}") from None
+        except BlockingIOError:
+            raise HarnessError("another command runs this sweep; wait until it has finished") from None
+        except OSError as error:
+            raise HarnessError(f"cannot use the checkpoint {self.path}: {error.strerror}") from None
 
-    @property
-    def missing_spans(self) -> list[tuple[int, int]]:
-        """Return the ranges of runs (first, end) that are not finished."""
-        spans, end = [], 0
+    def read(self) -> None:
+        """Read the finished runs, and cut off an incomplete last line; empty the file if a line is invalid."""
+        lines = self.path.read_bytes().splitlines(keepends=True)
+        complete = [line for line in lines if line.endswith(b"\n")]
+        try:
+            for line in complete:
+                self.store(*json.loads(line))
+        except (ValueError, TypeError, AttributeError, RecursionError):
+            self.damaged = True
+            self.clear()
+            complete = []
+        self.file.truncate(sum(map(len, complete)))
+
+    def store(self, first: int, values: list[list[float]], messages: dict[str, str]) -> None:
+        """Store a block of runs in memory; ValueError if it does not fit."""
+        end, (runs, columns) = first + len(values), self.shape
+        block = np.array(values, float)
+        if not 0 <= first < end <= runs or block.shape != (end - first, columns) or self.is_done[first:end].any():
+            raise ValueError("the block does not fit")
+        self.values[first:end], self.is_done[first:end] = block, True
+        self.messages |= {first + int(index): message for index, message in messages.items()}
+
+    def add(self, first: int, values: np.ndarray, messages: dict[int, str]) -> None:
+        """Append a block of runs to the file, and store it in memory."""
+        block = first, values.tolist(), {str(index): message for index, message in messages.items()}
+        line = memoryview(f"{json.dumps(block)}\n".encode())
         with self.convert_errors():
-            for first, size in self.connection.execute("SELECT first, size FROM blocks ORDER BY first"):
-                spans += [(end, first)] if first > end else []
-                end = first + size
-        return spans + ([(end, self.runs)] if end < self.runs else [])
-
-    def add(self, block: RunBlock) -> None:
-        """Write the runs of a block."""
-        content = np.ascontiguousarray(block.values, "<f8").tobytes()
-        failures = [(block.first + index, message) for index, message in block.messages.items()]
-        with self.convert_errors(), self.connection:
-            self.connection.execute("INSERT INTO blocks VALUES (?, ?, ?)", (block.first, len(block.values), content))
-            self.connection.executemany("INSERT INTO failures VALUES (?, ?)", failures)
-        self.n_done += len(block.values)
-
-    def blocks(self) -> Iterator[RunBlock]:
-        """Yield all runs in order."""
-        with self.convert_errors():
-            for first, size, content in self.connection.execute("SELECT * FROM blocks ORDER BY first"):
-                failures = self.connection.execute(
-                    "SELECT run, message FROM failures WHERE run >= ? AND run < ?", (first, first + size)
-                )
-                values = np.frombuffer(content, "<f8").reshape(size, self.columns)
-                yield RunBlock(first, values, {run - first: message for run, message in failures})
+            while line:  # a disk that gets full takes a part of it, and refuses the rest
+                line = line[self.file.write(line) :]
+        self.store(*block)
 
     def delete(self) -> None:
-        """Delete the closed database, and the journal that a killed command may have left."""
-        for path in (self.path, self.path.with_name(f"{self.path.name}-journal")):
-            path.unlink(missing_ok=True)
+        """Delete the file."""
+        self.path.unlink(missing_ok=True)
+
+    def delete_if_empty(self) -> None:
+        """Delete the file if no run is finished."""
+        if not self.n_done:
+            self.delete()

@@ -5,7 +5,7 @@ logarithmically or span decades. Very many runs are thinned evenly.
 """
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import partial
 
 import matplotlib
@@ -14,18 +14,14 @@ import xarray
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 
-from ...results.style import BLUE, GREEN, HEIGHT, ORANGE, WIDTH, Figure, axis_label, set_size
+from ...results.style import BLUE, HEIGHT, WIDTH, Figure, axis_label, set_size
 from ...running.fmu_tables import LookupTable, parse_table
 from ...running.plot import draw_table
-from .boundaries import Boundary
 
 FAILED_COLOUR = "#bbbbbb"
-BOUNDARY_COLOURS = (ORANGE, "#CC79A7", GREEN)  # colours of known boundaries
-HATCHES = ("//", "\\\\", "..")  # hatches of the region below
 LOG_RATIO = 100.0  # ratio of largest to smallest value from which an axis is logarithmic
 MAX_POINTS = 20_000  # runs drawn in curves and scatter plots
 MAX_CELLS = 300  # cells along each side of a map
-FINE_POINTS = 401  # points along an axis at which boundaries are evaluated
 MAX_CURVES = 20  # drawn of a lookup table
 
 
@@ -37,7 +33,7 @@ def thin_out(dataset: xarray.Dataset) -> xarray.Dataset:
     return measures.isel({name: slice(None, None, -(-size // limit)) for name, size in measures.sizes.items()}).load()
 
 
-def draw(data: xarray.Dataset, figure: Figure, boundaries: Sequence[Boundary], failed: int) -> None:
+def draw(data: xarray.Dataset, figure: Figure, failed: int) -> None:
     """Draw the figure: panels of the measures, over each parameter in scatter plots, and one of each varied table."""
     measures, varied = [str(name) for name in data.data_vars], [str(name) for name in data.coords]
     scattered, tables = is_scattered(data), tables_of(data)
@@ -49,7 +45,7 @@ def draw(data: xarray.Dataset, figure: Figure, boundaries: Sequence[Boundary], f
         ]
     else:
         n_columns = 1 if len(measures) == 1 and not tables else 2
-        draw_panel = [partial(draw_measure, data=data, measure=measure, boundaries=boundaries) for measure in measures]
+        draw_panel = [partial(draw_measure, data=data, measure=measure) for measure in measures]
     draw_panel += [partial(draw_curves, data=data, table=table) for table in tables]
     n_rows = -(-len(draw_panel) // n_columns)
     height = HEIGHT * (1.2 if scattered or len(varied) == 1 else 1.7)
@@ -95,12 +91,12 @@ def is_scattered(data: xarray.Dataset) -> bool:
     return "run" in data.dims or len(data.coords) > 2
 
 
-def draw_measure(axes: Axes, data: xarray.Dataset, measure: str, boundaries: Sequence[Boundary]) -> None:
+def draw_measure(axes: Axes, data: xarray.Dataset, measure: str) -> None:
     """Draw one measure over the first parameter, or over both."""
     if is_scattered(data):
         plot_scatter(axes, data, measure, str(next(iter(data.coords))))
     else:
-        (plot_curve if len(data.coords) == 1 else draw_map)(axes, data, measure, boundaries)
+        (plot_curve if len(data.coords) == 1 else draw_map)(axes, data, measure)
 
 
 def label_axes(axes: Axes, data: xarray.Dataset, x_name: str, y_name: str) -> None:
@@ -127,35 +123,16 @@ def axis_scale(data: xarray.Dataset, name: str) -> str:
     return "log" if decades or data[name].attrs.get("scale") == "log" else "linear"
 
 
-def sampled_range(data: xarray.Dataset, name: str) -> np.ndarray:
-    """Return a fine grid over the range of a parameter."""
-    low, high = float(data[name].min()), float(data[name].max())
-    return (
-        np.geomspace(low, high, FINE_POINTS) if axis_scale(data, name) == "log" else np.linspace(low, high, FINE_POINTS)
-    )
-
-
-def plot_curve(axes: Axes, data: xarray.Dataset, measure: str, boundaries: Sequence[Boundary]) -> None:
+def plot_curve(axes: Axes, data: xarray.Dataset, measure: str) -> None:
     """Plot a measure over one parameter; failed runs are gaps."""
     (name,) = map(str, data.dims)
     axes.plot(data[name], data[measure], color=BLUE, marker="." if data.sizes[name] < 100 else None)
     label_axes(axes, data, name, measure)
-    values = sampled_range(data, name)
-    for boundary, color in zip(boundaries, BOUNDARY_COLOURS, strict=False):
-        below = quantity(boundary, data, {name: values}) < 1
-        for at in values[1:][np.diff(below)]:
-            axes.axvline(at, color=color, linestyle="--", label=boundary.text)
-        if below.any() and not below.all():
-            shade = axes.fill_between(values, 0, 1, below, transform=axes.get_xaxis_transform(), label=boundary.below)
-            shade.set(color=color, alpha=0.15)
     axes.set_title(data[measure].attrs["long_name"])
 
 
-def draw_map(axes: Axes, data: xarray.Dataset, measure: str, boundaries: Sequence[Boundary]) -> None:
-    """Plot a measure over two parameters.
-
-    Failed runs are grey, known boundaries are dashed, and the regions below them are hatched.
-    """
+def draw_map(axes: Axes, data: xarray.Dataset, measure: str) -> None:
+    """Plot a measure over two parameters; failed runs are grey."""
     x_name, y_name = map(str, data.dims)
     axes.set_facecolor(FAILED_COLOUR)
     image = axes.pcolormesh(
@@ -166,17 +143,6 @@ def draw_map(axes: Axes, data: xarray.Dataset, measure: str, boundaries: Sequenc
         norm=axis_scale(data, measure),
     )
     axes.figure.colorbar(image, ax=axes, label=label_with_unit(data, measure))
-    plane = dict(
-        zip((x_name, y_name), np.meshgrid(sampled_range(data, x_name), sampled_range(data, y_name)), strict=True)
-    )
-    for boundary, color, hatch in zip(boundaries, BOUNDARY_COLOURS, HATCHES, strict=False):
-        values = quantity(boundary, data, plane)
-        if np.nanmin(values) < 1 < np.nanmax(values):
-            axes.contour(*plane.values(), values, levels=[1.0], colors=color, linestyles="--")
-            shade = axes.contourf(*plane.values(), values, levels=[-np.inf, 1.0], colors="none", hatches=[hatch])
-            shade.set_edgecolor(color)
-            axes.plot([], [], color=color, linestyle="--", label=boundary.text)
-            axes.fill([], [], facecolor="none", edgecolor=color, hatch=hatch, linewidth=0, label=boundary.below)
     label_axes(axes, data, x_name, y_name)
     axes.grid(visible=False)
     axes.set_title(data[measure].attrs["long_name"])
@@ -187,10 +153,3 @@ def plot_scatter(axes: Axes, data: xarray.Dataset, measure: str, name: str) -> N
     positions = data[name].broadcast_like(data[measure]).to_numpy()
     axes.plot(positions.ravel(), data[measure].to_numpy().ravel(), ".", color=BLUE, markersize=3, alpha=0.6)
     label_axes(axes, data, name, measure)
-
-
-def quantity(boundary: Boundary, data: xarray.Dataset, varied: dict[str, np.ndarray]) -> np.ndarray:
-    """Evaluate a boundary for arrays of the varied parameters, all of one shape."""
-    (shape,) = {values.shape for values in varied.values()}
-    constants = json.loads(data.attrs["parameters"])
-    return np.broadcast_to(boundary.evaluate(constants | varied, float(data.attrs["stop_time"])), shape)

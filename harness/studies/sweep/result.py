@@ -1,11 +1,8 @@
 """A finished sweep with its data, its figure and what the command prints."""
 
-import csv
 from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from shutil import copy
 from typing import TYPE_CHECKING, Any, Self
 
 from ...errors import HarnessError, SceneError, check_names, first_line, import_optional
@@ -13,9 +10,7 @@ from ...results.files import column_heading
 from ...results.provenance import load_provenance
 from ...results.registry import find_study
 from ...results.result import Result
-from ...results.stored_data import DATA_FILE
 from ...results.summary import Summary
-from .boundaries import Boundary
 
 if TYPE_CHECKING:
     import pandas
@@ -70,8 +65,6 @@ class SweepResult(Result):
         Failed runs by kind, most frequent first.
     seconds : float
         Run time of the new runs in s.
-    boundaries : tuple of Boundary
-        Known boundaries in the parameter space.
     columns : str
         The varied parameters and the measures, with their units.
     """
@@ -85,7 +78,6 @@ class SweepResult(Result):
     damaged: bool
     failures: tuple[FailureGroup, ...]
     seconds: float
-    boundaries: tuple[Boundary, ...] = ()
     columns: str = ""
     dataset: Any = field(default=None, init=False)
 
@@ -95,42 +87,21 @@ class SweepResult(Result):
 
     @classmethod
     def load(cls, folder: Path) -> Self:
-        if (folder / DATA_FILE).is_file():
-            result = super().load(folder)
-            result.folder = folder
-            result.data  # noqa: B018 - reports a damaged file
-            return result
-        result = cls(folder.name, 0, folder, 0, False, (), 0.0)  # of an earlier version
-        messages = result.data["error"].to_numpy().ravel()
-        failed = [message for message in messages.tolist() if message]
-        result.runs = len(messages)
-        result.failures = (FailureGroup(len(failed), failed[0], {}),) if failed else ()
+        result = super().load(folder)
+        result.folder = folder
+        library = import_optional("xarray", "to read a sweep", "sweep")
+        try:
+            with library.open_dataset(folder / DATASET_FILE, engine="scipy") as stored:
+                result.dataset = stored.load()
+        except (OSError, ValueError) as error:
+            raise SceneError(f"{folder / DATASET_FILE} cannot be read: {first_line(error)}") from None
         return result
 
     @property
     def data(self) -> "xarray.Dataset":
         """The values: a dimension for each varied parameter (``run`` for samples) and a variable for each measure."""
-        if self.dataset is None:
-            with self.open() as stored:
-                self.dataset = stored.load()
         dataset: xarray.Dataset = self.dataset
         return dataset
-
-    @contextmanager
-    def open(self, **options: Any) -> "Iterator[xarray.Dataset]":
-        """Open the values, whose parts are read when they are needed."""
-        library = import_optional("xarray", "to read a sweep", "sweep")
-        if self.dataset is not None:
-            yield self.dataset
-            return
-        assert self.folder is not None  # set as long as there is no dataset
-        file = self.folder / DATASET_FILE
-        try:
-            dataset = library.open_dataset(file, **options)
-        except (OSError, ValueError) as error:
-            raise SceneError(f"{file} cannot be read: {first_line(error)}") from None
-        with dataset:
-            yield dataset
 
     @property
     def title(self) -> str:
@@ -207,34 +178,23 @@ class SweepResult(Result):
         return {"files": (), "scene": old.get("scene"), "source": self.name}
 
     def write_tables(self, folder: Path) -> None:
-        """Write, or copy, the values for xarray and as CSV."""
-        if self.folder is not None and all((self.folder / name).is_file() for name in (DATASET_FILE, TABLE_FILE)):
-            if self.folder != folder:
-                for name in (DATASET_FILE, TABLE_FILE):
-                    copy(self.folder / name, folder)
-            return
-        data = self.data
-        data.to_netcdf(folder / DATASET_FILE, engine="netcdf4", format="NETCDF3_64BIT")
-        units = {str(name): str(variable.attrs.get("units", "1")) for name, variable in data.variables.items()}
-        names = [*map(str, data.coords), *map(str, data.data_vars)]
-        values = data.to_dataframe().reset_index()[names].astype(object)
-        with (folder / TABLE_FILE).open("w", encoding="utf-8", newline="") as text:
-            table = csv.writer(text, lineterminator="\n")
-            table.writerow([column_heading(name, "" if units[name] == "1" else units[name]) for name in names])
-            table.writerows([None if cell != cell else cell for cell in row] for row in values.to_numpy())
+        """Write the values for xarray and as CSV."""
+        self.data.to_netcdf(folder / DATASET_FILE, engine="scipy", format="NETCDF3_64BIT")
+        names = [*map(str, self.data.coords), *map(str, self.data.data_vars)]
+        units = {name: self.data[name].attrs.get("units", "1") for name in names}
+        frame = self.data.to_dataframe().reset_index()[names]
+        frame.columns = [column_heading(name, "" if units[name] == "1" else units[name]) for name in names]
+        frame.to_csv(folder / TABLE_FILE, index=False, lineterminator="\n")
 
     def draw(self, figure: "Figure") -> None:
         from .figure import draw, thin_out
 
-        with self.open(engine="scipy", drop_variables="error") as dataset:
-            data = thin_out(dataset)
-        if not data.data_vars:
+        if not self.data.drop_vars("error").data_vars:
             raise HarnessError(f"{self.name} has no measures to draw")
-        draw(data, figure, self.boundaries, self.failed)
+        draw(thin_out(self.data), figure, self.failed)
 
     def draw_panel(self, axes: "Axes") -> None:
         from .figure import draw_measure, thin_out
 
-        with self.open(engine="scipy", drop_variables="error") as dataset:
-            data = thin_out(dataset)
-        draw_measure(axes, data, str(next(iter(data.data_vars))), self.boundaries)
+        data = thin_out(self.data)
+        draw_measure(axes, data, str(next(iter(data.data_vars))))

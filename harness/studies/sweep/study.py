@@ -1,201 +1,206 @@
-"""Runs of a sweep: one FMU, many points, many workers, and a checkpoint that survives a kill.
+"""Study that runs a sweep and writes its result folder.
 
-Every finished block of runs is written to the checkpoint, so that the same command resumes an interrupted sweep.
-Results do not depend on the worker or the order of execution, and only the blocks in progress are held in memory.  A
-run that kills its worker is located by bisection and reported.
+The data are an xarray.Dataset, stored as sweep.nc and, with the same content, as sweep.csv:
+
+    <parameter>     values of a varied parameter: a dimension on a grid, over `run` in a sample; units, long_name, scale
+    <measure>       one number per run, NaN if the run failed or has no such value; units, long_name
+    error           error message of a failed run, otherwise empty
+    title, model    title and FMU; fmu_sha256 is its digest
+    parameters      JSON with the values of all other parameters, in the units of the FMU
+    stop_time       stop time of every run in s
+    sample          grid, or kind of sample and seed
+    tables          JSON of the lookup tables with varied values; only if there are some
 """
 
 import json
-from collections.abc import Callable, Collection, Iterator
-from concurrent.futures import Future
-from contextlib import contextmanager
-from dataclasses import asdict, dataclass
-from functools import cached_property
-from hashlib import sha256
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
-from time import perf_counter
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...errors import HarnessError
-from ...process.interrupt import RECEIVED_SIGNALS, CommandInterruptedError, check_interrupt
-from ...process.worker import WorkerPool
-from .checkpoint import Checkpoint, RunBlock
-from .cluster import DaskCluster, connect_cluster
-from .runner import SweepSpec
+from ...errors import HarnessError, SceneError, check_names, import_optional
+from ...results.files import column_heading
+from ...results.folder import replace_folder
+from ...results.provenance import describe_sources, write_provenance
+from ...results.summary import write_summary
+from ...running.fmu_archive import read_description
+from ...running.fmu_tables import LookupTable, read_tables_with
+from ...running.variable_values import REAL_TYPES, variable_unit
+from ...scenes.fmu_files import check_built
+from .checkpoint import Checkpoint
+from .dispatch import Sweep, run_pending
+from .labels import describe_labels
+from .measures import MeasureColumn
+from .result import STUDY, FailureGroup, SweepResult
+from .runner import SweepSpec, open_runner
 from .sampling import SweepPoints
-from .worker import BlockResult, run_block, unload
 
-MAX_BLOCK_SIZE = 10_000  # runs
-BLOCK_TIME = 0.5  # target run time of a block in s
-SHARES = 4  # minimum number of blocks per worker, to balance the load
-MAX_DEATHS = 200
-WORKER_DIED = "the process died in this run"
+if TYPE_CHECKING:
+    import xarray
 
-Span = tuple[int, int]  # range of runs: first, and one after the last
+NOT_NUMBERS = ("String", "Binary", "Clock")
+ERROR_TEXT = "error message of a failed run, otherwise empty"
+NUMBER = re.compile(r"-?\b\d+\.?\d*(e[-+]?\d+)?")
 
 
 @dataclass(frozen=True)
-class Sweep:
-    """A sweep: the settings of its `runs`, its `points`, the content of the FMU, and the number of `columns`."""
+class SweepDescription:
+    """Data of the FMU for a sweep.
 
-    runs: SweepSpec
-    points: SweepPoints
-    fmu: bytes
-    columns: int
+    Attributes
+    ----------
+    varied : dict
+        Unit and description of each varied parameter.
+    columns : tuple of MeasureColumn
+        Measured columns.
+    constants : dict
+        Value and unit of the other parameters.
+    stop : float
+        Stop time in s.
+    tables : tuple of LookupTable
+        Lookup tables with varied values; the others are those of the runs.
+    """
 
-    @cached_property
-    def digest(self) -> str:
-        """Return the SHA-256 of the FMU in hexadecimal."""
-        return sha256(self.fmu).hexdigest()
+    varied: dict[str, tuple[str, str]]
+    columns: tuple[MeasureColumn, ...]
+    constants: dict[str, tuple[object, str]]
+    stop: float
+    tables: tuple[LookupTable, ...] = ()
 
-    @cached_property
-    def key(self) -> str:
-        """Return a key that identifies the sweep."""
-        run = self.runs.run.options | {"model": self.runs.run.model}  # the folder of the FMU does not matter
-        identity = [run, self.runs.varied, self.runs.measures, asdict(self.points), self.digest]
-        return sha256(json.dumps(identity, sort_keys=True).encode()).hexdigest()[:16]
-
-    def checkpoint(self, folder: Path) -> Checkpoint:
-        return Checkpoint(folder / f".{self.key}.checkpoint", len(self.points), self.columns)
-
-
-def run_pending(
-    sweep: Sweep, checkpoint: Checkpoint, scheduler: str | None, workers: int | None, report: Callable[[float], None]
-) -> float:
-    """Do the missing runs and write them to the checkpoint; return the elapsed time in s."""
-    start = perf_counter()
-    pending = checkpoint.missing_spans
-    if not pending:
-        return 0.0
-    try:
-        with open_workers(scheduler, workers, sum(last - first for first, last in pending)) as pool:
-            for block in Dispatcher(sweep, pool, pending).completed_blocks():
-                checkpoint.add(block)
-                report(checkpoint.n_done / len(sweep.points))
-    except BaseException as error:  # an interrupt may cause any exception
-        if not (RECEIVED_SIGNALS or isinstance(error, KeyboardInterrupt)):
-            raise
-        state = f"{checkpoint.n_done} of {len(sweep.points)} runs are finished"
-        raise CommandInterruptedError(f"interrupted: {state}; repeat the command to resume") from None
-    return perf_counter() - start
+    @property
+    def headings(self) -> list[str]:
+        """Return the headings of the varied parameters and of the columns, with units."""
+        units = {name: unit for name, (unit, _) in self.varied.items()}
+        units |= {column.name: column.unit for column in self.columns}
+        return [column_heading(name, "" if unit == "1" else unit) for name, unit in units.items()]
 
 
-class InProcess:
-    """Runs tasks at once in this process, for callers without worker processes."""
-
-    size = 1
-    death_errors: tuple[type[Exception], ...] = ()
-
-    def submit(self, function: Callable[..., Any], *arguments: Any) -> Future[Any]:
-        """Call function(*arguments) and return its result as a finished future."""
-        future: Future[Any] = Future()
-        try:
-            future.set_result(function(*arguments))
-        except Exception as error:
-            future.set_exception(error)
-        return future
-
-    def wait_for_any(self, futures: Collection[Future[Any]]) -> set[Future[Any]]:
-        """Return the futures that are done, which are all."""
-        return set(futures)
-
-
-@contextmanager
-def open_workers(
-    scheduler: str | None, workers: int | None, runs: int
-) -> Iterator[WorkerPool | DaskCluster | InProcess]:
-    """Open the workers: processes on this machine, or the cluster of a scheduler."""
-    if scheduler is not None:
-        with connect_cluster(scheduler, unload) as connection:
-            yield connection
-        return
-    if workers is None:
-        try:
-            yield InProcess()
-        finally:
-            unload()
-        return
-    with WorkerPool(min(workers, runs)) as pool:
-        yield pool
-
-
-class Dispatcher:
-    """Distributes the runs of a sweep to workers, in blocks that grow until each takes half a second."""
-
-    def __init__(self, sweep: Sweep, workers: WorkerPool | DaskCluster | InProcess, pending: list[Span]) -> None:
-        self.sweep, self.workers, self.pending = sweep, workers, pending[::-1]
-        self.size = 1
-        self.running: dict[Future[BlockResult | None], Span] = {}
-        self.suspects: list[Span] = []  # blocks in which a worker died
-        self.is_isolated = False  # whether a suspect runs, with no other block
-        self.deaths = 0
-
-    def completed_blocks(self) -> Iterator[RunBlock]:
-        """Yield blocks as workers finish them."""
-        while self.pending or self.suspects or self.running:
-            check_interrupt()
-            self.dispatch()
-            for future in self.workers.wait_for_any(self.running):
-                yield from self.handle_result(future, self.running.pop(future))
-
-    def dispatch(self) -> None:
-        """Keep every worker busy, with one block in reserve."""
-        while not self.is_isolated and len(self.running) < 2 * max(1, self.workers.size):
-            if self.suspects and not self.running:
-                self.is_isolated = True
-                self.submit_block(self.suspects.pop())
-            elif self.pending and not self.suspects:
-                self.submit_block(self.next_span())
-            else:
-                return
-
-    def next_span(self) -> Span:
-        """Return the next block of the remaining runs."""
-        first, last = self.pending.pop()
-        share = sum(last - first for first, last in [*self.pending, (first, last)]) // (
-            SHARES * max(1, self.workers.size)
+def run_sweep(
+    runs: SweepSpec,
+    points: SweepPoints,
+    name: str | None,
+    out: Path,
+    scheduler: str | None,
+    workers: int | None,
+    report: Callable[[float], None],
+) -> SweepResult:
+    """Run the sweep and write its files to out/sweep/<name>."""
+    file = runs.run.fmu
+    check_built(file)
+    about = describe(runs, points)
+    sweep = Sweep(runs, points, file.read_bytes(), len(about.columns))
+    folder = out / STUDY.name / (name or "-".join((runs.run.model, *runs.varied, sweep.key[:8])))
+    source = describe_sources(str(file))
+    options = runs.run.options | {
+        "vary": {axis.name: str(axis) for axis in points.axes},
+        "random": points.random,
+        "seed": points.seed,
+        "measures": runs.measures,
+    }
+    checkpoint = sweep.checkpoint(out / STUDY.name)
+    # opened before the runs, so that conflicts are reported at once
+    with checkpoint.open(), replace_folder(folder, STUDY.files, source) as new_folder:
+        n_resumed = checkpoint.n_done
+        seconds = run_pending(sweep, checkpoint, scheduler, workers, report)
+        result = SweepResult(
+            folder.name,
+            len(points),
+            new_folder,
+            n_resumed,
+            checkpoint.damaged,
+            group_failures(sweep, checkpoint.messages),
+            seconds,
+            ", ".join(about.headings),
         )
-        end = min(last, first + max(1, min(self.size, share)))
-        if end < last:
-            self.pending.append((end, last))
-        return first, end
+        result.dataset = build_dataset(sweep, checkpoint, about)
+        result.write(new_folder)
+        write_provenance(new_folder, [file], about.constants, options, source=source)
+        write_summary(new_folder, result.summary())
+    checkpoint.delete()
+    result.folder = folder
+    return result
 
-    def submit_block(self, span: Span, fmu: bytes = b"") -> None:
-        sweep = self.sweep
-        self.running[self.workers.submit(run_block, sweep.points.coordinates(*span), sweep.runs, sweep.digest, fmu)] = (
-            span
-        )
 
-    def handle_result(self, future: "Future[BlockResult | None]", span: Span) -> Iterator[RunBlock]:
-        """Handle a finished block, or the death of its worker."""
-        first, last = span
-        try:
-            result = future.result()
-        except self.workers.death_errors:
-            if self.is_isolated and last - first == 1:
-                self.requeue([])
-                yield RunBlock(first, np.full((1, self.sweep.columns), np.nan), {0: WORKER_DIED})
-            else:
-                middle = (first + last) // 2
-                self.requeue([(first, middle), (middle, last)] if self.is_isolated else [span])
-        except HarnessError:
-            raise
-        except Exception as error:  # such as a missing package or lack of memory
-            raise HarnessError(f"a worker failed: {type(error).__name__}: {error}") from None
+def describe(runs: SweepSpec, points: SweepPoints) -> SweepDescription:
+    """Return the data of the FMU for a sweep; SceneError if the sweep is invalid.
+
+    Up to three test runs detect problems before workers are started.
+    """
+    fmu_description = read_description(runs.run.fmu, runs.run.lenient)
+    variables = {variable.name: variable for variable in fmu_description.modelVariables}
+    settable = [name for name, variable in variables.items() if is_settable(variable)]
+    check_names("parameter to vary", runs.varied, settable)
+    for axis in points.axes:
+        if axis.name in runs.run.values:
+            raise SceneError(f"{axis.name} is both varied and set; remove one of them")
+        if variables[axis.name].type not in REAL_TYPES and any(value % 1 for value in axis.values):
+            raise SceneError(f"{axis.name} is an enumeration; vary it over integers or labels, as in {axis.name}=1,2")
+    with open_runner(runs) as runner:
+        for number in (len(points) - 1, len(points) // 2, 0):
+            (point,) = points.coordinates(number, number + 1).tolist()
+            measures = runner.run(point)
+            if not isinstance(measures, str):
+                break
         else:
-            if result is None:
-                self.submit_block(span, self.sweep.fmu)
-                return
-            self.is_isolated = False
-            elapsed = max(result.seconds, 1e-9)
-            self.size = max(1, min(MAX_BLOCK_SIZE, 10 * self.size, round((last - first) / elapsed * BLOCK_TIME)))
-            yield RunBlock(first, result.values, result.messages)
+            raise HarnessError(f"three test runs of the sweep failed: {measures}")
+        constants = {name: value for name, value in runner.constants().items() if name not in runs.varied}
+        texts = {
+            name: f"{variables[name].description or name}{describe_labels(variables[name])}" for name in runs.varied
+        }
+        varied = {name: (variable_unit(variables[name]), text) for name, text in texts.items()}
+        tables = read_tables_with(runs.run.fmu, runs.varied, runs.run.values)
+        return SweepDescription(varied, runner.columns, constants, runner.stop, tables)
 
-    def requeue(self, spans: list[Span]) -> None:
-        """Put the blocks of a dead worker back into the queue."""
-        self.is_isolated, self.deaths = False, self.deaths + 1
-        if self.deaths > MAX_DEATHS:
-            raise HarnessError(f"workers died {self.deaths} times; repeat the command to resume")
-        self.suspects += spans
+
+def is_settable(variable: Any) -> bool:
+    """Return whether a numeric start value of the variable can be set."""
+    return variable.causality in ("parameter", "input") and variable.type not in NOT_NUMBERS and not variable.dimensions
+
+
+def build_dataset(sweep: Sweep, checkpoint: Checkpoint, about: SweepDescription) -> "xarray.Dataset":
+    """Return the values and error messages of all runs."""
+    library = import_optional("xarray", "a sweep", "sweep")
+    points, names = sweep.points, sweep.runs.varied
+    is_grid = points.random is None
+    dimensions = names if is_grid else ("run",)
+    shape = tuple(len(axis.values) for axis in points.axes) if is_grid else (len(points),)
+    coordinates = {}
+    for i, axis in enumerate(points.axes):
+        unit, text = about.varied[axis.name]
+        attributes = {"units": unit or "1", "long_name": text, "scale": "log" if axis.log else "linear"}
+        values = np.array(axis.values) if is_grid else points.sample[:, i]
+        coordinates[axis.name] = (axis.name if is_grid else "run", values, attributes)
+    errors = np.full(len(points), "", object)
+    errors[[*checkpoint.messages]] = [*checkpoint.messages.values()]
+    variables: dict[str, Any] = {
+        column.name: (dimensions, values.reshape(shape), {"units": column.unit or "1", "long_name": column.text})
+        for column, values in zip(about.columns, checkpoint.values.T, strict=True)
+    }
+    variables["error"] = (dimensions, errors.reshape(shape), {"long_name": ERROR_TEXT})
+    about_sweep: dict[str, Any] = {
+        "title": f"{sweep.runs.run.model} over {', '.join(names)}",
+        "model": sweep.runs.run.model,
+        "fmu_sha256": sweep.digest,
+        "stop_time": about.stop,
+        "parameters": json.dumps({name: value for name, (value, _) in about.constants.items()}, sort_keys=True),
+        "sample": "grid" if is_grid else f"Latin hypercube, seed {points.seed}",
+    }
+    if about.tables:
+        about_sweep["tables"] = json.dumps([vars(table) for table in about.tables])
+    data: xarray.Dataset = library.Dataset(variables, coordinates, about_sweep)
+    return data
+
+
+def group_failures(sweep: Sweep, messages: dict[int, str]) -> tuple[FailureGroup, ...]:
+    """Return the failures whose messages are equal except for numbers, most frequent first."""
+    groups: dict[str, list[int]] = {}
+    for run in sorted(messages):
+        groups.setdefault(NUMBER.sub("#", messages[run]), []).append(run)
+    failures = []
+    for runs in sorted(groups.values(), key=len, reverse=True):
+        (point,) = sweep.points.coordinates(runs[0], runs[0] + 1).tolist()
+        failures.append(FailureGroup(len(runs), messages[runs[0]], dict(zip(sweep.runs.varied, point, strict=True))))
+    return tuple(failures)
