@@ -21,6 +21,7 @@ if __name__ == "__main__":
     run_command(load_command, Path(sys.argv[0]).name)
     sys.exit()
 
+import logging
 import os
 import tempfile
 from collections.abc import Iterator
@@ -36,6 +37,7 @@ from fmus.packaging.lowering import LAWS, METHODS
 from fmus.packaging.model_lookup import find_model, model_names, more_model_names
 from harness.process.temporary_directory import temporary_directory
 
+LOG = logging.getLogger("fmus.build")
 HERE = Path(__file__).parent
 SCENES = HERE / "harness" / "scenes"
 # an installed package builds into the current folder
@@ -173,6 +175,7 @@ def main(
         return
     for model, source in sources.items():
         folder = out or default_folder(model, source) / subfolder
+        LOG.debug("the build of %s starts", model)
         try:
             if compiled:
                 with show_progress(

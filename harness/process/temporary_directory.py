@@ -5,6 +5,7 @@ process creates its first temporary directory, it removes those of killed proces
 not on all file systems.
 """
 
+import logging
 import os
 import sys
 from collections.abc import Callable, Iterator
@@ -20,6 +21,7 @@ from .interrupt import defer_signals
 if sys.platform != "win32":
     import fcntl
 
+LOG = logging.getLogger(__name__)
 PREFIX = "friction-fmus-"  # of the directories of this project
 FALLBACK_DIRECTORIES = (
     ("/tmp", "/var/tmp", "/dev/shm") if os.name == "posix" else ("C:/Users/Public", "C:/Windows/Temp")
@@ -56,6 +58,7 @@ def temporary_directory(prefix: str = "fmu-") -> Iterator[Path]:
             raise HarnessError(
                 f"cannot write to the temporary directory {temporary_root()}: {error.strerror}"
             ) from None
+        LOG.debug("temporary directory %s is in use", directory)
         yield directory
     finally:
         with defer_signals():

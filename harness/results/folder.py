@@ -10,6 +10,7 @@ locks exist (fcntl).
 """
 
 import ctypes
+import logging
 import os
 import re
 import sys
@@ -27,6 +28,7 @@ from .provenance import FILE, load_provenance, note_replaced_result
 from .stored_data import DATA_FILE
 from .summary import SUMMARY_FILE
 
+LOG = logging.getLogger(__name__)
 OVERWRITE = ContextVar("overwrite", default=False)  # whether a result of another source may be replaced
 # the folder of a stored result while it is repeated: no other one is written, whatever its provenance names
 REPEATED: ContextVar[Path | None] = ContextVar("repeated", default=None)
@@ -76,6 +78,7 @@ def replace_folder(folder: Path, own_files: Sequence[str], source: str = "") -> 
     try:
         with defer_signals():
             new_folder = create_locked_folder(lambda: create_new_folder(folder), resources)
+        LOG.debug("the result %s is being written", folder)
         yield new_folder
         note_replaced_result(folder, new_folder, own_files[0])
         swap_in(new_folder, folder)

@@ -7,16 +7,15 @@ import signal
 import subprocess
 import sys
 import threading
-import time
 from concurrent.futures import Future
 from contextlib import contextmanager, suppress
 from functools import partial
 from itertools import product
-from pathlib import Path
 
 import commands
 import pytest
 from build_cache import ROOT
+from logged_process import logged_process, wait_for_end, wait_for_line
 
 from benchmarks.__main__ import main as BENCHMARKS
 from harness.process import interrupt, interruptible_wait
@@ -25,14 +24,14 @@ from harness.process.interruptible_wait import wait_for_any
 from harness.process.subprocess_runner import SubprocessTimeoutError, run_subprocess
 
 SLOW = 'title = "t"\nmodel = "pacejka"\noutputs = ["x", "v"]\ngrid = 5e-6\n[values]\nx_m = 0.001\n'
-COMMANDS = {  # and a file or folder that exists once it has started
-    "main": ([], "out/.*"),
-    "run": (["run", "slow.toml"], "temporary/friction-fmus-fmu-*"),
-    "precision": (["precision", "pacejka"], "out/precision/.pacejka-*"),
-    "stability": (["stability", "stickslip"], "temporary/friction-fmus-child-*"),
-    "bench": (["bench"], "out/.bench-*"),
-    "importers": (["importers"], "temporary/friction-fmus-child-*"),
-    "sweep": (["sweep", "pacejka", "--vary", "x_m=0.001:0.1:3000", "--workers", "1"], "out/sweep/.*.checkpoint"),
+COMMANDS = {  # and a line of its log, once it has started
+    "main": ([], "is being written"),
+    "run": (["run", "slow.toml"], "friction-fmus-fmu-"),
+    "precision": (["precision", "pacejka"], "precision/pacejka is being written"),
+    "stability": (["stability", "stickslip"], "friction-fmus-child-"),
+    "bench": (["bench"], "bench is being written"),
+    "importers": (["importers"], "friction-fmus-child-"),
+    "sweep": (["sweep", "pacejka", "--vary", "x_m=0.001:0.1:3000", "--workers", "1"], "of 3000 runs are finished"),
 }
 
 
@@ -50,24 +49,13 @@ def test_a_signal_ends_a_command_and_leaves_nothing_behind(workspace, command, n
     """To the whole process group, as a terminal sends it."""
     (workspace / "temporary").mkdir()
     (workspace / "slow.toml").write_text(SLOW)
-    arguments, sign = COMMANDS[command]
+    arguments, line = COMMANDS[command]
     module = "benchmarks" if command in BENCHMARKS.commands else "harness"
-    environment = os.environ | {"PYTHONPATH": str(ROOT), "TMPDIR": str(workspace / "temporary")}
-    reset_sigint = partial(signal.signal, signal.SIGINT, signal.SIG_DFL)  # a test run in the background ignores it
-    process = subprocess.Popen(
-        [sys.executable, "-m", module, *arguments, "--out", "out"],
-        cwd=workspace,
-        env=environment,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        start_new_session=True,
-        preexec_fn=reset_sigint,
-    )
-    while process.poll() is None and not list(workspace.glob(sign)):
-        time.sleep(0.01)
-    os.killpg(process.pid, number)
-    stdout, stderr = process.communicate(timeout=60)
+    command_line = ("-m", module, *arguments, "--out", "out")
+    with logged_process(workspace, *command_line, TMPDIR=str(workspace / "temporary")) as process:
+        wait_for_line(process, line)
+        os.killpg(process.pid, number)
+        stdout, stderr = process.communicate(timeout=60)
     assert (process.returncode, stdout, stderr.count("\n")) == (128 + number, "", 1), stderr
     assert stderr.startswith(("Error: interrupted", "Error: terminated"))
     assert list((workspace / "temporary").iterdir()) == []
@@ -191,47 +179,29 @@ def test_messages_larger_than_a_pipe_buffer_arrive_at_a_slow_reader():
     assert (done.returncode, done.stdout.strip()) == (0, "200000")
 
 
-def ends(pid):
-    """Return whether a process ends within some seconds."""
-    state = Path("/proc", pid.strip(), "stat")
-    for _ in range(200):
-        if not state.exists() or state.read_text().split()[2] == "Z":  # nobody waits for its status
-            return True
-        time.sleep(0.05)
-    return False
-
-
 def test_a_program_that_times_out_ends_with_all_its_children(tmp_path):
-    script, begun = "sleep 100 & echo $! > pid; wait", time.monotonic()
+    os.mkfifo(tmp_path / "pipe")  # open for writing as long as a child lives
+    reader = os.open(tmp_path / "pipe", os.O_RDONLY | os.O_NONBLOCK)
     with pytest.raises(SubprocessTimeoutError, match=r"no answer after 0\.5 s") as late:
-        run_subprocess(["sh", "-c", f"cd '{tmp_path}'; echo so far; {script}"], timeout=0.5)
-    assert time.monotonic() - begun < 50  # not when the children have ended
+        run_subprocess(["sh", "-c", f"echo so far; exec 3> '{tmp_path}/pipe'; sleep 100 & wait"], timeout=0.5)
     assert late.value.process.stdout == "so far\n"
-    assert ends((tmp_path / "pid").read_text())
-
-
-def child_of_killed_parent(code, file):
-    """Run Python code whose child writes its process id to a file, kill it then, and return the id of the child."""
-    parent = subprocess.Popen([sys.executable, "-c", code], cwd=ROOT)
-    while not (file.is_file() and file.read_text()):
-        assert parent.poll() is None
-        time.sleep(0.05)
-    parent.kill()
-    parent.wait()
-    return file.read_text()
+    os.set_blocking(reader, True)
+    assert os.read(reader, 1) == b""  # the end of the pipe: no child lives
+    os.close(reader)
 
 
 @pytest.mark.parametrize("call", ["time.sleep, 100", "os.getcwd"], ids=["in a call", "between calls"])
-def test_a_worker_exits_and_removes_its_files_after_its_parent_was_killed(tmp_path, monkeypatch, call):
+def test_a_worker_exits_and_removes_its_files_after_its_parent_was_killed(tmp_path, call):
     (tmp_path / "temporary").mkdir()
-    monkeypatch.setenv("TMPDIR", str(tmp_path / "temporary"))
     code = (
-        "import os, time\nfrom pathlib import Path\nfrom harness.process.worker import WorkerPool\n"
-        "pool = WorkerPool(1)\nfuture = pool.submit(os.getpid)\n"
-        "while not pool.wait_for_any([future]):\n    pass\n"
-        f"Path({str(tmp_path / 'pid')!r}).write_text(str(future.result()))\npool.submit({call})\ntime.sleep(100)"
+        "import os, time\nfrom harness.process.worker import WorkerPool\npool = WorkerPool(1)\n"
+        "future = pool.submit(os.getpid)\nwhile not pool.wait_for_any([future]):\n    pass\n"
+        f"pool.submit({call})\nprint(future.result(), flush=True)\ntime.sleep(100)"
     )
-    assert ends(child_of_killed_parent(code, tmp_path / "pid"))
+    with logged_process(tmp_path, "-c", code, TMPDIR=str(tmp_path / "temporary")) as parent:
+        worker = os.pidfd_open(int(parent.stdout.readline()))
+        parent.kill()
+    wait_for_end(worker)
     assert not [*(tmp_path / "temporary").iterdir()]
 
 

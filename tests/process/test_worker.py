@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from build_cache import ROOT
+from logged_process import wait_for_end
 
 from harness import HarnessError, SceneError
 from harness.process import interrupt
@@ -171,8 +172,9 @@ def test_a_signal_that_reached_another_thread_ends_a_call(worker, monkeypatch):
 
 def test_a_process_that_died_after_its_reply_is_replaced(worker, functions):
     first = worker.call(os.getpid)
+    descriptor = os.pidfd_open(first)
     worker.call(functions.die_soon)
-    time.sleep(0.5)
+    wait_for_end(descriptor)
     assert worker.call(os.getpid) != first
 
 
@@ -224,8 +226,8 @@ def test_an_idle_process_of_a_pool_that_dies_is_replaced():
     with WorkerPool(1) as pool:
         first = wait(pool, pool.submit(os.getpid))
         os.kill(first, signal.SIGKILL)
-        time.sleep(0.2)
-        pool.wait_for_any([])
+        while pool.idle:  # until its end is noticed
+            pool.wait_for_any([])
         assert wait(pool, pool.submit(os.getpid)) != first
 
 

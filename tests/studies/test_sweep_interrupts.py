@@ -3,8 +3,6 @@
 import json
 import logging
 import os
-import re
-import select
 import signal
 import subprocess
 import sys
@@ -17,6 +15,7 @@ import commands
 import external_fmus
 import numpy as np
 import pytest
+from logged_process import logged_process, wait_for_end, wait_for_line
 from sweep_results import sweep_folder
 
 from harness import HarnessError, sweep
@@ -28,11 +27,8 @@ pytestmark = pytest.mark.slow
 
 SWEEP = ("sweep", "stickslip", "--vary", "mu_d=0.3:0.8:100", "--measure", "peak_speed")
 LONG = (*SWEEP, "--workers", "1")
-RUNS = "of 100 runs are finished\n"
 NOTE = """
-import logging, sys
-logging.getLogger('harness').addHandler(logging.StreamHandler())
-logging.getLogger('harness').setLevel('DEBUG')
+import sys
 def note(event, arguments):
     if event in ('socket.bind', 'socket.connect'):
         print(event, type(arguments[1]).__name__, file=open('bound', 'a'))
@@ -74,27 +70,15 @@ def finished_runs(folder):
 
 @contextmanager
 def started_sweep(folder):
-    """Start the long sweep in a child process and wait until two of its runs are finished; kill it at the end.
+    """Start the long sweep in a child process and wait until two of its blocks are finished; kill it at the end.
 
     The file `bound` lists the addresses at which its processes listen.
     """
-    reset_sigint = partial(signal.signal, signal.SIGINT, signal.SIG_DFL)
-    (folder / "sitecustomize.py").write_text(NOTE)
-    with subprocess.Popen(
-        [sys.executable, "-m", "harness", *LONG],
-        cwd=folder,
-        env=os.environ | {"PYTHONPATH": f"{folder}{os.pathsep}{build_cache.ROOT}"},
-        stderr=subprocess.PIPE,
-        text=True,
-        start_new_session=True,
-        preexec_fn=reset_sigint,  # a test run in the background ignores it
-    ) as process:
-        try:
-            (worker,) = re.findall(r"worker process (\d+) is ready", next(process.stderr))
-            assert [next(process.stderr).endswith(RUNS) for _ in range(2)] == [True, True]
-            yield process, os.pidfd_open(int(worker))
-        finally:
-            process.kill()
+    with logged_process(folder, "-m", "harness", *LONG, site_code=NOTE) as process:
+        worker = wait_for_line(process, "is ready").split()[2]
+        for _ in range(2):
+            wait_for_line(process, "of 100 runs are finished")
+        yield process, os.pidfd_open(int(worker))
 
 
 @pytest.mark.skipif(not hasattr(os, "pidfd_open"), reason="the system cannot wait for the end of a grandchild")
@@ -103,14 +87,14 @@ def test_a_killed_sweep_resumes_and_leaves_no_worker(harness, undisturbed, tmp_p
     with started_sweep(tmp_path) as (process, worker):
         process.kill()
         process.wait()
-        select.select([worker], [], [])  # returns when the worker has ended
+        wait_for_end(worker)
     first = finished_runs(tmp_path)
 
     with started_sweep(tmp_path) as (process, worker):
         os.killpg(process.pid, signal.SIGINT)
-        (error,) = (line for line in process.stderr if not line.endswith(RUNS))
-        select.select([worker], [], [])
-        assert process.wait() == 130
+        error = process.communicate(timeout=60)[1]
+        wait_for_end(worker)
+    assert (process.returncode, error.count("\n")) == (130, 1)
     assert error.startswith("Error: interrupted: ")
     done_runs = finished_runs(tmp_path)
     assert 0 < first < done_runs < 100

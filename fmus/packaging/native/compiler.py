@@ -1,5 +1,6 @@
 """Compiles the binaries of native FMUs with the package ziglang, which cross-compiles for every platform."""
 
+import logging
 import math
 import os
 import subprocess
@@ -12,6 +13,8 @@ from tempfile import TemporaryDirectory, gettempdir
 
 from .. import BuildError
 from .expressions import MAY_RAISE, NEVER_RAISING
+
+LOG = logging.getLogger(__name__)
 
 # Round after every operation, and call libm at run time: for constant arguments the compiler would insert its own
 # results, which can differ in the last digit.
@@ -125,6 +128,7 @@ def compile_and_link(files: Mapping[str, str], main: str, target: str, out: str,
         # The compiler caches its own parts in the home directory, which a service may not have. Objects of FMUs go to
         # the temporary folder, so that the cache does not grow.
         caches = {"HOME": gettempdir(), "ZIG_LOCAL_CACHE_DIR": f"{folder}/cache"} | os.environ
+        LOG.debug("the C compiler starts for %s, %s", out, target)
         completed = subprocess.run(command, cwd=folder, capture_output=True, text=True, env=caches)
         if completed.returncode:
             raise BuildError(f"{out} does not compile for {target}:\n{completed.stderr.strip()}")
