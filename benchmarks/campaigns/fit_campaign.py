@@ -19,13 +19,12 @@ from spec_runs import ignore_progress
 from harness.errors import HarnessError
 from harness.process.subprocess_runner import run_module
 from harness.process.temporary_directory import temporary_directory
-from harness.records.columns import ColumnOptions
-from harness.records.signal_table import parse_signals
+from harness.records.record import Record
 from harness.records.table_files import Table
 from harness.running.whole_run import open_simulator
 from harness.scenes.run_spec import RunSpec
 from harness.studies.fit.request import FitRequest, resolve_request
-from harness.studies.fit.study import fit_tables
+from harness.studies.fit.study import fit_samples
 
 from .drawn_records import GROUPS, draw_record
 
@@ -63,11 +62,11 @@ def fit_drawn_record(group, seed, fmus):
     observe, inputs = {name: name for name in group.outputs}, {name: name for name in record.inputs}
     fmu = fmus / f"{group.model}.fmu"
     run = RunSpec(fmu, values=record.fixed, timeout=10.0)
-    request = FitRequest(run, record.free, observe, inputs, columns=ColumnOptions())
+    request = FitRequest(run, record.free, observe, inputs)
     resolved = resolve_request(request)
     try:
-        signals = parse_signals(table, resolved.sources, request.columns, "record")
-        return record, fit_tables(resolved, [signals], ignore_progress)
+        samples = Record("record", table).signals(resolved.sources)
+        return record, fit_samples(resolved, [samples], ignore_progress)
     except HarnessError as error:
         return record, str(error)
 

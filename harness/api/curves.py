@@ -1,12 +1,11 @@
 """Identification of friction over velocity from Python: `identify_curve`."""
 
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..arguments import FINITE, FLAG, NONNEGATIVE, POSITIVE, TEXT, Rule, check_arguments
 from .options import check_time_range
-from .tables import build_table, convert_to_table, has_columns, is_pair, is_signals, record_source
+from .tables import has_columns, is_pair, record_source, to_record
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -14,7 +13,7 @@ if TYPE_CHECKING:
     import pandas
     from numpy.typing import ArrayLike
 
-    from ..records.table_files import Table
+    from ..records.record import Record
     from ..running.trajectory import Trajectory
     from ..studies.curve.result import CurveResult
 
@@ -27,7 +26,8 @@ def curve_source(value: Any) -> Any:
 
 
 CURVE = Rule(
-    "a file, a DataFrame, a mapping of columns, a trajectory, or velocities and forces as in (v, F)", curve_source
+    "a record, a file, a DataFrame, a mapping of columns, a trajectory, or velocities and forces as in (v, F)",
+    curve_source,
 )
 
 
@@ -48,7 +48,7 @@ CURVE = Rule(
     backlash=NONNEGATIVE,
 )
 def identify_curve(
-    record: "str | Path | pandas.DataFrame | Mapping[str, ArrayLike] | Trajectory | tuple[ArrayLike, ArrayLike]",
+    record: "Record | str | Path | pandas.DataFrame | Mapping[str, ArrayLike] | Trajectory | tuple[ArrayLike, ...]",
     *,
     velocity: str | None = None,
     position: str | None = None,
@@ -68,9 +68,10 @@ def identify_curve(
 
     Parameters
     ----------
-    record : str, path, DataFrame, mapping, Trajectory or tuple
-        A file with columns; a table, as a DataFrame or a mapping, with units in its headings as in ``"v [mm/s]"``; or
-        velocities (n,) in m/s and forces (n,) in N. A table with a column of times is a record over time.
+    record : Record, str, path, DataFrame, mapping, Trajectory or tuple
+        A record of `read_record`; a file with columns; a table, as a DataFrame or a mapping, with units in its headings
+        as in ``"v [mm/s]"``; or velocities (n,) in m/s and forces (n,) in N. A table with a column of times is a record
+        over time.
     velocity, position : str, optional
         Heading of the velocity, or of the position in a record over time; ``"v [mm/s]"`` sets the unit as well.
     force, current : str, optional
@@ -118,24 +119,12 @@ def identify_curve(
     ('viscous', 1.3, 2.0)
     """
     from ..records.columns import ColumnOptions
-    from ..records.curve_table import CurveColumns, parse_curve, read_curve
+    from ..records.friction_curve import CurveColumns
     from ..studies.curve.study import identify_record
 
     check_time_range(time, rate, begin, end)
-    times = ColumnOptions(time=time, rate=rate, begin=begin, end=end)
-    columns = CurveColumns(velocity, position, force, current, constant, points, times)
-    if isinstance(record, str | Path):
-        source = str(record)
-        loaded = read_curve(source, columns, Path(source).stem)
-    else:
-        table = to_table(record)
-        loaded = parse_curve(table, columns, table.name)
-    return identify_record(loaded, mass, bias, backlash)
-
-
-def to_table(record: Any) -> "Table":
-    """Return the table in columns or rows of numbers."""
-    if has_columns(record):
-        table = convert_to_table(record, needs_times=False)
-        return replace(table, name=record.name) if is_signals(record) else table
-    return build_table(dict(zip(("v", "F"), record, strict=True)), {"v": "m/s", "F": "N"})
+    options = ColumnOptions(time=time, rate=rate, begin=begin, end=end)
+    if isinstance(record, tuple):
+        record = dict(zip(("v [m/s]", "F [N]"), record, strict=True))
+    columns = CurveColumns(velocity, position, force, current, constant, points)
+    return identify_record(to_record(record, options, needs_times=False), columns, mass, bias, backlash)

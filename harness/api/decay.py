@@ -19,7 +19,7 @@ from ..arguments import (
 )
 from ..errors import SceneError
 from .options import check_time_range, reporter, with_progress_bar
-from .tables import RECORD, SIGNAL, convert_to_table, has_columns, is_signals
+from .tables import RECORD, SIGNAL, has_columns, is_signals, to_record
 
 if TYPE_CHECKING:
     import pandas
@@ -53,7 +53,7 @@ SAMPLES = Rule("a row of numbers", row)
 )
 @with_progress_bar
 def identify_decay(
-    record: "str | Path | pandas.DataFrame | pandas.Series | Mapping[str, ArrayLike] | Trajectory | ArrayLike",
+    record: "Record | str | Path | pandas.DataFrame | pandas.Series | Mapping[str, ArrayLike] | Trajectory | ArrayLike",
     x: "ArrayLike | None" = None,
     *,
     unit: str | None = None,
@@ -74,10 +74,10 @@ def identify_decay(
 
     Parameters
     ----------
-    record : str, path, DataFrame, Series, Dataset, mapping, Trajectory, tuple or array_like
-        A file with columns; a table, as a DataFrame, whose index may be the time in s, or a mapping; a Series over
-        time in s or time deltas; a trajectory; times and samples, as in ``(t, x)``; or the samples (n,), with their
-        `rate`.
+    record : Record, str, path, DataFrame, Series, Dataset, mapping, Trajectory, tuple or array_like
+        A record of `read_record`; a file with columns; a table, as a DataFrame, whose index may be the time in s, or a
+        mapping; a Series over time in s or time deltas; a trajectory; times and samples, as in ``(t, x)``; or the
+        samples (n,), with their `rate`.
     x : array_like, optional
         The samples (n,), if `record` holds their times (n,) in s.
     unit : str, optional
@@ -120,7 +120,7 @@ def identify_decay(
     """
     from ..analyses.decay.estimates import KnownParameters
     from ..analyses.decay.identification import fit_decay
-    from ..records.columns import ColumnOptions, read_record
+    from ..records.columns import ColumnOptions
     from ..studies.decay.result import DecayResult
 
     if k is not None and m is not None:
@@ -128,7 +128,7 @@ def identify_decay(
     check_time_range(time, rate, begin, end)
     columns = ColumnOptions(
         time=time,
-        position=column,
+        column=column,
         quantity=quantity,
         unit=unit,
         rate=rate,
@@ -144,35 +144,24 @@ def identify_decay(
     for name, heading in (("time", time), ("column", column)) if not has_columns(record) else ():
         if heading is not None:
             raise SceneError(f"{name} = {heading!r} has no effect on arrays, which have no headings: leave it out")
-    if isinstance(record, str | Path):
-        source = str(record)
-        loaded = read_record(source, columns, Path(source).stem)
-    else:
-        loaded = to_record(record, columns)
-    return DecayResult(**vars(fit_decay(loaded, KnownParameters(k, m, pendulum), drag, drift, reporter(progress))))
+    motion = find_record(record, columns).motion
+    return DecayResult(**vars(fit_decay(motion, KnownParameters(k, m, pendulum), drag, drift, reporter(progress))))
 
 
-def to_record(source: Any, columns: "ColumnOptions") -> "Record":
-    """Return the record in columns or rows of numbers."""
-    from ..records.columns import parse_record
-
-    name = "the record"
-    if not has_columns(source):
-        if not isinstance(source, tuple) and columns.rate is None:
-            raise SceneError(
-                "x is missing: identify_decay takes a file, a table, times and samples, as in (t, x), or samples with "
-                "their rate in Hz"
-            )
-        if columns.unit is None:
-            raise SceneError("unit is missing: name the unit of the samples, as in unit='mm'")
-        table = convert_to_table(source, SIGNAL, columns.rate)
-        columns = replace(columns, position=SIGNAL, rate=columns.rate if isinstance(source, tuple) else None)
-    else:
-        table = convert_to_table(source)
-    if is_signals(source):
-        name = source.name
-        if columns.position is None and columns.quantity is None:
+def find_record(source: Any, options: "ColumnOptions") -> "Record":
+    """Return the record of a decay."""
+    if has_columns(source):
+        record = to_record(source, options)
+        if is_signals(source) and options.column is None and options.quantity is None:
             if "position" not in source.motion_outputs:
-                raise SceneError(f"{name} records no position: add it to the outputs, or name a column")
-            columns = replace(columns, position=source.motion_outputs["position"])
-    return parse_record(replace(table, name=name), columns, name)
+                raise SceneError(f"{source.name} records no position: add it to the outputs, or name a column")
+            return replace(record, options=replace(options, column=source.motion_outputs["position"]))
+        return record
+    if not isinstance(source, tuple) and options.rate is None:
+        raise SceneError(
+            "x is missing: identify_decay takes a record, a file, a table, times and samples, as in (t, x), or samples "
+            "with their rate in Hz"
+        )
+    if options.unit is None:
+        raise SceneError("unit is missing: name the unit of the samples, as in unit='mm'")
+    return to_record(source, replace(options, column=SIGNAL))

@@ -1,6 +1,7 @@
 """Parameters of an FMU from measured records, from Python: `fit`."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -24,10 +25,11 @@ from ..arguments import (
 )
 from ..errors import SceneError
 from .options import check_time_range, reporter, with_progress_bar
-from .tables import RECORDS, SIGNAL, convert_to_table
+from .tables import RECORDS, SIGNAL, UNNAMED, to_record
 
 if TYPE_CHECKING:
     from ..analyses.fit.parameter_fit import ParameterFit
+    from ..records.record import Record
     from ..studies.fit.result import FitResult
 
 
@@ -184,22 +186,26 @@ def fit(
         start=start or {},
         each=tuple(each),
         robust=robust,
-        columns=ColumnOptions(time=time, rate=rate, begin=begin, end=end),
     )
 
+    options = ColumnOptions(time=time, rate=rate, begin=begin, end=end)
     heading = next(iter(request.observe.values()), SIGNAL) if len(request.observe) == 1 else SIGNAL
 
-    def load(argument: Any, name: str) -> list[study.RecordTable]:
+    def load(argument: Any, name: str) -> "list[Record]":
+        loaded = [
+            study.load_existing(str(source), options)
+            if isinstance(source, str | Path)
+            else to_record(source, options, heading)
+            for source in argument
+        ]
         names = [name] if len(argument) == 1 else [f"{name} {i + 1}" for i in range(len(argument))]
         return [
-            study.load_record(str(source), request)
-            if isinstance(source, str | Path)
-            else study.RecordTable(record_name, convert_to_table(source, heading, rate))
-            for source, record_name in zip(argument, names, strict=True)
+            replace(record, name=given) if record.name == UNNAMED else record
+            for record, given in zip(loaded, names, strict=True)
         ]
 
-    fitted, predicted = load(records, "the record"), load(validate, "the validation record")
+    fitted, predicted = load(records, UNNAMED), load(validate, "the validation record")
     if not fitted:
         raise SceneError("records is empty: give at least one record")
-    request, choice = choose_observed(request, fitted[0].table)
+    request, choice = choose_observed(request, fitted[0])
     return study.fit_laws(resolve_laws(request).with_note(choice), fitted, predicted, reporter(progress))

@@ -37,7 +37,7 @@ def read_record(
     begin: float | None = None,
     end: float | None = None,
 ) -> "Record":
-    """Read times and samples of a measured motion from a file, as the command `decay` does.
+    """Read a measured record from a file; `identify_decay`, `identify_curve`, `fit` and `compare` take what it returns.
 
     Parameters
     ----------
@@ -61,21 +61,25 @@ def read_record(
     Returns
     -------
     Record
-        Times `t` (n,) in s, samples `x` (n,) in `unit`, which is an SI unit, and `notes` on what was assumed and left
-        out.
+        The columns of the file, and how they are read. Its motion has times `t` (n,) in s, samples `x` (n,) in `unit`,
+        which is an SI unit, and `notes` on what was assumed and left out.
 
     Raises
     ------
     SceneError
-        If the file holds no record.
+        If the file holds neither a motion over time nor friction over velocity.
 
     Examples
     --------
     >>> record = read_record("swing.csv", column="laser [mm]")  # doctest: +SKIP
     >>> record.x.max(), record.unit, record.notes  # doctest: +SKIP
+    >>> decay = identify_decay(record, m=0.35)  # doctest: +SKIP
     """
-    from ..records import columns
+    from ..records.columns import ColumnOptions
+    from ..records.record import load_record
 
     check_time_range(time, rate, begin, end)
-    options = columns.ColumnOptions(time, column, quantity, unit, time_unit, per_count, headings, rate, begin, end)
-    return columns.read_record(str(source), options, Path(source).stem)
+    options = ColumnOptions(time, column, quantity, unit, time_unit, per_count, headings, rate, begin, end)
+    record = load_record(str(source), options)
+    record.check()
+    return record

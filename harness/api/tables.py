@@ -1,4 +1,4 @@
-"""Records from Python: tables of pandas and xarray, mappings, arrays and trajectories, which records are read from."""
+"""Records from Python: files, tables of pandas and xarray, mappings, arrays and trajectories become a `Record`."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -11,16 +11,26 @@ from ..errors import SceneError, format_value
 if TYPE_CHECKING:
     import numpy as np
 
+    from ..records.columns import ColumnOptions
+    from ..records.record import Record
     from ..records.table_files import Table
     from ..running.signals import Signals
 
-KINDS = "a file, a table of pandas or xarray, a mapping of columns, a trajectory, or times and values as in (t, x)"
+KINDS = "a record, a file, a table of pandas or xarray, columns, a trajectory, or times and values as in (t, x)"
 SIGNAL = "signal"  # heading of values without a name
+UNNAMED = "the record"  # name of a record that is not a file
 
 
 def is_frame(value: Any) -> bool:
     """Return whether a value is a DataFrame."""
     return hasattr(value, "columns") and hasattr(value, "index") and not is_signals(value)
+
+
+def is_record(value: Any) -> bool:
+    """Return whether a value is a record of `read_record`."""
+    from ..records.record import Record
+
+    return isinstance(value, Record)
 
 
 def is_series(value: Any) -> bool:
@@ -48,7 +58,7 @@ def is_pair(value: Any) -> bool:
 def has_columns(value: Any) -> bool:
     """Return whether a value is a record by itself: a file, or a table whose columns have names."""
     return isinstance(value, str | Path | Mapping) or any(
-        is_kind(value) for is_kind in (is_frame, is_series, is_signals, is_xarray)
+        is_kind(value) for is_kind in (is_record, is_frame, is_series, is_signals, is_xarray)
     )
 
 
@@ -78,7 +88,31 @@ def side(value: Any) -> Any:
 NUMBERS = Rule("a row of numbers, at least one", row)
 RECORD = Rule(f"{KINDS}, or a row of values with their rate", record_source)
 RECORDS = Rule(f"{KINDS}, or a list of these", record_sources)
-SIDE = Rule("a name, a file, a table of pandas or xarray, a mapping of columns, or a trajectory", side)
+SIDE = Rule("a name, a record, a file, a table of pandas or xarray, a mapping of columns, or a trajectory", side)
+
+
+def to_record(source: Any, options: "ColumnOptions", heading: str = SIGNAL, needs_times: bool = True) -> "Record":
+    """Return the record in a file, a table, a mapping, arrays or a trajectory.
+
+    Parameters
+    ----------
+    options : ColumnOptions
+        How its columns are read; those that are given replace those of a record.
+    heading, needs_times
+        As in `convert_to_table`.
+    """
+    from ..records.record import Record, load_record
+
+    if is_record(source):
+        given = {name: value for name, value in vars(options).items() if value is not None}
+        record: Record = replace(source, options=replace(source.options, **given))
+        return record
+    if isinstance(source, str | Path):
+        return load_record(str(source), options)
+    table = convert_to_table(source, heading, options.rate, needs_times)
+    if not has_columns(source) and not isinstance(source, tuple):  # its times follow from the rate
+        options = replace(options, rate=None)
+    return Record(source.name if is_signals(source) else table.name, table, options)
 
 
 def convert_to_table(
@@ -195,7 +229,7 @@ def build_table(columns: "dict[str, np.ndarray]", units: dict[str, str]) -> "Tab
         column.astype(float) if column.dtype.kind in "fiub" else [str(cell) for cell in column]
         for column in columns.values()
     ]
-    return Table("the record", tuple(column_heading(name, units.get(name, "")) for name in columns), tuple(cells))
+    return Table(UNNAMED, tuple(column_heading(name, units.get(name, "")) for name in columns), tuple(cells))
 
 
 def convert_to_signals(source: Any) -> "Signals":
@@ -208,29 +242,38 @@ def convert_to_signals(source: Any) -> "Signals":
     """
     import numpy as np
 
-    from ..records.headings import TIME_NAME, split_heading
+    from ..records.columns import ColumnOptions, find_column, list_columns, parse_numbers
+    from ..records.headings import TIME_NAME
     from ..records.units import TIMES
     from ..running.signals import Signals
 
     if is_signals(source):
         signals: Signals = source
         return signals
-    table = convert_to_table(source)
-    headings = [split_heading(heading) for heading in table.column_headings]
-    numbers = [np.asarray(cells) for cells in table.columns]
-    at = next((i for i, (name, _) in enumerate(headings) if TIME_NAME.search(name)), 0)
-    unit = headings[at][1] or "s"
+    record = to_record(source, ColumnOptions())
+    table, options = record.table, record.options
+    candidates = list_columns(table)
+    time_column = next((column for column in candidates if TIME_NAME.search(column.name)), candidates[0])
+    if options.time is not None:
+        time_column = find_column(options.time, table, candidates)
+    unit = options.time_unit or time_column.unit or "s"
     if unit not in TIMES:
         raise SceneError(f"the times of the record are in {unit}: give them in {', '.join(TIMES)}")
-    for heading, column in zip(table.column_headings, numbers, strict=True):
-        if column.dtype.kind not in "fiub":
-            text = format_value(column.tolist()[0])
+    numbers = [parse_numbers(table, column.index, strict=False) for column in candidates]
+    for column in candidates:
+        if (row := table.parsed_columns[column.index][1]) is not None:
+            text = format_value(table.columns[column.index][row])
             raise SceneError(
-                f"the column {heading} of the record holds texts, as {text}: give numbers, or leave it out"
+                f"the column {column.heading} of the record holds texts, as {text}: give numbers, or leave it out"
             )
-    time = numbers[at] * TIMES[unit]
+    time = numbers[time_column.index] * TIMES[unit]
+    if options.rate is not None:
+        time = np.arange(len(time)) / options.rate
     if len(time) < 2 or not (np.isfinite(time).all() and (np.diff(time) >= 0).all()):
         raise SceneError("the times of the record must be at least two finite numbers that do not fall")
-    columns = {name: column for (name, _), column in zip(headings, numbers, strict=True) if column is not numbers[at]}
-    units = {name: unit or "" for name, unit in headings}
-    return Signals(time, columns, units, label="the record")
+    begin, end = options.interval
+    part = (time >= begin) & (time <= end)
+    others = [column for column in candidates if column is not time_column]
+    columns = {column.name: numbers[column.index][part] for column in others}
+    units = {column.name: column.unit or "" for column in candidates}
+    return Signals(time[part], columns, units, label=record.name)

@@ -78,9 +78,9 @@ def curve(
       one direction:    friction-fmus curve brake.csv --bias 0
     """
     from ..records.columns import ColumnOptions
-    from ..records.curve_table import CurveColumns
+    from ..records.friction_curve import CurveColumns
     from ..studies.curve.study import identify_file
 
-    options = CurveColumns(velocity, position, force, current, constant, is_points, ColumnOptions(**columns))
-    result, folder = identify_file(source, options, mass, bias, backlash, terminal.out)
+    options = CurveColumns(velocity, position, force, current, constant, is_points)
+    result, folder = identify_file(source, ColumnOptions(**columns), options, mass, bias, backlash, terminal.out)
     terminal.print_result(result.as_json(), *result.blocks(), folder=folder)

@@ -21,13 +21,13 @@ from .terminal import (
 
 COLUMN_OPTIONS = (  # of records
     "time",
-    "position",
+    "column",
     "velocity",
     "quantity",
     "unit",
     "per_count",
     "time_unit",
-    "names",
+    "headings",
     "rate",
 )
 
@@ -36,7 +36,7 @@ COLUMN_OPTIONS = (  # of records
 @click.argument("source", metavar="FILE|SCENE|-")
 @click.option("--time", help="Heading of the time column. Default: t, time, ..., or the first column.")
 @click.option(
-    *("--column", "--position", "position"),
+    *("--column", "--position", "column"),
     cls=RenamedOption,
     help="Heading of the column to fit. Default: x, theta, ...",
 )
@@ -99,9 +99,9 @@ def decay(
     if k is not None and m is not None:
         raise click.UsageError("--k and --m: give only one of them; the other follows from the frequency")
     if velocity is not None:
-        if columns["position"] is not None or columns["quantity"] not in (None, "velocity"):
+        if columns["column"] is not None or columns["quantity"] not in (None, "velocity"):
             raise click.UsageError("--velocity: only one column is fitted; omit --column and --quantity")
-        columns |= {"position": velocity, "quantity": "velocity"}
+        columns |= {"column": velocity, "quantity": "velocity"}
     if columns["rate"] is not None and (columns["time"] is not None or columns["time_unit"] is not None):
         raise click.UsageError("--rate replaces the times in the file: omit --time and --time-unit")
     columns_spec, parameters = ColumnOptions(**columns), KnownParameters(k, m, pendulum)

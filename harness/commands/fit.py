@@ -118,9 +118,8 @@ def fit(
             start=options.parse_starts(start, ranges, per_record),
             each=per_record,
             robust=robust,
-            columns=ColumnOptions(**columns),
         )
         result, folder = study.fit_files(
-            request, records, validate, terminal.out, lambda share: report(records[0], share)
+            request, ColumnOptions(**columns), records, validate, terminal.out, lambda share: report(records[0], share)
         )
     terminal.print_result(result.as_json(), *result.blocks(), folder=folder)

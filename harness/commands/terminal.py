@@ -144,7 +144,7 @@ class RuleType(click.FloatRange):
 
 FINITE, POSITIVE, NONNEGATIVE = map(RuleType, (arguments.FINITE, arguments.POSITIVE, arguments.NONNEGATIVE))
 HEADINGS_OPTION = click.option(
-    *("--headings", "--columns", "names"),
+    *("--headings", "--columns", "headings"),
     cls=RenamedOption,
     metavar="NAMES",
     help="Headings, if the file has none: 't [s],x [mm]'.",

@@ -1,97 +1,177 @@
-"""Record of a free decay: measured values over time."""
+"""A measured record: the columns of a table, and how they are read."""
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
 from typing import Self
 
 import numpy as np
 
-from ..arguments import QUANTITIES
 from ..errors import SceneError, option_text
-
-SYMBOLS = ("x", "v", "a")
-MIN_SAMPLES = 12  # samples
-MAX_VALUE = 1e100  # its square is finite
-MIN_DURATION = 1e-30  # s; the squares of frequencies are finite
+from .columns import Column, ColumnOptions, find_column_and_unit, list_columns, no_time_message
+from .extraction import Samples, Source, extract, find_time_axis, has_times, mark_missing_output
+from .friction_curve import CurveColumns, extract_curve
+from .motion import Motion
+from .motion_columns import extract_motion
+from .table_files import Table, load_table
+from .units import conversion_factor, parse_per_count
 
 
 @dataclass(frozen=True)
+class SignalSource:
+    """Source of a signal: the heading of its column, and the unit to convert to (empty for a ratio or a count).
+
+    An input (`is_input`) keeps every sample: commanded zeros and plateaus are no marks of missing samples.
+    """
+
+    heading: str
+    unit: str
+    is_input: bool = False
+
+
+@dataclass(frozen=True, eq=False, repr=False)
 class Record:
-    """Samples of a measured motion, as `read_record` returns them.
+    """A measured record, as `read_record` returns it: `identify_decay`, `identify_curve`, `fit` and `compare` take it.
 
     Attributes
     ----------
     name : str
         Name of the record.
-    t : numpy.ndarray
-        Times (n,) in s, increasing.
-    x : numpy.ndarray
-        Values (n,) in `unit`.
-    unit : str
-        Unit of the values: an SI unit, or that of a sensor.
-    order : int
-        Order of the derivative of the position that was measured: 0, 1 or 2.
-    base : str
-        Unit of the position: m, rad, or that of a sensor.
-    notes : tuple of str
-        Assumptions and corrections made when reading.
+    table : Table
+        All columns, as they are in the file.
+    options : ColumnOptions
+        How the columns are read.
     """
 
     name: str
-    t: np.ndarray
-    x: np.ndarray
-    unit: str = "m"
-    order: int = 0
-    base: str = "m"
-    notes: tuple[str, ...] = ()
+    table: Table
+    options: ColumnOptions = field(default_factory=ColumnOptions)
+
+    @cached_property
+    def motion(self) -> Motion:
+        """Return the motion in SI units; SceneError if there is none."""
+        return extract_motion(self.name, self.table, self.options)
+
+    @property
+    def t(self) -> np.ndarray:
+        """Return the times (n,) of the motion in s, increasing."""
+        return self.motion.t
+
+    @property
+    def x(self) -> np.ndarray:
+        """Return the samples (n,) of the motion in `unit`."""
+        return self.motion.x
+
+    @property
+    def unit(self) -> str:
+        """Return the unit of the motion: an SI unit, or that of a sensor."""
+        return self.motion.unit
 
     @property
     def quantity(self) -> str:
-        """Return the measured quantity."""
-        return QUANTITIES[self.order]
+        """Return the measured quantity: position, velocity or acceleration."""
+        return self.motion.quantity
 
     @property
-    def symbol(self) -> str:
-        """Return the symbol of the measured quantity."""
-        return SYMBOLS[self.order]
+    def order(self) -> int:
+        """Return the order of the derivative of the position that was measured: 0, 1 or 2."""
+        return self.motion.order
 
-    def format_time(self, t: float) -> str:
-        """Return a time in s for messages, with a resolution of 1e-5 of the record."""
-        return f"{t:.{max(5 - int(np.ceil(np.log10(np.ptp(self.t)))), 0)}f}"
+    @property
+    def base(self) -> str:
+        """Return the unit of the position: m, rad, or that of a sensor."""
+        return self.motion.base
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Return what was assumed and left out when the motion was read."""
+        return self.motion.notes
+
+    def __repr__(self) -> str:
+        return f"<Record of {self.name}: {', '.join(filter(None, self.table.column_headings)) or 'no headings'}>"
 
     def select(self, begin: float, end: float) -> Self:
-        """Return the samples from `begin` to `end` in s."""
-        in_range = (self.t >= begin) & (self.t <= end)
-        return replace(self, t=self.t[in_range], x=self.x[in_range])
+        """Return the part of the record from `begin` to `end` in s."""
+        first, last = self.options.interval
+        return replace(self, options=replace(self.options, begin=max(begin, first), end=min(end, last)))
+
+    def check(self) -> None:
+        """Raise SceneError if the record holds neither a motion nor a friction curve."""
+        try:
+            self.motion  # noqa: B018 - reads it
+        except SceneError as error:
+            try:
+                self.curve(CurveColumns())
+            except SceneError:
+                raise error from None
+
+    def curve(self, columns: CurveColumns) -> Samples:
+        """Return the friction over velocity; SceneError if there is none."""
+        return extract_curve(self.name, self.table, self.options, columns)
+
+    def signals(self, sources: Mapping[str, SignalSource]) -> Samples:
+        """Return signals in given units.
+
+        Parameters
+        ----------
+        sources : mapping
+            The column and unit of each signal, by the name of the signal.
+
+        Raises
+        ------
+        SceneError
+            If the table lacks a column, or its numbers or units do not fit.
+        """
+        table, candidates, notes = self.table, list_columns(self.table), []
+        columns: dict[str, Source] = {}
+        for signal, source in sources.items():
+            column, unit = find_column_and_unit(source.heading, table, candidates)
+            factor, note = self.unit_factor(column, unit, source, signal)
+            columns[signal] = Source(column, factor, mark_missing_output, source.is_input)
+            notes += note
+        first = min((source.column for source in columns.values()), key=lambda column: column.index)
+        axis = find_time_axis(table, candidates, self.options, first.heading)
+        if not has_times(axis):
+            raise SceneError(no_time_message(table))
+        units = {signal: source.unit for signal, source in sources.items()}
+        samples = extract(self.name, table, axis, candidates, columns, units, self.options)
+        return replace(samples, notes=(*table.notes, *notes, *samples.notes))
+
+    def unit_factor(
+        self, column: Column, unit: str | None, source: SignalSource, signal: str
+    ) -> tuple[float, list[str]]:
+        """Return the factor from the unit of a column to that of the FMU, and a note if the unit is assumed."""
+        options, size = self.options, 1.0
+        if not source.is_input and options.column in (None, column.heading, column.name):  # the motion of the record
+            unit = options.unit or unit
+            if options.per_count is not None:
+                size, unit = parse_per_count(options.per_count)
+        target = source.unit
+        if not unit:
+            file = self.table.name
+            note = f"{column.heading} has no unit in {file}: {target} is assumed, the unit of {signal} in the FMU."
+            return 1.0, [note] if target else []
+        factor = conversion_factor(unit, target or "1")
+        if factor is None:
+            heading = f"{column.name} [{target or '1'}]"
+            example = option_text("inputs" if source.is_input else "observe", {signal: heading})
+            raise SceneError(
+                f"{column.name} is in {unit}, and {signal} of the FMU in {target or '1'}: give a column of the same "
+                f"quantity, or the right unit, as in {example}"
+            )
+        return size * factor, []
 
 
-def selection_text() -> str:
-    """Return the options that select a part of a record."""
-    return f"{option_text('begin')} and {option_text('end')}"
+def load_record(source: str, options: ColumnOptions) -> Record:
+    """Load a record from a file; SceneError if it contains no table.
 
-
-def check_record(record: Record) -> None:
-    """Check that a record has enough finite samples at increasing times.
-
-    Raises
-    ------
-    SceneError
-        If it has not.
+    Parameters
+    ----------
+    source : str
+        Path of the file; "-" for standard input.
+    options : ColumnOptions
+        How the columns are read.
     """
-    if len(record.t) < MIN_SAMPLES:
-        raise SceneError(
-            f"{record.name} has {len(record.t)} samples in this interval; at least {MIN_SAMPLES} are required"
-        )
-    for name, values in (("time", record.t), (record.quantity, record.x)):
-        if not np.isfinite(values).all():
-            raise SceneError(f"{record.name}: {name} is not finite in sample {int(np.argmin(np.isfinite(values)))}")
-        if np.abs(values).max() > MAX_VALUE:
-            raise SceneError(f"{record.name}: {name} is as large as {np.abs(values).max():.3g}, which is not plausible")
-    if np.ptp(record.t) < MIN_DURATION:
-        raise SceneError(f"{record.name} lasts {np.ptp(record.t):.3g} s, which is not plausible: check the times")
-    not_increasing = np.flatnonzero(np.diff(record.t) <= 0)
-    if len(not_increasing):
-        time = float(record.t[not_increasing[0]])
-        raise SceneError(
-            f"{record.name}: time does not rise after t = {time!r} s; sort the rows, keep one row for each time, and "
-            "save a second run in a separate file"
-        )
+    name = "stdin" if source == "-" else Path(source).stem.encode("utf-8", "replace").decode()
+    return Record(name, load_table(source, options.headings), options)

@@ -13,7 +13,7 @@ from itertools import pairwise
 import numpy as np
 
 from ..errors import SceneError, option_text
-from .record import Record
+from .motion import Motion
 
 DAY = 86400.0
 # dates as in 21.11.2026 are dropped; passing midnight starts the next day
@@ -204,7 +204,7 @@ def mark_dropouts(values: np.ndarray, name: str) -> list[str]:
     ]
 
 
-def leave_out_saturated(record: Record) -> Record:
+def leave_out_saturated(record: Motion) -> Motion:
     """Return a record without the samples at which the sensor was saturated, and with a note on them."""
     x = record.x
     if not len(x):

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from harness.analyses.fit.fit_problem import FitProblem, Unknown
-from harness.analyses.fit.fit_procedure import MeasuredRecord, RecordData, subdivide_inputs
+from harness.analyses.fit.fit_procedure import MeasuredRecord, subdivide_inputs
 from harness.analyses.fit.noise import correlation_length, estimate_noise, significant_correlation
+from harness.records.extraction import Samples
 
 
 @dataclass
@@ -66,7 +67,7 @@ def test_means_of_a_quantised_rest_keep_the_error_of_one_sample():
     t, step = np.linspace(0.0, 10.0, 20_001), 0.1
     moving = np.where(t > 5.0, 2.03 + 10.0 * (t - 5.0), 2.03)
     levels = np.round(moving / step) * step
-    record = MeasuredRecord(SIMULATOR, RecordData("record", t, levels[:, None], {}, (None,)), binned=True)
+    record = MeasuredRecord(SIMULATOR, Samples("record", t, {"x": levels}), binned=True)
     errors = record.quantisation_errors(np.interp(record.t, t, moving)[:, None])[:, 0]
     assert record.width > 1
     assert errors[record.t < 4.9] == pytest.approx(-0.03)
@@ -76,7 +77,7 @@ def test_means_of_a_quantised_rest_keep_the_error_of_one_sample():
 
 def test_the_known_noise_of_a_sample_is_that_of_a_mean_times_the_root_of_their_number():
     t = np.linspace(0.0, 10.0, 20_001)
-    record = MeasuredRecord(SIMULATOR, RecordData("record", t, np.sin(t)[:, None], {}, (0.3,)), binned=True)
+    record = MeasuredRecord(SIMULATOR, Samples("record", t, {"x": np.sin(t)}, sigma={"x": 0.3}), binned=True)
     assert record.width > 1
     assert record.noise == pytest.approx(0.3 / record.width**0.5)
 
@@ -84,7 +85,7 @@ def test_the_known_noise_of_a_sample_is_that_of_a_mean_times_the_root_of_their_n
 def test_inputs_pass_through_all_samples_after_their_error_has_been_estimated():
     t = np.linspace(0.0, 6.0, 6001)
     force = np.random.default_rng(1).normal(size=len(t))
-    data = RecordData("record", t, np.sin(2 * np.pi * t)[:, None], {"F": force}, (1e-4,))
+    data = Samples("record", t, {"x": np.sin(2 * np.pi * t)}, input_t=t, inputs={"F": force}, sigma={"x": 1e-4})
     record = MeasuredRecord(SIMULATOR, data, binned=False)
     problem = FitProblem([record], ["x"], [Unknown("size", "size", "m", 0.5, 2.0)], {})
     subdivide_inputs(problem, np.zeros(1))

@@ -146,7 +146,7 @@ REFUSED = [
     ({"v [m]": V, "F [N]": V}, {"velocity": "v"}, "v is in m, which is not the unit of a velocity"),
     ({"v [m/s]": V[:5], "F [N]": V[:5]}, {}, "has 5 points with velocity; at least 6"),
     ({"v [m/s]": np.sign(V), "F [N]": V}, {}, "all points have the speed 1 m/s; measure at several"),
-    ({"v [m/s]": V, "F [N]": V * np.nan}, {}, "24 of 24 rows have no number for v .* or F"),
+    ({"v [m/s]": V, "F [N]": V * np.nan}, {}, "24 of 24 rows have no number for v or F"),
     ({"v [m/s]": V, "F [N]": V}, {"force": "G"}, r"unknown column 'G'; allowed: F \[N\], v \[m/s\]"),
     ({"v [m/s]": V, "G": V}, {}, r"no column of forces \(it has v \[m/s\], G\): name it"),
     ({"w": V, "F [N]": V}, {}, r"no column of velocities \(it has w, F \[N\]\): name it"),

@@ -50,7 +50,10 @@ DECAY = np.linspace(0.0, 10.0, 101), np.exp(-0.1 * np.linspace(0.0, 10.0, 101)) 
 SWING = np.cos(DECAY[0])
 COMPARE = [  # changes of harness.compare("smd.fmu", "smd.fmu")
     ({"rtol": 0.0}, "rtol = 0.0 must be a finite number above 0"),
-    ({"a": 3}, "a = 3 must be a name, a file, a table of pandas or xarray, a mapping of columns, or a trajectory"),
+    (
+        {"a": 3},
+        "a = 3 must be a name, a record, a file, a table of pandas or xarray, a mapping of columns, or a trajectory",
+    ),
 ]
 IDENTIFY_DECAY = [
     ({"record": [0.0, 1.0]}, "x is missing"),
@@ -137,7 +140,7 @@ FIT = [  # changes of a fit of mu_s of the sled to its position
     ({"records": "missing.csv"}, "missing.csv"),
     (
         {"records": 3},
-        "records = 3 must be a file, a table of pandas or xarray, a mapping of columns, a trajectory, or times",
+        "records = 3 must be a record, a file, a table of pandas or xarray, columns, a trajectory, or times",
     ),
     ({"against": "stickslip"}, "stickslip is to be compared with itself: give another FMU"),
     ({"against": "pendulum", "free": ["m"]}, "unknown output of pendulum 'x'"),

@@ -127,7 +127,7 @@ QUANTITIES = {"phone.csv": "acceleration", "accelerometer-in-g.csv": "accelerati
 MESSAGES = {
     "logger.csv": "0.0125004 s apart. This step, and any frequency, has a relative uncertainty of about 8e-05",
     "holes.csv": "3 of 600 rows have a missing cell",
-    "cut-off.csv": "1 of 601 rows have a missing cell",
+    "cut-off.csv": "The last row has a time and no signal, and is left out",
     "phone.csv": "Linear Acceleration z (m/s^2)",
 }
 
@@ -297,7 +297,7 @@ UNITS = "\n".join(f"{i} sec,{i % 5} {'cm' if i == 3 else 'mm'}" for i in range(2
         (f"t [s],x [m]\n{ROWS}\n20,1e200", {}, "which is not plausible"),
         (f"t [s],x [m]\n{ROWS}", {"begin": 15}, "has 5 samples"),
         (
-            f"t [s],x [m]\n{ROWS.replace(',1', ',').replace(',3', ',')}\n20,\n21,\n22,\n23,",
+            f"t [s],x [m]\n{ROWS.replace(',1', ',').replace(',3', ',')}\n20,\n21,\n22,\n23,\n24,5",
             {},
             "rows have no number",
         ),

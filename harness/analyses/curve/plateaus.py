@@ -10,7 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...errors import SceneError
-from ...records.curve_table import CurveRecord
+from ...records.extraction import Samples
+from ...records.friction_curve import FORCE, POSITION, VELOCITY
 from ..estimation.noise import robust_std
 from .identification import MIN_POINTS, CurvePoints
 
@@ -44,7 +45,7 @@ class Blocks:
         return max(STANDSTILL * float(np.abs(self.v).max()), NOISE_BAND * self.noise)
 
 
-def build_points(record: CurveRecord, mass: float | None, backlash: float) -> CurvePoints:
+def build_points(record: Samples, mass: float | None, backlash: float) -> CurvePoints:
     """Return the points of a record.
 
     Parameters
@@ -59,17 +60,10 @@ def build_points(record: CurveRecord, mass: float | None, backlash: float) -> Cu
     SceneError
         If a record over time has too little motion.
     """
-    if record.t is None:
+    units = record.units[VELOCITY], record.units[FORCE]
+    if not len(record.t):
         labels = tuple(f"row {row}" for row in record.rows)
-        return CurvePoints(
-            record.name,
-            record.motion,
-            record.force,
-            record.velocity_unit,
-            record.force_unit,
-            labels,
-            record.notes,
-        )
+        return CurvePoints(record.name, record.columns[VELOCITY], record.columns[FORCE], *units, labels, record.notes)
     blocks = build_blocks(record)
     is_usable = find_usable_blocks(blocks, backlash)
     if is_usable.sum() < MIN_POINTS:
@@ -86,28 +80,21 @@ def build_points(record: CurveRecord, mass: float | None, backlash: float) -> Cu
             "." if mass else ", and inertia is not removed, because the mass is not given."
         )
     v, force, labels = zip(*rows, strict=True)
-    return CurvePoints(
-        record.name,
-        np.array(v),
-        np.array(force),
-        record.velocity_unit,
-        record.force_unit,
-        labels,
-        (*record.notes, note),
-    )
+    return CurvePoints(record.name, np.array(v), np.array(force), *units, labels, (*record.notes, note))
 
 
-def build_blocks(record: CurveRecord) -> Blocks:
+def build_blocks(record: Samples) -> Blocks:
     """Divide a record over time into blocks."""
-    assert record.t is not None
-    n = len(record.t)
-    width = max(-(-n // MAX_BLOCKS), BLOCK_SAMPLES if record.is_position else 1)
+    n, is_position = len(record.t), POSITION in record.columns
+    width = max(-(-n // MAX_BLOCKS), BLOCK_SAMPLES if is_position else 1)
     count = n // width
     if count < MIN_BLOCKS:
         raise SceneError(f"{record.name} has {n} samples over time; at least {MIN_BLOCKS * width} are required")
-    t, x, force = (values[: count * width].reshape(count, width) for values in (record.t, record.motion, record.force))
+    motion = record.columns[POSITION if is_position else VELOCITY]
+    signals = (record.t, motion, record.columns[FORCE])
+    t, x, force = (values[: count * width].reshape(count, width) for values in signals)
     times = t.mean(axis=1)
-    if record.is_position:
+    if is_position:
         offset = t - times[:, None]
         v = (offset * x).sum(axis=1) / (offset**2).sum(axis=1)
     else:

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import optimize
 
-from ...records.record import Record
+from ...records.motion import Motion
 from ..estimation.estimate import Estimate
 from .extrema import Extrema
 from .fit_problem import FitProblem, column_norms, least_squares
@@ -62,7 +62,7 @@ class KnownParameters:
     pendulum: bool = False
 
 
-def quantity_labels(record: Record) -> dict[int, tuple[str, str, str]]:
+def quantity_labels(record: Motion) -> dict[int, tuple[str, str, str]]:
     """Return name, unit and text of each unknown that is reported, by its index in UNKNOWNS."""
     base, is_rotation = record.base, record.base == "rad"
     rest, drift = "rest position", "drift of the rest position"
@@ -85,7 +85,7 @@ def unit_scales(problem: FitProblem) -> dict[int, float]:
 
 
 def to_record_units(
-    record: Record, problem: FitProblem, unknown: int, value: float, error: float, low: float, high: float
+    record: Motion, problem: FitProblem, unknown: int, value: float, error: float, low: float, high: float
 ) -> Estimate:
     """Return an estimate of one of the UNKNOWNS, converted from the units of the problem to those of the record."""
     scale, offset = unit_scales(problem)[unknown], problem.offset if unknown == REST else 0.0
@@ -96,7 +96,7 @@ def to_record_units(
 
 
 def make_estimates(
-    record: Record,
+    record: Motion,
     problem: FitProblem,
     law: FittedLaw,
     full: FittedLaw,
@@ -139,7 +139,7 @@ def make_estimates(
 
 
 def force_estimates(
-    record: Record, omega: Estimate, estimates: dict[int, Estimate], parameters: KnownParameters
+    record: Motion, omega: Estimate, estimates: dict[int, Estimate], parameters: KnownParameters
 ) -> tuple[Estimate, ...]:
     """Return friction force, damping and drag constants if k or m is known.
 
@@ -162,7 +162,7 @@ def force_estimates(
 
 
 def estimate_from_extrema(
-    record: Record, problem: FitProblem, extrema: Extrema, law: FittedLaw, parameters: KnownParameters, omega: Estimate
+    record: Motion, problem: FitProblem, extrema: Extrema, law: FittedLaw, parameters: KnownParameters, omega: Estimate
 ) -> tuple[tuple[Estimate, ...], str]:
     """Return estimates of the law from all turning points, and the reason if there are none."""
     if record.order:
@@ -199,7 +199,7 @@ def estimate_from_extrema(
 
 
 def estimate_from_two_peaks(
-    record: Record, problem: FitProblem, extrema: Extrema, law: FittedLaw, parameters: KnownParameters, omega: Estimate
+    record: Motion, problem: FitProblem, extrema: Extrema, law: FittedLaw, parameters: KnownParameters, omega: Estimate
 ) -> tuple[tuple[Estimate, ...], str]:
     """Return each single loss that leads from the first to the last turning point, and the reason if there is none."""
     if record.order:

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...errors import HarnessError
-from ...records.record import Record
+from ...records.motion import Motion
 from . import thresholds
 from .sample_noise import estimate_noise
 from .smooth_motion import SmoothMotion, are_regular, smooth_segments
@@ -53,7 +53,7 @@ class Extrema:
         return np.polyval(np.polyfit(t[1:-1] - t[0], middles, 1), t - t[0])
 
 
-def find_extrema(record: Record, half_period: float, quantiser_step: float, pendulum: bool) -> Extrema:
+def find_extrema(record: Motion, half_period: float, quantiser_step: float, pendulum: bool) -> Extrema:
     """Return the turning points of a decay with this half period in s; HarnessError if there are too few."""
     noise, _ = estimate_noise(record.t, record.x)
     motions = [cut_to_decay(motion, half_period) for motion in smooth_segments(record, half_period, noise, pendulum)]

@@ -14,7 +14,7 @@ import numpy as np
 from scipy import optimize
 
 from ...errors import HarnessError
-from ...records.record import MIN_SAMPLES, Record, selection_text
+from ...records.motion import MIN_SAMPLES, Motion, selection_text
 from . import thresholds
 from .energy_loss import estimate_losses
 from .extrema import Extrema
@@ -149,7 +149,7 @@ class FitProblem:
         return self.skip_half_cycles(p, int(np.argmin(np.abs(starts - t))))
 
 
-def prepare_problem(record: Record, extrema: Extrema, pendulum: bool, drift: bool) -> tuple[FitProblem, np.ndarray]:
+def prepare_problem(record: Motion, extrema: Extrema, pendulum: bool, drift: bool) -> tuple[FitProblem, np.ndarray]:
     """Return the fit problem of a record, and the values of the full law that fit its turning points best."""
     time_origin = float(record.t[0])
     times, first = extrema.t - time_origin, extrema.t_start - time_origin

@@ -10,7 +10,7 @@ from typing import Self
 
 import numpy as np
 
-from ...records.record import MIN_SAMPLES, Record
+from ...records.motion import MIN_SAMPLES, Motion
 from ..estimation.noise import robust_std
 from . import thresholds
 from .extrema import Extrema
@@ -26,7 +26,7 @@ class FreeMotion:
 
     Attributes
     ----------
-    record, extrema : Record, Extrema
+    record, extrema : Motion, Extrema
         The record and its turning points.
     terms : tuple of str
         Terms of the law that is fitted.
@@ -46,7 +46,7 @@ class FreeMotion:
         Sentences on other samples left out.
     """
 
-    record: Record
+    record: Motion
     extrema: Extrema
     terms: Terms
     available: FitProblem
@@ -74,7 +74,7 @@ class FreeMotion:
         """Return the residuals (n,) of the selected samples."""
         return self.problem.residuals(self.p, self.terms)[0]
 
-    def find_hums(self, decay: Record) -> list[Hum]:
+    def find_hums(self, decay: Motion) -> list[Hum]:
         """Return the hums in samples of the decay."""
         problem = self.problem
         t = decay.t - problem.time_origin
@@ -94,7 +94,7 @@ class FreeMotion:
         return self.record.format_time(t + self.problem.time_origin)
 
 
-def select_free_motion(record: Record, extrema: Extrema, terms: Terms, pendulum: bool, drift: bool) -> FreeMotion:
+def select_free_motion(record: Motion, extrema: Extrema, terms: Terms, pendulum: bool, drift: bool) -> FreeMotion:
     """Return the free motion of a record with the given turning points, fitted by the law with these terms."""
     problem, p = initial_problem(record, extrema, terms, pendulum, drift)
     motion = FreeMotion(record, extrema, terms, problem, problem, p)
@@ -115,7 +115,7 @@ def select_free_motion(record: Record, extrema: Extrema, terms: Terms, pendulum:
 
 
 def initial_problem(
-    record: Record, extrema: Extrema, terms: Terms, pendulum: bool, drift: bool
+    record: Motion, extrema: Extrema, terms: Terms, pendulum: bool, drift: bool
 ) -> tuple[FitProblem, np.ndarray]:
     """Return the fit problem, and the values of a law with these terms that fit its turning points."""
     problem, p = prepare_problem(record, extrema, pendulum, drift)

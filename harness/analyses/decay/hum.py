@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import optimize
 
-from ...records.record import Record
+from ...records.motion import Motion
 from . import thresholds
 
 PADDING = 4  # times the samples: between two frequencies of the spectrum, a line loses at most 5 % of its power
@@ -37,7 +37,7 @@ class Hum:
         """Return the values (n,) at times t (n,) in s."""
         return np.asarray((self.amplitude * np.exp(-2j * np.pi * self.frequency * (t - self.origin))).real)
 
-    def subtract_from(self, record: Record) -> Record:
+    def subtract_from(self, record: Motion) -> Motion:
         """Return the record without the hum, with a note."""
         note = (
             f"Hum is subtracted: a steady sinusoid with an amplitude of {abs(self.amplitude):.2g} {record.unit} at "

@@ -24,7 +24,7 @@ from functools import cached_property
 import numpy as np
 
 from ...errors import HarnessError, check_names, option_text
-from ...records.record import Record
+from ...records.motion import Motion
 from ..estimation.estimate import Estimate
 from . import thresholds
 from .energy_loss import EnergyLoss, loss_fractions
@@ -56,7 +56,7 @@ class DecayIdentification:
 
     Attributes
     ----------
-    record : Record
+    record : Motion
         The record, without spikes and hum.
     extrema : Extrema
         Its turning points.
@@ -82,7 +82,7 @@ class DecayIdentification:
         Sentences to read before relying on the values.
     """
 
-    record: Record
+    record: Motion
     extrema: Extrema
     problem: FitProblem
     laws: tuple[FittedLaw, ...]
@@ -175,7 +175,7 @@ class DecayIdentification:
 
 
 def fit_decay(
-    record: Record,
+    record: Motion,
     parameters: KnownParameters,
     drag: bool = True,
     drift: bool = False,
@@ -215,7 +215,7 @@ def fit_decay(
         raise HarnessError(message) from None
 
 
-def suggest_remedy(record: Record, parameters: KnownParameters, drag: bool, drift: bool) -> str:
+def suggest_remedy(record: Motion, parameters: KnownParameters, drag: bool, drift: bool) -> str:
     """Return what would let the record be fitted; empty if that is not known."""
     if parameters.pendulum and record.order == 2:
         return (
@@ -235,7 +235,7 @@ def suggest_remedy(record: Record, parameters: KnownParameters, drag: bool, drif
 
 
 def identify_record(
-    record: Record, parameters: KnownParameters, drag: bool, drift: bool, report: Callable[[float], None]
+    record: Motion, parameters: KnownParameters, drag: bool, drift: bool, report: Callable[[float], None]
 ) -> DecayIdentification:
     """Identify a decay as `fit_decay` does, without its attempts to recover; FitError if no law fits."""
     if parameters.pendulum and record.base != "rad":
@@ -324,7 +324,7 @@ def identify_record(
     )
 
 
-def thin_around(record: Record, decay: Record, half_period: float) -> tuple[Record, Record]:
+def thin_around(record: Motion, decay: Motion, half_period: float) -> tuple[Motion, Motion]:
     """Return the record and its decay, both thinned, with a note, if the decay is denser than its motion requires."""
     size = block_size(decay, half_period)
     if size == 1:

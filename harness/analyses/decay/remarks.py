@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...errors import command_text, option_text
-from ...records.record import Record
+from ...records.motion import Motion
 from ..estimation.estimate import Estimate
 from . import thresholds
 from .estimates import unit_scales
@@ -17,7 +17,7 @@ from .model_selection import FittedLaw, deviance_difference
 
 
 def check_fit(
-    record: Record, problem: FitProblem, full: FittedLaw, uncertainty: FitUncertainty, pendulum: bool
+    record: Motion, problem: FitProblem, full: FittedLaw, uncertainty: FitUncertainty, pendulum: bool
 ) -> None:
     """Raise FitError if the best fit leaves large residuals, or gains energy."""
     e, _ = problem.residuals(full.p, full.terms)
@@ -56,7 +56,7 @@ def damping_significance(problem: FitProblem, full: FittedLaw) -> float:
 
 
 def make_remarks(
-    record: Record, problem: FitProblem, laws: tuple[FittedLaw, ...], full: FittedLaw, uncertainty: FitUncertainty
+    record: Motion, problem: FitProblem, laws: tuple[FittedLaw, ...], full: FittedLaw, uncertainty: FitUncertainty
 ) -> tuple[str, ...]:
     """Return remarks on residuals, drift, rounding and undecided laws."""
     noise, rms, unit = problem.noise * problem.scale, uncertainty.rms * problem.scale, record.unit
@@ -130,7 +130,7 @@ def rounding_remark(problem: FitProblem, full: FittedLaw, unit: str) -> tuple[st
     )
 
 
-def drift_remark(record: Record, problem: FitProblem, full: FittedLaw) -> str:
+def drift_remark(record: Motion, problem: FitProblem, full: FittedLaw) -> str:
     """Return a remark if a fit with a drift of the rest position is significantly better; empty if not."""
     with_drift = replace(problem, drift=True)
     uncertainty = estimate_uncertainty(with_drift, full.p, full.terms)
@@ -168,7 +168,7 @@ def ambiguity_remark(problem: FitProblem, laws: tuple[FittedLaw, ...]) -> tuple[
     )
 
 
-def rise_remark(record: Record, rise: LowSpeedRise) -> str:
+def rise_remark(record: Motion, rise: LowSpeedRise) -> str:
     """Return the remark on friction that rises at low speed."""
     return (
         f"Friction that rises at low speed fits better: it is {rise.size:.2g} {record.base} (over stiffness) larger at "

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...records.record import MIN_SAMPLES, Record
+from ...records.motion import MIN_SAMPLES, Motion
 from ..estimation.noise import interpolation_residuals, robust_std
 from . import thresholds
 
@@ -28,7 +28,7 @@ def estimate_noise(t: np.ndarray, x: np.ndarray) -> tuple[float, float]:
     return max(noise, step / np.sqrt(12)), step if is_coarse else 0.0
 
 
-def remove_spikes(record: Record) -> Record:
+def remove_spikes(record: Motion) -> Motion:
     """Return the record without samples far from their neighbours; unchanged if there are many of them."""
     t, x = record.t, record.x
     for _ in range(thresholds.MAX_SPIKE_ROUNDS):

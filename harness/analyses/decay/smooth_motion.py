@@ -10,7 +10,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from ...records.record import Record
+from ...records.motion import Motion
 from ..estimation.reversals import find_reversals
 from . import thresholds
 
@@ -60,7 +60,7 @@ class SmoothMotion:
         return max(1.5 * self.threshold / thresholds.MIN_SMOOTH_REVERSAL, 2e-4 * float(np.ptp(positions)) / 2)
 
 
-def half_periods(record: Record, noise: float) -> list[float]:
+def half_periods(record: Motion, noise: float) -> list[float]:
     """Return different half periods in s that the record may have: of its reversals, and of slow and fast spectra."""
     smallest = max(thresholds.MIN_REVERSAL * noise, thresholds.MIN_RELATIVE_REVERSAL * float(np.ptp(record.x)))
     at = find_reversals(record.x, smallest)
@@ -82,7 +82,7 @@ def half_periods(record: Record, noise: float) -> list[float]:
     return result or [0.5 * float(np.ptp(record.t))]
 
 
-def smooth_segments(record: Record, half_period: float, noise: float, pendulum: bool) -> list[SmoothMotion]:
+def smooth_segments(record: Motion, half_period: float, noise: float, pendulum: bool) -> list[SmoothMotion]:
     """Return the smoothed position between the gaps of a record, where there are enough samples and reversals."""
     intervals = np.diff(record.t)
     longest = max(thresholds.GAP * half_period, thresholds.MIN_GAP_SAMPLES * float(np.median(intervals)))
@@ -92,7 +92,7 @@ def smooth_segments(record: Record, half_period: float, noise: float, pendulum: 
     return [motion for motion in motions if motion and len(motion.reversals) >= thresholds.MIN_TURNING_POINTS]
 
 
-def smooth(record: Record, part: slice, half_period: float, noise: float, pendulum: bool) -> SmoothMotion | None:
+def smooth(record: Motion, part: slice, half_period: float, noise: float, pendulum: bool) -> SmoothMotion | None:
     """Return the smoothed position in a part of a record; None if it has too few samples."""
     t, x = record.t[part], record.x[part]
     dt = (t[-1] - t[0]) / (len(t) - 1)

@@ -9,13 +9,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...records.record import Record
+from ...records.motion import Motion
 from . import thresholds
 
 REACH = 2  # blocks to each side, for the second derivative: their noise enters by 1/(24 REACH^2)
 
 
-def block_size(record: Record, half_period: float) -> int:
+def block_size(record: Motion, half_period: float) -> int:
     """Return the number of samples per block that a record with this half period (s) allows; 1 leaves it unchanged."""
     n = len(record.t)
     if n <= thresholds.MAX_DENSE_SAMPLES:
@@ -25,7 +25,7 @@ def block_size(record: Record, half_period: float) -> int:
     return max(int(min(n / thresholds.MIN_THINNED_SAMPLES, per_period)), 1)
 
 
-def thinning_error(record: Record, half_period: float, size: int) -> float:
+def thinning_error(record: Motion, half_period: float, size: int) -> float:
     """Return the largest shift of a sample by thinning, relative to the amplitude of a sine with this half period.
 
     At uneven times it is that of the mean itself, without the correction by the second derivative.
@@ -38,7 +38,7 @@ def thinning_error(record: Record, half_period: float, size: int) -> float:
     return float((np.pi / half_period) ** 2 * np.percentile(times.var(axis=1), 99) / 2)
 
 
-def thin(record: Record, size: int) -> Record:
+def thin(record: Motion, size: int) -> Motion:
     """Return the record with one sample per block of `size` samples; without blocks next to gaps."""
     count = len(record.t) // size
     if size < 2 or count <= 2 * REACH:

@@ -11,7 +11,7 @@ from itertools import pairwise
 import numpy as np
 
 from ...errors import HarnessError, command_text
-from ...records.record import Record, selection_text
+from ...records.motion import Motion, selection_text
 from . import thresholds
 from .sample_noise import estimate_noise, remove_spikes
 from .smooth_motion import are_regular, half_periods, smooth_segments
@@ -99,7 +99,7 @@ class Decay:
         return (self.end - self.begin) * float(np.sqrt(first * max(first - last, 0.0)))
 
 
-def select_decay(record: Record, pendulum: bool) -> tuple[Record, float]:
+def select_decay(record: Motion, pendulum: bool) -> tuple[Motion, float]:
     """Return the part of a record that holds its free decay, and its half period in s.
 
     It is the record itself if this holds little else.
@@ -132,7 +132,7 @@ def select_decay(record: Record, pendulum: bool) -> tuple[Record, float]:
     return (record, periods[0]) if best is None else (crop(record, best), best.half_period)
 
 
-def measure_swings(record: Record, half_period: float, noise: float, pendulum: bool) -> Swings | None:
+def measure_swings(record: Motion, half_period: float, noise: float, pendulum: bool) -> Swings | None:
     """Return the swings of a record with this half period; None if it has too few turning points."""
     motions = []
     for motion in smooth_segments(record, half_period, noise, pendulum):
@@ -224,7 +224,7 @@ def skip_disturbed_swings(swings: Swings, first: int, last: int) -> int:
     return first
 
 
-def check_motion(record: Record, swings: Swings, best: Decay | None, pendulum: bool) -> None:
+def check_motion(record: Motion, swings: Swings, best: Decay | None, pendulum: bool) -> None:
     """Raise HarnessError if the swings are those of a motion that is no free decay."""
     if best is None:
         at = longest_regular(swings)
@@ -284,7 +284,7 @@ def longest_regular(swings: Swings) -> slice:
     return slice(first, last)
 
 
-def describe_shape(record: Record, swings: Swings, part: slice, shape: float) -> str:
+def describe_shape(record: Motion, swings: Swings, part: slice, shape: float) -> str:
     """Return the sentence that refuses swings that are no waves."""
     duration, rises = swings.duration[part], swings.rises[part]
     up, down = (float(np.median(duration[which])) if which.any() else 1.0 for which in (rises, ~rises))
@@ -324,7 +324,7 @@ def find_regrowth(swings: Swings, best: Decay) -> tuple[int, int] | None:
     return None
 
 
-def crop(record: Record, best: Decay) -> Record:
+def crop(record: Motion, best: Decay) -> Motion:
     """Return the record of a decay, with a note; unchanged if only a rest or a cycle is before and after it."""
     swings = best.swings
     before, after = swings.size[: best.first], swings.size[best.last + 1 :]

@@ -6,9 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...errors import HarnessError, option_text
+from ...records.extraction import Samples
 from ...running.whole_run import Simulator
 from .fit_problem import FitProblem, Selection
-from .measured_record import MAX_AVERAGING_ERROR, MeasuredRecord, RecordData
+from .measured_record import MAX_AVERAGING_ERROR, MeasuredRecord
 from .profile_likelihood import profile_bound, search_bound
 from .search import DISTINCT, Minimum, search, select_distinct
 from .uncertainty import Uncertainty, estimate_uncertainty
@@ -66,7 +67,7 @@ class RawFit:
 
 def fit_records(
     simulator: Simulator,
-    data: Sequence[RecordData],
+    data: Sequence[Samples],
     unknowns: Sequence[Unknown],
     fixed: Mapping[str, float],
     robust: bool,
@@ -92,7 +93,7 @@ def fit_records(
     for binned in (True, False) if averages else (False,):
         records = [MeasuredRecord(simulator, record_data, binned) for record_data in data]
         problem = FitProblem(records, simulator.spec.outputs, unknowns, fixed, robust)
-        raw_fit = search_and_refine(problem, warm_start, any(any(record_data.sigma) for record_data in data), report)
+        raw_fit = search_and_refine(problem, warm_start, any(record_data.sigma for record_data in data), report)
         if is_averaging_negligible(problem, raw_fit):
             break
         warm_start = raw_fit.z

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.interpolate import CubicSpline
 
+from ...records.extraction import Samples
 from ...running.stepping import merge_points
 from ...running.whole_run import Run, Simulator
 from .noise import bin_means, estimate_noise
@@ -27,34 +28,6 @@ class RecordPart:
     run: Run
 
 
-@dataclass(frozen=True)
-class RecordData:
-    """A record in the units of the FMU.
-
-    Attributes
-    ----------
-    name : str
-        Name of the record.
-    t : numpy.ndarray
-        Times (n,) in s.
-    y : numpy.ndarray
-        Observed columns (n, columns).
-    inputs : mapping
-        Inputs (m,) by name.
-    sigma : tuple of float or None
-        Standard deviation of the noise of each column; None if it is not known.
-    input_t : numpy.ndarray, optional
-        Times (m,) of the inputs in s, from the first of `t` to the last; by default these are `t`.
-    """
-
-    name: str
-    t: np.ndarray
-    y: np.ndarray
-    inputs: Mapping[str, np.ndarray]
-    sigma: tuple[float | None, ...]
-    input_t: np.ndarray | None = None
-
-
 class MeasuredRecord:
     """Samples y (n, columns) at the times t (n,), the inputs between them, and the runs at the same times.
 
@@ -64,7 +37,7 @@ class MeasuredRecord:
     ----------
     simulator : Simulator
         Its specification has the observed outputs, one for each column.
-    data : RecordData
+    data : Samples
         The record in the units of the FMU.
     binned : bool
         Whether a long record is averaged.
@@ -79,9 +52,9 @@ class MeasuredRecord:
         Number of parts of each interval between samples, in each of which inputs are constant.
     """
 
-    def __init__(self, simulator: Simulator, data: RecordData, binned: bool) -> None:
+    def __init__(self, simulator: Simulator, data: Samples, binned: bool) -> None:
         t, y = data.t, data.y
-        input_t = t if data.input_t is None else data.input_t
+        input_t = data.input_t if data.inputs else t
         self.simulator, self.name, self.sampled_t, self.sampled_y = simulator, data.name, t, y
         estimates = [estimate_noise(t, column) for column in y.T]
         self.step = np.array([step for _, step in estimates])
@@ -99,7 +72,7 @@ class MeasuredRecord:
         self.rows = np.searchsorted(self.knots, self.t)
         scatter = [estimate_noise(self.t, column)[0] for column in self.y.T]
         self.noise = np.maximum(scatter, self.step / 12**0.5)
-        known = np.array([deviation or 0.0 for deviation in data.sigma])
+        known = np.array([data.sigma.get(name, 0.0) for name in data.columns])
         self.noise = np.where(known > 0, known / np.sqrt(self.width), self.noise)
         self.all = np.arange(len(self.t))
         self.parts: dict[int, RecordPart] = {}

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ...records.extraction import Samples
 from ..estimation.noise import interpolation_residuals, robust_std
 from ..estimation.reversals import find_reversals
-from .measured_record import RecordData
 from .parameter_fit import Slips
 
 FORCES = ("N", "N.m")
@@ -19,7 +19,7 @@ SLOW = 3.0  # ratio of the times of loading and of slip
 IRREGULAR = 0.1  # standard deviation of the drops, relative to their mean
 
 
-def irregular_slips(records: Sequence[RecordData], columns: Sequence[tuple[str, str]]) -> tuple[Slips, ...]:
+def irregular_slips(records: Sequence[Samples], columns: Sequence[tuple[str, str]]) -> tuple[Slips, ...]:
     """Return the irregular slips of each force in the records.
 
     Parameters
@@ -36,7 +36,7 @@ def irregular_slips(records: Sequence[RecordData], columns: Sequence[tuple[str, 
     return tuple(slips for slips in measured if slips and slips.drop.std(ddof=1) > IRREGULAR * slips.drop.mean())
 
 
-def measure_slips(record: RecordData, y: np.ndarray, column: str, unit: str) -> Slips | None:
+def measure_slips(record: Samples, y: np.ndarray, column: str, unit: str) -> Slips | None:
     """Return the slips of a force y (n,) that loads slowly and falls fast; None if it has too few of them."""
     threshold = max(NOISES * robust_std(interpolation_residuals(record.t, y)), SHARE * float(np.ptp(y)))
     at = find_reversals(y, threshold)

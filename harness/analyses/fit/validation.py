@@ -5,18 +5,19 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from ...errors import HarnessError
+from ...records.extraction import Samples
 from ..estimation.estimate import ColumnResiduals
 from .fit_description import column_residuals
 from .fit_problem import FitProblem
 from .fit_procedure import RawFit
-from .measured_record import MeasuredRecord, RecordData
+from .measured_record import MeasuredRecord
 from .parameter_fit import Validation
 from .uncertainty import split_residuals
 
 WORSE = 2.0  # ratio of the residuals of validation and fitted records from which there is a remark
 
 
-def validate(problem: FitProblem, raw_fit: RawFit, data: Sequence[RecordData]) -> Validation:
+def validate(problem: FitProblem, raw_fit: RawFit, data: Sequence[Samples]) -> Validation:
     """Predict records that were not fitted with the fitted values.
 
     Raises
@@ -42,7 +43,7 @@ def validate(problem: FitProblem, raw_fit: RawFit, data: Sequence[RecordData]) -
     return Validation(columns, tuple(record.fitted for record in records), tuple(predictions), remarks)
 
 
-def prepare_record(problem: FitProblem, raw_fit: RawFit, data: RecordData) -> MeasuredRecord:
+def prepare_record(problem: FitProblem, raw_fit: RawFit, data: Samples) -> MeasuredRecord:
     """Return a record that is averaged and whose inputs are subdivided as those of the first fitted record."""
     fitted = problem.records[0]
     record = MeasuredRecord(fitted.simulator, data, fitted.width > 1)

@@ -10,8 +10,9 @@ from typing import Any
 from ...analyses.decay.estimates import KnownParameters
 from ...analyses.decay.identification import fit_decay
 from ...errors import HarnessError, SceneError, format_value
-from ...records.columns import ColumnOptions, read_record
-from ...records.record import Record, check_record
+from ...records.columns import ColumnOptions
+from ...records.motion import Motion, check_samples
+from ...records.record import load_record as load_file
 from ...results import provenance
 from ...results.folder import replace_folder
 from ...results.registry import find_study
@@ -20,7 +21,7 @@ from .result import DecayResult
 
 STUDY = find_study("decay")
 
-LoadedRecord = tuple[Record, KnownParameters, dict[str, Any]]  # with provenance: files, parameters, run
+LoadedRecord = tuple[Motion, KnownParameters, dict[str, Any]]  # with provenance: files, parameters, run
 
 
 def identify_decay(
@@ -63,12 +64,11 @@ def load_record(
     """Load the record of a file, or run a scene and take the stiffness from its model."""
     path = Path(source)
     if source == "-":
-        return read_record(source, columns, "stdin"), parameters, {"files": ()}
+        return load_file(source, columns).motion, parameters, {"files": ()}
     if is_record_file(source):
         if not exists(source):
             raise SceneError(f"{format_value(source)} does not exist: give an existing record, or a scene")
-        name = path.stem.encode("utf-8", "replace").decode()
-        return read_record(source, columns, name), parameters, {"files": (path,)}
+        return load_file(source, columns).motion, parameters, {"files": (path,)}
     if path.is_dir():
         raise SceneError(f"{source} is a folder; give a file in it")
     return record_of_scene(source, columns, parameters, report)
@@ -103,8 +103,8 @@ def record_of_scene(
             f"scene {scene.name}: {position} has no unit in {run.spec.fmu.name}: run the scene, and identify the decay "
             "in its trajectory.csv with --unit"
         )
-    record = Record(scene.name, run.time, run.column_of_role("position"), unit, 0, unit).select(*columns.interval)
-    check_record(record)
+    record = Motion(scene.name, run.time, run.column_of_role("position"), unit, 0, unit).select(*columns.interval)
+    check_samples(record.name, record.t, record.x)
     provenance_data = {"files": (run.spec.fmu,), "parameters": run.effective_parameters, "run": run.spec}
     if parameters.k is None and parameters.m is None:
         with suppress(HarnessError):  # a model without stiffness has no friction force

@@ -4,8 +4,8 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from ...errors import SceneError, option_text
-from ...records.columns import Column, find_time_column, list_columns
-from ...records.table_files import Table
+from ...records.columns import Column, find_column, find_time_column, list_columns
+from ...records.record import Record
 from ...records.units import conversion_factor
 from ...running.fmu_archive import read_description
 from ...running.whole_run import real_variables
@@ -13,7 +13,7 @@ from ...scenes.roles import ROLES, find_roles
 from .request import FitRequest
 
 
-def choose_observed(request: FitRequest, table: Table) -> tuple[FitRequest, str]:
+def choose_observed(request: FitRequest, record: Record) -> tuple[FitRequest, str]:
     """Return a request that observes outputs, and a sentence on the choice; empty if the request names outputs.
 
     A column that is named like an output is taken: of several, the position, the velocity, the acceleration or the
@@ -26,8 +26,12 @@ def choose_observed(request: FitRequest, table: Table) -> tuple[FitRequest, str]
     """
     if request.observe:
         return request, ""
+    table, options = record.table, record.options
     candidates = list_columns(table)
-    time_column = find_time_column(table, candidates, request.columns)
+    time_column = find_time_column(table, candidates, options)
+    if options.column is not None:  # the record names its signal
+        column = find_column(options.column, table, candidates)
+        candidates = [replace(column, unit=options.unit or column.unit)]
     driven = {heading.lower() for heading in request.inputs.values()}
     columns = [
         column

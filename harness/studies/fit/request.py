@@ -8,12 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from ...analyses.fit.measured_record import RecordData
 from ...analyses.fit.unknowns import DELAY, GAIN, OFFSET, RANGE_FACTOR, SENSOR, Unknown
 from ...errors import SceneError, check_names, format_value, option_text
-from ...records.columns import ColumnOptions
-from ...records.record import MIN_SAMPLES
-from ...records.signal_table import SignalSource, SignalTable
+from ...records.extraction import Samples
+from ...records.motion import MIN_SAMPLES
+from ...records.record import SignalSource
 from ...running.fmu_archive import default_stop, read_description
 from ...running.fmu_tables import read_tables
 from ...running.variable_values import convert_value, enumeration_labels
@@ -53,8 +52,6 @@ class FitRequest:
         Unknowns that have a separate value for each record.
     robust : bool
         Whether large residuals count linearly instead of by their squares.
-    columns : ColumnOptions
-        Options for the time column.
     against : tuple of pathlib.Path
         Other FMUs to fit to the same records.
     name : str
@@ -69,7 +66,6 @@ class FitRequest:
     start: Mapping[str, float] = field(default_factory=dict)
     each: tuple[str, ...] = ()
     robust: bool = False
-    columns: ColumnOptions = field(default_factory=ColumnOptions)
     against: tuple[Path, ...] = ()
     name: str = ""
 
@@ -201,7 +197,7 @@ def settable_names(description: Any) -> list[str]:
     return [variable.name for variable in description.modelVariables if variable.causality in ("parameter", "input")]
 
 
-def make_unknowns(resolved: ResolvedRequest, records: Sequence[RecordData]) -> tuple[Unknown, ...]:
+def make_unknowns(resolved: ResolvedRequest, records: Sequence[Samples]) -> tuple[Unknown, ...]:
     """Return the unknowns; one with a separate value for each record occurs once per record, named as in x0[1]."""
     request, unknowns = resolved.request, []
     for name, limits in request.free.items():
@@ -223,7 +219,7 @@ def make_unknowns(resolved: ResolvedRequest, records: Sequence[RecordData]) -> t
 
 
 def make_unknown(
-    name: str, limits: Range, start: float | None, resolved: ResolvedRequest, records: Sequence[RecordData]
+    name: str, limits: Range, start: float | None, resolved: ResolvedRequest, records: Sequence[Samples]
 ) -> Unknown:
     """Return an unknown with the range to search; raise SceneError if the range is not valid."""
     observed = [*resolved.request.observe]
@@ -287,20 +283,7 @@ def check_range(name: str, low: float, high: float, minimum: float, maximum: flo
         raise SceneError(f"{text} is outside the range of the FMU; allowed: {' and '.join(bounds)} {unit}".rstrip())
 
 
-def record_data(resolved: ResolvedRequest, table: SignalTable) -> RecordData:
-    """Return the observed columns and the inputs of a table."""
-    request = resolved.request
-    return RecordData(
-        table.name,
-        table.t,
-        np.stack([table.columns[name] for name in request.observe], axis=1),
-        dict(table.inputs),
-        tuple(request.sigma.get(name) for name in request.observe),
-        table.input_t if table.inputs else None,
-    )
-
-
-def span_remarks(resolved: ResolvedRequest, records: Sequence[RecordData]) -> Iterator[str]:
+def span_remarks(resolved: ResolvedRequest, records: Sequence[Samples]) -> Iterator[str]:
     """Yield a remark on each record that lasts about a thousand times as long as a run of the FMU, or a thousandth."""
     stop = default_stop(read_description(resolved.request.run.fmu))
     for record in records:

@@ -1,7 +1,7 @@
 """Study that fits the parameters of an FMU to record files, and writes the result folder."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from os.path import exists
 from pathlib import Path
 from time import process_time
@@ -14,8 +14,9 @@ from ...analyses.fit.parameter_fit import ParameterFit
 from ...analyses.fit.slips import irregular_slips
 from ...analyses.fit.validation import validate
 from ...errors import HarnessError, SceneError, format_value, option_text
-from ...records.signal_table import SignalTable, parse_signals
-from ...records.table_files import Table, load_table
+from ...records.columns import ColumnOptions
+from ...records.extraction import Samples
+from ...records.record import Record, load_record
 from ...results import provenance
 from ...results.folder import replace_folder
 from ...results.registry import find_study
@@ -25,7 +26,7 @@ from ...running.native_equivalent import native_equivalent
 from ...running.whole_run import open_simulator
 from .laws import ResolvedLaws, resolve_laws
 from .observed import choose_observed
-from .request import FitRequest, ResolvedRequest, make_unknowns, record_data, span_remarks
+from .request import FitRequest, ResolvedRequest, make_unknowns, span_remarks
 from .result import FitResult
 
 STUDY = find_study("fit")
@@ -33,6 +34,7 @@ STUDY = find_study("fit")
 
 def fit_files(
     request: FitRequest,
+    options: ColumnOptions,
     files: Sequence[str],
     validation: Sequence[str],
     out: Path,
@@ -42,11 +44,13 @@ def fit_files(
 
     Parameters
     ----------
+    options : ColumnOptions
+        Options for the times.
     validation : sequence of str
         Record files that are predicted, but not fitted.
     """
-    records, others = ([load_record(file, request) for file in group] for group in (files, validation))
-    request, choice = choose_observed(request, records[0].table)
+    records, others = ([load_existing(file, options) for file in group] for group in (files, validation))
+    request, choice = choose_observed(request, records[0])
     laws = resolve_laws(request).with_note(choice)
     folder = out / STUDY.name / records[0].name
     source = provenance.describe_sources(*files)
@@ -54,7 +58,7 @@ def fit_files(
         fit = fit_laws(laws, records, others, report)
         fit.write(new_folder)
         paths = [request.run.fmu, *request.against, *(Path(file) for file in (*files, *validation) if file != "-")]
-        scene = {name: value for name, value in vars(request).items() if name not in ("run", "columns", "against")}
+        scene = {name: value for name, value in vars(request).items() if name not in ("run", "against")}
         scene |= {"fixed": request.run.values, "timeout": request.run.timeout}
         parameters = {name: (value, "") for name, value in request.run.values.items()}
         provenance.write_provenance(new_folder, files=paths, parameters=parameters, scene=scene, source=source)
@@ -62,26 +66,17 @@ def fit_files(
     return fit, folder
 
 
-@dataclass(frozen=True)
-class RecordTable:
-    """Table of a record, and the name of the record."""
-
-    name: str
-    table: Table
-
-
-def load_record(source: str, request: FitRequest) -> RecordTable:
-    """Load the table in a file."""
+def load_existing(source: str, options: ColumnOptions) -> Record:
+    """Load the record in a file; SceneError if there is none."""
     if source != "-" and not exists(source):
         raise SceneError(f"{format_value(source)} does not exist: give an existing record")
-    name = "stdin" if source == "-" else Path(source).stem.encode("utf-8", "replace").decode()
-    return RecordTable(name, load_table(source, request.columns.names))
+    return load_record(source, options)
 
 
 def fit_laws(
     laws: ResolvedLaws,
-    records: Sequence[RecordTable],
-    validation: Sequence[RecordTable],
+    records: Sequence[Record],
+    validation: Sequence[Record],
     report: Callable[[float], None],
 ) -> FitResult:
     """Fit an FMU, and the FMUs to compare it with, to the same records, and predict the validation records.
@@ -92,12 +87,12 @@ def fit_laws(
 
     def fit_law(i: int, averages: bool) -> ParameterFit:
         law = laws.requests[i]
-        tables, others = (
-            [parse_signals(record.table, law.sources, law.request.columns, record.name) for record in group]
+        data, others = (
+            [replace(record.signals(law.sources), sigma=law.request.sigma) for record in group]
             for group in (records, validation)
         )
         try:
-            fit = fit_tables(law, tables, lambda share: report((i + share) / count), averages, others)
+            fit = fit_samples(law, data, lambda share: report((i + share) / count), averages, others)
         except HarnessError as error:
             if count > 1:
                 error.args = (f"{law.name}: {error}", *error.args[1:])
@@ -149,20 +144,20 @@ def convert_columns(
     )
 
 
-def fit_tables(
+def fit_samples(
     resolved: ResolvedRequest,
-    tables: Sequence[SignalTable],
+    data: Sequence[Samples],
     report: Callable[[float], None],
     averages: bool = True,
-    validation: Sequence[SignalTable] = (),
+    validation: Sequence[Samples] = (),
 ) -> ParameterFit:
-    """Fit the parameters of an FMU to the signals in tables.
+    """Fit the parameters of an FMU to samples.
 
     Parameters
     ----------
     averages : bool
         Whether long records may be fitted as means of neighbouring samples.
-    validation : sequence of SignalTable
+    validation : sequence of Samples
         Records that are predicted, but not fitted.
 
     Raises
@@ -173,12 +168,11 @@ def fit_tables(
         If the fit fails.
     """
     request, start_time = resolved.request, process_time()
-    if validation and request.each and len(tables) > 1:
+    if validation and request.each and len(data) > 1:
         raise SceneError(
             f"{', '.join(request.each)} has a value of its own for each record, and none for the validation record: "
             f"leave out {option_text('each')} or {option_text('validate')}"
         )
-    data = [record_data(resolved, table) for table in tables]
     units = {name: resolved.variables[name].unit for name in request.observe}
     slips = irregular_slips(data, [*units.items()])
     unknowns, doubts = make_unknowns(resolved, data), [*span_remarks(resolved, data), *(one.remark for one in slips)]
@@ -187,10 +181,8 @@ def fit_tables(
             problem, raw_fit = fit_records(simulator, data, unknowns, resolved.fixed, request.robust, report, averages)
         except HarnessError as error:
             raise HarnessError(". ".join([str(error), *doubts]).removesuffix(".")) from None
-        prediction = (
-            validate(problem, raw_fit, [record_data(resolved, table) for table in validation]) if validation else None
-        )
-        notes = [note for table in (*tables, *validation) for note in table.notes]
+        prediction = validate(problem, raw_fit, validation) if validation else None
+        notes = [note for samples in (*data, *validation) for note in samples.notes]
         fit = describe_fit(resolved.name, problem, raw_fit, notes, simulator.n_runs, process_time() - start_time)
     curves = read_tables_with(request.run.fmu, [estimate.name for estimate in fit.estimates], request.run.values)
     fit = replace(

@@ -1,4 +1,4 @@
-"""Friction over velocity from a table: points, or a record over time.
+"""Friction over velocity in a table: points, or a record over time.
 
 A column of velocities or positions and a column of forces, torques or motor currents are found by their headings and
 units, or named. A table with a column of times is a record over time.
@@ -6,7 +6,7 @@ units, or named. A table with a column of times is a record over time.
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -14,24 +14,22 @@ from ..errors import SceneError, format_value, option_text
 from .columns import (
     Column,
     ColumnOptions,
+    find_column_and_unit,
     find_time_column,
     find_time_columns,
     list_columns,
     no_time_message,
-    parse_numbers,
-    read_times,
 )
+from .extraction import Samples, Source, TimeAxis, extract, has_times
 from .headings import FORCE_NAME
-from .record import Record, check_record
-from .samples import find_repeated_times, mark_sentinels, undo_time_rounding
-from .signal_table import find_signal
-from .table_files import Table, load_table
+from .samples import mark_sentinels
+from .table_files import Table
 from .units import conversion_factor, find_unit, force_unit_size, is_force_unit, time_unit_size, unit_size
 
-MAX_MISSING_SHARE = 0.2  # of the rows
 FRICTION_NAME = re.compile(r"friction|reibung", re.I)
 CURRENT_NAME = re.compile(r"^(i|iq|current|strom)(?![^\W_])", re.I)
 FORCE_UNITS = {"m/s": "N", "rad/s": "N.m"}
+POSITION, VELOCITY, FORCE = "position", "velocity", "force"  # names of the samples
 
 
 @dataclass(frozen=True)
@@ -46,8 +44,6 @@ class CurveColumns:
         Force or torque per current, with its unit, as in "0.12 N.m/A".
     is_points : bool
         Whether the rows are points even if the table has times.
-    time : ColumnOptions
-        Options for the times: column, unit, sampling rate, interval, headings.
     """
 
     velocity: str | None = None
@@ -56,94 +52,38 @@ class CurveColumns:
     current: str | None = None
     constant: str | None = None
     is_points: bool = False
-    time: ColumnOptions = field(default_factory=ColumnOptions)
 
 
-@dataclass(frozen=True)
-class CurveRecord:
-    """Measured velocities or positions, and forces, in SI units.
+def extract_curve(name: str, table: Table, options: ColumnOptions, columns: CurveColumns) -> Samples:
+    """Return the friction over velocity in a table: a velocity or a position, and a force, in SI units.
 
-    Attributes
-    ----------
-    name : str
-        Name of the record.
-    motion, force : numpy.ndarray
-        Velocities or positions (n,), and forces or torques (n,).
-    is_position : bool
-        Whether `motion` is a position.
-    velocity_unit, force_unit : str
-        m/s and N, or rad/s and N.m.
-    t : numpy.ndarray or None
-        Times (n,) in s; None for points.
-    rows : numpy.ndarray
-        Numbers (n,) of the rows in the file.
-    notes : tuple of str
-        Assumptions made when reading.
+    Raises
+    ------
+    SceneError
+        If it has none.
     """
-
-    name: str
-    motion: np.ndarray
-    force: np.ndarray
-    is_position: bool
-    velocity_unit: str
-    force_unit: str
-    t: np.ndarray | None
-    rows: np.ndarray
-    notes: tuple[str, ...]
-
-
-def read_curve(source: str, columns: CurveColumns, name: str) -> CurveRecord:
-    """Read friction over velocity from a file; SceneError if it has none."""
-    return parse_curve(load_table(source, columns.time.names), columns, name)
-
-
-def parse_curve(table: Table, columns: CurveColumns, name: str) -> CurveRecord:
-    """Return the friction over velocity in a table; SceneError if it has none."""
     check_options(columns)
-    candidates, notes = list_columns(table), list(table.notes)
-    motion, motion_unit, is_position = find_motion(table, candidates, columns)
-    time_column, interval = find_times(table, candidates, columns, motion)
-    taken = [column for column in (motion, time_column) if column]
+    candidates = list_columns(table)
+    motion, motion_unit, is_position = find_motion(table, candidates, columns, options)
+    axis = find_curve_axis(table, candidates, columns, options, motion)
+    taken = [column for column in (motion, axis.column) if column]
     force, force_unit, is_current = find_force(table, candidates, columns, taken)
-    velocity_unit, motion_size, note = resolve_motion(motion, motion_unit, is_position)
-    notes += note
+    velocity_unit, motion_size, motion_notes = resolve_motion(motion, motion_unit, is_position)
     if columns.constant is not None and not is_current:
         example = option_text("current", "i")
         raise SceneError(f"constant has no effect, because {force.heading} is no current: name it, as in {example}")
-    unit, force_size, note = resolve_force(force, force_unit, is_current, velocity_unit, columns.constant)
-    notes += note
-    x, y = (parse_numbers(table, column.index).copy() for column in (motion, force))
-    for values, column in ((x, motion), (y, force)):
-        notes += mark_sentinels(values, column.heading)
-    t = None
-    if interval is not None:
-        t = np.arange(len(x)) * interval
-    elif time_column is not None:
-        t = read_times(table, time_column, columns.time)
-    if is_position and t is None:
+    unit, force_size, force_notes = resolve_force(force, force_unit, is_current, velocity_unit, columns.constant)
+    if is_position and not has_times(axis):
         raise SceneError(f"{motion.heading} is a position: {no_time_message(table)}")
-    if t is None and columns.time.interval != (-np.inf, np.inf):
+    if not has_times(axis) and options.interval != (-np.inf, np.inf):
         raise SceneError("begin and end have no effect on points without times")
-    complete = np.isfinite(x) & np.isfinite(y) & (np.isfinite(t) if t is not None else True)
-    rows = np.flatnonzero(complete)
-    missing = len(x) - len(rows)
-    if missing > MAX_MISSING_SHARE * len(x):
-        raise SceneError(
-            f"{table.name}: {missing} of {len(x)} rows have no number for {motion.heading} or {force.heading}"
-        )
-    if missing:
-        notes.append(f"{missing} of {len(x)} rows have a missing cell and are skipped.")
-    if t is not None:
-        t, rounding = undo_time_rounding(t[rows])
-        is_repeated, repetition = find_repeated_times(t)
-        begin, end = columns.time.interval
-        kept = ~is_repeated & (t >= begin) & (t <= end)
-        t, rows = t[kept], rows[kept]
-        notes += filter(None, (rounding, repetition))
-        check_record(Record(name, t, x[rows]))
-        check_record(Record(name, t, y[rows]))
-    x, y = motion_size * x[rows], force_size * y[rows]
-    return CurveRecord(name, x, y, is_position, velocity_unit, unit, t, table.line + 1 + rows, tuple(notes))
+    sources = {
+        POSITION if is_position else VELOCITY: Source(motion, motion_size, mark_sentinels),
+        FORCE: Source(force, force_size, mark_sentinels),
+    }
+    units = {POSITION: velocity_unit.removesuffix("/s"), VELOCITY: velocity_unit, FORCE: unit}
+    samples = extract(name, table, axis, candidates, sources, units, options)
+    return replace(samples, notes=(*table.notes, *motion_notes, *force_notes, *samples.notes))
 
 
 def check_options(columns: CurveColumns) -> None:
@@ -158,20 +98,20 @@ def check_options(columns: CurveColumns) -> None:
         raise SceneError("points need a column of velocities, not of positions")
 
 
-def find_times(
-    table: Table, candidates: Sequence[Column], columns: CurveColumns, motion: Column
-) -> tuple[Column | None, float | None]:
-    """Return the column of times and the sampling interval in s; None and None for points."""
+def find_curve_axis(
+    table: Table, candidates: Sequence[Column], columns: CurveColumns, options: ColumnOptions, motion: Column
+) -> TimeAxis:
+    """Return the times of a table; those of points are neither a column nor an interval."""
     if columns.is_points:
-        return None, None
-    if columns.time.rate:
-        return None, 1 / columns.time.rate
+        return TimeAxis(None, None)
+    if options.rate:
+        return TimeAxis(None, 1 / options.rate)
     others = [part for part in candidates if part is not motion and may_be_time(part)]
-    if columns.time.time is not None:
-        return find_time_column(table, candidates, columns.time), None
+    if options.time is not None:
+        return TimeAxis(find_time_column(table, candidates, options), None)
     if others and (columns.position is not None or find_time_columns(others)):
-        return find_time_column(table, others, columns.time), None
-    return None, table.interval
+        return TimeAxis(find_time_column(table, others, replace(options, column=None)), None)
+    return TimeAxis(None, table.interval)
 
 
 def may_be_time(column: Column) -> bool:
@@ -179,13 +119,15 @@ def may_be_time(column: Column) -> bool:
     return bool(time_unit_size(column.unit)) if column.unit else column.name != "T"
 
 
-def find_motion(table: Table, candidates: Sequence[Column], columns: CurveColumns) -> tuple[Column, str | None, bool]:
+def find_motion(
+    table: Table, candidates: Sequence[Column], columns: CurveColumns, options: ColumnOptions
+) -> tuple[Column, str | None, bool]:
     """Return the column of velocities or positions, its unit, and whether it has positions."""
     for heading, is_position in ((columns.velocity, False), (columns.position, True)):
         if heading is not None:
-            return *find_signal(heading, table, list(candidates)), is_position
+            return *find_column_and_unit(heading, table, list(candidates)), is_position
     times = find_time_columns([part for part in candidates if may_be_time(part)])
-    for order in (1, 0) if times or columns.time.rate else (1,):
+    for order in (1, 0) if times or options.rate else (1,):
         for part in candidates:
             if part not in times and part.order == order and not FORCE_NAME.search(part.name):
                 return part, part.unit, order == 0
@@ -200,7 +142,7 @@ def find_force(
     """Return the column of forces or currents, its unit, and whether it has currents."""
     for heading, is_current in ((columns.force, False), (columns.current, True)):
         if heading is not None:
-            return *find_signal(heading, table, list(candidates)), is_current
+            return *find_column_and_unit(heading, table, list(candidates)), is_current
     others = [part for part in candidates if all(part.index != column.index for column in taken)]
     by_unit = [part for part in others if part.unit and is_force_unit(part.unit)]
     by_unit.sort(key=lambda part: not FRICTION_NAME.search(part.name))  # friction before the other forces of a run
