@@ -98,6 +98,7 @@ def fit(
     with terminal.progress(1) as report:  # the imports take most of a second
         from ..errors import SceneError
         from ..records.columns import ColumnOptions
+        from ..scenes.assignments import parse_assignments
         from ..scenes.fmu_files import check_built, find_fmu
         from ..scenes.run_spec import RunSpec
         from ..studies.fit import options, study
@@ -109,7 +110,7 @@ def fit(
         ranges = options.parse_ranges(free)
         per_record = tuple(options.split_list([each or ""]))
         request = FitRequest(
-            run=RunSpec(fmu, values=options.parse_values("--set", fixed), timeout=timeout),
+            run=RunSpec(fmu, values=parse_assignments("--set", fixed), timeout=timeout),
             against=tuple(others),
             free=ranges,
             observe=options.parse_columns("--observe", observe),

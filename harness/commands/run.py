@@ -18,7 +18,9 @@ UNUSED_SWEEP_OPTIONS = ("name", "scheduler")  # of a recorded call
 @click.command()
 @click.argument("scene", required=False)
 @click.option("--fmu", type=click.Path(path_type=Path), help="Run this FMU instead of a scene.")
-@click.option("--set", "values", multiple=True, metavar="NAME=VALUE", help="Start value; only with an FMU. Repeatable.")
+@click.option(
+    "--set", "values", multiple=True, metavar="NAME=VALUE,...", help="Start values; only with an FMU. Repeatable."
+)
 @run_options
 @result_options
 @click.pass_context
@@ -137,7 +139,7 @@ def run_fmu_file(path: Path, values: tuple[str, ...], options: dict[str, Any], t
 
     rtol = options.pop("tolerance")
     with terminal.progress(1) as report:
-        spec = RunSpec(path, values=parse_assignments(values), equal_steps=DEFAULT_EQUAL_STEPS, **options)
+        spec = RunSpec(path, values=parse_assignments("--set", values), equal_steps=DEFAULT_EQUAL_STEPS, **options)
         if rtol is not None:
             spec = set_rtol(spec, rtol)
         trajectory, folder = run_fmu(spec, terminal.out, partial(report, path.stem))

@@ -30,7 +30,7 @@ from .terminal import (
     metavar="NAME=LO:HI:N",
     help="Parameter to vary; append :log for logarithmic spacing, or list values or labels: a,b,c.",
 )
-@click.option("--set", "values", multiple=True, metavar="NAME=VALUE", help="Value set in every run.")
+@click.option("--set", "values", multiple=True, metavar="NAME=VALUE,...", help="Values set in every run.")
 @click.option(
     *("--samples", "--random", "random"),
     cls=RenamedOption,
@@ -100,7 +100,7 @@ def sweep(
     refuse_ignored_options(context, [find_fmu(model)], timeout_is_ignored=True)
     measures = tuple(dict.fromkeys(word.strip() for word in measure.split(","))) if measure is not None else ()
     rtol = options.pop("tolerance")
-    run = RunSpec(find_fmu(model), values=parse_assignments(values), follow=False, **options)
+    run = RunSpec(find_fmu(model), values=parse_assignments("--set", values), follow=False, **options)
     run = run if rtol is None else set_rtol(run, rtol)
     check_built(run.fmu)
     labels = read_labels(run)

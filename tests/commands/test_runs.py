@@ -353,3 +353,15 @@ def test_a_run_that_hardly_advances_ends_at_its_time_limit(workspace):
     assert line.endswith("advances by less than 1/4096 of the run in 0.5 s: choose an earlier stop or a longer timeout")
     done = commands.harness(workspace, "run", "--fmu", "fmus/stickslip.fmu", "--stop", 20, "--timeout", 5)
     assert (done.returncode, done.stderr) == (0, "")
+
+
+@pytest.mark.parametrize(
+    "words", [["--set", "m=1.5,k=50,solver.method=exact"], ["--set", "m=1.5,k=50", "--set", "c=1"]]
+)
+@pytest.mark.parametrize("command", [("run",), ("sweep", "--vary", "x0=0.1,0.2", "--workers", "1")])
+def test_several_assignments_stand_in_one_option(workspace, command, words):
+    done = commands.harness(workspace, *command, "fmus/smd.fmu", *words, "--stop", "0.5", "--out", "out")
+    assert (done.returncode, done.stderr) == (0, "")
+    (file,) = (workspace / "out").rglob("provenance.json")
+    parameters = json.loads(file.read_text())["parameters"]
+    assert (parameters["m"]["value"], parameters["k"]["value"]) == (1.5, 50.0)

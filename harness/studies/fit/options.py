@@ -4,9 +4,9 @@ import json
 from collections.abc import Iterable, Mapping
 from math import isfinite
 from pathlib import Path
-from typing import Any
 
 from ...errors import SceneError, format_value
+from ...scenes.assignments import parse_assignments
 from .request import is_unknown
 
 
@@ -29,26 +29,11 @@ def parse_ranges(texts: Iterable[str]) -> dict[str, tuple[float, float] | None]:
     return ranges
 
 
-def parse_values(option: str, texts: Iterable[str]) -> dict[str, Any]:
-    """Return the values of assignments, as in "m=3,friction=sign": numbers, or texts."""
-    values: dict[str, Any] = {}
-    for item in split_list(texts):
-        name, separator, value = (part.strip() for part in item.partition("="))
-        if not separator or not name or not value:
-            raise SceneError(f"{option} {format_value(item)} is not an assignment; write it as in m=3")
-        if name in values:
-            raise SceneError(f"{option} names {name} twice: give it one value")
-        try:
-            values[name] = float(value)
-        except ValueError:
-            values[name] = value
-    return values
-
-
 def parse_numbers(option: str, texts: Iterable[str]) -> dict[str, float]:
     """Return the numbers of assignments, as in "k=800,m=3"."""
     return {
-        name: parse_number(option, f"{name}={value}", str(value)) for name, value in parse_values(option, texts).items()
+        name: parse_number(option, f"{name}={value}", str(value))
+        for name, value in parse_assignments(option, texts).items()
     }
 
 
