@@ -77,8 +77,7 @@ FMUS = HERE / "fmus" if (HERE / "pyproject.toml").is_file() else Path("fmus")
     "--platform",
     "platforms",
     multiple=True,
-    help="Include only this platform, such as linux64; repeatable. wasm32-wasip2 (experimental, with --fmi 3) writes a "
-    "WebAssembly component.",
+    help="Include only this platform, such as linux64; repeatable.",
 )
 @click.option(
     "--out", type=click.Path(path_type=Path), help="Output folder; by default fmus, or the folder of FILE.py."

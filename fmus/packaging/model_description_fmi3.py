@@ -40,7 +40,6 @@ STEPPING_CAPABILITIES = {
     "providesIntermediateUpdate": "true",
     **shared.OUTPUT_DERIVATIVES,
 }
-WITHOUT_INTERMEDIATE_UPDATE = {"canReturnEarlyAfterIntermediateUpdate": "false", "providesIntermediateUpdate": "false"}
 
 
 def describe(
@@ -49,7 +48,6 @@ def describe(
     code: str,
     date: datetime,
     nominals: Sequence[float],
-    has_intermediate_update: bool = True,
 ) -> bytes:
     """Return the FMI 3.0 model description of the FMU `name` as XML; the token is computed like the GUID of FMI 2.0.
 
@@ -58,8 +56,7 @@ def describe(
     root = shared.create_root(model, name, "3.0", "instantiationToken")
     declared = all_variables(model)
     step_report = {"needsCompletedIntegratorStep": "true" if has_step_events(model) else "false"}
-    stepping = STEPPING_CAPABILITIES | ({} if has_intermediate_update else WITHOUT_INTERMEDIATE_UPDATE)
-    for interface, abilities in ("ModelExchange", step_report), ("CoSimulation", stepping):
+    for interface, abilities in ("ModelExchange", step_report), ("CoSimulation", STEPPING_CAPABILITIES):
         SubElement(root, interface, {"modelIdentifier": name} | COMMON_CAPABILITIES | abilities)
     shared.add_units(root, declared)
     _add_types(root, declared)

@@ -10,7 +10,6 @@
     variable.h, saved_state.h, instance.h, common_functions.h, fmi2.c, fmi3.c    the FMI layer
     sources.py                   the folder sources/ of an FMU, which any C compiler can build
     compiler.py                  the binaries
-    component/                   the WebAssembly component (experimental)
     fmu.py                       the FMU file
 
 The C code does what CPython does, bit for bit: the same operations in the same order. Where Python raises an exception,

@@ -1,7 +1,7 @@
 """Builds native FMU files: the same model description as the Python FMU, no Python inside, reproducible bytes.
 
 modelDescription.xml
-binaries/<platform>/<name>.{so,dll,dylib,wasm}
+binaries/<platform>/<name>.{so,dll,dylib}
 sources/                                  the C sources, for any other platform
 resources/tables.json                     points of lookup tables, if the model has any
 resources/contacts.json                   names of contacts and modes, if the model has any
@@ -29,7 +29,6 @@ from ..model_description_fmi3 import describe as describe3
 from ..model_lookup import find_model
 from ..terminals import terminals
 from ..text_output import xml_bytes
-from . import component
 from .compiler import DEFAULT_PLATFORMS, PLATFORMS, compile_binaries
 from .sources import MAIN_SOURCE, collect_sources, render_build_description, render_guid_header
 
@@ -64,24 +63,20 @@ def build(
     methods, laws
         Labels of the methods and friction laws to include; none: all.
     platforms
-        Platforms to compile for, or that of WebAssembly components; none: DEFAULT_PLATFORMS.
+        Platforms to compile for; none: DEFAULT_PLATFORMS.
     fmi
         Version of FMI: "2" or "3".
     real_only
         Whether all variables are Reals, with one method and one law, for hosts without other types.
     """
-    compiled = [platform for platform in platforms or DEFAULT_PLATFORMS if platform != component.PLATFORM]
-    has_component = component.PLATFORM in platforms
-    for platform in compiled:
+    platforms = platforms or DEFAULT_PLATFORMS
+    for platform in platforms:
         if platform not in PLATFORMS:
-            known = ", ".join((*PLATFORMS, component.PLATFORM))
-            raise BuildError(f"There is no platform {platform!r}; choose from {known}.")
-    if has_component and fmi != "3":
-        raise BuildError(f"The platform {component.PLATFORM!r} needs FMI 3.0: add --fmi 3.")
+            raise BuildError(f"There is no platform {platform!r}; choose from {', '.join(PLATFORMS)}.")
     date = build_date()
     source = replace(find_model(model), has_input_derivatives=fmi == "2")  # FMI 3.0 cannot set derivatives of inputs
     name, cls = source.name, lowered_model(source, select_features(source, methods, laws, real_only))
-    files, description = generate_c_sources(cls, name, date, fmi, has_intermediate_update=not has_component)
+    files, description = generate_c_sources(cls, name, date, fmi)
     declared = declared_variables(cls)
     entries = extra_files(cls, source.path, declared, source.analysis, ICON_PATHS[fmi], USAGE_NOTE)
     if fmi == "3":
@@ -91,24 +86,19 @@ def build(
     entries["sources/buildDescription.xml"] = render_build_description(name, fmi)
     with ThreadPoolExecutor() as pool:
         for content in pool.map(
-            lambda platform: compile_binaries(name, files, MAIN_SOURCE[fmi], platform, fmi), compiled
+            lambda platform: compile_binaries(name, files, MAIN_SOURCE[fmi], platform, fmi), platforms
         ):
             entries |= content
-    if has_component:
-        entries[f"binaries/{component.PLATFORM}/{name}.wasm"] = component.build_component(name, files)
-        entries[component.MANIFEST_FILE] = component.manifest()
     return write(folder / f"{name}.fmu", zip_entries(entries, date))
 
 
-def generate_c_sources(
-    model: type[VariableOwner], name: str, date: datetime, fmi: str, has_intermediate_update: bool = True
-) -> tuple[dict[str, str], bytes]:
+def generate_c_sources(model: type[VariableOwner], name: str, date: datetime, fmi: str) -> tuple[dict[str, str], bytes]:
     """Return the C sources of a model by file name, and the matching modelDescription.xml."""
     files = collect_sources(model, fmi)
     _, run = model_exchange_run(model)
     nominals = run.model_exchange.nominals
     if fmi == "3":
-        root = fromstring(describe3(model, name, digest(files), date, nominals, has_intermediate_update))
+        root = fromstring(describe3(model, name, digest(files), date, nominals))
         files["guid.h"] = render_guid_header(root.attrib["instantiationToken"])
         return files, xml_bytes(root)
     root = fromstring(describe(model, name, digest(files), date, nominals))

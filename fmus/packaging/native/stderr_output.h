@@ -8,12 +8,7 @@
 
 #include "text_buffer.h"
 
-#if defined(WASM_COMPONENT)
-
-/* A component has no standard error: its messages reach the importer by the log only. */
-static void write_to_stderr(const char *line, size_t length) { (void)line, (void)length; }
-
-#elif defined(_WIN32)
+#if defined(_WIN32)
 
 /* Declared here because windows.h defines macros such as `far`, which clash with names in the generated code. */
 __declspec(dllimport) void *__stdcall GetStdHandle(unsigned long which);
