@@ -13,7 +13,7 @@ analyses.decay: decrement fit_problem intervals signal_model
 analyses.fit: fit_problem fit_procedure noise profile_likelihood
 analyses: slip
 process: interrupt interruptible_wait subprocess_runner temporary_directory worker
-records: headings samples signal_table size_limits text_table
+records: columns extraction headings record samples size_limits text_table
 references: certified_reference models peer_solvers reference_trajectory single_model_reference
 results: folder quantity registry style
 running: embedded_model native_equivalent runner whole_run
@@ -21,6 +21,7 @@ running.external: step_refinement
 scenes: run_spec
 studies.precision: advice law_deviations study
 studies.stability: study
+studies.sweep: checkpoint dispatch result
 """
 
 
