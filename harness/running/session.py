@@ -205,7 +205,8 @@ class Session:
             stepper = CoSimulation(instance, grid, signals, next_step)
             step_to_stop(stepper, grid, self.recorder.record, report, every)
             evaluations = instance.get("solver.evaluations")
-        return RecordedRun(*read_rows(self.rows.getbuffer(), self.selection, instance.is_fmi2), evaluations)
+        # not getbuffer(): a view that a profiler still references would keep the next run from emptying the buffer
+        return RecordedRun(*read_rows(self.rows.getvalue(), self.selection, instance.is_fmi2), evaluations)
 
     def run(self, point: Sequence[float] = (), report: ProgressCallback = QUIET) -> Trajectory:
         """Run `repeat` times with the values of the varied variables; return the last run with the fastest time.

@@ -1,6 +1,7 @@
 """Sweeps on the built FMUs: the runs, their measures, and the messages of failed runs."""
 
 import json
+import sys
 from functools import partial
 from math import sqrt
 
@@ -210,3 +211,15 @@ def test_the_magic_formula_slides_steadily_below_the_peak_of_its_curve(sweep):
     grid = {"x_m": [0.03, 0.06], "v_driver": [0.02, 0.04, 0.08]}
     steady = sweep("pacejka", grid, measures=("unsteady",), stop=40.0)["unsteady"].to_numpy() < 0.1
     assert steady.tolist() == [[True, False, False], [True, True, False]]
+
+
+def test_a_profiler_that_keeps_frames_disturbs_no_run(sweep):
+    """As that of Dask does for a moment: the recorded points of one run are then still referenced in the next one."""
+    grid, frames = {"mu_d": [0.5, 0.6]}, []
+    sys.setprofile(lambda frame, event, value: frames.append(frame) if frame.f_code.co_name == "read_rows" else None)
+    try:
+        profiled = sweep("stickslip", grid, measures=("peak_speed",))
+    finally:
+        sys.setprofile(None)
+    assert frames
+    assert profiled["peak_speed"].equals(sweep("stickslip", grid, measures=("peak_speed",))["peak_speed"])
