@@ -13,9 +13,7 @@ import numpy as np
 
 from ..errors import SceneError, option_text, unknown_name_message
 from .headings import DATE_NAME, TIME_NAME, order_from_name, split_heading
-from .samples import (
-    parse_timestamps,
-)
+from .samples import parse_timestamps
 from .table_files import Cells, Table, load_table
 from .text_table import GROUPED_NUMBER, MISSING, TIMESTAMP
 from .units import TIMES, find_unit, time_unit_size

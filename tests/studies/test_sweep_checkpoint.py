@@ -175,15 +175,10 @@ def limited_files(size):
 @pytest.mark.parametrize("size", [0, 10, 1000])
 def test_a_sweep_on_a_full_disk_ends_in_one_sentence_and_resumes(size, monkeypatch):
     """The disk is full from the start, within the first block, or later."""
-    masses, add = np.linspace(1.0, 2.0, 200), Checkpoint.add
+    masses = np.linspace(1.0, 2.0, 200)
     expected = sweep("there", masses=masses).data
-
-    def add_on_full_disk(*arguments):
-        with limited_files(size):
-            add(*arguments)
-
     with monkeypatch.context() as patch:
-        patch.setattr(Checkpoint, "add", add_on_full_disk)
+        patch.setattr(Checkpoint, "add", limited_files(size)(Checkpoint.add))
         with pytest.raises(HarnessError, match=r"^cannot use the checkpoint \S*: File too large$"):
             sweep("here", masses=masses)
     result = sweep("here", masses=masses)
@@ -195,14 +190,9 @@ def test_a_sweep_on_a_full_disk_ends_in_one_sentence_and_resumes(size, monkeypat
 @pytest.mark.parametrize("size", [1000, 10_000])
 def test_results_that_do_not_fit_on_the_disk_are_one_sentence_and_no_run_is_lost(size, monkeypatch):
     """The disk is full before the data, or before the table."""
-    masses, write = np.linspace(1.0, 2.0, 200), SweepResult.write
-
-    def write_on_full_disk(*arguments):
-        with limited_files(size):
-            write(*arguments)
-
+    masses = np.linspace(1.0, 2.0, 200)
     with monkeypatch.context() as patch:
-        patch.setattr(SweepResult, "write", write_on_full_disk)
+        patch.setattr(SweepResult, "write", limited_files(size)(SweepResult.write))
         with pytest.raises(HarnessError, match=r"^cannot write \S*: File too large; choose another `folder`$"):
             sweep("here", masses=masses)
     assert sweep("here", masses=masses).n_resumed == 200

@@ -180,7 +180,8 @@ class SweepResult(Result):
     def write_tables(self, folder: Path) -> None:
         """Write the values for xarray and as CSV."""
         self.data.to_netcdf(folder / DATASET_FILE, engine="scipy", format="NETCDF3_64BIT")
-        names = [*map(str, self.data.coords), *(str(name) for name in self.data.data_vars if name != "error"), "error"]
+        measures = self.data.drop_vars("error").data_vars  # a loaded file has the errors first, a new sweep last
+        names = [*map(str, self.data.coords), *map(str, measures), "error"]
         units = {name: self.data[name].attrs.get("units", "1") for name in names}
         frame = self.data.to_dataframe().reset_index()[names]
         frame.columns = [column_heading(name, "" if units[name] == "1" else units[name]) for name in names]
