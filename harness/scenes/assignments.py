@@ -29,7 +29,7 @@ def parse_assignments(option: str, texts: Iterable[str]) -> dict[str, float | st
     values = dict[str, float | str]()
     for text in texts:
         for name, value in map(parse_assignment, split_assignments(text)):
-            if not name or not value:
+            if not name or value == "":
                 raise SceneError(f"{option} {format_value(text)} is not an assignment: write it as in k=100,m=3")
             if name in values:
                 raise SceneError(f"{option} names {name[:MAX_VALUE_LENGTH]} twice: give it one value")
