@@ -137,3 +137,50 @@ def test_a_holding_force_with_a_direction_is_refused_with_the_remedy(tmp_path):
     path.write_text(text.replace(", hold=mu_s * P", ""), encoding="utf-8")
     with pytest.raises(BuildError, match="depends on its direction: pass hold="):
         build(path, tmp_path)
+
+
+GEAR = '''
+from fmus import Contact, Input, Mode, Model, Output, Parameter, State, choose, fabs
+
+
+class Gear(Model):
+    """Inertia behind a gear that loses another share of the torque in each direction."""
+
+    J = Parameter(0.01, "kg.m2", "moment of inertia", above=0.0)
+    T_0 = Parameter(1.0, "N.m", "friction without load", low=0.0)
+    forward = Parameter(0.1, "1", "share of the torque that is lost forward", low=0.0)
+    backward = Parameter(0.4, "1", "share of the torque that is lost backward", low=0.0)
+    slope = Parameter(10.0, "N.m/s", "rate of the torque")
+    angle = State("rad", "angle")
+    omega = State("rad/s", "speed", rate_of=angle)
+    T = State("N.m", "torque of the motor", rate=slope)
+    mode = Mode()
+    up = T_0 + forward * fabs(T)
+    down = T_0 + backward * fabs(T)
+    {law}
+    alpha = Output("rad/s2", "angular acceleration", (T - T_friction) / J, rate_of=omega)
+    stop_time = 0.5
+'''
+BY_DIRECTION = """R = Contact("N.m", "friction", mode=mode, slip=omega, slide=choose(omega > 0.0, up, down))
+    T_friction = Output("N.m", "friction", R)"""
+BY_MEAN = """R = Contact("N.m", "mean friction", mode=mode, slip=omega, slide=0.5 * (up + down))
+    T_friction = Output("N.m", "friction", R + 0.5 * (up - down))"""
+
+
+@pytest.mark.parametrize("slope", [10.0, -10.0])
+def test_a_gear_with_the_split_that_its_refusal_advises_breaks_away_at_the_force_of_its_direction(tmp_path, slope):
+    path = tmp_path / "gear.py"
+    path.write_text(GEAR.format(law=BY_DIRECTION), encoding="utf-8")
+    with pytest.raises(
+        BuildError, match="slide the mean of the forces of both directions, and add half their difference"
+    ):
+        build(path, tmp_path)
+    path.write_text(GEAR.format(law=BY_MEAN), encoding="utf-8")
+    build(path, tmp_path)
+    run = harness.simulate(str(tmp_path / "gear.fmu"), {"slope": slope})
+    share = 0.1 if slope > 0.0 else 0.4  # T = T_0 + share T
+    breakaway = 1.0 / (1.0 - share) / abs(slope)
+    assert run.events.t.tolist() == [0.0, pytest.approx(breakaway, rel=1e-9)]  # stuck at the start, then free
+    torque, J = 10.0 * (1.0 - share), 0.01
+    expected = np.sign(slope) * torque * (0.5 - breakaway) ** 2 / (2.0 * J)
+    assert run.columns["omega"][-1] == pytest.approx(expected, rel=1e-6)

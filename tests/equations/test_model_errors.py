@@ -219,7 +219,13 @@ WRONG = {
         DRY + '    other = Mode()\n    S = Contact("N", "friction", mode=other, slip=v - u, slide=f)\n'
         "    a = Output('m/s2', 'acceleration', (F - k * x - R - S) / m, rate_of=v)\n",
         19,
-        "S and R hold the same motion at rest, so their forces are not determined: remove one or put a",
+        "S and R hold the same motion at rest, so their forces are not determined: put a spring between them",
+    ),
+    "two contacts with one slip": (
+        DRY + '    other = Mode()\n    S = Contact("N", "friction", mode=other, slip=v, slide=f)\n'
+        "    a = Output('m/s2', 'acceleration', (F - k * x - R - S) / m, rate_of=v)\n",
+        19,
+        "S and R hold the same motion at rest, so their forces are not determined: write one contact with the sum of",
     ),
     "contacts in a loop": (
         DRY + '    w = State("m/s", "second speed")\n    z = State("m/s", "third speed")\n'
@@ -231,7 +237,7 @@ WRONG = {
         "    b = Output('m/s2', 'acceleration', (U - S) / m, rate_of=w)\n"
         "    c = Output('m/s2', 'acceleration', (T - U) / m, rate_of=z)\n",
         23,
-        "T and R and S and U hold the same motion at rest, so their forces are not determined: remove one or put a",
+        "T and R and S and U hold the same motion at rest, so their forces are not determined: put a spring",
     ),
     "a slip that is not linear": (
         DRY.replace("slip=v", "slip=v * fabs(v)") + STUCK,
@@ -309,7 +315,7 @@ WRONG = {
     "other friction backward without a holding force": (
         DRY.replace("slide=f", "slide=choose(v > 0.0, f, 2.0 * f)") + STUCK,
         17,
-        "slide of R is 1 N for small positive slips, but 2 N for negative ones: declare as hold what the contact holds",
+        "slide of R is 1 N for small positive slips, but 2 N for negative ones: pass as slide the mean of",
     ),
     "a huge unit": (RATE + '    q = Parameter(1.0, "m999", "q")\n', 17, "q has the unit 'm999'; allowed units are"),
     "a method": (RATE + "    def rates(self):\n        pass\n", 17, "nothing calls the function rates"),

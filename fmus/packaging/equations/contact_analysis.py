@@ -26,6 +26,12 @@ from .model_roles import TIME, ModelRoles
 
 SMALLEST_DIVISOR = 1e-100  # in place of an inverse mass that vanishes; its square is not zero
 
+# A contact has one holding force. With this split, it slides and holds with the force of each direction.
+DIRECTION_ADVICE = (
+    "pass as slide the mean of the forces of both directions, and add half their difference, forward minus backward, "
+    "to the contact force in the equations"
+)
+
 
 class ContactAnalysis(ModelRoles):
     """The contacts of a model: what holds them and how they act on each other."""
@@ -68,8 +74,12 @@ class ContactAnalysis(ModelRoles):
             at_rest = {c.slip: 0.0} if isinstance(c.slip, Expression) else {}
             self.holding_limit[c] = substitute(c.slide, at_rest) if c.hold is None else c.hold
             if depends_on(self.holding_limit[c], forces):
-                instead = "pass hold=" if c.hold is None else "write a hold= that does not"
-                raise ModelError(f"the holding force of {c.name} depends on its direction: {instead}", c.location)
+                equal = "pass hold=" if c.hold is None else "write a hold= that does not"
+                raise ModelError(
+                    f"the holding force of {c.name} depends on its direction: {equal} if it holds the same in both "
+                    f"directions; otherwise {DIRECTION_ADVICE}",
+                    c.location,
+                )
             if is_among(c, self.independent_contacts):
                 # other forces that occur in the rate cancel
                 e = substitute(self.slip_rate[c], {d: 0.0 for d in self.contacts if d is not c})
@@ -282,10 +292,13 @@ class ContactAnalysis(ModelRoles):
                 sentence = f"{c.name} accelerates its own slip instead of opposing it: change its sign in the rates"
                 raise ModelError(sentence, c.location)
             if not A[c, c] > 1e-12 * diagonal[c]:
-                others = " and ".join(d.name for d in contacts[:n] if not is_same_expression(self.A[c, d], 0.0))
+                others = [d for d in contacts[:n] if not is_same_expression(self.A[c, d], 0.0)]
+                equal = [d for d in others if is_same_expression(c.slip, d.slip) and not (c.lifts_off or d.lifts_off)]
+                one = "write one contact with the sum of their limits, or " if equal else ""
+                names = " and ".join(d.name for d in equal or others)
                 raise ModelError(
-                    f"{c.name} and {others} hold the same motion at rest, so their forces are not determined: remove "
-                    "one or put a spring between them",
+                    f"{c.name} and {names} hold the same motion at rest, so their forces are not determined: {one}put "
+                    "a spring between them",
                     c.location,
                 )
             for d in contacts[n + 1 :]:

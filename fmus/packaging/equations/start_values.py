@@ -6,10 +6,11 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from .algebra import ARITHMETIC, has_condition_on, is_same_expression, operands, subexpressions, variables_in
+from .contact_analysis import DIRECTION_ADVICE
 from .dimensions import expression_text
 from .expressions import Expression, ModelError, Operand, Term
 from .model_analysis import ModelAnalysis
-from .model_declaration import Contact, Output
+from .model_declaration import Contact, Fixed, Input, Output, Parameter, State
 from .tables import Coefficient, Piece
 
 SMALL_SLIP = 1e-9  # m/s or rad/s, for the two sides of zero slip
@@ -42,6 +43,9 @@ def check_friction_forces(analysis: ModelAnalysis) -> None:
             except ModelError as error:
                 raise ModelError(f"{c.name}: {error}", c.location) from error
         check_symmetry(c, values, values | output_values)
+        if c.hold is None:
+            for point in (values, shifted_values(analysis, values)):
+                check_holding_force(c, point)
 
 
 def check_symmetry(c: Contact, values: dict[Expression, float], load_values: dict[Expression, float]) -> None:
@@ -52,7 +56,6 @@ def check_symmetry(c: Contact, values: dict[Expression, float], load_values: dic
     try:
         forward, backward = (sliding_force(c, slip, values) for slip in (1.0, -1.0))
         direct_forward, direct_backward = (sliding_force(c, slip, load_values) for slip in (1.0, -1.0))
-        ahead, behind = (sliding_force(c, slip, values) for slip in (SMALL_SLIP, -SMALL_SLIP))
     except ModelError:
         return  # no value at these slips
     if forward == -backward != 0.0:
@@ -61,19 +64,37 @@ def check_symmetry(c: Contact, values: dict[Expression, float], load_values: dic
             "directs against the slip",
             c.location,
         )
-    if not has_condition_on(c.slide_while_closed, variables_in(c.slip)):
-        if differ(direct_forward, direct_backward):
-            raise ModelError(
-                f"slide of {c.name} is {direct_forward:g} {c.unit} at a slip of 1, but {direct_backward:g} {c.unit} at "
-                "-1: write the size of the slip by fabs(); declare a load that depends on the direction as an Output",
-                c.location,
-            )
-    elif c.hold is None and differ(ahead, behind):
+    if not has_condition_on(c.slide_while_closed, variables_in(c.slip)) and differ(direct_forward, direct_backward):
         raise ModelError(
-            f"slide of {c.name} is {ahead:g} {c.unit} for small positive slips, but {behind:g} {c.unit} for negative "
-            "ones: declare as hold what the contact holds, at least the larger of both",
+            f"slide of {c.name} is {direct_forward:g} {c.unit} at a slip of 1, but {direct_backward:g} {c.unit} at "
+            "-1: write the size of the slip by fabs(), and declare a load that depends on the direction as an "
+            f"Output; if the friction itself depends on the direction, {DIRECTION_ADVICE}",
             c.location,
         )
+
+
+def check_holding_force(c: Contact, values: dict[Expression, float]) -> None:
+    """Raise ModelError if the sliding force has another limit on each side of zero slip, and none is to be held."""
+    try:
+        ahead, behind = (sliding_force(c, slip, values) for slip in (SMALL_SLIP, -SMALL_SLIP))
+    except ModelError:
+        return  # no value at these slips
+    if has_condition_on(c.slide_while_closed, variables_in(c.slip)) and differ(ahead, behind):
+        raise ModelError(
+            f"slide of {c.name} is {ahead:g} {c.unit} for small positive slips, but {behind:g} {c.unit} for negative "
+            f"ones: {DIRECTION_ADVICE}; pass hold= only if the contact holds the same in both directions",
+            c.location,
+        )
+
+
+def shifted_values(analysis: ModelAnalysis, values: dict[Expression, float]) -> dict[Expression, float]:
+    """Return the start values, moved by different amounts, so that forces equal by chance differ."""
+    shifted = dict(values)
+    for n, (e, start) in enumerate(values.items(), start=1):
+        value = start + 0.01 * n * (abs(start) + 1.0)
+        if isinstance(e, (Parameter, Fixed, Input, State)) and e.accepts(value):
+            shifted[e] = value
+    return shifted
 
 
 def sliding_force(c: Contact, slip: float, values: dict[Expression, float]) -> float:
