@@ -39,7 +39,6 @@ from harness.process.temporary_directory import temporary_directory
 
 LOG = logging.getLogger("fmus.build")
 HERE = Path(__file__).parent
-SCENES = HERE / "harness" / "scenes"
 # an installed package builds into the current folder
 FMUS = HERE / "fmus" if (HERE / "pyproject.toml").is_file() else Path("fmus")
 
@@ -231,7 +230,7 @@ def release_archive(folder: Path) -> Path:
 
     try:
         with show_progress("building everything") as status:
-            return build_release(folder, SCENES.glob("*.toml"), lambda file: status.update(f"building {file}"))
+            return build_release(folder, lambda file: status.update(f"building {file}"))
     except BuildError as error:
         raise click.ClickException(str(error)) from error
 
@@ -243,7 +242,7 @@ def build_page(
     from fmus.packaging.web import FILE, MORE_FILE, build
 
     try:
-        return build(models, folder, methods, laws, SCENES.glob("*.toml"), MORE_FILE if more else FILE)
+        return build(models, folder, methods, laws, MORE_FILE if more else FILE)
     except BuildError as error:
         raise click.ClickException(str(error)) from error
 

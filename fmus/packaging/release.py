@@ -1,6 +1,6 @@
 """The release archive: everything that users without Python download, in one zip file with its checksums."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from hashlib import sha256
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -30,7 +30,7 @@ licenses/          licences
 """
 
 
-def build_release(folder: Path, scenes: Iterable[Path], report: Callable[[str], None] = lambda file: None) -> Path:
+def build_release(folder: Path, report: Callable[[str], None] = lambda file: None) -> Path:
     """Build every FMU of every kind and the live pages, and write them into one zip file.
 
     The archive has the same bytes for the same sources.
@@ -39,8 +39,6 @@ def build_release(folder: Path, scenes: Iterable[Path], report: Callable[[str], 
     ----------
     folder : Path
         Where to write ``friction-fmus-VERSION.zip``.
-    scenes : iterable of Path
-        The scene files that the live pages offer as presets.
     report : callable, optional
         Takes the name of each file when its build begins.
 
@@ -54,7 +52,6 @@ def build_release(folder: Path, scenes: Iterable[Path], report: Callable[[str], 
     BuildError
         If an FMU cannot be built or the archive cannot be written.
     """
-    presets = list(scenes)
     entries = {f"licenses/{Path(path).name}": content for path, content in license_files().items()}
     entries["README.txt"] = README.encode()
     with TemporaryDirectory() as temporary:
@@ -73,7 +70,7 @@ def build_release(folder: Path, scenes: Iterable[Path], report: Callable[[str], 
                     entries[f"references/{file.name}"] = file.read_bytes()
             report(f"web/{page}")
             sources = [find_model(name) for name in names]
-            entries[f"web/{page}"] = build_page(sources, Path(temporary), (), (), presets, page).read_bytes()
+            entries[f"web/{page}"] = build_page(sources, Path(temporary), (), (), page).read_bytes()
     sums = "".join(f"{sha256(entries[path]).hexdigest()}  {path}\n" for path in sorted(entries))
     entries[CHECKSUMS] = sums.encode()
     root = f"friction-fmus-{__version__}"

@@ -7,7 +7,6 @@ from html.parser import HTMLParser
 from itertools import groupby
 
 import pytest
-import web_page
 from build_cache import ROOT, build_user_model, run_published_cases
 from commands import harness
 
@@ -273,23 +272,3 @@ def test_an_existing_interactive_page_is_included_and_every_picture_links_to_it(
     assert "The file\nfmus/web/index.html is the same page" in report
     assert 'href="../' not in report
     assert "index.html" not in (report_run[0] / "results/report.html").read_text(encoding="utf-8")
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("browser_name", ["browser", "firefox"])
-def test_a_link_to_a_published_case_shows_it_in_the_embedded_page(request, browser_name, tmp_path, report_run):
-    shutil.copytree(report_run[0] / "results", tmp_path / "results")
-    (tmp_path / "fmus/web").mkdir(parents=True)
-    shutil.copy(web_page.build_page("web"), tmp_path / "fmus/web/index.html")
-    assert harness(tmp_path, "report", "--quiet").returncode == 0
-    browser = request.getfixturevalue(browser_name)
-    browser.open((tmp_path / "results/report.html").as_uri())
-    browser.run(
-        "document.getElementById('live').scrollIntoView({ behavior: 'instant' })"
-    )  # a hidden frame draws nothing
-    browser.run_in_frame(web_page.READY)
-    assert browser.run_in_frame("app.state().preset") == ""
-    browser.run("document.querySelector('#live a[target=live-page]').click()")
-    chosen = "app.state().preset === 'coulomb-stop' ? done(app.state().stop) : setTimeout(look, 20)"
-    stop = browser.run_in_frame(f"new Promise(done => {{ const look = () => {chosen}; look() }})")
-    assert stop == 5

@@ -19,8 +19,6 @@ def test_a_link_stores_the_complete_setup(page):
     page.open(hash, anew=True)
     assert page.run("app.state()") == state
     assert page.run("Object.values(app.session.runs).map(run => run.columns.x.at(-1))") == end
-    page.open(".preset=pacejka-0.001")
-    assert page.run("app.state().values.x_m") == 0.001
     wrong = "mu_d=0.3&solver.method=7&friction=1.5&c=&.stop=&.change=1 nothing 2&.change=x k 2"
     page.open(f".model=coulomb&k=100&{wrong}")
     assert page.run("app.state()") | {"values": {"k": 100}, "changes": [], "stop": 4.3} == page.run("app.state()")

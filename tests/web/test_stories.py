@@ -72,30 +72,6 @@ def test_the_stories_are_drawn_before_they_scroll_into_view(page):
     assert page.run(painted) == [True] * 2 * len(STORIES)
 
 
-def test_the_stories_are_printed_on_white_at_their_end(page):
-    page.browser.dark()
-    page.open(anew=True)
-    page.wait("!document.querySelector('.pending')")
-    page.run(
-        "addEventListener('beforeprint', () => { globalThis.seen = {"
-        "verdict: document.getElementById('opening-verdict').textContent,"
-        "ink: getComputedStyle(document.documentElement).getPropertyValue('--ink').trim(),"
-        "times: [...document.querySelectorAll('.course[aria-valuenow]')].map(canvas =>"
-        "canvas.getAttribute('aria-valuenow') === Number(canvas.getAttribute('aria-valuemax')).toFixed(2)) } })"
-    )
-    assert page.browser.pdf().startswith(b"%PDF")
-    seen = page.run("seen")
-    assert seen["verdict"].startswith("In the same")  # although it was playing
-    assert (seen["ink"], seen["times"]) == ("#1c2126", [True] * 4)
-    page.browser.call("Emulation.setEmulatedMedia", media="print")
-    shown = (
-        "[...document.querySelectorAll('#stories p, #stories canvas, #stories table')].map(e => e.checkVisibility())"
-    )
-    assert all(page.run(shown))
-    page.browser.call("Emulation.setEmulatedMedia", media="")
-    page.browser.dark(False)
-
-
 LABELS_AND_CURVES = """app.stories.then(({ charts }) => {
   const { prototype } = CanvasRenderingContext2D;
   const { fillText, stroke, lineTo, beginPath } = prototype;

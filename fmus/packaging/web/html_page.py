@@ -1,15 +1,13 @@
-"""Builds the HTML file from models, presets, style and script; its content security policy blocks all requests."""
+"""Builds the HTML file from models, style and script; its content security policy blocks all requests."""
 
 import json
 from base64 import b64encode
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from gzip import compress
 from hashlib import sha256
 from pathlib import Path
 from string import Template
-from tomllib import loads
-from typing import Any
 from xml.etree.ElementTree import fromstring
 
 from .. import __version__
@@ -33,15 +31,13 @@ MODULES = (
         "overrides",
         "setting_lines",
         "measure",
-        "holding_band",
-        "energy_budget",
         "session",
         "plot",
         "mechanism",
         "drag",
         "controls",
     ),
-    *("measurement", "legend", "panels", "diagrams", "form", "tables", "export", "sound", "friction_map"),
+    *("legend", "panels", "diagrams", "form", "tables", "export"),
     *("animation", "background", "prose", "chart", "adjustable", "story_models", "story_bodies", "opening"),
     *("chatter_story", "story", "stories", "main"),
 )
@@ -54,7 +50,6 @@ def build(
     folder: Path,
     methods: Sequence[str] = (),
     laws: Sequence[str] = (),
-    scenes: Iterable[Path] = (),
     file: str = FILE,
 ) -> Path:
     """Build the live page of models and write it to `folder`.
@@ -67,8 +62,6 @@ def build(
         Output folder.
     methods, laws
         Labels of the methods and friction laws to include; none: all.
-    scenes
-        Scene files. Those with published values of one of the models become presets.
     file
         Name of the page.
     """
@@ -81,7 +74,6 @@ def build(
     data = {
         "version": __version__,
         "models": [model | {"code": code.result()} for model, code in zip(models, compiled, strict=True)],
-        "presets": read_presets(scenes, [source.name for source in sources]),
     }
     is_complete = not methods and not laws and {source.name for source in sources}.issuperset(STORY_MODELS)
     return write(folder / file, render_page(data, with_stories=is_complete).encode())
@@ -146,29 +138,3 @@ def compile_to_base64(name: str, files: Mapping[str, str]) -> str:
     return b64encode(
         compress(compile_and_link(files, MAIN_SOURCE["2"], TARGET, f"{name}.wasm", OPTIONS), mtime=0)
     ).decode()
-
-
-# Keys of a scene and the variables they set; values of enumerations are labels.
-ENUMERATION_KEYS = {"law": "friction", "method": "solver.method"}
-NUMBER_KEYS = {"rtol": "solver.rtol", "atol": "solver.atol"}
-COPIED_KEYS = ("title", "model", "stop", "grid", "decay")
-KINDS = ("published", "reference", "parameter")  # of known values; a scene has one of these tables
-
-
-def read_presets(scenes: Iterable[Path], models: Collection[str]) -> list[dict[str, Any]]:
-    """Return the scenes with known values of one of the models, sorted by file name.
-
-    The key "published" of a preset has these values, and "kind" has their kind.
-    """
-    presets = []
-    for path in sorted(scenes):
-        scene = loads(path.read_text(encoding="utf-8"))
-        kind = next((kind for kind in KINDS if kind in scene), None)
-        if kind and scene.get("model") in models:
-            labels = {name: scene[key] for key, name in ENUMERATION_KEYS.items() if key in scene}
-            numbers = {name: scene[key] for key, name in NUMBER_KEYS.items() if key in scene}
-            copied = {key: scene[key] for key in COPIED_KEYS if key in scene}
-            values = scene.get("values", {}) | numbers
-            known = {"kind": kind, "published": scene[kind]}
-            presets.append({"name": path.stem, **copied, **known, "labels": labels, "values": values})
-    return presets

@@ -65,11 +65,7 @@ def list_bodies(analysis: ModelAnalysis) -> list[ModelJson]:
 
 
 def body_json(analysis: ModelAnalysis, x: State) -> ModelJson:
-    """Describe a body: `kind` is block, pendulum or rotor; the other items are names of variables.
-
-    `band_starts` are the start values of position and speed with which the band of positions where friction holds the
-    body can be found; it moves with the driver.
-    """
+    """Describe a body: `kind` is block, pendulum or rotor; the other items are names of variables."""
     v = analysis.rate[x]
     a = next((e for s, e in analysis.rate.items() if s is v), None)
     law: Operand = a.expression if isinstance(a, Output) else 0.0
@@ -80,11 +76,7 @@ def body_json(analysis: ModelAnalysis, x: State) -> ModelJson:
     ]
     linked = [y.name for y in analysis.positions if y is not x and depends_on(law, (y,))]
     drives = [d for d in analysis.drivers if pulls_on(law, d, x)]
-    springs = [e for e in analysis.outputs for d in drives if is_spring_force(e, x, d)]
     slip = v.name if frictions and slips_with(frictions[0], v) else ""
-    starts = [s.start_expression.name for s in (x, v) if isinstance(s, State) and isinstance(s.start_expression, Fixed)]
-    moves_with_driver = all(moves_along(law, d, x) for d in analysis.drivers if depends_on(law, (d,)))
-    is_alone = len(analysis.contacts) == 1 and not linked
     items = {
         "kind": "pendulum" if is_angle and is_nonlinear else "rotor" if is_angle else "block",
         "position": x.name,
@@ -100,8 +92,6 @@ def body_json(analysis: ModelAnalysis, x: State) -> ModelJson:
         "contacts": [c.name for c in frictions if isinstance(c, Contact)],
         "mode": next((c.mode.name for c in frictions if isinstance(c, Contact)), ""),
         "start": x.start_expression.name if isinstance(x.start_expression, Fixed) else "",
-        "band_starts": starts if slip and is_alone and moves_with_driver and len(starts) == len((x, v)) else [],
-        "spring_force": springs[0].name if len(springs) == 1 else "",
         "input": next((e.name for e in analysis.inputs if depends_on(law, (e,))), ""),
     }
     return {key: value for key, value in items.items() if value}
@@ -130,15 +120,6 @@ def pulls_on(law: Operand, driver: State, x: State) -> bool:
     """Check whether a driver pulls on x, unlike a phase angle, which enters an acceleration by its sine."""
     pull = differentiate(law, {driver: 1.0})
     return depends_on(law, (driver,)) and (moves_along(law, driver, x) or not depends_on(pull, (driver,)))
-
-
-def is_spring_force(e: Output, x: State, driver: State) -> bool:
-    """Check whether an output is a force or torque that depends on the distance of the position x from the driver."""
-    return (
-        e.unit in FORCES
-        and variables_of_motion(e) == {x.name, driver.name}
-        and is_same_expression(differentiate(e, {x: 1.0, driver: 1.0}), 0.0)
-    )
 
 
 def variables_of_motion(e: Output) -> set[str]:

@@ -11,14 +11,13 @@ const SOLVER_LISTS = { // id: variable, label, label for the comparison run
 };
 
 export class Form {
-  // `actions` has the functions to call on input: preset(name), choose(name, value), compare(values), body(index),
+  // `actions` has the functions to call on input: choose(name, value), compare(values), body(index),
   // setVariable(variable, value), slideVariable(variable, position, valueOf), setStopTime(seconds), clearChanges(), reportError(message).
-  constructor(models, presets, actions) {
-    Object.assign(this, { models, presets, actions, fields: new Map() });
+  constructor(models, actions) {
+    Object.assign(this, { models, actions, fields: new Map() });
     const list = (id, text, onChange) => [id, new Choice(id, text, onChange)];
     const solverLists = Object.entries(SOLVER_LISTS);
     this.lists = Object.fromEntries([
-      list("preset", "Published case", actions.preset),
       ...solverLists.map(([id, [name, text]]) => list(id, text, (value) => actions.choose(name, Number(value)))),
       list("comparison", "Compare with", (model) => actions.compare({ model })),
       ...solverLists.map(([id, [name, , text]]) => list(`comparison-${id}`, text, (value) => actions.compare({ [name]: Number(value) }))),
@@ -55,8 +54,7 @@ export class Form {
     const modelInfo = this.models.get(state.model);
     const values = effectiveValues(modelInfo, state.values);
     this.follow(modelInfo, state);
-    const { preset, comparison, body } = this.lists;
-    preset.fill([["", "none (custom settings)"], ...[...this.presets.values()].map(({ name, title }) => [name, `${name}: ${title}`])], state.preset);
+    const { comparison, body } = this.lists;
     body.fill(modelInfo.bodies.map(({ position }, i) => [i, position]), state.body);
     const comparable = [...this.models.values()].filter(({ bodies }) => bodies[0].position === modelInfo.bodies[0].position);
     comparison.fill([["", "nothing"], ...comparable.map(({ name }) => [name, name === state.model ? "same model" : name])], state.comparison?.model ?? "");

@@ -6,16 +6,15 @@ const SVG_NAMESPACE = "http://www.w3.org/2000/svg";
 const [SAMPLE_WIDTH, SAMPLE_HEIGHT] = [26, 12]; // of a sample, in CSS pixels
 
 // Paths of the samples by kind; lines are drawn, bands are filled.
-export const SAMPLES = {
+const SAMPLES = {
   line: `M0 ${SAMPLE_HEIGHT / 2}H${SAMPLE_WIDTH}`,
-  bar: `M0 ${SAMPLE_HEIGHT / 2 - 2}h${SAMPLE_WIDTH}v4H0Z`,
   band: `M0 0H${SAMPLE_WIDTH}V${SAMPLE_HEIGHT}H0Z`,
   mark: `M${SAMPLE_WIDTH / 2} ${SAMPLE_HEIGHT / 2}V${SAMPLE_HEIGHT}`,
   change: `M${SAMPLE_WIDTH / 2} 0V${SAMPLE_HEIGHT}`,
   dots: `M${SAMPLE_WIDTH / 2 - 2} ${SAMPLE_HEIGHT / 2 - 2}h4v4h-4Z`,
   arrow: `M0 ${SAMPLE_HEIGHT / 2}H${SAMPLE_WIDTH}m-6 -4l6 4l-6 4`,
 };
-const FILLED = ["bar", "band", "dots"];
+const FILLED = ["band", "dots"];
 
 // Remove entries that look and read the same. An entry is {kind, colour, dash, text}.
 export function uniqueEntries(entries) {
@@ -39,28 +38,4 @@ export function showLegend(host, entries) {
     sample.append(path);
     return makeElement("span", {}, sample, text);
   }));
-}
-
-// Draw the entries in rows of a width, from (x, y) on. Returns the height used; measures only if `colourOf` is missing.
-export function drawLegend(context, entries, x, y, width, colourOf) {
-  const rowHeight = 1.5 * SAMPLE_HEIGHT;
-  let [left, row] = [0, 0];
-  for (const { kind, colour, dash = [], text } of entries) {
-    const size = SAMPLE_WIDTH + 6 + context.measureText(text).width;
-    if (left && left + size > width) [left, row] = [0, row + 1];
-    if (colourOf) {
-      context.save();
-      context.translate(x + left, y + row * rowHeight);
-      const path = new Path2D(SAMPLES[kind]);
-      [context.fillStyle, context.strokeStyle, context.lineWidth] = [colourOf(colour), colourOf(colour), 2];
-      context.setLineDash(dash);
-      if (FILLED.includes(kind)) context.fill(path);
-      else context.stroke(path);
-      context.fillStyle = colourOf("ink");
-      context.fillText(text, SAMPLE_WIDTH + 6, SAMPLE_HEIGHT - 2);
-      context.restore();
-    }
-    left += size + 16;
-  }
-  return entries.length ? (row + 1) * rowHeight : 0;
 }

@@ -4,19 +4,16 @@ import { makeElement, typicalSizes } from "./controls.js";
 import { Session } from "./session.js";
 import { showLegend } from "./legend.js";
 import { Diagrams } from "./diagrams.js";
-import { presetState, initialComparison, addChange, chooseForComparison, chooseItem, replaceValue } from "./overrides.js";
+import { initialComparison, addChange, chooseForComparison, chooseItem, replaceValue } from "./overrides.js";
 import { settingLines } from "./setting_lines.js";
 import { Form } from "./form.js";
 import { DragController } from "./drag.js";
 import { Mechanism } from "./mechanism.js";
 import { formatNumber } from "./plot.js";
-import { defaultState, effectiveValues, decodeState, findVariable, valueAt, encodeState } from "./state.js";
-import { costTable, decayTable, describeSettings, eventTable, publishedTable } from "./tables.js";
-import { MeasurementError, readMeasurement } from "./measurement.js";
+import { defaultState, effectiveValues, decodeState, valueAt, encodeState } from "./state.js";
+import { costTable, decayTable, describeSettings, eventTable } from "./tables.js";
 import { startStories } from "./stories.js";
-import { save, toCsv, toPng } from "./export.js";
-import { StickSlipSound } from "./sound.js";
-import { FrictionMap } from "./friction_map.js";
+import { save, toCsv } from "./export.js";
 
 const SLICE = 8; // ms per frame for simulation
 const SUMMARY_DELAY = 300; // ms without a change before tables, link and status are updated
@@ -29,10 +26,7 @@ const page = { session, state: null, modelInfo: null, playing: false, setVariabl
 const drag = new DragController(page);
 const mechanism = new Mechanism($$("mechanism"), drag);
 const diagrams = new Diagrams($$("panels"), seek);
-const sound = new StickSlipSound();
-const frictionMap = new FrictionMap(session, $$("map-canvas"), pickValues, (text) => { $$("map-status").textContent = text; });
-const form = new Form(session.models, session.presets, {
-  preset: (name) => { isAddressUsed = true; return session.presets.has(name) ? showState(stateOfPreset(name)) : restartEdited(); },
+const form = new Form(session.models, {
   choose: (name, value) => { chooseItem(page.modelInfo, page.state.values, name, value); restartEdited(); },
   compare: setComparison,
   body: (number) => { page.state.body = number; restart(); },
@@ -45,14 +39,12 @@ const form = new Form(session.models, session.presets, {
 let isAddressUsed = /^#\./.test(location.hash); // an untouched page leaves its address alone, so that it opens as before
 let isExploreRequested = false; // by a link
 let requestedState = null; // the state shown last, possibly still compiling
-let measurement = null; // of the visitor, drawn over the position of the body shown
 let linkWarning = ""; // unknown parts of a link
 let inputError = ""; // an invalid number
 let frameRequested = false;
 let stale = { curves: true, cursor: true };
 let lastFrame = 0; // time of the last frame in ms
 let summaryTimer = 0;
-let heardRuns = null; // whose sound has been played
 let announceFirstPicture = null;
 const firstPicture = new Promise((done) => { announceFirstPicture = done; });
 
@@ -70,27 +62,18 @@ async function showState(next, unknownKeys = [], version = null) {
   page.state = next;
   page.modelInfo = session.models.get(next.model);
   if (changed) buildControls();
-  if (changed && measurement) showMeasurement(null); // it belongs to another body
   linkWarning = unknownKeys.length ? `The link contains unknown settings: ${unknownKeys.join(", ")}. ` : "";
   if (version && version !== session.version) linkWarning += `The link was made with version ${version}; this is version ${session.version}. `;
   restart();
 }
 
-// Show what a link contains: a state, a published case by its name, or else the first model.
+// Show what a link contains, or else the first model.
 async function followLink(hash) {
   isExploreRequested = hash.includes("=");
   isAddressUsed ||= isExploreRequested;
   const decoded = decodeState(hash, session.models);
-  const parameters = new URLSearchParams(hash.slice(1));
-  const preset = parameters.get(".preset");
   if (decoded) await showState(decoded.state, decoded.unknownKeys, decoded.version);
-  else if (session.presets.has(preset)) await showState(stateOfPreset(preset));
-  else await showState(defaultState(session.models.values().next().value), [parameters.get(".model")].filter(Boolean));
-}
-
-function stateOfPreset(name) {
-  const preset = session.presets.get(name);
-  return presetState(preset, session.models.get(preset.model));
+  else await showState(defaultState(session.models.values().next().value), [new URLSearchParams(hash.slice(1)).get(".model")].filter(Boolean));
 }
 
 // Build controls and mechanism for another model.
@@ -103,10 +86,6 @@ function buildControls() {
   for (const formulas of $$("equations").querySelectorAll("pre")) formulas.tabIndex = 0; // scrolls on narrow screens
   mechanism.build(modelInfo);
   $$("kick").hidden = !modelInfo.bodies.some((body) => body.input);
-  $$("sound").hidden = !(hasStickSlip() && globalThis.AudioContext);
-  if ($$("sound").hidden) silence();
-  $$("map").hidden = !FrictionMap.suits(modelInfo);
-  if ($$("map").hidden) frictionMap.hide();
   const stop = session.stopTime(modelInfo.name);
   session.restart({ ...defaultState(modelInfo), stop });
   session.runs.main.advance();
@@ -123,10 +102,10 @@ function restart() {
   requestFrame();
 }
 
-// Restart after a change: the state is no longer a published case.
+// Restart after a change.
 function restartEdited() {
   isAddressUsed = true;
-  page.state.preset = linkWarning = "";
+  linkWarning = "";
   restart();
 }
 
@@ -189,33 +168,6 @@ async function setComparison({ model, ...values }) {
   restart();
 }
 
-// Set values from the start, from the map.
-function pickValues(values) {
-  const { state, modelInfo } = page;
-  state.changes = state.changes.filter(({ name }) => !(name in values));
-  for (const [name, value] of Object.entries(values)) replaceValue(modelInfo, state, name, value, 0);
-  restartEdited();
-}
-
-// Whether the body shown has friction and is pulled by a driver.
-function hasStickSlip() {
-  const body = page.modelInfo.bodies[page.state.body] ?? page.modelInfo.bodies[0];
-  return Boolean(body.driver && body.friction);
-}
-
-function silence() {
-  sound.stop();
-  $$("sound").setAttribute("aria-pressed", "false");
-}
-
-function playSound() {
-  const { main } = session.runs;
-  $$("sound").setAttribute("aria-pressed", "true");
-  heardRuns = session.runs;
-  sound.play(main, page.modelInfo.bodies[page.state.body]);
-  $$("status").textContent = sound.text;
-}
-
 // Whether changes apply from the cursor time on.
 function changesAtCursor() {
   return page.playing || $$("live").checked;
@@ -253,7 +205,7 @@ function frame(now) {
   if (stale.curves) drawAlert();
   if (main.time.length && stale.curves) {
     mechanism.fit(main);
-    diagrams.draw(session, page.state, { envelopes: $$("envelopes").checked, measurement });
+    diagrams.draw(session, page.state, { envelopes: $$("envelopes").checked });
     showLegend($$("legend"), diagrams.legend());
   }
   if (main.time.length && (stale.curves || stale.cursor) && main.hasReached(page.state.t)) {
@@ -309,13 +261,11 @@ function scheduleSummary() {
     if (!session.done) return scheduleSummary();
     const { state } = page;
     const { main } = session.runs;
-    const tables = main.time.length ? [publishedTable, costTable, decayTable, eventTable].map((table) => table(session, state)) : [];
+    const tables = main.time.length ? [costTable, decayTable, eventTable].map((table) => table(session, state)) : [];
     $$("tables").replaceChildren(...tables.filter(Boolean));
     updateAddress();
     const summary = main.failure ? "" : `${describeSettings(main)}: ${main.events.length} events in ${formatNumber(state.stop)} s.`;
-    if (sound.isOn && heardRuns !== session.runs) playSound();
-    if (!page.playing) $$("status").textContent = linkWarning + (sound.isOn ? sound.text : summary);
-    if (!$$("map").hidden) frictionMap.show(state);
+    if (!page.playing) $$("status").textContent = linkWarning + summary;
   }, SUMMARY_DELAY);
 }
 
@@ -367,21 +317,13 @@ function play(playing = true) {
 }
 
 for (const [id, action] of Object.entries({
-  "remove-measurement": () => { $$("measurement").value = ""; showMeasurement(null); },
   play: () => play(!page.playing),
   kick: () => drag.kick(),
-  sound: () => {
-    if (sound.isOn) silence();
-    else playSound();
-    scheduleSummary();
-  },
   projector: () => showProjector(!document.body.classList.contains("projector")),
   "previous-event": () => seekEvent(session.runs.main.events.findLast(({ t }) => t < page.state.t)),
   "next-event": () => seekEvent(session.runs.main.events.find(({ t }) => t > page.state.t)),
   reset: () => showState(defaultState(page.modelInfo)),
-  print: () => print(),
   csv: () => save(new Blob([toCsv(session.runs.main, session.runs.comparison, settingLines(session, page.state))], { type: "text/csv" }), `${page.state.model}.csv`),
-  png: async () => save(await toPng(diagrams.visible(), describeSettings(session.runs.main), settingLines(session, page.state), diagrams.legend()), `${page.state.model}.png`),
   link: copyLink,
 })) $$(id).addEventListener("click", action);
 $$("scrub").addEventListener("input", () => seek((page.state.stop * $$("scrub").value) / 1000));
@@ -391,32 +333,6 @@ $$("envelopes").addEventListener("change", redraw);
 function currentLink() {
   return encodeState(page.state, session.models, session.version);
 }
-
-function showMeasurement(next) {
-  measurement = next;
-  $$("remove-measurement").hidden = !next;
-  $$("status").textContent = next ? `${next.name}: ${next.count} points, drawn over the position. The file stays on this computer.` : "";
-  redraw();
-}
-
-async function openMeasurement(file) {
-  if (!file) return;
-  const { position } = page.modelInfo.bodies[page.state.body];
-  try {
-    showMeasurement(readMeasurement(file.name, await file.text(), findVariable(page.modelInfo, position).unit));
-    $$("panels").scrollIntoView({ block: "nearest" });
-  } catch (error) {
-    if (!(error instanceof MeasurementError)) throw error;
-    showError(error.message);
-  }
-}
-
-$$("measurement").addEventListener("change", ({ target }) => openMeasurement(target.files[0]));
-addEventListener("dragover", (event) => event.preventDefault());
-addEventListener("drop", (event) => {
-  event.preventDefault();
-  openMeasurement(event.dataTransfer.files[0]);
-});
 
 // Store the state in the address. A page embedded in another one leaves the address alone.
 function updateAddress() {
@@ -449,21 +365,7 @@ addEventListener("keydown", (event) => {
   $$("play").click();
 });
 
-// Print on white, also from a dark screen.
-for (const [event, paper] of [["beforeprint", true], ["afterprint", false]]) {
-  addEventListener(event, () => { 
-    document.documentElement.classList.toggle("paper", paper);
-    $$("map").classList.toggle("incomplete", !frictionMap.isComplete);
-    $$("settings").replaceChildren(...settingLines(session, page.state).map((line) => makeElement("p", {}, line)));
-    repaint();
-  });
-}
-for (const query of ["(prefers-color-scheme: dark)", "(forced-colors: active)"]) matchMedia(query).addEventListener("change", repaint);
-
-function repaint() {
-  diagrams.repaint();
-  frictionMap.draw();
-}
+for (const query of ["(prefers-color-scheme: dark)", "(forced-colors: active)"]) matchMedia(query).addEventListener("change", () => diagrams.repaint());
 
 // ---- start
 
@@ -475,7 +377,7 @@ for (const [name, modelInfo] of session.models) {
   $$("models").append(makeElement("label", {}, choice, name));
 }
 $$("choices").append(...Object.values(form.lists).map(({ element }) => element));
-globalThis.app = { session, plots: diagrams.plots, sound, frictionMap, seek, state: () => page.state }; // for tests and the console
+globalThis.app = { session, plots: diagrams.plots, seek, state: () => page.state }; // for tests and the console
 $$("stories")?.addEventListener("click", (event) => { // in a page embedded in a report, a link would lead to the report
   const link = event.target.closest("a");
   if (!link || !isEmbedded) return;

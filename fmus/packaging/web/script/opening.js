@@ -197,16 +197,6 @@ export async function showOpening(session) {
     });
   }
 
-  // Finish both runs at once, for a print.
-  function finish() {
-    if (isDragged || lanes.every(({ run }) => run.done)) return;
-    stopAnimation(advanceFrame);
-    cancelTask("opening");
-    t = stop;
-    for (const lane of lanes) lane.advance(stop, Infinity);
-    show();
-  }
-
   function describeResult() {
     if (lanes.some(({ run }) => !run.done)) {
       openingElement("verdict").textContent = "Watch the lower counter when the upper mass stops.";
@@ -334,7 +324,6 @@ export async function showOpening(session) {
   });
   openingElement("replay").disabled = false;
   openingOutput("start").textContent = `${fixedDigits(1000 * start.x0, 0)} mm`;
-  addEventListener("beforeprint", finish);
   new IntersectionObserver(([{ isIntersecting }], observer) => { // plays once, when it is first in view
     if (!isIntersecting) return;
     observer.disconnect();

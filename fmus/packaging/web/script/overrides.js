@@ -1,6 +1,6 @@
 // Changes of the state by the user: values, changes during playback, enumerations, comparison.
 
-import { comparisonSettings, defaultState, effectiveValues, findVariable, setValue } from "./state.js";
+import { comparisonSettings, effectiveValues, findVariable, setValue } from "./state.js";
 
 const CHATTERING_RTOL = 1e-3; // the default of many solvers
 export const MIN_CHANGE_SPACING = 1 / 400; // of the run; closer changes of a variable replace each other
@@ -57,12 +57,4 @@ export function initialComparison(modelInfo, state, model) {
   const [law, method] = [alternative("friction"), alternative("solver.method", "exact")];
   const loose = { "solver.rtol": CHATTERING_RTOL }; // with another law the run may chatter at rest, at a tight tolerance for ever
   return { ...(law !== undefined && { friction: law, ...loose }), ...(method !== undefined && { "solver.method": method }) };
-}
-
-// The state of a published case.
-export function presetState(preset, modelInfo) {
-  const state = { ...defaultState(modelInfo), preset: preset.name, stop: preset.stop ?? modelInfo.stop };
-  const chosen = Object.entries(preset.labels).map(([name, label]) => [name, valueOfLabel(findVariable(modelInfo, name), label)]);
-  for (const [name, value] of [...Object.entries(preset.values), ...chosen]) setValue(modelInfo, state.values, name, value);
-  return state;
 }

@@ -1,14 +1,10 @@
 // The content of the diagrams.
 
-import { heatOf } from "./energy_budget.js";
 import { difference, turningPoints } from "./measure.js";
 import { bounds, formatNumber } from "./plot.js";
 
 const MAX_MARKS = 400; // event marks
 const ENVELOPE_POINTS = 200;
-const BAND_TEXT = "friction can hold it in between";
-const BAR_WIDTH = 4; // px
-const PHASE_BAND_TEXT = "friction can hold it here";
 const MAX_PLOTTED_ROWS = 8000; // longer runs are plotted at grid points and events only
 
 // Return the diagrams as [{key, title, content}]. A diagram keeps its key from one state to the next. The key is the name
@@ -19,15 +15,13 @@ export function buildPanels(session, state, options) {
   const body = modelInfo.bodies[state.body];
   const names = [body.position, body.speed, body.acceleration].filter(Boolean);
   const energy = modelInfo.variables.find(({ unit, causality }) => unit === "J" && causality === "output")?.name;
-  const forces = [...new Set([body.friction, ...(body.contacts ?? [])].filter(Boolean))];
+  const others = [...new Set([energy, body.friction, ...(body.contacts ?? [])].filter(Boolean))];
   const inputs = main.inputs.filter((name) => !names.includes(name) && main.largestMagnitude(name) > 0);
-  const bands = session.holdingBands.find(state, body);
-  const panels = names.map((name) => timePanel(session, state, { ...options, bands }, name));
-  panels.push(phasePanel(session, body, bands));
+  const panels = names.map((name) => timePanel(session, state, options, name));
+  panels.push(phasePanel(session, body));
   if (body.slip) panels.push(lawPanel(session, body));
   panels.push(timePanel(session, state, options, "solver.h", ".step", true));
-  if (energy) panels.push(energyPanel(session, state, options, energy));
-  panels.push(...[...forces, ...inputs].map((name) => timePanel(session, state, options, name)));
+  panels.push(...[...others, ...inputs].map((name) => timePanel(session, state, options, name)));
   if (modelInfo.contacts.length > 1) panels.push(stickingPanel(main, state));
   const error = errorPanel(session, body, state);
   if (error) panels.push(error);
@@ -75,7 +69,7 @@ function timePanel(session, state, options, name, key = name, log = false) {
   const { factor, display_unit, text, symbol } = variable;
   const body = main.fmu.modelInfo.bodies[state.body];
   const isPosition = name === body.position;
-  const extras = isPosition ? positionCurves(main, body, options, factor, state.stop) : options.extras ?? [];
+  const extras = isPosition ? positionCurves(main, body, options, factor) : [];
   const curves = [...extras, ...runCurves(session.runs, (run) => curveData(run, variable))];
   const y = { ...bounds(curves.map((curve) => curve.y), log), log };
   const x = { low: 0, high: state.stop, label: "t in s" };
@@ -83,42 +77,10 @@ function timePanel(session, state, options, name, key = name, log = false) {
   const own = contacts.filter((contact) => contact.name === name);
   const shaded = own.length ? own : contacts.filter((contact) => body.contacts?.includes(contact.name));
   const content = { x, y, curves, ...stickingBands(main, shaded), marks: findMarks(main, state, isPosition) };
-  if (isPosition && options.bands) content.curves = [...bandCurves(main, body, options.bands, factor, state.stop), ...curves]; // the axis ignores them
   const isFriction = name === body.friction || contacts.some((contact) => contact.name === name);
   const arrow = name === body.friction && body.kind !== "none" ? `friction on the body, −${name}` : "";
   const sign = isFriction ? `; the arrow is −${name}` : "";
   return { key, name, title: `${text}${display_unit ? ` in ${display_unit}` : ""}${sign}`, symbol, factor, content, arrow };
-}
-
-// The edges of the band in which friction can hold the body, over time.
-function bandCurves(run, body, bands, factor, stop) {
-  return ["low", "high"].map((edge) => {
-    const [x, y] = [[], []];
-    bands.forEach((band, i) => {
-      const end = bands[i + 1]?.t ?? stop;
-      const steps = body.driver ? run.grid.map((row) => run.time[row]).filter((t) => t > band.t && t < end) : [];
-      for (const t of [band.t, ...steps, end].filter((at) => run.hasReached(at))) {
-        x.push(t);
-        y.push((band[edge] + (body.driver ? run.at(body.driver, t) : 0)) * factor);
-      }
-    });
-    return { x, y, colour: "stick", dash: [6, 3], width: 1, legend: BAND_TEXT };
-  });
-}
-
-// Kinetic and potential energy, the heat, and both together, which change by work from outside only.
-function energyPanel(session, state, options, name) {
-  const { main } = session.runs;
-  const variable = main.fmu.variables.get(name);
-  const heat = heatOf(main, name, main.fmu.modelInfo.bodies);
-  if (!heat) return timePanel(session, state, options, name);
-  const sum = heat.map((joule, row) => joule + main.columns[name][row]);
-  const extras = [
-    { ...plottedRows(main, sum), colour: "soft", dash: [5, 3], width: 1, legend: "energy and heat together" },
-    { ...plottedRows(main, heat), colour: "heat", legend: "heat" },
-  ];
-  const panel = timePanel(session, state, { ...options, extras }, name);
-  return { ...panel, title: `${variable.text}, and heat, in ${variable.display_unit}` };
 }
 
 // The intervals in which contacts stick as {bands, rows}: each of several contacts has a row with its name.
@@ -138,14 +100,9 @@ function stickingPanel(main, state) {
   return { key: ".sticking", title, symbol: "", content };
 }
 
-// Additional curves with the position: the driver, a measurement, and optionally envelopes and turning points.
-function positionCurves(main, body, options, factor, stop) {
+// Additional curves with the position: the driver, and optionally envelopes and turning points.
+function positionCurves(main, body, options, factor) {
   const curves = [];
-  if (options.measurement) {
-    const { name, time, position } = options.measurement;
-    const shown = time.map((t, i) => [t, position[i] * factor]).filter(([t]) => t >= 0 && t <= stop);
-    curves.push({ x: shown.map(([t]) => t), y: shown.map(([, y]) => y), colour: "measured", dots: true, legend: name });
-  }
   if (body.driver) curves.push({ ...curveData(main, { name: body.driver, factor }), colour: "soft", dash: [2, 3], width: 1, legend: "driver" });
   if (!options.envelopes) return curves;
   const turning = turningPoints(main.time, main.columns[body.position], main.columns[body.speed]);
@@ -213,9 +170,8 @@ function lawCurves(run, body, slip, friction) {
   return modes?.includes(0) ? [held, ...slips] : slips;
 }
 
-// Speed over position. The band in which friction can hold the body is a line at speed zero; one that moves is drawn with
-// the cursor.
-function phasePanel(session, body, bands) {
+// Speed over position.
+function phasePanel(session, body) {
   const [x, v] = [body.position, body.speed].map((name) => session.runs.main.fmu.variables.get(name));
   const has = (run) => run.columns[x.name] && run.columns[v.name];
   const curves = runCurves(session.runs, (run) => has(run) && { x: curveData(run, x).y, y: curveData(run, v).y, width: 1.2 });
@@ -223,15 +179,7 @@ function phasePanel(session, body, bands) {
     x: { ...bounds(curves.map((curve) => curve.x)), label: `${x.name}${x.display_unit ? ` in ${x.display_unit}` : ""}` },
     y: bounds(curves.map((curve) => curve.y)), curves,
   };
-  const isFixed = bands?.length === 1 && !body.driver;
-  const line = { colour: "stick", width: BAR_WIDTH };
-  if (isFixed) content.curves = [{ x: [bands[0].low * x.factor, bands[0].high * x.factor], y: [0, 0], ...line, legend: PHASE_BAND_TEXT }, ...curves];
-  const movingBand = bands && !isFixed && ((run, t) => {
-    const { low, high } = bands.findLast((band) => band.t <= t);
-    const shift = body.driver ? run.at(body.driver, t) : 0;
-    return { x: [low, high].map((edge) => (edge + shift) * x.factor), y: [0, 0], ...line };
-  });
-  return { key: ".phase", title: `phase plane: ${v.name} in ${v.display_unit} against ${x.name}`, symbol: "", content, phase: [x, v], movingBand };
+  return { key: ".phase", title: `phase plane: ${v.name} in ${v.display_unit} against ${x.name}`, symbol: "", content, phase: [x, v] };
 }
 
 // Errors of the runs against the closed form, or else the difference between the two runs. Null if a run has failed: an
@@ -261,19 +209,18 @@ function errorPanel(session, body, state) {
 }
 
 // The entries of the legend for a diagram.
-export function legendOf({ content, arrow, movingBand }) {
+export function legendOf({ content, arrow }) {
   const { curves, bands = [], marks = [] } = content;
-  const lines = curves.filter(({ legend }) => legend).map(({ colour, dash, dots, width, legend }) => ({ kind: dots ? "dots" : width >= BAR_WIDTH ? "bar" : "line", colour, dash, text: legend }));
+  const lines = curves.filter(({ legend }) => legend).map(({ colour, dash, dots, legend }) => ({ kind: dots ? "dots" : "line", colour, dash, text: legend }));
   const isStuck = bands.length > 0 && [{ kind: "band", colour: "hold", text: "sticks" }];
   const isEvent = marks.some(({ label }) => !label) && [{ kind: "mark", colour: "event", text: "event" }];
   const isChange = marks.some(({ label }) => label) && [{ kind: "change", colour: "event", text: "change of a value" }];
   const isArrow = arrow && [{ kind: "arrow", colour: "ink", text: arrow }];
-  if (movingBand) lines.push({ kind: "bar", colour: "stick", text: PHASE_BAND_TEXT });
   return [...lines.reverse(), ...(isStuck || []), ...(isEvent || []), ...(isChange || []), ...(isArrow || [])];
 }
 
 // The cursor of a diagram and the values there: {cursor, readings [{text, colour}]}.
-export function cursorReadings({ phase, name, factor, movingBand }, { runs }, t) {
+export function cursorReadings({ phase, name, factor }, { runs }, t) {
   const [points, readings] = [[], []];
   for (const [run, colour] of [[runs.main, "a"], [runs.comparison, "b"]]) {
     if (!run?.time.length || (run.failure && t > run.time.at(-1)) || !(phase ?? [{ name }]).every((variable) => run.columns[variable.name])) continue;
@@ -281,5 +228,5 @@ export function cursorReadings({ phase, name, factor, movingBand }, { runs }, t)
     points.push({ x, y, colour });
     if (!phase) readings.push({ text: formatNumber(y), colour });
   }
-  return { cursor: { x: phase ? undefined : t, points, line: movingBand ? movingBand(runs.main, t) : null }, readings };
+  return { cursor: { x: phase ? undefined : t, points }, readings };
 }

@@ -72,12 +72,12 @@ export function decimate(x, y, scale) {
 
 const colours = {}; // by name of the CSS variable
 
-// Read the current colours of the style sheet (light, dark or print) and the font size.
+// Read the current colours of the style sheet (light or dark) and the font size.
 export function readColours() {
   const style = getComputedStyle(document.documentElement);
   axisText.size = parseFloat(style.getPropertyValue("--plot-text")) || FONT_SIZE;
   [axisText.left, axisText.bottom] = [58, 22].map((margin) => (margin * axisText.size) / FONT_SIZE);
-  for (const name of ["a", "b", "ghost", "line", "soft", "hold", "event", "cursor", "measured", "heat", "stick", "slip"]) colours[name] = style.getPropertyValue(`--${name}`).trim();
+  for (const name of ["a", "b", "ghost", "line", "soft", "hold", "event", "cursor", "stick", "slip"]) colours[name] = style.getPropertyValue(`--${name}`).trim();
 }
 
 export class Plot {
@@ -173,7 +173,7 @@ export class Plot {
     this.paint();
   }
 
-  // Draw the cursor: x, points {x, y, colour} on the curves, and a line; and the rectangle that is being drawn.
+  // Draw the cursor: x, points {x, y, colour} on the curves, and the rectangle that is being drawn.
   moveCursor(cursor) {
     this.cursor = cursor;
     if (!this.content || !this.width) return;
@@ -185,7 +185,6 @@ export class Plot {
     context.rect(axisText.left - CURSOR_SIZE, 0, width - axisText.left - RIGHT + 2 * CURSOR_SIZE, height - axisText.bottom + CURSOR_SIZE);
     context.clip();
     if (cursor.x !== undefined) line(context, colours.cursor, 1, [scale.x(cursor.x), TOP, scale.x(cursor.x), height - axisText.bottom]);
-    if (cursor.line) this.curve(context, cursor.line, scale);
     for (const { x, y, colour } of cursor.points) dot(context, colours[colour], scale.x(x), scale.y(y), CURSOR_SIZE);
     context.restore();
     if (!this.rectangle) return;

@@ -3,12 +3,10 @@
 //   main         the run itself
 //   comparison   the run to compare it with
 //   unchanged    the run without the changes made during playback
-//   published    a published case, with the published grid
 //   preview      the same values with the model's default law, method and tolerance: shown while a slow run is under way
 //   reference    the preview or main run, if the default method is exact
 
 import { Fmu, FmuError } from "./fmu.js";
-import { HoldingBands } from "./holding_band.js";
 import { Run } from "./run.js";
 import { comparisonSettings, findVariable, settableVariables, valueAt } from "./state.js";
 import { load } from "./wasm.js";
@@ -21,12 +19,10 @@ export class Session {
   constructor(data) {
     this.version = data.version;
     this.models = new Map(data.models.map((modelInfo) => [modelInfo.name, modelInfo]));
-    this.presets = new Map(data.presets.map((preset) => [preset.name, preset]));
     this.code = new Map(); // compiled modules by model
     this.fmus = new Map();
     this.stopTimes = new Map();
     this.runs = {};
-    this.holdingBands = new HoldingBands(this);
   }
 
   // Compile a model, unless it is compiled already.
@@ -83,8 +79,6 @@ export class Session {
     if (isExact(modelInfo)) runs.reference = runs.preview ?? runs.main;
     if (state.comparison) runs.comparison = createRun("comparison", comparisonSettings(this.models, state), state.comparison.model);
     if (changes.length) runs.unchanged = createRun("unchanged", { changes: [] });
-    const preset = this.presets.get(state.preset);
-    if (preset) runs.published = createRun("published", { points: preset.grid ? Math.round(stop / preset.grid) : 0 });
     [this.runs, this.pointsShown] = [runs, 0];
   }
 

@@ -1,4 +1,4 @@
-// The settings behind the results in words, for prints, pictures and CSV files.
+// The settings behind the results in words, for CSV files.
 
 import { comparisonSettings, effectiveValues, findVariable } from "./state.js";
 
@@ -28,7 +28,6 @@ export function settingLines(session, state) {
     `Parameters: ${listValues(modelInfo, state.values, false)}`,
     `Solver: ${listValues(modelInfo, state.values, true)}, stop time = ${state.stop} s`,
   ];
-  if (state.preset) lines.push(`Published case: ${state.preset}`);
   const changes = state.changes.map(({ t, name, value }) => `${quantity(findVariable(modelInfo, name), value)} from ${Number(t.toPrecision(DIGITS))} s on`);
   if (changes.length) lines.push(`Changes: ${changes.join("; ")}`);
   if (state.comparison) {

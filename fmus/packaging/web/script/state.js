@@ -5,7 +5,7 @@ const COMPARISON_PREFIX = ".compare."; // of the variables of the comparison run
 
 // The default state of a model. A stop time of null is replaced when the model is compiled.
 export function defaultState(modelInfo) {
-  return { model: modelInfo.name, values: {}, changes: [], stop: null, t: 0, body: 0, comparison: null, preset: "" };
+  return { model: modelInfo.name, values: {}, changes: [], stop: null, t: 0, body: 0, comparison: null };
 }
 
 export function findVariable(modelInfo, name) {
@@ -48,7 +48,6 @@ export function encodeState(state, models, version) {
   parameters.set(".stop", state.stop);
   if (state.t) parameters.set(".t", state.t);
   if (state.body) parameters.set(".body", state.body);
-  if (state.preset) parameters.set(".preset", state.preset);
   if (state.comparison) {
     parameters.set(".compare", state.comparison.model);
     const { values } = comparisonSettings(models, state);
@@ -95,7 +94,6 @@ export function decodeState(hash, models) {
   state.stop = number(".stop", 0) > 0 ? number(".stop", 0) : null;
   state.t = Math.max(number(".t", 0), 0);
   state.body = modelInfo.bodies[number(".body", 0)] ? number(".body", 0) : 0;
-  state.preset = parameters.get(".preset") ?? "";
   return { state, unknownKeys, version: parameters.get(".version") };
 }
 

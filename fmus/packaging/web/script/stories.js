@@ -171,7 +171,6 @@ const specs = {
 export async function startStories(session, firstPicture) {
   readPalette();
   for (const query of ["(prefers-color-scheme: dark)", "(forced-colors: active)"]) matchMedia(query).addEventListener("change", readPalette);
-  for (const event of ["beforeprint", "afterprint"]) addEventListener(event, readPalette); // prints are white
   const opening = await showOpening(session);
   await firstPicture;
   const stories = {};

@@ -52,10 +52,6 @@ export class Story {
     this.compute();
     this.showTime(reducedMotion.matches ? this.spec.stop : 0);
     if (!this.costs.length) this.section.classList.remove("pending");
-    addEventListener("beforeprint", () => {
-      this.playing = false;
-      this.showTime(this.spec.stop);
-    });
     this.button.disabled = false;
     const text = this.section.querySelector(".prose p");
     let width = 0;

@@ -2,31 +2,13 @@
 
 import { formatTolerance, makeElement } from "./controls.js";
 import { COUNTS } from "./fmu.js";
-import { decayBetween, difference, frictionFromEnergy, measureQuantities, turningPoints } from "./measure.js";
+import { decayBetween, difference, frictionFromEnergy, turningPoints } from "./measure.js";
 import { formatNumber } from "./plot.js";
 import { effectiveValues } from "./state.js";
 
 const MAX_LISTED_EVENTS = 60;
 const CLOSED_FORM_DIGITS = 9;
 const LEAST_DIGITS = 4;
-const UNITS = { ms: 1e-3, s: 1, deg: Math.PI / 180, "lbf.in": 0.45359237 * 9.80665 * 0.0254 };
-const QUANTITIES = { // name in scene files: label, unit
-  steps: ["steps (time points)", ""],
-  mean_step: ["mean step", "s"],
-  run_time: ["run time on this computer", "s"],
-  x_0: ["first peak", "m"],
-  x_n: ["last peak", "m"],
-  sample_0: ["first peak, sampled", "m"],
-  sample_n: ["last peak, sampled", "m"],
-  first_slip: ["first slip", "s"],
-  slip_time: ["slip duration", "s"],
-  zeta: ["damping ratio", ""],
-  f: ["friction force", "N"],
-  T_f: ["joint torque", "N·m"],
-  period: ["slip period", "s"],
-  peak_speed: ["peak speed", "m/s"],
-  peak_acceleration: ["peak acceleration", "m/s²"],
-};
 
 function table(caption, headings, rows) {
   const head = makeElement("tr", {}, ...headings.map((text) => (text ? makeElement("th", { scope: "col" }, text) : makeElement("td"))));
@@ -76,30 +58,6 @@ export function costTable(session, state) {
     rows.push([`largest difference in ${body.position}`, "", largestDifference(body.position)], [`largest difference in ${body.speed}`, "", largestDifference(body.speed)]);
   }
   return table("Cost and accuracy", ["", ...runs.map(describeSettings)], rows);
-}
-
-// Published values and the values measured in this run.
-export function publishedTable(session, state) {
-  const preset = session.presets.get(state.preset);
-  const run = session.runs.published;
-  if (!preset || !run?.done || run.failure) return null;
-  const modelInfo = session.models.get(state.model);
-  const measured = measureQuantities(run, modelInfo.bodies[0], preset.decay, effectiveValues(modelInfo, state.values));
-  const rows = Object.entries(preset.published).filter(([name]) => name !== "source").map(([name, published]) => comparisonRow(name, published, measured[name], significantDigits(run)));
-  return table(preset.title, ["", "this run", preset.published.source ? `${preset.kind} (${preset.published.source})` : preset.kind, "difference"], rows);
-}
-
-function comparisonRow(name, published, value, resultDigits) {
-  const [label, defaultUnit] = QUANTITIES[name] ?? [name, ""];
-  const [number, unit] = Array.isArray(published) ? published : [published, defaultUnit];
-  const factor = Array.isArray(published) ? UNITS[unit] : 1;
-  if (value === undefined) return [label, "–", `${number} ${unit}`, ""];
-  const isNumber = typeof number === "number";
-  const publishedDigits = isNumber ? String(number).replace(".", "").replace(/^0+/, "").length : 0;
-  const digits = Math.min(Math.max(5, publishedDigits), resultDigits);
-  const [size, shownUnit] = !isNumber && defaultUnit === "s" && Math.abs(value) < 1 ? [1e3 * value, "ms"] : [value / factor, unit];
-  const deviation = isNumber && name !== "run_time" ? `${formatNumber(100 * (value / factor / number - 1), 2)} %` : name === "run_time" ? "other computer" : "";
-  return [label, `${formatNumber(size, digits)} ${shownUnit.replace(".", "·")}`, `${number} ${isNumber ? unit.replace(".", "·") : ""}`.trim(), deviation];
 }
 
 // Decay measured from the turning points.
