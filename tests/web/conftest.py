@@ -23,5 +23,7 @@ def quiet(browser):
 
 @pytest.fixture
 def page(page_in_browser, quiet):
-    """The page of the shipped models, opened once in a browser that all tests share."""
+    """The page of the shipped models, open in a browser that all tests share."""
+    if not page_in_browser.run("Boolean(globalThis.app)"):  # no test of this module has opened it yet
+        page_in_browser.open()
     return page_in_browser
