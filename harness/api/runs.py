@@ -22,11 +22,12 @@ from ..arguments import (
 )
 from ..errors import HarnessError, SceneError, format_value
 from .options import apply_options, reporter, with_progress_bar
-from .tables import SIDE, convert_to_signals
+from .tables import SIDE, convert_to_signals, is_xarray, list_variables
 
 if TYPE_CHECKING:
     import numpy as np
     import pandas
+    import xarray
     from numpy.typing import ArrayLike
 
     from ..running.trajectory import Trajectory
@@ -61,7 +62,7 @@ def simulate(
     method: str | int | None = None,
     rtol: float | None = None,
     interface: str | None = None,
-    inputs: "Mapping[str, ArrayLike] | pandas.DataFrame | None" = None,
+    inputs: "Mapping[str, ArrayLike] | pandas.DataFrame | xarray.Dataset | None" = None,
     timeout: float | None = None,
     progress: Progress | bool | None = None,
 ) -> "Trajectory":
@@ -91,7 +92,7 @@ def simulate(
         Other FMUs are run with shorter and shorter communication steps until two results agree to this tolerance.
     interface : {"CoSimulation", "ModelExchange"}, optional
         Interface to use if the FMU offers both; co-simulation by default.
-    inputs : mapping or DataFrame, optional
+    inputs : mapping, DataFrame or Dataset, optional
         Input signals: the column ``time`` in s and a column for each input. Values between two rows are interpolated;
         a time that occurs twice is a jump. In co-simulation an input is constant within a communication step and has
         its value at the middle of the step; an input whose rate the model declares starts with its value and is
@@ -217,11 +218,13 @@ def choose_fine_step(spec: "RunSpec", interval: float) -> float:
 
 
 def read_input_columns(inputs: Any) -> dict[str, tuple[float, ...]]:
-    """Return the columns of a mapping or a DataFrame; the index of a DataFrame may be its time."""
+    """Return the columns of a mapping, a DataFrame, whose index may be its time, or a Dataset with its coordinates."""
+    if is_xarray(inputs):
+        inputs = {name: variable.to_numpy() for name, variable in list_variables(inputs).items()}
     if not isinstance(inputs, Mapping) and not hasattr(inputs, "columns"):
         raise SceneError(
-            "inputs must be a mapping or a DataFrame with the column 'time' and a column for each input, not "
-            f"{format_value(inputs)}"
+            "inputs must be a mapping, a DataFrame or a Dataset with the column 'time' and a column for each input, "
+            f"not {format_value(inputs)}"
         )
     names = inputs.columns if hasattr(inputs, "columns") else inputs
     columns = {str(name): inputs[name] for name in names}

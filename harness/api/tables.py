@@ -164,11 +164,7 @@ def convert_to_table(
             )
         return table
     if is_xarray(source):
-        dataset = source if hasattr(source, "data_vars") else source.to_dataset(name=source.name or heading)
-        if len(dataset.dims) != 1:
-            dimensions = ", ".join(map(str, dataset.dims)) or "none"
-            raise SceneError(f"the record has the dimensions {dimensions}: select one, the time")
-        variables = {str(name): dataset[name] for name in (*dataset.coords, *dataset.data_vars)}
+        variables = list_variables(source, heading)
         units = {name: str(variable.attrs.get("units", "")) for name, variable in variables.items()}
         columns = {name: to_column(name, variable.to_numpy()) for name, variable in variables.items()}
         return build_table(columns, {name: "" if unit == "1" else unit for name, unit in units.items()})
@@ -179,6 +175,21 @@ def convert_to_table(
     if rate is None:
         raise SceneError("the record is a row of values without times: give their rate in Hz, or (t, x)")
     return build_table({"t": np.arange(len(source)) / rate, heading: source}, {"t": "s"})
+
+
+def list_variables(source: Any, heading: str = SIGNAL) -> dict[str, Any]:
+    """Return the coordinates and variables of a Dataset or a DataArray of xarray by name.
+
+    Raises
+    ------
+    SceneError
+        If it has another number of dimensions than one.
+    """
+    dataset = source if hasattr(source, "data_vars") else source.to_dataset(name=source.name or heading)
+    if len(dataset.dims) != 1:
+        dimensions = ", ".join(map(str, dataset.dims)) or "none"
+        raise SceneError(f"the table has the dimensions {dimensions}: select one, the time")
+    return {str(name): dataset[name] for name in (*dataset.coords, *dataset.data_vars)}
 
 
 def unit_of(source: Any, name: str) -> str:

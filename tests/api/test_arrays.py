@@ -59,7 +59,8 @@ def test_time_deltas_are_seconds_and_labels_may_be_an_array(user_folder, monkeyp
     delta = pandas.to_timedelta(T, unit="s")
     expected = harness.simulate("coulomb", times=T, inputs={"time": T, "F_ext": F})
     frame = pandas.DataFrame({"F_ext": F}, index=delta.rename("time"))
-    for inputs in ({"time": delta, "F_ext": F}, frame):
+    dataset = frame.to_xarray()
+    for inputs in ({"time": delta, "F_ext": F}, frame, dataset, dataset["F_ext"], dataset.assign(time=T)):
         run = harness.simulate("coulomb", times=delta.to_numpy(), inputs=inputs)
         assert run["x"].tolist() == expected["x"].tolist()
     for heading in ("t", "t [s]", "t [ms]"):
@@ -95,7 +96,7 @@ def test_tables_of_xarray_are_records(user_folder, monkeypatch):
     expected = harness.identify_decay(run).as_json()["fit"]
     for record in (dataset, dataset["x"]):
         assert harness.identify_decay(record).as_json()["fit"] == expected
-    with pytest.raises(harness.SceneError, match="the record has the dimensions time, case: select one, the time"):
+    with pytest.raises(harness.SceneError, match="the table has the dimensions time, case: select one, the time"):
         harness.identify_decay(dataset["x"].expand_dims("case", 1))
 
 

@@ -44,7 +44,7 @@ SIMULATE = [  # changes of harness.simulate("smd"), and words of the sentence
         {"inputs": {"time": [0.0], "F_ext": [2.0]}, "values": {"F_ext": 1.0}},
         "F_ext = 1.0 and inputs has a column F_ext: remove one",
     ),
-    ({"inputs": [1.0, 2.0]}, "inputs must be a mapping or a DataFrame"),
+    ({"inputs": [1.0, 2.0]}, "inputs must be a mapping, a DataFrame or a Dataset"),
 ]
 DECAY = np.linspace(0.0, 10.0, 101), np.exp(-0.1 * np.linspace(0.0, 10.0, 101)) * np.cos(6.0 * np.linspace(0, 10, 101))
 SWING = np.cos(DECAY[0])
