@@ -97,7 +97,11 @@ COMMAND_LINES = [  # arguments, exit status, words of the sentence
     ([*SWEEP, "--stop", "-1"], 2, "stop = -1.0 s is not after start = 0.0 s"),
     (["sweep", "stickslip", "--vary", "m=1,2", "--measure", "zeta"], 2, "unknown measure of stickslip 'zeta'"),
     (["sweep", "stickslip", "--vary", "friction=1.5,2"], 2, "friction is an enumeration"),
-    (["sweep", "stickslip", "--vary", "mu_d=1:2:3"], 1, "three test runs of the sweep failed: mu_d is 1.0, above"),
+    (
+        ["sweep", "stickslip", "--vary", "mu_d=1:2:3"],
+        1,
+        "all runs of the sweep failed: 3 runs, such as mu_d = 1.0: mu_d is 1.0, above",
+    ),
 ]
 
 

@@ -223,3 +223,25 @@ def test_a_profiler_that_keeps_frames_disturbs_no_run(sweep):
         sys.setprofile(None)
     assert frames
     assert profiled["peak_speed"].equals(sweep("stickslip", grid, measures=("peak_speed",))["peak_speed"])
+
+
+@pytest.mark.parametrize("workers", [None, 1])
+def test_one_run_that_works_is_a_sweep(sweep, workers):
+    """Wherever it is among runs that fail."""
+    mu_d = [0.95, 0.6, 0.96, 0.97, 0.98]  # mu_s is 0.9
+    data = sweep("stickslip", {"mu_d": mu_d}, stop=2.0, measures=["events"], workers=workers)
+    alone = sweep("stickslip", {"mu_d": [0.6]}, stop=2.0, measures=["events"])
+    assert [bool(error) for error in data["error"].to_numpy()] == [True, False, True, True, True]
+    assert data["events"].sel(mu_d=[0.6]).equals(alone["events"])
+    assert (data.attrs["parameters"], data.attrs["stop_time"]) == (alone.attrs["parameters"], 2.0)
+    with pytest.raises(
+        harness.HarnessError, match=r"^all runs of the sweep failed: 4 runs, such as mu_d = 0\.95: mu_d "
+    ):
+        sweep("stickslip", {"mu_d": [mu_d[0], *mu_d[2:]]}, stop=2.0, workers=workers)
+
+
+def test_an_address_that_is_none_is_refused_and_later_sweeps_run(sweep):
+    pytest.importorskip("distributed", reason="the extra 'cluster' is not installed")
+    with pytest.raises(harness.HarnessError, match=r"^no scheduler found at x: missing port number"):
+        sweep("smd", {"m": [1.0]}, scheduler="x")
+    assert sweep("smd", {"m": [1.0]}, stop=0.1)["error"].item() == ""

@@ -55,7 +55,8 @@ def connect_cluster(address: str, unload: Callable[[], None]) -> Iterator[DaskCl
     for name in ("distributed", "distributed.client"):  # do not log lost workers
         logging.getLogger(name).setLevel(logging.ERROR)
     try:
-        client = Client(address, timeout=10)
+        # not as the default, which xarray uses to write a file, even after it failed to connect
+        client = Client(address, timeout=10, set_as_default=False)
     except (OSError, ValueError) as error:
         raise HarnessError(f"no scheduler found at {address}: {first_line(error)}") from None
     with client:

@@ -41,6 +41,11 @@ class FailureGroup:
     sentence: str
     where: dict[str, float]
 
+    def __str__(self) -> str:
+        """Return the number of runs, a point and its error message."""
+        point = ", ".join(f"{name} = {value!r}" for name, value in self.where.items())
+        return f"{self.runs} run{'s' * (self.runs > 1)}, such as {point}: {self.sentence}"
+
 
 @dataclass(repr=False, eq=False)
 class SweepResult(Result):
@@ -162,8 +167,7 @@ class SweepResult(Result):
         if self.failures and self.folder:
             yield f"{self.failed} of {self.runs} runs failed; see the error column of {self.folder / TABLE_FILE}"
         for failure in self.failures[:MAX_FAILURE_KINDS]:
-            point = ", ".join(f"{name} = {value!r}" for name, value in failure.where.items())
-            yield f"{failure.runs} run{'s' * (failure.runs > 1)}, such as {point}: {failure.sentence}"
+            yield str(failure)
         if len(self.failures) > MAX_FAILURE_KINDS:
             yield f"and {len(self.failures) - MAX_FAILURE_KINDS} other kinds of failures"
 

@@ -56,18 +56,12 @@ class SweepDescription:
         Unit and description of each varied parameter.
     columns : tuple of MeasureColumn
         Measured columns.
-    constants : dict
-        Value and unit of the other parameters.
-    stop : float
-        Stop time in s.
     tables : tuple of LookupTable
         Lookup tables with varied values; the others are those of the runs.
     """
 
     varied: dict[str, tuple[str, str]]
     columns: tuple[MeasureColumn, ...]
-    constants: dict[str, tuple[object, str]]
-    stop: float
     tables: tuple[LookupTable, ...] = ()
 
     @property
@@ -105,19 +99,24 @@ def run_sweep(
     with checkpoint.open(), replace_folder(folder, STUDY.files, source) as new_folder:
         n_resumed = checkpoint.n_done
         seconds = run_pending(sweep, checkpoint, scheduler, workers, report)
+        failures = group_failures(sweep, checkpoint.messages)
+        if len(checkpoint.messages) == len(points):
+            checkpoint.clear()  # all runs are repeated
+            raise HarnessError(f"all runs of the sweep failed: {failures[0]}")
+        constants, stop = read_constants(sweep, checkpoint.messages)
         result = SweepResult(
             folder.name,
             len(points),
             new_folder,
             n_resumed,
             checkpoint.damaged,
-            group_failures(sweep, checkpoint.messages),
+            failures,
             seconds,
             ", ".join(about.headings),
         )
-        result.dataset = build_dataset(sweep, checkpoint, about)
+        result.dataset = build_dataset(sweep, checkpoint, about, constants, stop)
         result.write(new_folder)
-        write_provenance(new_folder, [file], about.constants, options, source=source)
+        write_provenance(new_folder, [file], constants, options, source=source)
         write_summary(new_folder, result.summary())
     checkpoint.delete()
     result.folder = folder
@@ -125,10 +124,7 @@ def run_sweep(
 
 
 def describe(runs: SweepSpec, points: SweepPoints) -> SweepDescription:
-    """Return the data of the FMU for a sweep; SceneError if the sweep is invalid.
-
-    Up to three test runs detect problems before workers are started.
-    """
+    """Return the data of the FMU for a sweep; SceneError if the sweep is invalid."""
     fmu_description = read_description(runs.run.fmu, runs.run.lenient)
     variables = {variable.name: variable for variable in fmu_description.modelVariables}
     settable = [name for name, variable in variables.items() if is_settable(variable)]
@@ -139,20 +135,23 @@ def describe(runs: SweepSpec, points: SweepPoints) -> SweepDescription:
         if variables[axis.name].type not in REAL_TYPES and any(value % 1 for value in axis.values):
             raise SceneError(f"{axis.name} is an enumeration; vary it over integers or labels, as in {axis.name}=1,2")
     with open_runner(runs) as runner:
-        for number in (len(points) - 1, len(points) // 2, 0):
-            (point,) = points.coordinates(number, number + 1).tolist()
-            measures = runner.run(point)
-            if not isinstance(measures, str):
-                break
-        else:
-            raise HarnessError(f"three test runs of the sweep failed: {measures}")
-        constants = {name: value for name, value in runner.constants().items() if name not in runs.varied}
-        texts = {
-            name: f"{variables[name].description or name}{describe_labels(variables[name])}" for name in runs.varied
-        }
-        varied = {name: (variable_unit(variables[name]), text) for name, text in texts.items()}
-        tables = read_tables_with(runs.run.fmu, runs.varied, runs.run.values)
-        return SweepDescription(varied, runner.columns, constants, runner.stop, tables)
+        columns = runner.columns
+    texts = {name: f"{variables[name].description or name}{describe_labels(variables[name])}" for name in runs.varied}
+    varied = {name: (variable_unit(variables[name]), text) for name, text in texts.items()}
+    return SweepDescription(varied, columns, read_tables_with(runs.run.fmu, runs.varied, runs.run.values))
+
+
+def read_constants(sweep: Sweep, messages: dict[int, str]) -> tuple[dict[str, tuple[object, str]], float]:
+    """Return values and units of the parameters that are not varied, and the stop time in s, from a run without error.
+
+    This run is repeated, because a worker returns measures only.
+    """
+    number = next(run for run in range(len(sweep.points)) if run not in messages)
+    (point,) = sweep.points.coordinates(number, number + 1).tolist()
+    with open_runner(sweep.runs) as runner:
+        runner.run(point)
+        constants = {name: value for name, value in runner.constants().items() if name not in sweep.runs.varied}
+        return constants, runner.stop
 
 
 def is_settable(variable: Any) -> bool:
@@ -160,7 +159,13 @@ def is_settable(variable: Any) -> bool:
     return variable.causality in ("parameter", "input") and variable.type not in NOT_NUMBERS and not variable.dimensions
 
 
-def build_dataset(sweep: Sweep, checkpoint: Checkpoint, about: SweepDescription) -> "xarray.Dataset":
+def build_dataset(
+    sweep: Sweep,
+    checkpoint: Checkpoint,
+    about: SweepDescription,
+    constants: dict[str, tuple[object, str]],
+    stop: float,
+) -> "xarray.Dataset":
     """Return the values and error messages of all runs."""
     library = import_optional("xarray", "a sweep", "sweep")
     points, names = sweep.points, sweep.runs.varied
@@ -184,8 +189,8 @@ def build_dataset(sweep: Sweep, checkpoint: Checkpoint, about: SweepDescription)
         "title": f"{sweep.runs.run.model} over {', '.join(names)}",
         "model": sweep.runs.run.model,
         "fmu_sha256": sweep.digest,
-        "stop_time": about.stop,
-        "parameters": json.dumps({name: value for name, (value, _) in about.constants.items()}, sort_keys=True),
+        "stop_time": stop,
+        "parameters": json.dumps({name: value for name, (value, _) in constants.items()}, sort_keys=True),
         "sample": "grid" if is_grid else f"Latin hypercube, seed {points.seed}",
     }
     if about.tables:
