@@ -4,9 +4,7 @@
     binaries/<platform>/<name>.{so,dll}     native layer of pythonfmu
     resources/slavemodule.txt               names the entry script
     resources/<entry>.py                    imports the class (see runtime/pythonfmu_workarounds.py)
-    resources/tables.json                   points of lookup tables, if the model has any
-    resources/contacts.json                 names of contacts and modes, if the model has any
-    resources/input_rates.json              inputs in the rates of inputs, if the model has any
+    resources/model_data.json               what the model description cannot state (model_data.py)
     resources/<package>/                    the model and the modules it needs (embedded_modules.py)
     documentation/                          page, licences, requirements on the host
     model.png                               icon

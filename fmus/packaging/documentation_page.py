@@ -1,6 +1,5 @@
-"""Writes the files for users in FMUs of all kinds: documentation page, icon, certified result."""
+"""Writes the files that FMUs of all kinds have: documentation page, icon, certified result, data for the harness."""
 
-import json
 import re
 from collections.abc import Sequence
 from html import escape
@@ -13,14 +12,12 @@ from . import __version__
 from .certified_result import RESULT_FOLDER, CertifiedResult, find_certified_result, result_files
 from .equations.model_analysis import ModelAnalysis
 from .equations.tables import PCHIP, Table
-from .fmi_variables import Variables, fixed_choices, integrated_states, mode_names
+from .fmi_variables import Variables, fixed_choices, integrated_states
+from .model_data import MODEL_DATA_FILE, model_data
 from .svg_chart import draw_chart
 from .units import unit_of
 
 GREEK = {"theta": "theta", "omega": "omega", "alpha": "alpha", "mu": "mu", "eps": "epsilon", "phi": "phi", "pi": "pi"}
-TABLES_FILE = "resources/tables.json"  # points of the tables, which harness/running/fmu_tables.py reads
-CONTACTS_FILE = "resources/contacts.json"  # harness/running/fmu_contacts.py reads it
-INPUT_RATES_FILE = "resources/input_rates.json"  # harness/running/input_rates.py reads it
 CURVE_POINTS = 200  # of a table that is not linear
 STYLE = Path(__file__).with_name("documentation_page.css")
 USAGE = """\
@@ -201,22 +198,15 @@ def extra_files(
 ) -> dict[str, bytes]:
     """Return the content of these files by path in the FMU.
 
-    The names of contacts and modes are in resources/contacts.json, the inputs on which the rates of inputs depend in
-    resources/input_rates.json.  Icon (.png) and certified result (.csv) are optional and stand next to the model file
+    Icon (.png) and certified result (.csv) are optional and stand next to the model file
     at `path`, under the same name.  `icon` is the path of the icon in the FMU; `use` is a paragraph of the page on how
     to run the FMU.
     """
-    tables, rates = analysis.tables, analysis.rate_inputs
     name, picture = path.stem, path.with_suffix(".png")
     certified = find_certified_result(path, model, declared)
     icon_path = icon if picture.is_file() else ""
-    entries = {"documentation/index.html": documentation_page(model, name, declared, certified, tables, icon_path, use)}
-    if tables:
-        entries[TABLES_FILE] = (json.dumps([table.as_json() for table in tables], indent=1) + "\n").encode()
-    if contacts := mode_names(model, declared):
-        entries[CONTACTS_FILE] = (json.dumps(contacts, indent=1) + "\n").encode()
-    if rates:
-        entries[INPUT_RATES_FILE] = (json.dumps(rates, indent=1) + "\n").encode()
+    page = documentation_page(model, name, declared, certified, analysis.tables, icon_path, use)
+    entries = {"documentation/index.html": page, MODEL_DATA_FILE: model_data(model, declared, analysis)}
     if certified is not None:
         entries |= result_files(name, certified, declared)
     if picture.is_file():

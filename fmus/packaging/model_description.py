@@ -24,7 +24,6 @@ from .fmi_variables import (
     declared_variables,
     derivative_indices,
     event_indicator_indices,
-    fixed_choices,
     has_step_events,
 )
 from .text_output import xml_bytes
@@ -49,7 +48,6 @@ REAL_ONLY_HINT = (  # in the description of every other FMU
     "For hosts that read or set every variable as a Real, build it with --real-only; for hosts without Python, with "
     "--native."
 )
-ANNOTATION = "friction-fmus"  # which the harness reads
 EXPERIMENT_ATTRIBUTES = {"stopTime": "stop_time", "tolerance": "tolerance", "stepSize": "step_size"}
 LOG_CATEGORIES = {
     "logStatusWarning": "Messages with status {fmi}Warning.",
@@ -88,7 +86,6 @@ def describe(model: Any, name: str, code: str, date: datetime, nominals: Sequenc
     add_units(root, declared)
     _add_types(root, declared)
     add_log_categories_and_experiment(root, model, "fmi2")
-    add_annotation(root, model, declared, "VendorAnnotations", "Tool", "name")
     scalars = SubElement(root, "ModelVariables")
     positions = {variable: str(number) for number, (variable, _) in enumerate(declared, 1)}
     for reference, (variable, meaning) in enumerate(declared):
@@ -110,30 +107,6 @@ def create_root(model: Any, name: str, version: str, key: str) -> Element:
     root.attrib |= {"author": "friction-fmus", "version": __version__, "license": "MIT"}
     root.attrib |= {"generationTool": f"friction-fmus {__version__}", "variableNamingConvention": "structured"}
     return root
-
-
-def add_annotation(root: Element, model: Any, declared: Variables, group: str, element: str, key: str) -> None:
-    """Add an annotation with what FMI has no attributes for, if there is any.
-
-    It has the method, law or other enumeration that the build fixed, and that is no variable; and the bounds that are
-    exclusive. `group` and `element` are the elements of annotations, and `key` is the attribute with the name of the
-    tool.
-    """
-    fixed = fixed_choices(model)
-    bounds = [
-        (exported_name(name, meaning), attribute)
-        for name, meaning in declared
-        for attribute, is_open in (("min", meaning.above >= meaning.low), ("max", meaning.below <= meaning.high))
-        if is_open and attribute in type_attributes(name, meaning)
-    ]
-    if not fixed and not bounds:
-        return
-    annotation = SubElement(SubElement(SubElement(root, group), element, {key: ANNOTATION}), "Declarations")
-    for name, meaning in fixed:
-        for label, value, _ in meaning.items:
-            SubElement(annotation, "FixedChoice", name=name, label=label, value=str(value))
-    for name, attribute in bounds:
-        SubElement(annotation, "ExclusiveBound", name=name, attribute=attribute)
 
 
 def serialize(root: Element, key: str, code: str, date: datetime) -> bytes:

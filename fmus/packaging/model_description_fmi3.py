@@ -78,7 +78,6 @@ def describe(
             SubElement(element, "Alias", name=meaning.alias, description=meaning.text)
     shared.mark_states(elements, model, rates, nominals, first=0)
     _add_structure(root, model, declared, rates)
-    shared.add_annotation(root, model, declared, "Annotations", "Annotation", "type")
     return shared.serialize(root, "instantiationToken", code, date)
 
 

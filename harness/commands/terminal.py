@@ -217,7 +217,8 @@ def refuse_ignored_options(
     timeout_is_ignored : bool
         Whether the command limits no time of FMUs of this project.
     """
-    from ..running.fmu_archive import exposes_solver_steps, read_description, read_fixed_choices
+    from ..running.fmu_archive import exposes_solver_steps, read_description
+    from ..running.model_data import read_model_data
 
     files, uses_exchange = list(fmus), context.params["exchange"] or context.params["interface"] == MODEL_EXCHANGE
     if not files:
@@ -228,7 +229,7 @@ def refuse_ignored_options(
         if all(map(exposes_solver_steps, descriptions)):
             reason = f"on {files[0].name}, which runs at the steps of its own solver"
             refuse_options(context, reason, *["timeout"] * timeout_is_ignored)
-            methods = [read_fixed_choices(file).get("solver.method", ("", 0))[0] for file in files]
+            methods = [read_model_data(file).fixed_choices.get("solver.method", ("", 0))[0] for file in files]
             assignments = context.params.get("values", ())
             if all(uses_closed_form(*pair, assignments) for pair in zip(descriptions, methods, strict=True)):
                 remedy = "" if all(methods) else ": set solver.method as well"

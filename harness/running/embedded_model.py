@@ -16,7 +16,8 @@ from ..errors import HarnessError
 from ..process.subprocess_runner import run_module
 from ..process.temporary_directory import temporary_directory
 from ..scenes.fmu_files import check_built
-from .fmu_archive import REQUIRED_VARIABLES, SCRIPT_NAME_FILE, cached_by_mtime, read_description, unpack
+from .fmu_archive import REQUIRED_VARIABLES, SCRIPT_NAME_FILE, read_description, unpack
+from .mtime_cache import cached_by_mtime
 from .solution import Solution
 
 OK = 0  # status of the solver

@@ -6,16 +6,14 @@ lack required files are refused.
 """
 
 import atexit
-import json
-from collections.abc import Callable, Hashable, Iterator
+from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
-from functools import cache, wraps
 from inspect import signature
 from pathlib import Path
 from shutil import disk_usage
-from typing import Any, TypeVar
+from typing import Any
 from xml.etree import ElementTree
-from zipfile import BadZipFile, ZipFile
+from zipfile import ZipFile
 
 import fmpy
 from fmpy.model_description import SimpleType, ValidationError
@@ -26,9 +24,9 @@ from ..process.temporary_directory import has_plain_uri, temporary_directory
 from ..scenes.fmu_files import check_built
 from ..scenes.run_spec import RunSpec
 from .array_elements import is_own, split_own_arrays
+from .model_data import read_model_data
+from .mtime_cache import cached_by_mtime
 from .variable_values import ExclusiveBound, effective_value, variable_unit
-
-Result = TypeVar("Result")
 
 DESCRIPTION_FILE = "modelDescription.xml"
 MAX_LISTED_FAULTS = 50  # violations listed in a message
@@ -49,20 +47,6 @@ SET_CAUSALITIES = ("parameter", "structuralParameter", "input")
 FMI2_TYPES = ("Real", "Integer", "Boolean", "String", "Enumeration")
 PROCESS_RESOURCES = ExitStack()  # directories that exist until the process ends
 atexit.register(PROCESS_RESOURCES.close)
-
-
-def cached_by_mtime(make: Callable[..., Result]) -> Callable[..., Result]:
-    """Decorate make(fmu, ...) with a cache keyed by path, modification time and arguments. The file must exist."""
-
-    @cache
-    def cached(fmu: Path, mtime: int, *arguments: Hashable) -> Result:
-        return make(fmu, *arguments)
-
-    @wraps(make)
-    def lookup(fmu: Path, *arguments: Hashable) -> Result:
-        return cached(fmu.absolute(), fmu.stat().st_mtime_ns, *arguments)
-
-    return lookup
 
 
 def read_description(path: Path, lenient: bool = False) -> Any:
@@ -107,6 +91,8 @@ def validate_description(path: Path, lenient: bool) -> Any:
     except (AttributeError, IndexError, TypeError) as error:  # fmpy reads elements and attributes that are missing
         problem = f"its modelDescription.xml lacks a required element or the FMI version ({first_line(error)})"
         raise HarnessError(f"{path.name} cannot be read: {problem}") from None
+    except HarnessError:
+        raise
     except Exception as error:  # fmpy raises bare Exceptions, and those of zip and XML readers
         raise HarnessError(
             f"{path.name} cannot be read: {first_line(error)}; export it again, or specify another file"
@@ -116,46 +102,13 @@ def validate_description(path: Path, lenient: bool) -> Any:
     return description
 
 
-def read_json_resource(fmu: Path, name: str, parse: Callable[[Any], Result]) -> Result | None:
-    """Return the parsed content of a JSON file of an FMU, or None for an FMU without it.
-
-    Raises
-    ------
-    HarnessError
-        If the file is damaged.
-    """
-    try:
-        with ZipFile(fmu) as archive:
-            return parse(json.loads(archive.read(name))) if name in archive.namelist() else None
-    except (OSError, BadZipFile, ValueError, TypeError, KeyError, AttributeError) as error:
-        raise HarnessError(f"{name} of {fmu.name} cannot be read: {first_line(error)}") from None
-
-
-@cached_by_mtime
-def read_fixed_choices(path: Path) -> dict[str, tuple[str, int]]:
-    """Return label and number of the method and law that an FMU of this project has no variable for, by name.
-
-    The build fixed them, by `--method`, `--law` or `--real-only`, and states them in an annotation.
-    """
-    return {
-        choice.attrib["name"]: (choice.attrib["label"], int(choice.attrib["value"]))
-        for choice in read_root(path).iter("FixedChoice")
-    }
-
-
 def mark_exclusive_bounds(description: Any, path: Path) -> None:
-    """Mark those of the attributes `min` and `max` that the annotation of an FMU of this project excludes."""
-    variables = {variable.name: variable for variable in description.modelVariables}
-    for bound in read_root(path).iter("ExclusiveBound"):
-        variable, attribute = variables[bound.attrib["name"]], bound.attrib["attribute"]
-        if (value := getattr(variable, attribute)) is not None:
-            setattr(variable, attribute, ExclusiveBound(value))
-
-
-def read_root(path: Path) -> ElementTree.Element:
-    """Return the root element of the model description of an FMU."""
-    with ZipFile(path) as archive, archive.open(DESCRIPTION_FILE) as file:
-        return ElementTree.parse(file).getroot()
+    """Mark those of the attributes `min` and `max` that an FMU of this project excludes."""
+    exclusive_bounds = read_model_data(path).exclusive_bounds
+    for variable in description.modelVariables:
+        for attribute in exclusive_bounds.get(variable.name, ()):
+            if (value := getattr(variable, attribute)) is not None:
+                setattr(variable, attribute, ExclusiveBound(value))
 
 
 def read_leniently(path: Path) -> Any:

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..scenes.fmu_files import find_fmu
-from .fmu_archive import read_fixed_choices
 from .fmu_variables import METHOD
+from .model_data import read_model_data
 from .runner import read_own_description
 from .variable_values import enumeration_labels
 
@@ -41,7 +41,7 @@ def read_info(model: str) -> FmuInfo:
         variable.name: int(variable.start) if variable.name in choices else float(variable.start)
         for variable in settable
     }
-    fixed = read_fixed_choices(fmu)
+    fixed = read_model_data(fmu).fixed_choices
     choices |= {name: {label: number} for name, (label, number) in fixed.items()}
     methods = {number: label for label, number in choices[METHOD].items()}
     default = methods[fixed[METHOD][1] if METHOD in fixed else int(defaults[METHOD])]

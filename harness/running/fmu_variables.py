@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 from ..arguments import CO_SIMULATION, MODEL_EXCHANGE
 from ..errors import import_optional
-from .fmu_archive import read_description, read_fixed_choices
-from .fmu_tables import LookupTable, read_tables
+from .fmu_archive import read_description
+from .model_data import LookupTable, read_model_data
 from .variable_values import ExclusiveBound, effective_value, enumeration_labels, find_bound, variable_unit
 
 if TYPE_CHECKING:
@@ -215,7 +215,7 @@ def describe_fmu(path: Path) -> FmuDescription:
     HarnessError
         If the file does not exist or cannot be read.
     """
-    content = read_description(path, lenient=True)
+    content, data = read_description(path, lenient=True), read_model_data(path)
     experiment = content.defaultExperiment
     offered = ((CO_SIMULATION, content.coSimulation), (MODEL_EXCHANGE, content.modelExchange))
     return FmuDescription(
@@ -227,8 +227,8 @@ def describe_fmu(path: Path) -> FmuDescription:
         stop=read_number(experiment, "stopTime"),
         tolerance=read_number(experiment, "tolerance"),
         variables=tuple(map(describe_variable, content.modelVariables)),
-        fixed={name: label for name, (label, _) in read_fixed_choices(path).items()},
-        tables=read_tables(path),
+        fixed={name: label for name, (label, _) in data.fixed_choices.items()},
+        tables=data.tables,
     )
 
 

@@ -10,7 +10,8 @@ from ..process.subprocess_runner import SubprocessTimeoutError, run_module
 from ..process.temporary_directory import temporary_directory
 from ..scenes.fmu_files import FOLDERS
 from ..scenes.run_spec import RunSpec
-from .fmu_archive import PROCESS_RESOURCES, cached_by_mtime, default_stop, is_python_fmu, read_description, unpack_once
+from .fmu_archive import PROCESS_RESOURCES, default_stop, is_python_fmu, read_description, unpack_once
+from .mtime_cache import cached_by_mtime
 from .whole_run import open_simulator, real_variables
 
 BUILD_TIMEOUT = 300.0  # s

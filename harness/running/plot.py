@@ -7,7 +7,7 @@ import numpy as np
 
 from ..results.files import column_heading
 from .fmu_archive import read_description
-from .fmu_tables import LookupTable
+from .model_data import LookupTable
 from .variable_values import variable_unit
 
 PANEL = (7.0, 1.7)  # inches, width and height

@@ -19,9 +19,9 @@ from ..errors import HarnessError, SceneError, check_names, format_value
 from ..process.interrupt import check_interrupt
 from ..scenes.run_spec import RunSpec
 from ..scenes.scene import SHORT_KEYS
-from .fmu_archive import read_fixed_choices, resolve_time_span
-from .fmu_contacts import read_contacts
+from .fmu_archive import resolve_time_span
 from .fmu_instance import CALL_FAILURES, FmuInstance, call_all
+from .model_data import read_model_data
 from .recorder import Columns, Recorder, ShapedVariable, c_type, read_rows
 from .signals import ModeChanges
 from .stepping import CoSimulation, TimeGrid, check_inputs, check_rates, input_signals, make_grid, step_to_stop
@@ -157,7 +157,7 @@ class Session:
         """Return the variables to record: the outputs, and those that expose internal steps and events."""
         names = list(self.spec.outputs)
         if self.spec.follow:
-            extra = (*FOLLOWED, *read_contacts(self.spec.fmu).values())
+            extra = (*FOLLOWED, *read_model_data(self.spec.fmu).contacts.values())
             names += [name for name in extra if name in self.variables and name not in names]
         return self.select(names)
 
@@ -240,7 +240,7 @@ class Session:
             ends = find_step_ends(time, samples["solver.t_next"], self.grid.tolerance)
             steps = SolverSteps(time[ends], np.diff(time[ends]), np.diff(samples["solver.rejected"][ends]))
         effective = self.read_parameters()
-        contacts = read_contacts(spec.fmu)
+        contacts = read_model_data(spec.fmu).contacts
         if spec.follow and contacts and effective.get("friction") == "hybrid":
             at = np.flatnonzero(np.diff(samples["events.count"])) + 1
             rows = np.append(0, at)
@@ -260,7 +260,9 @@ class Session:
 
     def read_parameters(self) -> dict[str, float | str]:
         """Return the value of every parameter: reals in SI units, enumerations by label, also those that are fixed."""
-        fixed: dict[str, float | str] = {name: label for name, (label, _) in read_fixed_choices(self.spec.fmu).items()}
+        fixed: dict[str, float | str] = {
+            name: label for name, (label, _) in read_model_data(self.spec.fmu).fixed_choices.items()
+        }
         get = self.instance.get
         return fixed | {
             name: enumeration_labels(variable)[get(name)] if variable.type == "Enumeration" else get(name)
@@ -285,7 +287,7 @@ def plan_grid(spec: RunSpec, instance: FmuInstance) -> TimeGrid:
 def resolve_settings(run: RunSpec, variables: dict[str, Any]) -> list[tuple[Any, float | int]]:
     """Return variables and values to set before the run, checked against their declared ranges."""
     settable = [name for name, variable in variables.items() if variable.causality in ("parameter", "input")]
-    fixed = read_fixed_choices(run.fmu)
+    fixed = read_model_data(run.fmu).fixed_choices
     for name in run.values.keys() & fixed.keys():
         if run.values[name] not in fixed[name]:
             setting = f"{name} = {format_value(run.values[name])}"

@@ -18,7 +18,7 @@ import numpy as np
 from ..errors import HarnessError, SceneError, check_names, format_value
 from ..scenes.run_spec import RunSpec
 from .fmu_instance import FmuInstance, TerminatedError
-from .input_rates import read_rate_inputs
+from .model_data import read_model_data
 from .variable_values import REAL_TYPES
 
 Inputs = Mapping[str, Sequence[float] | np.ndarray]  # "time" in s, and the values of each input at these times
@@ -256,7 +256,7 @@ def check_rates(fmu: Path, inputs: Inputs, values: Mapping[str, Any]) -> None:
         If a rate is missing.
     """
     time = np.asarray(inputs.get(TIME, ()), dtype=float)
-    for name, rate_inputs in read_rate_inputs(fmu).items() if inputs else ():
+    for name, rate_inputs in read_model_data(fmu).rate_inputs.items() if inputs else ():
         missing = [rate for rate in rate_inputs if rate not in inputs and rate not in values]
         if name in inputs and missing and (np.diff(inputs[name])[np.diff(time) > 0] != 0).any():
             raise SceneError(
@@ -317,7 +317,7 @@ def interpolate(time: np.ndarray, column: np.ndarray, points: np.ndarray, side: 
 def input_signals(spec: RunSpec, instance: FmuInstance) -> "InputSignals | None":
     """Return what sets the inputs of an instance, None without input signals."""
     has_signals = any(name != TIME for name in spec.inputs)
-    return InputSignals(spec.inputs, instance, read_rate_inputs(spec.fmu)) if has_signals else None
+    return InputSignals(spec.inputs, instance, read_model_data(spec.fmu).rate_inputs) if has_signals else None
 
 
 class InputSignals:

@@ -34,7 +34,7 @@ from .fmu_archive import (
     unpack_once,
 )
 from .fmu_instance import CALL_FAILURES, FmuInstance, capture_stderr
-from .input_rates import read_rate_inputs
+from .model_data import read_model_data
 from .stepping import TIME, check_rates, make_grid, ramps_of_steps, values_of_steps
 from .variable_values import REAL_TYPES, effective_value, find_bound, variable_unit
 
@@ -124,7 +124,7 @@ class CompiledLoop:
             self.u, self.slopes = ramps_of_steps(spec.inputs, self.t)
         else:
             check_rates(simulator.spec.fmu, spec.inputs, spec.values)
-            self.u = values_of_steps(spec.inputs, self.t, read_rate_inputs(simulator.spec.fmu))
+            self.u = values_of_steps(spec.inputs, self.t, read_model_data(simulator.spec.fmu).rate_inputs)
         self.y = np.empty((np.count_nonzero(self.is_recorded), len(spec.outputs)))
         self.outputs, self.inputs = spec.outputs, tuple(name for name in spec.inputs if name != TIME)
         self.names: tuple[str, ...] | None = None

@@ -83,3 +83,15 @@ def test_what_is_no_model_and_no_fmu_is_refused_in_one_sentence(tmp_path):
         assert done.returncode in (1, 2)
         assert words in done.stderr
         assert done.stderr.count("\n") == 1
+
+
+@pytest.mark.parametrize("content", [b"", b"{", b"[]", b"{}", b'{"tables": 1}', b"\xff"])
+def test_damaged_model_data_of_an_fmu_end_in_one_sentence(fmus, tmp_path, content):
+    copy = external_fmus.edited_copy(
+        fmus / "coulomb.fmu", tmp_path / "coulomb.fmu", {"resources/model_data.json": content}
+    )
+    for use in (harness.describe, harness.simulate):
+        with pytest.raises(
+            harness.HarnessError, match=r"^coulomb.fmu cannot be read: its resources/model_data.json is damaged; "
+        ):
+            use(copy)

@@ -130,7 +130,7 @@ def test_the_archive_contents_are_complete(smd):
     sources.add("sources/buildDescription.xml")
     files = read_archive(fmu)
     documentation = {path for path in files if path.split("/")[0] in ("documentation", "extra", "model.png")}
-    assert set(files) - documentation == binaries | sources | {"modelDescription.xml"}
+    assert set(files) - documentation == binaries | sources | {"modelDescription.xml", "resources/model_data.json"}
     assert "documentation/licenses/license.txt" in documentation
     digest = sha256(fmu.read_bytes()).hexdigest()
     assert printed == f"smd.fmu  {len(fmu.read_bytes()) / 1000:4.0f} kB  {digest[:16]}\n"

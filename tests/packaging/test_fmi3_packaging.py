@@ -243,7 +243,7 @@ def test_the_files_are_those_of_fmi3(fmu, name):
         "terminalsAndIcons/icon.png",
         "terminalsAndIcons/terminalsAndIcons.xml",
         f"binaries/x86_64-linux/{name}.so",
-        *(["resources/contacts.json"] if model_class(name).contacts else []),
+        "resources/model_data.json",
         *(f"sources/{file}" for file in (*headers, "buildDescription.xml")),
         *(f"extra/org.fmi-standard.fmi-ls-ref/{file}" for file in certified),
     }

@@ -3,9 +3,7 @@
 modelDescription.xml
 binaries/<platform>/<name>.{so,dll,dylib}
 sources/                                  the C sources, for any other platform
-resources/tables.json                     points of lookup tables, if the model has any
-resources/contacts.json                   names of contacts and modes, if the model has any
-resources/input_rates.json                inputs in the rates of inputs, if the model has any
+resources/model_data.json                 what the model description cannot state (model_data.py)
 documentation/, extra/                    documentation, licence and certified result
 model.png                                 the icon; in FMI 3.0 terminalsAndIcons/, with the terminal
 """

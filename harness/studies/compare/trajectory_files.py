@@ -20,7 +20,7 @@ from ...records.units import TIMES
 from ...results.loading import load_summary
 from ...results.provenance import load_provenance
 from ...running.fmu_archive import read_description
-from ...running.fmu_contacts import read_contacts
+from ...running.model_data import read_model_data
 from ...running.recorder import element_names
 from ...running.signals import ModeChanges, Signals
 from ...running.trajectory import SolverSteps, Trajectory
@@ -204,7 +204,7 @@ def read_run(folder: Path) -> Trajectory:
         with suppress(HarnessError):
             variables = {item.name: item for item in read_description(spec.fmu, lenient=True).modelVariables}
             names |= {name: variables[name].description or name for name in names if name in variables}
-            contacts = read_contacts(spec.fmu)
+            contacts = read_model_data(spec.fmu).contacts
             if events and len(events.modes) == len(contacts):
                 modes = events.modes if len(contacts) > 1 else dict.fromkeys(contacts, events.mode)
                 events = ModeChanges(events.t, modes, contacts)

@@ -12,7 +12,7 @@ from ...analyses.estimation.figure import plot_legend, plot_record, plot_residua
 from ...analyses.fit.parameter_fit import FittedRecord, ParameterFit, Profile
 from ...results.quantity import display_unit
 from ...results.style import GREEN, GREY, HEIGHT, ORANGE, WIDTH, Axes, Figure, axis_label, set_size
-from ...running.fmu_tables import LookupTable
+from ...running.model_data import LookupTable
 from ...running.plot import draw_table
 
 MAX_COLUMNS, MAX_PROFILES = 6, 12  # drawn at most

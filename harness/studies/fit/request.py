@@ -14,7 +14,7 @@ from ...records.extraction import Samples
 from ...records.motion import MIN_SAMPLES
 from ...records.record import SignalSource
 from ...running.fmu_archive import default_stop, read_description
-from ...running.fmu_tables import read_tables
+from ...running.model_data import read_model_data
 from ...running.variable_values import convert_value, enumeration_labels
 from ...running.whole_run import RealVariable, real_variables
 from ...scenes.run_spec import RunSpec
@@ -263,7 +263,7 @@ def table_size(name: str, request: FitRequest) -> float:
 
     It is the scale that all values of a table share, so that one of them may start at zero and change its sign.
     """
-    tables = [table for table in read_tables(request.run.fmu) if name in table.parameters]
+    tables = [table for table in read_model_data(request.run.fmu).tables if name in table.parameters]
     return max((abs(y) for table in tables for y in table.y_with({**request.run.values, **request.start})), default=0.0)
 
 

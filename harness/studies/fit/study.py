@@ -21,7 +21,7 @@ from ...results import provenance
 from ...results.folder import replace_folder
 from ...results.registry import find_study
 from ...results.summary import write_summary
-from ...running.fmu_tables import read_tables_with
+from ...running.model_data import read_tables_with
 from ...running.native_equivalent import native_equivalent
 from ...running.whole_run import open_simulator
 from .laws import ResolvedLaws, resolve_laws

@@ -29,7 +29,7 @@ from ...results.style import (
 )
 from ...results.summary import SKETCH_SIZE, Sketch
 from ...running.fmu_archive import exposes_solver_steps, read_description
-from ...running.fmu_tables import LookupTable, read_tables
+from ...running.model_data import LookupTable, read_model_data
 from ...running.plot import draw_sticking, draw_table
 from ...running.runner import run_own_fmu
 from ...running.trajectory import Trajectory
@@ -93,7 +93,7 @@ def draw(
     columns: list[list[Any]] = [*arrange_columns([panel for name in plots for panel in expand_plot(name, run)], run)]
     if not columns:
         return
-    if tables := read_tables(run.spec.fmu):
+    if tables := read_model_data(run.spec.fmu).tables:
         right = columns.pop() if is_right(columns[-1][0], run) else []
         columns.append([*right, *tables])
     plotted = PlottedRun(refine(run), results, known)

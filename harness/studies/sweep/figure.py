@@ -15,7 +15,7 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 
 from ...results.style import BLUE, HEIGHT, WIDTH, Figure, axis_label, set_size
-from ...running.fmu_tables import LookupTable, parse_table
+from ...running.model_data import LookupTable, parse_table
 from ...running.plot import draw_table
 
 FAILED_COLOUR = "#bbbbbb"

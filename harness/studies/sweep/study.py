@@ -27,7 +27,7 @@ from ...results.folder import replace_folder
 from ...results.provenance import describe_sources, write_provenance
 from ...results.summary import write_summary
 from ...running.fmu_archive import read_description
-from ...running.fmu_tables import LookupTable, read_tables_with
+from ...running.model_data import LookupTable, read_tables_with
 from ...running.variable_values import REAL_TYPES, variable_unit
 from ...scenes.fmu_files import check_built
 from .checkpoint import Checkpoint
