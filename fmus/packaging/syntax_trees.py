@@ -6,6 +6,8 @@ from functools import lru_cache
 from operator import is_
 from typing import Any, TypeVar
 
+from . import BuildError
+
 Node = TypeVar("Node", bound=ast.AST)
 NON_NODE_FIELDS = {"ctx", "id", "attr", "arg", "name", "asname", "module", "level", "kind", "type_comment"}
 NODE_TYPES = [
@@ -15,6 +17,17 @@ STATEMENT_FIELDS = ("body", "handlers", "orelse", "finalbody")
 CHILD_FIELDS = {kind: [name for name in kind._fields if name not in NON_NODE_FIELDS] for kind in NODE_TYPES} | {
     ast.Constant: []
 }
+
+
+class TranslationError(BuildError):
+    """Source of the numerics that cannot be lowered to scalars or translated to C, with its file and line."""
+
+    def __init__(self, location: str, node: ast.AST) -> None:
+        text = ast.unparse(node).partition("\n")[0]
+        super().__init__(
+            f"{location}: '{text}' cannot be translated; fmus/packaging/lowering/__init__.py and "
+            "fmus/packaging/native/__init__.py describe what can."
+        )
 
 
 @lru_cache(200)

@@ -1,7 +1,6 @@
 """The lowered numerics: the same bits as the vector sources on arrays, removed code, and unsupported constructs."""
 
 import ast
-import re
 import traceback
 from inspect import isfunction, signature
 from itertools import product
@@ -12,7 +11,7 @@ from internal_steps import array_steps, prepared_run, scalar_steps
 from models import CASES, LARGER_MODELS, MODELS, ROOT, label, model_class
 
 from fmus.packaging import BuildError
-from fmus.packaging.lowering import LoweringError, function_tree, lowered_files, lowered_model, select_features
+from fmus.packaging.lowering import function_tree, lowered_files, lowered_model, select_features
 from fmus.packaging.lowering.emit_source import FileLowerer
 from fmus.packaging.lowering.layout import ModelLayout, component_name
 from fmus.packaging.lowering.lowered_sources import lower_all
@@ -20,7 +19,7 @@ from fmus.packaging.lowering.scalarize import fold_zero
 from fmus.packaging.lowering.source_symbols import SourceSymbols
 from fmus.packaging.lowering.unused_code import remove_unused_code
 from fmus.packaging.model_lookup import find_model
-from fmus.packaging.syntax_trees import nested_statements
+from fmus.packaging.syntax_trees import TranslationError, nested_statements
 from fmus.runtime import stick_slip
 from fmus.runtime.vectors import ContactIndex, ContactVector, StateVector
 
@@ -109,22 +108,22 @@ HEAD = """class Some:
     def step(self, model, modes: ContactVector, t, y: StateVector, f: RateVector, h):
         """
 SPEC = ModelLayout({"x": "v", "v": "a"}, {"mode": "v"})
-BODIES = {
-    "z = y + h * f\n        f = model.rates(t, z, modes)": "evaluates f at other states than before",
-    "z = y + h * f\n        step.f1 = model.rates(t, z, modes)": "at other states than their class declares",
-    "slopes = model.rates(t, step.y1, modes)": "at states without a name",
-    "z = y + h * f\n        slopes = model.rates(t, z, modes)\n        z = y": "changes under slopes",
-    "y2 = y + h * model.rates(t, y, modes)": "assign it to a name on a separate line",
-    "e = magnitude(y + f)": "would evaluate its argument twice",
-    "e = y + f\n        e += y": "write c = c + ...",
-    "if y > 0.0:\n            t = 0.0": "is a vector where a scalar is required",
-    "j = 1\n        t = y[j]": "is an index that is not known at build time",
-    "e = y + modes": "loop over contact_indices",
-    "y = y + h * f": "changes under f",
-    "self.f2 = f": "declare it in its class",
-    "modes = contact_vector()": "write modes = 0 * modes",
-    "y2 = y + h * f\n        y2_end = t": "uses y2_end for a scalar",
-}
+BODIES = [  # of functions that mean something else component by component
+    "z = y + h * f\n        f = model.rates(t, z, modes)",
+    "z = y + h * f\n        step.f1 = model.rates(t, z, modes)",
+    "slopes = model.rates(t, step.y1, modes)",
+    "z = y + h * f\n        slopes = model.rates(t, z, modes)\n        z = y",
+    "y2 = y + h * model.rates(t, y, modes)",
+    "e = magnitude(y + f)",
+    "e = y + f\n        e += y",
+    "if y > 0.0:\n            t = 0.0",
+    "j = 1\n        t = y[j]",
+    "e = y + modes",
+    "y = y + h * f",
+    "self.f2 = f",
+    "modes = contact_vector()",
+    "y2 = y + h * f\n        y2_end = t",
+]
 
 
 def lower(text, spec):
@@ -134,11 +133,9 @@ def lower(text, spec):
 
 
 @pytest.mark.parametrize("body", BODIES)
-def test_an_unsupported_construct_is_refused_with_file_line_and_remedy(body):
-    text = HEAD + body + "\n"
-    with pytest.raises(LoweringError, match=re.escape(BODIES[body])) as caught:
-        lower(text, SPEC)
-    assert re.match(r"runtime/some\.py:[5678]: ", str(caught.value))
+def test_an_unsupported_construct_is_refused_with_file_and_line(body):
+    with pytest.raises(TranslationError, match=r"^runtime/some\.py:[5678]: '.*' cannot be translated"):
+        lower(HEAD + body + "\n", SPEC)
 
 
 @pytest.mark.parametrize(

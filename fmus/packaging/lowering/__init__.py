@@ -33,12 +33,10 @@ from .import_hook import (
     sibling_module,
 )
 from .layout import component_name
-from .scalarize import LoweringError
 
 __all__ = [
     "LAWS",
     "METHODS",
-    "LoweringError",
     "component_name",
     "function_tree",
     "lowered_files",

@@ -134,10 +134,8 @@ class FileLowerer:
             arguments = replace_fields(node.args, args=[ast.arg(name) for name in names])
             result = replace_fields(result, name=name, args=arguments, returns=None)
         marks = [mark for mark in node.decorator_list if getattr(mark, "id", "") != "elementwise"]
-        if name := self.scalarizer.find_name_clash():
-            raise self.scalarizer.error(
-                node, f"uses {name} for a scalar, but a component of a vector gets that name; take another"
-            )
+        if self.scalarizer.has_name_clash():
+            raise self.scalarizer.error(node)
         self.has_systems = self.has_systems or bool(self.scalarizer.systems)
         self.scalarizer = outer
         return replace_fields(result, decorator_list=marks)

@@ -3,8 +3,7 @@
 import ast
 from collections.abc import Sequence
 
-from .. import BuildError
-from ..syntax_trees import TreeTransformer, all_nodes, is_same_tree, replace_fields
+from ..syntax_trees import TranslationError, TreeTransformer, all_nodes, is_same_tree, replace_fields
 from .constant_folding import ConstantFolder
 from .elimination import LoweredSystem, tuple_or_single
 from .layout import CONDITIONS, STATES, ModelLayout
@@ -15,10 +14,6 @@ ALLOCATORS = ("state_vector", "contact_vector")
 LOOP_RANGES = ("state_indices", "velocity_indices", "contact_indices")  # iterables of loops
 METHOD_LOOP = "methods"  # iterable of (label, module, class)
 INDEX_LOOKUPS = {"slip_index": "slip", "position_index": "place"}
-
-
-class LoweringError(BuildError):
-    """Raised for source that cannot be lowered: line, problem, and what to write instead."""
 
 
 class Substitution(TreeTransformer):
@@ -49,9 +44,9 @@ class Scalarizer(ConstantFolder):
         self.jacobians: set[str] = set()  # names of Jacobians
         self.method_bindings: dict[str, ast.expr] = {}  # in a loop over methods: loop variable -> value
 
-    def error(self, node: ast.AST, reason: str) -> LoweringError:
-        """Return a LoweringError with location and source text."""
-        return LoweringError(f"{self.path}:{getattr(node, 'lineno', '?')}: '{ast.unparse(node)[:60]}' {reason}.")
+    def error(self, node: ast.AST) -> TranslationError:
+        """Return the error for a node of this file."""
+        return TranslationError(f"{self.path}:{getattr(node, 'lineno', '?')}", node)
 
     # ---- vectors and their components
 
@@ -72,7 +67,7 @@ class Scalarizer(ConstantFolder):
             case ast.BinOp(left=left, right=right) | ast.Compare(left=left, comparators=[right]):
                 result = {self.vector_kind(left), self.vector_kind(right)} - {None}
                 if len(result) > 1:
-                    raise self.error(node, "mixes a vector of states and one of contacts; loop over contact_indices")
+                    raise self.error(node)
                 return result.pop() if result else None
             case ast.UnaryOp(op=ast.USub(), operand=operand):
                 return self.vector_kind(operand)
@@ -130,7 +125,7 @@ class Scalarizer(ConstantFolder):
             case ast.Call(func=ast.Name(id=name), args=args) if name in self.declared.inlined:
                 parameters, expression = self.declared.inlined[name]
                 if not all(isinstance(argument, (ast.Name, ast.Attribute, ast.Constant)) for argument in args):
-                    raise self.error(node, "would evaluate its argument twice; assign the argument to a name first")
+                    raise self.error(node)
                 arguments = dict(zip(parameters, args, strict=True))
                 return self.component(Substitution(arguments).visit(expression), place)
             case ast.Call(func=ast.Name(id="select_kinematic"), args=[moved, other]):
@@ -144,14 +139,14 @@ class Scalarizer(ConstantFolder):
                 return self.component(argument, self.spec.rate_place(place))
             case ast.Call(func=ast.Name(id=name), args=args) if name in ELEMENTWISE:
                 if not all(isinstance(argument, (ast.Name, ast.Attribute)) for argument in args):
-                    raise self.error(node, "would evaluate its argument twice; assign the argument to a name first")
+                    raise self.error(node)
                 return parse_expression(
                     ELEMENTWISE[name].format(*(ast.unparse(self.component(argument, place)) for argument in args))
                 )
             case ast.Call(func=function, args=args) if self.is_elementwise(node):
                 return ast.Call(function, [self.component(argument, place) for argument in args], [])
             case _:
-                raise self.error(node, "is a vector inside an expression; assign it to a name on a separate line")
+                raise self.error(node)
 
     def own_components(self, node: ast.expr) -> list[ast.expr]:
         """Return the components stored in an argument, target or result."""
@@ -161,7 +156,7 @@ class Scalarizer(ConstantFolder):
     def all_components(self, node: ast.expr) -> list[ast.expr]:
         """Return all components of a vector, including those stored in another one."""
         if not (kind := self.vector_kind(node)):
-            raise self.error(node, "is a scalar where a vector is required")
+            raise self.error(node)
         return [self.component(node, i) for i in self.all_indices(kind)]
 
     # ---- scalars
@@ -182,7 +177,7 @@ class Scalarizer(ConstantFolder):
         if node.id in self.method_bindings:
             return self.method_bindings[node.id]
         if self.vector_kinds.get(node.id):
-            raise self.error(node, "is a vector where a scalar is required")
+            raise self.error(node)
         return ast.Constant(self.loop_indices[node.id]) if node.id in self.loop_indices else node
 
     def visit_Subscript(self, node: ast.Subscript) -> ast.AST:
@@ -204,9 +199,7 @@ class Scalarizer(ConstantFolder):
         """Evaluate an index that must be known at build time."""
         result = self.visit(index)
         if not (isinstance(result, ast.Constant) and isinstance(result.value, int)):
-            raise self.error(
-                index, "is an index that is not known at build time; loop over contact_indices or state_indices"
-            )
+            raise self.error(index)
         return result.value
 
     def visit_BinOp(self, node: ast.BinOp) -> ast.AST:
@@ -283,7 +276,7 @@ class Scalarizer(ConstantFolder):
             case ast.AnnAssign() if annotated_kind(node):
                 return []
             case ast.AugAssign(target=target) if self.vector_kind(target):
-                raise self.error(node, "modifies a vector in place, which another name may refer to; write c = c + ...")
+                raise self.error(node)
             case ast.Expr(ast.Call(ast.Name(id="setattr"), [thing, ast.Name(id=name), value])) if (
                 name in self.method_bindings
             ):
@@ -325,24 +318,18 @@ class Scalarizer(ConstantFolder):
         """Record the kinds of assigned names; scalars by default."""
         for target_node, kind in zip(targets, kinds or [None] * len(targets), strict=True):
             if isinstance(target_node, ast.Attribute) and kind and not self.vector_kind(target_node):
-                raise self.error(
-                    target_node, "is assigned a vector; declare it in its class, for example as StateVector"
-                )
+                raise self.error(target_node)
             if not isinstance(target_node, ast.Name):
                 continue
             if kind is None:
                 if target_node.id in self.vector_kinds:
-                    raise self.error(target_node, "is a vector elsewhere in the function; take another name")
+                    raise self.error(target_node)
                 self.scalar_names.add(target_node.id)
                 continue
-            if rates := next(
-                (rates for rates, states in self.states_of_rates.items() if states.id == target_node.id), ""
-            ):
-                raise self.error(
-                    target_node, f"changes under {rates}, which takes some of its rates from it; take another name"
-                )
+            if target_node.id in [states.id for states in self.states_of_rates.values()]:
+                raise self.error(target_node)
             if self.vector_kinds.setdefault(target_node.id, kind) != kind:
-                raise self.error(target_node, "is another vector elsewhere in the function; take another name")
+                raise self.error(target_node)
 
     def lower_assignment(self, node: ast.Assign) -> list[ast.stmt]:
         """Rewrite an assignment by component; as one tuple assignment where components depend on each other."""
@@ -361,7 +348,7 @@ class Scalarizer(ConstantFolder):
                     and target.id in self.vector_kinds
                     and target.id not in self.allocated_names
                 ):
-                    raise self.error(target, f"would keep its values; write {target.id} = 0 * {target.id}")
+                    raise self.error(target)
                 self.allocated_names.add(ast.unparse(target))
             self.record_kinds(left, [self.vector_kind(value) for value in right])
             return []
@@ -421,11 +408,9 @@ class Scalarizer(ConstantFolder):
             rates, states = targets[result], targets[place] if place >= 0 else call.args[place]
             if isinstance(rates, ast.Name) and isinstance(states, ast.Name):
                 if self.states_of_rates.setdefault(rates.id, states).id != states.id:
-                    raise self.error(node, f"evaluates {rates.id} at other states than before; take another name")
-            elif isinstance(rates, ast.Name):
-                raise self.error(node, f"evaluates {rates.id} at states without a name; assign them to a name first")
-            elif not is_same_tree(self.states_of(rates), states):
-                raise self.error(node, "evaluates rates at other states than their class declares")
+                    raise self.error(node)
+            elif isinstance(rates, ast.Name) or not is_same_tree(self.states_of(rates), states):
+                raise self.error(node)
 
     def record_copied_rates(self, left: Sequence[ast.expr], right: Sequence[ast.expr]) -> None:
         """Record the states of rates that are copied together with them, as in y, f = step.y0, step.f0."""
@@ -448,10 +433,10 @@ class Scalarizer(ConstantFolder):
             names += [named[i], *("_" if at in self.spec.zeros else self.spec.entry_name(J, *at) for at in entries)]
         return [ast.Assign([tuple_or_single([ast.Name(name) for name in names])], self.visit(call))]
 
-    def find_name_clash(self) -> str:
-        """Return a scalar whose name is that of a component in some model, or ""."""
+    def has_name_clash(self) -> bool:
+        """Return whether a scalar has the name of a component in some model."""
         prefixes = tuple(f"{name}_" for name in (*self.vector_kinds, *self.jacobians, *self.systems))
-        return min((name for name in self.scalar_names if name.startswith(prefixes)), default="")
+        return any(name.startswith(prefixes) for name in self.scalar_names)
 
 
 def function_name(call: ast.Call) -> str:

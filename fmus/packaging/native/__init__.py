@@ -1,7 +1,7 @@
 """Translates the numerics from Python to C and compiles them to FMUs that need no Python, for every platform.
 
     struct_layout.py             the model object as structs with initializers
-    c_types.py                   types of values and their C spelling; errors for source that has none
+    c_types.py                   types of values and their C spelling
     expressions.py, statements.py    translate one function for given argument types
     call_graph.py                all functions that the FMI layer reaches
     directional_derivative.py    differentiates a model (forward mode)

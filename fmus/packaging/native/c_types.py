@@ -1,13 +1,11 @@
-"""Types of values in the numerics and their C spelling; errors for source that has none."""
+"""Types of values in the numerics and their C spelling."""
 
-import ast
 import inspect
 from dataclasses import dataclass
 from math import copysign, inf
 from types import FunctionType
 from typing import TypeAlias
 
-from .. import BuildError
 from ..model_lookup import FMUS
 
 
@@ -112,19 +110,8 @@ def c_literal(value: object) -> str:
     return "-0.0" if value == 0.0 and copysign(1.0, value) < 0.0 else repr(value)
 
 
-class UnsupportedConstructError(BuildError):
-    """Source that cannot be translated to C. The message has file, line, reason and an alternative."""
-
-
 def source_location(function: FunctionType, line: int = 0) -> str:
     """Return file and line of a function, or the given line of its file, independent of the machine."""
     file = inspect.getsourcefile(function) or "?"
     path = file.removeprefix(f"{FMUS.parent}/") if file.startswith(str(FMUS)) else file.rsplit("/", 1)[-1]
     return f"{path}:{line or function.__code__.co_firstlineno}"
-
-
-def unsupported(function: FunctionType, node: ast.AST, reason: str, remedy: str) -> UnsupportedConstructError:
-    """Return the error for a node in the source of a function."""
-    return UnsupportedConstructError(
-        f"{source_location(function, getattr(node, 'lineno', 0))}: '{ast.unparse(node)[:60]}' {reason}; {remedy}."
-    )

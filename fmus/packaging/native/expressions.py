@@ -16,6 +16,7 @@ from itertools import count
 from types import BuiltinFunctionType, FunctionType
 from typing import Any, NoReturn
 
+from ..syntax_trees import TranslationError
 from .c_types import (
     BOOL,
     FLOAT,
@@ -28,11 +29,10 @@ from .c_types import (
     Scalar,
     ScalarTuple,
     StructPointer,
-    UnsupportedConstructError,
     c_declaration,
     c_literal,
     scalar_type_of,
-    unsupported,
+    source_location,
 )
 from .struct_layout import StructLayout
 
@@ -99,12 +99,12 @@ class ExpressionTranslator(ast.NodeVisitor):
         self.conditional_depth = 0  # nesting depth of operands that are evaluated conditionally
         self.statement_call: ast.AST | None = None  # a call that is the whole right-hand side
 
-    def unsupported(self, node: ast.AST, reason: str, remedy: str) -> UnsupportedConstructError:
+    def error(self, node: ast.AST) -> TranslationError:
         """Return the error for a node of this function."""
-        return unsupported(self.function, node, reason, remedy)
+        return TranslationError(source_location(self.function, getattr(node, "lineno", 0)), node)
 
     def generic_visit(self, node: ast.AST) -> NoReturn:
-        raise self.unsupported(node, "cannot be translated to C", "use numbers, attributes, calls and if")
+        raise self.error(node)
 
     def fault_argument(self) -> str:
         """Return the argument for the fault flag, and note that the statement can fault."""
@@ -147,20 +147,20 @@ class ExpressionTranslator(ast.NodeVisitor):
             text = c_literal(ctype.value)
             return CExpression(scalar, text, UNARY if text.startswith("-") else PRIMARY)
         if not isinstance(ctype, Scalar):
-            raise self.unsupported(node, "is not a number", "use a float, an int or a bool")
+            raise self.error(node)
         return value
 
     def arithmetic_operand(self, node: ast.expr, value: CExpression) -> CExpression:
         value = self.to_run_time(node, value)
         if value.ctype is BOOL:
-            raise self.unsupported(node, "is a bool in arithmetic", "write 1 if ... else 0")
+            raise self.error(node)
         return value
 
     def boolean(self, node: ast.expr) -> CExpression:
         """Translate an expression that must be a bool. Conditions on model constants were folded before."""
         value = self.run_time_number(node)
         if value.ctype is not BOOL:
-            raise self.unsupported(node, "is used as a condition but is not a bool", "compare it")
+            raise self.error(node)
         return value
 
     # ---- names
@@ -171,21 +171,21 @@ class ExpressionTranslator(ast.NodeVisitor):
     def visit_Name(self, node: ast.Name) -> CExpression:
         if node.id in self.local_types:
             if node.id not in self.assigned_names:
-                raise self.unsupported(node, "may be unassigned here", "assign it on every path to this line")
+                raise self.error(node)
             return CExpression(self.local_types[node.id], node.id)
         for names in (self.function.__globals__, vars(builtins)):
             if node.id in names:
                 return CExpression(CompileTimeValue(names[node.id]))
-        raise self.unsupported(node, "is undefined", "assign it first")
+        raise self.error(node)
 
     def visit_Attribute(self, node: ast.Attribute) -> CExpression:
         owner = self.visit(node.value)
         if isinstance(owner.ctype, CompileTimeValue):
             if not hasattr(owner.ctype.value, node.attr):
-                raise self.unsupported(node, "does not exist", "check the spelling")
+                raise self.error(node)
             return CExpression(CompileTimeValue(getattr(owner.ctype.value, node.attr)))
         if not isinstance(owner.ctype, StructPointer):
-            raise self.unsupported(node, "is an attribute of a number", "use the number itself")
+            raise self.error(node)
         cls = owner.ctype.cls
         lvalue = f"{owner.text[1:]}.{node.attr}" if owner.text.startswith("&") else f"{owner.text}->{node.attr}"
         field = self.layout.fields[cls].get(node.attr)
@@ -199,20 +199,20 @@ class ExpressionTranslator(ast.NodeVisitor):
             return CExpression(BoundMethod(attribute, owner.text, cls))
         if scalar_type_of(attribute):
             return CExpression(CompileTimeValue(attribute))
-        raise self.unsupported(node, f"is neither a number nor a method of {cls.__name__}", "set it in __init__")
+        raise self.error(node)
 
     def visit_Subscript(self, node: ast.Subscript) -> CExpression:
         row, index = self.visit(node.value), self.visit(node.slice)
         if isinstance(row.ctype, CompileTimeValue) and isinstance(node.value, ast.Name):
             row = self.constant_array(node.value.id, row)
         if not isinstance(row.ctype, FloatArray):
-            raise self.unsupported(node, "is not an element of a list of floats", "create the list in __init__")
+            raise self.error(node)
         if isinstance(index.ctype, CompileTimeValue):
             if not (isinstance(index.ctype.value, int) and -row.ctype.length <= index.ctype.value < row.ctype.length):
-                raise self.unsupported(node, f"is out of range for a list of {row.ctype.length}", "use a valid index")
+                raise self.error(node)
             return CExpression(FLOAT, f"{row.text}[{index.ctype.value % row.ctype.length}]")
         if index.ctype is not INT:
-            raise self.unsupported(node, "has an index that is not an int", "use an int")
+            raise self.error(node)
         index_text = f"py_index({index.text}, {row.ctype.length}, {self.fault_argument()})"
         if not self.conditional_depth:
             index_text = self.emit_temporary(INT, index_text)
@@ -237,7 +237,7 @@ class ExpressionTranslator(ast.NodeVisitor):
             number: Any = value.ctype.value
             return CExpression(CompileTimeValue(-number if isinstance(node.op, ast.USub) else number))
         if not isinstance(node.op, ast.USub):
-            raise self.unsupported(node, "has an operator that cannot be translated to C", "remove the operator")
+            raise self.error(node)
         return CExpression(self.arithmetic_operand(node.operand, value).ctype, "-" + value.as_operand(PRIMARY), UNARY)
 
     def visit_BinOp(self, node: ast.BinOp) -> CExpression:
@@ -260,35 +260,31 @@ class ExpressionTranslator(ast.NodeVisitor):
                 ctype, f"{left.as_operand(precedence)} {sign} {right.as_operand(precedence + 1)}", precedence
             )
         if ctype is INT:
-            raise self.unsupported(node, "has two int operands", "make one of them a float")
+            raise self.error(node)
         if operation is ast.Div and divisor:
             return CExpression(FLOAT, f"{left.as_operand(MULTIPLICATIVE)} / {right.as_operand(UNARY)}", MULTIPLICATIVE)
         if operation is ast.Div:
             return CExpression(FLOAT, f"py_divide({left.text}, {right.text}, {self.fault_argument()})")
         if operation is ast.Pow:
             return CExpression(FLOAT, f"py_pow({left.text}, {right.text}, {self.fault_argument()})")
-        raise self.unsupported(node, "has an operator that cannot be translated to C", "use + - * / or **")
+        raise self.error(node)
 
     def fold(self, node: ast.AST, function: Callable[..., Any], *values: object) -> object:
         """Evaluate an operation on constants in Python."""
         if not all(scalar_type_of(value) for value in values):
-            raise self.unsupported(node, "has an operand that is not a number", "use floats and ints")
+            raise self.error(node)
         try:
             return function(*values)
         except (ArithmeticError, ValueError) as error:
-            raise self.unsupported(node, f"raises an exception: {error}", "change the constants") from error
+            raise self.error(node) from error
 
     def visit_Compare(self, node: ast.Compare) -> CExpression:
         nodes = [node.left, *node.comparators]
         if any(type(op) not in COMPARISONS for op in node.ops):
-            raise self.unsupported(
-                node, "has an operator that cannot be translated to C", "compare numbers with < <= > >= == !="
-            )
+            raise self.error(node)
         for middle in nodes[1:-1]:
             if any(isinstance(part, ast.Call) for part in ast.walk(middle)):
-                raise self.unsupported(
-                    node, "has a call in the middle of a chained comparison", "call the function on a separate line"
-                )
+                raise self.error(node)
         values = [
             self.run_time_number(nodes[0]),
             self.run_time_number(nodes[1]),
@@ -319,7 +315,7 @@ class ExpressionTranslator(ast.NodeVisitor):
         test = self.boolean(node.test)
         yes, no = self.visit_conditional(self.run_time_number, (node.body, node.orelse))
         if yes.ctype != no.ctype:
-            raise self.unsupported(node, "has branches of different types", "make both a float or both an int")
+            raise self.error(node)
         return CExpression(
             yes.ctype, f"{test.as_operand(OR)} ? {yes.as_operand(OR)} : {no.as_operand(CONDITIONAL)}", CONDITIONAL
         )
@@ -329,7 +325,7 @@ class ExpressionTranslator(ast.NodeVisitor):
     def visit_Call(self, node: ast.Call) -> CExpression:
         effects_allowed = self.effects_allowed
         if node.keywords or any(isinstance(argument, ast.Starred) for argument in node.args):
-            raise self.unsupported(node, "has keyword or starred arguments", "pass them by position")
+            raise self.error(node)
         called = self.super_method(node) or self.visit(node.func).ctype
         values = [self.visit(argument) for argument in node.args]
         if isinstance(called, BoundMethod):
@@ -340,7 +336,7 @@ class ExpressionTranslator(ast.NodeVisitor):
             return self.translate_call(node, called.value, values, effects_allowed)
         if isinstance(called, CompileTimeValue) and isinstance(called.value, (BuiltinFunctionType, type)):
             return self.translate_builtin(node, called.value, values)
-        raise self.unsupported(node, "does not call a function", "call a function of the numerics or of math")
+        raise self.error(node)
 
     def super_method(self, node: ast.Call) -> BoundMethod | None:
         """Find the method that super().name refers to."""
@@ -353,18 +349,15 @@ class ExpressionTranslator(ast.NodeVisitor):
                 for cls in lineage[lineage.index(home) + 1 :]:
                     if name in vars(cls):
                         return BoundMethod(vars(cls)[name], "self", ctype.cls)
-                raise self.unsupported(node, "does not exist in a base class", "check the spelling")
+                raise self.error(node)
         return None
 
     def translate_call(
         self, node: ast.Call, function: FunctionType, values: list[CExpression], effects_allowed: bool
     ) -> CExpression:
         """Translate a call of a function of the numerics, specialised to the types of its arguments."""
-        count = function.__code__.co_argcount
-        if len(values) != count or function.__code__.co_kwonlyargcount or function.__defaults__:
-            raise self.unsupported(
-                node, f"passes {len(values)} arguments to a function of {count}", "pass every argument"
-            )
+        if len(values) != function.__code__.co_argcount or function.__code__.co_kwonlyargcount or function.__defaults__:
+            raise self.error(node)
         arguments = [
             self.to_run_time(node, value)
             if isinstance(value.ctype, CompileTimeValue) and scalar_type_of(value.ctype.value)
@@ -372,12 +365,10 @@ class ExpressionTranslator(ast.NodeVisitor):
             for value in values
         ]
         if not all(isinstance(value.ctype, (Scalar, StructPointer, CompileTimeValue)) for value in arguments):
-            raise self.unsupported(
-                node, "passes a tuple or list as one argument", "pass each number, or the object that owns them"
-            )
+            raise self.error(node)
         compiled = self.specialise(function, [value.ctype for value in arguments])
         if compiled is None:
-            raise self.unsupported(node, "is recursive", "write a loop")
+            raise self.error(node)
         if self.may_fault and not compiled.is_pure:  # after a fault in the arguments, the call must not have effects
             arguments = [self.in_local(value) if isinstance(value.ctype, Scalar) else value for value in arguments]
             self.emit_fault_check()
@@ -390,9 +381,7 @@ class ExpressionTranslator(ast.NodeVisitor):
             self.is_pure = False
             if self.statement_call is not node:
                 if self.conditional_depth or not effects_allowed:
-                    raise self.unsupported(
-                        node, "has side effects within an expression", "call the function on a separate line"
-                    )
+                    raise self.error(node)
                 if compiled.result:
                     text = self.emit_temporary(compiled.result, text)
                     self.emit_fault_check()
@@ -403,21 +392,15 @@ class ExpressionTranslator(ast.NodeVisitor):
         """Translate a call of a function of math or one of the supported built-in functions."""
         allowed = (*NEVER_RAISING, *MAY_RAISE, *PREDICATES, abs, min, max, float, int)
         if function not in allowed:
-            raise self.unsupported(
-                node,
-                "calls a function that cannot be translated to C",
-                "use abs, min, max, float, int or a function of math that C has",
-            )
-        if function in (min, max):
-            if len(values) < 2:
-                raise self.unsupported(node, "has a single argument", "pass two or more numbers")
-        elif len(values) != ARGUMENT_COUNTS.get(function, 1):
-            raise self.unsupported(node, "has the wrong number of arguments", "see the documentation of math")
+            raise self.error(node)
+        is_count_right = len(values) > 1 if function in (min, max) else len(values) == ARGUMENT_COUNTS.get(function, 1)
+        if not is_count_right:
+            raise self.error(node)
         values = [self.arithmetic_operand(argument, value) for argument, value in zip(node.args, values, strict=True)]
         texts = ", ".join(value.text for value in values)
         if function in (min, max, abs):
             if {value.ctype for value in values} != {FLOAT}:
-                raise self.unsupported(node, "has an argument that is not a float", "write a conditional expression")
+                raise self.error(node)
             name = {min: "py_min", max: "py_max", abs: "fabs"}[function]
             text = values[0].text
             for value in values[1:]:

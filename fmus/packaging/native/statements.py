@@ -13,7 +13,6 @@ from ..equations.reserved_names import C_NAMES
 from ..lowering import function_tree
 from ..syntax_trees import replace_fields
 from .c_types import (
-    FLOAT,
     INT,
     CompileTimeValue,
     CType,
@@ -48,7 +47,7 @@ class FunctionTranslator(ExpressionTranslator):
             self.declare_local(tree, name, ctype)
             self.assigned_names.add(name)
         if self.translate_block(tree.body) and self.result:
-            raise self.unsupported(tree, "may end without a return", "return a value on every path")
+            raise self.error(tree)
 
     def text(self, name: str, is_rarely_called: bool = False) -> str:
         """Return the C function."""
@@ -131,7 +130,7 @@ class FunctionTranslator(ExpressionTranslator):
         if not isinstance(node.value, ast.Call) or (
             isinstance(value.ctype, CompileTimeValue) and value.ctype.value is not None
         ):
-            raise self.unsupported(node, "has no effect", "remove it")
+            raise self.error(node)
         self.emit(f"{value.text};" if value.ctype == CompileTimeValue(None) else f"(void){value.as_operand(UNARY)};")
         self.emit_fault_check()
         return True
@@ -140,7 +139,7 @@ class FunctionTranslator(ExpressionTranslator):
         value = self.right_hand_side(node.value) if node.value else None
         ctype = value.ctype if value else None
         if self.has_return and ctype != self.result:
-            raise self.unsupported(node, "returns another type than the previous return", "return the same types")
+            raise self.error(node)
         self.result, self.has_return = ctype, True
         self.emit(f"return {value.text};" if value else "return;")
         return False
@@ -157,9 +156,7 @@ class FunctionTranslator(ExpressionTranslator):
         match node:
             case ast.Assign(targets=[ast.Tuple(elts=targets)], value=ast.Tuple(elts=values)):
                 if len(targets) != len(values):
-                    raise self.unsupported(
-                        node, "has a different number of values than names", "write one value per name"
-                    )
+                    raise self.error(node)
                 self.assign_parallel(targets, values)
                 return True
         value = self.right_hand_side(node.value)
@@ -188,7 +185,7 @@ class FunctionTranslator(ExpressionTranslator):
 
     def unpack(self, target: ast.Tuple, value: CExpression) -> None:
         if not isinstance(value.ctype, ScalarTuple) or len(value.ctype.parts) != len(target.elts):
-            raise self.unsupported(target, "does not match the returned tuple", "write one name per number")
+            raise self.error(target)
         for i, (part, ctype) in enumerate(zip(target.elts, value.ctype.parts, strict=True)):
             self.assign(part, CExpression(ctype, f"{value.text}._{i}"))
 
@@ -221,16 +218,14 @@ class FunctionTranslator(ExpressionTranslator):
     def declare_local(self, node: ast.AST, name: str, ctype: CType) -> None:
         """Declare a local variable; its type never changes."""
         if name in C_NAMES:
-            raise self.unsupported(node, f"uses {name}, a C keyword or macro", "use another name")
+            raise self.error(node)
         self.require_same_type(node, self.local_types.setdefault(name, ctype), ctype)
 
     def require_same_type(self, node: ast.AST, old_type: CType, new_type: CType) -> None:
         """Raise an error if a variable would change its type."""
         if old_type == new_type and isinstance(new_type, (Scalar, StructPointer, CompileTimeValue)):
             return
-        words = [getattr(ctype, "name", "non-number") for ctype in (old_type, new_type)]
-        instead = "write 0.0, not 0" if (old_type, new_type) == (FLOAT, INT) else "use another name"
-        raise self.unsupported(node, f"is assigned a {words[1]} but has the type {words[0]}", instead)
+        raise self.error(node)
 
     # ---- branches and loops
 
@@ -274,7 +269,7 @@ class FunctionTranslator(ExpressionTranslator):
 
     def visit_While(self, node: ast.While) -> bool:
         if node.orelse:
-            raise self.unsupported(node, "has an else branch", "use a flag")
+            raise self.error(node)
         before = set(self.assigned_names)
         self.assigned_at_breaks.append([])
         lines, self.lines = self.lines, []
@@ -304,11 +299,9 @@ class FunctionTranslator(ExpressionTranslator):
             case ast.For(target=ast.Name(), iter=ast.Call(func=ast.Name(id="range"), args=args), orelse=[]):
                 bounds = [self.run_time_number(argument) for argument in args]
             case _:
-                raise self.unsupported(node, "is not a loop over a range", "write for i in range(n)")
+                raise self.error(node)
         if len(bounds) not in (1, 2) or any(bound.ctype is not INT for bound in bounds):
-            raise self.unsupported(
-                node, "has a range with other arguments than one or two ints", "write range(n) or range(m, n)"
-            )
+            raise self.error(node)
         low, high = (self.in_local(bound).text for bound in [CExpression(INT, "0"), *bounds][-2:])
         self.emit_fault_check()
         counter, before = f"_{next(self.temporaries)}", set(self.assigned_names)

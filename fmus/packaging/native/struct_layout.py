@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 
+from .. import BuildError
 from ..equations.reserved_names import C_NAMES
 from .c_types import (
     FLOAT,
@@ -9,13 +10,22 @@ from .c_types import (
     FloatArray,
     Scalar,
     StructPointer,
-    UnsupportedConstructError,
     c_declaration,
     c_literal,
     scalar_type_of,
 )
 
 EMPTY_MEMBER = "nothing"  # the member of a struct without fields: C has no empty structs
+
+
+class AttributeTypeError(BuildError):
+    """An attribute that C structs cannot represent."""
+
+    def __init__(self, path: str) -> None:
+        super().__init__(
+            f"{path} cannot be translated to C; an attribute must be a float, int, bool, list of floats, or an object "
+            "of its own, with the same attributes in all objects of its class, and no keyword or macro of C."
+        )
 
 
 class StructLayout:
@@ -29,32 +39,25 @@ class StructLayout:
 
     def _add(self, instance: object, path: str) -> StructPointer:
         if id(instance) in self._seen:
-            raise UnsupportedConstructError(
-                f"{path} refers to an object that another attribute owns; create a new object."
-            )
+            raise AttributeTypeError(path)
         self._seen.add(id(instance))
         fields = {name: self._type_of(value, f"{path}.{name}") for name, value in vars(instance).items()}
         cls = type(instance)
-        if self.fields.setdefault(cls, fields) != fields:
-            raise UnsupportedConstructError(
-                f"{path} has different attributes from another {cls.__name__}; set all of them in __init__."
-            )
-        if any(other is not cls and other.__name__ == cls.__name__ for other in self.fields):
-            raise UnsupportedConstructError(f"{path}: two classes have the name {cls.__name__}; rename one.")
+        names = [other.__name__ for other in self.fields if other is not cls]
+        if self.fields.setdefault(cls, fields) != fields or cls.__name__ in names:
+            raise AttributeTypeError(path)
         return StructPointer(cls)
 
     def _type_of(self, value: object, path: str) -> CType:
-        if (name := path.rsplit(".", 1)[-1]) in C_NAMES:
-            raise UnsupportedConstructError(f"{path}: {name} is a C keyword or macro; use another name.")
+        if path.rsplit(".", 1)[-1] in C_NAMES:
+            raise AttributeTypeError(path)
         if ctype := scalar_type_of(value):
             return ctype
         if isinstance(value, list) and value and all(scalar_type_of(item) is FLOAT for item in value):
             return FloatArray(len(value))
         if hasattr(value, "__dict__") and not callable(value):
             return self._add(value, path)
-        raise UnsupportedConstructError(
-            f"{path} is {value!r}; an attribute must be a float, int, bool, list of floats or object."
-        )
+        raise AttributeTypeError(path)
 
     def iter_scalars(self, cls: type, prefix: str = "") -> Iterator[tuple[str, Scalar]]:
         """Yield dotted name and type of every number of a class and of the objects it owns, except those in lists."""
