@@ -47,7 +47,6 @@ FIGURES_OF_PAGES = {
 FIGURES_OF_COMMANDS = {
     "coulomb": ("harness run coulomb", "results/coulomb/figure.svg"),
     "pendulum": ("harness run pendulum", "results/pendulum/figure.svg"),
-    "coupled": ("harness couple two-masses", "results/coupled/two-masses/figure.svg"),
     "precision": ("harness precision stickslip --quick", "results/precision/stickslip/figure.svg"),
     "rivals": ("benchmarks rivals", "results/rivals/figure.svg"),  # needs the extra rivals
 }

@@ -64,22 +64,6 @@ DECAY_TEXTS = {
     "first": "Number of peaks to skip at the start.",
     "cycles": "Number of cycles to use. Default: all.",
 }
-COUPLED_TEXTS = {
-    "title": "One line that describes the scene.",
-    "stop": "Stop time in s.",
-    "steps": "Communication steps in s. The scene runs once with each; the figure shows the finest.",
-    "parts": "One table for each FMU, as in `[parts.left]`.",
-    "springs": "Springs and dampers between two parts, as in `[[springs]]`.",
-    "connections": "Outputs that drive an input of another part, as in `[[connections]]`.",
-    "model": "A model, of which `smd`, `coulomb` and `stickslip` have a reference solution; or the path of an FMU.",
-    "values": "Parameters of the part, in SI units.",
-    "between": "The names of two parts. The spring exerts no force when their positions are equal.",
-    "k": "Stiffness in N/m.",
-    "c": "Damping constant in N·s/m.",
-    "from": "`part.x`, `part.v` or `part.F_spring`; any output if `to` names an input.",
-    "to": "The part that receives the force at its input `F_ext`; or `part.input`.",
-    "factor": "Factor from the output to the force; it must be 1 for `F_spring` and for a named input.",
-}
 
 
 def format_table(headings: Iterable[str], rows: Iterable[Iterable[object]]) -> str:
@@ -190,7 +174,7 @@ def schema_within(schema: Any, key: str) -> Any:
 
 def keys(texts: dict[str, str], *schemas: Any) -> str:
     """Return the table of the keys that have a text; they are fields of the dataclasses of the schema."""
-    declared = {field.name.rstrip("_"): field for schema in schemas for field in fields(schema)}
+    declared = {field.name: field for schema in schemas for field in fields(schema)}
     rows = []
     for name, text in texts.items():
         field = declared[name]
@@ -204,12 +188,6 @@ def keys(texts: dict[str, str], *schemas: Any) -> str:
             default_text = f"`{str(default).lower() if isinstance(default, bool) else default}`"
         rows.append((f"`{name}`", describe_values(field.type), default_text, text))
     return format_table(("key", "value", "default", "meaning"), rows)
-
-
-def coupled_keys(schema: Any) -> str:
-    """Return the keys of one table of a coupled scene."""
-    names = [field.name.rstrip("_") for field in fields(schema)]
-    return keys({name: COUPLED_TEXTS[name] for name in names}, schema)
 
 
 def result_files(fmus: Path) -> str:
@@ -318,7 +296,6 @@ SAMPLES = (
 def parts(fmus: Path) -> dict[str, Callable[[], str]]:
     """Return the function that generates each part, by the name of the part."""
     from harness.scenes import scene
-    from harness.scenes.coupled import scene as coupled
     from harness.scenes.run_spec import RunSpec
 
     return {
@@ -331,10 +308,6 @@ def parts(fmus: Path) -> dict[str, Callable[[], str]]:
         "scene-keys": lambda: keys(SCENE_TEXTS, RunSpec, scene.SceneKeys),
         "scene-citation": lambda: keys(CITATION_TEXTS, schema_within(scene.SceneKeys, "citation")),
         "scene-decay": lambda: keys(DECAY_TEXTS, schema_within(scene.SceneKeys, "decay")),
-        "coupled-keys": lambda: coupled_keys(coupled.CoupledKeys),
-        "coupled-parts": lambda: coupled_keys(schema_within(coupled.CoupledKeys, "parts")),
-        "coupled-springs": lambda: coupled_keys(schema_within(coupled.CoupledKeys, "springs")),
-        "coupled-connections": lambda: coupled_keys(schema_within(coupled.CoupledKeys, "connections")),
         "result-files": lambda: result_files(fmus),
         "record-formats": record_formats,
     }

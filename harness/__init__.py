@@ -34,7 +34,6 @@ if TYPE_CHECKING:
     from .running.trajectory import Trajectory
     from .studies.compare.difference import Comparison
     from .studies.compare.result import ComparisonResult
-    from .studies.coupled.result import CoupledResult
     from .studies.curve.result import CurveResult
     from .studies.decay.result import DecayResult
     from .studies.fit.result import FitResult
@@ -48,7 +47,6 @@ if TYPE_CHECKING:
 __all__ = [
     "Comparison",
     "ComparisonResult",
-    "CoupledResult",
     "CurveIdentification",
     "CurveResult",
     "DecayIdentification",
@@ -81,7 +79,6 @@ __all__ = [
 TYPES = {
     "Comparison": "harness.studies.compare.difference",
     "ComparisonResult": "harness.studies.compare.result",
-    "CoupledResult": "harness.studies.coupled.result",
     "CurveIdentification": "harness.analyses.curve.identification",
     "CurveResult": "harness.studies.curve.result",
     "FitResult": "harness.studies.fit.result",

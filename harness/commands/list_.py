@@ -10,7 +10,7 @@ HEADINGS = ("command", "scene", "model", "title")
 @click.command("list")
 @json_option
 def list_(as_json: bool) -> None:
-    """List the shipped scenes and models for `run`, and the coupled scenes for `couple`.
+    """List the shipped scenes and models for `run`.
 
     A model without a scene file is listed by its name: build it by this name; `run` then uses its defaults.
 
@@ -20,16 +20,10 @@ def list_(as_json: bool) -> None:
     """
     from rich.table import Table
 
-    from ..scenes.coupled import scene as coupled
     from ..scenes.fmu_files import model_title, more_model_files
     from ..scenes.scene import load_scene, shipped_scenes
-    from ..scenes.schema import parse_table, read_toml
 
     rows = [("run", scene.name, scene.run.fmu.stem, scene.title) for scene in map(load_scene, shipped_scenes())]
-    for file in coupled.shipped_coupled_scenes():
-        keys = parse_table(read_toml(file), coupled.CoupledKeys)
-        models = ", ".join(part.model for part in keys.parts.values())
-        rows.append(("couple", file.stem, models, keys.title))
     rows += [("run", file.stem, file.stem, model_title(file)) for file in more_model_files()]
     table = Table(*HEADINGS, box=None, padding=(0, 1, 0, 0))
     for row in rows:

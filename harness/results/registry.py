@@ -139,15 +139,6 @@ STUDIES = (
         ("a comparison", "compare results/coulomb results/coulomb-sign"),
     ),
     Study(
-        "coupled",
-        "couple",
-        "studies.coupled.result:CoupledResult",
-        ("error.csv", "trajectory.csv", "engines.csv", PICTURE),
-        "Coupled",
-        "Coupled FMUs, run by existing engines and compared with one model of the whole system.",
-        ("a coupled scene", "couple two-masses"),
-    ),
-    Study(
         "precision",
         "precision",
         "studies.precision.result:PrecisionResult",
@@ -188,8 +179,7 @@ def study_of_folder(folder: Path) -> Study:
     SceneError
         If there is none.
     """
-    candidates = [study for study in STUDIES if (folder / study.files[0]).is_file()]
-    study = max(candidates, key=lambda study: study.depth, default=None)  # a coupled run has a trajectory, too
+    study = next((study for study in STUDIES if (folder / study.files[0]).is_file()), None)
     if study is None:
         files = ", ".join(dict.fromkeys(study.files[0] for study in STUDIES))
         raise SceneError(f"{format_value(str(folder))} holds no result: name a folder with one of {files}")

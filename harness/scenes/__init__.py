@@ -1,1 +1,1 @@
-"""Scenes: TOML files that specify runs and coupled systems."""
+"""Scenes: TOML files that specify runs."""

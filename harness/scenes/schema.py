@@ -96,23 +96,17 @@ def convert(value: Any, annotation: Any, path: str, faults: Faults) -> Any:
 
 
 def convert_table(table: Mapping[str, Any], schema: Any, path: str, faults: Faults) -> Any:
-    """Return a table whose keys are the fields of a dataclass; the field `from_` holds the key `from`."""
+    """Return a table whose keys are the fields of a dataclass."""
     n_faults = len(faults)
-    names = {name.rstrip("_"): name for name in field_names(schema)}
-    if unknown := table.keys() - names:
+    names = field_names(schema)
+    if unknown := table.keys() - set(names):
         faults.append((0, unknown_name_message(f"key in [{path}]" if path else "key", min(unknown), names)))
     required = {one.name for one in fields(schema) if one.default is MISSING and one.default_factory is MISSING}
     faults += [
-        (2, f"the key '{join_key_path(path, key)}' is missing")
-        for key, name in names.items()
-        if name in required and key not in table
+        (2, f"the key '{join_key_path(path, key)}' is missing") for key in names if key in required and key not in table
     ]
     types = type_hints(schema)
-    values = {
-        name: convert(table[key], types[name], join_key_path(path, key), faults)
-        for key, name in names.items()
-        if key in table
-    }
+    values = {key: convert(table[key], types[key], join_key_path(path, key), faults) for key in names if key in table}
     if len(faults) > n_faults:
         return None
     try:

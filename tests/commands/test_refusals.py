@@ -17,7 +17,6 @@ COMMANDS = (  # with every argument that names a source
     ("sweep", "--vary", "k=1,2"),
     ("stability",),
     ("precision",),
-    ("couple",),
     ("references",),
     ("build",),
 )

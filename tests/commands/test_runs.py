@@ -273,12 +273,6 @@ def test_a_failing_case_does_not_lose_the_others(workspace, monkeypatch):
     assert [path.name for path in (workspace / "out").iterdir()] == ["good"]
 
 
-PAIR = (
-    'title = "a title"\nstop = 0.1\nsteps = [0.01]\n[parts.one]\nmodel = "coulomb"\n[parts.two]\nmodel = "smd"\n'
-    '[[connections]]\nfrom = "one.F_spring"\nto = "two"\n'
-)
-
-
 @pytest.mark.parametrize(
     "arguments",
     [
@@ -286,14 +280,12 @@ PAIR = (
         ["run", "nosuch"],
         ["run", "mine.toml", "--json"],
         ["decay", "swing.csv", "--no-drag", "--json"],
-        pytest.param(["couple", "pair.toml", "--json"], marks=pytest.mark.slow),
         ["report", "--help"],
     ],
 )
 def test_a_command_runs_alike_in_a_process_of_its_own(workspace, arguments):
     """Most tests run commands in the process of pytest."""
     (workspace / "mine.toml").write_text(BASE + "analyses = ['slip']\nplots = []")
-    (workspace / "pair.toml").write_text(PAIR)
     rows = [f"{0.04 * i},{exp(-0.04 * i) * cos(0.48 * i)}" for i in range(50)]
     (workspace / "swing.csv").write_text("\n".join(["t [s],x [m]", *rows]))
     inside = harness(workspace, *arguments)

@@ -23,7 +23,6 @@ from harness.studies.precision.law_deviations import LawDeviation
 from harness.studies.precision.study import FMU, ME, Point, StudiedCase, Study
 
 SCENES = {file.stem: tomllib.loads(file.read_text()) for file in sorted((ROOT / "harness/scenes").glob("*.toml"))}
-COUPLED = sorted(file.stem for file in (ROOT / "harness/scenes/coupled").glob("*.toml"))
 WIDTH = 80
 PLAIN = {"COLUMNS": str(WIDTH), "PATH": ""}
 harness = processes.harness
@@ -41,7 +40,7 @@ def assert_fits(output, *headings):
 @pytest.mark.parametrize(
     ("arguments", "headings"),
     [
-        (("list",), ("scene", "couple", *SCENES)),
+        (("list",), ("scene", *SCENES)),
         (("run", "stickslip"), ("compared with", "0.430665996656")),
         (("run", "coulomb-sign"), ("half of smd's",)),
         (("decay", "coulomb"), ("two peaks",)),
@@ -92,7 +91,7 @@ def test_names_with_brackets_are_printed_literally(tmp_path):
     "arguments",
     [
         *("", "run stickslip", "run mine.toml", "decay coulomb", "compare smd coulomb", "sweep smd --vary c=1,2"),
-        *("couple two-masses", "precision smd"),
+        "precision smd",
     ],
 )
 def test_a_command_without_its_fmus_explains_how_to_build_them(tmp_path, monkeypatch, arguments):
@@ -118,7 +117,6 @@ def test_an_fmu_failure_of_either_backend_is_reported_once(backend_fmus, tmp_pat
     ("package", "extra", "arguments"),
     [
         ("xarray", "sweep", ("sweep", "smd", "--vary", "c=1,2")),
-        ("pyssp_standard", "coupled", ("couple", "two-masses")),
     ],
 )
 def test_a_missing_optional_package_is_named_before_any_run(workspace, package, extra, arguments):
@@ -150,15 +148,11 @@ def test_the_versions_are_printed(tmp_path):
 
 def test_the_json_list_is_accepted_by_the_commands(workspace):
     listing = json.loads(harness(workspace, "list", "--json").stdout)
-    names = {
-        command: [item["scene"] for item in listing if item["command"] == command] for command in ("run", "couple")
-    }
-    assert sorted(names["run"]) == sorted([*SCENES, *more_model_names()])
-    assert sorted(names["couple"]) == COUPLED
+    assert sorted(item["scene"] for item in listing) == sorted([*SCENES, *more_model_names()])
     for item in listing:
         if item["scene"] in more_model_names():  # a model without a scene
             assert item["model"] == item["scene"]
-        elif item["command"] == "run":
+        else:
             scene = SCENES[item["scene"]]
             assert (item["title"], item["model"]) == (scene["title"], scene["model"])
 

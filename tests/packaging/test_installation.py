@@ -28,7 +28,7 @@ WORK = {  # by command; all run in one folder, in this order
     "references": ["references block.py"],
     "report": ["report"],
 }
-EXTRAS = {"sweep smd --vary c=1,2": "sweep", "couple two-masses": "coupled", "build --native smd": "native"}
+EXTRAS = {"sweep smd --vary c=1,2": "sweep", "build --native smd": "native"}
 
 
 @pytest.fixture(scope="module")

@@ -14,7 +14,7 @@ analyses.fit: fit_problem fit_procedure noise profile_likelihood
 analyses: slip
 process: interrupt interruptible_wait subprocess_runner temporary_directory worker
 records: columns extraction headings record samples size_limits text_table
-references: certified_reference models peer_solvers reference_trajectory single_model_reference
+references: certified_reference models peer_solvers reference_trajectory
 results: folder quantity registry style
 running: embedded_model native_equivalent runner whole_run
 running.external: step_refinement

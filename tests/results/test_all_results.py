@@ -5,7 +5,6 @@ import shutil
 from dataclasses import replace
 from functools import cache
 from html.parser import HTMLParser
-from math import nan
 from pathlib import Path
 from tempfile import TemporaryDirectory, mkdtemp
 
@@ -64,27 +63,6 @@ def pulled_sled():
     return harness.simulate("stickslip", stop=6.0)
 
 
-def coupled_scene():
-    """A scene of one position whose error halves with the communication step."""
-    time = np.linspace(0.0, 1.0, 11)
-    motion = np.cos(time)[:, None]
-    return harness.CoupledResult(
-        "a mass",
-        (("mass", "x", 1),),
-        ("mass",),
-        ("m",),
-        (0.2, 0.1),
-        1.0,
-        "finest run",
-        time=time,
-        x=motion + 1e-3,
-        truth=motion,
-        errors=(2e-3, 1e-3),
-        engines={"fmpy": ((0.5,), 1e-3, ""), "Ecos": ((), nan, "not installed")},
-        name="single",
-    )
-
-
 def measured_precision():
     """Points of one case by two methods, one of which failed once."""
     case = StudiedCase("smd", "linear", {"k": 100.0})
@@ -119,7 +97,6 @@ MAKERS = {
     "fit": fitted_parameters,
     "sweep": swept_parameters,
     "compare": compared_runs,
-    "coupled": coupled_scene,
     "precision": measured_precision,
     "stability": judged_cases,
 }

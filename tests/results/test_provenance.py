@@ -365,7 +365,6 @@ def test_the_text_of_a_command_is_never_run(workspace):
 REPEATED = {  # a call of each command whose result can be repeated, and the folder below --out
     "run": ({"fmu": "fmus/smd.fmu", "stop": 0.5}, "smd"),
     "compare": ({"first": "fmus/smd.fmu", "second": "fmus/coulomb.fmu", "stop": 0.1}, "compare/smd-coulomb"),
-    "couple": ({"scene": "two-masses"}, "coupled/two-masses"),
     "curve": ({"source": "bench.csv", "mass": 1.0}, "curve/bench"),
     "decay": ({"source": "swing.csv", "m": 1.0}, "decay/swing"),
     "stability": ({"models": ["smd"]}, "stability"),

@@ -155,53 +155,6 @@ def test_a_scene_of_an_earlier_version_holds_the_keys_of_its_run(workspace):
     assert len(repeated.time) == 201
 
 
-def to_toml(value):
-    """Return a value as TOML, tables on one line."""
-    if isinstance(value, dict):
-        return "{" + ", ".join(f"{name} = {to_toml(part)}" for name, part in value.items()) + "}"
-    if isinstance(value, list):
-        return "[" + ", ".join(map(to_toml, value)) + "]"
-    return json.dumps(value)
-
-
-PAIR = {
-    "title": "a title",
-    "stop": 1.0,
-    "steps": [0.1],
-    "parts": {"a": {"model": "smd"}, "b": {"model": "smd"}},
-}
-
-
-@pytest.mark.parametrize(
-    ("wrong", "sentence"),
-    [
-        ({"parts": 3}, "parts = 3 must be a table"),
-        ({"parts": {"a": 3}}, "parts.a = 3 must be a table"),
-        (
-            {"parts": {"a": {"modle": "smd"}}},
-            "unknown key in [parts.a] 'modle' (nearest: 'model'); allowed: model, values",
-        ),
-        ({"parts": {"a": {"values": {"k": 1}}}}, "the key 'parts.a.model' is missing"),
-        ({"parts": {"a": {"model": "smd", "values": {"k": "x"}}}}, "parts.a.values.k = 'x' must be a finite number"),
-        ({"springs": {"k": 1}}, "springs = {'k': 1} must be a list"),
-        ({"springs": [{"between": ["a", "b"], "k": 1}, 3]}, "springs[1] = 3 must be a table"),
-        (
-            {"springs": [{"between": ["a", "a"], "k": 1}]},
-            "springs[0].between = ['a', 'a'] must be a list of two distinct",
-        ),
-        ({"connections": [{"from": 1, "to": "b", "factor": 1}]}, "connections[0].from = 1 must be a text"),
-        ({"connections": [{"from_": "a.x", "to": "b", "factor": 1}]}, "unknown key in [connections[0]] 'from_'"),
-    ],
-    ids=lambda value: value if isinstance(value, str) else "",
-)
-def test_an_error_names_its_location_at_any_depth(workspace, wrong, sentence):
-    scene = "".join(f"{name} = {to_toml(value)}\n" for name, value in (PAIR | wrong).items())
-    (workspace / "pair.toml").write_text(scene)
-    done = commands.harness(workspace, "couple", "pair.toml")
-    assert done.returncode == 2
-    assert sentence in done.stderr
-
-
 def test_an_unknown_scene_error_lists_the_shipped_names(workspace):
     done = commands.harness(workspace, "run", "pendulm")
     assert done.returncode == 2
