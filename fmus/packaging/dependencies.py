@@ -8,7 +8,7 @@ from ..runtime.variable_access import SETTABLE_CAUSALITIES
 from ..runtime.variable_declarations import VariableOwner
 from .equations.algebra import differentiate, substitute, variables_in
 from .equations.expressions import Expression, Operand
-from .equations.model_analysis import ModelAnalysis
+from .equations.model_analysis import ANALYSES
 from .equations.model_declaration import HYBRID, SIGN, THRESHOLD, Contact
 from .equations.model_roles import TIME
 from .fmi_variables import Variables, friction_laws
@@ -22,7 +22,7 @@ def output_dependencies(model: type[VariableOwner], declared: Variables, at_star
     outputs = [name for name, meaning in declared if meaning.causality == "output"]
     if not outputs:
         return {}
-    analysis: ModelAnalysis = model.analysis  # type: ignore[attr-defined]
+    analysis = ANALYSES[model]
     laws = friction_laws(model) or [HYBRID]
     start: dict[Expression, Operand] = {
         TIME: 0.0,

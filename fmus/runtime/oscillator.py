@@ -18,7 +18,8 @@ from .vectors import ConditionVector, ContactVector, Derivatives, RateVector, St
 class Oscillator(VariableOwner):
     """Oscillator with one or more states.
 
-    Its constructor creates all attributes.
+    Its constructor creates all attributes.  No variable of a model has the name of an attribute of this class or of
+    those derived from it (reserved_names.py).
     """
 
     solver_class: Any  # Integrator with the methods that suit the model
@@ -27,6 +28,12 @@ class Oscillator(VariableOwner):
     # of each condition: 1.0 where it holds, else -1.0, or the piece of its table; the solver sets them at events
     condition_sides: list[float]
     condition_pieces: list[float]  # of each condition: the piece of its table at the latest evaluation, or -1.0
+    condition_texts: tuple[str, ...]  # of each condition: what changes where its event function falls to zero
+    condition_units: tuple[str, ...]  # of each condition: the unit of its margin
+    violation_time: float  # when a condition that must hold was violated
+    violation_value: float  # its value then
+    x_base: float  # position of the driver at t_base
+    t_base: float  # time of the last change of its speed, or of an input with derivatives
 
     states: dict[str, str] = {"x": "v", "v": "a"}  # state -> its rate, which may be a state
     contacts: dict[str, str] = {}  # mode -> state that is the slip velocity of the contact

@@ -21,9 +21,9 @@ from .declaration_checks import METHODS, check_declarations
 from .expressions import Expression, ModelError, Operand, Term, is_among
 from .model_declaration import Contact, Fixed, Input, Mode, Model, Parameter, Rule, Variable
 from .model_roles import TIME
-from .reserved_names import RESERVED_WHERE_COUPLED, check_name
 
 STEEP_FUNCTIONS = ("exp", "tanh", "atan", "sinh", "cosh", "/")
+ANALYSES: dict[type, "ModelAnalysis"] = {}  # of lowered model classes; no attribute of them, see reserved_names.py
 # methods for some models only, with the default methods of these models
 OFFERED_WITH = {label: file.OFFERED_WITH for label, file, _ in methods if hasattr(file, "OFFERED_WITH")}
 
@@ -51,8 +51,6 @@ class ModelAnalysis(ContactAnalysis):
             self._dynamic_expressions(), (TIME, *self.states, *self.drivers, *self.input_rates), self.contacts
         )
         self.limits = self._find_limits()
-        for e in self.named if self.contacts and not self.rests_when_stuck else ():
-            check_name(e.name, e, RESERVED_WHERE_COUPLED)
 
     def _division_rules(self) -> tuple[Rule, ...]:
         """Return a rule for each parameter that divides in every evaluation and may be 0.

@@ -1,13 +1,14 @@
 """Names that variables of a model must not use: those of generated Python, and those reserved in C."""
 
-from collections.abc import Collection
+from inspect import get_annotations
 from keyword import iskeyword
 
 from ...runtime.contact_lcp import CoupledFriction
 from ...runtime.method_registry import methods
+from ...runtime.oscillator import Oscillator
 from ...runtime.stick_slip import DryFriction
 from .expressions import FUNCTIONS, Expression, ModelError
-from .model_declaration import KINDS
+from .model_declaration import KINDS, Model
 
 MATH = ("copysign", "inf", "nan", "pi", *FUNCTIONS)
 IMPORTS = {  # module -> names that generated code may import
@@ -21,28 +22,14 @@ IMPORTS = {  # module -> names that generated code may import
     "active_method": ("EXACT_ITEM", "METHOD_ITEMS"),
     "oscillator": ("Oscillator",),
 }
-ATTRIBUTES = (
-    "friction",
-    "solver",
-    "events",
-    "exact",
-    "x_base",
-    "t_base",
-    "time",
-    "method",
-    "condition_sides",
-    "condition_pieces",
-    "solver_class",
-    "violation_time",
-    "violation_value",
-)
 CLASSES = ("Solver", "Model", "Fmi3Slave")
+BASES = (Model, Oscillator, DryFriction, CoupledFriction)  # of declared and generated classes
+ATTRIBUTES = {name for base in BASES for name in (*dir(base), *get_annotations(base)) if not name.startswith("_")}
+FMI_NAMES = ("time", "solver", "events")  # of variables that each FMU has
 RESERVED = {
-    *("self", "t", *MATH, *ATTRIBUTES, *CLASSES),
+    *("self", "t", *MATH, *ATTRIBUTES, *FMI_NAMES, *CLASSES),
     *(name for names in IMPORTS.values() for name in names),
-    *(name for name in dir(DryFriction) if not name.startswith("__")),
 }
-RESERVED_WHERE_COUPLED = {*dir(CoupledFriction)}
 
 INTEGER_TYPES = """
     CHAR SCHAR UCHAR SHRT USHRT INT UINT LONG ULONG LLONG ULLONG SIZE WCHAR
@@ -74,13 +61,13 @@ def is_reserved_in_c(name: str) -> bool:
     return name in C_NAMES or name.startswith(FMI_PREFIXES)
 
 
-def check_name(name: str, e: Expression, reserved: Collection[str] = RESERVED) -> None:
+def check_name(name: str, e: Expression) -> None:
     """Raise ModelError for a name that a variable of a model cannot have."""
     if not str(name).isidentifier():
         raise ModelError(
             f"the name {name!r} is no identifier: use letters, digits and _, and no digit at the start", e.location
         )
-    if name in reserved or is_reserved_in_c(name) or iskeyword(name) or name.startswith("_"):
+    if name in RESERVED or is_reserved_in_c(name) or iskeyword(name) or name.startswith("_"):
         raise ModelError(f"the name {name} is reserved by the solver or by C: choose another name", e.location)
     if not name.isascii():
         raise ModelError(f"the name {name} is not ASCII, as C requires: choose another name", e.location)

@@ -15,6 +15,7 @@ from typing import Any
 from ...runtime import variable_declarations
 from ...runtime.variable_declarations import VariableOwner
 from ..embedded_modules import digest
+from ..equations.model_analysis import ANALYSES
 from ..equations.model_file import ModelFile
 from ..model_lookup import FMUS, find_model
 from ..syntax_trees import child_nodes
@@ -57,7 +58,7 @@ def import_lowered(source: ModelFile, features: FeatureSelection) -> type[Variab
     sys.meta_path.insert(0, LoweredModuleFinder(package, texts, lower_all(source, features), {f"{name}.py": file}))
     result = vars(import_module(f"{package}.{name}"))[model.__name__]
     result.real_only = features.real_only  # variable_declarations.py is not lowered here
-    result.analysis = source.analysis  # used by model description and page
+    ANALYSES[result] = source.analysis
     return result
 
 

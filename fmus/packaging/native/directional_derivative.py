@@ -26,6 +26,7 @@ from typing import Any
 
 from ..equations.expression_printer import ExpressionPrinter
 from ..equations.expressions import FUNCTIONS, Expression, Term
+from ..equations.model_analysis import ANALYSES
 from ..fmi_variables import DERIVATIVE_NAME, Variables
 from ..lowering import component_name, function_tree
 from ..lowering.import_hook import TREE_NAME
@@ -147,7 +148,7 @@ class TangentWriter:
             elif meaning.causality in ("input", "parameter") and name in fields:
                 self.seeds |= dict.fromkeys((name, f"{name}_polynomial"), fields[name])
         # derivatives of inputs with a declared rate -> the expressions that the rates give for them
-        derivatives = model.analysis.declared_derivatives()
+        derivatives = ANALYSES[model].declared_derivatives()
         texts = {e.name: ExpressionPrinter({}, (), (), 0).text(value) for e, value in derivatives.items()}
         self.input_derivatives = {name: parse_expression(text) for name, text in texts.items()}
         self.driver_rates = {fields[DERIVATIVE_NAME.format(name)]: d.rate for name, d in declared if d.rate}
