@@ -7,10 +7,10 @@ import build_cache
 import commands
 import pytest
 
-READY = "new Promise(done => { const wait = () => globalThis.app?.session.runs.main && Object.values(app.session.runs)"
-READY += ".every(run => run.done) ? requestAnimationFrame(() => done(true)) : setTimeout(wait, 5); wait() })"
-FOLLOWED = "new Promise(done => { const { runs } = app.session; location.hash = HASH;"
-FOLLOWED += "const look = () => app.session.runs === runs ? setTimeout(look, 1) : done(true); look() })"
+READY = (  # all runs are done and drawn
+    "new Promise(done => { const look = () => document.querySelector('main[data-ready]') ? done(true)"
+    ": setTimeout(look, 1); look() })"
+)
 DRAWN = "new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))"  # the next picture is complete
 SHIFTS = (
     "globalThis.shift = 0; new PerformanceObserver(list => { for (const entry of list.getEntries())"
@@ -45,7 +45,7 @@ class Page:
         if anew or not expected or expected.split("#")[0] != self.file.as_uri() or expected == link:
             self.browser.open(link)
         else:
-            self.run(FOLLOWED.replace("HASH", json.dumps(hash)))
+            self.run(f"delete document.querySelector('main').dataset.ready; location.hash = {json.dumps(hash)}")
         return self.run(READY)
 
     def run(self, script):

@@ -12,7 +12,7 @@ def test_a_slow_method_is_previewed_with_a_fast_one(page):
     values = page.run(
         "new Promise(done => { const e = document.querySelector('.field:has(#field-k) [type=range]');"
         "for (const at of [100, 200, 300]) { e.value = at; e.dispatchEvent(new Event('input')) }"
-        "requestAnimationFrame(() => { const { main, preview } = app.session.runs;"
+        "requestAnimationFrame(() => { const { main, preview } = app.runs;"
         "const [ghost, own] = app.plots.get('x').panel.content.curves.slice(-2);"
         "done([main.done, main.setting.values.k, preview.setting.values, ghost.x.at(-1), own.x.at(-1)]) }) })"
     )
@@ -23,16 +23,16 @@ def test_a_slow_method_is_previewed_with_a_fast_one(page):
         16,
         16,
     ]
-    assert page.run("app.session.runs.main.setting.values.k") == k
+    assert page.run("app.runs.main.setting.values.k") == k
 
 
 def test_comparing_two_laws_shows_the_difference_and_the_counters(page):
     page.open(".model=coulomb")
     page.choose("comparison", "coulomb")
-    assert page.run("app.session.runs.comparison.setting.values.friction") == 2
+    assert page.run("app.runs.comparison.setting.values.friction") == 2
     page.wait("document.getElementById('tables').textContent.includes('largest difference in x')")
     apart = page.run(
-        "(() => { const { main, comparison } = app.session.runs; return Math.max(...main.grid.map((row, i) => "
+        "(() => { const { main, comparison } = app.runs; return Math.max(...main.grid.map((row, i) => "
         "Math.abs(main.columns.x[row] - comparison.columns.x[comparison.grid[i]]))) })()"
     )
     assert 1e-6 < apart < 1e-2
@@ -62,7 +62,7 @@ def test_a_failed_run_of_a_comparison_is_named_and_has_no_error(page, link, role
     assert not any("difference" in row or "error" in row for row in page.table("Cost and accuracy"))
     assert page.run("app.plots.get('.error')?.figure.hidden ?? true")
     failed = "comparison" if "second" in role else "main"
-    *_, ends = page.run(f"[0, ...app.session.runs.{failed}.time]")
+    *_, ends = page.run(f"[0, ...app.runs.{failed}.time]")
     curve = "app.plots.get('x').panel.content.curves.find(curve => curve.colour === {!r})"
     shown = page.run(f"{curve.format('b' if 'second' in role else 'a')}?.x.at(-1) ?? 0")
     assert shown == ends < page.run("app.state().stop")
@@ -70,20 +70,20 @@ def test_a_failed_run_of_a_comparison_is_named_and_has_no_error(page, link, role
 
 def test_another_model_keeps_values_of_the_same_names(page):
     page.open(".model=stickslip&k=500&.compare=pacejka&.compare.x_m=0.005")
-    assert page.run("app.session.runs.comparison.setting.values.k") == 500
-    assert page.run("app.session.runs.comparison.setting.values.x_m") == 0.005
-    assert page.run("app.session.runs.comparison.columns.v.some((v, i) => i > 99 && v > 0 && v < 0.01)")  # it creeps
+    assert page.run("app.runs.comparison.setting.values.k") == 500
+    assert page.run("app.runs.comparison.setting.values.x_m") == 0.005
+    assert page.run("app.runs.comparison.columns.v.some((v, i) => i > 99 && v > 0 && v < 0.01)")  # it creeps
 
 
 def test_the_second_run_can_have_the_default_where_the_first_has_another_value(page):
     page.open(".model=coulomb&friction=2&solver.method=2&solver.rtol=0.001&.stop=2&.compare=coulomb")
-    assert page.run("app.session.runs.comparison.setting.values.friction") == 2
+    assert page.run("app.runs.comparison.setting.values.friction") == 2
     page.choose("comparison-friction", 1)
     page.choose("comparison-rtol", 0)
-    values = page.run("app.session.runs.comparison.setting.values")
+    values = page.run("app.runs.comparison.setting.values")
     assert (values["friction"], values["solver.rtol"]) == (1, 0)
     shown = "['friction', 'rtol'].map(id => document.getElementById(`comparison-${id}`).value)"
     assert page.run(shown) == ["1", "0"]
     page.choose("comparison-method", 1)
-    assert page.run("app.session.runs.comparison.setting.values['solver.method']") == 1
-    assert page.run("app.session.runs.main.setting.values.friction") == 2
+    assert page.run("app.runs.comparison.setting.values['solver.method']") == 1
+    assert page.run("app.runs.main.setting.values.friction") == 2

@@ -11,8 +11,8 @@ from models import MODELS, declared
 @pytest.mark.parametrize("name", MODELS)
 def test_the_default_run_shows_a_rest_that_begins_soon_after_the_default_stop_time(page, name):
     page.open(f".model={name}")
-    stop = page.run("app.session.models.get(app.state().model).stop")
-    shown, rest = page.run("[app.state().stop, app.session.runs.main.restTime() ?? null]")
+    stop = page.run("app.library.models.get(app.state().model).stop")
+    shown, rest = page.run("[app.state().stop, app.runs.main.restTime() ?? null]")
     assert stop <= shown <= 1.2 * stop
     if name == "coulomb":  # at rest after eight full swings
         assert rest == pytest.approx(8 * 2 * pi / sqrt(157.9), abs=1e-9)
@@ -33,7 +33,7 @@ def test_the_legend_explains_every_line_shading_and_mark(page, name):
     assert {"run", "second run", "without the changes"} <= {*drawn}
     assert all(text in legend for text in drawn)
     assert "change of a value" in legend
-    has_modes = page.run("app.session.models.get(app.state().model).contacts.length > 0")
+    has_modes = page.run("app.library.models.get(app.state().model).contacts.length > 0")
     assert ("sticks" in legend) == has_modes
 
 
@@ -42,7 +42,7 @@ def test_friction_has_one_sign_in_diagram_arrow_and_titles(page):
     page.open(".model=coulomb")
     page.seek(0.1)
     page.run(web_page.DRAWN)
-    force, speed = page.run("['F_friction', 'v'].map(name => app.session.runs.main.at(name, 0.1))")
+    force, speed = page.run("['F_friction', 'v'].map(name => app.runs.main.at(name, 0.1))")
     arrow = page.run("document.querySelector('#mechanism .force').getAttribute('d')")
     length = float(re.match(r"M\S+ \S+h(\S+)m", arrow)[1])
     assert speed < 0
@@ -72,10 +72,10 @@ def test_numbers_have_the_digits_of_the_computation_and_typeset_powers(page):
 @pytest.mark.parametrize("name", MODELS)
 def test_summaries_of_diagrams_state_the_extremes_of_the_run(page, name):
     page.open(f".model={name}")
-    x = page.run("app.session.models.get(app.state().model).bodies[0].position")
+    x = page.run("app.library.models.get(app.state().model).bodies[0].position")
     label, values, factor = page.run(
-        f"[app.plots.get('{x}').panel.content.description, app.session.runs.main.columns.{x},"
-        f"app.session.runs.main.fmu.variables.get('{x}').factor]"
+        f"[app.plots.get('{x}').panel.content.description, app.runs.main.columns.{x},"
+        f"app.runs.main.fmu.variables.get('{x}').factor]"
     )
     low, high = re.search(r"from (\S+) to (\S+),", label).groups()
     assert web_page.number(low) == pytest.approx(min(values) * factor, rel=5e-3)
@@ -85,7 +85,7 @@ def test_summaries_of_diagrams_state_the_extremes_of_the_run(page, name):
 @pytest.mark.parametrize("name", sorted({*MODELS} - {"smd"}))
 def test_the_friction_law_is_drawn_over_the_slip_speed_with_the_point_at_the_cursor(page, name):
     page.open(f".model={name}&.t=0.3")
-    body = page.run("app.session.models.get(app.state().model).bodies[0]")
+    body = page.run("app.library.models.get(app.state().model).bodies[0]")
     curves = page.run("app.plots.get('.law').panel.content.curves")
     held = [curve for curve in curves if curve["colour"] == "stick"]
     for curve in held:  # one vertical line
@@ -98,7 +98,7 @@ def test_the_friction_law_is_drawn_over_the_slip_speed_with_the_point_at_the_cur
             if curve["colour"] == "slip":
                 assert {round(abs(value) / force, 9) for value in curve["y"]} == {1}
     (point,) = page.run("app.plots.get('.law').plot.cursor.points")
-    at = "app.session.runs.main.at({!r}, 0.3) * app.session.runs.main.fmu.variables.get({!r}).factor"
+    at = "app.runs.main.at({!r}, 0.3) * app.runs.main.fmu.variables.get({!r}).factor"
     assert [point["x"], point["y"]] == page.run(
         f"[{at.format(body['slip'], body['slip'])}, {at.format(body['friction'], body['friction'])}]"
     )
@@ -107,11 +107,11 @@ def test_the_friction_law_is_drawn_over_the_slip_speed_with_the_point_at_the_cur
 @pytest.mark.parametrize("name", ["coulomb", "pendulum"])
 def test_the_value_of_a_force_that_jumps_is_never_between_its_values(page, name):
     page.open(f".model={name}")
-    (friction,) = page.run("app.session.models.get(app.state().model).contacts.map(({ name }) => name)")
-    before = "app.session.runs.main.events.slice(1, -1).map(({ t }) => Math.abs(app.session.runs.main.at(F, t - 1e-5)))"
+    (friction,) = page.run("app.library.models.get(app.state().model).contacts.map(({ name }) => name)")
+    before = "app.runs.main.events.slice(1, -1).map(({ t }) => Math.abs(app.runs.main.at(F, t - 1e-5)))"
     sizes = page.run(f"(F => {before})({friction!r})")
     assert sizes
-    largest = page.run(f"app.session.runs.main.largestMagnitude({friction!r})")
+    largest = page.run(f"app.runs.main.largestMagnitude({friction!r})")
     assert all(size > 0.9 * largest for size in sizes)
 
 

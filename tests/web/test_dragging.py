@@ -21,7 +21,7 @@ def path_of_pointer(page):
     """Return the points of a horizontal drag, for a pendulum along its arc, and where its body should be."""
     x, y = page.run(CENTRE)
     path = [step * (2 if page.run("innerWidth") > 1000 else 1) for step in PATH]
-    if page.run("app.session.models.get(app.state().model).bodies[0].kind") == "block":
+    if page.run("app.library.models.get(app.state().model).bodies[0].kind") == "block":
         return [(x + step, y) for step in path]
     pin_x, pin_y = page.run(PIN)
     radius = ((x - pin_x) ** 2 + (y - pin_y) ** 2) ** 0.5

@@ -41,7 +41,7 @@ def test_every_model_runs_and_bodies_stay_under_the_pointer_in_firefox(firefox):
         firefox.open(f"{page.as_uri()}#.model={name}")
         firefox.run(web_page.READY)
         firefox.run(NOTE_ERRORS)
-        assert firefox.run("[app.state().model, app.session.runs.main.failure]") == [name, ""]
+        assert firefox.run("[app.state().model, app.runs.main.failure]") == [name, ""]
         drag(firefox, "#mechanism")
         assert firefox.run(NOTED) == ""
     firefox.open(page.as_uri())

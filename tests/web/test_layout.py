@@ -67,25 +67,3 @@ def test_sticking_has_one_colour_and_slipping_another_in_mechanism_and_diagrams(
         page.run("new Promise(done => setTimeout(done, 300))")  # the colour has a transition
         colour = page.run(style.format(name)).lstrip("#")
         assert page.run(body) == f"rgb({', '.join(str(int(colour[i : i + 2], 16)) for i in (0, 2, 4))})"
-
-
-def test_the_projector_mode_shows_one_large_diagram_with_large_text(page):
-    page.browser.size(1280)
-    page.open(".model=coulomb")
-    fonts = (
-        "(() => { const { plot } = app.plots.get('x'); const sizes = new Set();"
-        "const context = document.createElement('canvas').getContext('2d');"
-        "context.fillText = () => sizes.add(parseFloat(context.font));"
-        "plot.draw(context, 900, 500); return [...sizes] })()"
-    )
-    shown = "[...document.querySelectorAll('figure')].filter(figure => figure.getBoundingClientRect().height).length"
-    height = "document.querySelector('.plot').getBoundingClientRect().height"
-    before = page.run(f"[{shown}, {height}]")
-    page.click("#projector")
-    page.wait(f"{shown} === 1")
-    assert page.run(height) > 1.5 * before[1]
-    assert page.run(fonts) == [18]
-    assert page.run("getComputedStyle(document.querySelector('figcaption')).fontSize") == "18px"
-    page.click("#projector")
-    page.wait(f"{shown} === {before[0]}")
-    assert page.run(fonts) == [11]

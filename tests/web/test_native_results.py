@@ -12,7 +12,7 @@ EXACT, CLOSED = (
     {"smd", "coulomb", "stickslip"},
 )  # relative to the largest value, where the motion has a closed form
 STATED = 1e-5  # another math library shifts the steps of the solver, within its tolerance
-ONE = "const main = app.session.runs.main;"
+ONE = "const main = app.runs.main;"
 TIMES = f"{ONE} main.grid.map(row => main.time[row])"
 COLUMNS = f"{ONE} main.reals.map(name => main.grid.map(row => main.columns[name][row]))"
 

@@ -9,7 +9,7 @@ pytestmark = pytest.mark.slow
 
 def test_a_change_during_playback_acts_from_then_on_only(page):
     page.open(".model=smd")
-    positions = page.run("[...app.session.runs.main.columns.x]")
+    positions = page.run("[...app.runs.main.columns.x]")
     page.click("#play")
     page.wait("app.state().t > 0.2")
     page.type_number("c", "20")
@@ -18,16 +18,16 @@ def test_a_change_during_playback_acts_from_then_on_only(page):
     assert change["name"] == "c"
     assert 0.2 < change["t"] < 4
     assert page.run("app.state().values") == {}
-    now = page.when_done("({ t: app.session.runs.main.time, x: app.session.runs.main.columns.x })")
+    now = page.when_done("({ t: app.runs.main.time, x: app.runs.main.columns.x })")
     before = [x for t, x in zip(now["t"], now["x"], strict=True) if t < change["t"]]
     assert before == positions[: len(before)]
     assert max(map(abs, now["x"][-200:])) < 0.1 * max(map(abs, positions[-200:]))
-    assert page.run("app.session.runs.unchanged.columns.x.length") == len(positions)
+    assert page.run("app.runs.unchanged.columns.x.length") == len(positions)
 
 
 def test_playback_repaints_no_curve_and_a_curve_is_limited_by_the_pixels(page):
     page.open(".model=pacejka&x_m=0.001&solver.method=2&solver.rtol=0.001&.t=1")
-    assert page.run("app.session.runs.main.time.length") > 60000
+    assert page.run("app.runs.main.time.length") > 60000
     painted = "[...app.plots.values()].reduce((sum, { plot }) => sum + plot.paints, 0)"
     before = page.run(painted)
     page.click("#play")
@@ -64,7 +64,7 @@ def test_pausing_keeps_the_values_in_force_and_changes_edit_those(page):
 def test_a_dragged_body_starts_where_it_is_released(page, name):
     page.browser.size(1280)
     page.open(f".model={name}")
-    body = page.run("app.session.models.get(app.state().model).bodies[0]")
+    body = page.run("app.library.models.get(app.state().model).bodies[0]")
     x, y = page.middle("#mechanism .body")
     page.browser.mouse("Pressed", x, y)
     page.browser.mouse("Moved", x + 30, y)
@@ -75,14 +75,14 @@ def test_a_dragged_body_starts_where_it_is_released(page, name):
     page.wait("app.state().t > 0")
     page.click("#play")
     assert start > declared(name)[body["start"]].start
-    assert page.when_done(f"app.session.runs.main.columns[{body['position']!r}][0]") == start
+    assert page.when_done(f"app.runs.main.columns[{body['position']!r}][0]") == start
 
 
 @pytest.mark.parametrize("name", MODELS)
 def test_dragging_a_moving_body_applies_a_force_until_release(page, name):
     page.browser.size(1280)
     page.open(f".model={name}&.t=0.3")
-    body = page.run("app.session.models.get(app.state().model).bodies[0]")
+    body = page.run("app.library.models.get(app.state().model).bodies[0]")
     x, y = page.middle("#mechanism .body")
     page.browser.mouse("Pressed", x, y)
     page.browser.mouse("Moved", x + 80, y)
@@ -93,7 +93,7 @@ def test_dragging_a_moving_body_applies_a_force_until_release(page, name):
     assert {change["name"] for change in changes} == {body["input"]}
     assert any(change["value"] for change in changes)
     assert changes[-1]["value"] == 0
-    apart = "app.session.runs.main.columns[p].at(-1) !== app.session.runs.unchanged.columns[p].at(-1)"
+    apart = "app.runs.main.columns[p].at(-1) !== app.runs.unchanged.columns[p].at(-1)"
     assert page.run(f"(p => {apart})({body['position']!r})")
 
 
@@ -119,12 +119,12 @@ def test_a_kick_is_a_push_of_finite_duration(page):
     first, last = page.when_done("app.state().changes")
     assert (first["name"], first["t"], last["value"]) == ("F_ext", 1, 0)
     assert 1 < last["t"] < 2
-    assert page.run("Math.max(...app.session.runs.main.columns.v.slice(100, 300))") > 0
+    assert page.run("Math.max(...app.runs.main.columns.v.slice(100, 300))") > 0
 
 
 def test_the_buttons_jump_to_the_next_and_the_previous_event(page):
     page.open(".model=coulomb")
-    times = page.run("app.session.runs.main.events.map(({ t }) => t)")
+    times = page.run("app.runs.main.events.map(({ t }) => t)")
     seen = []
     for _ in times:
         page.click("#next-event")

@@ -38,7 +38,7 @@ def test_a_slider_changes_the_run_and_shows_the_value_used(page):
     d = {name: meaning.start for name, meaning in declared("stickslip").items()}
     omega = sqrt(d["k"] / d["m"])
     peak = d["v_driver"] + sqrt(((d["mu_s"] - mu) * d["m"] * d["g"] / d["k"] * omega) ** 2 + d["v_driver"] ** 2)
-    assert page.run("Math.max(...app.session.runs.main.columns.v)") == pytest.approx(peak, rel=1e-3)
+    assert page.run("Math.max(...app.runs.main.columns.v)") == pytest.approx(peak, rel=1e-3)
 
 
 def test_the_next_frame_shows_a_changed_parameter(page):
@@ -90,7 +90,7 @@ def test_a_slider_stops_where_the_model_would_refuse_its_value_and_says_why(page
     text = page.run(f"{alert}.textContent")
     for part in ("above mu_s = 0.9", "lower mu_d or raise mu_s", f"the slider stops at mu_d = {mu_d:.4g}"):
         assert part in text
-    assert page.run("app.session.runs.main.failure") == ""
+    assert page.run("app.runs.main.failure") == ""
     assert page.run(SLIDE.format(stopped - 20, "mu_d")) == str(stopped - 20)
     assert page.when_done(f"{alert}.hidden")
     page.run(SLIDE.format(0, "mu_s"))  # the other parameter of the condition stops likewise
@@ -139,7 +139,7 @@ def test_a_decimal_comma_is_accepted_or_refused_but_never_read_as_another_number
 @pytest.mark.parametrize("name", MODELS)
 def test_extreme_numbers_are_reported_or_drawn_and_never_shown_as_nan(page, name):
     page.open(f".model={name}")
-    body = page.run("app.session.models.get(app.state().model).bodies[0]")
+    body = page.run("app.library.models.get(app.state().model).bodies[0]")
     figures = "document.getElementById('mechanism').innerHTML + document.querySelector('#panels').textContent"
     for variable, text in (
         ("start", "1e308"),

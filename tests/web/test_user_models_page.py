@@ -35,11 +35,11 @@ def test_the_models_of_fmus_more_run_on_a_second_page(quiet):
     page = web_page.Page(quiet, web_page.build_page("web-more", "--more", file="more.html"))
     assert [file.name for file in page.file.parent.iterdir()] == ["more.html"]
     page.open()
-    assert page.run("[...app.session.models.keys()]") == more_model_names()
+    assert page.run("[...app.library.models.keys()]") == more_model_names()
     for name in more_model_names():
         page.open(f".model={name}")
-        assert page.run("app.session.runs.main.failure") == ""
-        assert page.run("app.session.runs.main.time.at(-1)") >= find_model(name).model.stop_time
+        assert page.run("app.runs.main.failure") == ""
+        assert page.run("app.runs.main.time.at(-1)") >= find_model(name).model.stop_time
     check_servo(page)
 
 
@@ -48,7 +48,7 @@ def check_servo(page):
     page.open(".model=servo")
     (table,) = find_model("servo").analysis.tables
     columns = page.run(
-        "(({ columns: { v, mode, F_friction } }) => [v, mode, F_friction].map(c => [...c]))(app.session.runs.main)"
+        "(({ columns: { v, mode, F_friction } }) => [v, mode, F_friction].map(c => [...c]))(app.runs.main)"
     )
     slides = [(v, mode, force) for v, mode, force in zip(*columns, strict=True) if mode]
     assert len(slides) > 100
@@ -69,15 +69,15 @@ def test_user_models_run_on_a_page_of_their_own(quiet, tmp_path):
     for path, count in zip(files, (1, 2), strict=True):
         page.open(f".model={path.stem}")
         assert page.run("document.getElementById('method').parentElement.hidden")  # with one method there is no choice
-        assert page.run("app.session.runs.main.failure") == ""
-        assert page.run("app.session.runs.main.events.length") > 2
+        assert page.run("app.runs.main.failure") == ""
+        assert page.run("app.runs.main.events.length") > 2
         assert page.run("document.querySelectorAll('#mechanism .body').length") == count
         assert page.run("document.getElementById('body').parentElement.hidden") == (count == 1)
     check_table_values(page)
     page.open(".model=blocks")
     page.choose("body", 1)  # the plots of the motion come first here too
     shown = "[...document.querySelectorAll('figure')].filter(each => !each.hidden).map(each => each.id).slice(0, 3)"
-    second = page.run("app.session.models.get('blocks').bodies[1]")
+    second = page.run("app.library.models.get('blocks').bodies[1]")
     assert page.when_done(shown) == [f"panel-{second[name]}" for name in ("position", "speed", "acceleration")]
 
 
@@ -86,7 +86,7 @@ def check_table_values(page):
     page.open(".model=curve&force.y[2]=4.5")
     assert page.run("document.getElementById('field-force.y[2]').closest('#fields, #solver-fields').id") == "fields"
     assert page.run("document.getElementById('field-force.y[2]').value") == "4.5"
-    assert page.run("app.session.runs.main.columns.a[0]") == (0.75 * 1.0 + 0.25 * 4.5) / 2.0
+    assert page.run("app.runs.main.columns.a[0]") == (0.75 * 1.0 + 0.25 * 4.5) / 2.0
 
 
 def test_several_contacts_are_shaded_and_named_each(quiet):
@@ -98,7 +98,7 @@ def test_several_contacts_are_shaded_and_named_each(quiet):
     for key, rows in ((".sticking", ["F1", "F2"]), ("x1", ["F1", "F2"]), ("F1", ["F1"]), ("F2", ["F2"])):
         assert page.run(f"{content.format(key)}.rows") == rows
     sticks = page.run(f"{content.format('F2')}.bands")
-    speeds = "(({ time, columns: { v1, v2 } }) => time.map((t, i) => [t, v2[i] - v1[i]]))(app.session.runs.main)"
+    speeds = "(({ time, columns: { v1, v2 } }) => time.map((t, i) => [t, v2[i] - v1[i]]))(app.runs.main)"
     for t, slip in page.run(speeds):
         if any(band["from"] < t < band["to"] for band in sticks):
             assert abs(slip) < 1e-12

@@ -117,6 +117,6 @@ def test_numbers_in_a_message_are_formatted_as_in_python(page):
     doubles = (struct.unpack("<d", draw.randbytes(8))[0] for _ in range(300))
     values = [-abs(item) for item in (*NUMBERS, *doubles) if math.isfinite(item)]
     page.open(".model=stickslip")
-    result = "(m) => { try { app.session.runs.main.fmu.begin({ m }, 1) } catch (error) { return error.message } }"
+    result = "(m) => { try { app.runs.main.fmu.begin({ m }, 1) } catch (error) { return error.message } }"
     for item, sentence in zip(values, page.run(f"{json.dumps(values)}.map({result})"), strict=True):
         assert sentence.startswith(f"m = {item!r} kg is refused")

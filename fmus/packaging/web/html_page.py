@@ -22,22 +22,8 @@ from .model_json import ModelJson, build_model_json
 FILE, MORE_FILE = "index.html", "more.html"  # pages of the shipped models and of those in fmus/more
 HERE = Path(__file__).parent
 MODULES = (
-    *(
-        "libc",
-        "wasm",
-        "fmu",
-        "run",
-        "state",
-        "overrides",
-        "setting_lines",
-        "measure",
-        "session",
-        "plot",
-        "mechanism",
-        "drag",
-        "controls",
-    ),
-    *("legend", "panels", "diagrams", "form", "tables", "export"),
+    *("numbers", "libc", "wasm", "fmu", "run", "state", "library", "run_set", "measure", "plot", "panels", "controls"),
+    *("legend", "diagrams", "tables", "export", "mechanism", "drag", "scene", "explore"),
     *("animation", "background", "prose", "chart", "adjustable", "story_models", "story_bodies", "opening"),
     *("chatter_story", "story", "stories", "main"),
 )

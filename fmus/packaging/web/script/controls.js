@@ -1,6 +1,6 @@
 // Sliders, number fields and drop-down lists for the variables of a model.
 
-import { formatNumber, formatPower } from "./plot.js";
+import { formatScientific, formatValue } from "./numbers.js";
 import { findVariable } from "./state.js";
 
 const SLIDER_STEPS = 400;
@@ -43,60 +43,55 @@ function sliderValue(position, { low, high, log }, factor) {
   return Number(((low + fraction * (high - low)) * factor).toFixed(Math.min(digits, 12))) / factor;
 }
 
-// Return a function that estimates the typical size of a variable from its unit and the results of the default run.
-export function typicalSizes(main) {
-  const { modelInfo } = main.fmu;
+// Return a function that estimates the typical size of a variable from its unit and the results of a run.
+export function typicalSizes(run) {
+  const { modelInfo } = run.fmu;
   const [{ position, speed }] = modelInfo.bodies;
   const firstStart = (unit) => modelInfo.variables.find((variable) => variable.unit === unit && variable.start > 0)?.start ?? 1;
-  const length = findVariable(modelInfo, position).unit === "m" ? main.largestMagnitude(position) : firstStart("m");
-  const time = main.largestMagnitude(position) / main.largestMagnitude(speed);
+  const length = findVariable(modelInfo, position).unit === "m" ? run.largestMagnitude(position) : firstStart("m");
+  const time = run.largestMagnitude(position) / run.largestMagnitude(speed);
   const baseSizes = [firstStart("kg"), length, time, firstStart("A"), firstStart("K"), 1];
   return ({ unit, unit_exponents }) => {
-    const sameUnit = main.reals.filter((name) => findVariable(modelInfo, name).unit === unit).map((name) => main.largestMagnitude(name));
+    const sameUnit = run.reals.filter((name) => findVariable(modelInfo, name).unit === unit).map((name) => run.largestMagnitude(name));
     const size = Math.max(0, ...sameUnit) || unit_exponents.reduce((product, exponent, i) => product * baseSizes[i] ** exponent, 1);
     return Number.isFinite(size) && size > 0 ? Number(size.toPrecision(1)) : 1;
   };
 }
 
-// One row of the form: symbol, description, number field, unit and slider. Calls onChange(value) with the value in SI
-// units, onError(message) if the input is not a number, and onSlide(position, valueOf) if the slider moves; without it,
-// onChange.
+// One row of a form: symbol, description, number field, unit and slider. Calls change(value) with the value in SI units,
+// slide(position, valueOf) if the slider moves, and refuse(message) if the input is not a number.
 export class Field {
-  constructor(variable, typicalSize, onChange, onError, onSlide = (position, valueOf) => onChange(valueOf(position))) {
+  constructor(id, variable, range, { change, slide, refuse }) {
     const { name, text, display_unit, factor, symbol, allowed } = variable;
-    Object.assign(this, { variable, range: sliderRange(variable, typicalSize) });
-    const id = `field-${name}`;
+    Object.assign(this, { variable, range });
     const description = `${text}${display_unit ? `, in ${display_unit}` : ""}`;
     this.number = makeElement("input", { type: "text", autocomplete: "off", id, inputmode: "decimal", title: `${name}: ${allowed}` });
     this.slider = makeElement("input", { type: "range", min: 0, max: SLIDER_STEPS, step: 1, "aria-label": `${name}: ${description}` });
     const label = makeElement("label", { for: id }, makeElement("b", { html: symbol }), ` ${text}`);
     this.element = makeElement("div", { class: "field" }, label, makeElement("span", { class: "entry" }, this.number, makeElement("span", { class: "unit" }, display_unit)), this.slider);
-    this.slider.addEventListener("input", () => onSlide(Number(this.slider.value), (position) => sliderValue(position, this.range, factor)));
+    this.slider.addEventListener("input", () => slide(Number(this.slider.value), (position) => sliderValue(position, range, factor)));
     this.number.addEventListener("change", () => {
       const value = parseNumber(this.number.value);
-      if (!Number.isNaN(value)) return this.changeTo(value === Number(this.initialText) ? variable.start : value / factor, onChange);
+      if (!Number.isNaN(value)) {
+        const inSi = value === Number(this.textOf(variable.start)) ? variable.start : value / factor;
+        this.show(inSi);
+        return change(inSi);
+      }
       this.number.value = this.text;
-      onError(`${name} must be a number; it remains ${`${this.text} ${display_unit}`.trim()}.`);
+      refuse(`${name} must be a number; it remains ${`${this.text} ${display_unit}`.trim()}.`);
     });
-    this.initialText = this.formatValue(variable.start);
   }
 
-  formatValue(value) {
+  textOf(value) {
     return String(Number((value * this.variable.factor).toPrecision(FIELD_DIGITS)));
   }
 
-  changeTo(value, onChange) {
-    this.show(value);
-    onChange(value);
-  }
-
-  // Show a value in SI units, without calling onChange.
+  // Show a value in SI units.
   show(value) {
-    const { display_unit, factor } = this.variable;
-    this.text = this.formatValue(value);
+    this.text = this.textOf(value);
     if (this.number.value !== this.text) this.number.value = this.text;
     this.slider.value = this.position = sliderPosition(value, this.range);
-    this.slider.setAttribute("aria-valuetext", `${formatNumber(value * factor)} ${display_unit}`);
+    this.slider.setAttribute("aria-valuetext", formatValue(this.variable, value));
   }
 }
 
@@ -118,12 +113,6 @@ export class Choice {
   }
 }
 
-// A tolerance with a power of ten, also where a number of its size would be written without one.
-export function formatTolerance(value) {
-  const [mantissa, exponent] = value.toExponential().split("e").map(Number);
-  return mantissa === 1 ? formatPower(exponent) : `${mantissa}·${formatPower(exponent)}`;
-}
-
 // Read a number as typed, with a point or a comma as decimal sign; NaN if it is not a number, or has separators of thousands.
 export function parseNumber(text) {
   const plain = text.trim().replace("−", "-").replace(/^([^.,]*),([^.,]*)$/, "$1.$2");
@@ -131,12 +120,12 @@ export function parseNumber(text) {
   return Number.isFinite(value) ? value : NaN;
 }
 
-export const TOLERANCES = [1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11, 1e-12];
+const TOLERANCES = [1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11, 1e-12];
 
 // The options for a relative tolerance; zero is the default of the model.
 export function toleranceOptions(modelInfo, selected) {
   const all = selected && !TOLERANCES.includes(selected) ? [selected, ...TOLERANCES] : TOLERANCES;
-  return [[0, `default, ${formatTolerance(modelInfo.tolerance)}`], ...all.map((rtol) => [rtol, formatTolerance(rtol)])];
+  return [[0, `default, ${formatScientific(modelInfo.tolerance)}`], ...all.map((rtol) => [rtol, formatScientific(rtol)])];
 }
 
 // The options for an enumeration.

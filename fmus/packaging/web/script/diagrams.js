@@ -2,17 +2,17 @@
 
 import { makeElement } from "./controls.js";
 import { uniqueEntries } from "./legend.js";
-import { buildPanels, cursorReadings, legendOf } from "./panels.js";
-import { Plot, readColours } from "./plot.js";
+import { cursorReadings, legendOf } from "./panels.js";
+import { Plot } from "./plot.js";
 
 const SMALLEST_PART = 1e-9; // of an axis that can be enlarged
 
 export class Diagrams {
-  constructor(host, onSeek) {
-    Object.assign(this, { host, onSeek, plots: new Map() }); // by key: {plot, figure, heading, reading, showAll, panel}
+  // `prefix` distinguishes the ids of several scenes.
+  constructor(host, prefix, onSeek) {
+    Object.assign(this, { host, prefix, onSeek, plots: new Map() }); // by key: {plot, figure, heading, reading, showAll, panel}
     this.ranges = new Map(); // {x, y} of enlarged diagrams by key
     this.timeRange = null; // of all diagrams over time, if they are enlarged
-    readColours();
   }
 
   clear() {
@@ -22,9 +22,8 @@ export class Diagrams {
     this.host.replaceChildren();
   }
 
-  // Draw the diagrams of a state; `options` has `envelopes`.
-  draw(session, state, options) {
-    const panels = buildPanels(session, state, options);
+  // Draw these panels.
+  draw(panels) {
     for (const [key, { figure }] of this.plots) figure.hidden = !panels.some((panel) => panel.key === key);
     const added = panels.filter(({ key }) => !this.plots.has(key));
     for (const { key } of added) this.plots.set(key, this.createDiagram(key));
@@ -66,7 +65,7 @@ export class Diagrams {
     const reading = makeElement("span", { class: "reading" });
     const showAll = makeElement("button", { type: "button", class: "show-all", hidden: true }, "Show all");
     const host = makeElement("div", { class: "plot", role: "group", tabindex: 0, "aria-describedby": "zoom-help" });
-    const figure = makeElement("figure", { id: `panel-${key}` }, makeElement("figcaption", {}, heading, showAll, reading), host);
+    const figure = makeElement("figure", { id: `${this.prefix}panel-${key}` }, makeElement("figcaption", {}, heading, showAll, reading), host);
     const plot = new Plot(host, isOverTime(key) ? this.onSeek : null, (ranges) => this.zoom(key, ranges));
     showAll.addEventListener("click", () => {
       this.zoom(key, null);
@@ -76,9 +75,9 @@ export class Diagrams {
   }
 
   // Move the cursor to a time in s.
-  moveCursor(session, t) {
+  moveCursor(runs, t) {
     for (const { plot, panel, reading } of this.visible()) {
-      const { cursor, readings } = cursorReadings(panel, session, t);
+      const { cursor, readings } = cursorReadings(panel, runs, t);
       plot.moveCursor(cursor);
       reading.replaceChildren(...readings.map(({ text, colour }) => makeElement("span", { class: colour }, text)));
     }
@@ -95,7 +94,6 @@ export class Diagrams {
 
   // Redraw everything in the current colours.
   repaint() {
-    readColours();
     for (const { plot } of this.plots.values()) plot.paint();
   }
 }

@@ -1,7 +1,8 @@
 // Exports results as CSV.
 
-// The results of a run in SI units, or of two runs at the points of their common grid. Begins with the settings as comments.
-export function toCsv(main, comparison, settings) {
+// The results of a run in SI units, or of two runs at the points of their common grid. Begins with the settings, which the
+// link contains, as comments.
+export function toCsv({ main, comparison }, link) {
   const column = (run, prefix) => (name) => {
     const variable = run.fmu.variables.get(name);
     return { head: `${prefix}${name}${variable.unit ? ` [${variable.unit}]` : ""}`, values: run.columns[name], run };
@@ -11,7 +12,8 @@ export function toCsv(main, comparison, settings) {
   if (comparison) columns.push(...names(comparison).map(column(comparison, "compare.")));
   const rows = comparison ? Math.min(main.grid.length, comparison.grid.length) : main.time.length;
   const gridRow = (run, row) => (comparison ? run.grid[row] : row);
-  const lines = [...settings.map((line) => `# ${line}`), ["t [s]", ...columns.map(({ head }) => head)].join(",")];
+  const settings = [...new URLSearchParams(link.slice(1))].map(([key, value]) => `# ${key.replace(/^\./, "")} = ${value}`);
+  const lines = ["# friction-fmus; all values in SI units", ...settings, ["t [s]", ...columns.map(({ head }) => head)].join(",")];
   for (let row = 0; row < rows; row++) {
     lines.push([main.time[gridRow(main, row)], ...columns.map(({ values, run }) => values[gridRow(run, row)])].join(","));
   }

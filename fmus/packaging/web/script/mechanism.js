@@ -1,6 +1,7 @@
 // The animated mechanism. What it shows follows from the bodies that the model declares.
 
-import { formatNumber, ticks } from "./plot.js";
+import { formatNumber, formatValue } from "./numbers.js";
+import { ticks } from "./plot.js";
 import { findVariable } from "./state.js";
 
 const WIDTH = 800;
@@ -180,8 +181,7 @@ export class Mechanism {
 
   // The friction on a body: the negative of the variable, in the direction of the arrow.
   describeForce({ friction }, value) {
-    const { factor, display_unit } = findVariable(this.modelInfo, friction);
-    return `friction ${formatNumber(-value(friction) * factor, 3)} ${display_unit}`;
+    return `friction ${formatValue(findVariable(this.modelInfo, friction), -value(friction), 3)}`;
   }
 
   // Hide dampers with a coefficient of zero.
@@ -194,9 +194,8 @@ export class Mechanism {
   // The text alternative of the drawing.
   describe(value) {
     const descriptions = this.parts.map(({ body }) => {
-      const { display_unit, factor } = findVariable(this.modelInfo, body.position);
       const mode = body.mode ? (value(body.mode) === 0 ? ", stuck" : ", sliding") : "";
-      return `${body.position} = ${formatNumber(value(body.position) * factor, 3)} ${display_unit}${mode}`;
+      return `${body.position} = ${formatValue(findVariable(this.modelInfo, body.position), value(body.position), 3)}${mode}`;
     });
     return `Mechanism: ${descriptions.join("; ")}`;
   }

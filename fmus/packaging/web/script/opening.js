@@ -6,7 +6,7 @@ import { createFmu, HYBRID, ode23, positionAt, SIGN, simulate, startValues, Step
 import { StoryBlock } from "./story_bodies.js";
 import { makeAdjustable } from "./adjustable.js";
 import { Chart, gridLines, linearScale, modeCurve, palette, timeAxis } from "./chart.js";
-import { formatPower } from "./plot.js";
+import { formatPower } from "./numbers.js";
 import { countOf, fixedDigits, groupDigits, powerOfTen, significant, withUnit } from "./prose.js";
 
 const GRID_STEP = 0.005; // s

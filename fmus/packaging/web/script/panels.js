@@ -1,29 +1,29 @@
 // The content of the diagrams.
 
 import { difference, turningPoints } from "./measure.js";
-import { bounds, formatNumber } from "./plot.js";
+import { formatNumber, formatValue } from "./numbers.js";
+import { bounds } from "./plot.js";
 
 const MAX_MARKS = 400; // event marks
 const ENVELOPE_POINTS = 200;
 const MAX_PLOTTED_ROWS = 8000; // longer runs are plotted at grid points and events only
 
-// Return the diagrams as [{key, title, content}]. A diagram keeps its key from one state to the next. The key is the name
-// of the variable; other keys start with a dot, which no name does.
-export function buildPanels(session, state, options) {
-  const { main, comparison } = session.runs;
-  const modelInfo = session.models.get(state.model);
-  const body = modelInfo.bodies[state.body];
+// Return the diagrams of a scene as [{key, title, content}]. A diagram keeps its key from one state to the next. The key is
+// the name of the variable; other keys start with a dot, which no name does. With `envelopes`, the position has turning
+// points and envelopes.
+export function buildPanels(scene, { envelopes }) {
+  const { runs: { main, comparison }, modelInfo, body } = scene;
   const names = [body.position, body.speed, body.acceleration].filter(Boolean);
   const energy = modelInfo.variables.find(({ unit, causality }) => unit === "J" && causality === "output")?.name;
   const others = [...new Set([energy, body.friction, ...(body.contacts ?? [])].filter(Boolean))];
   const inputs = main.inputs.filter((name) => !names.includes(name) && main.largestMagnitude(name) > 0);
-  const panels = names.map((name) => timePanel(session, state, options, name));
-  panels.push(phasePanel(session, body));
-  if (body.slip) panels.push(lawPanel(session, body));
-  panels.push(timePanel(session, state, options, "solver.h", ".step", true));
-  panels.push(...[...others, ...inputs].map((name) => timePanel(session, state, options, name)));
-  if (modelInfo.contacts.length > 1) panels.push(stickingPanel(main, state));
-  const error = errorPanel(session, body, state);
+  const panels = names.map((name) => timePanel(scene, name, { envelopes }));
+  panels.push(phasePanel(scene));
+  if (body.slip) panels.push(lawPanel(scene));
+  panels.push(timePanel(scene, "solver.h", { key: ".step", log: true }), timePanel(scene, "solver.steps", { key: ".steps", log: true }));
+  panels.push(...[...others, ...inputs].map((name) => timePanel(scene, name)));
+  if (modelInfo.contacts.length > 1) panels.push(stickingPanel(scene));
+  const error = errorPanel(scene);
   if (error) panels.push(error);
   for (const panel of panels) panel.content.description ??= `${panel.title}${comparison ? ", two runs" : ""}: ${describeRange(panel, main)}`;
   return panels;
@@ -63,17 +63,15 @@ function runCurves({ main, comparison, unchanged, preview }, curveOf) {
 }
 
 // A variable of all runs over time.
-function timePanel(session, state, options, name, key = name, log = false) {
-  const { main } = session.runs;
+function timePanel({ runs, state, modelInfo: { contacts }, body }, name, { key = name, log = false, envelopes = false } = {}) {
+  const { main } = runs;
   const variable = main.fmu.variables.get(name);
   const { factor, display_unit, text, symbol } = variable;
-  const body = main.fmu.modelInfo.bodies[state.body];
   const isPosition = name === body.position;
-  const extras = isPosition ? positionCurves(main, body, options, factor) : [];
-  const curves = [...extras, ...runCurves(session.runs, (run) => curveData(run, variable))];
+  const extras = isPosition ? positionCurves(main, body, envelopes, factor) : [];
+  const curves = [...extras, ...runCurves(runs, (run) => curveData(run, variable))];
   const y = { ...bounds(curves.map((curve) => curve.y), log), log };
   const x = { low: 0, high: state.stop, label: "t in s" };
-  const { contacts } = main.fmu.modelInfo;
   const own = contacts.filter((contact) => contact.name === name);
   const shaded = own.length ? own : contacts.filter((contact) => body.contacts?.includes(contact.name));
   const content = { x, y, curves, ...stickingBands(main, shaded), marks: findMarks(main, state, isPosition) };
@@ -90,8 +88,7 @@ function stickingBands(run, contacts) {
 }
 
 // The sticking of all contacts over time, in a row for each.
-function stickingPanel(main, state) {
-  const { contacts } = main.fmu.modelInfo;
+function stickingPanel({ runs: { main }, state, modelInfo: { contacts } }) {
   const x = { low: 0, high: state.stop, label: "t in s" };
   const total = ({ mode }) => main.stuckIntervals(mode).reduce((sum, [from, to]) => sum + to - from, 0);
   const title = "sticking of each contact";
@@ -101,10 +98,10 @@ function stickingPanel(main, state) {
 }
 
 // Additional curves with the position: the driver, and optionally envelopes and turning points.
-function positionCurves(main, body, options, factor) {
+function positionCurves(main, body, hasEnvelopes, factor) {
   const curves = [];
   if (body.driver) curves.push({ ...curveData(main, { name: body.driver, factor }), colour: "soft", dash: [2, 3], width: 1, legend: "driver" });
-  if (!options.envelopes) return curves;
+  if (!hasEnvelopes) return curves;
   const turning = turningPoints(main.time, main.columns[body.position], main.columns[body.speed]);
   for (const envelope of envelopes(turning)) {
     for (const sign of [1, -1]) curves.push({ ...envelope, y: envelope.y.map((value) => sign * value * factor), colour: "event", width: 1 });
@@ -134,14 +131,13 @@ function findMarks(main, state, labelled) {
   const latest = new Map(); // of changes in quick succession, only the last gets a label
   for (const change of state.changes) latest.set(`${change.name} ${Math.round((40 * change.t) / state.stop)}`, change);
   const changes = [...latest.values()].map(({ t, name, value }) => {
-    const { factor, display_unit } = main.fmu.variables.get(name);
-    return { x: t, label: labelled ? `${name} ${formatNumber(value * factor, 3)} ${display_unit}` : " ", colour: "event" };
+    return { x: t, label: labelled ? `${name} ${formatValue(main.fmu.variables.get(name), value, 3)}` : " ", colour: "event" };
   });
   return [...events, ...changes];
 }
 
 // Friction over slip speed; the cursor is the point at its time.
-function lawPanel({ runs }, body) {
+function lawPanel({ runs, body }) {
   const [slip, friction] = [body.slip, body.friction].map((name) => runs.main.fmu.variables.get(name));
   const other = runs.comparison?.columns[slip.name] && runs.comparison.columns[friction.name] ? lawCurves(runs.comparison, body, slip, friction) : [];
   const curves = [...other.map((curve) => ({ ...curve, colour: "b", legend: "second run" })), ...lawCurves(runs.main, body, slip, friction)];
@@ -171,10 +167,10 @@ function lawCurves(run, body, slip, friction) {
 }
 
 // Speed over position.
-function phasePanel(session, body) {
-  const [x, v] = [body.position, body.speed].map((name) => session.runs.main.fmu.variables.get(name));
+function phasePanel({ runs, body }) {
+  const [x, v] = [body.position, body.speed].map((name) => runs.main.fmu.variables.get(name));
   const has = (run) => run.columns[x.name] && run.columns[v.name];
-  const curves = runCurves(session.runs, (run) => has(run) && { x: curveData(run, x).y, y: curveData(run, v).y, width: 1.2 });
+  const curves = runCurves(runs, (run) => has(run) && { x: curveData(run, x).y, y: curveData(run, v).y, width: 1.2 });
   const content = {
     x: { ...bounds(curves.map((curve) => curve.x)), label: `${x.name}${x.display_unit ? ` in ${x.display_unit}` : ""}` },
     y: bounds(curves.map((curve) => curve.y)), curves,
@@ -184,8 +180,7 @@ function phasePanel(session, body) {
 
 // Errors of the runs against the closed form, or else the difference between the two runs. Null if a run has failed: an
 // error up to the failure would say little.
-function errorPanel(session, body, state) {
-  const { main, comparison, reference } = session.runs;
+function errorPanel({ runs: { main, comparison, reference }, state, body }) {
   if ([main, comparison, reference].some((run) => run?.failure)) return null;
   const { factor, display_unit } = main.fmu.variables.get(body.position);
   const sameModel = state.comparison?.model === state.model;
@@ -220,7 +215,7 @@ export function legendOf({ content, arrow }) {
 }
 
 // The cursor of a diagram and the values there: {cursor, readings [{text, colour}]}.
-export function cursorReadings({ phase, name, factor }, { runs }, t) {
+export function cursorReadings({ phase, name, factor }, runs, t) {
   const [points, readings] = [[], []];
   for (const [run, colour] of [[runs.main, "a"], [runs.comparison, "b"]]) {
     if (!run?.time.length || (run.failure && t > run.time.at(-1)) || !(phase ?? [{ name }]).every((variable) => run.columns[variable.name])) continue;

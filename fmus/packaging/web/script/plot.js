@@ -1,9 +1,11 @@
 // A diagram: axes, curves, shaded intervals and marks on one canvas, the cursor on another on top.
 
+import { formatNumber, formatPower } from "./numbers.js";
+
 const RIGHT = 10;
 const TOP = 8;
-const FONT_SIZE = 11; // px, for which the margins at the texts of the axes are chosen
-const axisText = { size: FONT_SIZE, left: 58, bottom: 22 }; // the font size now, and the margins for it
+const FONT_SIZE = 11; // px
+const [LEFT, BOTTOM] = [58, 22]; // margins at the texts of the axes
 const TICK_COUNT = 5;
 const ROW_GAP = 4; // above and below a shaded row
 const CURSOR_SIZE = 3.5; // px
@@ -17,26 +19,6 @@ export function ticks(low, high, count = TICK_COUNT) {
   const step = [1, 2, 5, 10].map((factor) => factor * power).find((round) => round >= spacing * (1 - 1e-9));
   const [first, last] = [Math.ceil(low / step - 1e-9), Math.floor(high / step + 1e-9)];
   return Array.from({ length: last - first + 1 }, (_, i) => (first + i) * step);
-}
-
-const SUPERSCRIPTS = { "-": "⁻", ...Object.fromEntries([..."⁰¹²³⁴⁵⁶⁷⁸⁹"].map((digit, i) => [String(i), digit])) };
-
-// A power of ten, as in 10⁻⁶.
-export function formatPower(exponent) {
-  return `10${[...String(exponent)].map((character) => SUPERSCRIPTS[character]).join("")}`;
-}
-
-// Format a number with at most `digits` digits, without trailing zeros, with a typographic minus sign; very large and small
-// ones with a power of ten, as in 2.5·10⁻⁶.
-export function formatNumber(value, digits = 4) {
-  if (!Number.isFinite(value)) return "–";
-  let text = String(Number(value.toPrecision(digits)));
-  if (Math.abs(value) >= 1e5 || (value !== 0 && Math.abs(value) < 1e-3)) {
-    const [mantissa, power] = value.toExponential(digits - 1).split("e");
-    const factor = Number(mantissa);
-    text = factor === 1 ? formatPower(Number(power)) : `${factor}·${formatPower(Number(power))}`;
-  }
-  return text.replace(/-/g, "−");
 }
 
 // Format a tick with as many digits as distinguish it from its neighbours.
@@ -72,11 +54,9 @@ export function decimate(x, y, scale) {
 
 const colours = {}; // by name of the CSS variable
 
-// Read the current colours of the style sheet (light or dark) and the font size.
+// Read the current colours of the style sheet (light or dark).
 export function readColours() {
   const style = getComputedStyle(document.documentElement);
-  axisText.size = parseFloat(style.getPropertyValue("--plot-text")) || FONT_SIZE;
-  [axisText.left, axisText.bottom] = [58, 22].map((margin) => (margin * axisText.size) / FONT_SIZE);
   for (const name of ["a", "b", "ghost", "line", "soft", "hold", "event", "cursor", "stick", "slip"]) colours[name] = style.getPropertyValue(`--${name}`).trim();
 }
 
@@ -104,7 +84,7 @@ export class Plot {
     const at = (event) => {
       const { left, top } = this.host.getBoundingClientRect();
       const clamp = (value, low, high) => Math.min(Math.max(value, low), high);
-      return [clamp(event.clientX - left, axisText.left, this.width - RIGHT), clamp(event.clientY - top, TOP, this.height - axisText.bottom)];
+      return [clamp(event.clientX - left, LEFT, this.width - RIGHT), clamp(event.clientY - top, TOP, this.height - BOTTOM)];
     };
     const seek = (event) => this.onSeek?.(this.valuesAt(...at(event)).x);
     const showRectangle = (rectangle) => {
@@ -144,7 +124,7 @@ export class Plot {
     if (event.key === "Escape") [this.cancelRectangle(), this.onZoom(null)];
     else if (factor === 1 && !pan.some(Boolean)) return;
     else {
-      const [left, right, top, bottom] = [axisText.left, this.width - RIGHT, TOP, this.height - axisText.bottom];
+      const [left, right, top, bottom] = [LEFT, this.width - RIGHT, TOP, this.height - BOTTOM];
       const [x, y] = [(left + right) / 2 + pan[0] * (right - left), (top + bottom) / 2 - pan[1] * (bottom - top)];
       const [across, down] = [right - left, bottom - top].map((size) => (factor * size) / 2);
       const [start, end] = [this.valuesAt(x - across, y + down), this.valuesAt(x + across, y - down)];
@@ -157,9 +137,9 @@ export class Plot {
   valuesAt(px, py) {
     const { x, y } = this.content;
     const [low, high] = [y.low, y.high].map((value) => (y.log ? Math.log10(value) : value));
-    const value = high - ((py - TOP) / (this.height - TOP - axisText.bottom)) * (high - low);
+    const value = high - ((py - TOP) / (this.height - TOP - BOTTOM)) * (high - low);
     return {
-      x: x.low + ((px - axisText.left) / (this.width - axisText.left - RIGHT)) * (x.high - x.low),
+      x: x.low + ((px - LEFT) / (this.width - LEFT - RIGHT)) * (x.high - x.low),
       y: y.log ? 10 ** value : value,
     };
   }
@@ -182,9 +162,9 @@ export class Plot {
     const scale = this.scales(width, height);
     context.save();
     context.beginPath();
-    context.rect(axisText.left - CURSOR_SIZE, 0, width - axisText.left - RIGHT + 2 * CURSOR_SIZE, height - axisText.bottom + CURSOR_SIZE);
+    context.rect(LEFT - CURSOR_SIZE, 0, width - LEFT - RIGHT + 2 * CURSOR_SIZE, height - BOTTOM + CURSOR_SIZE);
     context.clip();
-    if (cursor.x !== undefined) line(context, colours.cursor, 1, [scale.x(cursor.x), TOP, scale.x(cursor.x), height - axisText.bottom]);
+    if (cursor.x !== undefined) line(context, colours.cursor, 1, [scale.x(cursor.x), TOP, scale.x(cursor.x), height - BOTTOM]);
     for (const { x, y, colour } of cursor.points) dot(context, colours[colour], scale.x(x), scale.y(y), CURSOR_SIZE);
     context.restore();
     if (!this.rectangle) return;
@@ -220,8 +200,8 @@ export class Plot {
     const transform = y.log ? (value) => (value > 0 ? Math.log10(value) : NaN) : (value) => value;
     const [low, high] = [transform(y.low), transform(y.high)];
     return {
-      x: (value) => axisText.left + ((value - x.low) / (x.high - x.low)) * (width - axisText.left - RIGHT),
-      y: (value) => TOP + ((high - transform(value)) / (high - low)) * (height - TOP - axisText.bottom),
+      x: (value) => LEFT + ((value - x.low) / (x.high - x.low)) * (width - LEFT - RIGHT),
+      y: (value) => TOP + ((high - transform(value)) / (high - low)) * (height - TOP - BOTTOM),
     };
   }
 
@@ -229,8 +209,8 @@ export class Plot {
   draw(context, width, height) {
     const { x, y, curves, bands = [], rows = [], marks = [] } = this.content;
     const scale = this.scales(width, height);
-    const [right, bottom] = [width - RIGHT, height - axisText.bottom];
-    context.font = `${axisText.size}px system-ui, sans-serif`;
+    const [right, bottom] = [width - RIGHT, height - BOTTOM];
+    context.font = `${FONT_SIZE}px system-ui, sans-serif`;
     context.lineJoin = "round";
     context.fillStyle = colours.hold;
     const rowHeight = (bottom - TOP) / Math.max(rows.length, 1);
@@ -241,12 +221,12 @@ export class Plot {
     context.fillStyle = colours.soft;
     context.textAlign = "right";
     context.textBaseline = "middle";
-    if (y.hidden) rows.forEach((name, row) => context.fillText(name, axisText.left - 6, TOP + (row + 0.5) * rowHeight, axisText.left - 8));
+    if (y.hidden) rows.forEach((name, row) => context.fillText(name, LEFT - 6, TOP + (row + 0.5) * rowHeight, LEFT - 8));
     const isDecade = y.log && y.high / y.low >= 10;
     const values = y.hidden ? [] : isDecade ? decades(y.low, y.high) : ticks(y.low, y.high);
     for (const value of values) {
-      line(context, colours.line, 1, [axisText.left, scale.y(value), right, scale.y(value)]);
-      context.fillText(isDecade ? formatPower(Math.round(Math.log10(value))) : formatTick(value, values), axisText.left - 6, scale.y(value));
+      line(context, colours.line, 1, [LEFT, scale.y(value), right, scale.y(value)]);
+      context.fillText(isDecade ? formatPower(Math.round(Math.log10(value))) : formatTick(value, values), LEFT - 6, scale.y(value));
     }
     context.textAlign = "center";
     context.textBaseline = "alphabetic";
@@ -261,7 +241,7 @@ export class Plot {
     context.fillText(x.label, width - 2, height - 6);
     context.save();
     context.beginPath();
-    context.rect(axisText.left, TOP, right - axisText.left, bottom - TOP);
+    context.rect(LEFT, TOP, right - LEFT, bottom - TOP);
     context.clip();
     for (const curve of curves) this.curve(context, curve, scale);
     for (const mark of marks) this.mark(context, mark, scale, right, bottom);

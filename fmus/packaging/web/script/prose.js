@@ -19,12 +19,12 @@ export function fixedDigits(value, decimals) {
   return typographicMinus(value.toFixed(decimals));
 }
 
-const PREFIXES = [[1, ""], [1e-3, "m"], [1e-6, "µ"], [1e-9, "n"]];
+const STORY_PREFIXES = [[1, ""], [1e-3, "m"], [1e-6, "µ"], [1e-9, "n"]];
 
 // A quantity with a unit that suits its size, as 1.3 mm.
 export function withUnit(value, digits, unit) {
   if (value === 0) return `0 ${unit}`;
-  const [size, prefix] = PREFIXES.find(([least]) => Math.abs(value) >= 0.9995 * least) ?? PREFIXES.at(-1);
+  const [size, prefix] = STORY_PREFIXES.find(([least]) => Math.abs(value) >= 0.9995 * least) ?? PREFIXES.at(-1);
   return `${significant(value / size, digits)}\u00a0${prefix}${unit}`;
 }
 

@@ -171,8 +171,8 @@ const specs = {
 export async function startStories(session, firstPicture) {
   readPalette();
   for (const query of ["(prefers-color-scheme: dark)", "(forced-colors: active)"]) matchMedia(query).addEventListener("change", readPalette);
-  const opening = await showOpening(session);
   await firstPicture;
+  const opening = await showOpening(session);
   const stories = {};
   for (const [name, spec] of Object.entries(specs)) {
     await becomeIdle();

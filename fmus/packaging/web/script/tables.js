@@ -1,16 +1,17 @@
 // The tables below the diagrams.
 
-import { formatTolerance, makeElement } from "./controls.js";
+import { makeElement } from "./controls.js";
 import { COUNTS } from "./fmu.js";
 import { decayBetween, difference, frictionFromEnergy, turningPoints } from "./measure.js";
-import { formatNumber } from "./plot.js";
+import { formatNumber, formatScientific, formatValue } from "./numbers.js";
 import { effectiveValues } from "./state.js";
 
 const MAX_LISTED_EVENTS = 60;
 const CLOSED_FORM_DIGITS = 9;
 const LEAST_DIGITS = 4;
 
-function table(caption, headings, rows) {
+// A table that scrolls on narrow screens. The first cell of a row is its heading.
+export function table(caption, headings, rows) {
   const head = makeElement("tr", {}, ...headings.map((text) => (text ? makeElement("th", { scope: "col" }, text) : makeElement("td"))));
   const body = rows.map(([first, ...cells]) => makeElement("tr", {}, makeElement("th", { scope: "row" }, first), ...cells.map((cell) => makeElement("td", {}, cell))));
   return makeElement("div", { class: "scroll", tabindex: 0, role: "region", "aria-label": caption },
@@ -30,16 +31,13 @@ function significantDigits(run) {
 export function describeSettings(run) {
   const values = effectiveValues(run.fmu.modelInfo, run.setting.values);
   const label = (name) => run.fmu.variables.get(name)?.items.find(({ value }) => value === values[name])?.label;
-  const rtol = values["solver.rtol"] ? `rtol ${formatTolerance(values["solver.rtol"])}` : "";
+  const rtol = values["solver.rtol"] ? `rtol ${formatScientific(values["solver.rtol"])}` : "";
   return [run.fmu.modelInfo.name, label("friction"), label("solver.method"), rtol].filter(Boolean).join(", ");
 }
 
 // Steps, run times and errors of the runs.
-export function costTable(session, state) {
-  const { main, comparison, reference } = session.runs;
+export function costTable({ runs: { main, comparison, reference }, body }) {
   const runs = [main, comparison].filter(Boolean);
-  const body = session.models.get(state.model).bodies[state.body];
-  const { display_unit, factor } = main.fmu.variables.get(body.position);
   const rows = [
     ...Object.entries(COUNTS).map(([name, label]) => [label, ...runs.map((run) => String(run.counts?.[name] ?? ""))]),
     ["run time, including grid points", ...runs.map((run) => `${formatNumber(1000 * run.seconds, 2)} ms`)],
@@ -47,32 +45,26 @@ export function costTable(session, state) {
   const hasFailed = [main, comparison, reference].some((run) => run?.failure);
   const failure = (run) => (!run.failure ? "" : run.time.length ? `at ${formatNumber(run.time.at(-1))} s` : "does not start");
   if (runs.some((run) => run.failure)) rows.unshift(["fails", ...runs.map(failure)]);
-  const largestError = (run) => (run === reference ? "closed form" : `${formatNumber(difference(reference, run, body.position).largest * factor, 3)} ${display_unit}`);
+  const largest = (from, to, name) => formatValue(main.fmu.variables.get(name), difference(from, to, name).largest, 3);
+  const largestError = (run) => (run === reference ? "closed form" : largest(reference, run, body.position));
   const hasReference = (run) => run.fmu.modelInfo === reference?.fmu.modelInfo;
   if (reference?.done && !hasFailed) rows.push([`largest error of ${body.position} against the closed form`, ...runs.map((run) => (hasReference(run) ? largestError(run) : ""))]);
   if (!hasFailed && comparison?.columns[body.position] && comparison.columns[body.speed]) {
-    const largestDifference = (name) => {
-      const variable = main.fmu.variables.get(name);
-      return `${formatNumber(difference(main, comparison, name).largest * variable.factor, 3)} ${variable.display_unit}`;
-    };
-    rows.push([`largest difference in ${body.position}`, "", largestDifference(body.position)], [`largest difference in ${body.speed}`, "", largestDifference(body.speed)]);
+    rows.push(...[body.position, body.speed].map((name) => [`largest difference in ${name}`, "", largest(main, comparison, name)]));
   }
   return table("Cost and accuracy", ["", ...runs.map(describeSettings)], rows);
 }
 
 // Decay measured from the turning points.
-export function decayTable(session, state) {
-  const { main } = session.runs;
-  const modelInfo = session.models.get(state.model);
-  const body = modelInfo.bodies[state.body];
-  const { display_unit, factor } = main.fmu.variables.get(body.position);
+export function decayTable({ runs: { main }, modelInfo, body }) {
   const turning = turningPoints(main.time, main.columns[body.position], main.columns[body.speed]);
   const decreasing = turning.filter(({ x }, i) => i === 0 || Math.abs(x) < Math.abs(turning[i - 1].x));
   const [first, last] = [decreasing[0], decreasing.at(-1)];
   const decay = decreasing.length > 2 && decayBetween(Math.abs(first.x), Math.abs(last.x), (decreasing.length - 1) / 2);
   if (!decay) return null;
   const digits = Math.min(6, significantDigits(main));
-  const size = (x) => `${formatNumber(Math.abs(x) * factor, digits)} ${display_unit}`;
+  const position = main.fmu.variables.get(body.position);
+  const size = (x) => formatValue(position, Math.abs(x), digits);
   const rows = [
     ["turning points", String(turning.length)],
     ["first, and last that is smaller than the one before", `${size(first.x)}, ${size(last.x)}`],
@@ -83,15 +75,13 @@ export function decayTable(session, state) {
   const energy = modelInfo.variables.find(({ unit, causality }) => unit === "J" && causality === "output");
   if (energy) {
     const force = frictionFromEnergy(main, body, energy.name, decreasing);
-    rows.push(["mean friction from energy loss (all losses)", `${formatNumber(force, digits)} ${display_unit === "deg" ? "N·m" : "N"}`]);
+    rows.push(["mean friction from energy loss (all losses)", `${formatNumber(force, digits)} ${position.unit === "rad" ? "N·m" : "N"}`]);
   }
   return table("Decay", ["", "measured"], rows);
 }
 
 // The events with their times.
-export function eventTable(session, state) {
-  const { main } = session.runs;
-  const { contacts } = session.models.get(state.model);
+export function eventTable({ runs: { main }, modelInfo: { contacts } }) {
   if (!main.events.length) return null;
   const stateAfter = { "-1": "slides backward", 0: "sticks", 1: "slides forward" };
   const describe = ({ name, mode }) => (contacts.length > 1 ? `${name} ${stateAfter[mode]}` : stateAfter[mode]);
