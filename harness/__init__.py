@@ -8,10 +8,18 @@ import os
 import signal
 import sys
 
-if signal.getsignal(signal.SIGINT) == signal.default_int_handler and (
-    sys.orig_argv[1:3] == ["-m", "harness"] or "".join(sys.orig_argv[1:2]).endswith("friction-fmus")
-):  # a command handles Ctrl-C after these imports, in `interruptible`; no traceback before that
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
+if sys.orig_argv[1:3] in (["-m", "harness"], ["-m", "build_fmus"]) or "".join(sys.orig_argv[1:2]).endswith(
+    ("friction-fmus", "build_fmus.py")
+):  # a command: after these imports, `interruptible` handles both signals
+
+    def exit_early(number: int, frame: object) -> None:
+        """End a command at a signal with the message and the exit status of `interruptible`."""
+        os.write(2, b"Error: interrupted\n" if number == signal.SIGINT else b"Error: terminated\n")
+        os._exit(128 + number)
+
+    for number in (signal.SIGINT, signal.SIGTERM):
+        if signal.getsignal(number) != signal.SIG_IGN:
+            signal.signal(number, exit_early)
 
 if sys.argv[:1] == ["-m"]:  # python -m harness: no file of the working folder, such as a model math.py, is imported
     HERE = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))

@@ -183,6 +183,12 @@ def path(value: Any) -> str | Path:
     return value
 
 
+def check_interval(begin: float, end: float) -> None:
+    """Raise SceneError unless a part of a record, in s, begins before it ends."""
+    if not begin < end:
+        raise SceneError(f"begin = {begin!r} s must be before end = {end!r} s")
+
+
 def items(value: Any) -> list[Any]:
     """Return the items of a sequence or another iterable, or a single text or path as the only one."""
     if isinstance(value, str | Path):
@@ -238,7 +244,8 @@ def to_array(value: Any) -> "np.ndarray":
 
     if np.ma.is_masked(value):
         return np.ma.filled(value.astype(float), np.nan)  # numpy.asarray would return what the mask hides
-    array = np.asarray(value)
+    has_texts = isinstance(value, list | tuple) and any(isinstance(item, str) for item in value)
+    array = np.asarray(value, object if has_texts else None)  # an array of texts would take n times the longest one
     if array.dtype.kind == "m":
         return array / np.timedelta64(1, "s")
     if array.dtype.kind == "O" and all(isinstance(item, Number) and not is_boolean(item) for item in array.flat):
@@ -313,6 +320,13 @@ def progress(value: Any) -> Any:
     return value
 
 
+def axes(value: Any) -> Any:
+    """Return axes of matplotlib."""
+    if not hasattr(value, "transAxes"):
+        raise TypeError
+    return value
+
+
 FINITE = Rule("a finite number", real, float)
 POSITIVE = Rule("a finite number above 0", above_zero, float, "x>0")
 NONNEGATIVE = Rule("a finite number of at least 0", at_least_zero, float, "x>=0")
@@ -335,4 +349,5 @@ HEADINGS = names_with(TEXT, "headings", lambda name: name)
 INTERFACE = choice("interface", INTERFACES)
 QUANTITY = choice("quantity", QUANTITIES)
 METHOD = Rule("a name or a number", method)
+AXES = Rule("axes of matplotlib", axes)
 PROGRESS = Rule("a function of one number, or False", progress)

@@ -81,10 +81,10 @@ def unknown_source_message(category: str, source: str, allowed: Iterable[str], o
     return f"{quoted} does not exist; {message}" if is_path else f"{message}; no file or folder {quoted} exists"
 
 
-def check_names(category: str, names: Iterable[str], allowed: Collection[str]) -> None:
-    """Raise SceneError for the first name that is not allowed."""
+def check_names(category: str, names: Iterable[object], allowed: Collection[str]) -> None:
+    """Raise SceneError for the first name that is not allowed, or no text."""
     for name in names:
-        if name not in allowed:
+        if not isinstance(name, str) or name not in allowed:
             raise SceneError(unknown_name_message(category, name, allowed))
 
 

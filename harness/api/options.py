@@ -5,7 +5,7 @@ from dataclasses import replace
 from functools import wraps
 from typing import TYPE_CHECKING, ParamSpec, TypeVar
 
-from ..arguments import Progress
+from ..arguments import Progress, check_interval
 from ..errors import SceneError
 from ..process.progress_bar import show_progress
 
@@ -39,8 +39,8 @@ def check_time_range(time: str | None, rate: float | None, begin: float | None, 
     """Raise SceneError if the options for the times of a record exclude each other."""
     if rate is not None and time is not None:
         raise SceneError("rate replaces the times in the column that `time` names: leave one of them out")
-    if begin is not None and end is not None and not begin < end:
-        raise SceneError(f"begin = {begin!r} s must be before end = {end!r} s")
+    if begin is not None and end is not None:
+        check_interval(begin, end)
 
 
 def apply_options(

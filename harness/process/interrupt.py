@@ -11,7 +11,7 @@ import signal
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from signal import SIG_DFL, SIGINT, SIGTERM, default_int_handler
+from signal import SIG_IGN, SIGINT, SIGTERM
 from threading import current_thread, main_thread
 from time import sleep
 from traceback import clear_frames
@@ -89,7 +89,7 @@ def exit_after_signal() -> None:
 def interruptible() -> Iterator[None]:
     """Handle both signals in the block, unless they are ignored, and raise CommandInterruptedError."""
     for number in SIGNALS:
-        if signal.getsignal(number) in (default_int_handler, SIG_DFL):
+        if signal.getsignal(number) != SIG_IGN:
             signal.signal(number, handle_signal)
     sys.unraisablehook = ignore_unraisable_interrupt
     atexit.register(exit_after_signal)  # registered first, called last

@@ -8,6 +8,7 @@ from typing import Self
 
 import numpy as np
 
+from ..arguments import FINITE, check_arguments, check_interval
 from ..errors import SceneError, option_text
 from .columns import Column, ColumnOptions, find_column_and_unit, list_columns, no_time_message
 from .extraction import Samples, Source, extract, find_time_axis, has_times, mark_missing_output
@@ -91,8 +92,10 @@ class Record:
     def __repr__(self) -> str:
         return f"<Record of {self.name}: {', '.join(filter(None, self.table.column_headings)) or 'no headings'}>"
 
+    @check_arguments(begin=FINITE, end=FINITE)
     def select(self, begin: float, end: float) -> Self:
-        """Return the part of the record from `begin` to `end` in s."""
+        """Return the part of the record from `begin` to `end` in s; SceneError if `begin` is not before `end`."""
+        check_interval(begin, end)
         first, last = self.options.interval
         return replace(self, options=replace(self.options, begin=max(begin, first), end=min(end, last)))
 

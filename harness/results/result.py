@@ -7,6 +7,7 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
+from ..arguments import AXES, FLAG, PATH, check_arguments
 from ..errors import HarnessError, check_names, import_optional
 from .folder import OVERWRITE, replace_folder
 from .provenance import write_provenance
@@ -95,6 +96,7 @@ class Result(ABC):
         frame: pandas.DataFrame = library.DataFrame(rows).set_index(index)
         return frame
 
+    @check_arguments(ax=AXES)
     def plot(self, *, ax: "Axes | None" = None) -> "np.ndarray":
         """Plot the result with pyplot, so that notebooks show it: the same figure that the command saves.
 
@@ -131,6 +133,7 @@ class Result(ABC):
                 text.set_parse_math(False)
         return np.array(figure.axes)
 
+    @check_arguments(folder=PATH, overwrite=FLAG)
     def save(self, folder: str | Path, overwrite: bool = False) -> None:
         """Write the result into a folder: its files, figure, provenance and summary; `load_result` reads it.
 
@@ -184,9 +187,10 @@ class Result(ABC):
         return (folder / DATA_FILE).is_file()
 
     @classmethod
-    def load(cls, folder: Path) -> Self:
+    @check_arguments(folder=PATH)
+    def load(cls, folder: str | Path) -> Self:
         """Read the result in a folder; SceneError if its data are damaged."""
-        return read_data(cls, folder / DATA_FILE)
+        return read_data(cls, Path(folder) / DATA_FILE)
 
     def __getitem__(self, name: str) -> Any:
         """Return a part of the result by its key in the JSON."""

@@ -170,9 +170,14 @@ def wrap_text(text: Text, width: float) -> None:
         text.set_text("\n".join(map(folded.fill, lines)))
 
 
+def is_drawable(values: Any) -> Any:
+    """Return whether numbers, in an array of numpy or xarray, are small enough for an axis."""
+    return abs(values) < MAX_DRAWN_VALUE
+
+
 def mask_undrawable(y: np.ndarray) -> np.ndarray:
     """Return values (n,) with NaN for those that are too large for an axis."""
-    return np.where(np.abs(y) < MAX_DRAWN_VALUE, y, np.nan)
+    return np.where(is_drawable(y), y, np.nan)
 
 
 def axis_label(name: str, unit: str) -> str:

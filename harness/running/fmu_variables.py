@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..arguments import CO_SIMULATION, MODEL_EXCHANGE
-from ..errors import import_optional
+from ..errors import check_names, import_optional
 from .fmu_archive import read_description
 from .model_data import LookupTable, read_model_data
 from .variable_values import ExclusiveBound, effective_value, enumeration_labels, find_bound, variable_unit
@@ -115,7 +115,9 @@ class FmuDescription:
         return self._choices(METHOD)
 
     def __getitem__(self, name: str) -> VariableInfo:
-        return next(variable for variable in self.variables if variable.name == name)
+        by_name = {variable.name: variable for variable in self.variables}
+        check_names("variable", [name], by_name)
+        return by_name[name]
 
     def summary(self) -> str:
         """Return the description as text: defaults, laws and methods, and a table of the variables of each group."""

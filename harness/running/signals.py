@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..arguments import AXES, FINITE, TEXT, check_arguments
 from ..errors import HarnessError, check_names, import_optional
 from ..scenes.roles import find_roles
 
@@ -65,10 +66,12 @@ class ModeChanges:
 
     def changes(self, contact: str) -> tuple[np.ndarray, np.ndarray]:
         """Return times (m,) in s and modes (m,) of one contact, without the changes of the others."""
+        check_names("contact", [contact], self.modes)
         modes = self.modes[contact]
         is_change = np.append(True, (np.diff(modes) != 0) | (len(self.modes) == 1))
         return self.t[is_change], modes[is_change]
 
+    @check_arguments(stop=FINITE)
     def sticking(self, contact: str, stop: float) -> list[tuple[float, float]]:
         """Return the intervals of time in s in which a contact sticks, up to the stop."""
         times, modes = self.changes(contact)
@@ -152,7 +155,7 @@ class Signals:
         return self.columns[name]
 
     def __contains__(self, name: object) -> bool:
-        return name in self.columns
+        return isinstance(name, str) and name in self.columns
 
     def __iter__(self) -> Iterator[str]:
         return iter(self.columns)
@@ -217,6 +220,7 @@ class Signals:
         dataset: xarray.Dataset = library.Dataset(variables, {"time": time}, self.attributes)
         return dataset
 
+    @check_arguments(x=TEXT, ax=AXES)
     def plot(self, *names: str, x: str | None = None, ax: "Axes | None" = None) -> "np.ndarray":
         """Plot outputs over time, one panel each, and input signals; shade the times when the contact sticks.
 
@@ -248,7 +252,9 @@ class Signals:
         if ax is not None:
             if len(names) > 1:
                 raise HarnessError(f"ax has room for one output, and {len(names)} are named: name one")
-            plot_output(ax, self, (*names, *self.plotted)[0], x)
+            if not (chosen := names or self.plotted):
+                raise HarnessError(f"{self.name} has no output with a curve")
+            plot_output(ax, self, chosen[0], x)
             return np.array([ax])
         figure = plt.figure()
         return draw_panels(figure, self, names or self.plotted, [] if names or x else self.plotted_inputs, x)
@@ -293,7 +299,7 @@ class Signals:
 
     def find_changes(self, name: str) -> list[tuple[float, int]]:
         """Return every change of an integer output as (time in s, new value)."""
-        values = self.columns[name]
+        values = self[name]
         after = np.flatnonzero(np.diff(values)) + 1
         return list(zip(self.time[after].tolist(), values[after].tolist(), strict=True))
 

@@ -1,5 +1,6 @@
 """Arrays and columns of any type hold the numbers that their library shows: none that a mask hides."""
 
+import tracemalloc
 from decimal import Decimal
 
 import numpy as np
@@ -85,6 +86,17 @@ def test_an_index_without_a_name_is_the_time_if_no_column_is(user_folder, monkey
     for index in (range(401), run.time[::-1]):
         with pytest.raises(harness.SceneError, match="the record has one column of numbers, x, and no times"):
             harness.identify_decay(frame.set_index(pandas.Index(index)))
+
+
+def test_a_long_text_takes_the_memory_of_one_text():
+    """Not that of one in each row."""
+    notes = ["a" * 100_000, *["ok"] * 1999]
+    table = {"t": np.arange(2000.0), "x": np.arange(2000.0), "note": notes}
+    tracemalloc.start()
+    with pytest.raises(harness.SceneError, match="the column note of the record holds texts, as 'aaa"):
+        harness.compare(table, table)
+    assert tracemalloc.get_traced_memory()[1] < 5e6
+    tracemalloc.stop()
 
 
 def test_tables_of_xarray_are_records(user_folder, monkeypatch):

@@ -98,6 +98,10 @@ CURVE = [  # changes of harness.identify_curve of forces over velocities
     ({"record": {"v [m/s]": SWING, "i [A]": SWING}, "current": "i [A]"}, "as in constant='0.12 N.m/A'"),
     ({"record": {"F [N]": SWING}}, "no column of velocities (it has F [N]): name it, as in velocity='v'"),
     ({"record": {"v [m/s]": SWING}}, "no column of forces (it has v [m/s]): name it, as in force='F'"),
+    *(
+        ({"record": {"v [m/s]": v * SWING, "F [N]": F * SWING}}, "outside 1e-100 to 1e+100: check its unit")
+        for v, F in ((1.0, 1e-200), (1.0, 1e160), (1e-160, 1.0), (1e300, 1.0))
+    ),
     ({"record": {"v [m/s]": SWING, "F [N.m]": SWING}}, "or set the right unit, as in force='F [N]'"),
 ]
 SWEEP = [  # changes of harness.sweep("smd", {"k": [1.0]})
@@ -126,6 +130,7 @@ FIT = [  # changes of a fit of mu_s of the sled to its position
     ({"fixed": {"m": -1.0}}, "m = -1.0 is outside its range"),
     ({"start": {"m": 1.0}}, "unknown free parameter 'm'; allowed: mu_s"),
     ({"free": {"mu_s": (0.1, 2.0)}, "start": {"mu_s": 99.0}}, "the start value 99.0 of mu_s is outside its range"),
+    ({"sigma": {"x": 5e-324}}, "give the standard deviation of the noise, at least 2e-50"),
     ({"sigma": {"x": 0.0}}, "sigma: x = 0.0 must be a finite number above 0"),
     ({"free": {"delay(x)": (0.0, 20.0)}}, "delay(x) = 0.0:20.0 reaches beyond the record, which lasts 16 s"),
     ({"free": ["delay(x)"], "start": {"delay(x)": 5.0}}, "the start value 5.0 of delay(x) is outside its range"),

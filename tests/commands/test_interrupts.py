@@ -249,11 +249,9 @@ def test_a_swallowed_interrupt_is_raised_at_the_next_report_of_progress(workspac
     assert not (workspace / "results").exists() or not list((workspace / "results").iterdir())
 
 
-def interrupt_import(folder, library, arguments):
+def interrupt_import(folder, library, arguments, number=signal.SIGINT):
     """Return exit status, output and messages of a command in which an imported library interrupts the process."""
-    (folder / f"{library}.py").write_text(
-        "import os, signal, time\nos.kill(os.getpid(), signal.SIGINT)\ntime.sleep(60)\n"
-    )
+    (folder / f"{library}.py").write_text(f"import os, time\nos.kill(os.getpid(), {number:d})\ntime.sleep(60)\n")
     done = subprocess.run(
         [sys.executable, *arguments],
         cwd=folder,
@@ -274,7 +272,12 @@ def test_a_signal_while_a_library_is_imported_ends_a_command_like_any_other(tmp_
     assert interrupt_import(tmp_path, library, arguments) == (130, "", "Error: interrupted\n")
 
 
-@pytest.mark.parametrize("arguments", [["-m", "harness"], ["friction-fmus"]])
-def test_ctrl_c_before_a_command_handles_it_prints_no_traceback(tmp_path, arguments):
+@pytest.mark.parametrize(
+    ("number", "sentence"), [(signal.SIGINT, "Error: interrupted\n"), (signal.SIGTERM, "Error: terminated\n")]
+)
+@pytest.mark.parametrize(
+    "arguments", [["-m", "harness"], ["friction-fmus"], [str(ROOT / "build_fmus.py")], ["-m", "build_fmus"]]
+)
+def test_a_signal_while_the_harness_is_imported_ends_a_command_like_any_other(tmp_path, arguments, number, sentence):
     (tmp_path / "friction-fmus").write_text("from harness.__main__ import main\nmain()\n")
-    assert interrupt_import(tmp_path, "dataclasses", arguments) == (-signal.SIGINT, "", "")
+    assert interrupt_import(tmp_path, "dataclasses", arguments, number) == (128 + number, "", sentence)

@@ -1,5 +1,7 @@
 """Every result of every study: in one line, as the command prints it, as HTML, table and picture, saved and loaded."""
 
+import inspect
+import itertools
 import json
 import shutil
 from dataclasses import replace
@@ -283,3 +285,65 @@ def test_a_summary_of_an_unknown_study_is_at_the_end_of_the_report_and_loads(tmp
     assert "damping ratio, zeta" in str(loaded)
     with pytest.raises(harness.HarnessError, match="holds no data to plot"):
         loaded.plot()
+
+
+# methods by which the harness calls its own classes, with arguments of types that users do not make
+INTERNAL = {
+    "draw",
+    "draw_panel",
+    "is_stored",
+    "write",
+    "write_figure",
+    "write_tables",
+    "curve",
+    "signals",
+    "unit_factor",
+}
+INTERNAL |= {"check_sampling", "column_of_role", "contact_of", "get_parameter", "sample_at", "rest", "signal"}
+OTHER_MAKERS = {
+    "Signals": lambda: result_of("compare").one,
+    "ModeChanges": lambda: pulled_sled().events,
+    "Record": lambda: harness.read_record(commands.ROOT / "docs/records/spring.csv"),
+    "FmuDescription": lambda: harness.describe("smd"),
+}
+OPERATORS = {"__getitem__", "__contains__"}
+VALID = {"folder": "kept", "begin": 0.5, "end": 1.0, "contact": "F_friction", "stop": 1.0, "rtol": 0.0, "atol": 0.0}
+WRONG = [
+    5,
+    -1.0,
+    float("nan"),
+    None,
+    True,
+    "a\0b",
+    "x",
+    "a" * 9000,
+    b"x",
+    [],
+    ["x"],
+    {},
+    (1, 2),
+    object(),
+    np.zeros(2),
+    len,
+]
+
+
+@pytest.mark.parametrize("maker", [*MAKERS, *OTHER_MAKERS])
+def test_a_method_uses_an_argument_or_refuses_it_in_one_sentence(maker, monkeypatch):
+    monkeypatch.setattr("harness.results.result.Result.write_figure", lambda result, path: None)
+    value, failures = result_of(maker) if maker in MAKERS else OTHER_MAKERS[maker](), []
+    methods = [getattr(value, name) for name in dir(type(value)) if name in OPERATORS or name[0] != "_"]
+    for method in filter(inspect.ismethod, methods):
+        parameters = inspect.signature(method).parameters if method.__name__ not in INTERNAL else {}
+        required = {name: VALID[name] for name in parameters if name in VALID}
+        for name, wrong in itertools.product(parameters, WRONG):
+            try:
+                if name in ("name", "names"):
+                    method(wrong)
+                else:
+                    method(**required | {name: wrong})
+            except harness.HarnessError as error:
+                failures += [(method.__name__, name, wrong, error)] * ("\n" in str(error))
+            except Exception as error:
+                failures.append((method.__name__, name, wrong, error))
+    assert failures == []

@@ -225,6 +225,21 @@ def test_a_profiler_that_keeps_frames_disturbs_no_run(sweep):
     assert profiled["peak_speed"].equals(sweep("stickslip", grid, measures=("peak_speed",))["peak_speed"])
 
 
+@pytest.mark.parametrize("grid", [{"m": [1e308]}, {"m": [2e307, 1e308], "k": [1.0, 1e308]}, {"m": [1.0, 1e308]}])
+def test_values_that_are_too_large_for_an_axis_are_results(fmus, grid):
+    """They are left out of the figure."""
+    pyplot = pytest.importorskip("matplotlib.pyplot")
+    pyplot.switch_backend("Agg")
+    result = harness.sweep(fmus / "smd.fmu", grid, stop=0.1)
+    assert result.failed == 0
+    if grid["m"][0] == 1.0:
+        assert [line.get_xdata().tolist() for line in result.plot()[0].lines] == [[1.0]]
+    else:
+        with pytest.raises(harness.HarnessError, match=r"too large for an axis; to_pandas\(\) has its numbers"):
+            result.plot(ax=pyplot.figure().subplots())
+    pyplot.close("all")
+
+
 @pytest.mark.parametrize("workers", [None, 1])
 def test_one_run_that_works_is_a_sweep(sweep, workers):
     """Wherever it is among runs that fail."""

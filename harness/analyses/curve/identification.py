@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from ...arguments import TEXT, check_arguments
 from ...errors import HarnessError, SceneError, check_names, option_text
 from ..estimation.estimate import Estimate
 from .law_fit import LawFit, count_speeds, fit_law, group_speeds
@@ -14,6 +15,7 @@ from .outliers import find_outliers
 
 MIN_POINTS = 6
 OUTLIER_COST = 3.0  # unknowns for which an outlier counts: its size, and twice the choice of the point among n
+MIN_SIZE, MAX_SIZE = 1e-100, 1e100  # of the largest velocity or force; their squares are finite
 MAX_BIAS = 1e3  # of the largest force
 CLEAR_DIFFERENCE = 6.0  # of two BIC
 SIGNIFICANT_RUNS = 0.002  # probability of as few runs of signs in independent residuals
@@ -106,6 +108,7 @@ class CurveIdentification:
         closeness = "" if difference >= CLEAR_DIFFERENCE else ", which is no clear difference"
         return f"{text}. The BIC of the next law, {others[0].name}, is larger by {difference:.1f}{closeness}."
 
+    @check_arguments(name=TEXT)
     def find_law(self, name: str) -> LawFit | None:
         """Return the fit of a law, or None if it was not fitted."""
         return next((fit for fit in self.laws if fit.name == name), None)
@@ -159,6 +162,13 @@ def check_points(points: CurvePoints, bias: float | None) -> tuple[CurvePoints, 
         If the force does not reverse with the velocity, or with the known bias.
     """
     moving, name = points.v != 0.0, points.name
+    for label, values, unit in (
+        ("velocity", points.v, points.velocity_unit),
+        ("force", points.force, points.force_unit),
+    ):
+        if (size := float(np.abs(values).max(initial=0.0))) and not MIN_SIZE <= size <= MAX_SIZE:
+            span = f"{MIN_SIZE:g} to {MAX_SIZE:g}"
+            raise SceneError(f"{name}: the largest {label} is {size:.3g} {unit}, outside {span}: check its unit")
     count = int((~moving).sum())
     notes = [f"{count} points have the velocity 0 and are left out."] if count else []
     v, force = points.v[moving], points.force[moving]

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...errors import HarnessError, option_text
+from ...errors import HarnessError, SceneError, option_text
 from ...records.extraction import Samples
 from ...running.whole_run import Simulator
 from .fit_problem import FitProblem, Selection
@@ -15,6 +15,7 @@ from .search import DISTINCT, Minimum, search, select_distinct
 from .uncertainty import Uncertainty, estimate_uncertainty
 from .unknowns import Unknown
 
+MIN_SIGMA = 1e-50  # of the range of the samples, so that squares of residuals are finite
 MIN_REDUCTION = 30.0  # of the squares of a constant, in variances of the residuals and for each unknown
 MOTION = 2.0  # rms of a record that moves, in units of its noise
 MAX_SUBDIVISION = 32  # of the intervals between samples of inputs
@@ -87,8 +88,15 @@ def fit_records(
         If a record shows no motion or the FMU refuses all values.
     """
     for record_data in data:
-        if not np.ptp(record_data.y, axis=0).all():
+        sizes = np.ptp(record_data.y, axis=0)
+        if not sizes.all():
             raise HarnessError(f"{record_data.name} shows no motion in a column: nothing can be determined from it")
+        for name, size in zip(record_data.columns, sizes.tolist(), strict=True):
+            if record_data.sigma.get(name, size) < (least := MIN_SIGMA * size):
+                raise SceneError(
+                    f"sigma of {name} is {record_data.sigma[name]!r}, and the samples of {record_data.name} span "
+                    f"{size:.3g}: give the standard deviation of the noise, at least {least:.3g}"
+                )
     warm_start: np.ndarray | None = None
     for binned in (True, False) if averages else (False,):
         records = [MeasuredRecord(simulator, record_data, binned) for record_data in data]

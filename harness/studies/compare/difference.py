@@ -6,6 +6,7 @@ from math import isnan
 
 import numpy as np
 
+from ...arguments import NONNEGATIVE, check_arguments
 from ...errors import HarnessError
 from ...records.units import conversion_factor
 from ...running.signals import Signals
@@ -84,6 +85,7 @@ class Comparison:
         """Return the largest relative difference; NaN if any is NaN."""
         return float(np.max([variable.relative for variable in self.differences]))
 
+    @check_arguments(rtol=NONNEGATIVE, atol=NONNEGATIVE)
     def violations(self, rtol: float, atol: float) -> list[str]:
         """Return messages on variables that differ by more than atol + rtol * size, and on unmatched events."""
         messages = [

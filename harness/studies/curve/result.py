@@ -40,8 +40,9 @@ class CurveResult(Result, CurveIdentification):
 
     def __getitem__(self, name: str) -> Any:
         """Return the estimate of a constant of the best law, or a part of the result by its key in the JSON."""
-        content = {} if name in self.best.values else self.as_json()
-        return content[name] if name in content else CurveIdentification.__getitem__(self, name)
+        if isinstance(name, str) and name not in self.best.values and name in (content := self.as_json()):
+            return content[name]
+        return CurveIdentification.__getitem__(self, name)
 
     @property
     def models(self) -> dict[str, dict[str, float | str]]:

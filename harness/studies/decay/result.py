@@ -41,8 +41,9 @@ class DecayResult(Result, DecayIdentification):
     def __getitem__(self, name: str) -> Any:
         """Return the estimate of a constant from the whole signal, or a part of the result by its key in the JSON."""
         names = [estimate.name for estimate in self.estimates]
-        content = {} if name in names else self.as_json()
-        return content[name] if name in content else DecayIdentification.__getitem__(self, name)
+        if isinstance(name, str) and name not in names and name in (content := self.as_json()):
+            return content[name]
+        return DecayIdentification.__getitem__(self, name)
 
     def summary(self) -> Summary:
         return summarize_decay(self)

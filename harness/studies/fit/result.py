@@ -39,8 +39,9 @@ class FitResult(Result, ParameterFit):
     def __getitem__(self, name: str) -> Any:
         """Return the estimate of an unknown or a combination, or a part of the result by its key in the JSON."""
         names = [estimate.name for estimate in (*self.estimates, *self.combinations)]
-        content = {} if name in names else self.as_json()
-        return content[name] if name in content else ParameterFit.__getitem__(self, name)
+        if isinstance(name, str) and name not in names and name in (content := self.as_json()):
+            return content[name]
+        return ParameterFit.__getitem__(self, name)
 
     def summary(self) -> Summary:
         return summarize_fit(self)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ...errors import check_names
 from ...results.files import write_csv_rows
 from ...results.result import Result
 from ...results.summary import Summary
@@ -47,6 +48,12 @@ class StabilityResult(Result):
 
     def as_json(self) -> Any:
         return [{"scene": row.case.label, "passed": row.has_passed, "ended": row.ended} for row in self.outcomes]
+
+    def __getitem__(self, name: str) -> Any:
+        """Return how a case ended by its label, as in the JSON."""
+        cases = {case["scene"]: case for case in self.as_json()}
+        check_names("case", [name], cases)
+        return cases[name]
 
     def blocks(self) -> list[Any]:
         rows = list(self.outcomes)

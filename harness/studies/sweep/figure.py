@@ -14,7 +14,7 @@ import xarray
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 
-from ...results.style import BLUE, HEIGHT, WIDTH, Figure, axis_label, set_size
+from ...results.style import BLUE, HEIGHT, WIDTH, Figure, axis_label, is_drawable, set_size
 from ...running.model_data import LookupTable, parse_table
 from ...running.plot import draw_table
 
@@ -26,15 +26,24 @@ MAX_CURVES = 20  # drawn of a lookup table
 
 
 def thin_out(dataset: xarray.Dataset) -> xarray.Dataset:
-    """Return the measures of at most as many runs as are drawn."""
+    """Return the measures of at most as many runs as are drawn, without values that are too large for an axis."""
     measures = dataset.drop_vars("error", errors="ignore")
     n_axes = len(measures.dims)
     limit = MAX_CELLS if n_axes == 2 else int(MAX_POINTS ** (1 / n_axes))
-    return measures.isel({name: slice(None, None, -(-size // limit)) for name, size in measures.sizes.items()}).load()
+    thin = measures.isel({name: slice(None, None, -(-size // limit)) for name, size in measures.sizes.items()}).load()
+    for name in thin.coords:
+        (dimension,) = thin[name].dims
+        thin = thin.isel({dimension: np.flatnonzero(is_drawable(thin[name]))})
+    return thin.where(is_drawable)
 
 
 def draw(data: xarray.Dataset, figure: Figure, failed: int) -> None:
-    """Draw the figure: panels of the measures, over each parameter in scatter plots, and one of each varied table."""
+    """Draw the figure: panels of the measures, over each parameter in scatter plots, and one of each varied table.
+
+    Without runs, the figure stays empty.
+    """
+    if not all(data.sizes.values()):
+        return
     measures, varied = [str(name) for name in data.data_vars], [str(name) for name in data.coords]
     scattered, tables = is_scattered(data), tables_of(data)
     draw_panel: list[Callable[[Axes], None]]

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
-from ...errors import HarnessError, SceneError, check_names, first_line, import_optional
+from ...errors import HarnessError, SceneError, first_line, import_optional, unknown_name_message
 from ...results.files import column_heading
 from ...results.provenance import load_provenance
 from ...results.registry import find_study
@@ -91,9 +91,9 @@ class SweepResult(Result):
         return (folder / DATASET_FILE).is_file()
 
     @classmethod
-    def load(cls, folder: Path) -> Self:
+    def load(cls, folder: str | Path) -> Self:
         result = super().load(folder)
-        result.folder = folder
+        result.folder = folder = Path(folder)
         library = import_optional("xarray", "to read a sweep", "sweep")
         try:
             with library.open_dataset(folder / DATASET_FILE, engine="scipy") as stored:
@@ -127,11 +127,14 @@ class SweepResult(Result):
             content = self.as_json()
             if name in content:
                 return content[name]
-            check_names("measure or parameter", [name], [str(known) for known in self.data.variables])
-        return self.data[name]
+        try:
+            return self.data[name]
+        except (AttributeError, IndexError, KeyError, TypeError, ValueError):
+            known = map(str, self.data.variables)
+            raise SceneError(unknown_name_message("measure or parameter", name, known)) from None
 
     def __contains__(self, name: object) -> bool:
-        return name in self.data
+        return isinstance(name, str) and name in self.data
 
     def __iter__(self) -> Iterator[Any]:
         return iter(self.data)
@@ -202,4 +205,6 @@ class SweepResult(Result):
         from .figure import draw_measure, thin_out
 
         data = thin_out(self.data)
+        if not all(data.sizes.values()):
+            raise HarnessError(f"the values of {self.name} are too large for an axis; to_pandas() has its numbers")
         draw_measure(axes, data, str(next(iter(data.data_vars))))
