@@ -491,16 +491,6 @@ WRONG = {
     "a parameter without an effect": (RATE, 11, "no equation uses f: use it, or remove its declaration"),
     "an input without an effect": (RATE.replace("F - ", "-") + USE, 13, "no equation uses F: use it, or remove its"),
     "a choice without an effect": (RATE + USE + '    q = Choice("kind", a="x", b="y")\n', 18, "no equation uses q: "),
-    "a random number": (
-        "    import random\n" + RATE.replace("F -", "random.random() * F -"),
-        17,
-        "the file gives other values each time it is read: write fixed numbers instead of random ones or the time",
-    ),
-    "the time of the computer": (
-        '    import time as clock\n    q = Parameter(clock.perf_counter(), "s", "time")\n' + RATE,
-        17,
-        "the file gives other values each time it is read: write fixed numbers instead of random ones or the time",
-    ),
     "a bare equation": (RATE + "    m * a == F - k * x\n", 17, "this line has no effect: an equation is written as"),
     "a bare term": (RATE + "    k * x + F\n", 17, "this line has no effect: an equation is written as name = Output"),
     "a bare sign": (RATE + "    -F\n", 17, "this line has no effect: an equation is written as name = Output"),

@@ -2,7 +2,6 @@
 
 from math import inf
 from sys import float_info
-from typing import Any
 
 from ...runtime.active_method import EXACT_ITEM, METHOD_ITEMS
 from .algebra import depends_on, operands, operands_first, subexpressions
@@ -18,10 +17,9 @@ from .expressions import (
     is_comparison,
     is_number,
 )
-from .model_declaration import Choice, Contact, Model, Output, Rule, SettableVariable, Variable
+from .model_declaration import Choice, Contact, Output, SettableVariable, Variable
 from .model_roles import ModelRoles
 from .reserved_names import RESERVED
-from .tables import Table
 
 LARGEST_FLOAT = float_info.max
 METHODS = [label for label, _, _ in (EXACT_ITEM, *METHOD_ITEMS)]
@@ -164,34 +162,3 @@ def check_use(analysis: ModelRoles) -> None:
     for e in (*analysis.parameters, *analysis.choices, *analysis.inputs, *analysis.tables):
         if id(e) not in read:
             raise ModelError(f"no equation uses {e.name}: use it, or remove its declaration", e.location)
-
-
-def check_repetition(model: type[Model], repeated: type[Model]) -> None:
-    """Raise ModelError if a second execution of the file declares something else, as random numbers and clocks do."""
-    for (e, *content), (_, *other) in zip(declared_content(model), declared_content(repeated), strict=False):
-        if content != other:
-            raise ModelError(
-                "the file gives other values each time it is read: write fixed numbers instead of random ones or the "
-                "time, or draw them from a random generator with a fixed seed",
-                e.location,
-            )
-
-
-def declared_content(model: type[Model]) -> list[tuple[Any, ...]]:
-    """Return each variable and term of a model class, with its name or operation and its numbers."""
-    rules = (model.rules,) if isinstance(model.rules, Rule) else model.rules
-    roots = [rule.broken for rule in rules]
-    for e in vars(model).values():
-        if isinstance(e, Variable):
-            roots += [e, *ModelRoles.declared_expressions(e)]
-    found: dict[int, Operand] = {}
-    for e in roots:
-        subexpressions(e, found)
-    variables = [
-        (e, e.name, e.start, *(vars(e).get(name) for name in OPTIONS))
-        for e in found.values()
-        if isinstance(e, Variable)
-    ]
-    terms = [e for e in found.values() if isinstance(e, Term)]
-    variables += [(e, e.name, *e.x, *filter(is_number, e.y)) for e in vars(model).values() if isinstance(e, Table)]
-    return [*variables, *((e, e.op, *(one for one in e.args if is_number(one))) for e in terms)]

@@ -6,11 +6,9 @@ Errors are reported in one sentence with file and line.
 import ast
 import linecache
 import sys
-from contextlib import redirect_stdout
 from dataclasses import dataclass
 from functools import cached_property
 from hashlib import sha256
-from io import StringIO
 from keyword import iskeyword
 from pathlib import Path
 from traceback import extract_tb
@@ -21,7 +19,7 @@ from ...runtime.codes import MODEL_RULE, OK
 from ...runtime.variable_declarations import VariableOwner
 from .. import BuildError
 from .conditions import add_liftoff, locate_kinks
-from .declaration_checks import check_repetition, check_use
+from .declaration_checks import check_use
 from .dimensions import check_frequencies, check_units
 from .expressions import ModelError
 from .model_analysis import ModelAnalysis
@@ -59,9 +57,6 @@ class ModelFile:
             analysis = ModelAnalysis(self._load_class(), self.has_input_derivatives)
             check_units(analysis)
             check_frequencies(analysis)
-            with redirect_stdout(StringIO()):
-                repeated = vars(self._execute())[analysis.name]
-            check_repetition(analysis.model, repeated)
             return analysis
         except ModelError as mistake:
             raise self._build_error(mistake) from mistake
