@@ -5,7 +5,7 @@ those before the event.
 """
 
 from . import call_sequence, conditions
-from .codes import BAD_STEP, OK, TOO_MANY_STEPS
+from .codes import BAD_STEP, FAILED, OK, TOO_MANY_STEPS
 from .integrator import MAX_EVALUATIONS, MAX_STEPS
 
 
@@ -60,6 +60,15 @@ def next_internal_step(run, model, defer_events):
         if model.has_conditions:
             conditions.select_sides(model, step.event_location, False)
     return status
+
+
+def end_step(run, model):
+    """Apply the inputs set in the last intermediate update.  Returns a status; a step without finite outputs fails."""
+    if run.has_failed:
+        return FAILED
+    if not run.has_pending_changes:
+        return OK
+    return call_sequence.update_outputs(run, model)
 
 
 def complete_event(run, model):

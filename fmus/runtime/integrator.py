@@ -228,6 +228,8 @@ class Integrator(VariableOwner):
                 break
             status = step.compute_next(model)
             if status != OK:
+                if not step.t1 <= self.t:  # discard the failed step, so that a communication step fails there again
+                    step.t1, step.y1, step.f1, step.modes1 = step.t0, step.y0, step.f0, step.modes0
                 self.t_next = nan
                 return
         now = self.start_time + self.t

@@ -105,6 +105,23 @@ def test_a_step_that_begins_elsewhere_is_refused_even_at_zero(launch, late):
     assert_refused(fmu, late * 0.01, 0.01, "t = 0.0 s")
 
 
+def test_a_parameter_reads_what_was_set_though_the_run_fails_in_the_same_call(worker, backend_fmus):
+    fmu = worker.instantiate(backend_fmus / "smd.fmu").begin()
+    fmu.set({"F_ext": 1e308, "m": 1e-9})
+    mass, force, a = fmu.get("m", "F_ext", "a")
+    assert (mass, force, isnan(a)) == (1e-9, 1e308, True)
+    assert fmu.get("m", "F_ext") == [1e-9, 1e308]
+
+
+def test_a_step_fails_though_a_read_of_the_next_time_has_failed_before(worker, backend_fmus):
+    """The motion overflows at the end of the internal step, which the time solver.t_next needs."""
+    fmu = worker.instantiate(backend_fmus / "smd.fmu").begin(stop=1.0)
+    fmu.set({"F_ext": 1e308})
+    assert isnan(fmu.get("solver.t_next"))
+    with pytest.raises(FmiError):
+        fmu.step(0.0, 1e-9)
+
+
 @pytest.mark.parametrize("tolerance", [0.0, -1e-3, 1.0, 2.0, nan, inf])
 def test_an_invalid_tolerance_is_ignored(worker, backend_fmus, tolerance):
     """Otherwise the error of the solver would be as large as the motion."""

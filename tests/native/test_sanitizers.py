@@ -9,6 +9,7 @@ import sys
 
 import fmi3_fixtures
 import pytest
+from build_cache import build_user_model
 from models import MODELS, STICKSLIP_IN_CI
 from native_fmus import build_native_fmus
 from native_host import SANITIZER_ENVIRONMENT, SANITIZERS, compile_sanitized
@@ -29,7 +30,7 @@ def program(source, fmu, sanitizers=SANITIZERS):
 
     def run(*words, **options):
         streams = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "env": SANITIZER_ENVIRONMENT} | options
-        done = subprocess.run([str(out), *map(str, words)], timeout=120, **streams)
+        done = subprocess.run([str(out), *map(str, words)], timeout=900, **streams)
         assert done.returncode == 0, f"{done.returncode}: {done.stdout[-300:]} {(done.stderr or b'')[-3000:]}"
         return done.stdout, done.stderr
 
@@ -72,6 +73,46 @@ def test_a_forged_discrete_value_is_refused_in_fmi3(walk):
 
 def test_random_fmi3_calls_end_in_a_status_and_leave_other_instances_alone(walk):
     walk("random_calls", 1, 20_000)
+
+
+SLIDER = """
+from fmus import Contact, Input, Mode, Model, Output, Parameter, State, Table
+
+
+class Slider(Model):
+    '''Block on a spring, with measured friction.'''
+
+    m = Parameter(1.0, "kg", "mass", above=0)
+    k = Parameter(100.0, "N/m", "stiffness of the spring", low=0)
+    x0 = Parameter(0.1, "m", "initial position")
+    F_ext = Input(0.0, "N", "external force")
+    x = State("m", "position", start=x0)
+    v = State("m/s", "speed", rate_of=x)
+    mode = Mode()
+    mu = Table([0.0, 0.1, 1.0], [5.0, 4.0, 4.5], "m/s", "N", values="tunable", low=0.0)
+    F_friction = Contact("N", "friction force, opposing the motion", mode=mode, slip=v, slide=mu(abs(v)))
+    a = Output("m/s2", "acceleration", (F_ext - k * x - F_friction) / m, rate_of=v)
+    energy = Output("J", "energy", 0.5 * m * v * v + 0.5 * k * x * x)
+"""
+
+
+@pytest.fixture(scope="module", params=["slider", "smd", "stickslip"])
+def cosimulation(request, tmp_path_factory):
+    """The program for a model with an array of parameters, and for two shipped ones."""
+    if request.param != "slider":
+        return program("fmi3_stress.c", fmi3_fixtures.build_fmi3_fmus() / f"{request.param}.fmu")
+    path = tmp_path_factory.mktemp("slider") / "slider.py"
+    path.write_text(SLIDER)
+    fmu = build_user_model(path, "--fmi", "3", "--platform", "linux64") / "native/fmi3/slider.fmu"
+    return program("fmi3_stress.c", fmu)
+
+
+@pytest.mark.parametrize(("seed", "runs"), [(1, 300), pytest.param(2, 10_000, marks=pytest.mark.campaign)])
+def test_valid_fmi3_calls_with_any_values_keep_parameters_times_and_finite_values(cosimulation, seed, runs):
+    """With early returns and intermediate updates: a value that was set reads back, also in a run that failed; a
+    completed step ends with finite values, at or after its start; an intermediate update sets nothing but inputs."""
+    steps, _ = cosimulation("valid_calls", seed, runs)
+    assert int(steps) > 5 * runs
 
 
 def test_fmi3_instances_share_nothing_between_threads():

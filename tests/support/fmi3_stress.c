@@ -1,6 +1,8 @@
 /* Every function of FMI 3.0 in every state of every kind of instance. This program includes the sources of the FMU.
  *
- *     fmi3_stress states THREADS | random_calls SEED TURNS | forge_states     prints the number of instances | nothing
+ *     fmi3_stress states THREADS | random_calls SEED TURNS | valid_calls SEED RUNS | forge_states
+ *
+ * prints the number of instances, of the completed steps, or nothing.
  *
  * It aborts on an unexpected result; a sanitizer stops it on a memory error.
  */
@@ -300,6 +302,122 @@ static void random_calls(uint64_t seed, int turns)
     release(&bystander);
 }
 
+/* ---- random runs of co-simulation in the order of the standard, with values of any size */
+
+typedef struct {
+    Context context; /* first: the environment of the callbacks */
+    double t, h, end, last_update; /* of the step; of the last update after an internal step */
+} CoSimulation;
+
+static bool is_input(uint32_t reference)
+{
+    return variables[reference].is_state_or_input && !variables[reference].is_calculated;
+}
+
+/* Read all values. Parameters and inputs have the values of the last call, and outputs are finite in a healthy run. */
+static void read_all(Instance *it)
+{
+    for (fmi3ValueReference i = 0; i < VARIABLES; i++) {
+        double values[MAX_VALUES], stored[MAX_VALUES];
+        size_t n = value_count(i);
+        if (!n || !variables[i].is_real) continue;
+        CHECK(n <= MAX_VALUES);
+        for (size_t k = 0; k < n; k++) stored[k] = variable_value(&it->state, &variables[i + k]);
+        CHECK(fmi3GetFloat64(it, &i, 1, values, n) == fmi3OK);
+        for (size_t k = 0; k < n; k++) {
+            CHECK(variables[i].is_calculated || values[k] == stored[k]);
+            bool may_lack_value = i == T_NEXT || !it->state.run.outputs_current; /* doomed, failed or refused */
+            CHECK(!variables[i].is_calculated || may_lack_value || isfinite(values[k]));
+        }
+    }
+}
+
+/* Set a variable to a value or an array of any size; the values read back, whatever else is wrong. */
+static void set_any(CoSimulation *run)
+{
+    Instance *it = run->context.it;
+    fmi3ValueReference i = (fmi3ValueReference)draw(VARIABLES);
+    bool intermediate = it->state.run.phase == INTERMEDIATE;
+    double values[MAX_VALUES], read[MAX_VALUES];
+    size_t n = value_count(i);
+    if (!n || !variables[i].is_real) return;
+    for (size_t k = 0; k < n; k++) {
+        double extreme = draw(2) ? number() : draw(2) ? -1e308 : 1e-9;
+        values[k] = draw(3) ? (double)draw(1000) / 100.0 : extreme;
+    }
+    fmi3Status status = fmi3SetFloat64(it, &i, 1, values, n);
+    CHECK(!intermediate || is_input(i) || status == fmi3Error);
+    if (status != fmi3OK || variables[i].is_calculated) return; /* a calculated value may be set to what it is */
+    CHECK(fmi3GetFloat64(it, &i, 1, read, n) == fmi3OK);
+    for (size_t k = 0; k < n; k++) CHECK(read[k] == values[k]);
+}
+
+static void on_update(fmi3InstanceEnvironment environment, fmi3Float64 t, fmi3Boolean set, fmi3Boolean get,
+                      fmi3Boolean finished, fmi3Boolean early, fmi3Boolean *requests_return, fmi3Float64 *return_time)
+{
+    CoSimulation *run = environment;
+    Instance *it = run->context.it;
+    (void)set, (void)get, (void)early;
+    CHECK(run->t <= t && t <= run->end && t >= run->last_update);
+    if (finished) run->last_update = t;
+    if (draw(3) == 0) set_any(run);
+    if (draw(3) == 0) rows[draw(ROWS)].valid(it);
+    if (draw(3) == 0) read_all(it);
+    CHECK(it->state.run.phase == INTERMEDIATE);
+    *requests_return = draw(4) == 0, *return_time = draw(2) ? t + run->h * (double)draw(100) / 99.0 : number();
+}
+
+/* Make one step, and handle the event after it. Returns false if the run cannot continue. */
+static bool step_once(CoSimulation *run, bool handles_events)
+{
+    static const double sizes[] = {1e-9, 1e-3, 0.1, 0.5, 1.0, 3.0, 1e4};
+    Instance *it = run->context.it;
+    bool event, ends, early;
+    double last, now = current_time(&it->state.run);
+    run->h = sizes[draw(sizeof sizes / sizeof *sizes)];
+    run->t = draw(4) ? now : now + 1e-7 * run->h; /* as a sum of many steps */
+    run->end = run->t + run->h * (1.0 + 1e-6) + 1e-14 * run->t; /* may be rounded to that of the run */
+    run->last_update = run->t;
+    if (fmi3DoStep(it, run->t, run->h, true, &event, &ends, &early, &last) != fmi3OK) return false;
+    CHECK(!it->state.run.has_failed && last >= run->t && last <= run->end);
+    CHECK(early || last >= (run->t + run->h) * (1.0 - 1e-14) - 1e-6 * run->h);
+    read_all(it);
+    CHECK(it->state.run.outputs_current);
+    if (handles_events && (event || draw(4) == 0)) {
+        CHECK(fmi3EnterEventMode(it) == fmi3OK);
+        if (draw(3) == 0) set_any(run);
+        if (valid_UpdateDiscreteStates(it) != fmi3OK) return false;
+        CHECK(fmi3EnterStepMode(it) == fmi3OK);
+    }
+    if (draw(4) == 0) set_any(run);
+    return true;
+}
+
+static int valid_calls(uint64_t seed, int runs)
+{
+    int steps = 0;
+    random_state = seed;
+    for (int i = 0; i < runs; i++) {
+        CoSimulation run = {.context = {.states = STATES, .limits = INDICATORS}};
+        bool handles_events = draw(2), early = draw(2);
+        Instance *it = fmi3InstantiateCoSimulation("it", MODEL_GUID, NULL, false, true, handles_events, early, NULL, 0,
+                                                   &run, on_log, draw(4) ? on_update : NULL);
+        CHECK(it);
+        run.context.it = it;
+        for (uint64_t n = draw(3); n; n--) set_any(&run);
+        CHECK(fmi3EnterInitializationMode(it, true, 1e-5, (double)draw(3) * 100.0, draw(2), 1000.0) == fmi3OK);
+        for (uint64_t n = draw(4); n; n--) set_any(&run);
+        if (draw(2)) read_all(it);
+        bool healthy = fmi3ExitInitializationMode(it) == fmi3OK;
+        if (healthy && handles_events) healthy = valid_UpdateDiscreteStates(it) == fmi3OK && valid_EnterStepMode(it) == fmi3OK;
+        for (int n = 0; healthy && n < 12; n++, steps += healthy) healthy = step_once(&run, handles_events);
+        read_all(it);
+        if (run.context.state) CHECK(fmi3FreeFMUState(it, &run.context.state) == fmi3OK);
+        fmi3FreeInstance(it);
+    }
+    return steps;
+}
+
 /* A stored value of a discrete integer that no int64_t can have is refused, though the checksum is right. */
 static void forge_states(void)
 {
@@ -324,6 +442,7 @@ int main(int argc, char **argv)
     if (!strcmp(what, "forge_states")) forge_states();
     else if (!strcmp(what, "states") && argc == 3) printf("%d\n", walk_in_threads(atoi(argv[2])));
     else if (!strcmp(what, "random_calls") && argc == 4) random_calls(strtoull(argv[2], NULL, 10), atoi(argv[3]));
+    else if (!strcmp(what, "valid_calls") && argc == 4) printf("%d\n", valid_calls(strtoull(argv[2], NULL, 10), atoi(argv[3])));
     else die("usage", __LINE__);
     return 0;
 }

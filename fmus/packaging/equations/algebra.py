@@ -397,31 +397,3 @@ def _term_rounding_scale(e: Term, scales: Memo) -> Operand:
             return build_term("choose", a, scales[id(e.args[1])], scales[id(b)])
     slope = build_term("*", Term("fabs", FUNCTIONS[e.op](a, e)), scales[id(a)]) if e.op in FUNCTIONS else 0.0
     return build_term("+", Term("fabs", e), slope)
-
-
-def growth_exponents(expressions: Sequence[Operand], moving: Collection[Expression]) -> list[float]:
-    """Return the exponents with which expressions grow with the moving variables."""
-    varying, result = dependents(expressions, moving), dict[int, float]()
-    for part in operands_first(*expressions):
-        exponents = [result[id(operand)] for operand in operands(part)]
-        result[id(part)] = _growth_exponent(part, exponents) if id(part) in varying else 0.0
-    return [result[id(e)] for e in expressions]
-
-
-def _growth_exponent(e: Operand, exponents: list[float]) -> float:
-    if not exponents:
-        return 1.0
-    match getattr(e, "op", "neg"):
-        case Piece() | Coefficient():
-            return 0.0
-        case "+" | "-" | "neg" | "fabs" | "choose":
-            return max(exponents)
-        case "*":
-            return sum(exponents)
-        case "/" if exponents[1] == 0.0:
-            return exponents[0]
-        case "sqrt":
-            return 0.5 * exponents[0]
-        case "sin" | "cos" | "atan" | "tanh" | "copysign":
-            return 0.0
-    return float("inf")

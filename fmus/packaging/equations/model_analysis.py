@@ -7,7 +7,6 @@ from .algebra import (
     dependents,
     depends_on,
     factors,
-    growth_exponents,
     has_condition_on,
     is_same_expression,
     negate,
@@ -194,12 +193,3 @@ class ModelAnalysis(ContactAnalysis):
         """The identities of the expressions in outputs that depend directly on an input."""
         contacts = [c for c in self.contacts if self.has_direct_feedthrough(c)]
         return dependents(self.outputs, (*self.inputs, *contacts))
-
-    @property
-    def overflow_indicators(self) -> list[Variable]:
-        """Outputs that are finite only if all are: the energy, if it is quadratic and nothing grows faster."""
-        grows = growth_exponents([*self.outputs, *(c.slide for c in self.contacts)], self.time_varying)
-        energies = [e for e in self.outputs if e.unit == "J" and all(depends_on(e, (s,)) for s in self.states)]
-        if energies and max(grows) <= 2.0:
-            return energies[:1]
-        return [*self.states, *self.outputs, *self.contacts]

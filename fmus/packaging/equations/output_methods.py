@@ -44,12 +44,13 @@ def observe_method(context: CodegenContext) -> str:
             printer.local_variable(e)
     for e in (*analysis.input_rates, *analysis.states, *analysis.drivers, *analysis.outputs, *analysis.contacts):
         printer.emit(f"self.{e.name} = {printer.text(e)}")
-    sizes = [printer.text(e) if e.low >= 0.0 else f"fabs({printer.text(e)})" for e in analysis.overflow_indicators]
-    while len(sizes) > MAX_SUMMANDS:
-        total = printer.fresh_name("size")
-        printer.emit(f"{total} = {' + '.join(sizes[:MAX_SUMMANDS])}")
-        sizes = [total, *sizes[MAX_SUMMANDS:]]
-    printer.emit(f"return {' + '.join(sizes)} < inf")
+    # a sum is finite only if all its terms are
+    summands = [printer.text(e) for e in (*analysis.states, *analysis.drivers, *analysis.outputs, *analysis.contacts)]
+    while len(summands) > MAX_SUMMANDS:
+        total = printer.fresh_name("total")
+        printer.emit(f"{total} = {' + '.join(summands[:MAX_SUMMANDS])}")
+        summands = [total, *summands[MAX_SUMMANDS:]]
+    printer.emit(f"return -inf < {' + '.join(summands)} < inf")
     return method_source("compute_outputs", context.arguments, printer.lines)
 
 

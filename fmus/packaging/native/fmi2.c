@@ -81,13 +81,13 @@ static fmi2Integer saturated_integer(const Instance *self, fmi2ValueReference re
 fmi2Status fmi2GetReal(fmi2Component component, const fmi2ValueReference vr[], size_t nvr, fmi2Real value[])
 {
     REQUIRE_PHASE(component, IN_ANY_PHASE);
-    READ_VALUES(self, &REAL, vr, nvr, value, read_real, NAN);
+    READ_VALUES(self, &REAL, vr, nvr, value, read_real);
 }
 
 fmi2Status fmi2GetInteger(fmi2Component component, const fmi2ValueReference vr[], size_t nvr, fmi2Integer value[])
 {
     REQUIRE_PHASE(component, IN_ANY_PHASE);
-    READ_VALUES(self, &INTEGER, vr, nvr, value, saturated_integer, 0);
+    READ_VALUES(self, &INTEGER, vr, nvr, value, saturated_integer);
 }
 
 fmi2Status fmi2SetReal(fmi2Component component, const fmi2ValueReference vr[], size_t nvr, const fmi2Real value[])

@@ -161,7 +161,7 @@ fmi3Status fmi3GetFloat64(fmi3Instance instance, const fmi3ValueReference valueR
 {
     REQUIRE_PHASE(instance, IN_READABLE_PHASE);
     REQUIRE_LENGTH;
-    READ_VALUES(self, &FLOAT64, valueReferences, nValueReferences, values, read_float64, NAN);
+    READ_VALUES(self, &FLOAT64, valueReferences, nValueReferences, values, read_float64);
 }
 
 fmi3Status fmi3GetInt64(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,
@@ -169,7 +169,7 @@ fmi3Status fmi3GetInt64(fmi3Instance instance, const fmi3ValueReference valueRef
 {
     REQUIRE_PHASE(instance, IN_READABLE_PHASE);
     REQUIRE_LENGTH;
-    READ_VALUES(self, &INT64, valueReferences, nValueReferences, values, read_int64, 0);
+    READ_VALUES(self, &INT64, valueReferences, nValueReferences, values, read_int64);
 }
 
 fmi3Status fmi3SetFloat64(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,
@@ -306,21 +306,23 @@ fmi3Status fmi3EnterStepMode(fmi3Instance instance)
     return fmi3OK;
 }
 
-/* Call the importer's intermediate update at the start of a communication step and after each internal step. It may
- * read values, set inputs from here on and request an early return. */
-static void call_intermediate_update(Instance *self, bool finished)
+/* Call the importer's intermediate update at the start t of a communication step and after each internal step. It may
+ * read values, set inputs from here on and request an early return.
+ *
+ * The current time may be before t, by what call_sequence_do_step takes for rounding errors of the importer's sums. */
+static void call_intermediate_update(Instance *self, double t, bool finished)
 {
+    const Run *run = &self->state.run; /* its solver counts time from the start of the run */
     struct ModelExchange *exchange = &self->state.run.model_exchange;
-    double now = current_time(&self->state.run), return_time = now;
-    bool return_requested = false;
+    bool is_before_t = current_time(run) < t, return_requested = false;
+    double now = is_before_t ? t : current_time(run), return_time = now;
     if (!self->host.intermediate_update) return;
     self->state.run.phase = INTERMEDIATE;
     self->host.intermediate_update(self->host.environment, now, true, true, finished, self->host.early_return_allowed,
                                    &return_requested, &return_time);
     self->state.run.phase = RUNNING;
     if (!self->host.early_return_allowed || !return_requested) return;
-    const Run *run = &self->state.run; /* its solver counts time from the start of the run */
-    double elapsed = return_time > now ? return_time - run->solver.start_time : run->solver.t;
+    double elapsed = return_time > now || is_before_t ? fmax(return_time, now) - run->solver.start_time : run->solver.t;
     if (elapsed < exchange->step_end && (elapsed > run->solver.t || finished)) exchange->step_end = elapsed;
 }
 
@@ -349,16 +351,18 @@ fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoi
     if (!self->host.event_mode_used) store_discrete_values(self);
     int64_t status = early_return_begin_step(&state->run, &state->model, t, h, &fault);
     double end = exchange->step_end;
-    if (status == OK && !fault) call_intermediate_update(self, false);
+    if (status == OK && !fault) call_intermediate_update(self, t, false);
     while (status == OK && !fault && *now < exchange->step_end) {
         status = early_return_next_internal_step(&state->run, &state->model, self->host.event_mode_used, &fault);
         if (status != OK || fault) break;
         event_passed = event_passed || exchange->event_reached;
-        call_intermediate_update(self, true);
-        if (exchange->event_reached && self->host.early_return_allowed) break;
+        call_intermediate_update(self, t, true);
+        if (exchange->event_reached && self->host.early_return_allowed && current_time(&state->run) >= t) break;
     }
+    if (status == OK && !fault) status = early_return_end_step(&state->run, &state->model, &fault);
     *lastSuccessfulTime = current_time(&state->run);
     if (status == OK && !fault) {
+        *lastSuccessfulTime = fmax(*lastSuccessfulTime, t);
         warn_of_inconsistent_rate(self);
         *eventHandlingNeeded = self->host.event_mode_used && event_passed;
         *earlyReturn = *now < end;

@@ -181,7 +181,7 @@ static Status check_references(const Instance *self, const FmiType *type, const 
     return STATUS_OK;
 }
 
-/* Calculate the values that a call reads. Returns STATUS_DISCARD after a fault. */
+/* Calculate the values that a call reads. If that fails, calculated values read NaN, and all others what was set. */
 static Status prepare_values(Instance *self, const FmiType *type, const uint32_t vr[], size_t n, const void *value,
                              const char *function)
 {
@@ -209,7 +209,7 @@ static Status prepare_values(Instance *self, const FmiType *type, const uint32_t
         return STATUS_OK;
     }
     fail_run(self, DIVERGED, NAN, NAN);
-    return STATUS_DISCARD;
+    return STATUS_OK;
 }
 
 /* Order of the polynomial of an input: its derivatives above this order are zero. */
@@ -269,11 +269,10 @@ static int64_t read_integer(const Instance *self, uint32_t reference)
     return *(const int64_t *)((const char *)&self->state + variables[reference].offset);
 }
 
-/* Bodies of the functions that read and write values; after a fault every value reads `blank`. */
-#define READ_VALUES(self, type, vr, n, value, at, blank)                   \
-    Status status = prepare_values(self, type, vr, n, value, __func__);    \
-    if (status == STATUS_ERROR) return STATUS_ERROR;                       \
-    FOR_EACH_VALUE(vr, n) value[k] = status ? (blank) : at(self, element); \
+/* Bodies of the functions that read and write values. */
+#define READ_VALUES(self, type, vr, n, value, at)                                \
+    if (prepare_values(self, type, vr, n, value, __func__)) return STATUS_ERROR; \
+    FOR_EACH_VALUE(vr, n) value[k] = at(self, element);                          \
     return STATUS_OK
 
 #define WRITE_VALUES(self, type, vr, n, value)                                     \

@@ -313,7 +313,7 @@ ENTRY_POINTS = {  # module of the runtime -> its functions; callees come before 
         *("update_rates", "update_input_rates", "update_indicators", "update_variables", "has_step_event"),
         *("complete_step", "handle_event"),
     ),
-    "early_return": ("begin_step", "next_internal_step", "complete_event"),  # for FMI 3.0
+    "early_return": ("begin_step", "next_internal_step", "end_step", "complete_event"),  # for FMI 3.0
 }
 # Parameters of type bool; run and model are structs, a status is an int, all others are floats.
 BOOL_PARAMETERS = ("calculated", "fixed", "allowed", "ahead", "defer_events")
