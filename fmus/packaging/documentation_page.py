@@ -38,7 +38,7 @@ CAPABILITIES = """\
 | event mode, early return at stick and slip | | | yes |
 | intermediate update after each internal step, where inputs can be set | | | yes |
 | terminal `flange`: position, speed, force | | | yes |
-"""  # of each kind of FMU; docs/how-to/fmi3.md has the same table
+"""  # of each kind of FMU; docs/how-to/native.md has the same table
 UNRESTRICTED = VariableDeclaration("", "").allowed  # the range text of an unbounded variable
 
 

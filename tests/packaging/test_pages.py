@@ -76,7 +76,7 @@ def test_the_capabilities_listed_per_backend_are_true_on_every_page_and_in_the_g
     for files in kinds:
         (table,) = re.findall(r"<table class='offered'>.*?</table>", files[PAGE].decode())
         rows = [re.findall(r"<td>(.*?)</td>", row) for row in table.split("<tr>")[2:]]
-        text = (ROOT / "docs" / "how-to" / "fmi3.md").read_text(encoding="utf-8")
+        text = (ROOT / "docs" / "how-to" / "native.md").read_text(encoding="utf-8")
         guide_table = text.split("|---|---|---|---|\n")[1].split("\n\n")[0]
         assert rows == [
             [re.sub("`(.*?)`", r"<code>\1</code>", cell.strip()) for cell in line.split("|")[1:-1]]
