@@ -4,12 +4,14 @@
 
 "Found": all values within five standard errors of the truth, where the record determines them; "partly": it does not
 determine all. "Silent": not found, and without a remark. "Inputs": a remark that the inputs are uncertain between their
-samples. Coverage: share of the finite 95 % intervals that hold the truth, with its standard error.
+samples. Coverage: share of the finite 95 % intervals that hold the truth, with its standard error. The exit
+status is 1 if a fit with the right law is silent.
 """
 
 import argparse
 import json
 import os
+import sys
 from math import isfinite
 from pathlib import Path
 
@@ -176,6 +178,8 @@ def main():
             if arguments.log:
                 arguments.log.write_text(json.dumps(rows))
     print_summary(rows)
+    fitted = [row for row in rows if row["group"] != "wrong law" and "refused" not in row]
+    sys.exit(any(not is_found(row) and not row["remarks"] for row in fitted))
 
 
 if __name__ == "__main__":

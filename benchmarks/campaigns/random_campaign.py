@@ -438,6 +438,7 @@ def main():
     print(*(f"{key}: {n}" for key, n in sorted(kinds.items(), key=str)), sep="\n")
     print("examples", examples)
     worker.close()
+    sys.exit(bool(kinds))
 
 
 if __name__ == "__main__":
