@@ -181,13 +181,9 @@ def repair_description(root: Any) -> None:
 
 
 def exposes_solver_steps(description: Any) -> bool:
-    """Return whether an FMU exposes the steps of its solver, as those of this project do in FMI 2.0."""
+    """Return whether an FMU for co-simulation exposes the steps of its solver, as those of this project do."""
     names = [variable.name for variable in description.modelVariables]
-    return (
-        description.fmiVersion == "2.0"
-        and description.coSimulation is not None
-        and all(name in names for name in REQUIRED_VARIABLES)
-    )
+    return description.coSimulation is not None and all(name in names for name in REQUIRED_VARIABLES)
 
 
 def declared_parameters(fmu: Path) -> dict[str, tuple[object, str]]:

@@ -98,7 +98,7 @@ def run_own_fmu(spec: RunSpec, report: ProgressCallback = QUIET) -> Trajectory:
 
 
 def runs_in_process(spec: RunSpec) -> bool:
-    """Return whether an FMU runs in this process: one of this project, for co-simulation in FMI 2.0."""
+    """Return whether an FMU runs in this process: one of this project, for co-simulation."""
     return exposes_solver_steps(read_description(spec.fmu, spec.lenient)) and not spec.exchange
 
 

@@ -84,6 +84,30 @@ def test_a_refusal_states_whether_a_bound_is_excluded(folder):
         assert str(refused.value) == allowed
 
 
+@pytest.mark.parametrize(
+    ("model", "options"),
+    [
+        ("stickslip", {"rtol": 1e-9}),
+        ("pacejka", {"stop": 2.0}),
+        ("coulomb", {"inputs": {"time": [0.0, 1.0, 1.0, 2.0], "F_ext": [0.0, 1.0, 2.0, 3.0]}, "method": "dop853"}),
+    ],
+)
+def test_an_fmu_of_fmi3_runs_at_its_internal_steps_as_in_fmi2(model, options):
+    """Also its events are listed, and its solver is the one that a tolerance is for."""
+    two, three = (
+        harness.simulate(build() / f"{model}.fmu", **options)
+        for build in (native_fmus.build_native_fmus, fmi3_fixtures.build_fmi3_fmus)
+    )
+    assert (three.accuracy, three.failure) == (two.accuracy, "")
+    assert np.array_equal(three.time, two.time)
+    assert all(np.array_equal(three[name], two[name]) for name in two)
+    assert np.array_equal(three.steps.t, two.steps.t)
+    if two.events is not None:
+        assert len(two.events.t) > 3
+        assert np.array_equal(three.events.t, two.events.t)
+        assert np.array_equal(three.events.mode, two.events.mode)
+
+
 @pytest.mark.parametrize("interface", ["CoSimulation", "ModelExchange"])
 @pytest.mark.parametrize("folder", [native_fmus.build_native_fmus, fmi3_fixtures.build_fmi3_fmus], ids=["fmi2", "fmi3"])
 def test_input_signals_drive_every_interface(folder, interface):

@@ -531,6 +531,48 @@ def test_the_achieved_error_is_stated_and_refinement_ends_when_it_cannot_help(or
         assert float(re.search(r"order ([0-9.]+)", answer.note)[1]) == pytest.approx(order, abs=0.1)
 
 
+@pytest.mark.parametrize("kind", [float, int, bool])
+@pytest.mark.parametrize(
+    ("shift", "stated"),
+    [
+        (lambda i, h: 1e-12 * (-1) ** i, 0.0),  # an event at a communication point, before it in every second run
+        (lambda i, h: 0.0, 0.0),
+        (lambda i, h: 3.5 * h, None),  # an event that is located with first order
+    ],
+)
+def test_times_of_jumps_are_compared_and_not_the_values_between_them(kind, shift, stated):
+    """Outputs are 0.3 t, and one that jumps from 0 to 1 at t = 0.25 s, and by -1 at t = 0.75 s."""
+
+    def run(h, tolerance):
+        runs.append(h)
+        time = np.linspace(0.0, 1.0, round(1.0 / h) + 1)
+        begin, end = 0.25 + shift(len(runs), h), 0.75 + shift(len(runs), h)
+        jumping = ((time >= begin) & (time < end)).astype(kind)
+        return RefinementRun(
+            len(runs) - 1, time, {"x": 0.3 * time, "y": jumping + (0.1 * time if kind is float else 0)}
+        )
+
+    runs = []
+    answer = refine(RunSpec(Path("any.fmu"), start=0.0, stop=1.0, tolerance=1e-5), WITHOUT_DECLARED_STEP, run)
+    assert answer.failure == ""
+    if stated is None:
+        assert 0.35e-5 <= runs[-1] <= 2e-5
+        assert re.search(r"changes no output by more than ([0-9.e-]+), order 1\.0", answer.note)
+    else:
+        assert len(runs) <= 5
+
+
+def test_a_jump_in_one_run_only_is_a_difference_of_values():
+    def run(h, tolerance):
+        runs.append(h)
+        time = np.linspace(0.0, 1.0, round(1.0 / h) + 1)
+        return RefinementRun(len(runs) - 1, time, {"mode": (time >= 0.5).astype(int) * (len(runs) % 2)})
+
+    runs = []
+    answer = refine(RunSpec(Path("any.fmu"), start=0.0, stop=1.0), WITHOUT_DECLARED_STEP, run)
+    assert "error about 1 of the largest mode; further halving does not reduce it" in answer.note
+
+
 @pytest.fixture(scope="module")
 def typed_fmu(external_fmu_folder, tmp_path_factory):
     """The FMU Arrays with parameters of all integer types, and a structural parameter for the size of `place`."""

@@ -4,6 +4,8 @@ Co-simulation halves the communication step; model exchange divides the solver t
 nothing, the FMU has internal steps; their error can only be estimated if a smaller tolerance, passed at the start,
 changes the result.
 
+Where an output jumps in both runs, the times of the jump are compared, and not the values between them (jumps.py).
+
 The changes of successive halvings give the order of convergence. Refinement stops early if the changes do not fall, or
 if the order shows that the tolerance requires more than `MAX_STEPS` steps. The last run is then the result, with the
 error that it achieves; it is a failure only if the user demanded the tolerance.
@@ -19,6 +21,7 @@ import numpy as np
 from ...scenes.run_spec import RunSpec
 from ..recorder import Columns
 from ..stepping import TimeGrid
+from .jumps import distance, find_jumps, is_between, match_jumps
 
 # names of files in the directory of results
 STRINGS_FILE = "strings"
@@ -75,13 +78,26 @@ NoteCallback = Callable[[str], object]  # receives the current accuracy, for the
 
 @dataclass(frozen=True)
 class Change:
-    """Largest change of an output from one run to the next, relative to the largest value of that output."""
+    """Largest change from one run to the next.
+
+    Attributes
+    ----------
+    size : float
+        Change of an output relative to its largest value, or of the time of a jump relative to the run.
+    name : str
+        Name of the output; empty without a change.
+    is_time : bool
+        Whether the time of a jump changes.
+    """
 
     size: float
     name: str = ""
+    is_time: bool = False
 
-    def __str__(self) -> str:
-        return f"{self.size:.2g} of its largest value ({self.name})" if self.name else f"{self.size:.2g}"
+    @property
+    def reference(self) -> str:
+        """Return what the change is relative to."""
+        return f"the run, by which a jump of {self.name} moves" if self.is_time else f"the largest {self.name}"
 
 
 @dataclass
@@ -256,8 +272,8 @@ def accept_inexact_run(
     spec: RunSpec, current: RefinementRun, step: str, convergence: Convergence, reason: str
 ) -> RefinementResult:
     """Select a run that misses the tolerance: a result with its error, or a failure if the tolerance was demanded."""
-    name = convergence.changes[-1].name
-    error = f"error about {convergence.error:.2g} of the largest {name}{convergence.order_text}; {reason}"
+    reference = convergence.changes[-1].reference
+    error = f"error about {convergence.error:.2g} of {reference}{convergence.order_text}; {reason}"
     return accept_inexact(spec, current, f"{step}; {error}")
 
 
@@ -299,7 +315,7 @@ def refine_solver_tolerance(
             return accept_run(refined, f"{note}; a hundred times that changes no output by more than {change.size:.2g}")
         current = refined
         changes.append(change)
-    return accept_inexact(spec, current, f"{note}; a hundred times that changes an output by {changes[-1]}")
+    return accept_inexact(spec, current, f"{note}; a hundred times that changes an output by {describe(changes[-1])}")
 
 
 def find_internal_step(samples: RefinementRun) -> str:
@@ -339,12 +355,20 @@ def refine_tolerance(spec: RunSpec, h: float, run: RunFunction, show: NoteCallba
             if change.size <= spec.rtol:
                 return accept_run(current, f"{note}; ten times that changes no output by more than {change.size:.2g}")
         previous, rtol = current, max(rtol / 10, MIN_TOLERANCE)
-    return accept_inexact(spec, current, f"{note}; ten times that changes an output by {change}")
+    return accept_inexact(spec, current, f"{note}; ten times that changes an output by {describe(change)}")
 
 
-@np.errstate(over="ignore")  # a warning of numpy would appear as output of the FMU
+def describe(change: Change) -> str:
+    """Return a change as a text."""
+    return f"{change.size:.2g} of {change.reference}"
+
+
+@np.errstate(over="ignore", invalid="ignore")  # a warning of numpy would appear as output of the FMU
 def largest_change(first: RefinementRun, second: RefinementRun, spec: RunSpec) -> Change:
-    """Return the largest difference of two runs at the coarsest times, relative to each variable's largest value."""
+    """Return the largest difference of two runs at the coarsest times, relative to each variable's largest value.
+
+    Of a jump that both runs have, the times are compared, and not the values between them.
+    """
     grid = coarsest_grid(spec)
     end = min(run.time[-1] if len(run.time) else grid.start for run in (first, second))
     tolerance = 1e-9 * grid.duration
@@ -358,10 +382,12 @@ def largest_change(first: RefinementRun, second: RefinementRun, spec: RunSpec) -
             first.columns[name][last_rows_before(first.time, times)].astype(float),
             column[last_rows_before(second.time, times)].astype(float),
         )
-        scale = float(np.abs(right).max())
-        size = float(np.abs(left - right).max()) / scale if scale else float(np.abs(left).max() > 0)
-        if size > largest.size:
-            largest = Change(size, name)
+        jumps = match_jumps(find_jumps(first.time, first.columns[name]), find_jumps(second.time, column), grid.h)
+        shift = max((distance(*pair) for pair in jumps), default=0.0) / grid.duration
+        scale, is_compared = float(np.abs(right).max()), ~is_between(times, jumps, tolerance)
+        difference = float(np.abs(left - right).max(where=is_compared, initial=0.0))
+        size = difference / scale if scale else float(difference > 0)
+        largest = max(largest, Change(size, name), Change(shift, name, is_time=True), key=lambda change: change.size)
     return largest
 
 
