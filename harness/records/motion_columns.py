@@ -83,7 +83,8 @@ def find_signal_column(
 ) -> tuple[Column, list[str]]:
     """Return the motion column and notes on the choice.
 
-    A position is preferred to a velocity or an acceleration. Of several, the one with the largest deviation is chosen.
+    A position is preferred to a velocity or an acceleration. Of several, the one with the largest deviation is chosen,
+    with units and without; columns that only rise or only fall, as counters do, are chosen last.
     """
     if columns.column is not None:
         return find_column(columns.column, table, candidates), []
@@ -99,13 +100,12 @@ def find_signal_column(
         order = min((part.order for part in others if part.order is not None), default=None)
     motions = [part for part in others if part.order == order]
     motions = [part for part in motions if not MAGNITUDE_NAME.search(part.name)] or motions or others
-    if motions[0].order is None:
-        return motions[0], []  # no heading indicates a quantity: use the first
     same_unit = [part for part in motions if part.unit == motions[0].unit]
     if len(same_unit) == 1 or (order == 0 and same_unit[0].name.lower() in ("x", "theta")):
         return same_unit[0], []
-    deviations = [np.nanstd(parse_numbers(table, part.index, strict=False)) for part in same_unit]
-    most_varying = same_unit[int(np.argmax(deviations))]
+    samples = [parse_numbers(table, part.index, strict=False) for part in same_unit]
+    swings = [x if np.any(np.diff(x) < 0) and np.any(np.diff(x) > 0) else np.zeros(1) for x in samples]  # no counter
+    most_varying = same_unit[int(np.argmax([np.nanstd(x) for x in swings]))]
     names = ", ".join(part.heading for part in same_unit)
     note = (
         f"Of {names}, {most_varying.heading} is used, because it varies most; {option_text('column')} selects another."

@@ -34,6 +34,7 @@ MIN_STAY = 3  # samples at the largest value, in a peak
 MIN_RARE_STEPS = 3  # of rounded times: a single step of another size is a repeated or a missing sample
 MAX_RARE_SPREAD = 2  # samples by which the distances between them differ
 MAX_REPEATED_SHARE = 0.2  # of the times
+MAX_LATE_SHARE = 0.01  # of the rows, out of order or with a repeated time: more are several runs
 MIN_RUN = 4  # samples on average of runs in one table whose times overlap: shorter ones are rows in no order
 MIN_DWELL = 4.0  # times the samples at the level before the last; 1/(sqrt(2) - 1) = 2.4 at a rounded turning point
 
@@ -123,14 +124,17 @@ def sort_times(t: np.ndarray) -> tuple[np.ndarray, str]:
     """
     unchanged = np.arange(len(t))
     falls = np.flatnonzero(np.diff(t) < 0)
-    if not len(falls) or len(np.unique(t)) < len(t):
+    if not len(falls) or len(t) - len(np.unique(t)) > MAX_LATE_SHARE * len(t):
         return unchanged, ""
     parts = np.split(t, falls + 1)
     spans = sorted((float(part[0]), float(part[-1])) for part in parts)
     is_overlapping = any(later < end for (_, end), (later, _) in pairwise(spans))
-    if is_overlapping and len(t) > MIN_RUN * len(parts):
+    n_late = int((t < np.maximum.accumulate(t)).sum())  # rows that come after a row with a later time
+    if is_overlapping and len(t) > MIN_RUN * len(parts) and n_late > MAX_LATE_SHARE * len(t):
         return unchanged, ""
-    return np.argsort(t), f"The rows are not in the order of time ({len(falls)} times fall): they are sorted."
+    verb = "time falls" if len(falls) == 1 else "times fall"
+    note = f"The rows are not in the order of time ({len(falls)} {verb}): they are sorted."
+    return np.argsort(t, kind="stable"), note
 
 
 def find_repeated_times(t: np.ndarray) -> tuple[np.ndarray, str]:

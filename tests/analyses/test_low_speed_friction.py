@@ -29,6 +29,13 @@ def test_a_rise_below_the_stated_limit_is_not_excluded():
     assert f"less than {100 * fit.undetected_rise:.2g} % of r is not excluded" in remarks_text(fit)
 
 
+def test_a_rise_of_the_size_of_the_friction_or_more_is_not_mentioned():
+    """A limit above 100 % says nothing about the friction."""
+    fit = fit_rise(1.0, 0.02)
+    assert fit.undetected_rise > 1.0
+    assert "at low speed" not in remarks_text(fit)
+
+
 def test_a_rise_is_shown_by_a_record_that_is_cut_where_it_departs():
     """The part before the departure follows a law of its own, with too much dry friction."""
     fit = fit_rise(1.67, 1e-4, zeta=0.003, speed=0.125)

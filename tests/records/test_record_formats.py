@@ -3,6 +3,7 @@
 import contextlib
 import gzip
 import io
+import re
 
 import numpy as np
 import pytest
@@ -346,12 +347,26 @@ def test_a_missing_file_error_names_the_nearest(tmp_path):
         read_record(tmp_path / "swng.csv")
 
 
-def test_a_first_column_that_does_not_move_is_named_with_the_others(tmp_path):
+@pytest.mark.parametrize("headings", ["t [s],{}", "t [s],{} [mm]", ""], ids=["no units", "units", "no headings"])
+@pytest.mark.parametrize("others", [(0 * X,), (0.3 * X,), (np.arange(len(X)),)], ids=["at rest", "less", "counter"])
+@pytest.mark.parametrize("last", [True, False])
+def test_of_several_columns_the_one_that_varies_most_is_used(tmp_path, headings, others, last):
+    columns = [*others, X] if last else [X, *others]
+    names = ["cart", "arm"]
+    heading = headings.format((" [mm]," if "mm" in headings else ",").join(names))
     path = tmp_path / "record.csv"
-    path.write_text("t [s],cart,arm\n" + rows(T, 0 * X, X))
-    with pytest.raises(SceneError, match="cart does not move; select another column by `column`: arm"):
+    path.write_text((f"{heading}\n" if heading else "") + rows(T, *columns))
+    record = read_record(path)
+    assert record.x == pytest.approx(X * (1e-3 if "mm" in headings else 1.0), abs=1e-9)
+    note = r"^Of (cart|column 2).*, .*, .* is used, because it varies most; `column` selects another\.$"
+    assert [text for text in record.notes if re.match(note, text)]
+
+
+def test_a_column_that_does_not_move_is_named_with_the_others(tmp_path):
+    path = tmp_path / "record.csv"
+    path.write_text("t [s],x [m],v [m/s]\n" + rows(T, 0 * X, X))
+    with pytest.raises(SceneError, match=r"x \[m\] does not move; select another column by `column`: v \[m/s\]"):
         read_record(path)
-    assert read_record(path, column="arm").x == pytest.approx(X, abs=1e-9)
 
 
 def test_a_heading_is_matched_literally(tmp_path):

@@ -186,3 +186,19 @@ def test_rows_in_no_order_are_sorted_and_reported():
         found, sentence = sort_times(times)
         assert (found == np.arange(len(times))).all()
         assert sentence == ""
+
+
+def test_a_single_time_that_steps_back_and_repeated_times_do_not_refuse_a_record(tmp_path):
+    """As phones write them: one row comes late, and a few times occur twice."""
+    t = np.cumsum(np.random.default_rng(3).uniform(0.0018, 0.0022, 18_000))
+    x = np.exp(-0.1 * t) * np.cos(10 * t)
+    t[7500], t[7501] = t[7501], t[7500]
+    x[7500], x[7501] = x[7501], x[7500]
+    repeated = np.arange(1000, 12_000, 1000)
+    t[repeated] = t[repeated - 1]
+    record = read(tmp_path, t, x)
+    assert (np.diff(record.t) > 0).all()
+    assert len(record.t) == len(t) - len(repeated)
+    texts = "\n".join(record.notes)
+    assert "The rows are not in the order of time (1 time falls): they are sorted." in texts
+    assert f"{len(repeated)} of {len(t)} samples are left out." in texts

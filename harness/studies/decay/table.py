@@ -106,7 +106,7 @@ def summary_lines(identification: DecayIdentification) -> list[str]:
             "No friction that rises at low speed is excluded (Stribeck): the record departs from the law, and the part "
             "after that shows none. The losses of the part before may be those of such friction."
         )
-    elif np.isfinite(rise):
+    elif rise < 1.0:  # a larger limit says nothing
         lines.append(
             f"Friction that rises at low speed by less than {100 * rise:.2g} % of r is not excluded (Stribeck, falling "
             f"to 1/e of the rise at {LIMIT_SPEED:g} of the first peak speed)."
