@@ -11,6 +11,7 @@ from ...analyses.fit.fit_description import describe_fit
 from ...analyses.fit.fit_procedure import fit_records
 from ...analyses.fit.law_comparison import compare_laws
 from ...analyses.fit.parameter_fit import ParameterFit
+from ...analyses.fit.search import ROUGH
 from ...analyses.fit.slips import irregular_slips
 from ...analyses.fit.validation import validate
 from ...errors import HarnessError, SceneError, format_value, option_text
@@ -175,19 +176,21 @@ def fit_samples(
         )
     units = {name: resolved.variables[name].unit for name in request.observe}
     slips = irregular_slips(data, [*units.items()])
-    unknowns, doubts = make_unknowns(resolved, data), [*span_remarks(resolved, data), *(one.remark for one in slips)]
+    unknowns, doubts = make_unknowns(resolved, data), [*span_remarks(resolved, data)]
     with open_simulator(replace(resolved.shared, fmu=native_equivalent(request.run.fmu))) as simulator:
         try:
             problem, raw_fit = fit_records(simulator, data, unknowns, resolved.fixed, request.robust, report, averages)
         except HarnessError as error:
-            raise HarnessError(". ".join([str(error), *doubts]).removesuffix(".")) from None
+            remarks = [*doubts, *(one.remark for one in slips)]
+            raise HarnessError(". ".join([str(error), *remarks]).removesuffix(".")) from None
         prediction = validate(problem, raw_fit, validation) if validation else None
         notes = [note for samples in (*data, *validation) for note in samples.notes]
         fit = describe_fit(resolved.name, problem, raw_fit, notes, simulator.n_runs, process_time() - start_time)
     curves = read_tables_with(request.run.fmu, [estimate.name for estimate in fit.estimates], request.run.values)
-    fit = replace(
-        fit, columns=set_units(fit.columns, units), remarks=(*doubts, *fit.remarks), slips=slips, tables=curves
-    )
+    rough = {(column.record, column.name) for column in fit.columns if column.residual > ROUGH * column.noise}
+    slips = tuple(one for one in slips if (one.record, one.column) in rough)  # an input may explain the others
+    remarks = [*doubts, *(one.remark for one in slips), *fit.remarks]
+    fit = replace(fit, columns=set_units(fit.columns, units), remarks=tuple(remarks), slips=slips, tables=curves)
     if prediction:
         prediction = replace(prediction, columns=set_units(prediction.columns, units))
         fit = replace(fit, validation=prediction, remarks=(*fit.remarks, *prediction.remarks))
