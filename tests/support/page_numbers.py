@@ -12,13 +12,15 @@ import numpy as np
 
 import harness
 
-SCENE_STOP, CLOSE_UP_FROM, CREEP_FROM = 4.3, 4.1, 4.1  # s
+SCENE_STOP, CREEP_FROM = 4.3, 4.1  # s
 BELT_STOP, SWING_STOP = 12.0, 6.0  # s
 UNITS = {"": 1.0, "m": 1.0, "m/s": 1.0, "N": 1.0, "s": 1.0, "°": 1.0, "N·m": 1.0}
 PREFIXES = {"m": 1e-3, "µ": 1e-6, "n": 1e-9}
 UNITS |= {prefix + unit: size for prefix, size in PREFIXES.items() for unit in ("m", "m/s", "s", "N·m")}
 NUMBER = re.compile(
-    r"(±?)(-?\d+(?:\.(\d+))?) ?(" + "|".join(sorted(map(re.escape, UNITS), key=len, reverse=True)) + r")(?![\w·/])"
+    r"(?<!\w)(±?)(-?\d+(?:\.(\d+))?) ?("
+    + "|".join(sorted(map(re.escape, UNITS), key=len, reverse=True))
+    + r")(?![\w·/])"
 )
 
 
@@ -78,47 +80,45 @@ def creep(run):
     return abs(x[-1] - np.interp(CREEP_FROM, run.time, x)) / (run.time[-1] - CREEP_FROM)
 
 
-def opening_table(law, exponent):
-    """Return the numbers of the table in the opening by row; a row may have several."""
-    run = opening_run(law, exponent)
-    return {
-        "off": [abs(run["x"][-1] - closed_form()["x"][-1])],
-        "speed": [abs(run["v"][-1])],
-        "spring": [abs(run["F_spring"][-1])],
-        "friction": [abs(run["F_friction"][-1])],
-        "mode": [run.events.t[-1]] if law == "hybrid" else [],
-    }
+def errors(*runs):
+    """Return the distances of the ends of runs from the closed form."""
+    return [abs(run["x"][-1] - closed_form()["x"][-1]) for run in runs]
 
 
-def chatter_numbers(law, exponent):
-    run = opening_run(law, exponent)
-    before = last_step_before(run, closed_form().events.t[-1])
-    return {
-        "before": [before],
-        "after": [run.statistics.steps - before],
-        "rejected": [run.statistics.rejected],
-        "off": [abs(run["x"][-1] - closed_form()["x"][-1])],
-    }
+def opening_numbers(exponent):
+    """Return the numbers in the text of the opening."""
+    true, sign = (opening_run(law, exponent) for law in ("hybrid", "sign"))
+    fine = [opening_run(law, -4) for law in ("hybrid", "sign")]
+    rows = [abs(run[name][-1]) for name in ("v", "F_spring", "F_friction") for run in (true, sign)]
+    sentence = [SCENE_STOP, true.statistics.steps, true.events.t[-1], sign.statistics.steps, creep(sign)]
+    accuracy = [number for run in fine for number in (run.statistics.steps, *errors(run))]
+    return [*sentence, *errors(true, sign), *rows, 10, 4, *accuracy, closed_form().statistics.steps]
+
+
+def chatters_numbers(exponent=-3):
+    true, sign = (opening_run(law, exponent) for law in ("hybrid", "sign"))
+    rest = closed_form().events.t[-1]
+
+    def count(run):
+        before = last_step_before(run, rest)
+        return [before, run.statistics.steps - before, 0.3, run.statistics.rejected, *errors(run)]
+
+    force = [abs(sign["F_friction"][-1]), abs(sign["F_spring"][-1])]
+    return [*force, rest, *count(sign), *count(true), 0.3e-3]
 
 
 def stops_numbers():
     run = simulate("coulomb", stop=5.0)
     band = run.parameters["f"] / run.parameters["k"]
-    return {
-        "loss": [4 * band],
-        "band": [band],
-        "end": [np.count_nonzero(run.events.t > 0), run.events.t[-1], abs(run["x"][-1])],
-    }
+    return [4 * band, np.count_nonzero(run.events.t > 0), run.events.t[-1], abs(run["x"][-1]), band]
 
 
 def squeaks_numbers():
     run = simulate("stickslip", stop=BELT_STOP)
     (modes,) = run.events.modes.values()
     slips, holds = run.events.t[modes != 0], run.events.t[modes == 0]
-    return {
-        "mu_s": [run.parameters["mu_s"]],
-        "cycle": [len(slips), BELT_STOP, slips[-1] - slips[-2], holds[holds > slips[0]][0] - slips[0]],
-    }
+    friction = [run.parameters["mu_d"], run.parameters["mu_s"]]
+    return [*friction, len(slips), BELT_STOP, slips[-1] - slips[-2], holds[holds > slips[0]][0] - slips[0]]
 
 
 def creeps_numbers(x_m=0.01):
@@ -128,17 +128,14 @@ def creeps_numbers(x_m=0.01):
     x, t = (column[row - 1] + share * (column[row] - column[row - 1]) for column in (run["x"], run.time))
     exact = simulate("stickslip", stop=BELT_STOP)
     (modes,) = exact.events.modes.values()
-    return {
-        "creep": [x - run["x"][0], t, exact.events.t[modes != 0][0]],
-        "steps": [ode23("pacejka", {"x_m": x_m}, 1e-3, stop=BELT_STOP).statistics.steps],
-        "true-steps": [ode23("stickslip", {}, 1e-3, stop=BELT_STOP).statistics.steps],
-    }
+    steps = [
+        ode23(model, values, 1e-3, stop=BELT_STOP).statistics.steps
+        for model, values in (("pacejka", {"x_m": x_m}), ("stickslip", {}))
+    ]
+    return [x_m, x - run["x"][0], t, exact.events.t[modes != 0][0], steps[0], 10, 3, steps[1]]
 
 
 def swings_numbers():
     run = simulate("pendulum", {"theta0": radians(10)}, stop=SWING_STOP)
-    parameters = run.parameters
-    return {
-        "end": [run.events.t[-1], degrees(abs(run["theta"][-1]))],
-        "band": [degrees(asin(parameters["mu"] * parameters["r"] / parameters["a"]))],
-    }
+    mu, r, a = (run.parameters[name] for name in ("mu", "r", "a"))
+    return [mu, 10, run.events.t[-1], degrees(abs(run["theta"][-1])), degrees(asin(mu * r / a))]

@@ -7,9 +7,9 @@ import build_cache
 import commands
 import pytest
 
-READY = (  # all runs are done and drawn
-    "new Promise(done => { const look = () => document.querySelector('main[data-ready]') ? done(true)"
-    ": setTimeout(look, 1); look() })"
+READY = (  # all runs of the scenes that a selector matches are done and drawn
+    "new Promise(done => {{ const look = () => document.querySelector('{0}')"
+    "&& !document.querySelector('{0}:not([data-ready])') ? done(true) : setTimeout(look, 1); look() }})"
 )
 DRAWN = "new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))"  # the next picture is complete
 SHIFTS = (
@@ -45,23 +45,30 @@ class Page:
         if anew or not expected or expected.split("#")[0] != self.file.as_uri() or expected == link:
             self.browser.open(link)
         else:
-            self.run(f"delete document.querySelector('main').dataset.ready; location.hash = {json.dumps(hash)}")
-        return self.run(READY)
+            followed = (
+                "new Promise(done => { addEventListener('hashchange', done, { once: true }); location.hash = HASH })"
+            )
+            self.run(followed.replace("HASH", json.dumps(hash)))
+        return self.wait_until_drawn()
 
     def run(self, script):
         return self.browser.run(script)
 
+    def wait_until_drawn(self, scene="main"):
+        """Wait until all runs of Explore, or of other scenes, are done and drawn."""
+        return self.run(READY.format(scene))
+
     def when_done(self, script):
         """Evaluate an expression after all runs are done."""
-        self.run(READY)
+        self.wait_until_drawn()
         return self.run(script)
 
-    def type_number(self, name, text):
+    def type_number(self, name, text, prefix="", scene="main"):
         """Type into a number field."""
-        field = json.dumps(f"field-{name}")
+        field = json.dumps(f"{prefix}field-{name}")
         change = "e.dispatchEvent(new Event('change'))"
         self.run(f"(() => {{ const e = document.getElementById({field}); e.value = {json.dumps(text)}; {change} }})()")
-        self.run(READY)
+        self.wait_until_drawn(scene)
 
     def choose(self, name, value):
         """Choose from a list."""
@@ -69,7 +76,7 @@ class Page:
             f"(() => {{ const e = document.getElementById({json.dumps(name)}); e.value = {json.dumps(str(value))}; "
             "e.dispatchEvent(new Event('change')) })()"
         )
-        self.run(READY)
+        self.wait_until_drawn()
 
     def check(self, id, on):
         """Tick or untick a box."""
@@ -78,7 +85,7 @@ class Page:
 
     def click(self, selector):
         self.run(f"document.querySelector({json.dumps(selector)}).click()")
-        self.run(READY)
+        self.wait_until_drawn()
 
     def seek(self, t):
         """Move the cursor to a time."""

@@ -27,3 +27,13 @@ def page(page_in_browser, quiet):
     if not page_in_browser.run("Boolean(globalThis.app)"):  # no test of this module has opened it yet
         page_in_browser.open()
     return page_in_browser
+
+
+@pytest.fixture
+def still(page):
+    """The page for a visitor who prefers reduced motion, complete: all results are there at once."""
+    page.browser.size(1280)
+    page.browser.call("Emulation.setEmulatedMedia", features=[{"name": "prefers-reduced-motion", "value": "reduce"}])
+    page.open(anew=True)
+    page.wait_until_drawn(".story")
+    return page

@@ -72,10 +72,7 @@ def test_without_scripts_the_page_shows_its_claim_and_a_text(page):
     page.browser.call("DOM.enable")
     page.browser.call("CSS.enable")
     root = page.browser.call("DOM.getDocument")["root"]["nodeId"]
-    shown = {
-        selector: is_shown(selector)
-        for selector in ("h1", "#no-script", "#lede", ".lane", ".story", "#explore", "main")
-    }
+    shown = {selector: is_shown(selector) for selector in ("h1", "#no-script", "#lede", ".lane", "#explore", "main")}
     page.browser.call("CSS.disable")
     page.browser.call("DOM.disable")
     page.browser.call("Emulation.setScriptExecutionDisabled", value=False)

@@ -24,8 +24,7 @@ HERE = Path(__file__).parent
 MODULES = (
     *("numbers", "libc", "wasm", "fmu", "run", "state", "library", "run_set", "measure", "plot", "panels", "controls"),
     *("legend", "diagrams", "tables", "export", "mechanism", "drag", "scene", "explore"),
-    *("animation", "background", "prose", "chart", "adjustable", "story_models", "story_bodies", "opening"),
-    *("chatter_story", "story", "stories", "main"),
+    *("story", "stories", "main"),
 )
 CLAIM = "Real things stop. sign(v) never does."
 STORY_MODELS = ("coulomb", "stickslip", "pacejka", "pendulum")
@@ -76,10 +75,7 @@ def model_with_sources(
 
 def render_page(data: object, with_stories: bool) -> str:
     """Return the HTML text of the page, with the opening and the stories, which need STORY_MODELS, or without."""
-    style, stories, css = (
-        (HERE / name).read_text(encoding="utf-8") for name in ("style.css", "stories.html", "stories.css")
-    )
-    style += css if with_stories else ""
+    style, stories = ((HERE / name).read_text(encoding="utf-8") for name in ("style.css", "stories.html"))
     title = CLAIM if with_stories else "Dry friction, live"
     heading = "<h2>Explore</h2>" if with_stories else f"<h1>{title}</h1>"
     code = bundle_script()

@@ -21,17 +21,17 @@ export class DragController {
     this.scene.play();
   }
 
-  // Start dragging. This sets the start position, at time zero or where the scene asks for it; or else it pulls the body with
-  // a virtual spring.
-  grab(body) {
+  // Start dragging a body at its position. This sets the start position, at time zero or where the scene asks for it; or else
+  // it pulls the body with a virtual spring.
+  grab(body, position) {
     const { state, modelInfo, playing, dragsStart } = this.scene;
     const startVariable = (dragsStart || (state.t === 0 && !playing)) && findVariable(modelInfo, body.start);
     if (startVariable) {
       if (playing) this.scene.play(false);
+      this.active = { startVariable, target: state.t > 0 ? position : undefined };
       state.t = 0;
-      this.active = { startVariable };
-    }
-    else if (body.input) {
+      this.scene.requestFrame();
+    } else if (body.input) {
       this.active = { body, restForce: valueAt(modelInfo, state, body.input, state.t), stiffness: this.stiffness(body) };
       this.scene.play();
     }

@@ -2,12 +2,15 @@
 
 import { Explore, isEmbedded } from "./explore.js";
 import { ModelLibrary } from "./library.js";
-import { startStories } from "./stories.js";
+import { OPENING, STORIES } from "./stories.js";
+import { createSection, Story } from "./story.js";
 
 const data = JSON.parse(document.getElementById("data").textContent);
 const library = new ModelLibrary(data);
+const host = document.getElementById("stories");
+const opening = host && new Story(document.getElementById("opening"), library, OPENING);
 const explore = new Explore(document.querySelector("main"), library);
-const storyHost = document.getElementById("stories");
+const stories = host ? Object.entries(STORIES).map(([id, story]) => new Story(createSection(id, story.title), library, story)) : [];
 
 document.getElementById("version").textContent = data.version;
 addEventListener("hashchange", ({ newURL }) => { // the state may have replaced the address since
@@ -22,12 +25,13 @@ addEventListener("keydown", (event) => {
   event.preventDefault();
   document.getElementById("play").click();
 });
-storyHost?.addEventListener("click", (event) => { // in a page embedded in a report, a link would lead to the report
-  const link = event.target.closest("a");
-  if (!link || !isEmbedded) return;
+host?.addEventListener("click", (event) => { // in a page embedded in a report, a link would lead to the report
+  const hash = event.target.closest("a")?.getAttribute("href");
+  if (!hash || !isEmbedded) return;
   event.preventDefault();
-  document.querySelector(link.getAttribute("href")).scrollIntoView();
+  if (hash.startsWith("#.")) explore.follow(hash);
+  else document.querySelector(hash).scrollIntoView();
 });
-globalThis.app = { library, runs: explore.runs, plots: explore.diagrams.plots, seek: (t) => explore.seek(t), state: () => explore.state }; // for tests and the console
-if (storyHost) globalThis.app.stories = startStories(library, explore.follow(location.hash));
-else await explore.follow(location.hash);
+globalThis.app = { library, opening, stories, runs: explore.runs, plots: explore.diagrams.plots, seek: (t) => explore.seek(t), state: () => explore.state }; // for tests and the console
+await Promise.all([opening?.start(), explore.follow(location.hash)]);
+for (const story of stories) await story.start();

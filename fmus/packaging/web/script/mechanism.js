@@ -17,6 +17,7 @@ const [SMALLEST, LARGEST] = [1e-150, 1e150]; // limits of drawn values
 const SHORTEST_SPRING = 40; // drawn length to which a dragged block can compress its spring
 const SCALE_MARGIN = 40; // drawn length by which a motion may exceed the scale before the scale changes
 const DRAG_RESOLUTION = 0.1; // drawn length, or degrees
+const [KEY_STEP, KEY_ANGLE] = [0.05, Math.PI / 180]; // of the range of a block, and for a rotation, by one key
 const NAMESPACE = "http://www.w3.org/2000/svg";
 
 function element(name, attributes, parent) {
@@ -26,7 +27,7 @@ function element(name, attributes, parent) {
 }
 
 export class Mechanism {
-  // Calls `drag` while a body is dragged: grab(body), move(position), drop().
+  // Calls `drag` while a body is dragged: grab(body, position), move(position), drop().
   constructor(host, drag) {
     Object.assign(this, { host, drag, parts: [], held: null }); // held: the part that is dragged
   }
@@ -37,7 +38,7 @@ export class Mechanism {
     const bodies = modelInfo.bodies.filter((body) => body.kind !== "none");
     const lanes = Math.max(bodies.length, 1);
     const [top, height] = bodies.some((body) => body.kind !== "block") ? [0, ROTATION_HEIGHT] : [TOP_MARGIN, LANE_HEIGHT * lanes - TOP_MARGIN];
-    this.svg = element("svg", { viewBox: `0 ${top} ${WIDTH} ${height}`, role: "img", "aria-label": "" });
+    this.svg = element("svg", { viewBox: `0 ${top} ${WIDTH} ${height}`, role: "group", "aria-label": "" });
     this.host.replaceChildren(this.svg);
     this.host.hidden = !bodies.length;
     this.held = null;
@@ -145,14 +146,15 @@ export class Mechanism {
       const stuck = body.mode && value(body.mode) === 0;
       part.moving.classList.toggle("stuck", Boolean(stuck));
       part.moving.classList.toggle("slipping", Boolean(body.friction) && !stuck);
-      part.position = position;
+      Object.assign(part, { position, stuck });
       part.driverPosition = body.driver ? value(body.driver) : 0;
       if (body.kind === "block") this.moveBlock(part, position, limited);
       else this.rotate(part, position, limited);
       part.pull.setAttribute("d", part === this.held && Number.isFinite(part.target) ? this.pullLine(part) : "");
       if (part.label && body.mode) part.label.textContent = stuck ? "sticks" : "slips";
     }
-    this.svg?.setAttribute("aria-label", this.describe(value));
+    this.svg?.setAttribute("aria-label", `Mechanism: ${this.parts.map((part) => this.describe(part)).join("; ")}`);
+    for (const part of this.parts) this.describeHandle(part);
   }
 
   moveBlock(part, position, value) {
@@ -191,13 +193,18 @@ export class Mechanism {
     }
   }
 
-  // The text alternative of the drawing.
-  describe(value) {
-    const descriptions = this.parts.map(({ body }) => {
-      const mode = body.mode ? (value(body.mode) === 0 ? ", stuck" : ", sliding") : "";
-      return `${body.position} = ${formatValue(findVariable(this.modelInfo, body.position), value(body.position), 3)}${mode}`;
-    });
-    return `Mechanism: ${descriptions.join("; ")}`;
+  describe({ body, position, stuck }) {
+    const mode = body.mode ? (stuck ? ", stuck" : ", sliding") : "";
+    return `${body.position} = ${formatValue(findVariable(this.modelInfo, body.position), position, 3)}${mode}`;
+  }
+
+  // State the position of a body to readers who move it by keys.
+  describeHandle(part) {
+    const { factor } = findVariable(this.modelInfo, part.body.position);
+    const range = part.range ?? Math.PI;
+    const numbers = { "aria-valuemin": -range * factor, "aria-valuemax": range * factor, "aria-valuenow": part.position * factor };
+    for (const [name, number] of Object.entries(numbers)) part.moving.setAttribute(name, number.toPrecision(3));
+    part.moving.setAttribute("aria-valuetext", this.describe(part));
   }
 
   // The line from a dragged body to the pointer; only a body that is pulled while it moves is not under the pointer.
@@ -222,10 +229,10 @@ export class Mechanism {
     return part.body.kind === "block" ? (x - part.origin) / part.pixels : Math.atan2(x - part.x, y - part.pin);
   }
 
-  // The position to which the pointer drags a body, with the digits that the drawing resolves.
-  dragTarget(part, event, offset) {
+  // The position to which a body is dragged: one that the drawing can show, with the digits that it resolves.
+  dragTarget(part, position) {
     const { factor } = findVariable(this.modelInfo, part.body.position);
-    let target = this.pointerPosition(part, event) - offset;
+    let target = position;
     if (part.body.kind === "block") {
       const [low, high] = this.dragRange(part);
       target = Math.min(Math.max(target, low), high);
@@ -235,30 +242,45 @@ export class Mechanism {
     return Number((target * factor).toFixed(digits)) / factor;
   }
 
-  // Let the pointer drag a body.
+  // Let the pointer and the arrow keys drag a body.
   makeDraggable(part) {
     const handle = part.moving;
+    const { text } = findVariable(this.modelInfo, part.body.position);
+    const attributes = { role: "slider", tabindex: 0, "aria-label": `${text}: drag, or press the arrow keys and then Enter` };
+    for (const [name, value] of Object.entries(attributes)) handle.setAttribute(name, value);
     let offset = 0;
+    const grab = () => {
+      this.held = part;
+      part.target = this.dragTarget(part, part.position);
+      this.drag.grab(part.body, part.target);
+    };
+    const move = (position) => {
+      part.target = this.dragTarget(part, position);
+      this.drag.move(part.target);
+    };
+    const drop = () => {
+      if (this.held !== part) return;
+      this.held = part.target = null;
+      this.drag.drop();
+    };
     handle.addEventListener("pointerdown", (event) => {
       if (this.held) return;
       handle.setPointerCapture(event.pointerId);
       offset = this.pointerPosition(part, event) - part.position;
-      this.held = part;
-      this.drag.grab(part.body);
+      grab();
       event.preventDefault();
     });
-    handle.addEventListener("pointermove", (event) => {
-      if (this.held !== part) return;
-      part.target = this.dragTarget(part, event, offset);
-      this.drag.move(part.target);
+    handle.addEventListener("pointermove", (event) => this.held === part && move(this.pointerPosition(part, event) - offset));
+    for (const end of ["pointerup", "pointercancel", "blur"]) handle.addEventListener(end, drop);
+    handle.addEventListener("keydown", (event) => {
+      const direction = { ArrowRight: 1, ArrowUp: 1, ArrowLeft: -1, ArrowDown: -1 }[event.key];
+      if (direction) {
+        if (!this.held) grab();
+        move(part.target + direction * (part.range ? KEY_STEP * part.range : KEY_ANGLE));
+      } else if (event.key === "Enter") drop();
+      else return;
+      event.preventDefault();
     });
-    for (const end of ["pointerup", "pointercancel"]) {
-      handle.addEventListener(end, () => {
-        if (this.held !== part) return;
-        this.held = part.target = null;
-        this.drag.drop();
-      });
-    }
   }
 }
 

@@ -9,13 +9,13 @@ export function formatPower(exponent) {
   return `10${[...String(exponent)].map((character) => SUPERSCRIPTS[character]).join("")}`;
 }
 
-// A number with at most `digits` digits, without trailing zeros, with a typographic minus sign; very large and small ones
-// with a power of ten, as in 2.5·10⁻⁶.
+// A number with at most `digits` digits, unless it is whole, without trailing zeros, with a typographic minus sign; very
+// large and small ones with a power of ten, as in 2.5·10⁻⁶.
 export function formatNumber(value, digits = 4) {
   if (!Number.isFinite(value)) return "–";
   const size = Math.abs(value);
   if (size >= LARGEST_PLAIN || (size > 0 && size < SMALLEST_PLAIN)) return formatScientific(value, digits);
-  return String(Number(value.toPrecision(digits))).replace("-", "−");
+  return String(Number.isInteger(value) ? value : Number(value.toPrecision(digits))).replace("-", "−");
 }
 
 // A number with a power of ten, whatever its size.

@@ -8,25 +8,33 @@ const MAX_MARKS = 400; // event marks
 const ENVELOPE_POINTS = 200;
 const MAX_PLOTTED_ROWS = 8000; // longer runs are plotted at grid points and events only
 
-// Return the diagrams of a scene as [{key, title, content}]. A diagram keeps its key from one state to the next. The key is
-// the name of the variable; other keys start with a dot, which no name does. With `envelopes`, the position has turning
-// points and envelopes.
-export function buildPanels(scene, { envelopes }) {
-  const { runs: { main, comparison }, modelInfo, body } = scene;
-  const names = [body.position, body.speed, body.acceleration].filter(Boolean);
-  const energy = modelInfo.variables.find(({ unit, causality }) => unit === "J" && causality === "output")?.name;
-  const others = [...new Set([energy, body.friction, ...(body.contacts ?? [])].filter(Boolean))];
-  const inputs = main.inputs.filter((name) => !names.includes(name) && main.largestMagnitude(name) > 0);
-  const panels = names.map((name) => timePanel(scene, name, { envelopes }));
-  panels.push(phasePanel(scene));
-  if (body.slip) panels.push(lawPanel(scene));
-  panels.push(timePanel(scene, "solver.h", { key: ".step", log: true }), timePanel(scene, "solver.steps", { key: ".steps", log: true }));
-  panels.push(...[...others, ...inputs].map((name) => timePanel(scene, name)));
-  if (modelInfo.contacts.length > 1) panels.push(stickingPanel(scene));
-  const error = errorPanel(scene);
-  if (error) panels.push(error);
+// Return the diagrams of a scene as [{key, title, content}]: those with these keys, in their order; without keys, all that a
+// visitor may want. A diagram keeps its key from one state to the next. The key is the name of the variable; other keys start
+// with a dot, which no name does. With `envelopes`, the position has turning points and envelopes.
+export function buildPanels(scene, { keys, envelopes = false }) {
+  const { runs: { main, comparison }, body } = scene;
+  const makers = {
+    ".phase": () => phasePanel(scene),
+    ".law": () => lawPanel(scene),
+    ".step": () => timePanel(scene, "solver.h", { key: ".step", log: true, isComplete: true }),
+    ".steps": () => timePanel(scene, "solver.steps", { key: ".steps", log: true, isComplete: true }),
+    ".magnitude": () => timePanel(scene, body.speed, { key: ".magnitude", log: true, isComplete: true }),
+    ".sticking": () => stickingPanel(scene),
+    ".error": () => errorPanel(scene),
+  };
+  const buildPanel = (key) => (makers[key] ? makers[key]() : timePanel(scene, key, { envelopes, isComplete: Boolean(keys) }));
+  const panels = (keys ?? usualKeys(scene)).map(buildPanel).filter(Boolean);
   for (const panel of panels) panel.content.description ??= `${panel.title}${comparison ? ", two runs" : ""}: ${describeRange(panel, main)}`;
   return panels;
+}
+
+function usualKeys({ runs: { main }, modelInfo, body }) {
+  const motion = [body.position, body.speed, body.acceleration].filter(Boolean);
+  const energy = modelInfo.variables.find(({ unit, causality }) => unit === "J" && causality === "output")?.name;
+  const forces = [...new Set([energy, body.friction, ...(body.contacts ?? [])].filter(Boolean))];
+  const inputs = main.inputs.filter((name) => !motion.includes(name) && main.largestMagnitude(name) > 0);
+  const [law, sticking] = [body.slip ? [".law"] : [], modelInfo.contacts.length > 1 ? [".sticking"] : []];
+  return [...motion, ".phase", ...law, ".step", ".steps", ...forces, ...inputs, ...sticking, ".error"];
 }
 
 function describeRange({ content }, main) {
@@ -39,37 +47,38 @@ function describeRange({ content }, main) {
 }
 
 // A variable over time as {x, y}, in its display unit; null if the run does not have it. For long runs, grid points,
-// events and the end are enough, except for the step size.
-function curveData(run, { name, factor }) {
+// events and the end are enough, unless it is to be complete.
+function curveData(run, { name, factor }, isComplete = false) {
   if (!run.columns[name]) return null;
-  const { x, y } = plottedRows(run, run.columns[name], name === "solver.h");
+  const { x, y } = plottedRows(run, run.columns[name], isComplete);
   return { x, y: factor === 1 ? y : y.map((value) => value * factor) };
 }
 
-function plottedRows(run, values, isComplete = false) {
+function plottedRows(run, values, isComplete) {
   if (isComplete || run.time.length < MAX_PLOTTED_ROWS) return { x: run.time, y: values };
   const rows = [...new Set([...run.grid, ...run.events.map(({ row }) => row), run.time.length - 1])].sort((a, b) => a - b);
   return { x: rows.map((row) => run.time[row]), y: rows.map((row) => values[row]) };
 }
 
 // One curve per run from curveOf(run). The main run comes last, so it is drawn on top.
-function runCurves({ main, comparison, unchanged, preview }, curveOf) {
+function runCurves({ runs: { main, comparison, unchanged, preview }, runNames }, curveOf) {
   return [
     unchanged && { ...curveOf(unchanged), colour: "ghost", dash: [4, 4], width: 1, legend: "without the changes" },
     preview && !main.done && { ...curveOf(preview), colour: "ghost", width: 1, legend: "preview by the default method" },
-    comparison && { ...curveOf(comparison), colour: "b", legend: "second run" },
-    { ...curveOf(main), colour: "a", legend: "run" },
+    comparison && { ...curveOf(comparison), colour: "b", legend: runNames[1] },
+    { ...curveOf(main), colour: "a", legend: runNames[0] },
   ].filter((curve) => curve?.y);
 }
 
 // A variable of all runs over time.
-function timePanel({ runs, state, modelInfo: { contacts }, body }, name, { key = name, log = false, envelopes = false } = {}) {
-  const { main } = runs;
+function timePanel(scene, name, { key = name, log = false, envelopes = false, isComplete = false }) {
+  const { runs: { main }, state, modelInfo: { contacts }, body } = scene;
   const variable = main.fmu.variables.get(name);
   const { factor, display_unit, text, symbol } = variable;
   const isPosition = name === body.position;
   const extras = isPosition ? positionCurves(main, body, envelopes, factor) : [];
-  const curves = [...extras, ...runCurves(runs, (run) => curveData(run, variable))];
+  const curves = [...extras, ...runCurves(scene, (run) => curveData(run, variable, isComplete))];
+  if (key === ".magnitude") for (const curve of curves) curve.y = curve.y.map(Math.abs);
   const y = { ...bounds(curves.map((curve) => curve.y), log), log };
   const x = { low: 0, high: state.stop, label: "t in s" };
   const own = contacts.filter((contact) => contact.name === name);
@@ -78,7 +87,7 @@ function timePanel({ runs, state, modelInfo: { contacts }, body }, name, { key =
   const isFriction = name === body.friction || contacts.some((contact) => contact.name === name);
   const arrow = name === body.friction && body.kind !== "none" ? `friction on the body, −${name}` : "";
   const sign = isFriction ? `; the arrow is −${name}` : "";
-  return { key, name, title: `${text}${display_unit ? ` in ${display_unit}` : ""}${sign}`, symbol, factor, content, arrow };
+  return { key, name, title: `${key === ".magnitude" ? "magnitude of the " : ""}${text}${display_unit ? ` in ${display_unit}` : ""}${sign}`, symbol, factor, content, arrow };
 }
 
 // The intervals in which contacts stick as {bands, rows}: each of several contacts has a row with its name.
@@ -137,10 +146,10 @@ function findMarks(main, state, labelled) {
 }
 
 // Friction over slip speed; the cursor is the point at its time.
-function lawPanel({ runs, body }) {
+function lawPanel({ runs, body, runNames }) {
   const [slip, friction] = [body.slip, body.friction].map((name) => runs.main.fmu.variables.get(name));
   const other = runs.comparison?.columns[slip.name] && runs.comparison.columns[friction.name] ? lawCurves(runs.comparison, body, slip, friction) : [];
-  const curves = [...other.map((curve) => ({ ...curve, colour: "b", legend: "second run" })), ...lawCurves(runs.main, body, slip, friction)];
+  const curves = [...other.map((curve) => ({ ...curve, colour: "b", legend: runNames[1] })), ...lawCurves(runs.main, body, slip, friction)];
   const content = {
     x: { ...bounds(curves.map((curve) => curve.x)), label: `${slip.name} in ${slip.display_unit}` },
     y: bounds(curves.map((curve) => curve.y)), curves,
@@ -148,29 +157,29 @@ function lawPanel({ runs, body }) {
   return { key: ".law", title: `friction law: ${friction.name} in ${friction.display_unit} against ${slip.name}`, symbol: "", content, phase: [slip, friction] };
 }
 
-// One line for the forces that hold the body, as far as the run shows them, and one curve for each slip, so that no line
-// joins the two.
+// One line for the forces that hold the body, as far as the run shows them, and one curve for each direction of the slip, so
+// that no line joins them.
 function lawCurves(run, body, slip, friction) {
-  const [x, y] = [slip, friction].map(({ name, factor }) => run.columns[name].map((value) => value * factor));
-  const modes = run.columns[body.mode];
-  const isStuck = (row) => modes?.[row] === 0;
   const largest = run.largestMagnitude(friction.name) * friction.factor;
   const held = { x: [0, 0], y: [-largest, largest], colour: "stick", legend: "holds", width: 3 };
-  const slips = [];
-  for (let row = 0; row < x.length; row++) {
-    if (isStuck(row)) continue;
-    if (row === 0 || isStuck(row - 1) || modes?.[row] !== modes?.[row - 1]) slips.push({ x: [], y: [], colour: "slip", legend: "slips" });
-    slips.at(-1).x.push(x[row]);
-    slips.at(-1).y.push(y[row]);
-  }
-  return modes?.includes(0) ? [held, ...slips] : slips;
+  const modes = run.columns[body.mode];
+  const slips = new Map(); // by mode
+  run.time.forEach((_, row) => {
+    const mode = modes?.[row];
+    if (mode === 0) return;
+    if (!slips.has(mode)) slips.set(mode, { x: [], y: [], colour: "slip", legend: "slips" });
+    slips.get(mode).x.push(run.columns[slip.name][row] * slip.factor);
+    slips.get(mode).y.push(run.columns[friction.name][row] * friction.factor);
+  });
+  return [...(modes?.includes(0) ? [held] : []), ...slips.values()];
 }
 
 // Speed over position.
-function phasePanel({ runs, body }) {
-  const [x, v] = [body.position, body.speed].map((name) => runs.main.fmu.variables.get(name));
+function phasePanel(scene) {
+  const { runs: { main }, body } = scene;
+  const [x, v] = [body.position, body.speed].map((name) => main.fmu.variables.get(name));
   const has = (run) => run.columns[x.name] && run.columns[v.name];
-  const curves = runCurves(runs, (run) => has(run) && { x: curveData(run, x).y, y: curveData(run, v).y, width: 1.2 });
+  const curves = runCurves(scene, (run) => has(run) && { x: curveData(run, x).y, y: curveData(run, v).y, width: 1.2 });
   const content = {
     x: { ...bounds(curves.map((curve) => curve.x)), label: `${x.name}${x.display_unit ? ` in ${x.display_unit}` : ""}` },
     y: bounds(curves.map((curve) => curve.y)), curves,
@@ -180,13 +189,13 @@ function phasePanel({ runs, body }) {
 
 // Errors of the runs against the closed form, or else the difference between the two runs. Null if a run has failed: an
 // error up to the failure would say little.
-function errorPanel({ runs: { main, comparison, reference }, state, body }) {
+function errorPanel({ runs: { main, comparison, reference }, state, body, runNames }) {
   if ([main, comparison, reference].some((run) => run?.failure)) return null;
   const { factor, display_unit } = main.fmu.variables.get(body.position);
   const sameModel = state.comparison?.model === state.model;
   const curve = (from, to, colour) => {
     const { time, differences } = difference(from, to, body.position);
-    return { x: time, y: differences.map((value) => Math.abs(value) * factor), colour, legend: colour === "a" ? "run" : "second run" };
+    return { x: time, y: differences.map((value) => Math.abs(value) * factor), colour, legend: runNames[colour === "a" ? 0 : 1] };
   };
   const curves = [];
   let title = `error of ${body.position} against the closed form`;
@@ -215,11 +224,12 @@ export function legendOf({ content, arrow }) {
 }
 
 // The cursor of a diagram and the values there: {cursor, readings [{text, colour}]}.
-export function cursorReadings({ phase, name, factor }, runs, t) {
+export function cursorReadings({ key, phase, name, factor }, runs, t) {
+  const sizeOf = key === ".magnitude" ? Math.abs : (value) => value;
   const [points, readings] = [[], []];
   for (const [run, colour] of [[runs.main, "a"], [runs.comparison, "b"]]) {
     if (!run?.time.length || (run.failure && t > run.time.at(-1)) || !(phase ?? [{ name }]).every((variable) => run.columns[variable.name])) continue;
-    const [x, y] = phase ? phase.map((variable) => run.at(variable.name, t) * variable.factor) : [t, run.at(name, t) * factor];
+    const [x, y] = phase ? phase.map((variable) => run.at(variable.name, t) * variable.factor) : [t, sizeOf(run.at(name, t) * factor)];
     points.push({ x, y, colour });
     if (!phase) readings.push({ text: formatNumber(y), colour });
   }

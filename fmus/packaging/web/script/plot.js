@@ -215,8 +215,9 @@ export class Plot {
     context.fillStyle = colours.hold;
     const rowHeight = (bottom - TOP) / Math.max(rows.length, 1);
     const gap = rows.length > 1 ? Math.min(ROW_GAP, 0.2 * rowHeight) : 0;
-    for (const { from, to, row } of bands) {
-      context.fillRect(scale.x(from), TOP + row * rowHeight + gap, Math.max(scale.x(to) - scale.x(from), 0.5), rowHeight - 2 * gap);
+    for (const { from, to, row } of bands.filter((band) => band.to >= x.low && band.from <= x.high)) {
+      const [start, end] = [scale.x(Math.max(from, x.low)), scale.x(Math.min(to, x.high))];
+      context.fillRect(start, TOP + row * rowHeight + gap, Math.max(end - start, 0.5), rowHeight - 2 * gap);
     }
     context.fillStyle = colours.soft;
     context.textAlign = "right";

@@ -53,6 +53,7 @@ export class Scene {
     this.mechanisms = [...root.querySelectorAll(".mechanism")].map((host) => new Mechanism(host, this.drag));
     this.diagrams = new Diagrams(this.find("panels"), prefix, (t) => this.seek(t));
     this.inputError = ""; // an invalid number
+    this.runNames = ["run", "second run"]; // in legends
     this.find("play").addEventListener("click", () => this.play(!this.playing));
     this.find("scrub").addEventListener("input", ({ target }) => this.seek((this.state.stop * target.value) / 1000));
     new IntersectionObserver(([{ isIntersecting }]) => (this.isInView = isIntersecting)).observe(root);
@@ -244,7 +245,7 @@ export class Scene {
       this.drawCursor(Math.min(state.t, main.time.at(-1)));
       this.isCursorStale = false;
     }
-    if (runs.done) this.root.dataset.ready = "";
+    if (runs.done && this.requested === state) this.root.dataset.ready = ""; // else another state is being compiled
   }
 
   // The runs that the mechanisms show.

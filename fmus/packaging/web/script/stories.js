@@ -1,184 +1,144 @@
-// The stories of the page, as specifications for story.js.
+// The opening and the stories: model, values, fields, diagrams and text of each.
+//
+//   model, values, stop   the state; comparison: the second run; restShown: ends this time in s after the motion has stopped
+//   fields                ranges of the fields by variable
+//   keys, ranges          diagrams, and the parts of them that are shown; envelopes: straight and exponential decay
+//   furtherRuns(state)    runs whose counters the text states
+//   text(scene)           HTML
 
-import { becomeIdle } from "./background.js";
-import { countOf, fixedDigits, significant } from "./prose.js";
-import { charts, modeCurve, palette, readPalette } from "./chart.js";
-import { HYBRID, ode23 } from "./story_models.js";
-import { StoryBelt, StoryBlock, StoryPendulum } from "./story_bodies.js";
-import { Story } from "./story.js";
-import { showChatter } from "./chatter_story.js";
-import { showOpening } from "./opening.js";
+import { formatCount, formatNumber, formatQuantity } from "./numbers.js";
+import { bounds } from "./plot.js";
+import { effectiveValues } from "./state.js";
 
+const [HYBRID, SIGN] = [1, 2]; // values of the variable friction
+const CREEP_TIME = 0.2; // s before the end
+const CLOSE_UP = { from: 4.1, to: 4.1003 }; // s, of the steps that chatter
 const DEGREE = Math.PI / 180;
-const COST_TOLERANCE = 1e-3;
 
-// Draw a friction law that holds any force up to `hold` and slides with `slide`, up to the speed `far`.
-function branches(chart, x, y, { hold, slide, far }) {
-  chart.line([[x(-far), y(-slide)], [x(0), y(-slide)]], palette.slip, 2);
-  chart.line([[x(0), y(slide)], [x(far), y(slide)]], palette.slip, 2);
-  chart.line([[x(0), y(-hold)], [x(0), y(hold)]], palette.stick, 4);
-}
+// The solver ode23 with a relative tolerance, and the absolute one in the ratio of MATLAB's defaults (1e-3 and 1e-6).
+const ode23 = (rtol) => ({ "solver.method": 2, "solver.rtol": rtol, "solver.atol": rtol / 1000 });
+const proportional = (values) => (values["solver.atol"] = values["solver.rtol"] / 1000);
+const tolerance = { "solver.rtol": { low: 1e-4, high: 1e-2, log: true } };
+const byBothLaws = { model: "coulomb", values: ode23(1e-3), comparison: { model: "coulomb", values: { friction: SIGN } }, runNames: ["true sticking", "sign(v)"], derive: proportional };
 
-// The friction coefficient of the model pacejka at a slip speed, to draw its curve.
-function magicFormula(v, x_m, mu_s, mu_d) {
-  const C = 2 - (2 * Math.asin(mu_d / mu_s)) / Math.PI;
-  const B = (2 * mu_s) / (x_m * C * mu_s);
-  const peak = B * x_m;
-  const E = (peak - Math.tan((0.5 * Math.PI) / C)) / (peak - Math.atan(peak));
-  const z = B * v;
-  return mu_s * Math.sin(C * Math.atan(z - E * (z - Math.atan(z))));
-}
-
-const beltLabel = (edge) => `friction can hold the spring: ±${fixedDigits(1000 * edge, 0)} mm`;
-const relative = (run) => ({ at: run.columns.x.map((x, i) => x - run.columns.x_driver[i]), shift: run.columns.x_driver, v: run.columns.v, F: run.columns.F_friction });
-const beltStory = { body: StoryBelt, range: 0.2, step: 0.01, stop: 12, speed: 2, unit: "mm", factor: 1000, y: 220, gridValues: [-200, -100, 0, 100, 200] };
-const weight = ({ m, g }) => m * g;
 const bold = (text) => `<b>${text}</b>`;
-const stopText = (rest, distance) => (rest === 0 ? `stays where it is, ${bold(distance)} off` : `stops after ${bold(`${fixedDigits(rest, 2)} s`)}, ${bold(distance)} off`);
-const cycles = (run) => {
-  const slips = run.events.filter(({ row }) => run.columns.mode[row] !== 0).map(({ t }) => t);
-  const holds = run.events.filter(({ row }) => run.columns.mode[row] === 0).map(({ t }) => t);
-  return { slips, holds };
+const seconds = (t) => bold(`${formatNumber(t)} s`);
+const metres = (x) => bold(formatQuantity(Math.abs(x), "m"));
+const degrees = (angle) => bold(`${formatNumber(Math.abs(angle) / DEGREE, 3)}°`);
+const newtons = (force) => bold(`${formatNumber(Math.abs(force), 3)} N`);
+const count = (value) => bold(formatCount(value));
+const countOf = (value, noun) => bold(`${formatCount(value)} ${noun}${value === 1 ? "" : "s"}`);
+const valuesOf = ({ modelInfo, state }) => effectiveValues(modelInfo, state.values);
+const stepsOf = (run) => run.counts["solver.steps"];
+const errorOf = ({ main, reference }, run = main) => run.columns.x.at(-1) - reference.columns.x.at(-1);
+const restText = (rest, distance) => (rest === 0 ? `stays where it is, ${distance} off` : `stops after ${seconds(rest)}, ${distance} off`);
+
+// The times at which a run begins to slip, and at which it begins to stick.
+function cycles(run) {
+  const times = (isSlip) => run.events.filter(({ row }) => (run.columns.mode[row] !== 0) === isSlip).map(({ t }) => t);
+  return { slips: times(true), holds: times(false) };
+}
+
+export const OPENING = {
+  ...byBothLaws, restShown: 0.3, stepsPerSecond: 13000,
+  fields: { ...tolerance, x0: { low: -0.12, high: 0.12, log: false } },
+  keys: ["x", ".steps", ".magnitude", ".law"],
+  furtherRuns: ({ values }) => ({
+    fineTrue: { model: "coulomb", values: { ...values, ...ode23(1e-4), friction: HYBRID } },
+    fineSign: { model: "coulomb", values: { ...values, ...ode23(1e-4), friction: SIGN } },
+  }),
+  text: ({ runs, state }) => {
+    const { main, comparison: sign, reference, further: { fineTrue, fineSign } } = runs;
+    const rest = main.restTime();
+    const creep = (sign.columns.x.at(-1) - sign.at("x", state.stop - CREEP_TIME)) / CREEP_TIME;
+    const rests = rest === undefined ? "" : ` and rests ${rest === 0 ? "from the start" : `from ${seconds(rest)} on`}`;
+    const row = (title, textOf) => `<tr><th scope="row">${title}</th><td class="a">${textOf(main)}</td><td class="b">${textOf(sign)}</td></tr>`;
+    const last = (name) => (run) => run.columns[name].at(-1);
+    return `<p>In the same ${seconds(state.stop)}, true sticking takes ${countOf(stepsOf(main), "step")}${rests}; sign(v) takes ${count(stepsOf(sign))}${creep ? `, and still moves at ${bold(formatQuantity(Math.abs(creep), "m/s"))} on average` : ""}.</p>
+      <table><thead><tr><td></td><th scope="col">true sticking</th><th scope="col">sign(v)</th></tr></thead><tbody>
+      ${row("distance from the closed form", (run) => metres(errorOf(runs, run)))}
+      ${row("speed", (run) => bold(formatQuantity(Math.abs(last("v")(run)), "m/s")))}
+      ${row("force of the spring", (run) => newtons(last("F_spring")(run)))}
+      ${row("friction", (run) => newtons(last("F_friction")(run)))}</tbody></table>
+      <p>The tolerance sets the error; the law sets the work: with 10<sup>−4</sup>, true sticking takes ${count(stepsOf(fineTrue))} steps and ends ${metres(errorOf(runs, fineTrue))} off, sign(v) ${count(stepsOf(fineSign))} and ${metres(errorOf(runs, fineSign))}. The default method of this FMU is the closed form: ${countOf(stepsOf(reference), "step")}, exact to rounding. Other tools hold a body exactly as well: scipy, PathSim and Drake do, once their user programs stick and slip as events. In these FMUs, the model contains the events.</p>`;
+  },
 };
 
-const specs = {
+export const STORIES = {
   stops: {
-    model: "coulomb", body: StoryBlock, range: 0.12, step: 0.005, stop: 5, speed: 1, unit: "mm", factor: 1000, y: 125, gridValues: [-100, -50, 0, 50, 100],
-    name: "Mass on a dry floor: drag it, or press the arrow keys and then Enter",
-    title: "position, mm", startKey: "x0",
-    formats: { f: (value) => `${fixedDigits(value, 2)} N`, x0: (value) => `${fixedDigits(value, 0)} mm` },
-    values: ({ f, x0 }, start) => ({ ...HYBRID, f, x0: start ?? x0 / 1000 }),
-    of: (run) => ({ at: run.columns.x, v: run.columns.v, F: run.columns.F_friction }),
-    band: ({ f }, { k }) => f / k,
-    bandLabel: (edge) => `friction can hold the spring: ±${fixedDigits(1000 * edge, 1)} mm`,
-    results: ({ run, rest, edge }) => {
-      const turns = run.events.filter(({ t }) => t > 0).length; // the last one is the stop
-      const off = `${fixedDigits(1000 * Math.abs(run.columns.x.at(-1)), 1)} mm`;
-      return {
-        loss: bold(`${fixedDigits(4000 * edge, 1)} mm`), band: bold(`±${fixedDigits(1000 * edge, 1)} mm`),
-        end: rest === undefined ? "still swings when the picture ends" : `${rest > 0 ? `makes ${bold(countOf(turns, "half-swing"))} and ` : ""}${stopText(rest, off)} centre`,
-      };
+    title: "It stops", model: "coulomb", stop: 5,
+    fields: { f: { low: 0.5, high: 2, log: false }, x0: { low: -0.12, high: 0.12, log: false } },
+    keys: ["x", ".law"], envelopes: true,
+    text: (scene) => {
+      const { main } = scene.runs;
+      const { f, k } = valuesOf(scene);
+      const [rest, turns] = [main.restTime(), main.events.filter(({ t }) => t > 0).length]; // the last one is the stop
+      const end = rest === undefined ? "still swings when the picture ends"
+        : `${rest > 0 ? `makes ${countOf(turns, "half-swing")} and ` : ""}${restText(rest, metres(main.columns.x.at(-1)))} centre`;
+      return `<p>Dry friction takes the same energy on every centimetre, so each full swing is ${metres((4 * f) / k)} shorter than the one before, and the swings shrink along a straight line. The mass ${end}. Anywhere within ${bold("±")}${metres(f / k)} of the centre, the spring is too weak to move it.</p>`;
     },
-    picture: ({ rest }) => `Position over time: the swings shrink along a straight line, and the mass ${rest === undefined ? "still moves at the end" : `stops after ${fixedDigits(rest, 2)} s`}`,
-    extra: (chart, x, y, { run, edge, rest, start }) => {
-      const begin = 1000 * Math.abs(run.columns.x[0]);
-      const period = 2 * Math.PI * Math.sqrt(start.m / start.k);
-      const end = rest ?? 5;
-      for (const sign of [1, -1]) chart.line([[x(0), y(sign * begin)], [x(end), y(sign * (begin - (4000 * edge * end) / period))]], palette.soft, 1, [3, 4]);
+  },
+  chatters: {
+    title: "It chatters", ...byBothLaws, stop: 4.3, fields: tolerance,
+    keys: ["v", ".law"],
+    ranges: ({ runs: { comparison: { time, columns: { v } } } }) => {
+      const shown = v.filter((_, i) => time[i] >= CLOSE_UP.from && time[i] <= CLOSE_UP.to);
+      const largest = 1.25 * Math.max(1e-9, ...shown.map(Math.abs));
+      return { v: { x: { low: CLOSE_UP.from, high: CLOSE_UP.to }, y: bounds([shown, [0]]) }, ".law": { x: { low: -largest, high: largest } } };
     },
-    labels: ({ run, rest, edge }) => [
-      ...(rest > 0 && rest < 4.4 ? [{ label: "holds", t: Math.min(rest + 0.3, 4.7), at: 1000 * run.columns.x.at(-1) + 14, colour: "stick" }] : []),
-      ...(Math.abs(run.columns.x[0]) > 0.06 ? [{ label: `a straight line, ${fixedDigits(4000 * edge, 1)} mm a swing`, t: 1.15, at: 1000 * Math.abs(run.columns.x[0]) - 8000 * edge + 9, colour: "soft", align: "left" }] : []),
-    ],
-    law: {
-      title: "friction in N over slip speed", from: -1.5, to: 1.5, low: -2.3, high: 2.3, gridValues: [-2, -1, 0, 1, 2], speeds: [-1, 0, 1], unit: "m/s", speedFactor: 1, forceFactor: 1,
-      draw: (chart, x, y, { values: { f } }) => branches(chart, x, y, { hold: f, slide: f, far: 2 }),
-      label: (chart, x, y, story, { F, stuck }) => chart.label(stuck ? `holds with ${fixedDigits(Math.abs(F), 2)} N` : "slips", x(0) + 12, stuck ? y(F) : y(0) - 2, { colour: stuck ? palette.stick : palette.slip, key: "mode" }),
+    text: ({ runs }) => {
+      const { main, comparison: sign, reference } = runs;
+      const rest = reference.restTime();
+      const before = (run) => run.ends.filter((row) => run.time[row] <= rest).length - 1;
+      const row = (run) => `${count(before(run))} steps until then and ${count(stepsOf(run) - before(run))} in the 0.3 s after that, rejects ${count(run.counts["solver.rejected"])} more, and ends ${metres(errorOf(runs, run))} from the closed form`;
+      return `<p>At rest, friction is whatever balances the spring; sign(v) offers only the full force, one way or the other: here ${newtons(sign.columns.F_friction.at(-1))}, where the spring pulls with ${newtons(sign.columns.F_spring.at(-1))}. The mass should stop after ${seconds(rest)}. With sign(v), ode23 takes ${row(sign)}. With true sticking, it takes ${row(main)}. The diagrams show ${bold(`${formatNumber(1000 * (CLOSE_UP.to - CLOSE_UP.from), 2)} ms`)} of the time at rest.</p>`;
     },
   },
   squeaks: {
-    ...beltStory, model: "stickslip", name: "Sled on a moving floor: drag it, or press the arrow keys and then Enter", title: "position of the sled in mm, zero where the spring is slack",
-    formats: { v_driver: (value) => `${fixedDigits(value, 0)} mm/s`, mu_d: (value) => fixedDigits(value, 2) },
-    values: ({ v_driver, mu_d }, start = 0) => ({ v_driver: v_driver / 1000, mu_d, x0: start }),
-    of: relative, band: (values, start) => (start.mu_s * weight(start)) / start.k, bandLabel: beltLabel,
-    results: ({ run, start, spec }) => {
-      const { slips, holds } = cycles(run);
+    title: "It squeaks", model: "stickslip", stop: 12,
+    fields: { v_driver: { low: 0.01, high: 0.2, log: false }, mu_d: { low: 0.1, high: 0.88, log: false } },
+    keys: ["x", ".law"],
+    text: (scene) => {
+      const { slips, holds } = cycles(scene.runs.main);
+      const { mu_s, mu_d } = valuesOf(scene);
+      const { stop } = scene.state;
       const hold = holds.find((t) => t > slips[0]);
-      const lasts = hold ? `lasting ${bold(`${fixedDigits(hold - slips[0], 2)} s`)}` : "without an end";
-      const cycle = slips.length > 1 ? `${bold(countOf(slips.length, "slip"))} in ${spec.stop} s, one every ${bold(`${fixedDigits(slips.at(-1) - slips.at(-2), 2)} s`)}, each ${lasts}`
-        : slips.length ? `one slip in the first ${spec.stop} s, ${lasts}` : `no slip in the first ${spec.stop} s`;
-      return { mu_s: bold(fixedDigits(start.mu_s, 2)), cycle };
-    },
-    picture: ({ run }) => `Stretch of the spring over time: a sawtooth with ${cycles(run).slips.length} slips`,
-    labels: ({ run }) => {
-      const { slips } = cycles(run);
-      return slips[0] > 1.6 ? [{ label: "holds: rides along", t: slips[0] * 0.5 + 0.35, at: -32, colour: "stick" }, { label: "slips back", t: slips[0] + 0.4, at: -24, colour: "slip" }] : [];
-    },
-    law: {
-      title: "friction in N over slip speed", from: -0.12, to: 0.6, low: -125, high: 125, gridValues: [-100, 0, 100], speeds: [0, 0.2, 0.4], unit: "m/s", speedFactor: 1, forceFactor: 1,
-      draw: (chart, x, y, { values: { mu_d }, start }) => branches(chart, x, y, { hold: start.mu_s * weight(start), slide: mu_d * weight(start), far: 1 }),
-      label: (chart, x, y, story, { F, stuck }) => chart.label(stuck ? `holds with ${fixedDigits(Math.abs(F), 0)} N` : "slips", x(0.05), stuck ? y(F) + (F > 60 ? 26 : 0) : y(30), { colour: stuck ? palette.stick : palette.slip, key: "mode" }),
+      const lasts = hold ? `lasting ${seconds(hold - slips[0])}` : "without an end";
+      const cycle = slips.length > 1 ? `${countOf(slips.length, "slip")} in ${stop} s, one every ${seconds(slips.at(-1) - slips.at(-2))}, each ${lasts}`
+        : slips.length ? `one slip in the first ${stop} s, ${lasts}` : `no slip in the first ${stop} s`;
+      return `<p>A driver pulls the sled through a spring. The sled stands until the spring is stronger than friction at rest; then it slips, and sticks again. Friction is weaker once it slips, ${bold(formatNumber(mu_d, 3))} instead of ${bold(formatNumber(mu_s, 3))}, so it overshoots: ${cycle}. A few hundred times a second, this is a door hinge, a brake, or a violin.</p>`;
     },
   },
   creeps: {
-    ...beltStory, model: "pacejka", name: "Sled with a smooth friction curve: drag it, or press the arrow keys and then Enter", title: "distance slipped over the floor, mm", low: -40, y: 520, gridValues: [0, 100, 200, 300, 400, 500],
-    formats: { x_m: (value) => `${significant(10 ** value, 2)} mm/s`, v_driver: (value) => `${fixedDigits(value, 0)} mm/s` },
-    values: ({ x_m, v_driver }, start = 0) => ({ x_m: 10 ** x_m / 1000, v_driver: v_driver / 1000, x0: start }),
-    of: (run) => ({ ...relative(run), y: run.columns.x.map((x) => x - run.columns.x[0]) }), band: () => 0, bandLabel: () => "no band: this law cannot hold",
-    reference: { model: "stickslip", values: ({ v_driver }, start = 0) => ({ v_driver: v_driver / 1000, x0: start }), of: (run) => ({ at: run.columns.x.map((x) => x - run.columns.x[0]), time: run.time, stuck: (i) => run.columns.mode[i] === 0, breaksAway: run.columns.mode[0] === 0 ? cycles(run).slips[0] : 0 }) },
-    costs: { // step counts of the same solver
-      steps: { model: "pacejka", values: ({ x_m, v_driver }, start = 0) => ({ x_m: 10 ** x_m / 1000, v_driver: v_driver / 1000, x0: start, ...ode23(COST_TOLERANCE) }) },
-      "true-steps": { model: "stickslip", values: ({ v_driver }, start = 0) => ({ v_driver: v_driver / 1000, x0: start, ...HYBRID, ...ode23(COST_TOLERANCE) }) },
+    title: "It creeps", model: "pacejka", stop: 12, comparison: { model: "stickslip", values: {} }, runNames: ["smooth curve", "true sticking"],
+    fields: { x_m: { low: 0.001, high: 0.02, log: true }, v_driver: { low: 0.02, high: 0.044, log: false } },
+    keys: ["x", ".law"],
+    furtherRuns: ({ values }) => {
+      const { x_m, ...shared } = values;
+      return { smooth: { model: "pacejka", values: { ...values, ...ode23(1e-3) } }, exact: { model: "stickslip", values: { ...shared, ...ode23(1e-3) } } };
     },
-    results: ({ run, values, spec, reference: { breaksAway } }) => {
-      const { time, columns: { x, v } } = run;
-      const peak = 10 ** values.x_m / 1000;
-      const row = v.findIndex((speed) => speed > peak);
-      const share = row > 0 ? (peak - v[row - 1]) / (v[row] - v[row - 1]) : 1; // of the interval before that row
+    text: (scene) => {
+      const { main: { time, columns: { x, v } }, comparison, further: { smooth, exact } } = scene.runs;
+      const { x_m } = valuesOf(scene);
+      const row = v.findIndex((speed) => speed > x_m);
+      const share = row > 0 ? (x_m - v[row - 1]) / (v[row] - v[row - 1]) : 1; // of the interval before that row
       const at = (column) => column.at(row - 1) + share * (column.at(row) - column.at(row - 1));
-      const slid = (position) => bold(`${significant(1000 * Math.abs(position - x[0]), 2)} mm`);
-      const seconds = (t) => bold(`${fixedDigits(t, 2)} s`);
-      const smooth = row < 0 ? `creeps ${slid(x.at(-1))} in ${spec.stop} s` : row === 0 ? "slips from the start" : `creeps ${slid(at(x))} before it breaks away, after ${seconds(at(time))}`;
-      const exact = breaksAway === undefined ? "does not move" : breaksAway === 0 ? "slips from the start" : `does not move for ${seconds(breaksAway)}`;
-      return { creep: `${smooth}; with true sticking, it ${exact}` };
-    },
-    picture: () => "Stretch of the spring over time, beside that of a sled that truly sticks",
-    extra: (chart, x, y, { reference }) => reference && modeCurve(chart, reference.time.length, (i) => [x(reference.time[i]), y(1000 * reference.at[i])], reference.stuck, 1.5, [5, 3]),
-    labels: ({ run }) => {
-      const slip = run.columns.v.findIndex((v) => v > 0.1);
-      if (slip < 0 || run.time[slip] < 2) return [];
-      return [{ label: "smooth curve: creeps", t: run.time[slip] * 0.5, at: 45, colour: "slip" }, { label: "true sticking: stands", t: 5.4, at: 84, colour: "stick", align: "left" }];
-    },
-    law: {
-      title: "friction in N over slip speed", from: -12, to: 60, low: -125, high: 125, gridValues: [-100, 0, 100], speeds: [0, 20, 40], unit: "mm/s", speedFactor: 1000, forceFactor: 1,
-      draw: (chart, x, y, { values, start }) => {
-        const x_m = 10 ** values.x_m / 1000;
-        const points = [];
-        for (let i = -180; i <= 900; i++) {
-          const v = (i * 0.06) / 900;
-          points.push([x(1000 * v), y(magicFormula(v, x_m, start.mu_s, start.mu_d) * weight(start))]);
-        }
-        chart.line(points, palette.slip, 2);
-      },
-      label: (chart, x, y, { values }, { v }) => chart.label(v > 60 ? "slips, far to the right" : v < 10 ** values.x_m ? `creeps at ${significant(v, 2)} mm/s` : "slips", x(58), y(-40), { colour: palette.slip, align: "right", key: "mode" }),
+      const creeps = row < 0 ? `creeps ${metres(x.at(-1) - x[0])} in ${scene.state.stop} s` : row === 0 ? "slips from the start" : `creeps ${metres(at(x) - x[0])} before it breaks away, after ${seconds(at(time))}`;
+      const breaksAway = comparison.columns.mode[0] === 0 ? cycles(comparison).slips[0] : 0;
+      const stands = breaksAway === undefined ? "does not move" : breaksAway === 0 ? "slips from the start" : `does not move for ${seconds(breaksAway)}`;
+      return `<p>A common cure is to smooth the jump, so that friction rises to its peak within ${bold(formatQuantity(x_m, "m/s"))} of slip. But a smooth curve is zero at rest and pushes back only on what slides: the sled ${creeps}; with true sticking, it ${stands}. A steeper curve creeps less and costs more: here ${count(stepsOf(smooth))} steps of ode23 with a tolerance of 10<sup>−3</sup>, where true sticking takes ${count(stepsOf(exact))} of the same.</p>`;
     },
   },
   swings: {
-    model: "pendulum", body: StoryPendulum, range: 0.436, step: 0.0175, stop: 6, speed: 1, unit: "°", factor: 1 / DEGREE, y: 26, gridValues: [-20, -10, 0, 10, 20],
-    name: "Pendulum: drag it, or press the arrow keys and then Enter", title: "angle, degrees", startKey: "theta0",
-    formats: { mu: (value) => fixedDigits(value, 2), theta0: (value) => `${fixedDigits(value, 0)}°` },
-    values: ({ mu, theta0 }, start) => ({ mu, theta0: start ?? theta0 * DEGREE }),
-    of: (run) => ({ at: run.columns.theta, v: run.columns.omega, F: run.columns.T_friction }),
-    band: ({ mu }, { r, a }) => Math.asin((mu * r) / a), bandLabel: (edge) => `±${fixedDigits(edge / DEGREE, 1)}°`,
-    results: ({ run, rest, edge }) => ({
-      end: rest === undefined ? "still swings when the picture ends" : `${stopText(rest, `${fixedDigits(Math.abs(run.columns.theta.at(-1)) / DEGREE, 2)}°`)} the vertical`,
-      band: bold(`±${fixedDigits(edge / DEGREE, 2)}°`),
-    }),
-    picture: ({ rest }) => `Angle over time: the pendulum ${rest === undefined ? "still swings at the end" : `stops after ${fixedDigits(rest, 2)} s`}`,
-    labels: ({ run, rest }) => (rest > 0 && rest < 5.4 ? [{ label: "holds", t: rest + 0.4, at: run.columns.theta.at(-1) / DEGREE + 3.2, colour: "stick" }] : []),
-    law: {
-      title: "friction in mN·m over turning speed", from: -240, to: 240, low: -7.5, high: 7.5, gridValues: [-5, 0, 5], speeds: [-200, 0, 200], unit: "°/s", speedFactor: 1 / DEGREE, forceFactor: 1000,
-      draw: (chart, x, y, { values: { mu }, start }) => {
-        const torque = 1000 * mu * start.r * weight(start); // mN·m
-        branches(chart, x, y, { hold: torque, slide: torque, far: 400 });
-      },
-      label: (chart, x, y, story, { F, stuck }) => chart.label(stuck ? `holds ${fixedDigits(Math.abs(F), 2)} mN·m` : "slips", x(0) + 10, y(F > 0 ? -3 : 3), { colour: stuck ? palette.stick : palette.slip, key: "mode" }),
+    title: "It swings", model: "pendulum", values: { theta0: 10 * DEGREE }, stop: 6,
+    fields: { mu: { low: 0.08, high: 0.5, log: false }, theta0: { low: -25 * DEGREE, high: 25 * DEGREE, log: false } },
+    keys: ["theta", ".law"], envelopes: true,
+    text: (scene) => {
+      const { main } = scene.runs;
+      const { mu, r, a, theta0 } = valuesOf(scene);
+      const rest = main.restTime();
+      const end = rest === undefined ? "still swings when the picture ends" : `${restText(rest, degrees(main.columns.theta.at(-1)))} the vertical`;
+      return `<p>Friction need not be on a floor: here it is in the pin of a pendulum, with a coefficient of ${bold(formatNumber(mu, 3))}. Released at ${degrees(theta0)}, it ${end}; anything within ${bold("±")}${degrees(Math.asin((mu * r) / a))} is held. From a record of such swings one can read the friction of a bearing, without taking it apart.</p>`;
     },
   },
 };
-
-// Start the opening at once, and the stories while the browser is idle.
-export async function startStories(session, firstPicture) {
-  readPalette();
-  for (const query of ["(prefers-color-scheme: dark)", "(forced-colors: active)"]) matchMedia(query).addEventListener("change", readPalette);
-  await firstPicture;
-  const opening = await showOpening(session);
-  const stories = {};
-  for (const [name, spec] of Object.entries(specs)) {
-    await becomeIdle();
-    stories[name] = new Story(document.getElementById(name), session, spec);
-    await stories[name].begin();
-  }
-  await showChatter(document.getElementById("chatters"), session);
-  return { opening, stories, charts };
-}
