@@ -130,7 +130,10 @@ FIT = [  # changes of a fit of mu_s of the sled to its position
     ({"fixed": {"m": -1.0}}, "m = -1.0 is outside its range"),
     ({"start": {"m": 1.0}}, "unknown free parameter 'm'; allowed: mu_s"),
     ({"free": {"mu_s": (0.1, 2.0)}, "start": {"mu_s": 99.0}}, "the start value 99.0 of mu_s is outside its range"),
-    ({"sigma": {"x": 5e-324}}, "give the standard deviation of the noise, at least 2e-50"),
+    *(
+        ({"sigma": {"x": sigma}}, "give the standard deviation of the noise, from 2e-50 to 2e+50")
+        for sigma in (5e-324, 1e160)
+    ),
     ({"sigma": {"x": 0.0}}, "sigma: x = 0.0 must be a finite number above 0"),
     ({"free": {"delay(x)": (0.0, 20.0)}}, "delay(x) = 0.0:20.0 reaches beyond the record, which lasts 16 s"),
     ({"free": ["delay(x)"], "start": {"delay(x)": 5.0}}, "the start value 5.0 of delay(x) is outside its range"),

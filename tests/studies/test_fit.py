@@ -519,6 +519,23 @@ def test_a_peer_that_fails_has_its_reason_in_the_table(capsys):
     assert lines[3].strip() == "failed: AttributeError: no such thing"
 
 
+@pytest.mark.parametrize(
+    ("model", "omega", "free"),
+    [("smd", 6.0, {"k": (1.0, 100.0)}), ("smd", 2.0, {"k": (1.0, 100.0)}), ("coulomb", 5.0, {"k": None, "f": None})],
+)
+def test_one_noise_of_all_samples_does_not_move_the_fit(model, omega, free):
+    """Of models that describe the record well and poorly; where the noise is large, nothing is determined."""
+    t = np.linspace(0.0, 5.0 if model == "coulomb" else 2.5, 26)
+    record = {"t [s]": t, "x [m]": np.cos(omega * t)}
+    options = {"observe": "x", "values": {"x0": 1.0}}
+    fits = [
+        harness.fit(native(model), record, free, sigma={"x": 2.0**power}, **options) for power in (-60, -7, -1, 0, 20)
+    ]
+    assert all(fit.values == fits[0].values for fit in fits)
+    assert fits[-1].undetermined == tuple(free)
+    assert fits[-1].headline == ", ".join(f"{name} not determined" for name in free)
+
+
 def test_irregular_slips_are_described_one_by_one():
     """Of a real surface each slip starts at another force, which no fit of one static friction describes."""
     random, t = np.random.default_rng(0), np.linspace(0.0, 40.0, 801)

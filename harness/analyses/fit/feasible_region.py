@@ -67,7 +67,8 @@ class FeasibleRegion:
         slack, normals = np.array(self.bounds) - normals @ z, normals[:, free]
         if (normals @ s <= slack + 1e-12).all():
             return np.asarray(s)
-        transform = np.linalg.inv(np.linalg.cholesky(matrix)).T
+        # relative to the largest element, as the limits of this method are absolute
+        transform = np.linalg.inv(np.linalg.cholesky(matrix / matrix.max(initial=1e-300))).T
         left, right = -normals @ transform, normals @ s - slack
         u, _ = nnls(np.vstack([left.T, right]), np.append(np.zeros(len(free)), 1.0))
         r = np.append(left.T @ u, right @ u - 1)

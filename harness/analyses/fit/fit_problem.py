@@ -60,6 +60,16 @@ class FitProblem:
     def n_samples(self) -> int:
         return sum(record.y.size for record in self.records)
 
+    @property
+    def scatter(self) -> float:
+        """Return the root mean square of the residuals of white noise, in units of the noise.
+
+        It is 1 unless the noise is known, and the unit of all limits of a search: one standard deviation of all columns
+        scales the squares, and the search does not depend on it.
+        """
+        squares = sum(len(record.y) * float(np.sum((record.scatter / record.noise) ** 2)) for record in self.records)
+        return float(np.sqrt(squares / self.n_samples))
+
     def values(self, z: np.ndarray, record: int) -> dict[str, float]:
         """Return the values to set for a record."""
         fitted = {
@@ -202,7 +212,7 @@ class FitProblem:
         for _ in range(max_steps if len(free) else 0):
             jacobian = self.jacobian(z, e, selection, free, is_central)
             matrix, slope = jacobian.T @ jacobian, jacobian.T @ e
-            scale = np.diag(np.maximum(np.diag(matrix), 1e-9 * matrix.max() + 1e-30))
+            scale = np.diag(np.maximum(np.diag(matrix), 1e-9 * matrix.max() or 1.0))
             for n in range(MAX_DAMPINGS):
                 s, step = self.region.constrained_step(matrix + damping * scale, slope, z, free), np.zeros(len(z))
                 if not np.isfinite(s).all():

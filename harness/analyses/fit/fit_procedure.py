@@ -15,7 +15,7 @@ from .search import DISTINCT, Minimum, search, select_distinct
 from .uncertainty import Uncertainty, estimate_uncertainty
 from .unknowns import Unknown
 
-MIN_SIGMA = 1e-50  # of the range of the samples, so that squares of residuals are finite
+MIN_SIGMA, MAX_SIGMA = 1e-50, 1e50  # of the range of the samples; squares of residuals are finite
 MIN_REDUCTION = 30.0  # of the squares of a constant, in variances of the residuals and for each unknown
 MOTION = 2.0  # rms of a record that moves, in units of its noise
 MAX_SUBDIVISION = 32  # of the intervals between samples of inputs
@@ -92,10 +92,11 @@ def fit_records(
         if not sizes.all():
             raise HarnessError(f"{record_data.name} shows no motion in a column: nothing can be determined from it")
         for name, size in zip(record_data.columns, sizes.tolist(), strict=True):
-            if record_data.sigma.get(name, size) < (least := MIN_SIGMA * size):
+            least, largest = MIN_SIGMA * size, MAX_SIGMA * size
+            if not least <= record_data.sigma.get(name, size) <= largest:
                 raise SceneError(
                     f"sigma of {name} is {record_data.sigma[name]!r}, and the samples of {record_data.name} span "
-                    f"{size:.3g}: give the standard deviation of the noise, at least {least:.3g}"
+                    f"{size:.3g}: give the standard deviation of the noise, from {least:.3g} to {largest:.3g}"
                 )
     warm_start: np.ndarray | None = None
     for binned in (True, False) if averages else (False,):
@@ -148,7 +149,7 @@ def search_and_refine(
     for remaining in reversed(range(ROUNDS)):
         squares, z = problem.minimize(z, problem.all, 30, 1e-9, central=True)
         check_motion(problem, squares)
-        uncertainty = estimate_uncertainty(problem, z, input_error, float(noise_is_known))
+        uncertainty = estimate_uncertainty(problem, z, input_error, 0.0)
         report(0.6)
         if squares < searched_squares - uncertainty.variance:
             minima = find_other_minima(problem, z, uncertainty, result.minima, squares)
@@ -170,6 +171,13 @@ def search_and_refine(
             break
     else:
         doubts.append("The sum of squares has many shallow minima here: the values may lie anywhere in the intervals.")
+    if noise_is_known and uncertainty.variance < 1.0:  # residuals below the noise: the intervals are those of the noise
+        uncertainty = estimate_uncertainty(problem, z, input_error, 1.0)
+        minima, flat_tails = find_other_minima(problem, z, uncertainty, result.minima, squares), []
+        for i, side in sides:
+            bound = search_bound(problem, z, uncertainty, i, side, ends_at_better=False)
+            ends[i, side], profiles[i, side] = bound.end, bound.profile
+            flat_tails += [i] * bound.has_flat_tail
     others = [minimum for minimum in minima if np.abs(minimum[1] - z).max() > DISTINCT]
     extend_ends(problem, z, uncertainty, ends, others)
     other_minima = [position for _, position in others]
@@ -228,7 +236,8 @@ def subdivide_inputs(problem: FitProblem, z: np.ndarray) -> np.ndarray:
         for record in problem.records:
             record.subdivide(parts)
         now = problem.residuals(z, problem.all)
-        is_fine = before is not None and now is not None and np.abs(now - before).max() < INPUT_CHANGE
+        limit = INPUT_CHANGE * problem.scatter
+        is_fine = before is not None and now is not None and np.abs(now - before).max() < limit
         before = now
         if is_fine:
             break

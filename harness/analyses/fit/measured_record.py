@@ -44,8 +44,9 @@ class MeasuredRecord:
 
     Attributes
     ----------
-    noise, step : numpy.ndarray
-        Standard deviation of the noise and step of the quantiser (columns,); the step is 0 if there is none.
+    noise, scatter, step : numpy.ndarray
+        Standard deviation of the noise (columns,), as it is known or as the scatter of neighbouring samples shows it;
+        that scatter; and the step of the quantiser, which is 0 if there is none.
     width : int
         Number of samples whose mean each row of `y` is.
     subdivision : int
@@ -71,9 +72,9 @@ class MeasuredRecord:
         self.inputs = {name: np.interp(self.knots, input_t, u) for name, u in inputs.items()}
         self.rows = np.searchsorted(self.knots, self.t)
         scatter = [estimate_noise(self.t, column)[0] for column in self.y.T]
-        self.noise = np.maximum(scatter, self.step / 12**0.5)
+        self.scatter = np.maximum(scatter, self.step / 12**0.5)
         known = np.array([data.sigma.get(name, 0.0) for name in data.columns])
-        self.noise = np.where(known > 0, known / np.sqrt(self.width), self.noise)
+        self.noise = np.where(known > 0, known / np.sqrt(self.width), self.scatter)
         self.all = np.arange(len(self.t))
         self.parts: dict[int, RecordPart] = {}
         self.subdivide(1)

@@ -74,9 +74,9 @@ def search(
     report : callable
         Receives the progress from 0 to 1.
     """
-    result, first = SearchResult(), 0
+    result, first, unit = SearchResult(), 0, problem.scatter**2
     n = sum(len(index) * record.y.shape[1] for index, record in zip(selection, problem.records, strict=True))
-    explained = n + EXPLAINED * np.sqrt(2 * n)
+    explained = unit * (n + EXPLAINED * np.sqrt(2 * n))
     for number in range(1, MAX_SEARCHES + 1):
         report((number - 1) / MAX_SEARCHES)
         is_evolution = number % 2 == 0
@@ -96,7 +96,7 @@ def search(
         result.log.append(f"search {number}, {kind}: sum of squares {new[0]:.6g}")
         if not np.isfinite(new[0]):
             continue
-        if result.best and abs(new[0] - result.best[0]) < 0.5 + 1e-3 * new[0]:
+        if result.best and abs(new[0] - result.best[0]) < 0.5 * unit + 1e-3 * new[0]:
             result.n_hits += 1
         elif not result.best or new[0] < result.best[0]:
             result.n_hits, first = 1, number
@@ -111,11 +111,11 @@ def search(
 
 def continue_in_time(problem: FitProblem, seed: int, starts: np.ndarray) -> list[Minimum]:
     """Return the minima that remain of a Sobol set and the `starts` on growing parts of the records."""
-    parts = growing_parts(problem)
+    parts, refused = growing_parts(problem), REFUSED_COST * problem.scatter
     points = np.vstack([starts, sobol_set(problem, seed, SOBOL_POINTS)])
     costs = np.array([absolute_cost(problem, z, parts[0]) for z in points])
-    order = [i for i in np.argsort(costs)[: SURVIVORS[0]] if costs[i] < REFUSED_COST]
-    order += [i for i in range(len(starts)) if i not in order and costs[i] < REFUSED_COST]
+    order = [i for i in np.argsort(costs)[: SURVIVORS[0]] if costs[i] < refused]
+    order += [i for i in range(len(starts)) if i not in order and costs[i] < refused]
     minima = [(float(costs[i]), points[i]) for i in order]
     for part, survivors in zip(parts, SURVIVORS, strict=True):
         minima = select_distinct([problem.minimize(z, part, 6, 1e-3) for _, z in minima], survivors)
@@ -185,7 +185,7 @@ def growing_parts(problem: FitProblem) -> list[Selection]:
 def absolute_cost(problem: FitProblem, z: np.ndarray, selection: Selection) -> float:
     """Return the sum of absolute residuals, to which single events contribute less than to squares."""
     e = problem.residuals(z, selection)
-    return REFUSED_COST if e is None else float(np.abs(e).sum())
+    return REFUSED_COST * problem.scatter if e is None else float(np.abs(e).sum())
 
 
 def select_distinct(minima: list[Minimum], most: int) -> list[Minimum]:

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
+from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,7 +13,7 @@ from ...analyses.fit.parameter_fit import FittedRecord, ParameterFit, Slips
 from ...results.files import column_heading, to_json, write_csv
 from ...results.result import Result
 from ...results.summary import Summary
-from .table import result_parts, summarize_fit
+from .table import format_estimate, result_parts, summarize_fit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -34,7 +35,12 @@ class FitResult(Result, ParameterFit):
 
     @property
     def headline(self) -> str:
-        return ", ".join(f"{item.name} = {item.value:.4g} {item.unit}".rstrip() for item in self.estimates)
+        return ", ".join(
+            f"{item.name} = {item.value:.4g} {item.unit}".rstrip()
+            if isfinite(item.error)
+            else f"{item.name} {format_estimate(item)}"
+            for item in self.estimates
+        )
 
     def __getitem__(self, name: str) -> Any:
         """Return the estimate of an unknown or a combination, or a part of the result by its key in the JSON."""
