@@ -66,13 +66,12 @@ def simulate(
     timeout: float | None = None,
     progress: Progress | bool | None = None,
 ) -> "Trajectory":
-    """Run a model, a scene, an FMU or a stored result once.
+    """Run a model, a scene or an FMU once.
 
     Parameters
     ----------
     source : str or path
-        The name of a model (``"stickslip"``), the path of an FMU, the name or path of a scene (``"my_scene.toml"``),
-        or the folder of a stored result, whose run is repeated.
+        The name of a model (``"stickslip"``), the path of an FMU, or the name or path of a scene (``"my_scene.toml"``).
     values : mapping, optional
         Parameters and start values by name, in the units of the FMU; enumerations by label or number.
     start, stop : float, optional

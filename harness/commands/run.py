@@ -1,18 +1,12 @@
 """run: one scene or one FMU."""
 
-import sys
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import click
-from click.core import ParameterSource
 
-from ..errors import HarnessError
-from .terminal import Terminal, build_arguments, refuse_ignored_options, result_options, run_options
-
-UNUSED_SWEEP_OPTIONS = ("name", "scheduler")  # of a recorded call
+from .terminal import Terminal, refuse_ignored_options, refuse_options, result_options, run_options
 
 
 @click.command()
@@ -32,10 +26,10 @@ def run(
     terminal: Terminal,
     **options: Any,
 ) -> None:
-    """Run a SCENE or an FMU, or re-run a stored result, bit for bit.
+    """Run a SCENE or an FMU.
 
-    SCENE is the name of a shipped scene (see list), the path of a TOML file, a result folder, the path of an FMU, or
-    the name or path of a model without a scene.
+    SCENE is the name of a shipped scene (see list), the path of a TOML file, the path of an FMU, or the name or path of
+    a model without a scene.
 
     An FMU that does not expose its solver steps is run with successively halved communication steps, until halving
     changes no output by more than the tolerance, or cannot reach it. The achieved error is stated. A run that misses
@@ -45,89 +39,27 @@ def run(
     Examples:
       friction-fmus run pendulum
       friction-fmus run ./my-scene.toml --out elsewhere
-      friction-fmus run results/pendulum
       friction-fmus run --fmu other.fmu --set mass=2 --stop 10 --rtol 1e-4
     """
-    from ..scenes.fmu_files import find_fmu, list_models
-    from ..scenes.scene import load_scene, scene_from_provenance, shipped_scenes
-
-    scenes = [file.stem for file in shipped_scenes()]
-    if (
-        fmu is None
-        and scene
-        and (scene.endswith(".py") or (scene in list_models() - {*scenes} and not Path(scene).exists()))
-    ):
-        fmu, scene = find_fmu(scene), None
-    if fmu is None and scene and scene.endswith(".fmu"):
-        fmu, scene = Path(scene), None
-    refuse_ignored_options(context, [fmu] if fmu else [])
-    if fmu is not None and scene is None:
-        run_fmu_file(fmu, values, options, terminal)
-        return
-    if scene is None or fmu is not None or values or options["stop"] is not None:
-        raise click.UsageError("give one SCENE, or --fmu PATH; --set and --stop require an FMU")
-    from ..results.folder import REPEATED
-    from ..results.provenance import PYTHON_API, load_verified_provenance
+    from ..running.resolve import find_source
     from ..studies.run import study
     from ..studies.run.table import results_table
 
-    folder_path = Path(scene)
-    if folder_path.is_dir() and scene not in scenes:
-        provenance = load_verified_provenance(folder_path)
-        if not (folder_path / study.STUDY.files[0]).is_file() or "title" not in (provenance["scene"] or {}):
-            if provenance["command"] == PYTHON_API:
-                raise HarnessError(f"{scene} was written from Python: repeat its run by harness.simulate('{scene}')")
-            repeat_call(context, folder_path, provenance, terminal)
-            return
-        selected_scene = scene_from_provenance(provenance)
-        if context.get_parameter_source("out") is not ParameterSource.COMMANDLINE:
-            if folder_path.name in ("", ".."):
-                folder_path = folder_path.resolve()
-            selected_scene = replace(selected_scene, name=folder_path.name)
-            terminal = replace(terminal, out=folder_path.parent)
-            REPEATED.set(folder_path)
-    else:
-        selected_scene = load_scene(scene)
+    if scene is None and fmu is None:
+        raise click.UsageError("give one SCENE, or --fmu PATH")
+    source = fmu or find_source(scene, scenes_first=True)
+    refuse_ignored_options(context, [source] if isinstance(source, Path) else [])
+    if isinstance(source, Path):
+        run_fmu_file(source, values, options, terminal)
+        return
+    refuse_options(context, "without an FMU; a scene sets it in its file", "values", "stop")
     with terminal.progress(1) as report:
-        outcome = study.run_scene(selected_scene, terminal.out, partial(report, selected_scene.name))
+        outcome = study.run_scene(source, terminal.out, partial(report, source.name))
     table = results_table([outcome], everything=True)
-    folder = terminal.out / selected_scene.name
-    notes = [*study.describe_known_values(selected_scene), *filter(None, [outcome.run.note if outcome.run else ""])]
+    folder = terminal.out / source.name
+    notes = [*study.describe_known_values(source), *filter(None, [outcome.run.note if outcome.run else ""])]
     failed = failure_message(outcome.error, folder)
     terminal.print_result(outcome_as_json(outcome, terminal.out), table, *notes, folder=folder, failed=failed)
-
-
-def repeat_call(context: click.Context, folder: Path, provenance: dict[str, Any], terminal: Terminal) -> None:
-    """Repeat the recorded call of a command; the recorded command text is only displayed, never run.
-
-    The result is written to the same folder, or below the --out of this command line. A recorded name of the folder or
-    address of a cluster is not used: a folder from elsewhere chooses neither where to write nor where to connect.
-    """
-    from ..results.folder import REPEATED
-    from ..results.registry import STUDIES
-
-    root, call = context.find_root(), provenance.get("call")
-    depths = {study.command: study.depth for study in STUDIES if study.depth}
-    if call is None or call["name"] not in depths:
-        raise HarnessError(
-            f"{folder} does not hold the run of one scene or FMU; its command was `{provenance['command']}`"
-        )
-    command = root.command.commands[call["name"]]  # type: ignore[attr-defined]
-    folder = folder.resolve() if folder.name in ("", "..") else folder.absolute()
-    out = folder.parents[depths[call["name"]] - 1]
-    if context.get_parameter_source("out") is ParameterSource.COMMANDLINE:
-        out = terminal.out
-    else:
-        REPEATED.set(folder)
-    output = [f"--out={out}", *["--quiet"] * terminal.quiet, *["--json"] * terminal.as_json]
-    options = dict(call["options"])
-    if call["name"] == "sweep":
-        output.append(f"--name={folder.name}")
-        options = {name: value for name, value in options.items() if name not in UNUSED_SWEEP_OPTIONS}
-    arguments = [*output, *build_arguments(command, options)]
-    sys.argv[1:] = [call["name"], *arguments]  # recorded as the command
-    with command.make_context(call["name"], arguments, parent=root) as new_context:
-        command.invoke(new_context)
 
 
 def run_fmu_file(path: Path, values: tuple[str, ...], options: dict[str, Any], terminal: Terminal) -> None:

@@ -6,7 +6,7 @@ Slow imports are local to functions, so that help and short commands start at on
 import os
 import sys
 import tempfile
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from functools import wraps
@@ -19,7 +19,7 @@ from click.core import ParameterSource
 
 from .. import arguments
 from ..arguments import INTERFACES, MODEL_EXCHANGE, Rule
-from ..errors import HarnessError, check_names, format_value
+from ..errors import HarnessError, format_value
 from ..process.interrupt import check_interrupt
 from ..process.temporary_directory import temporary_root
 
@@ -68,7 +68,6 @@ overwrite_option = click.option(
 
 
 EXACT = "exact"  # method of FMUs of this project
-COMMON_OPTIONS = ("out", "quiet", "as_json", "overwrite")  # not recorded: they do not change a result
 
 
 def result_options(command: Callable[..., Any]) -> Callable[..., Any]:
@@ -80,48 +79,9 @@ def result_options(command: Callable[..., Any]) -> Callable[..., Any]:
         for argument in context.command.params:
             if isinstance(argument, click.Argument) and others.get(argument.name or "") == "":
                 raise click.UsageError(f"{argument.make_metavar(context).strip('[]')} is empty: give a name or a path")
-        record_call(context)
         return command(terminal=Terminal(quiet, as_json, out), **others)
 
     return default_out_option(overwrite_option(quiet_option(json_option(wrapper))))
-
-
-def record_call(context: click.Context) -> None:
-    """Record the arguments and options of a command as data, for the provenance of its results."""
-    from ..results.provenance import CALL
-
-    options = {
-        name: [*value] if isinstance(value, tuple) else str(value) if isinstance(value, Path) else value
-        for name, value in context.params.items()
-        if is_given(context, name) and name not in COMMON_OPTIONS
-    }
-    CALL.set({"name": context.command.name, "options": options})
-
-
-def build_arguments(command: click.Command, options: Mapping[str, Any]) -> list[str]:
-    """Return command-line arguments for recorded options; the command itself checks their values.
-
-    Options that choose where to write, or what to replace, are none of them: the file may come from anyone.
-
-    Raises
-    ------
-    SceneError
-        If the command has no such option.
-    """
-    parameters = {
-        parameter.name or "": parameter for parameter in command.params if parameter.name not in COMMON_OPTIONS
-    }
-    check_names(f"option of {command.name} in provenance.json", options, parameters)
-    named, positional = [], []
-    for name, value in options.items():
-        parameter = parameters[name]
-        texts = [str(item) for item in (value if isinstance(value, list) else [value])]
-        if isinstance(parameter, click.Option):
-            switches = parameter.opts if value is True else parameter.secondary_opts
-            named += switches[:1] if isinstance(value, bool) else [f"{parameter.opts[0]}={text}" for text in texts]
-        else:
-            positional += texts
-    return [*named, "--", *positional]
 
 
 class RuleType(click.FloatRange):

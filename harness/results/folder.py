@@ -30,8 +30,6 @@ from .summary import SUMMARY_FILE
 
 LOG = logging.getLogger(__name__)
 OVERWRITE = ContextVar("overwrite", default=False)  # whether a result of another source may be replaced
-# the folder of a stored result while it is repeated: no other one is written, whatever its provenance names
-REPEATED: ContextVar[Path | None] = ContextVar("repeated", default=None)
 FRESH, OLD = ".new", ".old"  # suffixes of temporary folders, after the result's name and eight characters
 AT_FDCWD, RENAME_EXCHANGE, RENAME_SWAP = -100, 2, 2  # of Linux and macOS
 
@@ -54,15 +52,8 @@ def replace_folder(folder: Path, own_files: Sequence[str], source: str = "") -> 
     Raises
     ------
     HarnessError
-        If the old folder is a link, contains other files, or is a result of another `source` without OVERWRITE; or if a
-        stored result is repeated, and the folder is not its own.
+        If the old folder is a link, contains other files, or is a result of another `source` without OVERWRITE.
     """
-    repeated = REPEATED.get()
-    if repeated is not None and folder.absolute() != repeated.absolute():
-        raise HarnessError(
-            f"{repeated} names the result of another folder, {folder}: it was renamed, or its {FILE} was edited; "
-            f"choose a folder by {option_text('folder')}"
-        )
     try:
         own_files = (*own_files, DATA_FILE, FILE, SUMMARY_FILE)
         check_replaceable(folder, own_files)

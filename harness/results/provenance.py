@@ -9,7 +9,6 @@ import platform
 import shlex
 import sys
 from collections.abc import Iterable, Mapping
-from contextvars import ContextVar
 from dataclasses import dataclass, field
 from datetime import datetime
 from functools import cache
@@ -19,12 +18,11 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from ..arguments import Rule, text
-from ..errors import HarnessError, SceneError
+from ..errors import SceneError
 from ..scenes.schema import field_names, parse_table
 from .files import to_json
 
 FILE = "provenance.json"
-PYTHON_API = "harness.simulate"  # recorded as the command of results that Trajectory.save writes
 HARNESS = "friction-fmus"
 REPLACED = "replaced"
 # options of a result that follow from its parameters or input files
@@ -34,7 +32,6 @@ PACKAGES = (HARNESS, "fmpy", "numpy", "scipy")
 MAX_DEPTH = 6  # of tables and lists within a scene
 
 Parameters = Mapping[str, tuple[object, str]]  # effective value and unit by name
-CALL: ContextVar[dict[str, Any] | None] = ContextVar("call", default=None)  # the command that is running, as data
 
 
 def is_shallow(value: object, depth: int = MAX_DEPTH) -> bool:
@@ -78,14 +75,6 @@ class StoredParameter:
 
 
 @dataclass(frozen=True)
-class StoredCall:
-    """Name of the command that wrote a result, and the values of its arguments and options."""
-
-    name: str
-    options: dict[str, Annotated[Any, VALUE]]
-
-
-@dataclass(frozen=True)
 class ProvenanceKeys:
     """Keys of a provenance file; those with a default are missing in files of earlier versions."""
 
@@ -99,7 +88,6 @@ class ProvenanceKeys:
     versions: dict[str, str] = field(default_factory=dict)
     run: Annotated[Any, SETTINGS] = None
     replaced: str = ""
-    call: StoredCall | None = None
 
 
 def write_provenance(
@@ -133,7 +121,6 @@ def write_provenance(
     content = {
         "source": source,
         "command": shlex.join(["python", "-m", "harness", *sys.argv[1:]]) if command is None else command,
-        "call": CALL.get() if command is None else None,
         "date": datetime.now().astimezone().isoformat(timespec="seconds"),
         "versions": package_versions(),
         "platform": platform.platform(),
@@ -256,31 +243,6 @@ def replacement_note(folder: Path) -> str:
         return str(read_table(folder / FILE).get(REPLACED, ""))
     except (OSError, SceneError):
         return ""
-
-
-def load_verified_provenance(folder: Path) -> dict[str, Any]:
-    """Return the provenance of a result after verifying its input files.
-
-    Raises
-    ------
-    HarnessError
-        If there is no provenance, or if an input file is missing or has changed.
-    """
-    try:
-        content = read_provenance(folder / FILE)
-    except (OSError, SceneError) as error:
-        reason = f" ({error})" if isinstance(error, SceneError) else ""
-        raise HarnessError(f"{folder} contains no result with a complete {FILE}{reason}: choose another one") from None
-    for name, stored_digest in content["files"].items():
-        file = Path(name)
-        if not file.is_file():
-            raise HarnessError(f"{file}, an input of this result, does not exist: run from its original folder")
-        if (present_digest := file_digest(file)) != stored_digest:
-            raise HarnessError(
-                f"{file} has changed since it was used for this result (sha256 {stored_digest[:12]} then, "
-                f"{present_digest[:12]} now): restore the file, or create a new result with `{content['command']}`"
-            )
-    return content
 
 
 def describe_origin(content: dict[str, Any]) -> tuple[str, ...]:

@@ -1,4 +1,4 @@
-"""All studies, each stated once: for `load_result`, `friction-fmus run FOLDER`, result folders and the report.
+"""All studies, each stated once: for `load_result`, result folders and the report.
 
 A new study is a package in `harness/studies` with a class of results, a file in `harness/commands`, and an entry here.
 Classes are named by strings, because this module imports no study.
@@ -35,8 +35,6 @@ class Study:
         Title and introduction of its section in the report.
     example : tuple of (str, str)
         What the report lists as missing while there is no result, and the arguments that compute it; empty for nothing.
-    depth : int
-        Levels from the folder of a result up to --out; 0 if `friction-fmus run FOLDER` cannot repeat its command.
     reader : str
         Function that reads a result folder, as "module:function"; by default `load` of the class.
     verifies : bool
@@ -50,7 +48,6 @@ class Study:
     title: str
     intro: str
     example: tuple[str, str] = ("", "")
-    depth: int = 2
     reader: str = ""
     verifies: bool = False
 
@@ -79,7 +76,6 @@ STUDIES = (
         ("trajectory.csv", "steps.csv", "events.csv", "quantities.csv", PICTURE, "figures.csv"),  # of earlier versions
         "Runs",
         "Scenes, models and FMUs that you ran.",
-        depth=1,
         reader="studies.compare.trajectory_files:read_run",
     ),
     Study(
@@ -115,7 +111,6 @@ STUDIES = (
         ("fit.json", "fit.csv", "validation.csv", PICTURE),
         "Fits",
         "Parameters of FMUs from measured records, with 95 % intervals.",
-        depth=0,
     ),
     Study(
         "sweep",
@@ -146,7 +141,6 @@ STUDIES = (
         "Error against run time",
         "Error against run time and right-hand side evaluations; lower left is better. References are certified. FMU "
         "is the code of the FMU in this process; scipy and cvode solve the same equations.",
-        depth=0,
         verifies=True,
     ),
     Study(
@@ -157,7 +151,6 @@ STUDIES = (
         "Stability",
         "Every case either finishes within its error bound or is rejected with an error message; none hangs.",
         ("stability", "stability"),
-        depth=1,
         verifies=True,
     ),
 )

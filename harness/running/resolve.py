@@ -1,13 +1,12 @@
-"""Run that a user specifies by a model, an FMU, a scene or a stored result."""
+"""Run that a user specifies by a model, an FMU or a scene."""
 
 from dataclasses import replace
 from pathlib import Path
 
 from ..errors import SceneError, unknown_source_message
-from ..results.provenance import load_verified_provenance
 from ..scenes.fmu_files import check_built, find_fmu, list_models
 from ..scenes.run_spec import DEFAULT_EQUAL_STEPS, RunOptions, RunSpec
-from ..scenes.scene import load_scene, scene_from_provenance, shipped_scenes
+from ..scenes.scene import Scene, load_scene, shipped_scenes
 from .fmu_archive import exposes_solver_steps, read_description
 
 FMU_SUFFIXES = (".fmu", ".py")
@@ -20,46 +19,56 @@ def resolve(source: str | Path, options: RunOptions | None = None, scenes_first:
     Parameters
     ----------
     source : str or path
-        The path of an FMU or of a model file, the name of a model, the name or path of a scene, or the folder of a
-        stored result.
+        As in `find_source`.
     options : RunOptions, optional
-        Options of the run of an FMU or a model; scenes and stored results have their own.
+        Options of the run of an FMU or a model; a scene has its own.
     scenes_first : bool
         Whether a name that a scene and a model share means the scene.
 
     Raises
     ------
     HarnessError
-        If there is no such source, or if the files of a stored result have changed since it was written.
+        If there is no such source.
+    """
+    item = find_source(source, scenes_first)
+    if isinstance(item, Path):
+        return RunSpec(item, **vars(options or RunOptions(equal_steps=DEFAULT_EQUAL_STEPS)))
+    check_built(item.run.fmu)
+    return item.run
+
+
+def find_source(source: str | Path, scenes_first: bool = False) -> Path | Scene:
+    """Return the FMU or the scene of a source.
+
+    Parameters
+    ----------
+    source : str or path
+        The path of an FMU or of a model file, the name of a model, or the name or path of a scene.
+    scenes_first : bool
+        Whether a name that a scene and a model share means the scene.
+
+    Raises
+    ------
+    SceneError
+        If there is no such source.
     """
     path, name = Path(source), str(source)
-    scenes = {file.stem for file in shipped_scenes()} if scenes_first else set()
-    if path.suffix in FMU_SUFFIXES or (name in list_models() - scenes and not path.is_dir()):
-        return RunSpec(find_fmu(name), **vars(options or RunOptions(equal_steps=DEFAULT_EQUAL_STEPS)))
+    scenes = {file.stem for file in shipped_scenes()}
+    if path.suffix in FMU_SUFFIXES or (name in list_models() and not (scenes_first and name in scenes)):
+        return find_fmu(name)
     if path.is_dir() and name not in scenes:
-        return read_stored_run(path)
+        raise SceneError(
+            f"{source} is a folder: give a model, a scene or an FMU; the provenance.json of a result has its command"
+        )
     try:
-        scene = load_scene(source)
+        return load_scene(source)
     except SceneError as error:
         if path.suffix == ".toml":
             raise
-        names = sorted(list_models() | {file.stem for file in shipped_scenes()})
-        other = ", or the path of an FMU, a scene or a result"
-        raise SceneError(unknown_source_message("model or scene", name, names, other)) from error
-    check_built(scene.run.fmu)
-    return scene.run
-
-
-def read_stored_run(folder: Path) -> RunSpec:
-    """Return the run of a stored result; raise HarnessError if its files have changed since it was written."""
-    provenance = load_verified_provenance(folder)
-    scene = provenance["scene"] or {}
-    try:
-        if "title" in scene and not provenance.get("run"):  # of an earlier version
-            return scene_from_provenance(provenance).run
-        return RunSpec.from_json(provenance.get("run") or scene)
-    except SceneError as error:
-        raise SceneError(f"{folder} does not hold the result of one run ({error}): name another folder") from None
+        names = sorted(list_models() | scenes)
+        raise SceneError(
+            unknown_source_message("model or scene", name, names, ", or the path of an FMU or a scene")
+        ) from error
 
 
 def set_rtol(spec: RunSpec, rtol: float) -> RunSpec:

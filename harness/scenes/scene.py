@@ -40,7 +40,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from ..arguments import NAMES, POSITIVE, TEXT, Rule, above_zero, choice, real, text, whole
-from ..errors import SceneError, check_names, format_value, unknown_name_message, unknown_source_message
+from ..errors import SceneError, check_names, unknown_name_message, unknown_source_message
 from .fmu_files import find_fmu
 from .roles import ROLES, find_roles
 from .run_spec import DEFAULT_EQUAL_STEPS, SCENE_KEYS, RunSpec
@@ -247,41 +247,13 @@ def load_scene(scene: str | Path) -> Scene:
         raise SceneError(f"scene {path.stem}: {error}") from None
 
 
-def scene_from_provenance(provenance: dict[str, Any]) -> Scene:
-    """Return the scene of a stored result, with its run.
-
-    Parameters
-    ----------
-    provenance : dict
-        Provenance of the result. In results of earlier versions, the keys of the run are among those of the scene.
-
-    Raises
-    ------
-    SceneError
-        If the result has no valid scene.
-    """
-    try:
-        scene, run = dict(provenance["scene"]), provenance.get("run")
-        path, source, file = Path(scene["name"]), str(scene["source"]), Path((run or scene)["fmu" if run else "file"])
-        scene["decay"] = {name: value for name, value in scene["decay"].items() if value is not None}
-        if run is None:
-            scene |= {"timeout": scene.get("timeout", scene.get("patience")), "fmu": str(file), "model": None}
-    except (AttributeError, KeyError, TypeError, ValueError):
-        raise SceneError("its provenance.json contains no scene: run the command in it instead") from None
-    if path.name in ("", ".."):
-        raise SceneError(f"its provenance.json has the invalid scene name {format_value(scene['name'])}")
-    keys = [*field_names(SceneKeys), *(SCENE_KEYS if run is None else ())]
-    table = {name: scene[name] for name in keys if scene.get(name) not in (None, "")}
-    return replace(build_scene(path, table, source, RunSpec.from_json(run) if run else None), name=path.name)
-
-
-def build_scene(path: Path, table: dict[str, Any], source: str, run: RunSpec | None = None) -> Scene:
-    """Build a scene from the table in its file; if `run` is given, it replaces the keys of the run in the table."""
+def build_scene(path: Path, table: dict[str, Any], source: str) -> Scene:
+    """Build a scene from the table in its file."""
     allowed = {*field_names(SceneKeys), *SCENE_KEYS}
     if unknown := {*table} - allowed:
         raise SceneError(unknown_name_message("key", min(unknown), allowed))
     keys = parse_table({name: value for name, value in table.items() if name not in SCENE_KEYS}, SceneKeys)
-    run = run or build_run(locate_fmu(path, keys), keys, table)
+    run = build_run(locate_fmu(path, keys), keys, table)
     plots = default_plots(run.outputs) if keys.plots is None else keys.plots
     check_names("name in analyses", keys.analyses, ANALYSES)
     check_names("name in plots", plots, (*PLOTS, *run.outputs))

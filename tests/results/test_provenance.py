@@ -11,7 +11,6 @@ from zipfile import ZipFile
 import commands
 import numpy as np
 import pytest
-from build_cache import ROOT, run_published_cases
 from fmpy import read_model_description
 from models import MODELS
 
@@ -122,59 +121,7 @@ def files(folder):
     }
 
 
-def test_a_result_is_reproduced_from_its_folder_bit_for_bit(example_run, tmp_path):
-    original, (command, *_), folder = example_run
-    workspace = shutil.copytree(original, tmp_path / "copy", symlinks=True)  # a repetition replaces the result
-    folder = workspace / folder.relative_to(original)
-    before, provenance = files(folder), read_provenance(folder)
-    done = commands.harness(workspace, "run", folder.relative_to(workspace), figures=folder.match(DRAWN))
-    assert (done.returncode, done.stderr) == (0, "")
-    assert files(folder) == before
-    for key in ("files", "parameters", "run", "scene", "source"):
-        assert read_provenance(folder)[key] == provenance[key]
-    if command == "run":
-        assert "the same, bit for bit" in done.stdout
-        quiet = harness(workspace, "run", folder.relative_to(workspace), "--quiet")  # and again
-        assert (quiet.returncode, quiet.stdout) == (0, "")
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "scene",
-    [path.stem for path in (ROOT / "harness/scenes").glob("*.toml") if path.stem not in ("coulomb", "pacejka-0.001")],
-)
-def test_every_shipped_scene_is_reproduced_bit_for_bit(workspace, scene):
-    shutil.copytree(run_published_cases() / "results" / scene, workspace / "results" / scene)
-    assert "the same, bit for bit" in harness(workspace, "run", f"results/{scene}").stdout
-
-
 MINE = 'title = "a title"\nmodel = "smd"\noutputs = ["x"]\nplots = []\nstop = 1.0\ngrid = 0.1\n[values]\nc = 3.0\n'
-
-
-def test_a_result_is_reproduced_without_its_scene_and_into_any_folder(workspace):
-    (workspace / "mine.toml").write_text(MINE)
-    assert harness(workspace, "run", "mine.toml", "--out", "there").returncode == 0
-    before = files(workspace / "there/mine")
-    (workspace / "mine.toml").unlink()
-    for out in ((), ("--out", "elsewhere")):
-        assert harness(workspace, "run", "there/mine", *out).returncode == 0
-    assert files(workspace / "there/mine") == files(workspace / "elsewhere/mine") == before
-    assert sorted(path.name for path in workspace.iterdir()) == ["elsewhere", "fmus", "there"]
-
-
-def test_a_result_whose_fmu_changed_or_vanished_is_not_reproduced(workspace, fmus):
-    shutil.copy(fmus / "smd.fmu", workspace / "mine.fmu")
-    (workspace / "mine.toml").write_text(MINE.replace('model = "smd"', 'fmu = "mine.fmu"'))
-    assert harness(workspace, "run", "mine.toml").returncode == 0
-    before = files(workspace / "results/mine")
-    shutil.copy(fmus / "coulomb.fmu", workspace / "mine.fmu")
-    done = harness(workspace, "run", "results/mine")
-    assert (done.returncode, done.stderr.count("\n")) == (1, 1)
-    assert "mine.fmu has changed since it was used for this result" in done.stderr
-    assert "`python -m harness run mine.toml`" in done.stderr
-    (workspace / "mine.fmu").unlink()
-    assert "mine.fmu, an input of this result, does not exist" in harness(workspace, "run", "results/mine").stderr
-    assert files(workspace / "results/mine") == before
 
 
 def write_decay(file):
@@ -253,21 +200,6 @@ def test_a_result_of_another_build_of_its_fmu_is_not_replaced_silently(workspace
     assert re.search(r"It replaces the result of [-\dT:+]+, which had another mine\.fmu\.", done.stdout)
 
 
-def test_a_folder_without_provenance_is_not_run_again(workspace, first_run):
-    file = workspace / "results/smd/provenance.json"
-    shutil.copytree(first_run / "results/smd", workspace / "results/smd")
-    for content in ("[]", "{}", '{"command": 1}', "", None):
-        if content is None:
-            file.unlink()
-        else:
-            file.write_text(content)
-        done = harness(workspace, "run", "results/smd")
-        assert (done.returncode, done.stderr.count("\n")) == (1, 1)
-        assert "results/smd contains no result with a complete provenance.json" in done.stderr
-        if not content:
-            assert harness(workspace, "run", "smd").returncode == 0
-
-
 HOSTILE = (None, 0, float("inf"), True, "", 'unbalanced "', "\ud800", [], {}, {"a": 1}, {"a": {"b": []}})
 DEEP = "[" * 900 + "]" * 900
 
@@ -316,9 +248,8 @@ def test_a_new_result_never_depends_on_the_provenance_of_an_old_one(tmp_path, fi
         (tmp_path / f"results/{i}").mkdir(parents=True)
         for file in (old / "provenance.json", tmp_path / f"results/{i}/provenance.json"):
             file.write_text(text)
-        for read in (load_result, simulate):
-            with suppress(HarnessError):
-                read(old)
+        with suppress(HarnessError):
+            load_result(old)
         with replace_folder(old, STUDIES[0].files, read_source(text)) as folder:
             for file in new.iterdir():
                 shutil.copy(file, folder)
@@ -328,111 +259,23 @@ def test_a_new_result_never_depends_on_the_provenance_of_an_old_one(tmp_path, fi
     assert page.count("cannot be shown: summary.json is missing") == len(texts)
 
 
-@pytest.mark.parametrize("arguments", [("run", "--fmu", "fmus/smd.fmu", "--stop", "0.5"), ("run", "smd")])
-def test_an_edited_provenance_file_ends_a_repetition_in_one_sentence(workspace, arguments):
-    assert harness(workspace, *arguments).returncode == 0
-    file = workspace / "results/smd/provenance.json"
-    provenance = read_provenance(file.parent)
-    edits = [("files", "fmus/smd.fmu", 5), ("files", "fmus/smd.fmu", "0" * 64), ("date", []), ("call", "options", 5)]
-    if arguments == ("run", "smd"):
-        edits += [("scene", "title", ""), ("run", "outputs", 5), ("scene", "name", ".."), ("run", "stop", [])]
-    else:
-        edits += [("call", "name", "build"), ("call", "options", {"nosuch": 1}), ("call", "options", {"fmu": [[1]]})]
-        edits += [("call", "options", {"scene": "--quiet"})]  # a source, although it looks like an option
-    for *path, value in edits:
-        file.write_text(altered(provenance, path, value))
-        done = harness(workspace, "run", "results/smd")
-        assert done.returncode in (1, 2)
-        assert done.stderr.count("Error: ") == 1
-        assert "Traceback" not in done.stderr
-
-
-def test_the_text_of_a_command_is_never_run(workspace):
-    (workspace / "mine.py").write_text("raise SystemExit('the text was run')")
-    assert harness(workspace, "run", "--fmu", "fmus/smd.fmu", "--stop", "0.5").returncode == 0
-    file = workspace / "results/smd/provenance.json"
-    provenance = read_provenance(file.parent) | {"command": "python -m harness build mine.py"}
-    file.write_text(json.dumps(provenance))
+def test_a_folder_is_no_run(workspace, first_run):
+    """Nothing that a provenance file names is run."""
+    folder = shutil.copytree(first_run / "results/smd", workspace / "results/smd")
     done = harness(workspace, "run", "results/smd")
+    assert (done.returncode, done.stdout) == (2, "")
+    assert "results/smd is a folder: give a model, a scene or an FMU" in done.stderr
+    with pytest.raises(HarnessError, match="is a folder"):
+        simulate(folder)
+
+
+def test_the_same_run_is_reproduced_bit_for_bit(example_run):
+    workspace, arguments, folder = example_run
+    before, provenance = files(folder), read_provenance(folder)
+    done = commands.harness(workspace, *arguments, figures=folder.match(DRAWN))
     assert (done.returncode, done.stderr) == (0, "")
-    assert "Results in" in done.stdout
-    file.write_text(json.dumps(provenance | {"call": None}))
-    done = harness(workspace, "run", "results/smd")
-    assert done.returncode == 1
-    assert "its command was `python -m harness build mine.py`" in done.stderr
-
-
-REPEATED = {  # a call of each command whose result can be repeated, and the folder below --out
-    "run": ({"fmu": "fmus/smd.fmu", "stop": 0.5}, "smd"),
-    "compare": ({"first": "fmus/smd.fmu", "second": "fmus/coulomb.fmu", "stop": 0.1}, "compare/smd-coulomb"),
-    "curve": ({"source": "bench.csv", "mass": 1.0}, "curve/bench"),
-    "decay": ({"source": "swing.csv", "m": 1.0}, "decay/swing"),
-    "stability": ({"models": ["smd"]}, "stability"),
-    "sweep": ({"model": "smd", "vary": ["k=1,2"], "stop": 0.1}, "sweep/smd-k"),
-}
-
-
-def snapshot(folder):
-    """Return the content of all files below a folder, by path."""
-    return {path: path.read_bytes() for path in folder.rglob("*") if path.is_file() and not path.is_symlink()}
-
-
-@pytest.mark.parametrize("name", REPEATED)
-def test_an_edited_provenance_file_chooses_no_folder_to_write(workspace, name):
-    """The folder of a stranger names a place to write, or the result of another folder, which is kept."""
-    assert {study.command for study in STUDIES if study.depth} == set(REPEATED)
-    t = np.linspace(0, 10, 200)
-    table = "".join(f"{a:.3f},{b:.6f}\n" for a, b in zip(t, np.exp(-0.1 * t) * np.cos(6 * t), strict=True))
-    (workspace / "swing.csv").write_text("t [s],x [m]\n" + table)
-    points = "".join(f"{v},{(1.3 + 2 * abs(v)) * np.sign(v)}\n" for v in np.linspace(-0.3, 0.3, 20))
-    (workspace / "bench.csv").write_text("v [m/s],F [N]\n" + points)
-    options, place = REPEATED[name]
-    call = {"command": "harness", "date": "2026-11-27", "files": {}, "parameters": {}, "scene": None}
-    folder, victim = workspace / "stranger" / place, workspace / "mine" / place
-    for path in (folder, victim):
-        path.mkdir(parents=True)
-        (path / "provenance.json").write_text(json.dumps(call | {"call": {"name": name, "options": options}}))
-    renamed = folder.with_name("renamed")  # its call is that of the folder of another name
-    shutil.copytree(folder, renamed)
-    before = snapshot(workspace)
-    edits = [{"out": str(workspace / "mine")}, {"overwrite": True}, {"quiet": True}, {"as_json": True}]
-    edits += [{"name": f"../../../mine/{place}"}, {"folder": str(victim)}] if name != "sweep" else []
-    for edit in edits:
-        edited = call | {"call": {"name": name, "options": options | edit}}
-        (folder / "provenance.json").write_text(json.dumps(edited))
-        done = harness(workspace, "run", folder.relative_to(workspace))
-        assert done.returncode == 2
-        assert f"unknown option of {name} in provenance.json '{min(edit)}'" in done.stderr
-    (folder / "provenance.json").write_bytes(before[folder / "provenance.json"])
-    if name != "sweep":
-        done = harness(workspace, "run", renamed.relative_to(workspace))
-        assert done.returncode == 1
-        assert "names the result of another folder" in done.stderr
-    assert snapshot(workspace) == before
-
-
-def test_a_sweep_is_repeated_in_its_folder_whatever_it_names(workspace):
-    pytest.importorskip("xarray")
-    done = harness(workspace, "sweep", "smd", "--vary", "k=1,2", "--stop", 0.1, "--workers", 1, "--name", "mine")
-    assert done.returncode == 0
-    stranger = shutil.copytree(workspace / "results/sweep/mine", workspace / "stranger/sweep/stranger")
-    provenance = read_provenance(stranger)
-    for name, value in (("name", "../../results/sweep/mine"), ("scheduler", "tcp://127.0.0.1:1")):
-        provenance["call"]["options"][name] = value
-    (stranger / "provenance.json").write_text(json.dumps(provenance))
-    before = snapshot(workspace / "results")
-    done = harness(workspace, "run", "stranger/sweep/stranger")
-    assert (done.returncode, done.stderr) == (0, "")
-    assert snapshot(workspace / "results") == before
-    assert (stranger / "sweep.nc").exists()
-
-
-def test_a_scene_is_repeated_in_its_folder_whatever_it_names(workspace):
-    (workspace / "mine.toml").write_text(MINE)
-    assert harness(workspace, "run", "mine.toml").returncode == 0
-    shutil.copytree(workspace / "results/mine", workspace / "results/stranger")
-    before = snapshot(workspace / "results/mine")
-    done = harness(workspace, "run", "results/stranger")
-    assert (done.returncode, done.stderr) == (0, "")
-    assert snapshot(workspace / "results/mine") == before
-    assert "Results in results/stranger" in done.stdout
+    assert files(folder) == before
+    for key in ("files", "parameters", "run", "scene", "source"):
+        assert read_provenance(folder)[key] == provenance[key]
+    if arguments[0] == "run":
+        assert "the same, bit for bit" in done.stdout

@@ -130,29 +130,12 @@ def test_an_invalid_scene_is_reported_in_one_sentence(workspace, keys, sentence)
 
 
 def test_a_value_is_published_only_with_a_citation(workspace):
-    """A table [published] without one, as in earlier versions, holds references. A stored scene keeps its table."""
+    """A table [published] without one, as in earlier versions, holds references."""
     for citation, kind in ((CITATION, "published"), ("", "reference")):
         extra = f"[published]\nsource = 'a method'\nslips = 3\n{citation}"
         folder, _ = run(write(workspace, extra=extra, analyses='["slip"]'))
         heads = (folder / "quantities.csv").read_text().splitlines()[0]
         assert f"{kind} (a method)" in heads
-        assert "the same, bit for bit" in commands.harness(workspace, "run", folder, COLUMNS="120").stdout
-        assert (folder / "quantities.csv").read_text().splitlines()[0] == heads
-
-
-def test_a_scene_of_an_earlier_version_holds_the_keys_of_its_run(workspace):
-    folder, provenance = run(write(workspace, model='"smd"', outputs='["x"]'))
-    keys = {"name": "mine", "source": "mine.toml", "title": "a title", "decay": {"gives": None}, "stop": 2.0}
-    keys |= {"file": "fmus/smd.fmu", "outputs": ["x"], "values": {"c": 3.0}, "grid": 0.01, "patience": 7.0}
-    del provenance["run"]
-    (folder / "provenance.json").write_text(json.dumps(provenance | {"scene": keys}))
-    repeated = harness.simulate(folder)
-    expected = harness.simulate(
-        write(workspace, "[values]\nc = 3.0", model='"smd"', outputs='["x"]', grid="0.01", stop="2")
-    )
-    assert repeated.time.tolist() == expected.time.tolist()
-    assert repeated["x"].tolist() == expected["x"].tolist()
-    assert len(repeated.time) == 201
 
 
 def test_an_unknown_scene_error_lists_the_shipped_names(workspace):
