@@ -287,7 +287,7 @@ RECORD_OPTIONS = {
 }  # by the argument of read_record
 SAMPLES = (
     "run stickslip",
-    "run --fmu fmus/pendulum.fmu",
+    "run fmus/pendulum.fmu",
     "decay coulomb",
     "sweep stickslip --vary mu_d=0.5,0.6 --measures slips,period --workers 1 --name mine",
 )

@@ -137,10 +137,10 @@ def try_fmu(fmu: Path, folder: Path, timeout: float) -> Iterator[Trial]:
     start = float((experiment and experiment.startTime) or 0.0)
     stop = "" if experiment and experiment.stopTime else str(start + DEFAULT_STOP)
     options = [*(["--stop", stop] if stop else []), "--out", str(folder), "--overwrite"]
-    reply = run_in_terminal(["run", "--fmu", str(fmu), *options], timeout)
+    reply = run_in_terminal(["run", str(fmu), *options], timeout)
     if "--lenient" in reply.message:
         options.append("--lenient")
-        reply = run_in_terminal(["run", "--fmu", str(fmu), *options], timeout)
+        reply = run_in_terminal(["run", str(fmu), *options], timeout)
     remark = "with --lenient: " if "--lenient" in options else ""
     if not (folder / fmu.stem).is_dir():
         yield Trial(fmu.stem, fmi, "run", *judge_run(reply, remark + reply.message), *times_of(reply))

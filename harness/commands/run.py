@@ -10,8 +10,7 @@ from .terminal import Terminal, refuse_ignored_options, refuse_options, result_o
 
 
 @click.command()
-@click.argument("scene", required=False)
-@click.option("--fmu", type=click.Path(path_type=Path), help="Run this FMU instead of a scene.")
+@click.argument("source", metavar="MODEL|SCENE|FMU")
 @click.option(
     "--set", "values", multiple=True, metavar="NAME=VALUE,...", help="Start values; only with an FMU. Repeatable."
 )
@@ -20,16 +19,15 @@ from .terminal import Terminal, refuse_ignored_options, refuse_options, result_o
 @click.pass_context
 def run(
     context: click.Context,
-    scene: str | None,
-    fmu: Path | None,
+    source: str,
     values: tuple[str, ...],
     terminal: Terminal,
     **options: Any,
 ) -> None:
-    """Run a SCENE or an FMU.
+    """Run a model, a scene or an FMU.
 
-    SCENE is the name of a shipped scene (see list), the path of a TOML file, the path of an FMU, or the name or path of
-    a model without a scene.
+    The argument is the name of a scene or a model (see info), the path of a scene file or a model file, or the path of
+    an FMU.  A name that a scene and a model share means the scene.
 
     An FMU that does not expose its solver steps is run with successively halved communication steps, until halving
     changes no output by more than the tolerance, or cannot reach it. The achieved error is stated. A run that misses
@@ -39,25 +37,23 @@ def run(
     Examples:
       friction-fmus run pendulum
       friction-fmus run ./my-scene.toml --out elsewhere
-      friction-fmus run --fmu other.fmu --set mass=2 --stop 10 --rtol 1e-4
+      friction-fmus run other.fmu --set mass=2 --stop 10 --rtol 1e-4
     """
     from ..running.resolve import find_source
     from ..studies.run import study
     from ..studies.run.table import results_table
 
-    if scene is None and fmu is None:
-        raise click.UsageError("give one SCENE, or --fmu PATH")
-    source = fmu or find_source(scene, scenes_first=True)
-    refuse_ignored_options(context, [source] if isinstance(source, Path) else [])
-    if isinstance(source, Path):
-        run_fmu_file(source, values, options, terminal)
+    item = find_source(source, scenes_first=True)
+    refuse_ignored_options(context, [item] if isinstance(item, Path) else [])
+    if isinstance(item, Path):
+        run_fmu_file(item, values, options, terminal)
         return
     refuse_options(context, "without an FMU; a scene sets it in its file", "values", "stop")
     with terminal.progress(1) as report:
-        outcome = study.run_scene(source, terminal.out, partial(report, source.name))
+        outcome = study.run_scene(item, terminal.out, partial(report, item.name))
     table = results_table([outcome], everything=True)
-    folder = terminal.out / source.name
-    notes = [*study.describe_known_values(source), *filter(None, [outcome.run.note if outcome.run else ""])]
+    folder = terminal.out / item.name
+    notes = [*study.describe_known_values(item), *filter(None, [outcome.run.note if outcome.run else ""])]
     failed = failure_message(outcome.error, folder)
     terminal.print_result(outcome_as_json(outcome, terminal.out), table, *notes, folder=folder, failed=failed)
 

@@ -215,7 +215,7 @@ def test_numbers_on_the_command_line_are_finite_or_refused(workspace, option, wo
     (workspace / "a.csv").write_text("t [s],x [m]\n0,1\n1,2\n2,3\n")
     check(*run_command("compare", "a.csv", "a.csv", option, word, "--quiet"), word)
     if option != "--within":
-        check(*run_command("run", "--fmu", "fmus/smd.fmu", option, word, "--quiet"), word)
+        check(*run_command("run", "fmus/smd.fmu", option, word, "--quiet"), word)
 
 
 @pytest.mark.slow

@@ -11,7 +11,6 @@ import pytest
 NO_SUCH = ("nosuch", "nosuch.fmu", "nosuch.py", "nosuch.toml", "nosuch.csv", "nosuch.h5", "results/nosuch")
 COMMANDS = (  # with every argument that names a source
     ("run",),
-    ("run", "--fmu"),
     ("compare", "coulomb"),
     ("decay",),
     ("sweep", "--vary", "k=1,2"),
@@ -67,8 +66,8 @@ OPTIONS_WITHOUT_EFFECT = [
 COMMAND_LINES = [  # arguments, exit status, words of the sentence
     (["runn"], 2, "runn"),
     (["--nosuch"], 2, "--nosuch"),
-    (["run"], 2, "give one SCENE, or --fmu PATH"),
-    (["run", "nosuch"], 2, "unknown scene 'nosuch'"),
+    (["run"], 2, "Missing argument 'MODEL|SCENE|FMU'"),
+    (["run", "nosuch"], 2, "unknown model or scene 'nosuch'"),
     *((arguments, 2, f"{option} has no effect ") for arguments, option in OPTIONS_WITHOUT_EFFECT),
     (["compare", "fmus", OWN], 2, "trajectory.csv is missing"),
     (["decay", "stickslip"], 1, "as in stick-slip, and is no decay"),
@@ -80,7 +79,7 @@ COMMAND_LINES = [  # arguments, exit status, words of the sentence
     ([*FIT, "--free", "k", "--set", "m"], 2, "--set 'm' is not an assignment: write it as in k=100,m=3"),
     ([*FIT, "--free", "k", "--set", "m=1", "--set", "m=2"], 2, "--set names m twice: give it one value"),
     ([*FIT, "--free", "k", "--sigma", "x=1,x=2"], 2, "--sigma names x twice: give it one value"),
-    (["run", "--fmu", OWN, "--set", "m=1", "--set", "m=2"], 2, "--set names m twice: give it one value"),
+    (["run", OWN, "--set", "m=1", "--set", "m=2"], 2, "--set names m twice: give it one value"),
     ([*SWEEP, "--set", "k=1", "--set", " k=1"], 2, "--set names k twice: give it one value"),
     ([*FIT, "--free", "k", "--start", "k=3,m=2"], 2, "unknown free parameter 'm'"),
     ([*FIT, "--free", "k", "--start", "fmus"], 2, "fmus holds no result of a fit: name its folder or its fit.json"),

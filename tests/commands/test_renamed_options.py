@@ -41,7 +41,7 @@ def test_former_options_with_another_form_still_work(tmp_path):
     """--exchange is --interface ModelExchange, and --velocity names a column and its quantity."""
     run = partial(commands.harness, tmp_path, "--json", "--overwrite")
     former, present = (
-        run("run", "--fmu", external_fmus.build_external_fmus() / "ModelExchangeOnly.fmu", *words)
+        run("run", external_fmus.build_external_fmus() / "ModelExchangeOnly.fmu", *words)
         for words in (["--exchange"], ["--interface", "modelexchange"])
     )
     assert (former.returncode, former.stdout) == (0, present.stdout)
@@ -57,7 +57,7 @@ def test_former_options_with_another_form_still_work(tmp_path):
 @pytest.mark.parametrize("words", [["--rtol", "1e-4"], ["--set", "solver.rtol=1e-4"]])
 def test_rtol_sets_the_solver_of_an_fmu_of_this_project(fmus, tmp_path, words):
     (tmp_path / "fmus").symlink_to(fmus)
-    done = commands.harness(tmp_path, "run", "--fmu", "fmus/coulomb.fmu", "--set", "solver.method=ode45", *words)
+    done = commands.harness(tmp_path, "run", "fmus/coulomb.fmu", "--set", "solver.method=ode45", *words)
     assert (done.returncode, done.stderr) == (0, "")
     assert harness.load_result(tmp_path / "results/coulomb").parameters["solver.rtol"] == 1e-4
 

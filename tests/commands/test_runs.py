@@ -336,14 +336,14 @@ def test_no_temporary_fmu_files_remain_of_a_failed_run(user_folder, tmp_path):
 
 def test_a_run_that_hardly_advances_ends_at_its_time_limit(workspace):
     """A slip every two seconds, up to 1e12 s; up to 1e300 s, a slip is too short beside the run."""
-    done = commands.harness(workspace, "run", "--fmu", "fmus/stickslip.fmu", "--stop", 1e300, "--timeout", 0.5)
+    done = commands.harness(workspace, "run", "fmus/stickslip.fmu", "--stop", 1e300, "--timeout", 0.5)
     assert (done.returncode, done.stderr.count("\n")) == (1, 1)
-    done = commands.harness(workspace, "run", "--fmu", "fmus/stickslip.fmu", "--stop", 1e12, "--timeout", 0.5)
+    done = commands.harness(workspace, "run", "fmus/stickslip.fmu", "--stop", 1e12, "--timeout", 0.5)
     assert done.returncode == 1
     (line,) = done.stderr.splitlines()
     assert line.startswith("Error: stickslip.fmu is at t = ")
     assert line.endswith("advances by less than 1/4096 of the run in 0.5 s: choose an earlier stop or a longer timeout")
-    done = commands.harness(workspace, "run", "--fmu", "fmus/stickslip.fmu", "--stop", 20, "--timeout", 5)
+    done = commands.harness(workspace, "run", "fmus/stickslip.fmu", "--stop", 20, "--timeout", 5)
     assert (done.returncode, done.stderr) == (0, "")
 
 

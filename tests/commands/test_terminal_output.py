@@ -105,7 +105,7 @@ def test_a_command_without_its_fmus_explains_how_to_build_them(tmp_path, monkeyp
         commands.main(arguments.split(), standalone_mode=False)
 
 
-@pytest.mark.parametrize("arguments", [("run", "--fmu"), ("sweep", "--vary", "k=1,2", "--workers", "1")])
+@pytest.mark.parametrize("arguments", [("run",), ("sweep", "--vary", "k=1,2", "--workers", "1")])
 def test_an_fmu_failure_of_either_backend_is_reported_once(backend_fmus, tmp_path, arguments):
     """A native FMU also prints it to the standard error of the process, bypassing Python."""
     done = harness(tmp_path, *arguments, backend_fmus / "smd.fmu", "--set", "m=1e-300", "--set", "F_ext=1e308")
@@ -127,15 +127,6 @@ def test_a_missing_optional_package_is_named_before_any_run(workspace, package, 
     assert package in done.stderr
     assert f"pip install 'friction-fmus[{extra}]'" in done.stderr
     assert not (workspace / "results").exists()
-
-
-def test_an_fmu_given_as_a_scene_is_run(workspace, tmp_path):
-    outputs = [
-        harness(workspace, "run", *option, "fmus/smd.fmu", "--set", "k=50", "--out", tmp_path / str(len(option)))
-        for option in ((), ("--fmu",))
-    ]
-    assert [done.returncode for done in outputs] == [0, 0]
-    assert outputs[0].stdout.splitlines()[:-1] == outputs[1].stdout.splitlines()[:-1] != []
 
 
 def test_the_versions_are_printed(tmp_path):

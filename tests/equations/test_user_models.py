@@ -197,7 +197,7 @@ def test_a_model_file_may_be_named_like_a_python_module(oil):
     folder.mkdir()
     for name in ("math.py", "fmus.py", "random.py"):
         (folder / name).write_bytes(b"\xef\xbb\xbf" + (oil / "pendulum.py").read_bytes().replace(b"\n", b"\r\n"))
-    for words in ("build_fmus", "fmus.py"), ("harness", "run", "--fmu", "fmus.fmu"):
+    for words in ("build_fmus", "fmus.py"), ("harness", "run", "fmus.fmu"):
         done = subprocess.run([sys.executable, "-m", *words], cwd=folder, capture_output=True, text=True, timeout=300)
         assert done.returncode == 0, done.stderr
 
@@ -299,7 +299,7 @@ def test_it_is_run_and_compared_by_its_path_like_its_fmu(tmp_path):
     for path in (source, built(source, "")):
         (tmp_path / path.name).symlink_to(path)
     harness("run", "rotor_brake.py", cwd=tmp_path)
-    assert "the same, bit for bit" in harness("run", "--fmu", "rotor_brake.fmu", cwd=tmp_path).stdout
+    assert "the same, bit for bit" in harness("run", "rotor_brake.fmu", cwd=tmp_path).stdout
     done = harness("compare", "rotor_brake.py", "rotor_brake.fmu", "--atol", "0", "--stop", "1", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
 

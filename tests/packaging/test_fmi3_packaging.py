@@ -107,7 +107,7 @@ def test_an_alias_is_a_second_name_of_a_settable_variable(fmu, tmp_path):
     assert one.alias.name == "mu_d"
     runs = [simulate_fmu(str(sled), start_values=values).tobytes() for values in ({"mu_k": 0.4}, {"mu_d": 0.4}, {})]
     assert runs[0] == runs[1] != runs[2]
-    done = commands.harness(tmp_path, "run", "--fmu", sled, "--set", "mu_k=0.4", "--stop", "1")
+    done = commands.harness(tmp_path, "run", sled, "--set", "mu_k=0.4", "--stop", "1")
     assert done.returncode == 0, done.stderr
     parameters = json.loads((tmp_path / "results" / "stickslip" / "provenance.json").read_text())["parameters"]
     assert (parameters["mu_d"]["value"], parameters["mu_k"]["value"]) == (0.4, 0.4)

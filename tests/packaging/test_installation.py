@@ -18,7 +18,7 @@ WORK = {  # by command; all run in one folder, in this order
     "build": ["build smd coulomb stickslip"],
     "list": ["list"],
     "info": ["info stickslip"],
-    "run": ["run stickslip", "build block.py --method dop853 --method rodas", "run --fmu block.fmu"],
+    "run": ["run stickslip", "build block.py --method dop853 --method rodas", "run block.fmu"],
     "curve": ["curve bench.csv --mass 2"],
     "decay": ["decay docs/records/spring.csv --m 0.35", "decay coulomb"],
     "compare": ["compare smd coulomb"],

@@ -137,7 +137,7 @@ def test_text_from_results_is_escaped(report_run):
 
 def test_a_report_with_only_users_models_begins_with_them(tmp_path):
     shutil.copy(build_user_model(ROOT / "tests/example_models/larger/sleds.py") / "sleds.fmu", tmp_path)
-    assert harness(tmp_path, "run", "--fmu", "sleds.fmu", "--quiet").returncode == 0
+    assert harness(tmp_path, "run", "sleds.fmu", "--quiet").returncode == 0
     assert harness(tmp_path, "report", "--quiet").returncode == 0
     page = (tmp_path / "results/report.html").read_text(encoding="utf-8")
     headings = re.findall(r"<h[23]>(.*?)</h[23]>", page)

@@ -20,7 +20,7 @@ from harness.results.registry import STUDIES
 
 COMMANDS = {  # that take seconds, and the folders of their results
     "run": (("run", "coulomb"), "coulomb"),
-    "run --fmu": (("run", "--fmu", "fmus/coulomb.fmu", "--set", "f=0.25"), "coulomb"),
+    "run FMU": (("run", "fmus/coulomb.fmu", "--set", "f=0.25"), "coulomb"),
     "compare": (("compare", "fmus/coulomb.fmu", "fmus/smd.fmu"), "compare/coulomb-smd"),
     "decay": (("decay", "coulomb", "--no-drag", "--end", "2"), "decay/coulomb"),
     "sweep": (("sweep", "coulomb", "--vary", "f=0.25,0.5", "--workers", "1", "--name", "f"), "sweep/f"),
@@ -62,7 +62,7 @@ def test_a_result_records_the_digests_of_its_files_and_all_versions(example_run)
 
 @pytest.mark.parametrize("model", MODELS)
 def test_every_effective_parameter_is_recorded_with_its_unit(workspace, model):
-    assert harness(workspace, "run", "--fmu", f"fmus/{model}.fmu", "--set", "m=1.5", "--stop", "0.5").returncode == 0
+    assert harness(workspace, "run", f"fmus/{model}.fmu", "--set", "m=1.5", "--stop", "0.5").returncode == 0
     recorded = read_provenance(workspace / "results" / model)["parameters"]
     variables = read_model_description(str(workspace / f"fmus/{model}.fmu")).modelVariables
     parameters = [variable for variable in variables if variable.causality == "parameter"]
@@ -101,7 +101,7 @@ def test_the_report_shows_the_provenance_of_its_results(first_run):
 def test_the_report_shows_every_run(workspace):
     """Each FMU and each user scene, by its first and last values, if nothing else was requested."""
     (workspace / "mine.toml").write_text('title = "a title"\nmodel = "smd"\noutputs = ["x"]\nplots = ["position"]\n')
-    for arguments in (("--fmu", "fmus/pacejka.fmu"), ("mine.toml",)):
+    for arguments in (("fmus/pacejka.fmu",), ("mine.toml",)):
         assert harness(workspace, "run", *arguments).returncode == 0
     assert harness(workspace, "report").returncode == 0
     page = (workspace / "results/report.html").read_text()
@@ -137,10 +137,10 @@ ONCE = ("--vary", "c=2,3", "--workers", "1", "--name", "c")
 @pytest.mark.parametrize(
     ("first", "second", "folder"),
     [
-        (("run", "coulomb"), ("run", "--fmu", "fmus/coulomb.fmu"), "coulomb"),
-        (("run", "--fmu", "fmus/coulomb.fmu"), ("run", "coulomb"), "coulomb"),
+        (("run", "coulomb"), ("run", "fmus/coulomb.fmu"), "coulomb"),
+        (("run", "fmus/coulomb.fmu"), ("run", "coulomb"), "coulomb"),
         (("run", "a/mine.toml"), ("run", "b/mine.toml"), "mine"),
-        (("run", "--fmu", "fmus/smd.fmu"), ("run", "--fmu", "a/smd.fmu"), "smd"),
+        (("run", "fmus/smd.fmu"), ("run", "a/smd.fmu"), "smd"),
         (("decay", "coulomb", "--no-drag"), ("decay", "a/coulomb.csv", "--no-drag"), "decay/coulomb"),
         (("compare", "smd", "a/smd.fmu"), ("compare", "smd", "b/a/smd.fmu"), "compare/scene-smd-a-smd"),
         (("sweep", "a/smd.fmu", *ONCE), ("sweep", "b/smd.fmu", *ONCE), "sweep/c"),
@@ -177,7 +177,7 @@ def test_a_result_with_other_values_is_not_replaced_silently(workspace):
 @pytest.mark.parametrize(
     ("arguments", "older", "newer", "had"),
     [
-        (("run", "--fmu", "fmus/coulomb.fmu"), ("--set", "f=0.25"), ("--set", "f=0.5"), "f = 0.25 N"),
+        (("run", "fmus/coulomb.fmu"), ("--set", "f=0.25"), ("--set", "f=0.5"), "f = 0.25 N"),
         (("decay", "swing.csv"), (), ("--no-drag", "--end", "1.5"), "drag, no end"),
         (("compare", "fmus/coulomb.fmu", "smd"), ("--stop", "2"), (), "stop = 2.0"),
         (("sweep", "smd", *ONCE), ("--set", "m=2"), (), "m = 2.0 kg"),
@@ -193,10 +193,10 @@ def test_a_result_with_other_options_is_not_replaced_silently(workspace, argumen
 
 def test_a_result_of_another_build_of_its_fmu_is_not_replaced_silently(workspace, fmus):
     shutil.copy(fmus / "smd.fmu", workspace / "mine.fmu")
-    assert harness(workspace, "run", "--fmu", "mine.fmu", "--stop", "0.5").returncode == 0
+    assert harness(workspace, "run", "mine.fmu", "--stop", "0.5").returncode == 0
     with ZipFile(workspace / "mine.fmu", "a") as archive:
         archive.comment = b"built again"
-    done = harness(workspace, "run", "--fmu", "mine.fmu", "--stop", "0.5", COLUMNS="200")
+    done = harness(workspace, "run", "mine.fmu", "--stop", "0.5", COLUMNS="200")
     assert re.search(r"It replaces the result of [-\dT:+]+, which had another mine\.fmu\.", done.stdout)
 
 

@@ -27,12 +27,12 @@ def external_fmu_folder():
 
 @pytest.fixture
 def run(external_fmu_folder, tmp_path):
-    """Return run(name, ...): the finished `run --fmu`, and the result by column; each FMU is plotted once in this
+    """Return run(name, ...): the finished `run`, and the result by column; each FMU is plotted once in this
     file."""
 
     def run(name, *arguments, figures=False):
         fmu = name if name.endswith(".fmu") else external_fmu_folder / f"{name}.fmu"
-        done = commands.harness(tmp_path, "run", "--fmu", fmu, *arguments, COLUMNS="120", figures=figures)
+        done = commands.harness(tmp_path, "run", fmu, *arguments, COLUMNS="120", figures=figures)
         assert "Traceback" not in done.stderr
         assert "np." not in done.stdout + done.stderr
         return done, table(tmp_path / "results" / name.removesuffix(".fmu") / "trajectory.csv")

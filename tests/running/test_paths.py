@@ -52,7 +52,7 @@ def test_without_a_plain_folder_a_python_fmu_is_refused_and_others_run(odd_folde
 @pytest.mark.parametrize("part", ["resources/", "resources/slavemodule.txt", "_fmu.py"])
 def test_a_python_fmu_without_the_files_of_its_library_is_refused(fmus, tmp_path, part):
     broken = copy_without(fmus / "smd.fmu", tmp_path / "broken.fmu", lambda name: part in name)
-    done = harness(tmp_path, "run", "--fmu", broken)
+    done = harness(tmp_path, "run", broken)
     assert done.returncode == 1
     assert done.stderr.count("\n") == 1
     assert done.stderr.startswith("Error: ")

@@ -141,7 +141,7 @@ def test_a_value_is_published_only_with_a_citation(workspace):
 def test_an_unknown_scene_error_lists_the_shipped_names(workspace):
     done = commands.harness(workspace, "run", "pendulm")
     assert done.returncode == 2
-    assert "unknown scene 'pendulm' (nearest: 'pendulum'); allowed: coulomb, " in done.stderr
+    assert "unknown model or scene 'pendulm' (nearest: 'pendulum'); allowed: belt, " in done.stderr
 
 
 def test_a_missing_file_is_reported():

@@ -31,14 +31,14 @@ def harness(workspace):
 
 def test_a_project_fmu_is_run_at_its_internal_steps(harness, tmp_path):
     values = ("--set", "f=1", "--set", "solver.method=ode45")
-    done = harness("run", "--fmu", "fmus/coulomb.fmu", *values)
+    done = harness("run", "fmus/coulomb.fmu", *values)
     assert (done.returncode, done.stderr) == (0, "")
     assert "solver: ode45, hybrid" in done.stdout
     assert (tmp_path / "results/coulomb/trajectory.csv").exists()
 
 
 def test_a_run_as_json_prints_only_json(harness, external_fmu_folder):
-    done = harness("run", "--fmu", external_fmu_folder / "Midpoint.fmu", "--tolerance", 1e-3, "--json")
+    done = harness("run", external_fmu_folder / "Midpoint.fmu", "--tolerance", 1e-3, "--json")
     assert (done.returncode, done.stderr) == (0, "")
     assert json.loads(done.stdout)["final"]["x"] == pytest.approx(cos(sqrt(40)), abs=2e-3)
     done = harness("run", "coulomb", "--json")

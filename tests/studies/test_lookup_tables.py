@@ -92,7 +92,7 @@ def test_points_are_listed_and_drawn_with_the_values_of_a_run(sled, tmp_path, mo
         panels.extend(figure.get_axes())
 
     monkeypatch.setattr(Figure, "savefig", save)
-    commands.harness(tmp_path, "run", "--fmu", str(sled), "--set", "F_2=7.5", figures=True)
+    commands.harness(tmp_path, "run", str(sled), "--set", "F_2=7.5", figures=True)
     (axes,) = [axes for axes in panels if axes.get_title(loc="left") == "table guide"]
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("argument [m/s]", "guide [N]")
     x, y = axes.lines[0].get_data()

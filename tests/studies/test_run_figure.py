@@ -145,7 +145,7 @@ def blocks_run(tmp_path_factory):
     """The run of a model of two contacts, by itself, with its result folder."""
     folder = tmp_path_factory.mktemp("blocks")
     fmu = build_fmu(CONTACTS / "blocks.py")
-    done = commands.harness(folder, "run", "--fmu", str(fmu), figures=True)
+    done = commands.harness(folder, "run", str(fmu), figures=True)
     assert done.returncode == 0, done.stderr
     return done.stdout, folder / "results/blocks"
 
@@ -228,7 +228,7 @@ def test_an_output_takes_precedence_over_the_panel_of_its_name(tmp_path):
     )
     for words, titles in (
         (("named.toml",), {"another length", "phase angle", "a length of steps", "its rate"}),
-        (("--fmu", str(fmu)), {"another length", "phase angle", "a length of steps", "its rate", "a length"}),
+        ((str(fmu),), {"another length", "phase angle", "a length of steps", "its rate", "a length"}),
     ):
         done = commands.harness(tmp_path, "run", *words, figures=True)
         assert done.returncode == 0, done.stderr

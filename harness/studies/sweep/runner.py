@@ -1,6 +1,6 @@
 """Repeated runs of one FMU, in a worker of a sweep.
 
-An FMU of this project is instantiated once and reset before each run.  Other FMUs are run as by `run --fmu`, with step
+An FMU of this project is instantiated once and reset before each run.  Other FMUs are run as by `run`, with step
 refinement, in one worker process.
 """
 
