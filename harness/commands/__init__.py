@@ -44,7 +44,7 @@ def commands(context: click.Context, terminal: Terminal) -> None:
       friction-fmus
       friction-fmus run stickslip
       friction-fmus run my-scene.toml --out elsewhere
-      friction-fmus list
+      friction-fmus info
     """
     # options before the command apply to the command as well
     context.default_map = dict.fromkeys(commands.commands, vars(terminal))

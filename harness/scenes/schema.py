@@ -14,7 +14,7 @@ from typing import Any, TypeVar, get_args, get_origin, get_type_hints
 from ..arguments import FINITE, FLAG, NATURAL, PATH, Rule, text
 from ..errors import SceneError, format_value, unknown_name_message
 
-LIST_HINT = "`friction-fmus list` lists the available scenes"
+LIST_HINT = "`friction-fmus info` lists the available scenes"
 MAX_TITLE_LENGTH = 200  # letters
 MAX_FILE_BYTES = 1_000_000  # bytes
 Schema = TypeVar("Schema")

@@ -282,9 +282,9 @@ FULL = "Error: No space left on device\n"
 @pytest.mark.parametrize(
     ("command", "shell", "status", "message"),
     [
-        (("list",), "| head -1", 0, ""),
-        (("list",), ">&- 2>&-", 0, ""),
-        (("list", "--json"), "> /dev/full", 1, FULL),
+        (("info",), "| head -1", 0, ""),
+        (("info",), ">&- 2>&-", 0, ""),
+        (("info", "--json"), "> /dev/full", 1, FULL),
         (("run", "mine.toml"), ">&-", 0, ""),
         (("run", "mine.toml"), "> /dev/full", 1, FULL),
     ],

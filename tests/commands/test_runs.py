@@ -276,7 +276,7 @@ def test_a_failing_case_does_not_lose_the_others(workspace, monkeypatch):
 @pytest.mark.parametrize(
     "arguments",
     [
-        ["list"],
+        ["info"],
         ["run", "nosuch"],
         ["run", "mine.toml", "--json"],
         ["decay", "swing.csv", "--no-drag", "--json"],

@@ -40,7 +40,7 @@ def assert_fits(output, *headings):
 @pytest.mark.parametrize(
     ("arguments", "headings"),
     [
-        (("list",), ("scene", *SCENES)),
+        (("info",), ("scene", *SCENES)),
         (("run", "stickslip"), ("compared with", "0.430665996656")),
         (("run", "coulomb-sign"), ("half of smd's",)),
         (("decay", "coulomb"), ("two peaks",)),
@@ -137,13 +137,11 @@ def test_the_versions_are_printed(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_the_json_list_is_accepted_by_the_commands(workspace):
-    listing = json.loads(harness(workspace, "list", "--json").stdout)
-    assert sorted(item["scene"] for item in listing) == sorted([*SCENES, *more_model_names()])
+def test_info_lists_all_scenes_and_models(workspace):
+    listing = json.loads(harness(workspace, "info", "--json").stdout)
+    assert sorted(item["scene"] or item["model"] for item in listing) == sorted([*SCENES, *more_model_names()])
     for item in listing:
-        if item["scene"] in more_model_names():  # a model without a scene
-            assert item["model"] == item["scene"]
-        else:
+        if item["scene"]:
             scene = SCENES[item["scene"]]
             assert (item["title"], item["model"]) == (scene["title"], scene["model"])
 

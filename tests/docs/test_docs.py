@@ -55,7 +55,7 @@ def test_code_blocks_run(page, workspace, environment):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("words", ["list", "run nosuch", "run smd --nosuch"])
+@pytest.mark.parametrize("words", ["info", "run nosuch", "run smd --nosuch"])
 def test_a_forked_command_prints_and_ends_as_a_fresh_one(environment, workspace, words):
     program = [Path(environment["PROGRAMS"], "friction-fmus"), *words.split()]
     forked = subprocess.run(program, cwd=workspace, env=environment, capture_output=True, text=True)

@@ -154,7 +154,7 @@ def test_native_and_fmi3_agree_with_python_bit_for_bit(worker, name, kind):
 
 @pytest.mark.slow
 def test_commands_know_the_models_by_name(tmp_path):
-    listing = commands.harness(tmp_path, "list", "--json").stdout
+    listing = commands.harness(tmp_path, "info", "--json").stdout
     assert all(f'"model": "{name}"' in listing for name in OSCILLATORS)
     done = commands.harness(tmp_path, "run", "belt")
     assert "no fmus/more/belt.fmu: build it with `friction-fmus build belt`" in done.stderr

@@ -16,8 +16,7 @@ pytestmark = pytest.mark.slow
 
 WORK = {  # by command; all run in one folder, in this order
     "build": ["build smd coulomb stickslip"],
-    "list": ["list"],
-    "info": ["info stickslip"],
+    "info": ["info", "info stickslip"],
     "run": ["run stickslip", "build block.py --method dop853 --method rodas", "run block.fmu"],
     "curve": ["curve bench.csv --mass 2"],
     "decay": ["decay docs/records/spring.csv --m 0.35", "decay coulomb"],
