@@ -104,7 +104,7 @@ def fit_with_harness(t, x, free, known, force, fmu):
     """Fit in the ranges."""
     frame = pandas.DataFrame({"t": t, "x": x, "F_ext": 0.0 if force is None else force})
     ranges = {name: (low, high) for name, (_, low, high) in free.items()}
-    return harness.fit(fmu, frame, ranges, observe="x", inputs=[] if force is None else ["F_ext"], fixed=known)
+    return harness.fit(fmu, frame, ranges, observe="x", inputs=[] if force is None else ["F_ext"], values=known)
 
 
 # ---- the comparison

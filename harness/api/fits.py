@@ -64,7 +64,6 @@ STARTS = Rule("a mapping from names to numbers, an earlier fit or the folder of 
     end=FINITE,
     timeout=POSITIVE,
     progress=PROGRESS,
-    fixed=SETTINGS,
 )
 @with_progress_bar
 def fit(
@@ -87,7 +86,6 @@ def fit(
     end: float | None = None,
     timeout: float = 10.0,
     progress: Progress | bool | None = None,
-    fixed: Mapping[str, float | str] | None = None,
 ) -> "FitResult":
     """Fit parameters of an FMU to measured records.
 
@@ -135,8 +133,6 @@ def fit(
     progress : callable or False, optional
         Receives the progress from 0 to 1. By default a terminal or a notebook shows a bar after two seconds; False
         switches it off.
-    fixed : mapping, optional
-        Former name of `values`.
 
     Returns
     -------
@@ -167,8 +163,6 @@ def fit(
     from ..studies.fit.request import FitRequest
 
     check_time_range(time, rate, begin, end)
-    if fixed is not None and values is not None:
-        raise SceneError("values and fixed: give only values")
     fmus = [find_fmu(str(law)) for law in (source, *against)]  # type: ignore[misc] # a list by its rule
     for fmu in fmus:
         check_built(fmu, SceneError)
@@ -177,7 +171,7 @@ def fit(
         earlier = start.values if isinstance(start, ParameterFit) else read_fitted_values(Path(start))
         start = select_starts(earlier, ranges, each)
     request = FitRequest(
-        run=RunSpec(fmus[0], values=dict(fixed or values or {}), timeout=timeout),
+        run=RunSpec(fmus[0], values=dict(values or {}), timeout=timeout),
         against=tuple(fmus[1:]),
         free=ranges,
         observe=dict(observe),  # type: ignore[arg-type]

@@ -22,8 +22,7 @@ def load_result(folder: "str | Path") -> "Result":
     -------
     Result
         The same class as from the function of Python: a `Trajectory`, `DecayResult`, `FitResult`, `Comparison` or
-        `SweepResult`; for other studies the class of their results. A result of an earlier version is a `StoredResult`,
-        which has its numbers and sentences.
+        `SweepResult`; for other studies the class of their results.
 
     Raises
     ------

@@ -60,7 +60,7 @@ def compare(
             refuse_options(context, "on stored results and files", "stop")
         fmus = [find_fmu(source) for source in (first, second) if Path(source).suffix in FMU_SUFFIXES]
         refuse_ignored_options(context, fmus)
-        rtol, spec = options.pop("tolerance"), RunOptions(**options)
+        rtol, spec = options.pop("rtol"), RunOptions(**options)
         comparison, folder = study.run_comparison((first, second), spec, rtol, terminal.out, partial(report, "compare"))
     runs = [side for side in (comparison.one, comparison.two) if isinstance(side, Trajectory)]
     failed = [run.failure for run in runs if run.failure]

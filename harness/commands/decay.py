@@ -13,7 +13,6 @@ from .terminal import (
     POSITIVE,
     RATE_OPTION,
     TIME_UNIT_OPTION,
-    RenamedOption,
     Terminal,
     refuse_options,
     result_options,
@@ -22,7 +21,6 @@ from .terminal import (
 COLUMN_OPTIONS = (  # of records
     "time",
     "column",
-    "velocity",
     "quantity",
     "unit",
     "per_count",
@@ -35,12 +33,7 @@ COLUMN_OPTIONS = (  # of records
 @click.command()
 @click.argument("source", metavar="FILE|SCENE|-")
 @click.option("--time", help="Heading of the time column. Default: t, time, ..., or the first column.")
-@click.option(
-    *("--column", "--position", "column"),
-    cls=RenamedOption,
-    help="Heading of the column to fit. Default: x, theta, ...",
-)
-@click.option("--velocity", hidden=True)  # former name of --column with --quantity velocity
+@click.option("--column", help="Heading of the column to fit. Default: x, theta, ...")
 @click.option(
     "--quantity",
     type=click.Choice(QUANTITIES),
@@ -63,7 +56,6 @@ COLUMN_OPTIONS = (  # of records
 def decay(
     context: click.Context,
     source: str,
-    velocity: str | None,
     k: float | None,
     m: float | None,
     pendulum: bool,
@@ -98,10 +90,6 @@ def decay(
         refuse_options(context, "on a scene, whose FMU declares names and units", *COLUMN_OPTIONS)
     if k is not None and m is not None:
         raise click.UsageError("--k and --m: give only one of them; the other follows from the frequency")
-    if velocity is not None:
-        if columns["column"] is not None or columns["quantity"] not in (None, "velocity"):
-            raise click.UsageError("--velocity: only one column is fitted; omit --column and --quantity")
-        columns |= {"column": velocity, "quantity": "velocity"}
     if columns["rate"] is not None and (columns["time"] is not None or columns["time_unit"] is not None):
         raise click.UsageError("--rate replaces the times in the file: omit --time and --time-unit")
     columns_spec, parameters = ColumnOptions(**columns), KnownParameters(k, m, pendulum)

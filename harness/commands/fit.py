@@ -11,7 +11,6 @@ from .terminal import (
     POSITIVE,
     RATE_OPTION,
     TIME_UNIT_OPTION,
-    RenamedOption,
     Terminal,
     result_options,
 )
@@ -22,8 +21,7 @@ from .terminal import (
 @click.argument("records", metavar="FILE...", nargs=-1, required=True)
 @click.option("--free", multiple=True, metavar="NAME[=LOW:HIGH],...", help="Parameters to fit, and ranges to search.")
 @click.option(
-    *("--set", "--fixed", "fixed"),
-    cls=RenamedOption,
+    *("--set", "values"),
     multiple=True,
     metavar="NAME=VALUE,...",
     help="Values of other parameters.",
@@ -60,7 +58,7 @@ def fit(
     model: str,
     records: tuple[str, ...],
     free: tuple[str, ...],
-    fixed: tuple[str, ...],
+    values: tuple[str, ...],
     observe: tuple[str, ...],
     inputs: tuple[str, ...],
     start: tuple[str, ...],
@@ -110,7 +108,7 @@ def fit(
         ranges = options.parse_ranges(free)
         per_record = tuple(options.split_list([each or ""]))
         request = FitRequest(
-            run=RunSpec(fmu, values=parse_assignments("--set", fixed), timeout=timeout),
+            run=RunSpec(fmu, values=parse_assignments("--set", values), timeout=timeout),
             against=tuple(others),
             free=ranges,
             observe=options.parse_columns("--observe", observe),

@@ -65,7 +65,7 @@ def run_fmu_file(path: Path, values: tuple[str, ...], options: dict[str, Any], t
     from ..scenes.run_spec import DEFAULT_EQUAL_STEPS, RunSpec
     from ..studies.run.study import run_fmu
 
-    rtol = options.pop("tolerance")
+    rtol = options.pop("rtol")
     with terminal.progress(1) as report:
         spec = RunSpec(path, values=parse_assignments("--set", values), equal_steps=DEFAULT_EQUAL_STEPS, **options)
         if rtol is not None:

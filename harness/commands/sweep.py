@@ -11,7 +11,6 @@ import click
 from ..arguments import NATURAL, RUNS, WORKERS
 from ..errors import MAX_VALUE_LENGTH, HarnessError, install_command
 from .terminal import (
-    RenamedOption,
     RuleType,
     Terminal,
     refuse_ignored_options,
@@ -32,15 +31,13 @@ from .terminal import (
 )
 @click.option("--set", "values", multiple=True, metavar="NAME=VALUE,...", help="Values set in every run.")
 @click.option(
-    *("--samples", "--random", "random"),
-    cls=RenamedOption,
+    "--samples",
     type=RuleType(RUNS),
     help="Number of points of a Latin hypercube; requires --vary NAME=LO:HI.",
 )
 @click.option("--seed", type=RuleType(NATURAL), default=1, show_default=True, help="Seed of the Latin hypercube.")
 @click.option(
-    *("--measures", "--measure", "measure"),
-    cls=RenamedOption,
+    "--measures",
     help="Measures, separated by commas. Default: final, and events if the FMU counts them.",
 )
 @click.option(
@@ -56,9 +53,9 @@ def sweep(
     model: str,
     vary: tuple[str, ...],
     values: tuple[str, ...],
-    random: int | None,
+    samples: int | None,
     seed: int,
-    measure: str | None,
+    measures: str | None,
     workers: int,
     scheduler: str | None,
     name: str | None,
@@ -82,7 +79,7 @@ def sweep(
         raise click.UsageError(
             f"--name {name[:MAX_VALUE_LENGTH]}: must be a single folder name that does not start with a dot"
         )
-    if random is None:
+    if samples is None:
         refuse_options(context, "without --samples", "seed")
     if scheduler is not None:
         refuse_options(context, "with --scheduler: the cluster has its own workers", "workers")
@@ -98,16 +95,16 @@ def sweep(
     from ..studies.sweep.study import run_sweep
 
     refuse_ignored_options(context, [find_fmu(model)], timeout_is_ignored=True)
-    measures = tuple(dict.fromkeys(word.strip() for word in measure.split(","))) if measure is not None else ()
-    rtol = options.pop("tolerance")
+    measured = tuple(dict.fromkeys(word.strip() for word in measures.split(","))) if measures is not None else ()
+    rtol = options.pop("rtol")
     run = RunSpec(find_fmu(model), values=parse_assignments("--set", values), follow=False, **options)
     run = run if rtol is None else set_rtol(run, rtol)
     check_built(run.fmu)
     labels = read_labels(run)
-    axes = tuple(parse_axis(replace_labels_in_text(text, labels), random is not None) for text in vary)
-    points = SweepPoints(axes, random, seed)
+    axes = tuple(parse_axis(replace_labels_in_text(text, labels), samples is not None) for text in vary)
+    points = SweepPoints(axes, samples, seed)
     with terminal.progress(1) as report:
-        spec, progress = SweepSpec(run, points.names, measures), partial(report, model)
+        spec, progress = SweepSpec(run, points.names, measured), partial(report, model)
         result = run_sweep(spec, points, name, terminal.out, scheduler, workers, progress)
     failed = [*result.describe_failures()]
     terminal.print_result(result.as_json(), *result.blocks(), folder=result.folder, failed=failed)

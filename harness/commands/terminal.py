@@ -26,20 +26,6 @@ from ..process.temporary_directory import temporary_root
 Command = Callable[..., Any]
 
 
-class RenamedOption(click.Option):
-    """Option that was renamed: the help shows its first name only; its former names still work.
-
-    The name of its value is the former one, so that stored calls of earlier versions can be repeated.
-    """
-
-    def get_help_record(self, ctx: click.Context) -> Any:
-        names, self.opts = self.opts, self.opts[:1]
-        try:
-            return super().get_help_record(ctx)
-        finally:
-            self.opts = names
-
-
 def out_option(text: str) -> Callable[..., Any]:
     """Return the option --out with a help text."""
     folder = click.Path(file_okay=False, path_type=Path)
@@ -103,29 +89,19 @@ class RuleType(click.FloatRange):
 
 
 FINITE, POSITIVE, NONNEGATIVE = map(RuleType, (arguments.FINITE, arguments.POSITIVE, arguments.NONNEGATIVE))
-HEADINGS_OPTION = click.option(
-    *("--headings", "--columns", "headings"),
-    cls=RenamedOption,
-    metavar="NAMES",
-    help="Headings, if the file has none: 't [s],x [mm]'.",
-)
+HEADINGS_OPTION = click.option("--headings", metavar="NAMES", help="Headings, if the file has none: 't [s],x [mm]'.")
 TIME_UNIT_OPTION = click.option(
     "--time-unit", help="Unit of time, if the heading has none: ms, or 0.01s for sample numbers. Default: s."
 )
 RATE_OPTION = click.option(
     "--rate", type=POSITIVE, metavar="HZ", help="Sampling rate in Hz, which replaces the times in the file."
 )
-BEGIN_OPTION = click.option(
-    *("--begin", "--from", "begin"), cls=RenamedOption, type=FINITE, help="Ignore samples before this time in s."
-)
-END_OPTION = click.option(
-    *("--end", "--until", "end"), cls=RenamedOption, type=FINITE, help="Ignore samples after this time in s."
-)
+BEGIN_OPTION = click.option("--begin", type=FINITE, help="Ignore samples before this time in s.")
+END_OPTION = click.option("--end", type=FINITE, help="Ignore samples after this time in s.")
 RUN_OPTIONS = (
     click.option("--stop", type=FINITE, help="Stop time in s. Default: that of the FMU."),
     click.option(
-        *("--rtol", "--tolerance", "tolerance"),
-        cls=RenamedOption,
+        "--rtol",
         type=POSITIVE,
         help="Relative tolerance: of the solver of an FMU of this project; of the result of any other FMU.  [default: "
         "that of the FMU; 1e-6 for any other]",
@@ -136,11 +112,9 @@ RUN_OPTIONS = (
         metavar="|".join(INTERFACES),
         help="Interface to use if the FMU offers both.  [default: CoSimulation]",
     ),
-    click.option("--exchange", is_flag=True, hidden=True),  # former name of --interface ModelExchange
     click.option("--lenient", is_flag=True, help="Run the FMU even if it violates the FMI standard."),
     click.option(
-        *("--timeout", "--patience", "timeout"),
-        cls=RenamedOption,
+        "--timeout",
         type=POSITIVE,
         default=60.0,
         show_default=True,
@@ -180,11 +154,11 @@ def refuse_ignored_options(
     from ..running.fmu_archive import exposes_solver_steps, read_description
     from ..running.model_data import read_model_data
 
-    files, uses_exchange = list(fmus), context.params["exchange"] or context.params["interface"] == MODEL_EXCHANGE
+    files, uses_exchange = list(fmus), context.params["interface"] == MODEL_EXCHANGE
     if not files:
-        options = ("tolerance", "interface", "exchange", "lenient", "timeout")
+        options = ("rtol", "interface", "lenient", "timeout")
         refuse_options(context, "without an FMU; a scene sets it in its file", *options)
-    elif (is_given(context, "tolerance") or is_given(context, "timeout")) and not uses_exchange:
+    elif (is_given(context, "rtol") or is_given(context, "timeout")) and not uses_exchange:
         descriptions = [read_description(file, context.params["lenient"]) for file in files]
         if all(map(exposes_solver_steps, descriptions)):
             reason = f"on {files[0].name}, which runs at the steps of its own solver"
@@ -194,7 +168,7 @@ def refuse_ignored_options(
             if all(uses_closed_form(*pair, assignments) for pair in zip(descriptions, methods, strict=True)):
                 remedy = "" if all(methods) else ": set solver.method as well"
                 reason = f"on {files[0].name} with the method {EXACT}, a closed form{remedy}"
-                refuse_options(context, reason, "tolerance")
+                refuse_options(context, reason, "rtol")
 
 
 def uses_closed_form(description: Any, fixed_method: str, assignments: Iterable[str]) -> bool:
@@ -211,14 +185,12 @@ def uses_closed_form(description: Any, fixed_method: str, assignments: Iterable[
 def run_options(command: Command) -> Command:
     """Add the options of commands that run FMUs.
 
-    The command receives fields of RunSpec, and `tolerance`, which is None unless it is given.
+    The command receives fields of RunSpec, and `rtol`, which is None unless it is given.
     """
 
     @wraps(command)
-    def wrapper(interface: str | None, exchange: bool, **others: Any) -> Any:
-        if exchange and interface is not None:
-            raise click.UsageError("--interface and --exchange: give only --interface")
-        return command(exchange=exchange or interface == MODEL_EXCHANGE, **others)
+    def wrapper(interface: str | None, **others: Any) -> Any:
+        return command(exchange=interface == MODEL_EXCHANGE, **others)
 
     result: Command = wrapper
     for option in reversed(RUN_OPTIONS):

@@ -76,7 +76,7 @@ class StoredParameter:
 
 @dataclass(frozen=True)
 class ProvenanceKeys:
-    """Keys of a provenance file; those with a default are missing in files of earlier versions."""
+    """Keys of a provenance file."""
 
     command: str
     date: str

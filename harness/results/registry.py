@@ -73,7 +73,7 @@ STUDIES = (
         "run",
         "run",
         "running.trajectory:Trajectory",
-        ("trajectory.csv", "steps.csv", "events.csv", "quantities.csv", PICTURE, "figures.csv"),  # of earlier versions
+        ("trajectory.csv", "steps.csv", "events.csv", "quantities.csv", PICTURE),
         "Runs",
         "Scenes, models and FMUs that you ran.",
         reader="studies.compare.trajectory_files:read_run",
@@ -147,7 +147,7 @@ STUDIES = (
         "stability",
         "stability",
         "studies.stability.result:StabilityResult",
-        ("stability.csv", PICTURE, "region.svg"),  # earlier versions wrote region.svg
+        ("stability.csv", PICTURE),
         "Stability",
         "Every case either finishes within its error bound or is rejected with an error message; none hangs.",
         ("stability", "stability"),

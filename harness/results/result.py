@@ -183,7 +183,7 @@ class Result(ABC):
 
     @classmethod
     def is_stored(cls, folder: Path) -> bool:
-        """Return whether a folder holds the data that `load` reads; results of earlier versions lack them."""
+        """Return whether a folder holds the data that `load` reads."""
         return (folder / DATA_FILE).is_file()
 
     @classmethod
@@ -227,51 +227,3 @@ class Result(ABC):
             elif str(block):
                 parts.append(f"<p>{escape(str(block))}</p>")
         return f"<div><strong>{escape(self.title)}</strong>{''.join(parts)}</div>"
-
-
-class StoredResult(Result):
-    """A result of an earlier version, or of a study that this program does not know: its files, without its data.
-
-    Attributes
-    ----------
-    folder : pathlib.Path
-        Folder of the result.
-    """
-
-    study, function = "stored", "load_result"
-
-    def __init__(self, folder: Path, summary: Summary, content: dict[str, Any]) -> None:
-        self.folder, self.stored_summary, self.content = folder, summary, content
-
-    @property
-    def title(self) -> str:
-        return self.stored_summary.title
-
-    @property
-    def headline(self) -> str:
-        return f"files in {self.folder}"
-
-    def summary(self) -> Summary:
-        return self.stored_summary
-
-    def as_json(self) -> dict[str, Any]:
-        return self.content
-
-    def blocks(self) -> list[Any]:
-        from .summary import to_terminal_table
-
-        return [*map(to_terminal_table, self.stored_summary.tables), *self.stored_summary.sentences]
-
-    def write_tables(self, folder: Path) -> None:
-        raise HarnessError(f"{self.folder} holds no data of this version: copy the folder, or repeat its command")
-
-    def draw(self, figure: "Figure") -> None:
-        raise HarnessError(
-            f"{self.folder} holds no data to plot: repeat the command that wrote it, or open {PICTURE_FILE}"
-        )
-
-    def draw_panel(self, axes: "Axes") -> None:
-        self.draw(axes.figure)  # type: ignore[arg-type] # raises
-
-    def save(self, folder: str | Path, overwrite: bool = False) -> None:
-        self.write_tables(Path(folder))

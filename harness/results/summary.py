@@ -158,16 +158,6 @@ def make_terminal_table(title: str | None = None) -> "rich.table.Table":
     return Table(title=title, title_justify="left", box=SIMPLE_HEAD, show_edge=False, padding=(0, 1, 0, 0))
 
 
-def to_terminal_table(table: SummaryTable) -> "rich.table.Table":
-    """Return a table of a summary for the terminal."""
-    result = make_terminal_table(table.title or None)
-    for heading in table.headings:
-        result.add_column(heading)
-    for row in table.rows:
-        result.add_row(*row)
-    return result
-
-
 def read_cells(table: "rich.table.Table", title: str = "") -> tuple[SummaryTable, ...]:
     """Return a table of the terminal as the only item; nothing if it has no rows."""
     rows = zip(*(column.cells for column in table.columns), strict=True)
@@ -201,12 +191,9 @@ def read_summary(folder: Path) -> Summary:
         elif content["version"] != VERSION:
             reason = f"is of version {content['version']}, and this program reads version {VERSION}"
         else:
-            summary = parse_table(content, Summary)
-            if summary.outcome is None or summary.outcome.deviation is None or summary.outcome.kind:
-                return summary
-            reason = "states no kind of its known values, as in results of earlier versions"
+            return parse_table(content, Summary)
     except FileNotFoundError:
-        reason = "is missing, as in results of earlier versions"
+        reason = "is missing"
     except (OSError, ValueError, RecursionError):
         reason = "is not complete"
     except SceneError as error:

@@ -122,8 +122,9 @@ class KnownValues:
 
     Attributes
     ----------
-    table : {"published", "reference", "parameter"}
-        Table of the scene file that holds the values.
+    kind : {"published", "reference", "parameter"}
+        Published with a citation, reference for a closed form or a certified result, or parameter for a parameter that
+        the run sets; the name of the table of the scene file.
     source : str
         Program or method that gave the values; empty for parameters.
     values : dict
@@ -132,18 +133,10 @@ class KnownValues:
         The publication of published values.
     """
 
-    table: str
+    kind: str
     source: str
     values: dict[str, Any]
     citation: Citation | None = None
-
-    @property
-    def kind(self) -> str:
-        """Return the kind: "published" with a citation, "reference" for a closed form or a certified result, or
-        "parameter" for a parameter that the run sets. A table [published] without a citation, as in scenes of earlier
-        versions, holds reference values.
-        """
-        return "reference" if self.table == "published" and self.citation is None else self.table
 
     @property
     def label(self) -> str:
@@ -154,7 +147,7 @@ class KnownValues:
     def tables(self) -> dict[str, Any]:
         """Return the tables of a scene file from which these values are read."""
         source = {"source": self.source} if self.source else {}
-        return {self.table: source | self.values, "citation": self.citation}
+        return {self.kind: source | self.values, "citation": self.citation}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -269,6 +262,8 @@ def find_known_values(keys: SceneKeys) -> KnownValues | None:
     tables = {name: getattr(keys, name) for name in KINDS if getattr(keys, name)}
     if keys.citation is not None and "published" not in tables:
         raise SceneError("[citation] has no effect without [published]: it names the publication of published values")
+    if "published" in tables and keys.citation is None:
+        raise SceneError("[published] needs the table [citation]; values without a publication are a [reference]")
     if len(tables) > 1:
         raise SceneError(f"[{'] and ['.join(tables)}] are both given: a scene compares with values of one kind")
     if not tables:

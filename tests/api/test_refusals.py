@@ -9,7 +9,7 @@ RECORD = {"t": np.linspace(0.0, 16.0, 201), "x": np.sin(np.linspace(0.0, 16.0, 2
 SIMULATE = [  # changes of harness.simulate("smd"), and words of the sentence
     ({"source": "stickslp"}, "unknown model or scene 'stickslp' (nearest: 'stickslip')"),
     ({"source": "nowhere.fmu"}, "nowhere.fmu"),
-    ({"source": "fmus"}, "contains no result"),
+    ({"source": "fmus"}, "fmus is a folder: give a model, a scene or an FMU"),
     ({"values": {"kk": 1.0}}, "'kk' (nearest: 'k')"),
     ({"values": {"m": -1.0}}, "m = -1.0 is outside its range"),
     ({"values": {"m": float("nan")}}, "m = nan"),

@@ -61,12 +61,6 @@ def test_an_interval_ends_with_the_stop():
     assert run["x"][-1] == harness.simulate("smd", stop=1.05)["x"][-1]
 
 
-def test_a_scene_and_a_stored_result_run():
-    run = harness.simulate("pacejka-0.01", stop=1.0)
-    run.save("saved")
-    assert np.array_equal(harness.simulate("saved")["x"], run["x"])
-
-
 @pytest.mark.parametrize(
     "folder",
     [lambda: Path("fmus"), native_fmus.build_native_fmus, fmi3_fixtures.build_fmi3_fmus],

@@ -198,19 +198,19 @@ def test_an_invalid_sweep_is_refused_before_a_worker_starts(workspace, option):
         assert status, text[:100]
     for name, value in (
         ("--seed", "-1"),
-        ("--random", "9" * 30),
+        ("--samples", "9" * 30),
         ("--workers", "0"),
         ("--workers", "9" * 9),
         ("--name", "../x"),
     ):
-        status, output = run_command("sweep", "smd", "--vary", "m=1:2", "--random", "2", name, value)
+        status, output = run_command("sweep", "smd", "--vary", "m=1:2", "--samples", "2", name, value)
         check(status, output, (name, value))
         assert status == 2, (name, value)
     assert not list(workspace.glob("results/sweep/*"))
 
 
 @pytest.mark.parametrize("word", ["nan", "inf", "-inf", "1e999", "", "x", HUGE, "0x10", "-0"])
-@pytest.mark.parametrize("option", ["--stop", "--tolerance", "--within"])
+@pytest.mark.parametrize("option", ["--stop", "--rtol", "--within"])
 def test_numbers_on_the_command_line_are_finite_or_refused(workspace, option, word):
     (workspace / "a.csv").write_text("t [s],x [m]\n0,1\n1,2\n2,3\n")
     check(*run_command("compare", "a.csv", "a.csv", option, word, "--quiet"), word)

@@ -14,6 +14,8 @@ import pytest
 from build_cache import ROOT, run_published_cases
 from models import MODELS, outputs
 
+from harness import load_result
+
 BASE = 'title = "a title"\nmodel = "stickslip"\noutputs = ["x", "v"]\n'
 
 
@@ -237,7 +239,7 @@ def test_the_grid_does_not_change_the_solver_steps(scene):
             1,
             "turning points",
         ),
-        (BASE + "[published]\nsource = 'me'\nperiod = 3", 2, "unknown name in [published] 'period'"),
+        (BASE + "[reference]\nsource = 'me'\nperiod = 3", 2, "unknown name in [reference] 'period'"),
         (
             BASE + "analyses = ['slip']\n[parameter]\nperiod = 3",
             2,
@@ -261,7 +263,7 @@ def test_an_invalid_scene_is_one_sentence_and_keeps_the_previous_result(scene, t
 
 
 def test_a_failing_case_does_not_lose_the_others(workspace, monkeypatch):
-    published = "\n[published]\nsource = 'me'\nrun_time = 1\n"
+    published = "\n[reference]\nsource = 'me'\nrun_time = 1\n"
     for name, extra in (("bad", "[values]\nmu_d = 0.95"), ("good", "stop = 1")):
         (workspace / f"{name}.toml").write_text(BASE + extra + published)
     monkeypatch.setattr("harness.scenes.scene.SHIPPED", workspace)
@@ -355,3 +357,11 @@ def test_several_assignments_stand_in_one_option(workspace, command, words):
     (file,) = (workspace / "out").rglob("provenance.json")
     parameters = json.loads(file.read_text())["parameters"]
     assert (parameters["m"]["value"], parameters["c"]["value"]) == (1.5, 0.0)
+
+
+@pytest.mark.parametrize("words", [["--rtol", "1e-4"], ["--set", "solver.rtol=1e-4"]])
+def test_rtol_sets_the_solver_of_an_fmu_of_this_project(fmus, tmp_path, words):
+    (tmp_path / "fmus").symlink_to(fmus)
+    done = commands.harness(tmp_path, "run", "fmus/coulomb.fmu", "--set", "solver.method=ode45", *words)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert load_result(tmp_path / "results/coulomb").parameters["solver.rtol"] == 1e-4

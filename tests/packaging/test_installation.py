@@ -21,7 +21,7 @@ WORK = {  # by command; all run in one folder, in this order
     "curve": ["curve bench.csv --mass 2"],
     "decay": ["decay docs/records/spring.csv --m 0.35", "decay coulomb"],
     "compare": ["compare smd coulomb"],
-    "fit": ["fit block.fmu swing.csv --free k=50:200 --fixed f=0"],
+    "fit": ["fit block.fmu swing.csv --free k=50:200 --set f=0"],
     "precision": ["precision smd --quick"],
     "stability": ["stability block.py"],
     "references": ["references block.py"],

@@ -11,7 +11,7 @@ def text_with(**changes):
 
 
 REFUSED = [  # the content of summary.json, and the reason
-    (None, "is missing, as in results of earlier versions"),
+    (None, "is missing"),
     ("", "is not complete"),
     ('{"study": "run", "ti', "is not complete"),
     ("[" * 100_000, "is not complete"),
@@ -28,10 +28,6 @@ REFUSED = [  # the content of summary.json, and the reason
         "is not valid (tables[0]: a row is not as long as the headings)",
     ),
     (text_with(files=["../../secret"]), "is not valid ("),
-    (
-        text_with(outcome={"value": "1", "text": "", "is_good": True, "deviation": 1.0}),
-        "states no kind of its known values, as in results of earlier versions",
-    ),
 ]
 
 

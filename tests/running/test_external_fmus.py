@@ -67,7 +67,7 @@ def assert_refused(done, status, *sentences):
 @pytest.mark.parametrize("name", ["Midpoint", "Fmi3Midpoint", "ModelExchangeOnly"])
 @pytest.mark.parametrize("tolerance", [1e-3, pytest.param(1e-5, marks=pytest.mark.slow)])
 def test_an_fmu_with_hidden_steps_is_refined_until_two_results_agree(run, name, tolerance):
-    done, rows = run(name, "--set", "k=50", "--tolerance", tolerance)
+    done, rows = run(name, "--set", "k=50", "--rtol", tolerance)
     assert_succeeded(done)
     assert "changes no output by more than" in done.stdout
     time, position, *_ = rows.values()
@@ -190,7 +190,7 @@ def test_a_scene_may_use_any_fmu(external_fmu_folder, tmp_path, name, outputs, m
         assert rows["place[2]"][-1] == pytest.approx(2 * cos(3))
     assert (tmp_path / "results/mine/figure.svg").is_file()
     assert "error unknown" in done.stdout or "changes no output by more than" in done.stdout
-    assert "the same, bit for bit" in commands.harness(tmp_path, "run", "results/mine", COLUMNS="120").stdout
+    assert "the same, bit for bit" in commands.harness(tmp_path, "run", "mine.toml", COLUMNS="120").stdout
 
 
 @pytest.mark.parametrize(
@@ -204,7 +204,7 @@ def test_a_scene_may_use_any_fmu(external_fmu_folder, tmp_path, name, outputs, m
         ),
         (
             "Fmi3Midpoint",
-            ["--set", "limit=0.5", "--tolerance", "1e-3"],
+            ["--set", "limit=0.5", "--rtol", "1e-3"],
             0.5,
             "fmi3DoStep returned terminateSimulation at t = 0.5",
         ),
@@ -324,7 +324,7 @@ def test_descriptions_that_fmpy_cannot_read_are_read_with_lenient(run, external_
         ("Midpoint", ["--set", "k=abc"], 2, "k = 'abc' is a text, not a number"),
         ("Midpoint", ["--set", "k=1e999"], 2, "k = inf is outside its range"),
         ("Midpoint", ["--stop", "-1"], 2, "stop = -1.0 s is not after start"),
-        ("Midpoint", ["--exchange"], 1, "offers co-simulation; model exchange is not among them"),
+        ("Midpoint", ["--interface", "ModelExchange"], 1, "offers co-simulation; model exchange is not among them"),
         ("Switching", ["--set", "enabled=5"], 2, "enabled = 5.0 is not a Boolean; use true or false"),
         ("Switching", ["--set", "most=1.5"], 2, "most = 1.5 is outside its range; allowed: any whole number"),
         ("Switching", ["--set", "most=3000000000"], 2, "any whole number, at least -2147483648 and at most 2147483647"),
@@ -468,7 +468,7 @@ def test_unicode_names_and_missing_units_are_supported(run, external_fmu_folder,
         tmp_path / "\u03c9.fmu",
         edited_description(lambda text: text.replace('name="x"', 'name="\u03c6, \u3042"')),
     )
-    done, _ = run("\u03c9.fmu", "--tolerance", "1e-3")
+    done, _ = run("\u03c9.fmu", "--rtol", "1e-3")
     assert_succeeded(done)
     assert re.search("^\u03c6, \u3042 +1 +0.99", done.stdout, re.M)
 

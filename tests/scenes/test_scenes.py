@@ -104,7 +104,7 @@ def test_a_scene_may_show_nothing(workspace):
         ({"extra": "[decay]\ngives = 'mu'"}, "unknown value of decay.gives 'mu'; allowed: T_f, f, zeta"),
         ({"extra": "[decay]\ncycles = 0.3"}, "cycles = 0.3 must be a whole or half number above 0"),
         ({"extra": "[decay]\nfrist = 1"}, "unknown key in [decay] 'frist' (nearest: 'first')"),
-        ({"extra": "[published]\nperiod = 3"}, "[published] needs a source"),
+        ({"extra": "[published]\nsource = 'me'\nperiod = 3"}, "[published] needs the table [citation]"),
         ({"extra": "[reference]\nperiod = 3"}, "[reference] needs a source"),
         (
             {"extra": "[parameter]\nf = 1\n[reference]\nsource = 'me'\nperiod = 3"},
@@ -127,15 +127,6 @@ def test_an_invalid_scene_is_reported_in_one_sentence(workspace, keys, sentence)
     assert str(caught.value).startswith("scene mine: ")
     assert sentence in str(caught.value)
     assert "\n" not in str(caught.value)
-
-
-def test_a_value_is_published_only_with_a_citation(workspace):
-    """A table [published] without one, as in earlier versions, holds references."""
-    for citation, kind in ((CITATION, "published"), ("", "reference")):
-        extra = f"[published]\nsource = 'a method'\nslips = 3\n{citation}"
-        folder, _ = run(write(workspace, extra=extra, analyses='["slip"]'))
-        heads = (folder / "quantities.csv").read_text().splitlines()[0]
-        assert f"{kind} (a method)" in heads
 
 
 def test_an_unknown_scene_error_lists_the_shipped_names(workspace):

@@ -38,7 +38,7 @@ def test_a_project_fmu_is_run_at_its_internal_steps(harness, tmp_path):
 
 
 def test_a_run_as_json_prints_only_json(harness, external_fmu_folder):
-    done = harness("run", external_fmu_folder / "Midpoint.fmu", "--tolerance", 1e-3, "--json")
+    done = harness("run", external_fmu_folder / "Midpoint.fmu", "--rtol", 1e-3, "--json")
     assert (done.returncode, done.stderr) == (0, "")
     assert json.loads(done.stdout)["final"]["x"] == pytest.approx(cos(sqrt(40)), abs=2e-3)
     done = harness("run", "coulomb", "--json")
@@ -50,7 +50,7 @@ def test_a_run_as_json_prints_only_json(harness, external_fmu_folder):
 def test_two_fmus_differ_as_their_closed_forms_do(harness, external_fmu_folder, tmp_path):
     stiffer = {"resources/Midpoint.py": lambda text: text.replace("40.0", "40.4")}
     other = external_fmus.edited_copy(external_fmu_folder / "Midpoint.fmu", tmp_path / "Other.fmu", stiffer)
-    arguments = (external_fmu_folder / "Midpoint.fmu", other, "--tolerance", 1e-4)
+    arguments = (external_fmu_folder / "Midpoint.fmu", other, "--rtol", 1e-4)
     done = harness("compare", *arguments, "--json", figures=True)
     assert (done.returncode, done.stderr) == (0, "")
     comparison = json.loads(done.stdout)

@@ -62,7 +62,7 @@ def fit_drawn(name, seed, max_samples):
         record.free,
         observe=group.outputs,
         inputs=[*record.inputs],
-        fixed=record.fixed,
+        values=record.fixed,
     )
     return record, fit
 
@@ -104,7 +104,7 @@ def test_a_long_curved_valley_does_not_hide_the_best_values():
 
 
 def test_a_position_determines_the_ratio_of_stiffness_and_mass():
-    fit = harness.fit(native("stickslip"), pull(), ["k", "m"], observe="x", fixed={"mu_s": 0.8} | DRIVEN)
+    fit = harness.fit(native("stickslip"), pull(), ["k", "m"], observe="x", values={"mu_s": 0.8} | DRIVEN)
     assert {*fit.undetermined} == {"k", "m"}
     assert [combination.name for combination in fit.combinations] == ["k/m"]
     assert holds(fit["k/m"], 900.0 / 12.5)
@@ -138,7 +138,7 @@ def test_several_records_share_parameters_and_have_some_of_their_own():
         ["mu_s", "v_driver"],
         observe="x",
         each=["v_driver"],
-        fixed={"k": 900.0, "mu_d": 0.5},
+        values={"k": 900.0, "mu_d": 0.5},
     )
     assert [estimate.name for estimate in fit.estimates] == ["mu_s", "v_driver[1]", "v_driver[2]"]
     for number, speed in enumerate(speeds, 1):
@@ -214,7 +214,7 @@ def test_a_sensor_with_offset_and_gain_is_identified():
     frame = pull()
     frame["x"] = 1.1 * frame["x"] + 0.02
     free = ["mu_s", "offset(x)", "gain(x)"]
-    fit = harness.fit(native("stickslip"), frame, free, observe="x", fixed=DRIVEN | {"k": 900.0})
+    fit = harness.fit(native("stickslip"), frame, free, observe="x", values=DRIVEN | {"k": 900.0})
     for name, truth in {"mu_s": 0.8, "offset(x)": 0.02, "gain(x)": 1.1}.items():
         assert holds(fit[name], truth)
 
@@ -229,7 +229,7 @@ def test_the_delay_of_a_sensor_is_identified(delay):
     y = np.interp(t - delay, fine, x) + 0.003 * np.ptp(x) * np.random.default_rng(3).normal(size=len(t))
     frame = pytest.importorskip("pandas").DataFrame({"t [s]": t, "x [m]": y, "F": shaker(t)})
     free = {"f": None, "delay(x)": (-0.3, 0.3)}
-    fit = harness.fit(native("coulomb"), frame, free, observe="x", inputs={"F_ext": "F"}, fixed={"x0": 0.0})
+    fit = harness.fit(native("coulomb"), frame, free, observe="x", inputs={"F_ext": "F"}, values={"x0": 0.0})
     assert holds(fit["delay(x)"], delay)
     assert holds(fit["f"], 2.0)
     assert fit["delay(x)"].high - fit["delay(x)"].low < 0.005
@@ -295,7 +295,7 @@ def test_a_driven_record_that_is_fitted_and_validated_has_one_prediction():
 
 def test_a_profile_crosses_its_limit_where_the_interval_ends():
     """Between the points, the root of the squares is nearly linear."""
-    fit = harness.fit(native("stickslip"), pull(), ["mu_s", "mu_d"], observe="x", fixed={"k": 900.0, "v_driver": 0.04})
+    fit = harness.fit(native("stickslip"), pull(), ["mu_s", "mu_d"], observe="x", values={"k": 900.0, "v_driver": 0.04})
     for profile, estimate in zip(fit.profiles, fit.estimates, strict=True):
         value, excess = np.array(profile.value), np.array(profile.excess)
         assert excess[value == estimate.value] == 0.0
@@ -306,7 +306,7 @@ def test_a_profile_crosses_its_limit_where_the_interval_ends():
 def test_outliers_count_little_in_a_robust_fit():
     frame = pull()
     frame.loc[::25, "x"] += 0.3
-    fit = harness.fit(native("stickslip"), frame, ["mu_s"], observe="x", fixed=DRIVEN | {"k": 900.0}, robust=True)
+    fit = harness.fit(native("stickslip"), frame, ["mu_s"], observe="x", values=DRIVEN | {"k": 900.0}, robust=True)
     assert holds(fit["mu_s"], 0.8)  # without `robust`, the interval is four times as wide
     assert fit["mu_s"].high - fit["mu_s"].low < 0.004
 
@@ -314,7 +314,7 @@ def test_outliers_count_little_in_a_robust_fit():
 def test_a_record_of_another_motion_is_remarked():
     frame = pull()
     frame["x"] += 0.2 * np.sin(T)
-    fit = harness.fit(native("stickslip"), frame, ["mu_s"], observe="x", fixed=DRIVEN | {"k": 900.0})
+    fit = harness.fit(native("stickslip"), frame, ["mu_s"], observe="x", values=DRIVEN | {"k": 900.0})
     assert not fit.describes_record
     assert "do not rely on these values" in fit.remarks[0]
     assert not any(isfinite(estimate.error) for estimate in fit.estimates)
@@ -324,7 +324,7 @@ def test_the_command_writes_what_it_prints(tmp_path):
     frame = pull()
     frame = frame.assign(x=1e3 * frame["x"]).rename(columns={"t": "t [s]", "x": "laser [mm]"})
     frame.to_csv("pull.csv", index=False)
-    words = ("fit", native("stickslip"), "pull.csv", "--free", "mu_s=0.3:1.5,k", "--fixed", "mu_d=0.5,v_driver=0.04")
+    words = ("fit", native("stickslip"), "pull.csv", "--free", "mu_s=0.3:1.5,k", "--set", "mu_d=0.5,v_driver=0.04")
     done = commands.harness(tmp_path, *words, "--observe", "x=laser", "--json")
     assert (done.returncode, done.stderr) == (0, "")
     printed = json.loads(done.stdout)
@@ -378,7 +378,7 @@ def test_a_column_at_rest_with_coloured_noise_is_described(motion, is_described)
     white = np.random.default_rng(2).normal(size=len(frame) + 19)
     frame["x"] = 1e-4 * np.convolve(white, 0.8 ** np.arange(20), "valid") + motion * frame["t"]
     observe = ["x", "F_spring"]
-    fit = harness.fit(native("stickslip"), frame, {"k": (500.0, 2000.0)}, observe=observe, fixed=DRIVEN)
+    fit = harness.fit(native("stickslip"), frame, {"k": (500.0, 2000.0)}, observe=observe, values=DRIVEN)
     assert fit.describes_record == is_described
     assert not is_described or holds(fit["k"], TRUTH["k"])
 
@@ -387,7 +387,7 @@ def test_times_in_another_unit_are_named():
     frame = pull(t=np.linspace(0.0, 16.0, 400))
     frame["t"] *= 1e-3
     with pytest.raises(HarnessError, match=r"lasts 0\.016 s, about a thousandth of a run of the FMU \(16 s\)"):
-        harness.fit(native("stickslip"), frame, ["mu_s", "k"], observe="x", fixed=DRIVEN)
+        harness.fit(native("stickslip"), frame, ["mu_s", "k"], observe="x", values=DRIVEN)
 
 
 def test_a_record_without_such_a_motion_is_refused():
@@ -397,7 +397,7 @@ def test_a_record_without_such_a_motion_is_refused():
         harness.fit(native("stickslip"), frame, ["mu_s"], observe="x")
     frame["x"] = np.cos(7.0 * T)  # free oscillations
     with pytest.raises(HarnessError, match="no values describe the record better than a constant does"):
-        harness.fit(native("stickslip"), frame, ["mu_s", "k"], observe="x", fixed=DRIVEN)
+        harness.fit(native("stickslip"), frame, ["mu_s", "k"], observe="x", values=DRIVEN)
     frame["x"] = 1e-4 * np.random.default_rng(1).normal(size=len(T))
     with pytest.raises(HarnessError, match="shows no motion beyond its noise"):
         harness.fit(native("stickslip"), frame, {"mu_s": (2.0, 8.0)}, observe="x")
@@ -474,7 +474,7 @@ def test_the_command_writes_the_compared_laws(tmp_path):
     frame = pull(t=T[:81]).rename(columns={"t": "t [s]", "x": "x [m]"})
     frame.to_csv("pull.csv", index=False)
     frame.iloc[:60].to_csv("later.csv", index=False)
-    words = ("fit", native("stickslip"), "pull.csv", "--free", "mu_s,f_s", "--fixed", "k=900,v_driver=0.04")
+    words = ("fit", native("stickslip"), "pull.csv", "--free", "mu_s,f_s", "--set", "k=900,v_driver=0.04")
     words += ("--observe", "x=x", "--against", native("stribeck_sled"), "--validate", "later.csv")
     done = commands.harness(tmp_path, *words, "--json")
     assert (done.returncode, done.stderr) == (0, "")
@@ -568,7 +568,7 @@ def test_regular_slips_are_described_by_the_fit_alone():
         pull(("F_spring",), t=np.linspace(0.0, 30.0, 1000)),
         {"mu_s": (0.5, 1.0)},
         observe="F_spring",
-        fixed=DRIVEN | {"k": 900.0},
+        values=DRIVEN | {"k": 900.0},
     )
     assert fit.slips == ()
 

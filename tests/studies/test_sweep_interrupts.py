@@ -25,7 +25,7 @@ distributed = pytest.importorskip("distributed", reason="the extra 'cluster' is 
 
 pytestmark = pytest.mark.slow
 
-SWEEP = ("sweep", "stickslip", "--vary", "mu_d=0.3:0.8:100", "--measure", "peak_speed")
+SWEEP = ("sweep", "stickslip", "--vary", "mu_d=0.3:0.8:100", "--measures", "peak_speed")
 LONG = (*SWEEP, "--workers", "1")
 NOTE = """
 import sys

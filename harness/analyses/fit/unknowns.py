@@ -4,8 +4,6 @@ from dataclasses import dataclass
 from functools import cached_property
 from math import exp, inf, log
 
-import numpy as np
-
 OFFSET, GAIN, DELAY = "offset", "gain", "delay"  # of a sensor
 SENSOR = (OFFSET, GAIN, DELAY)
 RANGE_FACTOR = 4.0  # of the range that is searched by default, about the start value of the FMU
@@ -94,8 +92,3 @@ class Unknown:
     def error_of(self, deviation: float, value: float) -> float:
         """Return the standard error of a value from the deviation of its coordinate."""
         return float(deviation * (abs(value) if self.sign else self.scale))
-
-
-def to_values(unknowns: tuple[Unknown, ...], z: np.ndarray) -> dict[str, float]:
-    """Return the value of each unknown, by name, at the coordinates z (k,)."""
-    return {unknown.name: unknown.to_value(float(coordinate)) for unknown, coordinate in zip(unknowns, z, strict=True)}

@@ -192,7 +192,7 @@ def read_run(folder: Path) -> Trajectory:
     units = signals.units | {name: parameter["unit"] for name, parameter in origin.get("parameters", {}).items()}
     try:
         spec = RunSpec.from_json(origin.get("run") or {})
-    except SceneError:  # of an earlier version, or of another tool
+    except SceneError:  # a folder of another tool
         fmus = (file for file in origin.get("files", {}) if file.endswith(".fmu"))
         spec = RunSpec(Path(next(fmus, f"{folder.name}.fmu")), outputs=tuple(signals.columns))
     steps = None

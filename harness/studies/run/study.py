@@ -129,7 +129,7 @@ def check_known_values(scene: Scene, run: Trajectory, quantities: tuple[Quantity
     kind, quantities_by_name = scene.known.kind, {quantity.name: quantity for quantity in quantities}
     for name, value in scene.known.values.items():
         if name not in quantities_by_name:
-            raise SceneError(unknown_name_message(f"name in [{scene.known.table}]", name, quantities_by_name))
+            raise SceneError(unknown_name_message(f"name in [{scene.known.kind}]", name, quantities_by_name))
         number, unit = value if isinstance(value, tuple) else (value, quantities_by_name[name].unit)
         try:
             quantities_by_name[name].to_unit(unit)
