@@ -29,10 +29,10 @@ from benchmarks.literature.command import literature
 from benchmarks.references.command import references
 from benchmarks.rivals.command import rivals
 from benchmarks.symmetry.command import symmetry
-from harness.commands import FullHelpGroup
+from harness.commands import SectionedGroup
 
 
-@click.group(cls=FullHelpGroup, context_settings={"help_option_names": ["-h", "--help"]})
+@click.group(cls=SectionedGroup, context_settings={"help_option_names": ["-h", "--help"]})
 def main() -> None:
     """Measure this project: speed and accuracy, symmetry, the same scenes in other engines, the FMUs in other tools,
     problems from the literature; and compute its certified results.

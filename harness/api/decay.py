@@ -42,7 +42,7 @@ SAMPLES = Rule("a row of numbers", row)
     time=TEXT,
     column=TEXT,
     k=POSITIVE,
-    m=POSITIVE,
+    mass=POSITIVE,
     pendulum=FLAG,
     drag=FLAG,
     drift=FLAG,
@@ -61,7 +61,7 @@ def identify_decay(
     time: str | None = None,
     column: str | None = None,
     k: float | None = None,
-    m: float | None = None,
+    mass: float | None = None,
     pendulum: bool = False,
     drag: bool = True,
     drift: bool = False,
@@ -86,7 +86,7 @@ def identify_decay(
         Measured quantity, if it follows neither from the unit nor from the name of the column.
     time, column : str, optional
         Headings of the columns of times and samples, if the table has several.
-    k, m : float, optional
+    k, mass : float, optional
         Stiffness in N/m or mass in kg (N.m/rad or kg.m2 for a rotation). Give one of them to obtain forces in N.
     pendulum : bool
         Whether the restoring torque is k sin(theta).
@@ -123,8 +123,8 @@ def identify_decay(
     from ..records.columns import ColumnOptions
     from ..studies.decay.result import DecayResult
 
-    if k is not None and m is not None:
-        raise SceneError("k and m are both given: leave one out, because the frequency determines it")
+    if k is not None and mass is not None:
+        raise SceneError("k and mass are both given: leave one out, because the frequency determines it")
     check_time_range(time, rate, begin, end)
     columns = ColumnOptions(
         time=time,
@@ -145,7 +145,7 @@ def identify_decay(
         if heading is not None:
             raise SceneError(f"{name} = {heading!r} has no effect on arrays, which have no headings: leave it out")
     motion = find_record(record, columns).motion
-    return DecayResult(**vars(fit_decay(motion, KnownParameters(k, m, pendulum), drag, drift, reporter(progress))))
+    return DecayResult(**vars(fit_decay(motion, KnownParameters(k, mass, pendulum), drag, drift, reporter(progress))))
 
 
 def find_record(source: Any, options: "ColumnOptions") -> "Record":

@@ -73,7 +73,7 @@ def read_record(
     --------
     >>> record = read_record("swing.csv", column="laser [mm]")  # doctest: +SKIP
     >>> record.x.max(), record.unit, record.notes  # doctest: +SKIP
-    >>> decay = identify_decay(record, m=0.35)  # doctest: +SKIP
+    >>> decay = identify_decay(record, mass=0.35)  # doctest: +SKIP
     """
     from ..records.columns import ColumnOptions
     from ..records.record import load_record

@@ -6,7 +6,7 @@ from pkgutil import iter_modules
 import click
 
 from .run import outcome_as_json
-from .terminal import Terminal, result_options
+from .terminal import Terminal, result_options, write_options
 
 
 def print_version(context: click.Context, option: click.Parameter, requested: bool) -> None:
@@ -18,16 +18,28 @@ def print_version(context: click.Context, option: click.Parameter, requested: bo
         context.exit()
 
 
-class FullHelpGroup(click.Group):
-    """Command group whose help prints the first sentence of each command in full."""
+class SectionedGroup(click.Group):
+    """Command group whose help prints the first sentence of each command in full.
 
-    def format_commands(self, context: click.Context, formatter: click.HelpFormatter) -> None:
-        """List each command with the first sentence of its help."""
-        with formatter.section("Commands"):
-            formatter.write_dl([(name, item.get_short_help_str(limit=1000)) for name, item in self.commands.items()])
+    Attributes
+    ----------
+    checks : tuple of str
+        Commands that the help lists in a section of their own.
+    """
+
+    checks: tuple[str, ...] = ()
+
+    def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        write_options(self, ctx, formatter)
+        rows = [(name, item.get_short_help_str(limit=1000)) for name, item in self.commands.items()]
+        checks = [row for row in rows if row[0] in self.checks]
+        for title, part in (("Commands", [row for row in rows if row not in checks]), ("Checks of models", checks)):
+            if part:
+                with formatter.section(title):
+                    formatter.write_dl(part)
 
 
-@click.group(cls=FullHelpGroup, invoke_without_command=True, context_settings={"help_option_names": ["-h", "--help"]})
+@click.group(cls=SectionedGroup, invoke_without_command=True, context_settings={"help_option_names": ["-h", "--help"]})
 @result_options
 @click.option(
     "--version", is_flag=True, is_eager=True, expose_value=False, callback=print_version, help="Print versions."
@@ -66,6 +78,7 @@ def commands(context: click.Context, terminal: Terminal) -> None:
         terminal.print_result(rows, table, "", *verdicts, folder=terminal.out, failed=failed)
 
 
+commands.checks = ("precision", "stability", "references")
 for file in iter_modules(__path__):
     for command in vars(import_module(f"{__name__}.{file.name}")).values():
         if isinstance(command, click.Command):

@@ -8,6 +8,7 @@ import click
 
 from .terminal import (
     NONNEGATIVE,
+    SectionedCommand,
     Terminal,
     refuse_ignored_options,
     refuse_options,
@@ -16,7 +17,7 @@ from .terminal import (
 )
 
 
-@click.command()
+@click.command(cls=SectionedCommand)
 @click.argument("first", metavar="A")
 @click.argument("second", metavar="B")
 @run_options

@@ -13,19 +13,20 @@ from .terminal import (
     POSITIVE,
     RATE_OPTION,
     TIME_UNIT_OPTION,
+    SectionedCommand,
     Terminal,
     result_options,
 )
 
 
-@click.command()
+@click.command(cls=SectionedCommand)
 @click.argument("source", metavar="FILE|-")
 @click.option("--velocity", help="Heading of the velocity. Default: v, speed, ..., or the first unit of a velocity.")
 @click.option("--position", help="Heading of the position, in a record over time without a velocity.")
 @click.option("--force", help="Heading of the force or torque. Default: F, torque, ..., or the first such unit.")
 @click.option("--current", help="Heading of the current of the motor, instead of a force.")
 @click.option("--constant", metavar="SIZE", help="Constant of the motor: '0.12 N.m/A' or '35 N/A'.")
-@click.option("--points", "is_points", is_flag=True, help="Take each row as a point, even if the file has times.")
+@click.option("--points", is_flag=True, help="Take each row as a point, even if the file has times.")
 @click.option("--time", help="Heading of the time, in a record over time. Default: t, time, ...")
 @TIME_UNIT_OPTION
 @HEADINGS_OPTION
@@ -33,7 +34,7 @@ from .terminal import (
 @BEGIN_OPTION
 @END_OPTION
 @click.option(
-    *("--mass", "--inertia", "mass"),
+    "--mass",
     type=POSITIVE,
     help="Mass in kg, or moment of inertia in kg.m2, to remove inertia; stickslip needs it as well.",
 )
@@ -53,7 +54,7 @@ def curve(
     force: str | None,
     current: str | None,
     constant: str | None,
-    is_points: bool,
+    points: bool,
     mass: float | None,
     bias: float | None,
     backlash: float,
@@ -81,6 +82,6 @@ def curve(
     from ..records.friction_curve import CurveColumns
     from ..studies.curve.study import identify_file
 
-    options = CurveColumns(velocity, position, force, current, constant, is_points)
+    options = CurveColumns(velocity, position, force, current, constant, points)
     result, folder = identify_file(source, ColumnOptions(**columns), options, mass, bias, backlash, terminal.out)
     terminal.print_result(result.as_json(), *result.blocks(), folder=folder)

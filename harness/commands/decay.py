@@ -13,6 +13,7 @@ from .terminal import (
     POSITIVE,
     RATE_OPTION,
     TIME_UNIT_OPTION,
+    SectionedCommand,
     Terminal,
     refuse_options,
     result_options,
@@ -30,7 +31,7 @@ COLUMN_OPTIONS = (  # of records
 )
 
 
-@click.command()
+@click.command(cls=SectionedCommand)
 @click.argument("source", metavar="FILE|SCENE|-")
 @click.option("--time", help="Heading of the time column. Default: t, time, ..., or the first column.")
 @click.option("--column", help="Heading of the column to fit. Default: x, theta, ...")
@@ -47,7 +48,7 @@ COLUMN_OPTIONS = (  # of records
 @BEGIN_OPTION
 @END_OPTION
 @click.option("--k", type=POSITIVE, help="Stiffness in N/m or N.m/rad; required for the friction force.")
-@click.option("--m", type=POSITIVE, help="Mass in kg, or moment of inertia in kg.m2; an alternative to --k.")
+@click.option("--mass", type=POSITIVE, help="Mass in kg, or moment of inertia in kg.m2; an alternative to --k.")
 @click.option("--pendulum", is_flag=True, help="Fit a pendulum: the restoring torque is k sin(theta), with k = m g a.")
 @click.option("--drag/--no-drag", default=True, show_default=True, help="Fit the models with quadratic drag as well.")
 @click.option("--drift", is_flag=True, help="Fit a linear drift of the rest position or sensor offset.")
@@ -57,7 +58,7 @@ def decay(
     context: click.Context,
     source: str,
     k: float | None,
-    m: float | None,
+    mass: float | None,
     pendulum: bool,
     drag: bool,
     drift: bool,
@@ -76,7 +77,7 @@ def decay(
 
     \b
     Examples:
-      a phone on a spring:    friction-fmus decay "Raw Data.csv" --m 0.35
+      a phone on a spring:    friction-fmus decay "Raw Data.csv" --mass 0.35
       a spreadsheet:          friction-fmus decay swing.xlsx --column "laser (mm)" --k 157.9
       a pendulum's encoder:   friction-fmus decay swing.txt --pendulum --per-count 0.36deg --headings t,count
       standard input:         zcat swing.gz | friction-fmus decay - --unit mm --begin 2.5
@@ -88,11 +89,11 @@ def decay(
 
     if not decays.is_record_file(source):
         refuse_options(context, "on a scene, whose FMU declares names and units", *COLUMN_OPTIONS)
-    if k is not None and m is not None:
-        raise click.UsageError("--k and --m: give only one of them; the other follows from the frequency")
+    if k is not None and mass is not None:
+        raise click.UsageError("--k and --mass: give only one of them; the other follows from the frequency")
     if columns["rate"] is not None and (columns["time"] is not None or columns["time_unit"] is not None):
         raise click.UsageError("--rate replaces the times in the file: omit --time and --time-unit")
-    columns_spec, parameters = ColumnOptions(**columns), KnownParameters(k, m, pendulum)
+    columns_spec, parameters = ColumnOptions(**columns), KnownParameters(k, mass, pendulum)
     with decays.pause_gc(), terminal.progress(1) as report:
         progress = partial(report, "standard input" if source == "-" else source)
         result, folder = decays.identify_decay(source, columns_spec, parameters, drag, drift, terminal.out, progress)

@@ -11,12 +11,13 @@ from .terminal import (
     POSITIVE,
     RATE_OPTION,
     TIME_UNIT_OPTION,
+    SectionedCommand,
     Terminal,
     result_options,
 )
 
 
-@click.command()
+@click.command(cls=SectionedCommand)
 @click.argument("model", metavar="MODEL|FMU")
 @click.argument("records", metavar="FILE...", nargs=-1, required=True)
 @click.option("--free", multiple=True, metavar="NAME[=LOW:HIGH],...", help="Parameters to fit, and ranges to search.")

@@ -2,12 +2,12 @@
 
 import click
 
-from .terminal import Terminal, json_option, quiet_option
+from .terminal import SectionedCommand, Terminal, json_option, quiet_option
 
 SOURCE_HEADINGS = ("scene", "model", "title")
 
 
-@click.command()
+@click.command(cls=SectionedCommand)
 @click.argument("model", metavar="[MODEL|FMU]", required=False)
 @quiet_option
 @json_option

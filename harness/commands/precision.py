@@ -2,10 +2,10 @@
 
 import click
 
-from .terminal import Terminal, result_options
+from .terminal import SectionedCommand, Terminal, result_options
 
 
-@click.command()
+@click.command(cls=SectionedCommand)
 @click.argument("models", metavar="[MODEL]...", nargs=-1)
 @result_options
 @click.option("--quick", is_flag=True, help="Three tolerances and short time limits.")

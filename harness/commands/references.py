@@ -4,12 +4,12 @@ from pathlib import Path
 
 import click
 
-from .terminal import Terminal, json_option, quiet_option
+from .terminal import SectionedCommand, Terminal, json_option, quiet_option
 
 FILE = click.Path(exists=True, dir_okay=False, path_type=Path)
 
 
-@click.command()
+@click.command(cls=SectionedCommand)
 @click.argument("files", metavar="FILE.py...", nargs=-1, required=True, type=FILE)
 @quiet_option
 @json_option

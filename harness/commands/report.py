@@ -4,10 +4,10 @@ from pathlib import Path
 
 import click
 
-from .terminal import json_option, out_option, print_json, quiet_option
+from .terminal import SectionedCommand, json_option, out_option, print_json, quiet_option
 
 
-@click.command()
+@click.command(cls=SectionedCommand)
 @out_option("Folder with the results; the page is written to it.")
 @quiet_option
 @json_option

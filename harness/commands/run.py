@@ -6,10 +6,10 @@ from typing import Any
 
 import click
 
-from .terminal import Terminal, refuse_ignored_options, refuse_options, result_options, run_options
+from .terminal import SectionedCommand, Terminal, refuse_ignored_options, refuse_options, result_options, run_options
 
 
-@click.command()
+@click.command(cls=SectionedCommand)
 @click.argument("source", metavar="MODEL|SCENE|FMU")
 @click.option(
     "--set", "values", multiple=True, metavar="NAME=VALUE,...", help="Start values; only with an FMU. Repeatable."

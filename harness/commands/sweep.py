@@ -12,6 +12,7 @@ from ..arguments import NATURAL, RUNS, WORKERS
 from ..errors import MAX_VALUE_LENGTH, HarnessError, install_command
 from .terminal import (
     RuleType,
+    SectionedCommand,
     Terminal,
     refuse_ignored_options,
     refuse_options,
@@ -20,7 +21,7 @@ from .terminal import (
 )
 
 
-@click.command()
+@click.command(cls=SectionedCommand)
 @click.argument("model")
 @click.option(
     "--vary",

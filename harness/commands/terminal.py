@@ -26,6 +26,34 @@ from ..process.temporary_directory import temporary_root
 Command = Callable[..., Any]
 
 
+SECTIONS = {  # of the help of a command: options that several commands share, each in the same order everywhere
+    "Input table": (
+        *("time", "column", "velocity", "position", "force", "current", "constant", "points", "quantity", "unit"),
+        *("per_count", "time_unit", "headings", "rate", "begin", "end"),
+    ),
+    "Run": ("stop", "rtol", "interface", "lenient", "timeout"),
+    "Output": ("name", "out", "overwrite", "quiet", "as_json"),
+}
+
+
+def write_options(command: click.Command, context: click.Context, formatter: click.HelpFormatter) -> None:
+    """Write the options of a command to its help, in sections."""
+    options = [item for item in command.get_params(context) if isinstance(item, click.Option)]
+    records = {option.name: option.get_help_record(context) for option in options}
+    shared = {name for names in SECTIONS.values() for name in names}
+    for title, names in {"Options": [name for name in records if name not in shared], **SECTIONS}.items():
+        if rows := [row for name in names if (row := records.get(name))]:
+            with formatter.section(title):
+                formatter.write_dl(rows)
+
+
+class SectionedCommand(click.Command):
+    """Command whose help has a section for each kind of options."""
+
+    def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        write_options(self, ctx, formatter)
+
+
 def out_option(text: str) -> Callable[..., Any]:
     """Return the option --out with a help text."""
     folder = click.Path(file_okay=False, path_type=Path)

@@ -66,7 +66,7 @@ def test_an_undecidable_law_is_reported_with_what_would_decide_it():
 
 @pytest.mark.parametrize(("k", "m"), [(157.9, None), (None, 2.0)])
 def test_stiffness_or_mass_convert_the_fit_to_physical_parameters(k, m):
-    fit = values(identify(decay_record(0.02, 0.003, 0.4, noise=1e-4), k=k, m=m).estimates)
+    fit = values(identify(decay_record(0.02, 0.003, 0.4, noise=1e-4), k=k, mass=m).estimates)
     zeta, r, b, omega = (fit[name] for name in (*TERMS, "omega"))
     k, m = k or m * omega**2, m or k / omega**2
     expected = {"f": k * r, "c": 2 * zeta * m * omega, "q": b * m}

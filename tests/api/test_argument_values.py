@@ -37,7 +37,7 @@ ACCEPTED = {  # arguments by function, and the values that they may have; None a
     "identify_decay": {
         "unit": {"'x'", "'8'", "long text"},  # a unit that is not known is that of a sensor
         "k": ABOVE_ZERO,
-        "m": ABOVE_ZERO,
+        "mass": ABOVE_ZERO,
         "pendulum": FLAG,
         "drag": FLAG,
         "drift": FLAG,
@@ -56,7 +56,6 @@ ACCEPTED = {  # arguments by function, and the values that they may have; None a
         "observe": {"'x'", *NOTHING},
         "inputs": NOTHING,
         "values": {"{}"},
-        "fixed": {"{}"},
         "sigma": {"{}", "{'x': 5}"},
         "start": {"{}"},
         "each": {"[]"},

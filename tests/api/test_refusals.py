@@ -60,14 +60,14 @@ IDENTIFY_DECAY = [
     ({"record": [0.0, 1.0], "x": [1.0, 2.0]}, "unit is missing"),
     ({"record": [0.0, 1.0], "x": [1.0], "unit": "m"}, "rows of the same length"),
     ({"record": "nowhere.csv"}, "cannot read nowhere.csv"),
-    ({"record": np.arange(20.0), "x": np.arange(20.0), "unit": "m", "k": 1.0, "m": 1.0}, "leave one out"),
+    ({"record": np.arange(20.0), "x": np.arange(20.0), "unit": "m", "k": 1.0, "mass": 1.0}, "leave one out"),
     ({"record": "nowhere.csv", "rate": 0.0}, "rate = 0.0 must be a finite number above 0"),
     *(
         (
             {"record": DECAY[0], "x": DECAY[1], "unit": "m", name: value},
             f"{name} = {value!r} must be a finite number above",
         )
-        for name, value in (("m", -1), ("k", -3), ("m", 0), ("m", float("nan")), ("k", float("inf")), ("k", True))
+        for name, value in (("mass", -1), ("k", -3), ("mass", 0), ("mass", float("nan")), ("k", float("inf")), ("k", True))
     ),
     ({"record": DECAY[0], "x": DECAY[1], "unit": "m", "column": "x"}, "column = 'x' has no effect on arrays"),
     ({"record": "nowhere.csv", "x": DECAY[1]}, "x has no effect, because the record has columns"),
@@ -126,8 +126,8 @@ FIT = [  # changes of a fit of mu_s of the sled to its position
     ({"observe": {"F_spring": "x"}}, "quantity, or the right unit, as in observe={'F_spring': 'x [N]'}"),
     ({"inputs": {"F_ext": "x"}}, "quantity, or the right unit, as in inputs={'F_ext': 'x [N]'}"),
     ({"inputs": {"x0": "x"}}, "unknown input 'x0'; allowed: F_ext"),
-    ({"fixed": {"mu_s": 0.5}}, "mu_s is fixed, and free: remove one"),
-    ({"fixed": {"m": -1.0}}, "m = -1.0 is outside its range"),
+    ({"values": {"mu_s": 0.5}}, "mu_s is fixed, and free: remove one"),
+    ({"values": {"m": -1.0}}, "m = -1.0 is outside its range"),
     ({"start": {"m": 1.0}}, "unknown free parameter 'm'; allowed: mu_s"),
     ({"free": {"mu_s": (0.1, 2.0)}, "start": {"mu_s": 99.0}}, "the start value 99.0 of mu_s is outside its range"),
     *(

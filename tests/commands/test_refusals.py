@@ -71,7 +71,7 @@ COMMAND_LINES = [  # arguments, exit status, words of the sentence
     *((arguments, 2, f"{option} has no effect ") for arguments, option in OPTIONS_WITHOUT_EFFECT),
     (["compare", "fmus", OWN], 2, "trajectory.csv is missing"),
     (["decay", "stickslip"], 1, "as in stick-slip, and is no decay"),
-    (["decay", "line.csv", "--k", 1, "--m", 1], 2, "--k and --m"),
+    (["decay", "line.csv", "--k", 1, "--mass", 1], 2, "--k and --mass"),
     ([*FIT, "--free", "k=3"], 2, "--free k=3: give a range, as in k=0.1:2, or fix it by --set k=3"),
     ([*FIT, "--free", "k=3:x"], 2, "--free k=3:x: 'x' is not a finite number"),
     ([*FIT, "--free", "k,k"], 2, "--free names k twice: remove one"),

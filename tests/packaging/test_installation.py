@@ -19,7 +19,7 @@ WORK = {  # by command; all run in one folder, in this order
     "info": ["info", "info stickslip"],
     "run": ["run stickslip", "build block.py --method dop853 --method rodas", "run block.fmu"],
     "curve": ["curve bench.csv --mass 2"],
-    "decay": ["decay docs/records/spring.csv --m 0.35", "decay coulomb"],
+    "decay": ["decay docs/records/spring.csv --mass 0.35", "decay coulomb"],
     "compare": ["compare smd coulomb"],
     "fit": ["fit block.fmu swing.csv --free k=50:200 --set f=0"],
     "precision": ["precision smd --quick"],

@@ -11,7 +11,7 @@ from decays import LAWS, decay_record, identify
 from shared_keys import check_shared_keys
 
 
-@pytest.mark.parametrize("arguments", [("coulomb",), (ROOT / "docs/records/spring.csv", "--m", "0.35")])
+@pytest.mark.parametrize("arguments", [("coulomb",), (ROOT / "docs/records/spring.csv", "--mass", "0.35")])
 def test_the_table_fits_into_80_columns_and_its_first_values_are_those_to_use(fmus, tmp_path, arguments):
     (tmp_path / "fmus").symlink_to(fmus)
     done = commands.harness(tmp_path, "decay", *arguments, COLUMNS="80")

@@ -241,7 +241,7 @@ def shaker(t):
 
 
 def test_the_values_predict_a_record_that_was_not_fitted():
-    arguments = {"free": ["mu_s"], "observe": "x", "fixed": DRIVEN | {"k": 900.0}}
+    arguments = {"free": ["mu_s"], "observe": "x", "values": DRIVEN | {"k": 900.0}}
     same, other = pull(seed=2, t=T[:150]), pull(values=TRUTH | {"mu_d": 0.7}, seed=3)
     fit = harness.fit(native("stickslip"), pull(), validate=[same, other], **arguments)
     good, bad = fit.validation.columns
@@ -422,7 +422,7 @@ def test_the_campaign_summarizes_its_log(tmp_path, capsys):
     assert line.split()[1:6] == ["2", "0", "0", "1/2", "1"]
 
 
-LAWS = {"free": ["k", "mu_s", "mu_d", "f_s", "f_d"], "fixed": {"v_driver": 0.04, "v_s": 0.2}}
+LAWS = {"free": ["k", "mu_s", "mu_d", "f_s", "f_d"], "values": {"v_driver": 0.04, "v_s": 0.2}}
 
 
 @pytest.mark.slow
