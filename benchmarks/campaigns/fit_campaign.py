@@ -25,7 +25,7 @@ from harness.records.record import Record
 from harness.records.table_files import Table
 from harness.running.whole_run import open_simulator
 from harness.scenes.run_spec import RunSpec
-from harness.studies.fit.request import FitRequest, resolve_request
+from harness.studies.fit.request import FitRequest, make_task
 from harness.studies.fit.study import fit_samples
 
 from .drawn_records import GROUPS, draw_record
@@ -65,10 +65,10 @@ def fit_drawn_record(group, seed, fmus):
     fmu = fmus / f"{group.model}.fmu"
     run = RunSpec(fmu, values=record.fixed, timeout=10.0)
     request = FitRequest(run, record.free, observe, inputs)
-    resolved = resolve_request(request)
+    task = make_task(request)
     try:
-        samples = Record("record", table).signals(resolved.sources)
-        return record, fit_samples(resolved, [samples], ignore_progress)
+        samples = Record("record", table).signals(task.sources)
+        return record, fit_samples(task, [samples], ignore_progress)
     except HarnessError as error:
         return record, str(error)
 

@@ -157,7 +157,7 @@ def fit(
     from ..scenes.fmu_files import check_built, find_fmu
     from ..scenes.run_spec import RunSpec
     from ..studies.fit import study
-    from ..studies.fit.laws import resolve_laws
+    from ..studies.fit.laws import make_tasks
     from ..studies.fit.observed import choose_observed
     from ..studies.fit.options import read_fitted_values, select_starts
     from ..studies.fit.request import FitRequest
@@ -202,4 +202,4 @@ def fit(
     if not fitted:
         raise SceneError("records is empty: give at least one record")
     request, choice = choose_observed(request, fitted[0])
-    return study.fit_laws(resolve_laws(request).with_note(choice), fitted, predicted, reporter(progress))
+    return study.fit_laws(make_tasks(request, choice), fitted, predicted, reporter(progress))

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from decays import OMEGA, Signal, decay_record, identify, remarks_text, values
 
-from harness.analyses.decay import fit_problem, signal_model
+from harness.analyses.decay import decay_problem, signal_model
 
 QUANTITIES = ("position", "velocity", "acceleration")
 
@@ -136,7 +136,7 @@ def test_a_motion_that_starts_in_mid_swing_with_speed_costs_a_bounded_number_of_
         evaluated.append(len(sequence.amplitudes))
         return sequence
 
-    for module in (signal_model, fit_problem):
+    for module in (signal_model, decay_problem):
         monkeypatch.setattr(module, "iterate_return_map", counted)
     t = np.linspace(0.0, 6.0, 240)
     swing = np.exp(-0.01 * 6 * (t - hold)) * np.cos(6 * (t - hold) + phase)

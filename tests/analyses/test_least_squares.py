@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from decays import TERMS, decay_record, identify
 
-from harness.analyses.decay.fit_problem import FitError, least_squares
+from harness.analyses.decay.decay_problem import FitError, least_squares
 
 T0, AMPLITUDE, REST, _, OMEGA, ZETA, R, B = range(8)  # the order of the unknowns
 T = np.linspace(0.0, 1.0, 21)

@@ -9,7 +9,7 @@ from build_cache import ROOT
 # Remove a module when its last import goes; add none: test a new function through `harness` or a command.
 ALLOWED = """
 .: __main__ commands
-analyses.decay: decrement fit_problem intervals signal_model
+analyses.decay: decay_problem decrement intervals signal_model
 analyses.fit: fit_problem fit_procedure noise profile_likelihood
 analyses: slip
 process: interrupt interruptible_wait subprocess_runner temporary_directory worker

@@ -18,8 +18,8 @@ from scipy import optimize
 
 from ...records.motion import Motion
 from ..estimation.estimate import Estimate
+from .decay_problem import DecayProblem, column_norms, least_squares
 from .extrema import Extrema
-from .fit_problem import FitProblem, column_norms, least_squares
 from .intervals import FitUncertainty, confidence_interval, to_correlation
 from .law import (
     AMPLITUDE,
@@ -78,14 +78,14 @@ def quantity_labels(record: Motion) -> dict[int, tuple[str, str, str]]:
     }
 
 
-def unit_scales(problem: FitProblem) -> dict[int, float]:
+def unit_scales(problem: DecayProblem) -> dict[int, float]:
     """Return the unit of each unknown of the problem, in units of the record, by its index in UNKNOWNS."""
     scale = problem.scale
     return {OMEGA: 1.0, ZETA: 1.0, R: scale, B: 1 / scale, REST: scale, DRIFT: scale}
 
 
 def to_record_units(
-    record: Motion, problem: FitProblem, unknown: int, value: float, error: float, low: float, high: float
+    record: Motion, problem: DecayProblem, unknown: int, value: float, error: float, low: float, high: float
 ) -> Estimate:
     """Return an estimate of one of the UNKNOWNS, converted from the units of the problem to those of the record."""
     scale, offset = unit_scales(problem)[unknown], problem.offset if unknown == REST else 0.0
@@ -97,7 +97,7 @@ def to_record_units(
 
 def make_estimates(
     record: Motion,
-    problem: FitProblem,
+    problem: DecayProblem,
     law: FittedLaw,
     full: FittedLaw,
     uncertainty: FitUncertainty,
@@ -162,7 +162,12 @@ def force_estimates(
 
 
 def estimate_from_extrema(
-    record: Motion, problem: FitProblem, extrema: Extrema, law: FittedLaw, parameters: KnownParameters, omega: Estimate
+    record: Motion,
+    problem: DecayProblem,
+    extrema: Extrema,
+    law: FittedLaw,
+    parameters: KnownParameters,
+    omega: Estimate,
 ) -> tuple[tuple[Estimate, ...], str]:
     """Return estimates of the law from all turning points, and the reason if there are none."""
     if record.order:
@@ -199,7 +204,12 @@ def estimate_from_extrema(
 
 
 def estimate_from_two_peaks(
-    record: Motion, problem: FitProblem, extrema: Extrema, law: FittedLaw, parameters: KnownParameters, omega: Estimate
+    record: Motion,
+    problem: DecayProblem,
+    extrema: Extrema,
+    law: FittedLaw,
+    parameters: KnownParameters,
+    omega: Estimate,
 ) -> tuple[tuple[Estimate, ...], str]:
     """Return each single loss that leads from the first to the last turning point, and the reason if there is none."""
     if record.order:

@@ -13,8 +13,8 @@ import numpy as np
 from ...records.motion import MIN_SAMPLES, Motion
 from ..estimation.noise import robust_std
 from . import thresholds
+from .decay_problem import DecayProblem, prepare_problem
 from .extrema import Extrema
-from .fit_problem import FitProblem, prepare_problem
 from .hum import Hum, find_hums
 from .law import AMPLITUDE, OMEGA, T0, TERMS, UNKNOWNS, Terms
 from .sample_noise import estimate_noise
@@ -30,9 +30,9 @@ class FreeMotion:
         The record and its turning points.
     terms : tuple of str
         Terms of the law that is fitted.
-    available : FitProblem
+    available : DecayProblem
         Samples from which the next step may select.
-    problem : FitProblem
+    problem : DecayProblem
         Samples that are selected.
     p : numpy.ndarray
         Values (8,) of UNKNOWNS that fit these samples.
@@ -40,7 +40,7 @@ class FreeMotion:
         Sum of squares of their residuals.
     outliers : int
         Number of samples left out as outliers.
-    whole : tuple of FitProblem and numpy.ndarray, optional
+    whole : tuple of DecayProblem and numpy.ndarray, optional
         Samples and values before a part that departs from the law was left out.
     notes : tuple of str
         Sentences on other samples left out.
@@ -49,20 +49,20 @@ class FreeMotion:
     record: Motion
     extrema: Extrema
     terms: Terms
-    available: FitProblem
-    problem: FitProblem
+    available: DecayProblem
+    problem: DecayProblem
     p: np.ndarray
     sum_of_squares: float = np.inf
     outliers: int = 0
-    whole: tuple[FitProblem, np.ndarray] | None = None
+    whole: tuple[DecayProblem, np.ndarray] | None = None
     notes: tuple[str, ...] = ()
 
-    def fit(self, problem: FitProblem, p: np.ndarray | None = None) -> Self:
+    def fit(self, problem: DecayProblem, p: np.ndarray | None = None) -> Self:
         """Return the motion with the samples of another problem and their fit, from the starting values p."""
         p, squares = problem.fit(self.p if p is None else p, self.terms)
         return replace(self, problem=problem, p=p, sum_of_squares=squares)
 
-    def search(self, problem: FitProblem, p: np.ndarray | None = None) -> Self:
+    def search(self, problem: DecayProblem, p: np.ndarray | None = None) -> Self:
         """Fit as `fit` does, and also by growing windows if that leaves more than noise; return the better fit."""
         motion = self.fit(problem, p)
         if not problem.exceeds_noise(motion.sum_of_squares):
@@ -116,7 +116,7 @@ def select_free_motion(record: Motion, extrema: Extrema, terms: Terms, pendulum:
 
 def initial_problem(
     record: Motion, extrema: Extrema, terms: Terms, pendulum: bool, drift: bool
-) -> tuple[FitProblem, np.ndarray]:
+) -> tuple[DecayProblem, np.ndarray]:
     """Return the fit problem, and the values of a law with these terms that fit its turning points."""
     problem, p = prepare_problem(record, extrema, pendulum, drift)
     p[[UNKNOWNS.index(term) for term in TERMS if term not in terms]] = 0.0
@@ -150,7 +150,7 @@ def truncate_at_stop(motion: FreeMotion) -> FreeMotion:
     return replace(motion, problem=selection) if len(selection.t) == len(motion.problem.t) else motion.fit(selection)
 
 
-def last_usable_time(problem: FitProblem, p: np.ndarray) -> float:
+def last_usable_time(problem: DecayProblem, p: np.ndarray) -> float:
     """Return the time in s up to which to fit: one half cycle before the motion stops or is lost in quantisation.
 
     A record at rest repeats one sample, and the stop itself makes a kink.
@@ -270,7 +270,7 @@ def extend_to_departure(motion: FreeMotion, last: float) -> tuple[FreeMotion, fl
     return motion, level, departure
 
 
-def departure_time(problem: FitProblem, p: np.ndarray, terms: Terms, after: float, limit: float) -> float:
+def departure_time(problem: DecayProblem, p: np.ndarray, terms: Terms, after: float, limit: float) -> float:
     """Return the start time in s of the first half cycle after `after` most of whose residuals exceed `limit`.
 
     If the half cycle before it has departed partly, its start counts.  Without a departure it is the last sample.

@@ -27,6 +27,7 @@ from ...errors import HarnessError, check_names, option_text
 from ...records.motion import Motion
 from ..estimation.estimate import Estimate
 from . import thresholds
+from .decay_problem import DecayProblem, FitError
 from .energy_loss import EnergyLoss, loss_fractions
 from .estimates import (
     KnownParameters,
@@ -37,7 +38,6 @@ from .estimates import (
     to_record_units,
 )
 from .extrema import Extrema, find_extrema
-from .fit_problem import FitError, FitProblem
 from .free_motion import select_free_motion
 from .intervals import FitUncertainty, estimate_uncertainty
 from .law import DRIFT, OMEGA, REST, TERMS, Terms
@@ -60,7 +60,7 @@ class DecayIdentification:
         The record, without spikes and hum.
     extrema : Extrema
         Its turning points.
-    problem : FitProblem
+    problem : DecayProblem
         Samples that are fitted, in the units of the fit.
     laws : tuple of FittedLaw
         Fitted laws, best first.
@@ -84,7 +84,7 @@ class DecayIdentification:
 
     record: Motion
     extrema: Extrema
-    problem: FitProblem
+    problem: DecayProblem
     laws: tuple[FittedLaw, ...]
     uncertainty: FitUncertainty
     estimates: tuple[Estimate, ...]

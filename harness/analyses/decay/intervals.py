@@ -30,7 +30,7 @@ from scipy import optimize, special
 from ..estimation.estimate import NORMAL_QUANTILE, student_quantile
 from ..estimation.noise import block_scores, residual_correlation
 from . import thresholds
-from .fit_problem import FitProblem, column_norms
+from .decay_problem import DecayProblem, column_norms
 from .law import OMEGA, ZETA, Terms
 from .wander import Wander, estimate_wander
 
@@ -74,7 +74,7 @@ class FitUncertainty:
     wander: Wander
 
 
-def estimate_uncertainty(problem: FitProblem, p: np.ndarray, terms: Terms) -> FitUncertainty:
+def estimate_uncertainty(problem: DecayProblem, p: np.ndarray, terms: Terms) -> FitUncertainty:
     """Return the uncertainty of the fitted values p of a law with these terms."""
     e, jacobian = problem.residuals(p, terms)
     unknowns, n = problem.unknowns(terms), len(e)

@@ -15,8 +15,8 @@ from scipy import optimize
 from ..estimation.estimate import NORMAL_QUANTILE, Estimate
 from ..estimation.noise import block_scores
 from . import thresholds
+from .decay_problem import DecayProblem, column_norms
 from .estimates import unit_scales
-from .fit_problem import FitProblem, column_norms
 from .law import AMPLITUDE, UNKNOWNS, ZETA, R, Terms
 
 
@@ -53,7 +53,7 @@ class LowSpeedRise:
         return self.deviance > thresholds.SHOWN_RISE and self.size < thresholds.MAX_RISE * self.losses["r"]
 
 
-def signal_changes(problem: FitProblem, p: np.ndarray, slope: np.ndarray, speeds: np.ndarray) -> np.ndarray:
+def signal_changes(problem: DecayProblem, p: np.ndarray, slope: np.ndarray, speeds: np.ndarray) -> np.ndarray:
     """Return the changes (n, k) of the signal by a unit rise at k relative speeds.
 
     Parameters
@@ -76,7 +76,7 @@ def signal_changes(problem: FitProblem, p: np.ndarray, slope: np.ndarray, speeds
     return np.stack([slope * np.interp(problem.t, starts, column) for column in total.T], axis=1)
 
 
-def find_low_speed_rise(problem: FitProblem, p: np.ndarray, terms: Terms) -> LowSpeedRise | None:
+def find_low_speed_rise(problem: DecayProblem, p: np.ndarray, terms: Terms) -> LowSpeedRise | None:
     """Return the rise that fits best to the residuals of a law with the values p; None if there are too few half
     cycles."""
     if "r" not in terms or len(problem.half_cycles(p)[0]) < thresholds.MIN_RISE_HALF_CYCLES:
@@ -98,7 +98,7 @@ def find_low_speed_rise(problem: FitProblem, p: np.ndarray, terms: Terms) -> Low
 
 
 def fit_rise(
-    problem: FitProblem,
+    problem: DecayProblem,
     p: np.ndarray,
     unknowns: np.ndarray,
     e: np.ndarray,

@@ -12,8 +12,8 @@ from itertools import permutations
 import numpy as np
 
 from . import thresholds
+from .decay_problem import DecayProblem, Minimum
 from .energy_loss import estimate_losses
-from .fit_problem import FitProblem, FitResult
 from .law import TERMS, ZETA, Terms, describe_law, sublaws
 
 
@@ -43,7 +43,7 @@ class FittedLaw:
         return describe_law(self.terms)
 
 
-def select_reported_law(laws: tuple[FittedLaw, ...], full: FittedLaw, problem: FitProblem) -> FittedLaw:
+def select_reported_law(laws: tuple[FittedLaw, ...], full: FittedLaw, problem: DecayProblem) -> FittedLaw:
     """Return the law whose values are reported: the best law if it agrees with the full law within a standard error.
 
     Between nested fits, no value moves by more standard errors than the root of the change of n ln(squares).
@@ -51,20 +51,20 @@ def select_reported_law(laws: tuple[FittedLaw, ...], full: FittedLaw, problem: F
     return full if deviance_difference(problem, laws[0], full) > thresholds.EQUAL_DEVIANCE else laws[0]
 
 
-def deviance_difference(problem: FitProblem, law: FittedLaw, other: FittedLaw) -> float:
+def deviance_difference(problem: DecayProblem, law: FittedLaw, other: FittedLaw) -> float:
     """Return n ln(squares) of a law minus that of another, with squares no smaller than the accuracy of the model."""
     n, floor = len(problem.t), len(problem.t) * problem.residual_floor**2
     return n * float(np.log(max(law.sum_of_squares, floor) / max(other.sum_of_squares, floor)))
 
 
 def fit_all_laws(
-    problem: FitProblem, full: FitResult, terms: Terms, amplitudes: np.ndarray, report: Callable[[float], None]
+    problem: DecayProblem, full: Minimum, terms: Terms, amplitudes: np.ndarray, report: Callable[[float], None]
 ) -> tuple[FittedLaw, ...]:
     """Fit every law with some of the terms and return them by rising BIC.
 
     Parameters
     ----------
-    full : FitResult
+    full : Minimum
         Fit of the law with all terms.
     amplitudes : numpy.ndarray
         Amplitudes (n,) at the turning points, for starting values.

@@ -8,8 +8,8 @@ from ...errors import command_text, option_text
 from ...records.motion import Motion
 from ..estimation.estimate import Estimate
 from . import thresholds
+from .decay_problem import DecayProblem, FitError
 from .estimates import unit_scales
-from .fit_problem import FitError, FitProblem
 from .intervals import FitUncertainty, estimate_uncertainty
 from .law import AMPLITUDE, DRIFT, OMEGA, REST, UNKNOWNS, ZETA
 from .low_speed_friction import LowSpeedRise
@@ -17,7 +17,7 @@ from .model_selection import FittedLaw, deviance_difference
 
 
 def check_fit(
-    record: Motion, problem: FitProblem, full: FittedLaw, uncertainty: FitUncertainty, pendulum: bool
+    record: Motion, problem: DecayProblem, full: FittedLaw, uncertainty: FitUncertainty, pendulum: bool
 ) -> None:
     """Raise FitError if the best fit leaves large residuals, or gains energy."""
     e, _ = problem.residuals(full.p, full.terms)
@@ -35,7 +35,7 @@ def check_fit(
         raise FitError("gains energy, so it is driven: the damping ratio that fits it best is negative")
 
 
-def time_of_largest_residuals(problem: FitProblem, p: np.ndarray, e: np.ndarray) -> float:
+def time_of_largest_residuals(problem: DecayProblem, p: np.ndarray, e: np.ndarray) -> float:
     """Return the time in s of the half cycle with the largest residuals e (n,)."""
     width = max(int(np.pi / p[OMEGA] / float(np.median(np.diff(problem.t)))), 1)
     sums = np.add.reduceat(e**2, np.arange(0, len(e), width))
@@ -43,7 +43,7 @@ def time_of_largest_residuals(problem: FitProblem, p: np.ndarray, e: np.ndarray)
     return float(problem.t[at] + problem.time_origin)
 
 
-def damping_significance(problem: FitProblem, full: FittedLaw) -> float:
+def damping_significance(problem: DecayProblem, full: FittedLaw) -> float:
     """Return the damping ratio of the viscous law in standard errors, negative if the motion gains energy.
 
     It is 0 if the full law has any loss.
@@ -56,7 +56,7 @@ def damping_significance(problem: FitProblem, full: FittedLaw) -> float:
 
 
 def make_remarks(
-    record: Motion, problem: FitProblem, laws: tuple[FittedLaw, ...], full: FittedLaw, uncertainty: FitUncertainty
+    record: Motion, problem: DecayProblem, laws: tuple[FittedLaw, ...], full: FittedLaw, uncertainty: FitUncertainty
 ) -> tuple[str, ...]:
     """Return remarks on residuals, drift, rounding and undecided laws."""
     noise, rms, unit = problem.noise * problem.scale, uncertainty.rms * problem.scale, record.unit
@@ -106,7 +106,7 @@ def wander_remark(uncertainty: FitUncertainty) -> list[str]:
     ]
 
 
-def rounding_remark(problem: FitProblem, full: FittedLaw, unit: str) -> tuple[str, ...]:
+def rounding_remark(problem: DecayProblem, full: FittedLaw, unit: str) -> tuple[str, ...]:
     """Return a remark if the sensor rounds all turning points alike, so that its rounding errors are not noise.
 
     This happens if the loss of amplitude per cycle is close to a multiple of the quantiser step.  Rayleigh's test
@@ -130,7 +130,7 @@ def rounding_remark(problem: FitProblem, full: FittedLaw, unit: str) -> tuple[st
     )
 
 
-def drift_remark(record: Motion, problem: FitProblem, full: FittedLaw) -> str:
+def drift_remark(record: Motion, problem: DecayProblem, full: FittedLaw) -> str:
     """Return a remark if a fit with a drift of the rest position is significantly better; empty if not."""
     with_drift = replace(problem, drift=True)
     uncertainty = estimate_uncertainty(with_drift, full.p, full.terms)
@@ -145,7 +145,7 @@ def drift_remark(record: Motion, problem: FitProblem, full: FittedLaw) -> str:
     return f"The rest position drifts by {total:.3g} {record.unit} over the record: {remedy}"
 
 
-def ambiguity_remark(problem: FitProblem, laws: tuple[FittedLaw, ...]) -> tuple[str, ...]:
+def ambiguity_remark(problem: DecayProblem, laws: tuple[FittedLaw, ...]) -> tuple[str, ...]:
     """Return a remark on the laws that this record cannot distinguish from the best one, and on a record that would."""
     best, n = laws[0], len(problem.t)
     differences = [deviance_difference(problem, law, best) for law in laws]
@@ -179,7 +179,7 @@ def rise_remark(record: Motion, rise: LowSpeedRise) -> str:
 
 
 def compare_halves(
-    problem: FitProblem, full: FittedLaw, estimates: tuple[Estimate, ...]
+    problem: DecayProblem, full: FittedLaw, estimates: tuple[Estimate, ...]
 ) -> tuple[tuple[Estimate, ...], tuple[str, ...]]:
     """Compare fits of the law to the two halves of the record.
 

@@ -20,8 +20,8 @@ import numpy as np
 from scipy import linalg
 
 from . import thresholds
+from .decay_problem import DecayProblem, FitError, column_norms, least_squares
 from .extrema import Extrema
-from .fit_problem import FitError, FitProblem, column_norms, least_squares
 from .intervals import confidence_interval, to_correlation
 from .law import AMPLITUDE, UNKNOWNS, Terms
 
@@ -46,7 +46,7 @@ class SwingFit:
     departure: float
 
 
-def fit_swings(problem: FitProblem, extrema: Extrema, p: np.ndarray, terms: Terms) -> SwingFit | None:
+def fit_swings(problem: DecayProblem, extrema: Extrema, p: np.ndarray, terms: Terms) -> SwingFit | None:
     """Fit the law to the swings of a record, from the values p of the whole signal.
 
     Returns None if the swings do not determine the losses.

@@ -74,7 +74,7 @@ EARLY_RELEASE = 0.9  # half periods before the first turning point: released sho
 PARTIAL_SWING = 0.25  # of a half cycle: a record that begins farther from a turning point begins within the motion
 MIN_EXTRAPOLATED = 2.0  # rad: the start of a pendulum beyond it, near its upper rest, is not extrapolated
 
-# --- Fit of the signal (fit_problem.py) ---
+# --- Fit of the signal (decay_problem.py) ---
 MODEL_ACCURACY = 1e-9  # relative to the motion: truncation error of the series, below which no fit is better
 UNREACHED = 30.0  # standard errors: residual of a turning point that the motion never reaches
 FIT_WINDOWS = (0.08, 0.2, 0.45, 1.0)  # fractions of a record: the fit of one window predicts the phase in the next

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from . import thresholds
-from .fit_problem import FitProblem, column_norms
+from .decay_problem import DecayProblem, column_norms
 from .law import DRIFT, OMEGA, REST, T0
 
 
@@ -33,7 +33,7 @@ class Wander:
 
 
 def estimate_wander(
-    problem: FitProblem, p: np.ndarray, e: np.ndarray, jacobian: np.ndarray, inverse: np.ndarray
+    problem: DecayProblem, p: np.ndarray, e: np.ndarray, jacobian: np.ndarray, inverse: np.ndarray
 ) -> Wander:
     """Return the departures of a record from the fitted values p.
 

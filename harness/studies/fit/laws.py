@@ -1,6 +1,6 @@
-"""Requests for a comparison of laws: each FMU frees and fixes those names that it has."""
+"""Tasks of a comparison of laws: each FMU frees and fixes those names that it has."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import chain
 from pathlib import Path
 
@@ -9,31 +9,18 @@ from ...running.fmu_archive import read_description
 from .request import (
     READABLE,
     FitRequest,
-    ResolvedRequest,
+    FitTask,
     check_starts,
     is_unknown,
+    make_task,
     parameter_names,
-    resolve_request,
     settable_names,
     variable_names,
 )
 
 
-@dataclass(frozen=True)
-class ResolvedLaws:
-    """A checked request for each FMU, the FMU to fit first, and notes on the names that each FMU lacks."""
-
-    requests: tuple[ResolvedRequest, ...]
-    notes: tuple[tuple[str, ...], ...]
-
-    def with_note(self, note: str) -> "ResolvedLaws":
-        """Return the same requests with a further note on the first; an empty text is no note."""
-        first, *others = self.notes
-        return replace(self, notes=((note, *first), *others)) if note else self
-
-
-def resolve_laws(request: FitRequest) -> ResolvedLaws:
-    """Check a request against the FMU and against those to compare it with.
+def make_tasks(request: FitRequest, note: str = "") -> tuple[FitTask, ...]:
+    """Return the fit of each FMU of a request, the FMU of the request first; the first one has the note, if any.
 
     Raises
     ------
@@ -43,8 +30,9 @@ def resolve_laws(request: FitRequest) -> ResolvedLaws:
     """
     fmus = [request.run.fmu, *request.against]
     names = law_names(fmus)
+    own_notes = (note,) if note else ()
     if len(fmus) == 1:
-        return ResolvedLaws((resolve_request(request),), ((),))
+        return (replace(make_task(request), notes=own_notes),)
     descriptions = [read_description(fmu) for fmu in fmus]
     free = [parameter_names(description, request.observe) for description in descriptions]
     settable = [settable_names(description) for description in descriptions]
@@ -52,7 +40,7 @@ def resolve_laws(request: FitRequest) -> ResolvedLaws:
     check_names("parameter", request.run.values, {*chain.from_iterable(settable)})
     check_names("free parameter", request.each, [*request.free])
     check_starts(request)
-    laws, notes = [], []
+    tasks: list[FitTask] = []
     for fmu, name, description, available, fixable in zip(fmus, names, descriptions, free, settable, strict=True):
         law = replace(
             request,
@@ -86,17 +74,17 @@ def resolve_laws(request: FitRequest) -> ResolvedLaws:
             for parameter in (*request.free, *request.run.values)
             if parameter not in available and parameter not in fixable
         ]
-        notes.append((f"{name} has no {', '.join(missing)}: its fit leaves them out.",) if missing else ())
+        notes = (f"{name} has no {', '.join(missing)}: its fit leaves them out.",) if missing else ()
         try:
-            laws.append(resolve_request(law))
+            tasks.append(replace(make_task(law), notes=notes if tasks else own_notes + notes))
         except SceneError as error:
             raise SceneError(f"{name}: {error}") from None
     for name in request.sigma:
-        units = {law.variables[name].unit or "1" for law in laws}
+        units = {task.variables[name].unit or "1" for task in tasks}
         if len(units) > 1:
             where = f"{option_text('sigma')} of {name} has no single unit"
             raise SceneError(f"{where}: it is in {' and '.join(sorted(units))}; leave it out")
-    return ResolvedLaws(tuple(laws), tuple(notes))
+    return tuple(tasks)
 
 
 def law_names(fmus: list[Path]) -> list[str]:

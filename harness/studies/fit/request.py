@@ -71,8 +71,8 @@ class FitRequest:
 
 
 @dataclass(frozen=True)
-class ResolvedRequest:
-    """A request that has been checked against the FMU.
+class FitTask:
+    """Fit of one FMU: a request that has been checked against its variables.
 
     Attributes
     ----------
@@ -86,6 +86,8 @@ class ResolvedRequest:
         Values of Reals that are not fitted.
     shared : RunSpec
         Settings that all runs of the fit share: the observed outputs, and values that are not Reals.
+    notes : tuple of str
+        Assumptions on which names the FMU has.
     """
 
     request: FitRequest
@@ -93,6 +95,7 @@ class ResolvedRequest:
     sources: Mapping[str, SignalSource]
     fixed: Mapping[str, float]
     shared: RunSpec
+    notes: tuple[str, ...] = ()
 
     @property
     def name(self) -> str:
@@ -100,7 +103,7 @@ class ResolvedRequest:
         return self.request.name or self.request.run.model
 
 
-def resolve_request(request: FitRequest) -> ResolvedRequest:
+def make_task(request: FitRequest) -> FitTask:
     """Check a request against the variables of the FMU.
 
     Raises
@@ -136,7 +139,7 @@ def resolve_request(request: FitRequest) -> ResolvedRequest:
             raise SceneError(f"sigma of {name} is {value!r}: it must be a finite number above 0")
     converted = {name: convert_value(declared[name], value) for name, value in request.run.values.items()}
     converted = solver_settings(declared) | converted
-    return ResolvedRequest(
+    return FitTask(
         request,
         variables,
         {
@@ -197,18 +200,18 @@ def settable_names(description: Any) -> list[str]:
     return [variable.name for variable in description.modelVariables if variable.causality in ("parameter", "input")]
 
 
-def make_unknowns(resolved: ResolvedRequest, records: Sequence[Samples]) -> tuple[Unknown, ...]:
+def make_unknowns(task: FitTask, records: Sequence[Samples]) -> tuple[Unknown, ...]:
     """Return the unknowns; one with a separate value for each record occurs once per record, named as in x0[1]."""
-    request, unknowns = resolved.request, []
+    request, unknowns = task.request, []
     for name, limits in request.free.items():
         start = request.start.get(name)
         if name in request.each and len(records) > 1:
             for i in range(len(records)):
                 indexed_name = f"{name}[{i + 1}]"
-                unknown = make_unknown(name, limits, request.start.get(indexed_name, start), resolved, records)
+                unknown = make_unknown(name, limits, request.start.get(indexed_name, start), task, records)
                 unknowns.append(replace(unknown, name=indexed_name, record=i))
         else:
-            unknowns.append(make_unknown(name, limits, start, resolved, records))
+            unknowns.append(make_unknown(name, limits, start, task, records))
     samples = sum(record.y.size for record in records)
     if samples < max(MIN_SAMPLES, SAMPLES_PER_UNKNOWN * len(unknowns)):
         raise SceneError(
@@ -218,18 +221,16 @@ def make_unknowns(resolved: ResolvedRequest, records: Sequence[Samples]) -> tupl
     return tuple(unknowns)
 
 
-def make_unknown(
-    name: str, limits: Range, start: float | None, resolved: ResolvedRequest, records: Sequence[Samples]
-) -> Unknown:
+def make_unknown(name: str, limits: Range, start: float | None, task: FitTask, records: Sequence[Samples]) -> Unknown:
     """Return an unknown with the range to search; raise SceneError if the range is not valid."""
-    observed = [*resolved.request.observe]
+    observed = [*task.request.observe]
     kind, _, argument = name.partition("(")
     if argument and argument.removesuffix(")") in observed:
         column = observed.index(argument.removesuffix(")"))
         size = max(float(np.ptp(record.y[:, column])) for record in records)
         duration = min(float(record.t[-1] - record.t[0]) for record in records)
         low, high = limits or {OFFSET: (-size, size), GAIN: GAIN_RANGE, DELAY: (0.0, DELAY_SHARE * duration)}[kind]
-        unit = {OFFSET: resolved.variables[observed[column]].unit, GAIN: "", DELAY: "s"}[kind]
+        unit = {OFFSET: task.variables[observed[column]].unit, GAIN: "", DELAY: "s"}[kind]
         check_range(name, low, high, -inf, inf, unit)
         if kind == DELAY and max(abs(low), abs(high)) >= duration:
             raise SceneError(
@@ -238,10 +239,10 @@ def make_unknown(
             )
         check_start(name, start, low, high)
         return Unknown(name, kind, unit, low, high, column=column, start=start)
-    variable = resolved.variables[name]
+    variable = task.variables[name]
     minimum = -inf if variable.minimum is None else variable.minimum
     maximum = inf if variable.maximum is None else variable.maximum
-    size = table_size(name, resolved.request) if limits is None else 0.0
+    size = table_size(name, task.request) if limits is None else 0.0
     if size:
         low, high = max(-RANGE_FACTOR * size, minimum), min(RANGE_FACTOR * size, maximum)
     elif limits is None:
@@ -283,9 +284,9 @@ def check_range(name: str, low: float, high: float, minimum: float, maximum: flo
         raise SceneError(f"{text} is outside the range of the FMU; allowed: {' and '.join(bounds)} {unit}".rstrip())
 
 
-def span_remarks(resolved: ResolvedRequest, records: Sequence[Samples]) -> Iterator[str]:
+def span_remarks(task: FitTask, records: Sequence[Samples]) -> Iterator[str]:
     """Yield a remark on each record that lasts about a thousand times as long as a run of the FMU, or a thousandth."""
-    stop = default_stop(read_description(resolved.request.run.fmu))
+    stop = default_stop(read_description(task.request.run.fmu))
     for record in records:
         duration = float(record.t[-1] - record.t[0])
         ratio = duration / stop if stop else 1.0

@@ -25,9 +25,9 @@ from ...results.summary import write_summary
 from ...running.model_data import read_tables_with
 from ...running.native_equivalent import native_equivalent
 from ...running.whole_run import open_simulator
-from .laws import ResolvedLaws, resolve_laws
+from .laws import make_tasks
 from .observed import choose_observed
-from .request import FitRequest, ResolvedRequest, make_unknowns, span_remarks
+from .request import FitRequest, FitTask, make_unknowns, span_remarks
 from .result import FitResult
 
 STUDY = find_study("fit")
@@ -52,11 +52,11 @@ def fit_files(
     """
     records, others = ([load_existing(file, options) for file in group] for group in (files, validation))
     request, choice = choose_observed(request, records[0])
-    laws = resolve_laws(request).with_note(choice)
+    tasks = make_tasks(request, choice)
     folder = out / STUDY.name / records[0].name
     source = provenance.describe_sources(*files)
     with replace_folder(folder, STUDY.files, source) as new_folder:
-        fit = fit_laws(laws, records, others, report)
+        fit = fit_laws(tasks, records, others, report)
         fit.write(new_folder)
         paths = [request.run.fmu, *request.against, *(Path(file) for file in (*files, *validation) if file != "-")]
         scene = {name: value for name, value in vars(request).items() if name not in ("run", "against")}
@@ -75,7 +75,7 @@ def load_existing(source: str, options: ColumnOptions) -> Record:
 
 
 def fit_laws(
-    laws: ResolvedLaws,
+    tasks: Sequence[FitTask],
     records: Sequence[Record],
     validation: Sequence[Record],
     report: Callable[[float], None],
@@ -84,21 +84,21 @@ def fit_laws(
 
     All fits use the same samples: if one of them cannot use means of neighbouring samples, none of them does.
     """
-    count, fits = len(laws.requests), []
+    count, fits = len(tasks), []
 
     def fit_law(i: int, averages: bool) -> ParameterFit:
-        law = laws.requests[i]
+        task = tasks[i]
         data, others = (
-            [replace(record.signals(law.sources), sigma=law.request.sigma) for record in group]
+            [replace(record.signals(task.sources), sigma=task.request.sigma) for record in group]
             for group in (records, validation)
         )
         try:
-            fit = fit_samples(law, data, lambda share: report((i + share) / count), averages, others)
+            fit = fit_samples(task, data, lambda share: report((i + share) / count), averages, others)
         except HarnessError as error:
             if count > 1:
-                error.args = (f"{law.name}: {error}", *error.args[1:])
+                error.args = (f"{task.name}: {error}", *error.args[1:])
             raise
-        return replace(fit, notes=(*fit.notes, *laws.notes[i]))
+        return replace(fit, notes=(*fit.notes, *task.notes))
 
     fits = [fit_law(i, averages=True) for i in range(count)]
     if len({fit.n_samples for fit in fits}) > 1:
@@ -146,7 +146,7 @@ def convert_columns(
 
 
 def fit_samples(
-    resolved: ResolvedRequest,
+    task: FitTask,
     data: Sequence[Samples],
     report: Callable[[float], None],
     averages: bool = True,
@@ -168,24 +168,24 @@ def fit_samples(
     HarnessError
         If the fit fails.
     """
-    request, start_time = resolved.request, process_time()
+    request, start_time = task.request, process_time()
     if validation and request.each and len(data) > 1:
         raise SceneError(
             f"{', '.join(request.each)} has a value of its own for each record, and none for the validation record: "
             f"leave out {option_text('each')} or {option_text('validate')}"
         )
-    units = {name: resolved.variables[name].unit for name in request.observe}
+    units = {name: task.variables[name].unit for name in request.observe}
     slips = irregular_slips(data, [*units.items()])
-    unknowns, doubts = make_unknowns(resolved, data), [*span_remarks(resolved, data)]
-    with open_simulator(replace(resolved.shared, fmu=native_equivalent(request.run.fmu))) as simulator:
+    unknowns, doubts = make_unknowns(task, data), [*span_remarks(task, data)]
+    with open_simulator(replace(task.shared, fmu=native_equivalent(request.run.fmu))) as simulator:
         try:
-            problem, raw_fit = fit_records(simulator, data, unknowns, resolved.fixed, request.robust, report, averages)
+            problem, raw_fit = fit_records(simulator, data, unknowns, task.fixed, request.robust, report, averages)
         except HarnessError as error:
             remarks = [*doubts, *(one.remark for one in slips)]
             raise HarnessError(". ".join([str(error), *remarks]).removesuffix(".")) from None
         prediction = validate(problem, raw_fit, validation) if validation else None
         notes = [note for samples in (*data, *validation) for note in samples.notes]
-        fit = describe_fit(resolved.name, problem, raw_fit, notes, simulator.n_runs, process_time() - start_time)
+        fit = describe_fit(task.name, problem, raw_fit, notes, simulator.n_runs, process_time() - start_time)
     curves = read_tables_with(request.run.fmu, [estimate.name for estimate in fit.estimates], request.run.values)
     rough = {(column.record, column.name) for column in fit.columns if column.residual > ROUGH * column.noise}
     slips = tuple(one for one in slips if (one.record, one.column) in rough)  # an input may explain the others

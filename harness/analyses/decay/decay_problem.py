@@ -1,4 +1,4 @@
-"""Fit problem: a record in the units of the fit, starting values of its unknowns, and their least squares.
+"""Problem of a decay: a record in the units of the fit, starting values of its unknowns, and their least squares.
 
 Times count from the start of the record, values from a point near the rest position.  The law of a spring has no
 length scale, so positions are in units of the first amplitude; those of a pendulum are in radians.  The sum of
@@ -22,12 +22,12 @@ from .law import AMPLITUDE, DRIFT, OMEGA, REST, T0, TERMS, UNKNOWNS, ZETA, R, Te
 from .return_map import MAX_HALF_CYCLES, iterate_return_map
 from .signal_model import LAW, SignalModel
 
-FitResult = tuple[np.ndarray, float]  # the values of UNKNOWNS, and the sum of squares
+Minimum = tuple[np.ndarray, float]  # the values of UNKNOWNS, and the sum of squares
 Residual = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 
 @dataclass(frozen=True)
-class FitProblem:
+class DecayProblem:
     """Samples of a record and the model to be fitted to them.
 
     Attributes
@@ -109,7 +109,7 @@ class FitProblem:
                 del self.cache[next(iter(self.cache))]
         return self.cache[key]
 
-    def fit(self, p: np.ndarray, terms: Terms, max_steps: int = 30) -> FitResult:
+    def fit(self, p: np.ndarray, terms: Terms, max_steps: int = 30) -> Minimum:
         """Fit the law with these terms, from the starting values p."""
         unknowns, stride = self.unknowns(terms), len(self.t) // thresholds.MAX_COARSE_SAMPLES
         if stride > 1:
@@ -149,7 +149,7 @@ class FitProblem:
         return self.skip_half_cycles(p, int(np.argmin(np.abs(starts - t))))
 
 
-def prepare_problem(record: Motion, extrema: Extrema, pendulum: bool, drift: bool) -> tuple[FitProblem, np.ndarray]:
+def prepare_problem(record: Motion, extrema: Extrema, pendulum: bool, drift: bool) -> tuple[DecayProblem, np.ndarray]:
     """Return the fit problem of a record, and the values of the full law that fit its turning points best."""
     time_origin = float(record.t[0])
     times, first = extrema.t - time_origin, extrema.t_start - time_origin
@@ -181,7 +181,7 @@ def prepare_problem(record: Motion, extrema: Extrema, pendulum: bool, drift: boo
         p[DRIFT] += slope
         p[REST] += slope * (model.t_mid - times[-1])
     t, x = record.t - time_origin, (record.x - offset) / scale
-    problem = FitProblem(
+    problem = DecayProblem(
         t, x, model, time_origin, offset, scale, noise, drift, extrema.half_period, extrema.quantiser_step
     )
     return problem, p
