@@ -76,7 +76,7 @@ STUDIES = (
         ("trajectory.csv", "steps.csv", "events.csv", "quantities.csv", PICTURE),
         "Runs",
         "Scenes, models and FMUs that you ran.",
-        reader="studies.compare.trajectory_files:read_run",
+        reader="running.trajectory_files:read_run",
     ),
     Study(
         "decay",

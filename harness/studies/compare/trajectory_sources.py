@@ -14,8 +14,8 @@ from ...running.resolve import FMU_SUFFIXES, resolve
 from ...running.runner import DEFAULT_COMMUNICATION_STEPS, run
 from ...running.session import ProgressCallback
 from ...running.signals import Signals
+from ...running.trajectory_files import read_signals
 from ...scenes.run_spec import RunOptions, RunSpec
-from .trajectory_files import read_signals
 
 FILE_SUFFIXES = (".csv", ".txt", ".mat", ".xlsx", ".ods", ".npz")
 RUN_SUFFIXES = (*FMU_SUFFIXES, ".toml")  # sources that are run

@@ -11,20 +11,20 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import HarnessError, SceneError, first_line, format_value
-from ...records.child_reader import read_in_child
-from ...records.columns import read_numeric
-from ...records.headings import split_heading
-from ...records.table_files import read_content
-from ...records.units import TIMES
-from ...results.loading import load_summary
-from ...results.provenance import load_provenance
-from ...running.fmu_archive import read_description
-from ...running.model_data import read_model_data
-from ...running.recorder import element_names
-from ...running.signals import ModeChanges, Signals
-from ...running.trajectory import SolverSteps, Trajectory
-from ...scenes.run_spec import RunSpec
+from ..errors import HarnessError, SceneError, first_line, format_value
+from ..records.child_reader import read_in_child
+from ..records.columns import read_numeric
+from ..records.headings import split_heading
+from ..records.table_files import read_content
+from ..records.units import TIMES
+from ..results.loading import load_summary
+from ..results.provenance import load_provenance
+from ..scenes.run_spec import RunSpec
+from .fmu_archive import read_description
+from .model_data import read_model_data
+from .recorder import element_names
+from .signals import ModeChanges, Signals
+from .trajectory import SolverSteps, Trajectory
 
 MAX_TIME = 1e100  # s; largest absolute time
 ELEMENT = re.compile(r".*\[\d+(,\d+)*\]")  # name of an array element; its brackets do not contain a unit
