@@ -17,7 +17,7 @@ from ..arguments import (
     check_arguments,
     row,
 )
-from ..errors import SceneError
+from ..errors import SceneError, option_text
 from .options import check_time_range, reporter, with_progress_bar
 from .tables import RECORD, SIGNAL, has_columns, is_signals, to_record
 
@@ -88,6 +88,7 @@ def identify_decay(
         Headings of the columns of times and samples, if the table has several.
     k, mass : float, optional
         Stiffness in N/m or mass in kg (N.m/rad or kg.m2 for a rotation). Give one of them to obtain forces in N.
+        A Trajectory has the stiffness of its model.
     pendulum : bool
         Whether the restoring torque is k sin(theta).
     drag : bool
@@ -121,10 +122,15 @@ def identify_decay(
     from ..analyses.decay.estimates import KnownParameters
     from ..analyses.decay.identification import fit_decay
     from ..records.columns import ColumnOptions
+    from ..running.trajectory import Trajectory
     from ..studies.decay.result import DecayResult
+    from ..studies.decay.study import read_parameters
 
     if k is not None and mass is not None:
-        raise SceneError("k and mass are both given: leave one out, because the frequency determines it")
+        raise SceneError(
+            f"{option_text('k')} and {option_text('mass')} are both given: leave one out, because the frequency "
+            "determines it"
+        )
     check_time_range(time, rate, begin, end)
     columns = ColumnOptions(
         time=time,
@@ -145,7 +151,10 @@ def identify_decay(
         if heading is not None:
             raise SceneError(f"{name} = {heading!r} has no effect on arrays, which have no headings: leave it out")
     motion = find_record(record, columns).motion
-    return DecayResult(**vars(fit_decay(motion, KnownParameters(k, mass, pendulum), drag, drift, reporter(progress))))
+    parameters = KnownParameters(k, mass, pendulum)
+    if isinstance(record, Trajectory) and parameters == KnownParameters():
+        parameters = read_parameters(record)
+    return DecayResult(**vars(fit_decay(motion, parameters, drag, drift, reporter(progress))))
 
 
 def find_record(source: Any, options: "ColumnOptions") -> "Record":

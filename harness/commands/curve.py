@@ -1,5 +1,7 @@
 """curve: identify friction over velocity from points, or from a record over time."""
 
+from functools import partial
+from pathlib import Path
 from typing import Any
 
 import click
@@ -47,20 +49,7 @@ from .terminal import (
     help="Distance in m or rad after a reversal to leave out of a record over time.",
 )
 @result_options
-def curve(
-    source: str,
-    velocity: str | None,
-    position: str | None,
-    force: str | None,
-    current: str | None,
-    constant: str | None,
-    points: bool,
-    mass: float | None,
-    bias: float | None,
-    backlash: float,
-    terminal: Terminal,
-    **columns: Any,
-) -> None:
+def curve(source: str, terminal: Terminal, **options: Any) -> None:
     """Identify friction over velocity from measured points in FILE, or from a record over time.
 
     A row of FILE is a point, a velocity and a force or torque.  With a column of times FILE is a record: plateaus of
@@ -78,10 +67,15 @@ def curve(
       a record:         friction-fmus curve slide.csv --time t --position x --force F --mass 2.5
       one direction:    friction-fmus curve brake.csv --bias 0
     """
+    from ..api import identify_curve
     from ..records.columns import ColumnOptions
-    from ..records.friction_curve import CurveColumns
-    from ..studies.curve.study import identify_file
+    from ..records.record import load_record
+    from ..results.provenance import describe_sources
+    from ..results.result import save_result
 
-    options = CurveColumns(velocity, position, force, current, constant, points)
-    result, folder = identify_file(source, ColumnOptions(**columns), options, mass, bias, backlash, terminal.out)
+    columns = {name: options.pop(name) for name in ("time", "time_unit", "headings", "rate", "begin", "end")}
+    record = load_record(source, ColumnOptions(**columns))
+    folder, files = terminal.out / "curve" / record.name, () if source == "-" else (Path(source),)
+    compute = partial(identify_curve, record, **options)
+    result = save_result(folder, compute, "curve", describe_sources(source), files=files, scene=columns | options)
     terminal.print_result(result.as_json(), *result.blocks(), folder=folder)

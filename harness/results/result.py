@@ -1,11 +1,11 @@
 """Results of studies: what Python, the commands, notebooks and the report do with every result."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar
 
 from ..arguments import AXES, FLAG, PATH, check_arguments
 from ..errors import HarnessError, check_names, import_optional
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 TEXT_WIDTH = 100  # characters of a line of `str`
+ResultType = TypeVar("ResultType", bound="Result")
 
 
 class Result(ABC):
@@ -227,3 +228,29 @@ class Result(ABC):
             elif str(block):
                 parts.append(f"<p>{escape(str(block))}</p>")
         return f"<div><strong>{escape(self.title)}</strong>{''.join(parts)}</div>"
+
+
+def save_result(folder: Path, compute: Callable[[], ResultType], study: str, source: str, **origin: Any) -> ResultType:
+    """Compute the result of a command and write it into a folder, whose conflicts are reported before.
+
+    Parameters
+    ----------
+    folder : pathlib.Path
+        Result folder.
+    compute : callable
+        Returns the result.
+    study : str
+        Name of the study.
+    source : str
+        Source of the result, as given on the command line.
+    **origin
+        Further arguments of `write_provenance`: files, parameters, run and scene.
+    """
+    from .registry import find_study
+
+    with replace_folder(folder, find_study(study).files, source) as new_folder:
+        result = compute()
+        result.write(new_folder)
+        write_provenance(new_folder, source=source, **origin)
+        write_summary(new_folder, result.summary())
+    return result

@@ -67,7 +67,14 @@ IDENTIFY_DECAY = [
             {"record": DECAY[0], "x": DECAY[1], "unit": "m", name: value},
             f"{name} = {value!r} must be a finite number above",
         )
-        for name, value in (("mass", -1), ("k", -3), ("mass", 0), ("mass", float("nan")), ("k", float("inf")), ("k", True))
+        for name, value in (
+            ("mass", -1),
+            ("k", -3),
+            ("mass", 0),
+            ("mass", float("nan")),
+            ("k", float("inf")),
+            ("k", True),
+        )
     ),
     ({"record": DECAY[0], "x": DECAY[1], "unit": "m", "column": "x"}, "column = 'x' has no effect on arrays"),
     ({"record": "nowhere.csv", "x": DECAY[1]}, "x has no effect, because the record has columns"),

@@ -1,77 +1,20 @@
-"""Study that identifies the decay of a measured record or a scene, and writes the result folder."""
+"""Sources of decays: record files, and runs of scenes."""
 
-import gc
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import replace
 from os.path import exists
 from pathlib import Path
-from typing import Any
 
+from ...analyses.decay.decrement import stiffness
 from ...analyses.decay.estimates import KnownParameters
-from ...analyses.decay.identification import fit_decay
 from ...errors import HarnessError, SceneError, format_value
 from ...records.columns import ColumnOptions
-from ...records.motion import Motion, check_samples
-from ...records.record import load_record as load_file
-from ...results import provenance
-from ...results.folder import replace_folder
-from ...results.registry import find_study
-from ...results.summary import write_summary
-from .result import DecayResult
-
-STUDY = find_study("decay")
-
-LoadedRecord = tuple[Motion, KnownParameters, dict[str, Any]]  # with provenance: files, parameters, run
-
-
-def identify_decay(
-    source: str,
-    columns: ColumnOptions,
-    parameters: KnownParameters,
-    drag: bool,
-    drift: bool,
-    out: Path,
-    report: Callable[[float], None],
-) -> tuple[DecayResult, Path]:
-    """Identify the decay of a record file or a scene, and write the results to out/decay/<name>."""
-    record, properties, provenance_data = load_record(source, columns, parameters, report)
-    options = vars(columns) | vars(parameters) | {"drag": drag, "drift": drift}
-    folder = out / STUDY.name / record.name
-    source_text = provenance.describe_sources(source)
-    # opened before the fit, so that conflicts are reported at once
-    with replace_folder(folder, STUDY.files, source_text) as new_folder:
-        result = DecayResult(**vars(fit_decay(record, properties, drag, drift, report)))
-        result.write(new_folder)
-        provenance.write_provenance(new_folder, **provenance_data, scene=options, source=source_text)
-        write_summary(new_folder, result.summary())
-    return result, folder
-
-
-@contextmanager
-def pause_gc() -> Iterator[None]:
-    """Pause garbage collection of cycles in the block; it takes a quarter of the run time of a short command."""
-    gc.disable()
-    try:
-        yield
-    finally:
-        gc.freeze()
-        gc.enable()
-
-
-def load_record(
-    source: str, columns: ColumnOptions, parameters: KnownParameters, report: Callable[[float], None]
-) -> LoadedRecord:
-    """Load the record of a file, or run a scene and take the stiffness from its model."""
-    path = Path(source)
-    if source == "-":
-        return load_file(source, columns).motion, parameters, {"files": ()}
-    if is_record_file(source):
-        if not exists(source):
-            raise SceneError(f"{format_value(source)} does not exist: give an existing record, or a scene")
-        return load_file(source, columns).motion, parameters, {"files": (path,)}
-    if path.is_dir():
-        raise SceneError(f"{source} is a folder; give a file in it")
-    return record_of_scene(source, columns, parameters, report)
+from ...records.record import Record, load_record
+from ...running.runner import run
+from ...running.trajectory import Trajectory
+from ...scenes.fmu_files import check_built
+from ...scenes.scene import load_scene
 
 
 def is_record_file(source: str) -> bool:
@@ -80,35 +23,39 @@ def is_record_file(source: str) -> bool:
     return source == "-" or (path.suffix.lower() != ".toml" and (path.is_file() or path.is_fifo() or bool(path.suffix)))
 
 
-def record_of_scene(
-    source: str, columns: ColumnOptions, parameters: KnownParameters, report: Callable[[float], None]
-) -> LoadedRecord:
-    """Run a scene and return its position as a record."""
-    from ...analyses.decay.decrement import stiffness
-    from ...running.runner import run as run_fmu
-    from ...scenes.fmu_files import check_built
-    from ...scenes.scene import load_scene
+def load_source(source: str, columns: ColumnOptions, report: Callable[[float], None]) -> Record | Trajectory:
+    """Return the record in a file, or the run of a scene under its name.
 
+    Raises
+    ------
+    HarnessError
+        If there is no such source, or the run fails or has no position.
+    """
+    if is_record_file(source):
+        if source != "-" and not exists(source):
+            raise SceneError(f"{format_value(source)} does not exist: give an existing record, or a scene")
+        return load_record(source, columns)
+    if Path(source).is_dir():
+        raise SceneError(f"{source} is a folder; give a file in it")
     scene = load_scene(source)
     check_built(scene.run.fmu)
     if "position" not in scene.run.motion_outputs:
         raise SceneError(f"scene {scene.name}: a decay needs the position among the outputs")
-    run = run_fmu(scene.run, report)
-    if run.failure:
-        raise HarnessError(f"scene {scene.name}: {run.failure}")
-    position = run.motion_outputs["position"]
-    unit = run.units[position]
-    if not unit:
+    trajectory = run(scene.run, report)
+    if trajectory.failure:
+        raise HarnessError(f"scene {scene.name}: {trajectory.failure}")
+    position = trajectory.motion_outputs["position"]
+    if not trajectory.units[position]:
         raise SceneError(
-            f"scene {scene.name}: {position} has no unit in {run.spec.fmu.name}: run the scene, and identify the decay "
-            "in its trajectory.csv with --unit"
+            f"scene {scene.name}: {position} has no unit in {scene.run.fmu.name}: run the scene, and identify the "
+            "decay in its trajectory.csv with --unit"
         )
-    record = Motion(scene.name, run.time, run.column_of_role("position"), unit, 0, unit).select(*columns.interval)
-    check_samples(record.name, record.t, record.x)
-    provenance_data = {"files": (run.spec.fmu,), "parameters": run.effective_parameters, "run": run.spec}
-    if parameters.k is None and parameters.m is None:
-        with suppress(HarnessError):  # a model without stiffness has no friction force
-            parameters = KnownParameters(
-                k=stiffness(run, unit == "rad", "the decay of a scene"), pendulum=unit == "rad"
-            )
-    return record, parameters, provenance_data
+    return replace(trajectory, label=scene.name)
+
+
+def read_parameters(trajectory: Trajectory) -> KnownParameters:
+    """Return the stiffness of the model of a run; a model without one has no friction force."""
+    is_rotation = trajectory.units[trajectory.motion_outputs["position"]] == "rad"
+    with suppress(HarnessError):
+        return KnownParameters(stiffness(trajectory, is_rotation, "the decay of a run"), pendulum=is_rotation)
+    return KnownParameters()
