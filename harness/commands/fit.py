@@ -1,5 +1,7 @@
 """fit: parameters of any FMU from measured records."""
 
+from functools import partial
+from pathlib import Path
 from typing import Any
 
 import click
@@ -95,31 +97,47 @@ def fit(
       friction-fmus fit sled.fmu a.csv b.csv --free f,v --each v --observe F=load
     """
     with terminal.progress(1) as report:  # the imports take most of a second
-        from ..errors import SceneError
+        from ..api import fit as fit_records
         from ..records.columns import ColumnOptions
+        from ..results.provenance import describe_sources
+        from ..results.result import save_result
         from ..scenes.assignments import parse_assignments
-        from ..scenes.fmu_files import check_built, find_fmu
-        from ..scenes.run_spec import RunSpec
-        from ..studies.fit import options, study
-        from ..studies.fit.request import FitRequest
+        from ..scenes.fmu_files import find_fmu
+        from ..studies.fit import options
+        from ..studies.fit.study import load_existing
 
-        fmu, *others = map(find_fmu, (model, *against))
-        for path in (fmu, *others):
-            check_built(path, SceneError)
-        ranges = options.parse_ranges(free)
-        per_record = tuple(options.split_list([each or ""]))
-        request = FitRequest(
-            run=RunSpec(fmu, values=parse_assignments("--set", values), timeout=timeout),
-            against=tuple(others),
-            free=ranges,
-            observe=options.parse_columns("--observe", observe),
-            inputs=options.parse_columns("--input", inputs),
-            sigma=options.parse_numbers("--sigma", sigma),
-            start=options.parse_starts(start, ranges, per_record),
-            each=per_record,
-            robust=robust,
+        ranges, per_record = options.parse_ranges(free), options.split_list([each or ""])
+        arguments: dict[str, Any] = {
+            "free": ranges,
+            "observe": options.parse_columns("--observe", observe),
+            "inputs": options.parse_columns("--input", inputs),
+            "values": parse_assignments("--set", values),
+            "sigma": options.parse_numbers("--sigma", sigma),
+            "start": options.parse_starts(start, ranges, per_record),
+            "each": per_record,
+            "robust": robust,
+            "timeout": timeout,
+        }
+        loaded, predicted = (
+            [load_existing(file, ColumnOptions(**columns)) for file in group] for group in (records, validate)
         )
-        result, folder = study.fit_files(
-            request, ColumnOptions(**columns), records, validate, terminal.out, lambda share: report(records[0], share)
+        compute = partial(
+            fit_records,
+            model,
+            loaded,
+            against=against,
+            validate=predicted,
+            progress=partial(report, records[0]),
+            **arguments,
+        )
+        folder = terminal.out / "fit" / loaded[0].name
+        result = save_result(
+            folder,
+            compute,
+            "fit",
+            describe_sources(*records),
+            files=[*map(find_fmu, (model, *against)), *(Path(file) for file in (*records, *validate) if file != "-")],
+            parameters={name: (value, "") for name, value in arguments["values"].items()},
+            scene=columns | arguments,
         )
     terminal.print_result(result.as_json(), *result.blocks(), folder=folder)

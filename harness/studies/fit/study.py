@@ -1,9 +1,8 @@
-"""Study that fits the parameters of an FMU to record files, and writes the result folder."""
+"""Study that fits the parameters of an FMU to records."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from os.path import exists
-from pathlib import Path
 from time import process_time
 
 from ...analyses.estimation.estimate import ColumnResiduals
@@ -18,53 +17,11 @@ from ...errors import HarnessError, SceneError, format_value, option_text
 from ...records.columns import ColumnOptions
 from ...records.extraction import Samples
 from ...records.record import Record, load_record
-from ...results import provenance
-from ...results.folder import replace_folder
-from ...results.registry import find_study
-from ...results.summary import write_summary
 from ...running.model_data import read_tables_with
 from ...running.native_equivalent import native_equivalent
 from ...running.whole_run import open_simulator
-from .laws import make_tasks
-from .observed import choose_observed
-from .request import FitRequest, FitTask, make_unknowns, span_remarks
+from .request import FitTask, make_unknowns, span_remarks
 from .result import FitResult
-
-STUDY = find_study("fit")
-
-
-def fit_files(
-    request: FitRequest,
-    options: ColumnOptions,
-    files: Sequence[str],
-    validation: Sequence[str],
-    out: Path,
-    report: Callable[[float], None],
-) -> tuple[FitResult, Path]:
-    """Fit the parameters of an FMU to record files, and write the result to out/fit/<record>.
-
-    Parameters
-    ----------
-    options : ColumnOptions
-        Options for the times.
-    validation : sequence of str
-        Record files that are predicted, but not fitted.
-    """
-    records, others = ([load_existing(file, options) for file in group] for group in (files, validation))
-    request, choice = choose_observed(request, records[0])
-    tasks = make_tasks(request, choice)
-    folder = out / STUDY.name / records[0].name
-    source = provenance.describe_sources(*files)
-    with replace_folder(folder, STUDY.files, source) as new_folder:
-        fit = fit_laws(tasks, records, others, report)
-        fit.write(new_folder)
-        paths = [request.run.fmu, *request.against, *(Path(file) for file in (*files, *validation) if file != "-")]
-        scene = {name: value for name, value in vars(request).items() if name not in ("run", "against")}
-        scene |= {"fixed": request.run.values, "timeout": request.run.timeout}
-        parameters = {name: (value, "") for name, value in request.run.values.items()}
-        provenance.write_provenance(new_folder, files=paths, parameters=parameters, scene=scene, source=source)
-        write_summary(new_folder, fit.summary())
-    return fit, folder
 
 
 def load_existing(source: str, options: ColumnOptions) -> Record:
