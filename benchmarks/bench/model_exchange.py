@@ -18,6 +18,7 @@ from harness.process.temporary_directory import temporary_directory
 from harness.references.certified_reference import relative_errors
 from harness.references.models import MODELS
 from harness.running.runner import run_own_fmu
+from harness.running.signals import sample_at
 from harness.running.trajectory import Trajectory
 from harness.scenes.fmu_files import find_fmu, fmi3_path
 
@@ -100,7 +101,7 @@ def error_ratio_to_cvode(scene: Scenario, tolerances: tuple[float, ...] = TOLERA
 
 def largest_error_of(scene: Scenario, result: Trajectory | np.ndarray) -> float:
     """Return the largest error of a recording, or of position and speed (n, 2), at the common times."""
-    motion = result.sample_at(scene.times, scene.case.run.outputs) if isinstance(result, Trajectory) else result
+    motion = sample_at(result, scene.times, scene.case.run.outputs) if isinstance(result, Trajectory) else result
     return float(relative_errors(motion, scene.reference_motion).max())
 
 
@@ -169,7 +170,7 @@ def difference_from_cosimulation(scene: Scenario) -> Benchmark:
             for recording in (exchange_run, cosimulation_run)
         ]
         baseline = Baseline("{} events in model exchange, {} in co-simulation".format(*counts))
-        states = (run.sample_at(scene.times, scene.case.run.outputs) for run in (exchange_run, cosimulation_run))
+        states = (sample_at(run, scene.times, scene.case.run.outputs) for run in (exchange_run, cosimulation_run))
         difference = relative_errors(*states).max()
         return float(difference) if counts[0] == counts[1] else inf, 1e-6, (baseline,)
 

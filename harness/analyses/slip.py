@@ -10,7 +10,8 @@ import numpy as np
 
 from ..errors import HarnessError
 from ..results.quantity import AnalysisResult, Quantity
-from ..running.trajectory import Trajectory
+from ..running.signals import check_sampling, column_of_role
+from ..running.trajectory import Trajectory, get_parameter
 
 
 def analyse(run: Trajectory) -> AnalysisResult:
@@ -23,8 +24,8 @@ def analyse(run: Trajectory) -> AnalysisResult:
     HarnessError
         If the driver does not move, the run has fewer than two slips, or a slip has too few samples.
     """
-    driver = run.get_parameter("v_driver", "the analysis 'slip'")
-    v = run.column_of_role("velocity")
+    driver = get_parameter(run, "v_driver", "the analysis 'slip'")
+    v = column_of_role(run, "velocity")
     if not driver:
         raise HarnessError("the analysis 'slip' needs a moving driver, and v_driver is 0 m/s: set it in [values]")
     relative_speed = v * np.sign(driver) - abs(driver)  # speed of the sled relative to the driver
@@ -37,7 +38,7 @@ def analyse(run: Trajectory) -> AnalysisResult:
         ends = ends[np.searchsorted(ends, starts[:1]).sum() :]  # ignore a slip that began before the run
     if len(starts) < 2:
         raise HarnessError(f"the analysis 'slip' needs two slips, and the run has {len(starts)}: set a later stop")
-    run.check_sampling(starts[: len(ends)], ends, "slip")
+    check_sampling(run.time, starts[: len(ends)], ends, "slip")
     slipping = relative_speed >= 0
     quantities = [
         Quantity("slips", len(starts), "", "slips"),
@@ -48,7 +49,7 @@ def analyse(run: Trajectory) -> AnalysisResult:
         quantities.append(Quantity("slip_time", float(np.mean(durations)), "s", "duration of a slip"))
     quantities.append(Quantity("peak_speed", peak_value(run.time, np.abs(v), slipping), "m/s", "peak speed"))
     if "acceleration" in run.motion_outputs:
-        peak = peak_value(run.time, np.abs(run.column_of_role("acceleration")), include_neighbours(slipping))
+        peak = peak_value(run.time, np.abs(column_of_role(run, "acceleration")), include_neighbours(slipping))
         quantities.append(Quantity("peak_acceleration", peak, "m/s2", "peak acceleration"))
     return AnalysisResult(tuple(quantities))
 

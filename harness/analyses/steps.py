@@ -4,6 +4,7 @@ import numpy as np
 
 from ..errors import HarnessError
 from ..results.quantity import AnalysisResult, step_size_quantities
+from ..running.signals import column_of_role
 from ..running.trajectory import Trajectory
 
 NEIGHBOUR_STEPS = 5  # steps on either side of a reversal that count as near it
@@ -16,7 +17,7 @@ def analyse(run: Trajectory) -> AnalysisResult:
     h = run.steps.h
     collapse = None
     if "velocity" in run.motion_outputs:
-        collapse = step_collapse(run.steps.t, h, run.time, run.column_of_role("velocity"))
+        collapse = step_collapse(run.steps.t, h, run.time, column_of_role(run, "velocity"))
     return AnalysisResult(step_size_quantities(h, int(run.steps.rejected.sum()), collapse))
 
 

@@ -122,7 +122,6 @@ def identify_decay(
     from ..analyses.decay.estimates import KnownParameters
     from ..analyses.decay.identification import fit_decay
     from ..records.columns import ColumnOptions
-    from ..running.trajectory import Trajectory
     from ..studies.decay.result import DecayResult
     from ..studies.decay.study import read_parameters
 
@@ -152,8 +151,8 @@ def identify_decay(
             raise SceneError(f"{name} = {heading!r} has no effect on arrays, which have no headings: leave it out")
     motion = find_record(record, columns).motion
     parameters = KnownParameters(k, mass, pendulum)
-    if isinstance(record, Trajectory) and parameters == KnownParameters():
-        parameters = read_parameters(record)
+    if hasattr(record, "parameters") and parameters == KnownParameters():  # a Trajectory
+        parameters = read_parameters(record)  # type: ignore[arg-type]
     return DecayResult(**vars(fit_decay(motion, parameters, drag, drift, reporter(progress))))
 
 

@@ -84,9 +84,9 @@ def decay(
     """
     from ..api import identify_decay
     from ..records.columns import ColumnOptions
+    from ..records.record import Record
     from ..results.provenance import describe_sources
     from ..results.result import save_result
-    from ..running.trajectory import Trajectory
     from ..studies.decay.study import is_record_file, load_source
 
     columns = {name: options.pop(name) for name in (*COLUMN_OPTIONS, "begin", "end")}
@@ -97,14 +97,15 @@ def decay(
     with pause_gc(), terminal.progress(1) as report:
         progress = partial(report, "standard input" if source == "-" else source)
         record = load_source(source, ColumnOptions(**columns), progress)
-        if isinstance(record, Trajectory):
-            options |= {"begin": columns["begin"], "end": columns["end"]}
-            origin = record.origin() | {"source": describe_sources(source)}
+        if isinstance(record, Record):
+            origin: dict[str, Any] = {"files": () if source == "-" else (Path(source),)}
         else:
-            origin = {"files": () if source == "-" else (Path(source),), "source": describe_sources(source)}
+            options |= {"begin": columns["begin"], "end": columns["end"]}
+            origin = record.origin()
         folder = terminal.out / "decay" / record.name
         compute = partial(identify_decay, record, **options, progress=progress)
-        result = save_result(folder, compute, "decay", **origin, scene=columns | options)
+        origin |= {"source": describe_sources(source), "scene": columns | options}
+        result = save_result(folder, compute, "decay", **origin)
     terminal.print_result(result.as_json(), *result.blocks(), folder=folder)
 
 

@@ -1,6 +1,6 @@
 """Plots of a trajectory for interactive work; the command `run` draws the panels that a scene names."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,6 +11,7 @@ from .model_data import LookupTable
 from .variable_values import variable_unit
 
 PANEL = (7.0, 1.7)  # inches, width and height
+MAX_PANELS = 8  # of a plot without named outputs
 BAR = 0.7  # height of the bars of one contact, whose rows are 1 high
 
 
@@ -63,7 +64,7 @@ def plot_output(axes: Any, run: Any, name: str, x: str | None = None) -> None:
     axes.plot(across, values, drawstyle="steps-post" if values.dtype.kind in "iu" and x is None else "default")
     axes.set_ylabel(column_heading(name, run.units[name]))
     axes.set_xlabel("time [s]" if x is None else column_heading(x, run.units[x]))
-    for begin, end in run.sticking.get(run.contact_of(name), ()) if x is None else ():
+    for begin, end in run.sticking.get(contact_of(run, name), ()) if x is None else ():
         axes.axvspan(begin, end, color="0.5", alpha=0.15, linewidth=0)
 
 
@@ -89,3 +90,33 @@ def draw_table(axes: Any, table: LookupTable, y: Sequence[float], color: str, la
     axes.set_title(f"table {table.name}")
     axes.set_xlabel(column_heading("argument", table.unit_x))
     axes.set_ylabel(column_heading(table.name, table.unit_y))
+
+
+def choose_plotted(run: Any) -> tuple[str, ...]:
+    """Return the outputs that are plotted if none is named: numbers, at most MAX_PANELS."""
+    numeric = [name for name, column in run.columns.items() if column.dtype.kind != "U"]
+    return choose_outputs(numeric, run.contacts, MAX_PANELS)
+
+
+def choose_outputs(outputs: Sequence[str], contacts: Collection[str], count: int) -> tuple[str, ...]:
+    """Return the first outputs, at most `count`, with preference for friction forces."""
+    forces = [name for name in outputs if name in contacts][:count]
+    others = [name for name in outputs if name not in contacts][: count - len(forces)]
+    return tuple(name for name in outputs if name in forces or name in others)
+
+
+def list_inputs(run: Any) -> list[str]:
+    """Return the input signals of a run that are plotted; none of signals from a file."""
+    spec = getattr(run, "spec", None)
+    return [name for name in spec.inputs if name != "time" and name not in run.columns] if spec else []
+
+
+def contact_of(run: Any, name: str) -> str:
+    """Return the contact whose sticking is shown in the panel of an output; empty if there is none.
+
+    It is the only contact of the model, or the contact whose friction force or mode the output is.
+    """
+    if len(run.contacts) == 1:
+        return str(run.contacts[0])
+    mode_names = run.events.mode_names if run.events else {}
+    return next((contact for contact in run.contacts if name in (contact, mode_names.get(contact))), "")

@@ -3,7 +3,7 @@
 A contact of an FMU of this project has a friction force and a mode. Its name is that of its force.
 """
 
-from collections.abc import Collection, ItemsView, Iterator, KeysView, Mapping, Sequence, ValuesView
+from collections.abc import ItemsView, Iterator, KeysView, Mapping, Sequence, ValuesView
 from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     import xarray
     from matplotlib.axes import Axes
 
-MAX_PANELS = 8  # of a plot without named outputs
 MIN_SAMPLES = 8  # in a half cycle or a slip: a parabola through the top samples is then accurate to 1e-4
 
 
@@ -243,7 +242,7 @@ class Signals:
         """
         import matplotlib.pyplot as plt
 
-        from .plot import draw_panels, plot_output
+        from .plot import choose_plotted, draw_panels, list_inputs, plot_output
 
         check_names("column", (*names, *filter(None, [x])), self.columns)
         texts = [name for name in (*names, *filter(None, [x])) if self.columns[name].dtype.kind == "U"]
@@ -252,23 +251,12 @@ class Signals:
         if ax is not None:
             if len(names) > 1:
                 raise HarnessError(f"ax has room for one output, and {len(names)} are named: name one")
-            if not (chosen := names or self.plotted):
+            if not (chosen := names or choose_plotted(self)):
                 raise HarnessError(f"{self.name} has no output with a curve")
             plot_output(ax, self, chosen[0], x)
             return np.array([ax])
         figure = plt.figure()
-        return draw_panels(figure, self, names or self.plotted, [] if names or x else self.plotted_inputs, x)
-
-    @property
-    def plotted(self) -> tuple[str, ...]:
-        """The outputs that are plotted if none is named."""
-        numeric = [name for name, column in self.columns.items() if column.dtype.kind != "U"]
-        return choose_outputs(numeric, self.contacts, MAX_PANELS)
-
-    @property
-    def plotted_inputs(self) -> list[str]:
-        """The input signals that are plotted."""
-        return []
+        return draw_panels(figure, self, names or choose_plotted(self), [] if names or x else list_inputs(self), x)
 
     @property
     def contacts(self) -> tuple[str, ...]:
@@ -282,45 +270,34 @@ class Signals:
             return {}
         return {contact: self.events.sticking(contact, float(self.time[-1])) for contact in self.contacts}
 
-    def contact_of(self, name: str) -> str:
-        """Return the contact whose sticking is shown in the panel of an output; empty if there is none.
 
-        It is the only contact of the model, or the contact whose friction force or mode the output is.
-        """
-        if len(self.contacts) == 1:
-            return self.contacts[0]
-        mode_names = self.events.mode_names if self.events else {}
-        return next((contact for contact in self.contacts if name in (contact, mode_names.get(contact))), "")
-
-    def sample_at(self, times: np.ndarray, names: Sequence[str]) -> np.ndarray:
-        """Return the named outputs, (n, names), at the recorded times nearest to `times` (n,) in s."""
-        nearest = np.abs(self.time[:, None] - times).argmin(axis=0)
-        return np.column_stack([self.columns[name][nearest] for name in names])
-
-    def find_changes(self, name: str) -> list[tuple[float, int]]:
-        """Return every change of an integer output as (time in s, new value)."""
-        values = self[name]
-        after = np.flatnonzero(np.diff(values)) + 1
-        return list(zip(self.time[after].tolist(), values[after].tolist(), strict=True))
-
-    def check_sampling(self, starts: np.ndarray, ends: np.ndarray, interval_name: str) -> None:
-        """Raise HarnessError if an interval between `starts` and `ends` (n,), in s, has fewer than MIN_SAMPLES samples.
-
-        `interval_name` is the name of an interval in the message.
-        """
-        counts = np.searchsorted(self.time, ends, "right") - np.searchsorted(self.time, starts, "left")
-        if len(counts) and counts.min() < MIN_SAMPLES:
-            i = int(np.argmin(counts))
-            # half of the necessary step: with few samples the bounds of an interval are uncertain
-            step = 0.5 * float((ends - starts).min()) / MIN_SAMPLES
-            raise HarnessError(
-                f"each {interval_name} needs at least {MIN_SAMPLES} samples, and the one from t = {starts[i]:.6g} s to "
-                f"{ends[i]:.6g} s has {counts[i]}: set grid to {step:.1g} s or less"
-            )
+def sample_at(signals: Signals, times: np.ndarray, names: Sequence[str]) -> np.ndarray:
+    """Return the named outputs, (n, names), at the recorded times nearest to `times` (n,) in s."""
+    nearest = np.abs(signals.time[:, None] - times).argmin(axis=0)
+    return np.column_stack([signals.columns[name][nearest] for name in names])
 
 
-def choose_outputs(outputs: Sequence[str], contacts: Collection[str], count: int) -> tuple[str, ...]:
-    """Return the first outputs, at most `count`, with preference for friction forces."""
-    forces = [name for name in outputs if name in contacts][:count]
-    others = [name for name in outputs if name not in contacts][: count - len(forces)]
-    return tuple(name for name in outputs if name in forces or name in others)
+def column_of_role(signals: Signals, role: str) -> np.ndarray:
+    """Return the recorded position, velocity or acceleration (n,)."""
+    return signals.columns[signals.motion_outputs[role]]
+
+
+def check_sampling(time: np.ndarray, starts: np.ndarray, ends: np.ndarray, interval_name: str) -> None:
+    """Raise HarnessError if an interval between `starts` and `ends` (n,), in s, has fewer than MIN_SAMPLES samples.
+
+    Parameters
+    ----------
+    time : numpy.ndarray
+        Times of the samples in s.
+    interval_name : str
+        Name of an interval in the message.
+    """
+    counts = np.searchsorted(time, ends, "right") - np.searchsorted(time, starts, "left")
+    if len(counts) and counts.min() < MIN_SAMPLES:
+        i = int(np.argmin(counts))
+        # half of the necessary step: with few samples the bounds of an interval are uncertain
+        step = 0.5 * float((ends - starts).min()) / MIN_SAMPLES
+        raise HarnessError(
+            f"each {interval_name} needs at least {MIN_SAMPLES} samples, and the one from t = {starts[i]:.6g} s to "
+            f"{ends[i]:.6g} s has {counts[i]}: set grid to {step:.1g} s or less"
+        )

@@ -148,16 +148,11 @@ class Trajectory(Signals, Result):
     def title(self) -> str:
         return self.name
 
-    @property
-    def plotted_inputs(self) -> list[str]:
-        """The input signals that are plotted."""
-        return [name for name in self.spec.inputs if name != "time" and name not in self.columns]
-
     def draw(self, figure: "Figure") -> None:
-        from .plot import draw_panels
+        from .plot import choose_plotted, draw_panels, list_inputs
 
-        if self.plotted:
-            draw_panels(figure, self, self.plotted, self.plotted_inputs)
+        if plotted := choose_plotted(self):
+            draw_panels(figure, self, plotted, list_inputs(self))
 
     def draw_panel(self, axes: "Axes") -> None:
         self.plot(ax=axes)
@@ -167,7 +162,7 @@ class Trajectory(Signals, Result):
 
     def as_json(self) -> dict[str, Any]:
         spans = {name: dict(zip(SPAN, span_of(column), strict=True)) for name, column in self.columns.items()}
-        stuck = {name: {"changes": changes, "stuck": duration} for name, changes, duration in self.rests()}
+        stuck = {name: {"changes": changes, "stuck": duration} for name, changes, duration in list_rests(self)}
         return {
             "fmu": self.name,
             "note": self.accuracy,
@@ -176,15 +171,6 @@ class Trajectory(Signals, Result):
             "outputs": {name: {"unit": self.units[name]} | span for name, span in spans.items()},
             **({"contacts": stuck} if self.events else {}),
         }
-
-    def rests(self) -> list[tuple[str, int, float]]:
-        """Return for each contact its name, its number of changes of mode, and the time in s for which it sticks."""
-        if self.events is None:
-            return []
-        return [
-            (name, len(self.events.changes(name)[0]) - 1, sum(end - begin for begin, end in rests))
-            for name, rests in self.sticking.items()
-        ]
 
     def blocks(self) -> list[Any]:
         table = make_terminal_table()
@@ -197,7 +183,7 @@ class Trajectory(Signals, Result):
             table.add_row(name, *cells, "" if self.units[name] == "1" else self.units[name])
         contacts = (
             f"{name}: {changes} change{'s' * (changes != 1)} of mode, sticks for {duration:.6g} s"
-            for name, changes, duration in self.rests()
+            for name, changes, duration in list_rests(self)
         )
         return [table, "", *contacts, *filter(None, [self.accuracy])]
 
@@ -215,19 +201,6 @@ class Trajectory(Signals, Result):
     def is_stored(cls, folder: Path) -> bool:
         return (folder / "trajectory.csv").is_file()
 
-    def column_of_role(self, role: str) -> np.ndarray:
-        """Return the recorded position, velocity or acceleration (n,)."""
-        return self.columns[self.motion_outputs[role]]
-
-    def get_parameter(self, name: str, purpose: str) -> float:
-        """Return a parameter's value; raise HarnessError if the model does not have it."""
-        value = self.parameters.get(name)
-        if not isinstance(value, float):
-            raise HarnessError(
-                f"{purpose} needs the parameter '{name}', which {self.spec.model} does not have: remove it"
-            )
-        return value
-
     def write_tables(self, directory: Path) -> None:
         """Write trajectory.csv, and steps.csv and events.csv if there are steps and events."""
         write_signals(directory / "trajectory.csv", self.time, self.columns, self.units)
@@ -237,6 +210,24 @@ class Trajectory(Signals, Result):
         if self.events:
             columns = [self.events.t, *self.events.modes.values()]
             write_csv(directory / "events.csv", ["t [s]", *self.events.headings], columns)
+
+
+def list_rests(run: Trajectory) -> list[tuple[str, int, float]]:
+    """Return for each contact its name, its number of changes of mode, and the time in s for which it sticks."""
+    if run.events is None:
+        return []
+    return [
+        (name, len(run.events.changes(name)[0]) - 1, sum(end - begin for begin, end in rests))
+        for name, rests in run.sticking.items()
+    ]
+
+
+def get_parameter(run: Trajectory, name: str, purpose: str) -> float:
+    """Return a parameter's value; raise HarnessError if the model does not have it."""
+    value = run.parameters.get(name)
+    if not isinstance(value, float):
+        raise HarnessError(f"{purpose} needs the parameter '{name}', which {run.spec.model} does not have: remove it")
+    return value
 
 
 def summarize_run(run: Trajectory, title: str) -> Summary:

@@ -5,8 +5,9 @@ from math import cos, exp, pi, sin, sqrt
 import numpy as np
 import pytest
 
-from harness import HarnessError, Signals
+from harness import HarnessError
 from harness.analyses.decay.decrement import (
+    check_sampling,
     damping_ratio,
     find_extrema_from_velocity,
     friction_from_envelope,
@@ -107,7 +108,6 @@ def test_a_signal_without_decay_is_refused(x_0, x_n):
 
 def test_a_half_cycle_needs_eight_samples_with_those_at_its_ends():
     time = np.arange(16.0)
-    run = Signals(time, {}, {})
-    run.check_sampling(time[[0, 7]], time[[7, 14]], "half cycle")
+    check_sampling(time, time[[0, 7]], time[[7, 14]], "half cycle")
     with pytest.raises(HarnessError, match="the one from t = 7 s to 13 s has 7"):
-        run.check_sampling(time[[0, 7]], time[[7, 13]], "half cycle")
+        check_sampling(time, time[[0, 7]], time[[7, 13]], "half cycle")

@@ -19,10 +19,11 @@ import numpy as np
 
 from ...errors import HarnessError
 from ...results.quantity import Quantity
+from ...running.signals import check_sampling, column_of_role
 from .law import damping_ratio, friction_from_envelope
 
 if TYPE_CHECKING:
-    from ...running.trajectory import Trajectory  # only for annotations: a record from a file needs no FMU
+    from ...running.trajectory import Trajectory
 
 
 FORCES = {"f": ("N", "friction force", False), "T_f": ("N.m", "joint torque", True)}  # unit, text, is a rotation
@@ -69,10 +70,10 @@ def analyse(run: "Trajectory", gives: str, first: int = 0, cycles: float | None 
         If the run shows no decay, or has too few turning points or samples.
     """
     times, positions = find_extrema_from_velocity(
-        run.time, run.column_of_role("position"), run.column_of_role("velocity")
+        run.time, column_of_role(run, "position"), column_of_role(run, "velocity")
     )
     times, positions, cycles = select_cycles(times, positions, first, cycles)
-    run.check_sampling(times[:-1], times[1:], "half cycle")
+    check_sampling(run.time, times[:-1], times[1:], "half cycle")
     x_0, x_n = float(abs(positions[0])), float(abs(positions[-1]))
     if gives == "zeta":
         result = Quantity("zeta", damping_ratio(x_0, x_n, cycles), "1", f"damping ratio, {cycles:g} cycles")
@@ -92,13 +93,15 @@ def analyse(run: "Trajectory", gives: str, first: int = 0, cycles: float | None 
 
 def stiffness(run: "Trajectory", is_rotation: bool, purpose: str) -> float:
     """Return k of a spring or m g a of a pendulum; HarnessError with the `purpose` if the model has neither."""
-    return prod(run.get_parameter(name, purpose) for name in (("m", "g", "a") if is_rotation else ("k",)))
+    from ...running.trajectory import get_parameter
+
+    return prod(get_parameter(run, name, purpose) for name in (("m", "g", "a") if is_rotation else ("k",)))
 
 
 def sampled_peak(run: "Trajectory", time: float) -> float:
     """Return the larger of the two samples around a turning point: the peak that a plot of the samples shows."""
     i = int(np.clip(np.searchsorted(run.time, time), 1, len(run.time) - 1))
-    return float(np.abs(run.column_of_role("position")[i - 1 : i + 1]).max())
+    return float(np.abs(column_of_role(run, "position")[i - 1 : i + 1]).max())
 
 
 def find_extrema_from_velocity(t: np.ndarray, x: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -5,16 +5,15 @@ from contextlib import suppress
 from dataclasses import replace
 from os.path import exists
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from ...analyses.decay.decrement import stiffness
 from ...analyses.decay.estimates import KnownParameters
 from ...errors import HarnessError, SceneError, format_value
 from ...records.columns import ColumnOptions
 from ...records.record import Record, load_record
-from ...running.runner import run
-from ...running.trajectory import Trajectory
-from ...scenes.fmu_files import check_built
-from ...scenes.scene import load_scene
+
+if TYPE_CHECKING:
+    from ...running.trajectory import Trajectory
 
 
 def is_record_file(source: str) -> bool:
@@ -23,7 +22,7 @@ def is_record_file(source: str) -> bool:
     return source == "-" or (path.suffix.lower() != ".toml" and (path.is_file() or path.is_fifo() or bool(path.suffix)))
 
 
-def load_source(source: str, columns: ColumnOptions, report: Callable[[float], None]) -> Record | Trajectory:
+def load_source(source: str, columns: ColumnOptions, report: Callable[[float], None]) -> "Record | Trajectory":
     """Return the record in a file, or the run of a scene under its name.
 
     Raises
@@ -37,6 +36,10 @@ def load_source(source: str, columns: ColumnOptions, report: Callable[[float], N
         return load_record(source, columns)
     if Path(source).is_dir():
         raise SceneError(f"{source} is a folder; give a file in it")
+    from ...running.runner import run
+    from ...scenes.fmu_files import check_built
+    from ...scenes.scene import load_scene
+
     scene = load_scene(source)
     check_built(scene.run.fmu)
     if "position" not in scene.run.motion_outputs:
@@ -53,8 +56,10 @@ def load_source(source: str, columns: ColumnOptions, report: Callable[[float], N
     return replace(trajectory, label=scene.name)
 
 
-def read_parameters(trajectory: Trajectory) -> KnownParameters:
+def read_parameters(trajectory: "Trajectory") -> KnownParameters:
     """Return the stiffness of the model of a run; a model without one has no friction force."""
+    from ...analyses.decay.decrement import stiffness
+
     is_rotation = trajectory.units[trajectory.motion_outputs["position"]] == "rad"
     with suppress(HarnessError):
         return KnownParameters(stiffness(trajectory, is_rotation, "the decay of a run"), pendulum=is_rotation)

@@ -24,6 +24,7 @@ from ...references.models import CASES
 from ...references.ode_problem import UnspecifiedProblem
 from ...running.embedded_model import EmbeddedModel, load_model_class, method_numbers
 from ...running.runner import run_own_fmu
+from ...running.signals import Signals, sample_at
 from ...running.solution import Solution
 from ...running.timing import time_call
 from ...scenes.fmu_files import find_fmu, fmi3_path
@@ -239,8 +240,8 @@ class CaseRunner:
         repeat = repeats(recording.statistics.seconds, settings.budget)
         timed = run_own_fmu(replace(spec, repeat=repeat)).statistics
         assert timed
-        events = recording.find_changes(*modes) if modes else None
-        motion, evaluations = recording.sample_at(self.times, states), recording.statistics.evaluations
+        events = find_changes(recording, *modes) if modes else None
+        motion, evaluations = sample_at(recording, self.times, states), recording.statistics.evaluations
         solution = Solution(self.times, motion, events, evaluations)
         return solution, min(timed.seconds, recording.statistics.seconds)
 
@@ -326,3 +327,10 @@ def best_time(call: Callable[[], object], budget: float) -> float:
 def repeats(once: float, budget: float) -> int:
     """Return how often a call of `once` s is repeated within a budget in s."""
     return 1 if once > 4 * budget else max(2, min(MAX_REPEATS, int(budget / once)))
+
+
+def find_changes(signals: Signals, name: str) -> list[tuple[float, int]]:
+    """Return every change of an integer output as (time in s, new value)."""
+    values = signals[name]
+    after = np.flatnonzero(np.diff(values)) + 1
+    return list(zip(signals.time[after].tolist(), values[after].tolist(), strict=True))

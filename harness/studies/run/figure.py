@@ -30,7 +30,7 @@ from ...results.style import (
 from ...results.summary import SKETCH_SIZE, Sketch
 from ...running.fmu_archive import exposes_solver_steps, read_description
 from ...running.model_data import LookupTable, read_model_data
-from ...running.plot import draw_sticking, draw_table
+from ...running.plot import contact_of, draw_sticking, draw_table
 from ...running.runner import run_own_fmu
 from ...running.trajectory import Trajectory
 from ...scenes.scene import MAX_DEFAULT_PLOTS, KnownValues, is_panel
@@ -163,7 +163,7 @@ def plot_output(axes: Axes, plotted: PlottedRun, name: str) -> None:
     values, (unit, size) = plotted.values(name), plotted.unit(name)
     style = "steps-post" if values.dtype.kind in "iu" else "default"
     axes.plot(run.time, values, color=BLUE, drawstyle=style)
-    mark_modes(axes, run, run.contact_of(name))
+    mark_modes(axes, run, contact_of(run, name))
     level = plotted.known_value(PEAK_LEVELS.get(role, ""))
     if level is not None:
         axes.axhline(level / size, color=GREEN, linestyle=":", label=f"{plotted.kind} peak")

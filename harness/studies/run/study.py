@@ -17,7 +17,7 @@ from ...results.quantity import Quantity
 from ...results.registry import find_study
 from ...results.summary import write_summary
 from ...running import runner
-from ...running.signals import choose_outputs
+from ...running.plot import choose_outputs, contact_of
 from ...running.trajectory import Trajectory, summarize_run
 from ...scenes.fmu_files import check_built
 from ...scenes.run_spec import RunSpec
@@ -186,5 +186,5 @@ def choose_plots(run: Trajectory) -> tuple[str, ...]:
     outputs = run.spec.outputs
     if len(run.contacts) < 2:
         return default_plots(outputs, choose_outputs(outputs, run.contacts, MAX_DEFAULT_PLOTS))
-    others = [name for name in outputs if not run.contact_of(name)]
+    others = [name for name in outputs if not contact_of(run, name)]
     return default_plots(outputs, (*others[:MAX_DEFAULT_PLOTS], *run.contacts[:MAX_DEFAULT_PLOTS]))

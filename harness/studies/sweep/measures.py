@@ -14,7 +14,8 @@ from ...analyses.decay.decrement import find_extrema_from_velocity
 from ...analyses.decay.law import damping_ratio, friction_from_envelope
 from ...analyses.slip import peak_value, slips_from_modes, upward_crossings
 from ...errors import HarnessError
-from ...running.trajectory import Trajectory
+from ...running.signals import column_of_role
+from ...running.trajectory import Trajectory, get_parameter
 from ...running.variable_values import variable_unit
 from ...scenes.roles import find_roles
 
@@ -63,9 +64,9 @@ def slip_starts(run: Trajectory) -> np.ndarray:
     """Return the times in s at which slips begin."""
     if run.events is not None:
         return slips_from_modes(run.events.t, run.events.mode)[0]
-    driver = run.get_parameter("v_driver", "the measure 'slips'")
+    driver = get_parameter(run, "v_driver", "the measure 'slips'")
     return (
-        upward_crossings(run.time, run.column_of_role("velocity") * np.sign(driver) - abs(driver))
+        upward_crossings(run.time, column_of_role(run, "velocity") * np.sign(driver) - abs(driver))
         if driver
         else np.array([])
     )
@@ -77,7 +78,7 @@ def period(run: Trajectory) -> float:
 
 
 def peak_speed(run: Trajectory) -> float:
-    speed = np.abs(run.column_of_role("velocity"))
+    speed = np.abs(column_of_role(run, "velocity"))
     return peak_value(run.time, speed, np.ones(len(speed), bool))
 
 
@@ -89,19 +90,19 @@ def stuck(run: Trajectory) -> float:
 
 
 def rest(run: Trajectory) -> float:
-    return float(run.column_of_role("position")[-1]) if run.events and run.events.mode[-1] == 0 else np.nan
+    return float(column_of_role(run, "position")[-1]) if run.events and run.events.mode[-1] == 0 else np.nan
 
 
 def unsteady(run: Trajectory) -> float:
-    driver = run.get_parameter("v_driver", "the measure 'unsteady'")
-    second_half = run.column_of_role("velocity")[2 * run.time > run.time[0] + run.time[-1]]
+    driver = get_parameter(run, "v_driver", "the measure 'unsteady'")
+    second_half = column_of_role(run, "velocity")[2 * run.time > run.time[0] + run.time[-1]]
     return float(np.ptp(second_half) / 2 / abs(driver)) if driver else np.nan
 
 
 def evaluate_decay(run: Trajectory, law: Callable[[float, float, float], float]) -> float:
     """Evaluate `law` for the first and last turning point of a free decay about zero."""
     _, extrema_values = find_extrema_from_velocity(
-        run.time, run.column_of_role("position"), run.column_of_role("velocity")
+        run.time, column_of_role(run, "position"), column_of_role(run, "velocity")
     )
     sizes = extrema_values * np.where(np.arange(len(extrema_values)) % 2, -1.0, 1.0) * np.sign(extrema_values[:1])
     extrema_values = sizes[sizes > 0]  # the last one may stop on the same side
