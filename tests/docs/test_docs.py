@@ -2,6 +2,7 @@
 without warnings."""
 
 import doctest
+import html
 import importlib.util
 import os
 import re
@@ -10,6 +11,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from commands import harness as harness_command
 from commands import run_process
 
 import harness
@@ -48,10 +50,41 @@ def run_page(page, folder, environment):
     assert done.returncode == 0, done.stderr
 
 
+def figure_texts(svg):
+    """Return the texts of a figure as one string; tick labels that are powers are comments, and left out."""
+    return " ".join(map(html.unescape, re.findall(r"<text[^>]*>([^<]+)</text>", svg)))
+
+
+def is_number(word):
+    """Return whether a word is a number, as those of tick labels."""
+    return re.fullmatch(r"[-+\d.e]+", word.replace("\N{MINUS SIGN}", "-")) is not None
+
+
+def assert_same_texts(picture, figure):
+    """The picture of the pages has the texts of the figure of a run; only its tick labels differ."""
+    shown, drawn = (figure_texts(path.read_text(encoding="utf-8")).split() for path in (picture, figure))
+    message = f"{picture.name} shows another run: python docs/make_images.py {picture.stem}"
+    assert set(drawn) - set(shown) == set(), message
+    assert {word for word in set(shown) - set(drawn) if not is_number(word)} == set(), message
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("page", [page for page in PAGES if runnable(page)])
-def test_code_blocks_run(page, workspace, environment):
+def test_code_blocks_run_and_draw_the_pictures_of_the_page(page, workspace, environment):
     run_page(DOCS / page, workspace, environment)
+    for name, (source, file) in load("make_images").FIGURES_OF_PAGES.items():
+        if source == page:
+            (figure,) = workspace.glob(file)
+            assert_same_texts(DOCS / "images" / f"{name}.svg", figure)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["coulomb", "pendulum"])
+def test_the_picture_of_a_scene_is_that_of_its_run(name, workspace):
+    command, file = load("make_images").FIGURES_OF_COMMANDS[name]
+    done = harness_command(workspace, *command.split()[1:])
+    assert done.returncode == 0, done.stderr
+    assert_same_texts(DOCS / "images" / f"{name}.svg", workspace / file)
 
 
 @pytest.mark.slow

@@ -238,6 +238,19 @@ def test_a_jump_of_the_force_costs_few_steps(launch):
     assert steps[1] < steps[0] + 2 * piecewise_solution("jump")[1]
 
 
+@pytest.mark.parametrize("name", ["jump", "relay", "backlash"])
+def test_a_change_costs_at_most_fifty_evaluations_and_no_accuracy(launch, name):
+    """As the page on own models says, against the mass on its spring without a condition."""
+    evaluations = []
+    for model, values in (("jump", {"f": 0.0}), (name, {})):
+        fmu = launch(model, method=ODE45, rtol=1e-6, **values)
+        fmu.step(0.0, STOP)
+        evaluations.append(fmu.get("solver.evaluations"))
+    (x, _), changes = piecewise_solution(name)
+    assert evaluations[1] <= evaluations[0] + 50 * changes
+    assert abs(fmu.get("x") - x) < 1e-6
+
+
 def test_a_condition_at_its_limit_at_the_start_changes_at_once(launch):
     """A mass at rest touches a spring, and a force presses it on: half of the motion of the free mass and spring."""
     for method in METHODS:

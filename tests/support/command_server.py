@@ -2,7 +2,7 @@
 
 `start_programs(folder)` writes the programs friction-fmus and run_blocks into a folder. They pass arguments, folder,
 environment and streams to the server, and end with the exit status of its child process. Each command has a process of
-its own, in which no other one ran. Its figures are empty files, because drawing takes most of a run.
+its own, in which no other one ran. Its figures have only texts, because drawing takes most of a run.
 """
 
 import atexit
