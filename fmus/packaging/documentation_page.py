@@ -74,7 +74,8 @@ def documentation_page(
         ("Outputs", [pair for pair in numbers if pair[1].causality == "output"]),
         ("Solver and events", [pair for pair in numbers if "." in pair[0]]),
     ):
-        parts += [f"<h2>{title}</h2>", _variable_table(rows)]
+        if rows:
+            parts += [f"<h2>{title}</h2>", _variable_table(rows)]
     parts += ["<h2>Use</h2>", USAGE + use, _capabilities_table(), _footer(model, result)]
     head = f"<meta charset='utf-8'><meta name='viewport' content='width=device-width'><title>{escape(name)}</title>"
     style = STYLE.read_text(encoding="utf-8")

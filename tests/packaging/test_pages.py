@@ -204,6 +204,16 @@ def test_a_model_without_a_certified_result_has_a_page():
     assert "sixth" in reader.text
 
 
+@pytest.mark.parametrize(("causality", "title"), [("input", "Input"), ("parameter", "Parameters")])
+def test_a_page_has_no_table_without_rows(causality, title):
+    model = model_class("smd")
+    variables = [pair for pair in declared_variables(model) if pair[1].causality != causality]
+    page = documentation_page(model, "free", variables, None, [], "", "").decode()
+    assert f"<h2>{title}</h2>" not in page
+    assert "<h2>Outputs</h2>" in page
+    assert all("<td" in table for table in re.findall(r"<table.*?</table>", page, re.S))
+
+
 def test_names_are_typeset_and_escaped():
     assert typeset("a < b & mu_s^2 - k x") == "a &lt; b &amp; &mu;<sub>s</sub><sup>2</sup> &minus; k x"
 
