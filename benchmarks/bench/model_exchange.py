@@ -131,7 +131,7 @@ def run_fmpy(scene: Scenario, rtol: float, exchange: bool = True) -> Trajectory:
 
 
 def run_fmusim(scene: Scenario, rtol: float) -> Trajectory:
-    """Run the FMI 3.0 FMU with fmusim."""
+    """Run the FMI 3.0 FMU with fmusim 0.8."""
     program, case = shutil.which("fmusim"), scene.case
     if program is None:
         raise MissingToolError("not installed: fmusim")
@@ -141,15 +141,23 @@ def run_fmusim(scene: Scenario, rtol: float) -> Trajectory:
         raise MissingToolError("fmusim does not distinguish times with a relative difference below 1e-5")
     with temporary_directory("fmusim-") as folder:
         file, input_file = folder / "out.csv", folder / "in.csv"
-        command = [program, "--interface-type", "me", "--solver", "cvode", "--tolerance", repr(rtol)]
-        command += ["--start-time", repr(scene.start), "--stop-time", repr(scene.stop)]
-        command += ["--output-interval", repr(scene.run.grid), "--output-file", str(file)]
-        command += [word for name, value in scene.run.values.items() for word in ("--start-value", name, repr(value))]
+        options = {
+            "interface-type": "me",
+            "solver": "cvode",
+            "tolerance": repr(rtol),
+            "start-time": repr(scene.start),
+            "stop-time": repr(scene.stop),
+            "output-interval": repr(scene.run.grid),
+            "output-file": str(file),
+        }
         if inputs := scene.run.inputs:
             rows = np.column_stack([*inputs.values()])
             np.savetxt(input_file, rows, "%.17g", ",", header=",".join(inputs), comments="")
-            command += ["--input-file", str(input_file)]
-        process = run_subprocess([*command, str(fmi3_fmu(case.model))])
+            options["input-file"] = str(input_file)
+        command = [program, "simulate", str(fmi3_fmu(case.model))]
+        command += [f"--{name}={value}" for name, value in options.items()]
+        command += [f"--start-value={name}={value!r}" for name, value in scene.run.values.items()]
+        process = run_subprocess(command)
         if process.returncode:
             raise HarnessError(
                 " ".join((process.stderr or process.stdout).split()) or "fmusim failed without a message"

@@ -3,7 +3,9 @@
 import csv
 import ctypes
 import json
+import os
 import shutil
+import sys
 from dataclasses import replace
 from functools import partial
 from math import atan, inf, nan, sin
@@ -259,6 +261,47 @@ def test_model_exchange_errors_match_cvode_with_explicit_events(scene, both_back
 def test_model_exchange_and_co_simulation_agree_and_count_the_same_events(scene, both_backends):
     """Also at ties, where the last bit or physics decides."""
     assert model_exchange.difference_from_cosimulation(scene).is_met
+
+
+FMUSIM = """#!{python}
+# The command line of fmusim 0.8, by its source
+import argparse, json
+parser = argparse.ArgumentParser(allow_abbrev=False)
+simulate = parser.add_subparsers(required=True).add_parser("simulate", allow_abbrev=False)
+simulate.add_argument("fmu_file")
+for name in ("start-time", "stop-time", "tolerance", "output-interval"):
+    simulate.add_argument(f"--{{name}}", type=float)
+for name in ("input-file", "output-file"):
+    simulate.add_argument(f"--{{name}}")
+simulate.add_argument("--start-value", dest="values", action="append", type=lambda text: text.split("=", 1), default=[])
+simulate.add_argument("--interface-type", choices=["me", "cs"])
+simulate.add_argument("--solver", choices=["euler", "cvode"])
+given = parser.parse_args()
+open(given.output_file, "w").write("time,{columns}\\n0.0,{row}\\n" + f"{{given.stop_time}},{row}\\n")
+given.inputs = open(given.input_file).readline().strip() if given.input_file else ""
+json.dump(vars(given), open(__file__ + ".json", "w"))
+"""
+
+
+@pytest.mark.parametrize("number", [0, -1])
+def test_fmusim_is_called_by_its_present_command_line(both_backends, tmp_path, monkeypatch, number):
+    """Start values are one word, name=value; the last scene has inputs."""
+    scenes = [
+        scene for scene in (*model_exchange.DEFAULT_SCENARIOS, *model_exchange.DRIVEN_SCENARIOS) if not scene.has_ramps
+    ]
+    scene, program = scenes[number], tmp_path / "fmusim"
+    names = scene.case.run.outputs
+    program.write_text(
+        FMUSIM.format(python=sys.executable, columns=",".join(names), row=",".join("1.5" for _ in names))
+    )
+    program.chmod(0o755)
+    monkeypatch.setenv("PATH", str(tmp_path), os.pathsep)
+    trajectory = model_exchange.run_fmusim(scene, 1e-8)
+    given = json.loads((tmp_path / "fmusim.json").read_text())
+    assert (given["interface_type"], given["solver"], given["tolerance"]) == ("me", "cvode", 1e-8)
+    assert dict(given["values"]) == {name: repr(value) for name, value in scene.run.values.items()}
+    assert given["inputs"] == ",".join(scene.run.inputs or ())
+    assert trajectory.columns[names[0]].tolist() == [1.5, 1.5]
 
 
 @pytest.mark.skipif(c_host.COMPILER is None, reason="there is no C compiler on this machine: install gcc")
