@@ -51,20 +51,68 @@ def solve_by_events(times):
 
 
 @pytest.fixture
-def iwan(tmp_path):
-    page = (DOCS / "explanation" / "limits.md").read_text(encoding="utf-8")
-    (block,) = [block for block in scripts.find_blocks(page) if block.title == "iwan.py"]
-    (tmp_path / "iwan.py").write_text(block.text)
-    done = commands.build("iwan.py", folder=tmp_path)
-    assert (done.returncode, done.stderr) == (0, "")
-    return tmp_path / "iwan.fmu"
+def build_model(tmp_path):
+    """Return build_model(name): the FMU of a model file of the page."""
+
+    def build_model(name):
+        page = (DOCS / "explanation" / "limits.md").read_text(encoding="utf-8")
+        (block,) = [block for block in scripts.find_blocks(page) if block.title == f"{name}.py"]
+        (tmp_path / f"{name}.py").write_text(block.text)
+        done = commands.build(f"{name}.py", folder=tmp_path)
+        assert (done.returncode, done.stderr) == (0, "")
+        return tmp_path / f"{name}.fmu"
+
+    return build_model
 
 
-def test_jenkins_elements_agree_with_a_solution_by_events(iwan):
+def test_jenkins_elements_agree_with_a_solution_by_events(build_model):
     times = np.linspace(0.0, STOP, 41)
-    run = harness.simulate(iwan, times=times, rtol=1e-10)
+    run = harness.simulate(build_model("iwan"), times=times, rtol=1e-10)
     expected = solve_by_events(times[1:])
     assert np.abs(run.columns["x"][1:] - expected).max() < 1e-8
     up, down = run.columns["F_elements"].max(), run.columns["F_elements"].min()
     assert 4.9 < up < 5.0 + 1e-9  # both slide: 2 N + 3 N
     assert -4.2 - 1e-9 < down < -4.1
+
+
+def path_end(F, f, phi0):
+    """Return time and place at which a mass of 1 kg stops that is launched at 1 m/s at an angle to a constant force.
+
+    With u = tan(phi/2) and k = f/F, the speed is proportional to u^k (1 + u^2)/u.
+    """
+    k, u = f / F, np.tan(0.5 * phi0)
+    C = 2.0 * u ** (1.0 - k) / (1.0 + u * u)
+    t = C / (2.0 * F) * (u ** (k - 1.0) / (k - 1.0) + u ** (k + 1.0) / (k + 1.0))
+    x = C * C / (4.0 * F) * (u ** (2.0 * k - 2.0) / (2.0 * k - 2.0) - u ** (2.0 * k + 2.0) / (2.0 * k + 2.0))
+    y = C * C / (2.0 * F) * (u ** (2.0 * k - 1.0) / (2.0 * k - 1.0) + u ** (2.0 * k + 1.0) / (2.0 * k + 1.0))
+    return t, x, y
+
+
+def test_a_body_on_a_plane_stops_by_the_closed_form_and_holds_within_a_circle(build_model):
+    disc = build_model("disc")
+    for F, phi0 in ((1.0, np.pi / 2), (1.9, np.pi / 2), (0.1, 2.0), (1.0, 3.0)):
+        t, x, y = path_end(F, 2.0, phi0)
+        force = {"time": [0.0, 2.0 * t], "F_x": [F, F], "F_y": [0.0, 0.0]}
+        run = harness.simulate(disc, {"phi0": phi0}, stop=1.5 * t, inputs=force, rtol=1e-8)
+        assert run.events.t[-1] == pytest.approx(t, abs=1e-7)
+        assert (run["x"][-1], run["y"][-1]) == pytest.approx((x, y), abs=1e-7)
+        assert run["s"][-1] == 0.0
+    for angle in (
+        0.4,
+        2.5,
+        -1.9,
+    ):  # at rest along x, the load turns anywhere: below the limit it holds, above it slides
+        loads = np.array(
+            [
+                [0.0, 0.0],
+                [0.0, 0.0],
+                *[[size * np.cos(angle), size * np.sin(angle)] for size in (1.999, 1.999, 3.0, 3.0)],
+            ]
+        )
+        times = [0.0, 1.0, 1.0, 2.0, 2.0, 4.0]
+        run = harness.simulate(
+            disc, stop=4.0, inputs={"time": times, "F_x": loads[:, 0], "F_y": loads[:, 1]}, rtol=1e-8
+        )
+        assert run.events.t[1:].tolist() == pytest.approx([0.5, 2.0], abs=1e-9)
+        moved = np.hypot(run["x"][-1] - 0.25, run["y"][-1])
+        assert moved == pytest.approx(0.5 * 1.0 * 2.0**2, rel=1e-5)
