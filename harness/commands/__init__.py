@@ -61,21 +61,16 @@ def commands(context: click.Context, terminal: Terminal) -> None:
     # options before the command apply to the command as well
     context.default_map = dict.fromkeys(commands.commands, vars(terminal))
     if context.invoked_subcommand is None:
-        from ..report.verdicts import judge_cases
         from ..studies.run import study
-        from ..studies.run.table import judge_outcomes, results_table
+        from ..studies.run.table import conclude, explain_chatter, results_table
 
         names = study.compared_scene_names()
         with terminal.progress(len(names)) as report:
             outcomes = list(study.run_scenes(names, terminal.out, report))
         rows = [outcome_as_json(outcome, terminal.out) for outcome in outcomes]
         failed = (outcome.error for outcome in outcomes if outcome.error)
-        table = results_table(outcomes, everything=False)
-        verdicts = [
-            "\n  ".join((f"{verdict.value} {verdict.meaning}.", *verdict.details))
-            for verdict in judge_cases(judge_outcomes(outcomes))
-        ]
-        terminal.print_result(rows, table, "", *verdicts, folder=terminal.out, failed=failed)
+        blocks = [results_table(outcomes, everything=False), "", *filter(None, [explain_chatter(outcomes)])]
+        terminal.print_result(rows, *blocks, folder=terminal.out, failed=failed, conclusion=conclude(outcomes))
 
 
 commands.checks = ("precision", "stability", "references")

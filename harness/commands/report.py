@@ -9,27 +9,22 @@ from .terminal import SectionedCommand, json_option, out_option, print_json, qui
 
 @click.command(cls=SectionedCommand)
 @out_option("Folder with the results; the page is written to it.")
+@click.option("--title", default="Results", show_default=True, help="Title of the page.")
 @quiet_option
 @json_option
-def report(out: Path, quiet: bool, as_json: bool) -> None:
-    """Write report.html, a self-contained page of all results.
+def report(out: Path, title: str, quiet: bool, as_json: bool) -> None:
+    """Write report.html, a page of all results in a folder, with their figures.
 
-    The command runs nothing: it lists missing results with the commands that produce them.  The page includes the
-    interactive web page if `friction-fmus build --web` has built it.
+    The command runs nothing.
 
     \b
     Example:
-      friction-fmus && friction-fmus decay coulomb && friction-fmus report
+      friction-fmus run coulomb && friction-fmus decay coulomb && friction-fmus report --title "My sled"
     """
     from ..report.page import write_report
-    from ..report.sections import ComparedScene
-    from ..scenes.scene import load_scene, shipped_scenes
 
-    scenes = [scene for scene in map(load_scene, shipped_scenes()) if scene.known]
-    page = write_report(out, [ComparedScene(scene.name, scene.run.fmu.stem, scene.about) for scene in scenes])
+    page = write_report(out, title)
     if as_json:
-        print_json({"page": str(page.path), "missing": [gap.name for gap in page.missing]})
+        print_json({"page": str(page)})
     elif not quiet:
-        for gap in page.missing:
-            click.echo(f"Missing: {gap.name}; run `{gap.command}`")
-        click.echo(f"Report in {page.path}")
+        click.echo(f"Report in {page}")

@@ -291,7 +291,9 @@ class Terminal:
     def progress(self, total: int) -> AbstractContextManager[Callable[[str, float], None]]:
         return progress(self.quiet or self.as_json, total)
 
-    def print_result(self, result: Any, *blocks: Any, folder: Path | None = None, failed: Iterable[str] = ()) -> None:
+    def print_result(
+        self, result: Any, *blocks: Any, folder: Path | None = None, failed: Iterable[str] = (), conclusion: Any = None
+    ) -> None:
         """Print the result as JSON, or as tables and sentences unless quiet.
 
         Parameters
@@ -301,9 +303,11 @@ class Terminal:
         *blocks
             Tables and sentences to print otherwise.
         folder
-            Folder of the result; printed last, with a note if an earlier result was replaced.
+            Folder of the result; printed after them, with a note if an earlier result was replaced.
         failed
             Error messages.
+        conclusion
+            Sentence to print last, unless there are error messages.
 
         Raises
         ------
@@ -325,5 +329,8 @@ class Terminal:
                 from ..results.provenance import replacement_note
 
                 console.print("\n".join(filter(None, (replacement_note(folder), f"Results in {folder}"))))
-        if messages := [*failed]:
+        messages = [*failed]
+        if conclusion and not (messages or self.as_json or self.quiet):
+            console.print(conclusion)
+        if messages:
             raise HarnessError("\n".join(messages))

@@ -1,44 +1,22 @@
 """HTML page of the report. All HTML of the harness is in page.html."""
 
 import os
-from collections.abc import Mapping, Sequence
+from base64 import b64encode
 from dataclasses import dataclass, replace
 from datetime import date
 from pathlib import Path
-from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
-from markupsafe import escape
 
 from ..errors import HarnessError
+from ..results.provenance import FILE as PROVENANCE_FILE
 from ..results.provenance import HARNESS, package_version
-from ..results.summary import METHODS_TABLE, SKETCH_SIZE, MissingResult
-from .embedding import MAX_PAGE_BYTES, Budget, encode_data
-from .sections import (
-    COLLECTED_TABLES,
-    RUNS,
-    USER_SECTIONS,
-    ComparedScene,
-    ResultItem,
-    Section,
-    build_sections,
-    collect_tables,
-    find_section,
-    list_missing,
-    read_items,
-)
+from ..results.registry import STUDIES
+from ..results.summary import PICTURE_FILE, SUMMARY_FILE, Summary, read_summary
 from .typeset import is_text_column, typeset
-from .verdicts import build_verdicts
 
 FILE = "report.html"
-LIVE_PAGE = Path("fmus/web/index.html")  # the interactive page, if it has been built
-ADVICE = (
-    "For dry friction with sticking use the law hybrid: stick and slip are modes, a stuck body does not creep, and "
-    "every change of mode is located as an event.",
-    "If the model is linear between events, use the method exact: it is the fastest and accurate to rounding.",
-    "The laws sign and threshold show the cost of common approximations: they chatter.",
-    "For a smooth friction curve use the magic formula with the method radau9, because it is stiff.",
-)
+LIVE_PAGE = Path("fmus/web/index.html")  # the interactive page; `friction-fmus build --web` writes it
 ENVIRONMENT = Environment(
     loader=PackageLoader(__package__, "."), autoescape=True, undefined=StrictUndefined, trim_blocks=True
 )
@@ -47,15 +25,26 @@ TEMPLATE = ENVIRONMENT.get_template("page.html")
 
 
 @dataclass(frozen=True)
-class ReportPage:
-    """Path of the written page, and the missing results."""
+class ResultItem:
+    """A result in the report: its folder, its summary, and its figure as a data URL, which is empty without one."""
 
-    path: Path
-    missing: tuple[MissingResult, ...]
+    folder: Path
+    summary: Summary
+    picture: str = ""
 
 
-def write_report(results: Path, scenes: Sequence[ComparedScene]) -> ReportPage:
-    """Write the page of all results in a folder to that folder.
+@dataclass(frozen=True)
+class Section:
+    """Section of the report: the results of a study, with the title and the introduction of the study."""
+
+    study: str
+    title: str
+    intro: str
+    items: tuple[ResultItem, ...] = ()
+
+
+def write_report(results: Path, title: str) -> Path:
+    """Write the page of all results in a folder to that folder, and return its path.
 
     Raises
     ------
@@ -64,64 +53,66 @@ def write_report(results: Path, scenes: Sequence[ComparedScene]) -> ReportPage:
     """
     items = read_items(results)
     if not items:
-        raise HarnessError(f"no results in {results}: run `friction-fmus`, or choose another --out")
-    sections = build_sections(items, scenes)
-    missing = list_missing(items, sections, scenes)
+        raise HarnessError(f"no results in {results}: run a command that writes some, or choose another --out")
+    page = TEMPLATE.render(
+        title=title,
+        sections=build_sections(items),
+        live=relative_path(LIVE_PAGE, results),
+        made=f"{date.today()} by {HARNESS} {package_version(HARNESS)}",
+        relative_path=lambda file: relative_path(file, results),
+    )
     path = results / FILE
     temporary = path.with_suffix(".new")
     try:
-        temporary.write_text(render_page(items, sections, missing, scenes, results), encoding="utf-8", errors="replace")
+        temporary.write_text(page, encoding="utf-8", errors="replace")
         temporary.replace(path)
     except OSError as error:
         raise HarnessError(f"cannot write {path}: {error.strerror}") from None
     finally:
         temporary.unlink(missing_ok=True)
-    return ReportPage(path, tuple(missing))
+    return path
 
 
-def render_page(
-    items: Sequence[ResultItem],
-    sections: Sequence[Section],
-    missing: Sequence[MissingResult],
-    scenes: Sequence[ComparedScene],
-    results: Path,
-) -> str:
-    """Return the HTML of the page, which refers to no other file, so that a copy of the page is complete.
+def relative_path(file: Path, folder: Path) -> str:
+    """Return the path of a file relative to a folder, as in a link."""
+    return Path(os.path.relpath(file, folder)).as_posix()
 
-    Figures, the live page and data files are embedded, in this order, as far as the page stays small; the results of
-    the user come first. Files that are not embedded are named.
-    """
-    sketches = {item.summary.title: item.summary.sketches for item in items if item.summary.sketches}
-    studies = [section.study for section in USER_SECTIONS]
-    content = {
-        "relative_path": lambda file: Path(os.path.relpath(file, results)).as_posix(),
-        "missing": missing,
-        "gallery": [(scene, sketches[scene.name]) for scene in scenes if scene.name in sketches and scene.about],
-        "sketch_size": SKETCH_SIZE,
-        "verdicts": build_verdicts(
-            [item.summary for item in items if item.summary.study != RUNS or find_section(item, scenes) != RUNS]
-        ),
-        "advice": ADVICE,
-        "collected_tables": COLLECTED_TABLES,
-        "choices": collect_tables(items, METHODS_TABLE),
-        "live": LIVE_PAGE.as_posix() if LIVE_PAGE.is_file() else "",
-        "made": f"{date.today()} by {HARNESS} {package_version(HARNESS)}",
+
+def read_items(results: Path) -> list[ResultItem]:
+    """Read all results in a folder, in the order of their names."""
+    files = (SUMMARY_FILE, PROVENANCE_FILE)  # a result of an earlier version has a provenance only
+    folders = {
+        file.parent for depth in ("[!.]*", "[!.]*/[!.]*") for name in files for file in results.glob(f"{depth}/{name}")
     }
-    size_without_files = len(render(content, sections, studies, Budget(0)).encode(errors="replace"))
-    return render(content, sections, studies, Budget(MAX_PAGE_BYTES - size_without_files))
+    return [read_item(folder, results) for folder in sorted(folders)]
 
 
-def render(content: Mapping[str, Any], sections: Sequence[Section], studies: Sequence[str], budget: Budget) -> str:
-    """Return the HTML of the page with the files that fit into the budget."""
+def read_item(folder: Path, results: Path) -> ResultItem:
+    """Read a result with its figure; a result that cannot be shown states why."""
+    try:
+        summary = read_summary(folder)
+        return ResultItem(folder, summary, read_picture(folder / PICTURE_FILE) if summary.picture else "")
+    except (HarnessError, OSError) as error:
+        first, *_ = folder.relative_to(results).parts
+        study = first if first in [study.name for study in STUDIES] else "run"
+        return ResultItem(folder, Summary(study, folder.name, (f"{folder} cannot be shown: {error}.",)))
+
+
+def read_picture(file: Path) -> str:
+    """Return a figure as a data URL; raise HarnessError if it is not a complete SVG drawing."""
+    text = file.read_text(encoding="utf-8", errors="replace")
+    if not ("<svg" in text and text.rstrip().endswith("</svg>")):
+        raise HarnessError(f"{file.name} is not a complete SVG drawing: repeat the command that wrote it")
+    return f"data:image/svg+xml;base64,{b64encode(text.encode(errors='replace')).decode()}"
+
+
+def build_sections(items: list[ResultItem]) -> list[Section]:
+    """Return the sections that have results, in the order of the studies; results of other studies are last."""
+    known = {study.name: Section(study.name, study.title, study.intro) for study in STUDIES}
+    others = {item.summary.study: Section(item.summary.study, item.summary.study, "") for item in items}
     sections = [
-        replace(section, items=tuple(replace(item, picture=budget.take(item.picture)) for item in section.items))
-        for section in sections
+        replace(section, items=tuple(item for item in items if item.summary.study == section.study))
+        for section in (others | known).values()
     ]
-    live = LIVE_PAGE.read_text(encoding="utf-8", errors="replace") if content["live"] else ""
-    return TEMPLATE.render(
-        content,
-        yours=[section for section in sections if section.study in studies],
-        ours=[section for section in sections if section.study not in studies],
-        live_content=budget.take(live, escape),
-        embed_file=lambda file: budget.take(encode_data(file)),
-    )
+    order = [*known, *others]
+    return sorted((section for section in sections if section.items), key=lambda section: order.index(section.study))

@@ -33,12 +33,8 @@ class Study:
         Files that a result may contain; the first one is compared when a result replaces another.
     title, intro : str
         Title and introduction of its section in the report.
-    example : tuple of (str, str)
-        What the report lists as missing while there is no result, and the arguments that compute it; empty for nothing.
     reader : str
         Function that reads a result folder, as "module:function"; by default `load` of the class.
-    verifies : bool
-        Whether the study verifies the project, so that the report shows it below the results of the user.
     """
 
     name: str
@@ -47,9 +43,7 @@ class Study:
     files: tuple[str, ...]
     title: str
     intro: str
-    example: tuple[str, str] = ("", "")
     reader: str = ""
-    verifies: bool = False
 
     def result_class(self) -> "type[Result]":
         """Import the class of the results."""
@@ -85,7 +79,6 @@ STUDIES = (
         ("decay.json", "turning-points.csv", "fit.csv", PICTURE),
         "Decay",
         "Damping, dry friction and drag from the whole signal and from its turning points, with 95 % intervals.",
-        ("a decay", "decay coulomb"),
     ),
     Study(
         "curve",
@@ -119,10 +112,6 @@ STUDIES = (
         ("sweep.nc", "sweep.csv", PICTURE),
         "Sweeps",
         "Parameter sweeps.",
-        (
-            "a sweep",
-            "sweep stickslip --vary mu_d=0.3:0.9:60 --vary v_driver=0.01:0.1:60 --measures slips",
-        ),
     ),
     Study(
         "compare",
@@ -131,7 +120,6 @@ STUDIES = (
         ("compare.json", PICTURE),
         "Comparisons",
         "Differences between two results or FMUs.",
-        ("a comparison", "compare results/coulomb results/coulomb-sign"),
     ),
     Study(
         "precision",
@@ -141,7 +129,6 @@ STUDIES = (
         "Error against run time",
         "Error against run time and right-hand side evaluations; lower left is better. References are certified. FMU "
         "is the code of the FMU in this process; scipy and cvode solve the same equations.",
-        verifies=True,
     ),
     Study(
         "stability",
@@ -150,8 +137,6 @@ STUDIES = (
         ("stability.csv", PICTURE),
         "Stability",
         "Every case either finishes within its error bound or is rejected with an error message; none hangs.",
-        ("stability", "stability"),
-        verifies=True,
     ),
 )
 

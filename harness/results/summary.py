@@ -16,9 +16,8 @@ if TYPE_CHECKING:
 
 SUMMARY_FILE, PICTURE_FILE = "summary.json", "figure.svg"
 VERSION = 1  # of the schema
-STEPS_TABLE, METHODS_TABLE = "Internal steps of the solver", "Fastest methods"  # rows that the report collects
+STEPS_TABLE, METHODS_TABLE = "Internal steps of the solver", "Fastest methods"
 MAX_DEVIATION = 5.0  # percent; a result agrees with its known values up to this difference
-SKETCH_SIZE = 320, 150  # width and height of the box of a sketch
 
 
 @dataclass(frozen=True)
@@ -59,36 +58,6 @@ class Outcome:
 
 
 @dataclass(frozen=True)
-class Sketch:
-    """A small drawing of a motion: points of SVG in a box of SKETCH_SIZE.
-
-    Attributes
-    ----------
-    text : str
-        Text alternative.
-    curve : str
-        Points of the whole curve.
-    stuck : tuple of str
-        Points of each part at which the body sticks.
-    zero : float or None
-        Height of zero; None if it is not in the box.
-    """
-
-    text: str
-    curve: str
-    stuck: tuple[str, ...]
-    zero: float | None
-
-
-@dataclass(frozen=True)
-class MissingResult:
-    """A result that a study left out, and the command that computes it."""
-
-    name: str
-    command: str
-
-
-@dataclass(frozen=True)
 class Summary:
     """Summary of a result.
 
@@ -106,10 +75,6 @@ class Summary:
         Text alternative of figure.svg in the folder; empty without one.
     outcome : Outcome or None
         Conclusion of the study; None if it judges nothing.
-    sketches : tuple of Sketch
-        Small drawings of a run: position over time, and speed over position.
-    missing : tuple of MissingResult
-        Results that the study left out.
     origin : tuple of str
         Sentences on the origin: files, versions, date, command, parameters.
     files : tuple of str
@@ -124,8 +89,6 @@ class Summary:
     tables: tuple[SummaryTable, ...] = ()
     picture: str = ""
     outcome: Outcome | None = None
-    sketches: tuple[Sketch, ...] = ()
-    missing: tuple[MissingResult, ...] = ()
     origin: tuple[str, ...] = ()
     files: tuple[str, ...] = ()
     version: int = VERSION

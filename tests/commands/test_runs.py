@@ -61,6 +61,28 @@ def test_the_main_job_runs_every_published_case(main_job):
         assert {"trajectory.csv", "steps.csv", "figure.svg"} <= {path.name for path in (results / case).iterdir()}
 
 
+def test_the_main_job_ends_with_one_sentence_on_what_agrees_and_explains_steps_that_depend_on_rounding(main_job):
+    """Steps of a law that chatters are explained, not counted as a difference."""
+    text = " ".join(main_job[0].stdout.split())
+    assert "Steps of coulomb-sign, stickslip-threshold are not judged: friction chatters at a stop" in text
+    last = text.partition("Results in results ")[2]
+    assert re.fullmatch(
+        r"9 of 9 cases agree within 5 %: 6 with published values, 1 with closed forms or certified results, 2 with "
+        r"parameters that were set; the largest difference is \S+ % \(pendulum\)\.",
+        last,
+    )
+
+
+def test_the_main_job_names_each_case_that_differs(workspace, monkeypatch):
+    """In red, as in a terminal; the exit status is that of the runs."""
+    monkeypatch.setattr("harness.studies.run.study.compared_scene_names", lambda: ["coulomb-stop"])
+    monkeypatch.setattr("harness.studies.run.table.MAX_DEVIATION", -1.0)
+    done = harness(workspace, "--out", "results", FORCE_COLOR="1")
+    assert done.returncode == 0
+    assert "\x1b[31m0 of 1 cases agree" in done.stdout
+    assert "coulomb-stop: " in done.stdout.splitlines()[-1] + done.stdout.splitlines()[-2]
+
+
 @pytest.mark.parametrize(
     ("case", "quantity", "measured"),
     [
@@ -82,14 +104,6 @@ def test_the_table_shows_the_published_values(main_job, case, quantity, measured
     block = main_job[0].stdout.split(f"\n{case} ")[1].split("\n   ")[0]
     line = next(line for line in block.splitlines() if line.strip().startswith(quantity))
     assert line.replace(quantity, "", 1).replace("(time points)", "").split()[0] == measured
-
-
-def test_the_main_job_counts_published_cases_only_and_says_what_the_others_are(main_job):
-    text = " ".join(main_job[0].stdout.split())
-    assert "5 of 6 published cases agree" in text
-    assert "stickslip-threshold: mean step differs by" in text
-    assert "compared with a closed form or certified result: stickslip compared with the parameter" in text
-    assert "that was set: coulomb, coulomb-stop" in text
 
 
 @pytest.mark.parametrize(("case", "kind"), [("smd", "published"), ("stickslip", "reference"), ("coulomb", "parameter")])

@@ -175,7 +175,7 @@ def test_a_quantity_is_formatted_alike_in_terminal_file_and_page(workspace, scen
         if row[""] == "run time":
             measured = f"{float(f'{float(measured):.2g}'):g}"
         assert f"<td>{row['']}</td><td>{measured}</td>" in page, row
-    steps = page.split('<section id="steps">')[1].split("</section>")[0]
+    steps = page.split("<summary>Internal steps of the solver</summary>")[1].split("</details>")[0]
     cell = dict(zip(*(re.findall(f"<{tag}[^>]*>([^<]*)</{tag}>", steps) for tag in ("th", "td")), strict=True))
     for row in rows:
         if row[""] in cell:

@@ -256,7 +256,7 @@ def test_every_study_has_a_command_and_a_section_in_the_report(tmp_path):
         assert commands.harness(tmp_path, study.command, "--help").returncode == 0
         shutil.copytree(saved(study.name), tmp_path / "results" / study.name / "mine")
     page = report_on(tmp_path / "results")
-    titles = [page.index(f">{study.title}<") for study in sorted(STUDIES, key=lambda study: study.verifies)]
+    titles = [page.index(f">{study.title}<") for study in STUDIES]
     assert titles == sorted(titles)
 
 

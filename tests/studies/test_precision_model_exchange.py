@@ -196,14 +196,11 @@ def test_json_holds_all_results(two_studies):
     assert data["advice"][0].startswith("smd: use exact")
 
 
-def test_the_page_shows_error_against_tolerance_or_the_commands_that_produce_it(two_studies):
+def test_the_page_shows_error_against_tolerance_of_the_fmus_that_are_built(two_studies):
     head = "model exchange by fmpy's CVode: largest error at rtol"
-    commands = "friction-fmus build smd --fmi 3 && friction-fmus precision smd"
     complete, incomplete = two_studies[2]
     assert head in complete
-    assert commands not in complete
     assert head not in incomplete  # files of another build are removed
-    assert commands in incomplete
 
 
 def test_the_command_writes_every_point_and_advice_and_keeps_results_of_other_models(two_studies):
@@ -219,7 +216,8 @@ def test_the_command_writes_every_point_and_advice_and_keeps_results_of_other_mo
     assert {row["tool"] for row in rows} == tools
     unbuilt = "not built: fmus/native/fmi3/smd.fmu (friction-fmus build --fmi 3)"
     assert [row["failure"] for row in later if row["tool"] in FMI3_TOOLS] == [unbuilt, unbuilt]
-    assert [item for item in json.loads(incomplete)["missing"] if unbuilt in item] == [unbuilt]
+    (unrun,) = (item for item in json.loads(incomplete)["missing"] if item.startswith("Not run: "))
+    assert unrun.count(unbuilt) == 1
     inside, outside = ([row for row in rows if row["tool"] == tool] for tool in (FMU, FMPY))
     assert len(inside) == 1 + 4 * len(QUICK.tolerances)
     assert float(inside[0]["largest [1]"]) < 1e-13

@@ -64,6 +64,8 @@ def blank_figures():
         from harness.results.style import find_texts  # loads matplotlib
 
         lines = [line for text in find_texts(figure) if text.get_visible() for line in text.get_text().splitlines()]
+        formatters = [axis.get_major_formatter() for axes in figure.axes for axis in (axes.xaxis, axes.yaxis)]
+        lines += [name for formatter in formatters for name in getattr(formatter, "seq", ())]  # given tick labels
         path.write_text(TEXTS_ONLY.format("".join(f"<text>{escape(line)}</text>" for line in lines)))
 
     return patch("harness.results.style.save_figure", save_texts)

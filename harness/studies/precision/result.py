@@ -6,10 +6,9 @@ from dataclasses import asdict, astuple, dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ...references.models import MODELS
 from ...results.files import column_heading, write_csv_rows
 from ...results.result import Result
-from ...results.summary import MissingResult, Summary, SummaryTable, make_table
+from ...results.summary import Summary, SummaryTable, make_table
 from . import table
 from .law_deviations import LawDeviation
 from .method_choice import tabulate_choices
@@ -74,8 +73,6 @@ class PrecisionResult(Result):
         if rows:
             exchange = make_table(headings, ([f"{number:.4g}" for number in row] for row in rows), EXCHANGE_TABLE)
         choices, outcome = tabulate_choices(self.measured, self.min_ratio)
-        command = f"friction-fmus build {self.title} --fmi 3 && friction-fmus precision {self.title}"
-        is_incomplete = not exchange and self.title in MODELS
         return Summary(
             "precision",
             self.title,
@@ -83,7 +80,6 @@ class PrecisionResult(Result):
             exchange + choices,
             f"{self.title}: run time and right-hand side evaluations over the largest error, by method",
             outcome,
-            missing=(MissingResult(f"{self.title} in model exchange", command),) if is_incomplete else (),
         )
 
     def as_json(self) -> dict[str, Any]:

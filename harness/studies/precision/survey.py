@@ -79,22 +79,24 @@ def run_studies(models: Iterable[str], extent: SweepSettings, report: Callable[[
     advice = tuple(
         recommend(item, [law for law in deviations if law.model == item.model], extent.min_ratio) for item in studies
     )
-    missing_peers = (
-        f"{peer} was skipped: {package} is not installed: {install_command('peers')}"
-        for peer, package in missing_packages().items()
-    )
-    return PrecisionSurvey(
-        studies,
-        tuple(deviations),
-        advice,
-        (*map(count_failures, studies), *failure_reasons(studies), *missing_peers),
-    )
+    missing = "; ".join((*failure_reasons(studies), *uninstalled_peers()))
+    notes = (*filter(None, map(count_failures, studies)), *([f"Not run: {missing}"] if missing else ()))
+    return PrecisionSurvey(studies, tuple(deviations), advice, notes)
+
+
+def uninstalled_peers() -> Iterable[str]:
+    """Return which solvers are not installed, and the command that installs them."""
+    missing = missing_packages()
+    if missing:
+        names = ", ".join(f"{package} ({peer})" for peer, package in missing.items())
+        yield f"not installed: {names}, {install_command('peers')}"
 
 
 def count_failures(study: Study) -> str:
-    """Return a sentence on the number of failed runs."""
-    failed = sum(bool(point.failure) for point in study.points)
-    return f"{study.model}: {failed} of {len(study.points)} runs failed; see {study.model}/points.csv"
+    """Return a sentence on the runs that failed, other than those that were not built; empty without any."""
+    runs = [point for point in study.points if not (point.failure and isnan(point.rtol))]
+    failed = sum(bool(point.failure) for point in runs)
+    return f"{study.model}: {failed} of {len(runs)} runs failed; see {study.model}/points.csv" if failed else ""
 
 
 def failure_reasons(studies: Iterable[Study]) -> Iterable[str]:

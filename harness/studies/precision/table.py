@@ -13,15 +13,20 @@ from .study import Study
 
 
 def work_precision_table(study: Study) -> Table:
-    """Return the table of run time in ms and evaluations that every solver needs for a given error."""
+    """Return the table of run time in ms and evaluations that every solver needs for a given error.
+
+    Solvers that did not run are left out.
+    """
     table = empty_table(f"{study.model}: run time and right-hand side calls for a given largest error", "solver")
     for target in TARGETS:
         table.add_column(f"{format_power(target)}: ms", justify="right")
         table.add_column("calls", justify="right")
     for case in study.cases:
-        table.add_section()
-        table.add_row(Text(case.law, style="bold"))
-        for tool, method in study.solvers(case):
+        rows = [(tool, method) for tool, method in study.solvers(case) if study.curve(case, tool, method)]
+        if rows:
+            table.add_section()
+            table.add_row(Text(case.law, style="bold"))
+        for tool, method in rows:
             cells = []
             for target in TARGETS:
                 point = fastest_point(study.curve(case, tool, method), target)

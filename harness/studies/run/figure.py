@@ -1,9 +1,8 @@
-"""Figure of a run, with one panel for each plot that the scene names, and small sketches of the motion for the report.
+"""Figure of a run, with one panel for each plot that the scene names.
 
 Sticking is shaded, reversals are marked, known values are drawn in green, and angles are in degrees.  With several
 contacts, only the panels of their friction forces and modes are shaded; a panel below shows when each contact sticks.
 Lookup tables of the FMU are drawn in the right column, with the values of the run.
-The report draws the sketches, small curves with few points, in its own colours.
 """
 
 from collections.abc import Callable, Iterable
@@ -27,7 +26,6 @@ from ...results.style import (
     mask_undrawable,
     open_figure,
 )
-from ...results.summary import SKETCH_SIZE, Sketch
 from ...running.fmu_archive import exposes_solver_steps, read_description
 from ...running.model_data import LookupTable, read_model_data
 from ...running.plot import contact_of, draw_sticking, draw_table
@@ -46,8 +44,6 @@ PEAK_LEVELS = {"velocity": "peak_speed", "acceleration": "peak_acceleration"}
 HANDLE_WIDTH, LINE_WIDTH = 5, 75  # in characters: legend handle, width of a panel
 TITLE_PAD = 20  # in points: padding of a title above a legend
 
-SKETCH_MARGIN = 6  # around the curve of a sketch
-SKETCH_COLUMNS = 400  # horizontal resolution to which the curve of a sketch is reduced
 
 Results = dict[str, Any]  # by the name of the analysis
 
@@ -277,62 +273,3 @@ def plot_steps(axes: Axes, plotted: PlottedRun, name: str) -> None:
 
 Panel = Callable[[Axes, PlottedRun, str], None]
 PANELS: dict[str, Panel] = {"position": plot_position, "phase": plot_phase_plane, "steps": plot_steps}
-
-
-def draw_sketches(run: Trajectory) -> tuple[Sketch, ...]:
-    """Return position over time and speed over position, the first two outputs; nothing without them."""
-    if len(run.columns) < 2:
-        return ()
-    t, (x, v, *_) = run.time, run.columns.values()
-    stuck, name = find_stuck_samples(run), run.spec.model
-    return (
-        draw_sketch(t, x, f"{name}: position over time", stuck),
-        draw_sketch(x, v, f"{name}: speed over position", stuck),
-    )
-
-
-def find_stuck_samples(run: Trajectory) -> np.ndarray:
-    """Return whether the first contact sticks at the times of a run (n,); without events nothing is stuck."""
-    if not run.events:
-        return np.zeros(len(run.time), dtype=bool)
-    modes = next(iter(run.events.modes.values()))
-    stuck: np.ndarray = modes[np.searchsorted(run.events.t, run.time, side="right") - 1] == 0
-    return stuck
-
-
-def draw_sketch(x: np.ndarray, y: np.ndarray, text: str, stuck: np.ndarray) -> Sketch:
-    """Return the sketch of y (n,) over x (n,) with the text alternative `text` and the parts that are `stuck` (n,)."""
-    width, height = SKETCH_SIZE
-    points = np.column_stack(
-        [SKETCH_MARGIN + normalize(values) * (size - 2 * SKETCH_MARGIN) for values, size in ((x, width), (-y, height))]
-    )
-    zero = (
-        SKETCH_MARGIN + (y.max() / (np.ptp(y) or 1.0)) * (height - 2 * SKETCH_MARGIN)
-        if y.min() <= 0 <= y.max()
-        else None
-    )
-    parts = tuple(format_points(points[ends]) for ends in find_intervals(stuck))
-    return Sketch(text, format_points(points[decimate(points[:, 0])]), parts, zero and round(float(zero), 1))
-
-
-def format_points(points: np.ndarray) -> str:
-    """Return points (n, 2) in the notation of SVG."""
-    return " ".join(f"{x:.1f},{y:.1f}" for x, y in points)
-
-
-def find_intervals(selected: np.ndarray) -> np.ndarray:
-    """Return the indices (m, 2) of the first and the last sample of each interval that is selected (n,)."""
-    changes = np.flatnonzero(np.diff(selected, prepend=False, append=False))
-    return changes.reshape(-1, 2) - [0, 1]
-
-
-def normalize(values: np.ndarray) -> np.ndarray:
-    """Scale values (n,) linearly to 0 ... 1."""
-    return (values - values.min()) / (np.ptp(values) or 1.0)
-
-
-def decimate(x: np.ndarray) -> np.ndarray:
-    """Return the indices (m,) of the first and last point in each of SKETCH_COLUMNS columns."""
-    column = np.floor(SKETCH_COLUMNS * normalize(x))
-    turns = np.flatnonzero(np.diff(column))
-    return np.unique(np.concatenate([[0], turns, turns + 1, [len(x) - 1]]))

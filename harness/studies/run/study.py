@@ -87,10 +87,6 @@ def run_and_write(scene: Scene, folder: Path, report: Callable[[float], None]) -
         summary = summarize_quantities(summary, quantities, scene.known, run)
     if not run.failure:
         summary = replace(summary, sentences=(*describe_scene(scene), *summary.sentences))
-    if scene.about and not run.failure:
-        from .figure import draw_sketches
-
-        summary = replace(summary, sketches=draw_sketches(run))
     if scene.plots:
         from .figure import draw
 

@@ -17,7 +17,12 @@ from ...scenes.scene import KnownValues, Scene
 OTHER_MACHINE = "other CPU: the published run time was measured on another machine"
 RUN_TIME = "run time"
 CHATTERING_LAWS = ("sign", "threshold")
-STEP_QUANTITIES = ("steps (time points)", "mean step")
+STEP_QUANTITIES = ("steps", "mean_step")
+KINDS = {  # of known values, and their meaning
+    "published": "published values",
+    "reference": "closed forms or certified results",
+    "parameter": "parameters that were set",
+}
 ALWAYS_SHOWN = ("steps", "mean_step", "run_time")  # shown for all scenes, even without a known value
 
 
@@ -158,16 +163,49 @@ def round_run_time(cells: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def judge_deviations(quantities: Iterable[Quantity], known: KnownValues | None, run: Trajectory) -> Outcome | None:
-    """Return the largest difference from a known value, with a reason if the law chatters."""
+    """Return the largest difference from a known value; steps of a law that chatters are not judged."""
     if known is None:
         return None
-    differences = [(deviation(quantity, known.values.get(quantity.name)), quantity.text) for quantity in quantities]
-    deviations = [(percent, name) for percent, name in differences if percent is not None]
+    ignored = STEP_QUANTITIES if chatters(run) else ()
+    differences = [(deviation(item, known.values.get(item.name)), item) for item in quantities]
+    deviations = [
+        (percent, item.text) for percent, item in differences if percent is not None and item.name not in ignored
+    ]
     if not deviations:
         return None
     percent, name = max(deviations, key=lambda pair: abs(pair[0]))
-    chatters = run.parameters.get("friction") in CHATTERING_LAWS and name in STEP_QUANTITIES
-    reason = "; its friction chatters, so its steps depend on rounding" * chatters
     is_good = abs(percent) <= MAX_DEVIATION
-    text = f"{name} differs by {percent:+.2g} %{reason}"
+    text = f"{name} differs by {percent:+.2g} %"
     return Outcome(f"{percent:+.2g} %", text, is_good, percent, known.kind, known.source)
+
+
+def chatters(run: Trajectory) -> bool:
+    """Return whether the friction law of a run chatters, so that its steps depend on rounding."""
+    return run.parameters.get("friction") in CHATTERING_LAWS
+
+
+def explain_chatter(outcomes: Iterable[SceneOutcome]) -> str:
+    """Return why the known steps of scenes whose friction chatters are not judged; empty without any."""
+    names = [
+        outcome.name
+        for outcome in outcomes
+        if outcome.scene and outcome.run and outcome.scene.known and chatters(outcome.run)
+        if {*STEP_QUANTITIES} & {*outcome.scene.known.values}
+    ]
+    reason = "friction chatters at a stop, so they depend on rounding"
+    return f"Steps of {', '.join(names)} are not judged: {reason}." if names else ""
+
+
+def conclude(outcomes: Iterable[SceneOutcome]) -> Text:
+    """Return what was checked: one line, in green if all cases agree with their known values and in red otherwise."""
+    judged = judge_outcomes(outcomes)
+    if not judged:
+        return Text()
+    good = [(name, outcome) for name, outcome in judged if outcome.is_good]
+    counts = {kind: sum(outcome.kind == kind for _, outcome in judged) for kind in KINDS}
+    parts = [f"{counts[kind]} with {meaning}" for kind, meaning in KINDS.items() if counts[kind]]
+    text = f"{len(good)} of {len(judged)} cases agree within {MAX_DEVIATION:g} %: {', '.join(parts)}"
+    if differing := [f"{name}: {outcome.text}" for name, outcome in judged if not outcome.is_good]:
+        return Text(f"{text}. {'; '.join(differing)}.", style="red")
+    name, worst = max(good, key=lambda pair: abs(pair[1].deviation or 0.0))
+    return Text(f"{text}; the largest difference is {worst.value} ({name}).", style="green")
