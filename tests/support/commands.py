@@ -61,11 +61,14 @@ def blank_figures():
     """Save only the texts of figures, without tick labels, while the returned context is open."""
 
     def save_texts(figure, path):
-        from harness.results.style import find_texts  # loads matplotlib
+        from matplotlib.ticker import FixedFormatter, FuncFormatter
+
+        from harness.results.style import find_texts
 
         lines = [line for text in find_texts(figure) if text.get_visible() for line in text.get_text().splitlines()]
-        formatters = [axis.get_major_formatter() for axes in figure.axes for axis in (axes.xaxis, axes.yaxis)]
-        lines += [name for formatter in formatters for name in getattr(formatter, "seq", ())]  # given tick labels
+        for axis in (axis for axes in figure.axes for axis in (axes.xaxis, axes.yaxis)):
+            if isinstance(axis.get_major_formatter(), FixedFormatter | FuncFormatter):  # given tick labels
+                lines += [label.get_text() for label in axis.get_ticklabels()]
         path.write_text(TEXTS_ONLY.format("".join(f"<text>{escape(line)}</text>" for line in lines)))
 
     return patch("harness.results.style.save_figure", save_texts)
