@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from decays import identify
+from decays import Signal, identify
 from laboratory_records import OTHERS, SCENES, laboratory_record, other_motion
 
 from harness import HarnessError
@@ -50,3 +50,13 @@ def test_a_second_decay_of_nearly_the_same_weight_is_named():
     record, _, (begin, end) = laboratory_record("two", 303)
     fit = identify(record.select(begin + 0.3 * (end - begin), np.inf), drag=False)
     assert "The record also decays from t =" in " ".join(fit.remarks)
+
+
+@pytest.mark.parametrize("stop", [16, 20, 60])
+def test_a_driven_motion_whose_amplitude_tends_to_a_constant_is_refused(stop):
+    """Of x'' = -4 x - 0.5 x' + cos 2t from x = 1, a part has swings of nearly equal size."""
+    t = np.linspace(0.0, stop, 50 * stop)
+    root = np.sqrt(4 - 0.25**2)  # x = sin(2t) + a free decay from x = 1, v = -2
+    x = np.sin(2 * t) + np.exp(-0.25 * t) * (np.cos(root * t) + (0.25 - 2) / root * np.sin(root * t))
+    with pytest.raises(HarnessError, match=r"is driven or gains energy.*; .*fit a model with its drive by"):
+        identify(Signal(t, x))

@@ -73,6 +73,14 @@ class FitUncertainty:
     degrees_of_freedom: int
     wander: Wander
 
+    @property
+    def distance_from_losses(self) -> float:
+        """Distance of the unconstrained losses from the nearest that are not negative, in standard errors."""
+        losses = np.flatnonzero((self.unknowns >= ZETA) & (self.standard_errors > 0))
+        z = self.unconstrained[losses] / self.standard_errors[losses]
+        _, square = NonnegativeCone(self.correlation[np.ix_(losses, losses)]).nearest(z)
+        return float(np.sqrt(square))
+
 
 def estimate_uncertainty(problem: DecayProblem, p: np.ndarray, terms: Terms) -> FitUncertainty:
     """Return the uncertainty of the fitted values p of a law with these terms."""
