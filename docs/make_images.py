@@ -310,7 +310,7 @@ def draw_live_page(folder: Path) -> None:
 
 def draw_report(folder: Path) -> None:
     """Save a screenshot of the beginning of a report."""
-    for command in ("", "precision --quick", "stability stickslip", "decay coulomb", "report"):
+    for command in ("run coulomb", "decay coulomb", "report"):
         run_command(folder, f"harness {command}")
     save_screenshot(folder / "results" / "report.html", IMAGES / "report.png", folder, 1250)
 

@@ -118,6 +118,23 @@ def test_each_python_or_sh_block_that_is_not_run_has_a_reason():
             assert not block.skipped or len(block.skipped.split()) >= 3, f"{page}, line {block.line}: give a reason"
 
 
+SEEDS = {"fit_campaign": r" --seed \d+ --records \d+", "decay_defects": r" \d+ \d+"}  # others have fixed seeds
+CAMPAIGN = re.compile(r"python -m benchmarks\.campaigns\.(\w+)([^`]*)`")
+
+
+def test_each_campaign_on_a_page_exists_and_names_its_seed():
+    """So that its table can be made again; also inside of the text, where a line may end in the command."""
+    found = {
+        (name, " ".join(arguments.split()))
+        for page in PAGES
+        for name, arguments in CAMPAIGN.findall((DOCS / page).read_text(encoding="utf-8"))
+    }
+    assert {name for name, _ in found} >= {"fit_campaign", "decay_defects", "low_speed_friction", "curve_coverage"}
+    for name, arguments in found:
+        assert (ROOT / "benchmarks" / "campaigns" / f"{name}.py").is_file()
+        assert re.fullmatch(SEEDS.get(name, ".*").strip(), arguments), f"{name} {arguments}: name the seed"
+
+
 @pytest.mark.slow
 def test_generated_tables_are_up_to_date(fmus, environment, monkeypatch):
     monkeypatch.setenv("PATH", environment["PATH"])
