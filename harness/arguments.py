@@ -7,6 +7,7 @@ need.
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from datetime import date
 from functools import wraps
 from inspect import signature
 from math import inf, isfinite
@@ -25,6 +26,7 @@ MAX_WORKERS = 1024  # processes of a sweep
 MAX_RUNS = 10_000_000  # of a sweep
 INTERFACES = CO_SIMULATION, MODEL_EXCHANGE = ("CoSimulation", "ModelExchange")
 QUANTITIES = ("position", "velocity", "acceleration")  # by the order of the derivative
+SUBTRACT_FIRST = "time stamps are no numbers: subtract the first one, as in t - t[0]"
 INVALID = (AttributeError, OverflowError, RecursionError, TypeError, ValueError)  # raised for a value that is not valid
 
 Progress = Callable[[float], None]  # takes the finished share, from 0 to 1
@@ -253,9 +255,16 @@ def to_array(value: Any) -> "np.ndarray":
     return array
 
 
+def has_time_stamps(array: "np.ndarray") -> bool:
+    """Return whether an array holds time stamps: those of numpy, or objects of datetime or pandas."""
+    return array.dtype.kind == "M" or (array.dtype.kind == "O" and any(isinstance(item, date) for item in array.flat))
+
+
 def row(value: Any) -> "np.ndarray":
     """Return a row (n,) of at least one number as floats; NaN is a missing number."""
     numbers = to_array(value)
+    if has_time_stamps(numbers):
+        raise SceneError(SUBTRACT_FIRST)
     if numbers.ndim != 1 or numbers.dtype.kind not in "fiu" or not len(numbers):
         raise TypeError
     return numbers.astype(float)

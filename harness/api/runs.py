@@ -16,8 +16,10 @@ from ..arguments import (
     PROGRESS,
     SETTINGS,
     SOME_NAMES,
+    SUBTRACT_FIRST,
     Progress,
     check_arguments,
+    has_time_stamps,
     to_array,
 )
 from ..errors import HarnessError, SceneError, format_value
@@ -243,6 +245,8 @@ def to_finite_row(name: str, numbers: "ArrayLike") -> "np.ndarray":
         row = np.atleast_1d(to_array(numbers))
     except (OverflowError, TypeError, ValueError):
         raise SceneError(f"{name} must be a row of numbers, not {format_value(numbers)}") from None
+    if has_time_stamps(row):
+        raise SceneError(f"{name}: {SUBTRACT_FIRST}")
     if row.ndim != 1 or row.dtype.kind not in "fiub":
         raise SceneError(f"{name} must be a row of numbers, not {format_value(numbers)}")
     row = row.astype(float)

@@ -28,6 +28,8 @@ from .units import conversion_factor, find_unit, force_unit_size, is_force_unit,
 
 FRICTION_NAME = re.compile(r"friction|reibung", re.I)
 CURRENT_NAME = re.compile(r"^(i|iq|current|strom)(?![^\W_])", re.I)
+TORQUE_NAME = re.compile(r"^(tau|torque|moment|drehmoment)(?![^\W_])", re.I)
+ROTATION_NAME = re.compile(r"^(theta|phi|angle|winkel|omega|gyro\w*|drehzahl|rpm)(?![^\W_])|angular", re.I)
 FORCE_UNITS = {"m/s": "N", "rad/s": "N.m"}
 POSITION, VELOCITY, FORCE = "position", "velocity", "force"  # names of the samples
 
@@ -68,7 +70,8 @@ def extract_curve(name: str, table: Table, options: ColumnOptions, columns: Curv
     axis = find_curve_axis(table, candidates, columns, options, motion)
     taken = [column for column in (motion, axis.column) if column]
     force, force_unit, is_current = find_force(table, candidates, columns, taken)
-    velocity_unit, motion_size, motion_notes = resolve_motion(motion, motion_unit, is_position)
+    reason = rotation_reason(motion, force, force_unit, is_current, columns.constant)
+    velocity_unit, motion_size, motion_notes = resolve_motion(motion, motion_unit, is_position, reason)
     if columns.constant is not None and not is_current:
         example = option_text("current", "i")
         raise SceneError(f"constant has no effect, because {force.heading} is no current: name it, as in {example}")
@@ -147,22 +150,47 @@ def find_force(
     by_unit = [part for part in others if part.unit and is_force_unit(part.unit)]
     by_unit.sort(key=lambda part: not FRICTION_NAME.search(part.name))  # friction before the other forces of a run
     by_name = [part for part in others if FORCE_NAME.search(part.name)]
-    for part in (*by_unit, *by_name):
-        return part, part.unit, False
+    times = [part for part in find_time_columns(by_name) if may_be_time(part)]
+    by_name.sort(key=lambda part: part in times)  # t may be a torque if nothing else is one
     if columns.constant is not None:
         for part in others:
             if CURRENT_NAME.search(part.name) or (part.unit and conversion_factor(part.unit, "A")):
                 return part, part.unit, True
+    for part in (*by_unit, *by_name):
+        return part, part.unit, False
     names = ", ".join(filter(None, (part.heading for part in candidates)))
     example = option_text("force", "F")
     raise SceneError(f"{table.name} has no column of forces (it has {names}): name it, as in {example}")
 
 
-def resolve_motion(column: Column, unit: str | None, is_position: bool) -> tuple[str, float, list[str]]:
-    """Return the SI unit of the velocity, the size of the unit of the column, and notes."""
+def rotation_reason(
+    motion: Column, force: Column, force_unit: str | None, is_current: bool, constant: str | None
+) -> str:
+    """Return why a motion without a unit is a rotation; empty if it is none.
+
+    The unit of the force, or of the constant of the motor, outranks the names of both columns.
+    """
+    unit, text = (force_unit, force.heading) if not is_current else (None, "")
+    if is_current and constant is not None:
+        unit, text = parse_constant(constant)[1], "the constant"
+    for base, is_rotation in (("N.m", True), ("N", False)):
+        if unit and conversion_factor(unit, f"{base}/A" if is_current else base) is not None:
+            return f"{text} is in {unit}" if is_rotation else ""
+    if ROTATION_NAME.search(motion.name):
+        return "its name is that of a rotation"
+    return f"{force.heading} is a torque" if TORQUE_NAME.search(force.name) else ""
+
+
+def resolve_motion(column: Column, unit: str | None, is_position: bool, rotation: str) -> tuple[str, float, list[str]]:
+    """Return the SI unit of the velocity, the size of the unit of the column, and notes.
+
+    `rotation` is why a motion without a unit is a rotation; empty if it is none.
+    """
     if unit is None:
-        name, base = ("a position", "m") if is_position else ("a velocity", "m/s")
-        return "m/s", 1.0, [f"{column.heading} has no unit: {name} in {base} is assumed."]
+        length, name = "rad" if rotation else "m", "a position" if is_position else "a velocity"
+        base = length if is_position else f"{length}/s"
+        reason = f", because {rotation}" if rotation else ""
+        return f"{length}/s", 1.0, [f"{column.heading} has no unit: {name} in {base} is assumed{reason}."]
     motion = find_unit(unit)
     if motion is None or motion.order != (0 if is_position else 1):
         expected = "a position, as m, mm or deg" if is_position else "a velocity, as m/s, mm/s, rad/s or rpm"

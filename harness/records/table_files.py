@@ -86,12 +86,22 @@ def load_table(source: str, headings: str | None = None) -> Table:
     except Exception as error:  # the readers raise arbitrary exceptions for damaged files
         raise SceneError(f"{name} cannot be read: {first_line(error)}") from None
     if headings is None:
-        return table
+        return note_unnamed_columns(table)
     names = tuple(part.strip() for part in headings.split(","))
     if len(names) != len(table.columns):
         names_text = f"{option_text('headings')} names {len(names)} columns"
         raise SceneError(f"{names_text}, and {name} has {len(table.columns)} that are not empty")
     return replace(table, column_headings=names)
+
+
+def note_unnamed_columns(table: Table) -> Table:
+    """Return a table with a note if it has fewer names than columns: the names are those of the first columns."""
+    headings = table.column_headings
+    count = next((i for i in range(len(headings), 0, -1) if headings[i - 1]), 0)
+    if count in (0, len(headings)):
+        return table
+    note = f"{table.name} names {count} of {len(headings)} columns: the names are taken for the first ones."
+    return replace(table, notes=(*table.notes, note))
 
 
 def read_content(path: Path) -> bytes:

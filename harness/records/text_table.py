@@ -268,18 +268,31 @@ def find_first_number_row(rows: list[list[str]], min_width: int = 2) -> int | No
 
 
 def find_headings(preceding: list[list[str]], width: int) -> list[str]:
-    """Return the headings above the numbers: the last row of that width, or two rows if the second has units."""
+    """Return the headings above the numbers: the last row of that width, or two rows if the second has units.
+
+    A row with fewer names, one of them that of a time, names the first columns.
+    """
     while preceding and all(cell.lower() in MISSING for cell in preceding[-1]):
         preceding = preceding[:-1]  # empty rows belong to the numbers
-    candidates = [row for row in preceding[-3:] if abs(len(row) - width) <= (len(row) > 1)]
-    candidates = [[*row, ""][:width] for row in candidates if not all(is_number(cell) for cell in row if cell)]
-    if not candidates or candidates[-1] != [*preceding[-1], ""][:width]:
+    candidates = [row for row in preceding[-3:] if abs(len(row) - width) <= (len(row) > 1) or names_a_part(row, width)]
+    candidates = [pad(row, width) for row in candidates if not all(is_number(cell) for cell in row if cell)]
+    if not candidates or candidates[-1] != pad(preceding[-1], width):
         return []
     last = candidates[-1]
     if len(candidates) > 1 and all(map(looks_like_unit, last)) and not all(map(looks_like_unit, candidates[-2])):
         last = add_units(candidates[-2], last)
     labels = next((row[1:] for row in preceding if row and row[0].lower() == UNITS_ROW), [])
     return add_units(last, ["", *labels, *[""] * width][:width])
+
+
+def names_a_part(row: list[str], width: int) -> bool:
+    """Return whether a row names the first of the columns, among them a time."""
+    return 1 < len(row) < width and all(row) and any(map(is_time_heading, row))
+
+
+def pad(row: list[str], width: int) -> list[str]:
+    """Return a row with empty cells up to a width, or cut to it."""
+    return [*row, *[""] * width][:width]
 
 
 def add_units(names: list[str], units: Sequence[str]) -> list[str]:

@@ -61,7 +61,7 @@ def test_a_second_oscillation_is_reported():
         (0.05 * np.cos(OMEGA * T) + 0.05 * np.exp(-T) * np.cos(9 * T), "beats: its swings fall to"),
         (np.random.default_rng(1).standard_normal(1000), "all noise"),
         (np.zeros(1000), "does not move"),
-        (np.exp(-T), "turning points"),
+        (np.exp(-T), "turning point"),
         (np.cos(T), "turning points"),
         (np.exp(0.1 * T) * np.cos(12 * T), "grows, from .* peak to peak"),
     ],
@@ -74,7 +74,7 @@ def test_a_record_without_decay_is_refused_in_one_sentence(x, sentence):
 
 def test_a_refusal_names_what_was_assumed_in_reading(tmp_path):
     np.savetxt(tmp_path / "bare.csv", np.stack([T, np.exp(-T)], 1), delimiter=",")
-    with pytest.raises(HarnessError, match=r"turning points .* The file has no headings: .*[^.]$"):
+    with pytest.raises(HarnessError, match=r"turning points? .* The file has no headings: .*[^.]$"):
         identify_decay(str(tmp_path / "bare.csv"), unit="m")
 
 

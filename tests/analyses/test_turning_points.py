@@ -4,6 +4,9 @@ import numpy as np
 import pytest
 from decays import TERMS, decay_record, identify, remarks_text, values
 
+import harness
+from harness import HarnessError
+
 
 @pytest.mark.parametrize(("sine", "a"), [(False, 0.1), (True, 0.1), (True, 2.0)])
 def test_turning_points_alone_give_the_same_estimates(sine, a):
@@ -37,3 +40,15 @@ def test_two_peaks_of_a_mixed_law_report_the_assumed_loss():
         in remarks_text(identify(decay_record(0.02, 0.003, noise=1e-4)))
     )
     assert "two peaks" not in remarks_text(identify(decay_record(0.02, noise=1e-4)))
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-3, 1e-2])
+@pytest.mark.parametrize(("phase", "count"), [(0.0, 2), (0.7, 2), (1.5, 2)])
+def test_a_short_record_is_refused_with_the_count_of_its_turning_points(phase, count, noise):
+    """The start is the first; the record lasts 0.6 periods, so that the motion reverses once after it."""
+    t = np.linspace(0.0, 0.6, 200)
+    x = np.cos(2.0 * np.pi * t + phase) + noise * np.random.default_rng(1).normal(size=200)
+    with pytest.raises(
+        HarnessError, match=rf"has {count} turning points above the noise .* its start among them, and 3"
+    ):
+        harness.identify_decay((t, x), unit="m")

@@ -70,6 +70,21 @@ def test_time_deltas_are_seconds_and_labels_may_be_an_array(user_folder, monkeyp
     assert harness.sweep("coulomb", {"friction": np.array(["hybrid"])}, stop=0.1)["friction"].values.tolist() == [1.0]
 
 
+@pytest.mark.parametrize("zone", [None, "UTC"])
+def test_time_stamps_are_refused_with_what_to_do(user_folder, monkeypatch, zone):
+    """Where a run or a pair of arrays needs times; the columns of a table may hold time stamps."""
+    monkeypatch.chdir(user_folder)
+    index = pandas.date_range("2026-01-01", periods=5, freq="s", tz=zone)
+    for stamps in (index, index.to_numpy(), list(index), pandas.Series(index)):
+        for call in (
+            lambda stamps=stamps: harness.simulate("coulomb", inputs={"time": stamps, "F_ext": F}),
+            lambda stamps=stamps: harness.simulate("coulomb", times=stamps),
+            lambda stamps=stamps: harness.identify_decay((stamps, F), unit="m"),
+        ):
+            with pytest.raises(harness.SceneError, match=r"time stamps are no numbers: subtract the first one"):
+                call()
+
+
 def test_an_index_without_a_name_is_the_time_if_no_column_is(user_folder, monkeypatch):
     monkeypatch.chdir(user_folder)
     run = harness.simulate("smd", times=np.linspace(0.0, 4.0, 401), outputs=["x"])

@@ -488,3 +488,22 @@ def test_a_table_to_compare_needs_two_columns(tmp_path):
     path.write_text("x\n1\n2\n3\n")
     with pytest.raises(SceneError, match="only one column that is not empty; time and a variable are required"):
         compare(path, path)
+
+
+@pytest.mark.parametrize("count", [2, 3])
+@pytest.mark.parametrize("delimiter", [",", ";", "\t", " "])
+@pytest.mark.parametrize("rows", [30, 6000])
+def test_fewer_names_than_columns_name_the_first_columns_with_a_note(tmp_path, count, delimiter, rows):
+    t = np.linspace(0.0, 6.0, rows)
+    names = ["t", "x_mm", "y_mm"][:count]
+    np.savetxt(
+        tmp_path / "a.csv",
+        np.column_stack([t, np.cos(t), t, t]),
+        delimiter=delimiter,
+        header=delimiter.join(names),
+        comments="",
+    )
+    record = read_record(tmp_path / "a.csv")
+    assert record.table.column_headings == (*names, *[""] * (4 - count))
+    assert f"a.csv names {count} of 4 columns: the names are taken for the first ones." in record.notes
+    assert record.x == pytest.approx(1e-3 * np.cos(t), abs=1e-12)

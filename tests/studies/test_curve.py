@@ -104,3 +104,30 @@ def test_options_that_do_not_fit_are_refused_in_a_sentence(tmp_path, options, me
     assert done.returncode == 2
     assert message in done.stderr
     assert not (tmp_path / "results" / "curve" / "bench").exists()
+
+
+@pytest.mark.parametrize(
+    ("headings", "constant", "units", "reason"),
+    [
+        ("t,u,i,omega", "0.042N.m/A", ("rad/s", "N.m"), "because the constant is in N.m/A"),
+        ("t,u,i,v", "0.042 N.m/A", ("rad/s", "N.m"), "because the constant is in N.m/A"),
+        ("t,u,i,omega", "35 N/A", ("m/s", "N"), "a velocity in m/s is assumed."),
+        ("t,u,F [N.m],speed", None, ("rad/s", "N.m"), "because F [N.m] is in N.m"),
+        ("t,u,F [N],omega", None, ("m/s", "N"), "a velocity in m/s is assumed."),
+        ("t,u,F,omega", None, ("rad/s", "N.m"), "because its name is that of a rotation"),
+        ("t,u,torque,v", None, ("rad/s", "N.m"), "because torque is a torque"),
+        ("t,u,F,v", None, ("m/s", "N"), "a velocity in m/s is assumed."),
+        ("t,u,i,omega [rpm]", "0.042 N.m/A", ("rad/s", "N.m"), "i has no unit: A is assumed."),
+    ],
+)
+def test_a_known_unit_outranks_names_and_names_outrank_a_default_unit(tmp_path, headings, constant, units, reason):
+    """Of a table whose columns are times, a voltage, a force or a current, and a velocity."""
+    speed = np.array([s * w for w in SPEEDS for s in (1, -1)])
+    rows = np.column_stack(
+        [0.5 + np.arange(len(speed)), np.full(len(speed), 12.0), np.sign(speed) + 0.1 * speed, speed]
+    )
+    np.savetxt(tmp_path / "motor.csv", rows, delimiter=",")
+    record = harness.read_record(tmp_path / "motor.csv", headings=headings)
+    curve = harness.identify_curve(record, constant=constant, points=True)
+    assert (curve.points.velocity_unit, curve.points.force_unit) == units
+    assert reason in " ".join(curve.points.notes)

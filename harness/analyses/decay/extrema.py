@@ -8,7 +8,7 @@ from ...errors import HarnessError
 from ...records.motion import Motion
 from . import thresholds
 from .sample_noise import estimate_noise
-from .smooth_motion import SmoothMotion, are_regular, smooth_segments
+from .smooth_motion import SmoothMotion, are_regular, find_reversals_above_noise, smooth_segments
 
 
 @dataclass(frozen=True)
@@ -60,16 +60,20 @@ def find_extrema(record: Motion, half_period: float, quantiser_step: float, pend
     sufficient = (motion for motion in motions if len(motion.reversals) > thresholds.ENOUGH_TURNING_POINTS)
     best = next(sufficient, max(motions, key=lambda motion: len(motion.reversals), default=None))
     if best is None or len(best.reversals) < thresholds.MIN_TURNING_POINTS:
-        count, span = 0 if best is None else len(best.reversals), float(np.ptp(record.x))
+        count = len(find_reversals_above_noise(record, noise) if best is None else best.reversals)
+        span = float(np.ptp(record.x))
         if span < thresholds.MIN_NOISY_RANGE * noise:
             raise HarnessError(
                 f"{record.name} is all noise: its range is {span:.3g} {record.unit}, its noise {noise:.3g}; "
                 "filter it, or take at least 10 samples per cycle"
             )
-        raise HarnessError(
-            f"{record.name} has {count} turning points above the noise ({noise:.3g} {record.unit}), and "
-            f"{thresholds.MIN_TURNING_POINTS} or more are needed: make a longer record"
+        turns = (
+            f"{record.name} has {count} turning point{'s' * (count != 1)} above the noise ({noise:.3g} {record.unit})"
         )
+        if count < thresholds.MIN_TURNING_POINTS:
+            least = thresholds.MIN_TURNING_POINTS
+            raise HarnessError(f"{turns}, its start among them, and {least} or more are needed: make a longer record")
+        raise HarnessError(f"{turns}, and too few samples or gaps between them: sample faster, or select a part")
     t_start, i = locate_start(best)
     t, x = best.refine(i)
     error = best.position_error(x)

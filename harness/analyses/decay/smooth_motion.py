@@ -62,8 +62,7 @@ class SmoothMotion:
 
 def half_periods(record: Motion, noise: float) -> list[float]:
     """Return different half periods in s that the record may have: of its reversals, and of slow and fast spectra."""
-    smallest = max(thresholds.MIN_REVERSAL * noise, thresholds.MIN_RELATIVE_REVERSAL * float(np.ptp(record.x)))
-    at = find_reversals(record.x, smallest)
+    at = find_reversals_above_noise(record, noise)
     result = [float(np.median(np.diff(record.t[at[1:]])))] if len(at) >= thresholds.MIN_REVERSALS else []
     n = min(len(record.t), thresholds.SPECTRUM_SAMPLES)
     t = np.linspace(record.t[0], record.t[-1], n)
@@ -80,6 +79,12 @@ def half_periods(record: Motion, noise: float) -> list[float]:
         ):
             result.append(0.5 / peak)
     return result or [0.5 * float(np.ptp(record.t))]
+
+
+def find_reversals_above_noise(record: Motion, noise: float) -> np.ndarray:
+    """Return the samples at which a record reverses by more than its noise, with the first extremum."""
+    smallest = max(thresholds.MIN_REVERSAL * noise, thresholds.MIN_RELATIVE_REVERSAL * float(np.ptp(record.x)))
+    return find_reversals(record.x, smallest)
 
 
 def smooth_segments(record: Motion, half_period: float, noise: float, pendulum: bool) -> list[SmoothMotion]:
