@@ -38,8 +38,7 @@ def test_nothing_shifts_while_the_page_appears(page, width):
     script = page.browser.call("Page.addScriptToEvaluateOnNewDocument", source=web_page.SHIFTS)
     page.open(".model=pendulum&.compare=pendulum", anew=True)
     page.browser.call("Page.removeScriptToEvaluateOnNewDocument", **script)
-    page.wait("document.querySelector('#tables caption')")
-    page.run("new Promise(done => setTimeout(done, 100))")
+    page.wait_until_drawn(".story")
     assert page.run("shift") < 0.1
 
 
@@ -48,7 +47,6 @@ def test_headings_of_tables_have_text_and_regions_that_scroll_take_the_focus(pag
     """These two kinds were found by axe-core 4; its other rules found nothing."""
     page.browser.size(width)
     page.open(".model=coulomb&.compare=pacejka")
-    page.wait("document.querySelector('#tables caption')")
     assert page.run("[...document.querySelectorAll('th')].filter(cell => !cell.textContent).length") == 0
     regions = page.run(
         "[...document.querySelectorAll('body *')].filter(e => /auto|scroll/.test(getComputedStyle(e).overflowX)"
@@ -61,9 +59,11 @@ def test_headings_of_tables_have_text_and_regions_that_scroll_take_the_focus(pag
 def test_sticking_has_one_colour_and_slipping_another_in_mechanism_and_diagrams(page):
     style = "getComputedStyle(document.documentElement).getPropertyValue({!r})"
     body = "getComputedStyle(document.querySelector('#mechanism .body rect')).fill"
+    still = [{"name": "prefers-reduced-motion", "value": "reduce"}]
+    page.browser.call("Emulation.setEmulatedMedia", features=still)  # the colour has a transition
     page.open(".model=coulomb")
     for t, name in ((0.1, "--slip"), (4.2, "--stick")):
         page.seek(t)
-        page.run("new Promise(done => setTimeout(done, 300))")  # the colour has a transition
+        page.wait_until_drawn()
         colour = page.run(style.format(name)).lstrip("#")
         assert page.run(body) == f"rgb({', '.join(str(int(colour[i : i + 2], 16)) for i in (0, 2, 4))})"

@@ -25,25 +25,6 @@ def test_a_change_during_playback_acts_from_then_on_only(page):
     assert page.run("app.runs.unchanged.columns.x.length") == len(positions)
 
 
-def test_playback_repaints_no_curve_and_a_curve_is_limited_by_the_pixels(page):
-    page.open(".model=pacejka&x_m=0.001&solver.method=2&solver.rtol=0.001&.t=1")
-    assert page.run("app.runs.main.time.length") > 60000
-    painted = "[...app.plots.values()].reduce((sum, { plot }) => sum + plot.paints, 0)"
-    before = page.run(painted)
-    page.click("#play")
-    page.wait("app.state().t > 1.2")
-    page.click("#play")
-    assert page.run(painted) == before
-    width = page.run("app.plots.get('.step').plot.host.clientWidth")
-    count = (
-        "(() => { const { plot, panel } = app.plots.get('.step'); const [curve] = panel.content.curves;"
-        "let points = 0; const context = { lineTo: () => points++ };"
-        "const all = new Proxy(context, { get: (it, key) => it[key] ?? (() => ({ width: 0 })) });"
-        "plot.curve(all, curve, plot.scales(plot.host.clientWidth, plot.host.clientHeight)); return points })()"
-    )
-    assert width < page.run(count) < 4 * width
-
-
 def test_pausing_keeps_the_values_in_force_and_changes_edit_those(page):
     page.open(".model=smd")
     page.click("#play")

@@ -44,22 +44,17 @@ def test_a_slider_changes_the_run_and_shows_the_value_used(page):
 def test_the_next_frame_shows_a_changed_parameter(page):
     page.open(".model=coulomb")
     shown = page.run(
-        "new Promise(done => { const before = app.plots.get('x').plot.paints;"
-        "const e = document.querySelector('#field-x0').closest('.field').querySelector('input[type=range]');"
-        "e.value = 390; e.dispatchEvent(new Event('input'));"
-        "requestAnimationFrame(() => { const { plot, panel } = app.plots.get('x');"
-        "done([plot.paints - before, panel.content.curves.at(-1).y[0], app.state().values.x0]) }) })"
+        "new Promise(done => { const e = document.querySelector('.field:has(#field-x0) input[type=range]');"
+        "e.value = 390; e.dispatchEvent(new Event('input')); requestAnimationFrame(() =>"
+        "done([app.plots.get('x').plot.content.curves.at(-1).y[0], app.state().values.x0])) })"
     )
-    assert shown[0] == 1
-    assert shown[1] == shown[2] > 0.1
+    assert shown[0] == shown[1] > 0.1
 
 
 def test_the_last_of_two_models_chosen_at_once_is_shown(page):
     page.open(".model=coulomb")
     for first, last in (("pacejka", "smd"), ("smd", "pendulum"), ("stickslip", "smd")):  # known, but not yet compiled
         page.run(f"for (const name of [{first!r}, {last!r}]) document.querySelector(`input[value=${{name}}]`).click()")
-        page.wait(f"app.state().model === {last!r}")
-        page.run("new Promise(done => setTimeout(done, 100))")
         assert page.when_done("app.state().model") == last == page.run("document.querySelector(':checked').value")
 
 

@@ -22,8 +22,8 @@ from .model_json import ModelJson, build_model_json
 FILE, MORE_FILE = "index.html", "more.html"  # pages of the shipped models and of those in fmus/more
 HERE = Path(__file__).parent
 MODULES = (
-    *("numbers", "libc", "wasm", "fmu", "run", "state", "library", "run_set", "measure", "plot", "panels", "controls"),
-    *("legend", "diagrams", "tables", "export", "mechanism", "drag", "scene", "explore"),
+    *("numbers", "libc", "fmu", "run", "state", "library", "run_set", "measure", "plot", "panels", "controls"),
+    *("diagrams", "tables", "export", "mechanism", "drag", "scene", "explore"),
     *("story", "stories", "main"),
 )
 CLAIM = "Real things stop. sign(v) never does."

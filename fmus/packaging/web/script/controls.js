@@ -19,6 +19,13 @@ export function makeElement(name, attributes = {}, ...children) {
   return element;
 }
 
+// Create an element of an SVG in a parent.
+export function makeSvg(name, attributes, parent) {
+  const created = document.createElementNS("http://www.w3.org/2000/svg", name);
+  for (const [key, value] of Object.entries(attributes)) created.setAttribute(key, value);
+  return parent ? parent.appendChild(created) : created;
+}
+
 // The range of a slider in SI units and whether it is logarithmic. `typicalSize` applies to variables that start at zero.
 export function sliderRange(variable, typicalSize) {
   const { start, unit } = variable;

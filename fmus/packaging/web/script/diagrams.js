@@ -1,7 +1,6 @@
-// The diagrams on the page, each below its title.
+// The diagrams of a scene, each below its title, and their legend.
 
-import { makeElement } from "./controls.js";
-import { uniqueEntries } from "./legend.js";
+import { makeElement, makeSvg } from "./controls.js";
 import { cursorReadings, legendOf } from "./panels.js";
 import { Plot } from "./plot.js";
 
@@ -107,4 +106,37 @@ function limitRange(range, { low, high, hidden }) {
   if (!range || hidden || !(range.high - range.low > SMALLEST_PART * (high - low))) return null;
   const limited = { low: Math.max(range.low, low), high: Math.min(range.high, high) };
   return limited.low < limited.high && (limited.low > low || limited.high < high) ? limited : null;
+}
+
+// ---- legend: one entry for every kind of line, mark and shading, and for the arrow of the mechanism
+
+const [SAMPLE_WIDTH, SAMPLE_HEIGHT] = [26, 12]; // of a sample, in CSS pixels
+
+// Paths of the samples by kind; lines are drawn, bands are filled.
+const SAMPLES = {
+  line: `M0 ${SAMPLE_HEIGHT / 2}H${SAMPLE_WIDTH}`,
+  band: `M0 0H${SAMPLE_WIDTH}V${SAMPLE_HEIGHT}H0Z`,
+  mark: `M${SAMPLE_WIDTH / 2} ${SAMPLE_HEIGHT / 2}V${SAMPLE_HEIGHT}`,
+  change: `M${SAMPLE_WIDTH / 2} 0V${SAMPLE_HEIGHT}`,
+  dots: `M${SAMPLE_WIDTH / 2 - 2} ${SAMPLE_HEIGHT / 2 - 2}h4v4h-4Z`,
+  arrow: `M0 ${SAMPLE_HEIGHT / 2}H${SAMPLE_WIDTH}m-6 -4l6 4l-6 4`,
+};
+const FILLED = ["band", "dots"];
+
+// Remove entries that look and read the same. An entry is {kind, colour, dash, text}.
+function uniqueEntries(entries) {
+  return [...new Map(entries.map((entry) => [JSON.stringify(entry), entry])).values()];
+}
+
+// Show the entries as samples with their texts.
+export function showLegend(host, entries) {
+  const key = JSON.stringify(entries);
+  if (host.dataset.key === key) return;
+  host.dataset.key = key;
+  host.replaceChildren(...entries.map(({ kind, colour, dash = [], text }) => {
+    const sample = makeSvg("svg", { viewBox: `0 0 ${SAMPLE_WIDTH} ${SAMPLE_HEIGHT}`, class: `colour-${colour}`, "aria-hidden": "true" });
+    const look = FILLED.includes(kind) ? { fill: "currentColor" } : { stroke: "currentColor", fill: "none", "stroke-width": 2, "stroke-dasharray": dash.join(" ") };
+    makeSvg("path", { d: SAMPLES[kind], ...look }, sample);
+    return makeElement("span", {}, sample, text);
+  }));
 }

@@ -1,9 +1,8 @@
 // The models of the page. A model is compiled when it is needed first.
 
-import { Fmu, FmuError } from "./fmu.js";
+import { Fmu, FmuError, load } from "./fmu.js";
 import { Run } from "./run.js";
 import { findVariable } from "./state.js";
-import { load } from "./wasm.js";
 
 export const POINTS = 1600; // grid steps
 const REST_SEARCH = 1.1; // a rest that begins before this multiple of a model's stop time is shown

@@ -1,5 +1,6 @@
 // The animated mechanism. What it shows follows from the bodies that the model declares.
 
+import { makeSvg } from "./controls.js";
 import { formatNumber, formatValue } from "./numbers.js";
 import { ticks } from "./plot.js";
 import { findVariable } from "./state.js";
@@ -18,13 +19,6 @@ const SHORTEST_SPRING = 40; // drawn length to which a dragged block can compres
 const SCALE_MARGIN = 40; // drawn length by which a motion may exceed the scale before the scale changes
 const DRAG_RESOLUTION = 0.1; // drawn length, or degrees
 const [KEY_STEP, KEY_ANGLE] = [0.05, Math.PI / 180]; // of the range of a block, and for a rotation, by one key
-const NAMESPACE = "http://www.w3.org/2000/svg";
-
-function element(name, attributes, parent) {
-  const created = document.createElementNS(NAMESPACE, name);
-  for (const [key, value] of Object.entries(attributes)) created.setAttribute(key, value);
-  return parent ? parent.appendChild(created) : created;
-}
 
 export class Mechanism {
   // Calls `drag` while a body is dragged: grab(body, position), move(position), drop().
@@ -38,14 +32,14 @@ export class Mechanism {
     const bodies = modelInfo.bodies.filter((body) => body.kind !== "none");
     const lanes = Math.max(bodies.length, 1);
     const [top, height] = bodies.some((body) => body.kind !== "block") ? [0, ROTATION_HEIGHT] : [TOP_MARGIN, LANE_HEIGHT * lanes - TOP_MARGIN];
-    this.svg = element("svg", { viewBox: `0 ${top} ${WIDTH} ${height}`, role: "group", "aria-label": "" });
+    this.svg = makeSvg("svg", { viewBox: `0 ${top} ${WIDTH} ${height}`, role: "group", "aria-label": "" });
     this.host.replaceChildren(this.svg);
     this.host.hidden = !bodies.length;
     this.held = null;
     this.parts = bodies.map((body, lane) => {
-      const group = element("g", {}, this.svg);
+      const group = makeSvg("g", {}, this.svg);
       const part = body.kind === "block" ? this.block(body, group, lane) : this.rotating(body, group, lane, lanes);
-      return { body, group, pull: element("path", { class: "pull" }, group), ...part };
+      return { body, group, pull: makeSvg("path", { class: "pull" }, group), ...part };
     });
     for (const part of this.parts) this.makeDraggable(part);
   }
@@ -53,26 +47,26 @@ export class Mechanism {
   // A block on the floor, with spring and damper to the wall or to the driver.
   block(body, group, lane) {
     const y = lane * LANE_HEIGHT;
-    element("line", { class: "floor", x1: 0, x2: WIDTH, y1: y + FLOOR_Y, y2: y + FLOOR_Y }, group);
+    makeSvg("line", { class: "floor", x1: 0, x2: WIDTH, y1: y + FLOOR_Y, y2: y + FLOOR_Y }, group);
     if (body.friction) {
-      for (let x = 4; x < WIDTH; x += 12) element("line", { class: "hatch", x1: x + 7, y1: y + FLOOR_Y, x2: x, y2: y + FLOOR_Y + 8 }, group);
+      for (let x = 4; x < WIDTH; x += 12) makeSvg("line", { class: "hatch", x1: x + 7, y1: y + FLOOR_Y, x2: x, y2: y + FLOOR_Y + 8 }, group);
     }
-    const scale = element("g", { class: "scale" }, group);
+    const scale = makeSvg("g", { class: "scale" }, group);
     const part = { y, scale, middle: y + FLOOR_Y - BLOCK.height / 2 };
     if (!body.driver && (body.spring || body.dampers)) {
-      element("path", { class: "wall", d: `M${WALL_X} ${y + 40}V${y + FLOOR_Y}` }, group);
-      for (let h = y + 46; h < y + FLOOR_Y; h += 12) element("line", { class: "hatch", x1: WALL_X, y1: h, x2: WALL_X - 8, y2: h + 8 }, group);
+      makeSvg("path", { class: "wall", d: `M${WALL_X} ${y + 40}V${y + FLOOR_Y}` }, group);
+      for (let h = y + 46; h < y + FLOOR_Y; h += 12) makeSvg("line", { class: "hatch", x1: WALL_X, y1: h, x2: WALL_X - 8, y2: h + 8 }, group);
     }
-    if (body.spring) part.spring = element("path", { class: "spring" }, group);
-    if (body.dampers) part.damper = element("path", { class: "damper" }, group);
-    if (body.driver) part.driver = element("path", { class: "driver" }, group);
-    part.moving = element("g", { class: "body" }, group);
+    if (body.spring) part.spring = makeSvg("path", { class: "spring" }, group);
+    if (body.dampers) part.damper = makeSvg("path", { class: "damper" }, group);
+    if (body.driver) part.driver = makeSvg("path", { class: "driver" }, group);
+    part.moving = makeSvg("g", { class: "body" }, group);
     const top = y + FLOOR_Y - BLOCK.height - (body.friction ? 0 : 8);
-    element("rect", { x: -BLOCK.width / 2, y: top, width: BLOCK.width, height: BLOCK.height, rx: 5 }, part.moving);
-    if (!body.friction) for (const x of [-28, 28]) element("circle", { class: "wheel", cx: x, cy: y + FLOOR_Y - 5, r: 5 }, part.moving);
-    part.label = element("text", { x: 0, y: top + BLOCK.height / 2 + 5 }, part.moving);
-    if (body.friction) part.force = element("path", { class: "force" }, group);
-    if (body.friction) part.forceValue = element("text", { class: "value", y: y + FLOOR_Y - BLOCK.height - 8 }, group);
+    makeSvg("rect", { x: -BLOCK.width / 2, y: top, width: BLOCK.width, height: BLOCK.height, rx: 5 }, part.moving);
+    if (!body.friction) for (const x of [-28, 28]) makeSvg("circle", { class: "wheel", cx: x, cy: y + FLOOR_Y - 5, r: 5 }, part.moving);
+    part.label = makeSvg("text", { x: 0, y: top + BLOCK.height / 2 + 5 }, part.moving);
+    if (body.friction) part.force = makeSvg("path", { class: "force" }, group);
+    if (body.friction) part.forceValue = makeSvg("text", { class: "value", y: y + FLOOR_Y - BLOCK.height - 8 }, group);
     return part;
   }
 
@@ -81,28 +75,28 @@ export class Mechanism {
     const x = (WIDTH * (lane + 0.5)) / lanes;
     const part = { x, pin: body.kind === "pendulum" ? PIN_Y : 115 };
     const atPin = { transform: `translate(${x} ${part.pin})` };
-    const fixed = element("g", atPin, group);
+    const fixed = makeSvg("g", atPin, group);
     if (body.kind === "pendulum") {
-      element("path", { class: "wall", d: "M-46 -18H46" }, fixed);
-      for (let h = -40; h < 46; h += 12) element("line", { class: "hatch", x1: h, y1: -18, x2: h + 8, y2: -26 }, fixed);
-      element("path", { class: "bracket", d: "M-16 -18L0 0L16 -18" }, fixed);
-      element("line", { class: "plumb", x1: 0, y1: 0, x2: 0, y2: ROD_LENGTH + 26 }, fixed);
+      makeSvg("path", { class: "wall", d: "M-46 -18H46" }, fixed);
+      for (let h = -40; h < 46; h += 12) makeSvg("line", { class: "hatch", x1: h, y1: -18, x2: h + 8, y2: -26 }, fixed);
+      makeSvg("path", { class: "bracket", d: "M-16 -18L0 0L16 -18" }, fixed);
+      makeSvg("line", { class: "plumb", x1: 0, y1: 0, x2: 0, y2: ROD_LENGTH + 26 }, fixed);
     } else {
-      element("circle", { class: "rim", r: 96 }, fixed);
-      if (body.driver) part.driver = element("path", { class: "driver", d: "M0 82V110M-7 104L0 112L7 104" }, fixed);
+      makeSvg("circle", { class: "rim", r: 96 }, fixed);
+      if (body.driver) part.driver = makeSvg("path", { class: "driver", d: "M0 82V110M-7 104L0 112L7 104" }, fixed);
     }
-    part.moving = element("g", { class: "body" }, fixed);
+    part.moving = makeSvg("g", { class: "body" }, fixed);
     if (body.kind === "pendulum") {
-      element("path", { class: "rod", d: `M-7 -8L-7 ${ROD_LENGTH}L7 ${ROD_LENGTH}L7 -8Z` }, part.moving);
-      element("circle", { cx: 0, cy: ROD_LENGTH, r: 24 }, part.moving);
-      part.pinDot = element("circle", { class: "pin", r: 6 }, fixed);
+      makeSvg("path", { class: "rod", d: `M-7 -8L-7 ${ROD_LENGTH}L7 ${ROD_LENGTH}L7 -8Z` }, part.moving);
+      makeSvg("circle", { cx: 0, cy: ROD_LENGTH, r: 24 }, part.moving);
+      part.pinDot = makeSvg("circle", { class: "pin", r: 6 }, fixed);
     } else {
-      element("circle", { r: 74 }, part.moving);
-      element("path", { class: "spoke", d: "M0 0V74" }, part.moving);
-      part.pinDot = element("circle", { class: "pin", r: 7 }, fixed);
+      makeSvg("circle", { r: 74 }, part.moving);
+      makeSvg("path", { class: "spoke", d: "M0 0V74" }, part.moving);
+      part.pinDot = makeSvg("circle", { class: "pin", r: 7 }, fixed);
     }
-    part.label = element("text", { x: 150, y: 20 }, fixed);
-    if (body.friction) part.force = element("path", { class: "force" }, fixed);
+    part.label = makeSvg("text", { x: 150, y: 20 }, fixed);
+    if (body.friction) part.force = makeSvg("path", { class: "force" }, fixed);
     return part;
   }
 
@@ -132,8 +126,8 @@ export class Mechanism {
     part.scale.replaceChildren();
     for (const value of ticks(low, part.range, Math.round((part.range - low) / step))) {
       const x = part.origin + part.pixels * value;
-      element("line", { x1: x, x2: x, y1: y + 10, y2: y + 16 }, part.scale);
-      element("text", { x, y: y + 31 }, part.scale).textContent = formatNumber(value * factor, 3) + (Math.abs(value) < 1e-12 ? ` ${display_unit}` : "");
+      makeSvg("line", { x1: x, x2: x, y1: y + 10, y2: y + 16 }, part.scale);
+      makeSvg("text", { x, y: y + 31 }, part.scale).textContent = formatNumber(value * factor, 3) + (Math.abs(value) < 1e-12 ? ` ${display_unit}` : "");
     }
   }
 

@@ -69,7 +69,6 @@ export class Plot {
     this.curveCanvas.setAttribute("role", "img");
     this.cursorCanvas = host.appendChild(document.createElement("canvas"));
     this.cursorCanvas.setAttribute("aria-hidden", "true");
-    this.paints = 0; // number of redraws, for tests
     this.content = this.cursor = this.rectangle = null;
     this.width = this.height = 0;
     new ResizeObserver(([{ contentRect: { width, height } }]) => { // reading clientWidth instead would force a layout
@@ -177,7 +176,6 @@ export class Plot {
 
   paint() {
     if (!this.content || !this.width) return;
-    this.paints++;
     this.draw(this.prepareCanvas(this.curveCanvas), this.width, this.height);
     if (this.cursor) this.moveCursor(this.cursor);
   }

@@ -28,7 +28,11 @@ export class RunSet {
     this.reference = isExact(models.get(state.model)) ? this.preview ?? this.main : undefined;
     this.comparison = state.comparison ? createRun("comparison", comparisonSettings(models, state), state.comparison.model) : undefined;
     this.unchanged = changes.length ? createRun("unchanged", { changes: [] }) : undefined;
-    this.further = Object.fromEntries(Object.entries(further).map(([name, { model, values: own }]) => [name, createRun(name, { values: own, changes: [], points: 0, isEndOnly: true }, model)]));
+    this.further = Object.fromEntries(Object.entries(further).map(([name, { model, values: own }]) => {
+      const key = JSON.stringify([model, own, stop]);
+      const known = this.further?.[name];
+      return [name, known?.key === key ? known : Object.assign(createRun(name, { values: own, changes: [], points: 0, isEndOnly: true }, model), { key })];
+    }));
     this.list = [this.preview, this.main, this.comparison, this.unchanged, ...Object.values(this.further)].filter(Boolean);
     this.pointsShown = 0;
   }

@@ -1,8 +1,7 @@
 // A scene: the state of one motion, its runs, and what shows them: mechanisms, diagrams, fields and playback.
 
-import { Diagrams } from "./diagrams.js";
+import { Diagrams, showLegend } from "./diagrams.js";
 import { DragController } from "./drag.js";
-import { showLegend } from "./legend.js";
 import { Mechanism } from "./mechanism.js";
 import { formatNumber, formatValue } from "./numbers.js";
 import { readColours } from "./plot.js";
@@ -27,7 +26,8 @@ function drawFrame(now) {
   isFrameRequested = false;
   const elapsed = lastFrame ? Math.min((now - lastFrame) / 1000, LONGEST_FRAME) : 0;
   lastFrame = now;
-  document.body.classList.remove("starting"); // everything appears at once, so that nothing shifts
+  const isComplete = scenes.every(({ requested, state }) => state || !requested);
+  if (isComplete) document.body.classList.remove("starting"); // everything appears at once, so that nothing shifts
   const deadline = performance.now() + SLICE;
   const shown = scenes.filter(({ state }) => state).sort((a, b) => b.isInView - a.isInView);
   for (const scene of shown) scene.draw(elapsed, deadline);
@@ -46,7 +46,7 @@ export class Scene {
   // `root` has elements with the classes mechanism (for the run and for the second run), panels, legend, alert, play, scrub
   // and clock. When all runs are drawn, it has the attribute data-ready. `prefix` begins the ids of created elements.
   constructor(root, library, prefix = "") {
-    Object.assign(this, { root, library, prefix, state: null, playing: false, isInView: false, fields: new Map() });
+    Object.assign(this, { root, library, prefix, state: null, requested: null, playing: false, isInView: false, fields: new Map() });
     this.find = (name) => root.querySelector(`.${name}`);
     this.runs = new RunSet(library);
     this.drag = new DragController(this);

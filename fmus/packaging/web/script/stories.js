@@ -1,6 +1,7 @@
 // The opening and the stories: model, values, fields, diagrams and text of each.
 //
 //   model, values, stop   the state; comparison: the second run; restShown: ends this time in s after the motion has stopped
+//   derive(values)        sets values that follow from others; stepsPerSecond: most steps that playback passes in a second
 //   fields                ranges of the fields by variable
 //   keys, ranges          diagrams, and the parts of them that are shown; envelopes: straight and exponential decay
 //   furtherRuns(state)    runs whose counters the text states
@@ -17,9 +18,9 @@ const DEGREE = Math.PI / 180;
 
 // The solver ode23 with a relative tolerance, and the absolute one in the ratio of MATLAB's defaults (1e-3 and 1e-6).
 const ode23 = (rtol) => ({ "solver.method": 2, "solver.rtol": rtol, "solver.atol": rtol / 1000 });
-const proportional = (values) => (values["solver.atol"] = values["solver.rtol"] / 1000);
-const tolerance = { "solver.rtol": { low: 1e-4, high: 1e-2, log: true } };
-const byBothLaws = { model: "coulomb", values: ode23(1e-3), comparison: { model: "coulomb", values: { friction: SIGN } }, runNames: ["true sticking", "sign(v)"], derive: proportional };
+const setAbsoluteTolerance = (values) => (values["solver.atol"] = values["solver.rtol"] / 1000);
+const TOLERANCE = { "solver.rtol": { low: 1e-4, high: 1e-2, log: true } };
+const TWO_LAWS = { model: "coulomb", values: ode23(1e-3), comparison: { model: "coulomb", values: { friction: SIGN } }, runNames: ["true sticking", "sign(v)"], derive: setAbsoluteTolerance };
 
 const bold = (text) => `<b>${text}</b>`;
 const seconds = (t) => bold(`${formatNumber(t)} s`);
@@ -40,8 +41,8 @@ function cycles(run) {
 }
 
 export const OPENING = {
-  ...byBothLaws, restShown: 0.3, stepsPerSecond: 13000,
-  fields: { ...tolerance, x0: { low: -0.12, high: 0.12, log: false } },
+  ...TWO_LAWS, restShown: 0.3, stepsPerSecond: 13000,
+  fields: { ...TOLERANCE, x0: { low: -0.12, high: 0.12, log: false } },
   keys: ["x", ".steps", ".magnitude", ".law"],
   furtherRuns: ({ values }) => ({
     fineTrue: { model: "coulomb", values: { ...values, ...ode23(1e-4), friction: HYBRID } },
@@ -79,7 +80,7 @@ export const STORIES = {
     },
   },
   chatters: {
-    title: "It chatters", ...byBothLaws, stop: 4.3, fields: tolerance,
+    title: "It chatters", ...TWO_LAWS, stop: 4.3, fields: TOLERANCE,
     keys: ["v", ".law"],
     ranges: ({ runs: { comparison: { time, columns: { v } } } }) => {
       const shown = v.filter((_, i) => time[i] >= CLOSE_UP.from && time[i] <= CLOSE_UP.to);

@@ -106,6 +106,7 @@ export class Story extends Scene {
     super.drawCursor(t);
     this.root.querySelectorAll(".meter").forEach((meter, i) => {
       const run = this.shownRuns[i];
+      if (!run.time.length) return;
       const row = run.row(t);
       meter.querySelector(".count").textContent = formatCount(run.columns["solver.steps"][row]);
       meter.querySelector(".motion").textContent = run.columns.mode[row] === 0 ? "at rest" : run.columns.v[row] === 0 ? "released" : "slips";
