@@ -12,7 +12,10 @@ from .terminal import SectionedCommand, Terminal, refuse_ignored_options, refuse
 @click.command(cls=SectionedCommand)
 @click.argument("source", metavar="MODEL|SCENE|FMU")
 @click.option(
-    "--set", "values", multiple=True, metavar="NAME=VALUE,...", help="Start values; only with an FMU. Repeatable."
+    *("--set", "values"),
+    multiple=True,
+    metavar="NAME=VALUE,...",
+    help="Parameters and start values; those of a scene are replaced. Repeatable.",
 )
 @run_options
 @result_options
@@ -27,7 +30,8 @@ def run(
     """Run a model, a scene or an FMU.
 
     The argument is the name of a scene or a model (see info), the path of a scene file or a model file, or the path of
-    an FMU.  A name that a scene and a model share means the scene.
+    an FMU.  A name that a scene and a model share means the scene.  A scene with other values by --set is not compared
+    with its published or reference values.
 
     An FMU that does not expose its solver steps is run with successively halved communication steps, until halving
     changes no output by more than the tolerance, or cannot reach it. The achieved error is stated. A run that misses
@@ -36,10 +40,13 @@ def run(
     \b
     Examples:
       friction-fmus run pendulum
+      friction-fmus run stickslip --set mu_s=0.7,mu_d=0.5
       friction-fmus run ./my-scene.toml --out elsewhere
       friction-fmus run other.fmu --set mass=2 --stop 10 --rtol 1e-4
     """
     from ..running.resolve import find_source
+    from ..scenes.assignments import parse_assignments
+    from ..scenes.scene import change_values
     from ..studies.run import study
     from ..studies.run.table import results_table
 
@@ -48,7 +55,8 @@ def run(
     if isinstance(item, Path):
         run_fmu_file(item, values, options, terminal)
         return
-    refuse_options(context, "without an FMU; a scene sets it in its file", "values", "stop")
+    refuse_options(context, "without an FMU; a scene sets it in its file", "stop")
+    item = change_values(item, parse_assignments("--set", values))
     with terminal.progress(1) as report:
         outcome = study.run_scene(item, terminal.out, partial(report, item.name))
     table = results_table([outcome], everything=True)

@@ -203,11 +203,12 @@ def uses_closed_form(description: Any, fixed_method: str, assignments: Iterable[
     """Return whether an FMU of this project is run by its closed form, which has no tolerance."""
     if fixed_method:
         return fixed_method == EXACT
+    from ..scenes.assignments import parse_assignments
+
     method = next(variable for variable in description.modelVariables if variable.name == "solver.method")
     labels = {str(item.value): item.name for item in method.declaredType.items}
-    values = dict(text.partition("=")[::2] for text in assignments)
-    number = values.get("solver.method", str(method.start)).strip()
-    return labels.get(number, number) == EXACT
+    number = str(parse_assignments("--set", assignments).get("solver.method", method.start))
+    return labels.get(number.removesuffix(".0"), number) == EXACT
 
 
 def run_options(command: Command) -> Command:

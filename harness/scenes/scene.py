@@ -34,7 +34,7 @@
 Required are title, outputs, and either model or fmu.
 """
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any
@@ -255,6 +255,18 @@ def build_scene(path: Path, table: dict[str, Any], source: str) -> Scene:
     scene = Scene(path.stem, source, run, *texts, keys.analyses, plots, keys.decay, known)
     check_requirements(scene)
     return scene
+
+
+def change_values(scene: Scene, values: Mapping[str, Any]) -> Scene:
+    """Return a scene with other values of variables; its known values hold no longer, but for parameters it keeps."""
+    if not values:
+        return scene
+    known = scene.known
+    if known:
+        kept = {name: value for name, value in known.values.items() if known.kind == "parameter" and name not in values}
+        known = replace(known, values=kept) if kept else None
+    run = replace(scene.run, values={**scene.run.values, **values})
+    return replace(scene, run=run, known=known, remark=scene.remark if known == scene.known else "")
 
 
 def find_known_values(keys: SceneKeys) -> KnownValues | None:

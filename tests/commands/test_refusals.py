@@ -110,6 +110,13 @@ def test_an_invalid_command_line_is_one_sentence_and_leaves_no_result(workspace,
     assert [file for file in workspace.glob("results/**/*") if file.is_file()] == []
 
 
+@pytest.mark.parametrize("options", [["f=0.3,solver.method=ode45"], ["f=0.3", "solver.method= 3"]])
+def test_a_tolerance_applies_to_a_method_that_is_set_with_other_values(workspace, options):
+    words = [word for text in options for word in ("--set", text)]
+    done = commands.harness(workspace, "run", "fmus/coulomb.fmu", *words, "--rtol", "1e-5", "--stop", "0.5")
+    assert (done.returncode, done.stderr) == (0, "")
+
+
 def test_an_option_that_applies_to_one_of_two_fmus_is_accepted(workspace):
     other = external_fmus.build_external_fmus() / "Midpoint.fmu"
     done = commands.harness(workspace, "compare", OWN, other, "--timeout", 30, "--stop", 0.1)

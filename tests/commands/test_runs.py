@@ -379,3 +379,27 @@ def test_rtol_sets_the_solver_of_an_fmu_of_this_project(fmus, tmp_path, words):
     done = commands.harness(tmp_path, "run", "fmus/coulomb.fmu", "--set", "solver.method=ode45", *words)
     assert (done.returncode, done.stderr) == (0, "")
     assert load_result(tmp_path / "results/coulomb").parameters["solver.rtol"] == 1e-4
+
+
+@pytest.mark.parametrize(
+    ("name", "assignments", "values", "comparison"),
+    [
+        ("stickslip", ["mu_s=0.7,mu_d=0.5"], {"mu_s": 0.7, "mu_d": 0.5}, []),
+        ("stickslip", ["mu_s=0.7", "mu_d=0.5"], {"mu_s": 0.7, "mu_d": 0.5}, []),
+        ("coulomb", ["f=0.6"], {"f": 0.6}, []),
+        ("coulomb", ["k=100"], {"k": 100.0}, ["f"]),
+        ("pendulum", ["m=2"], {"m": 2.0}, []),
+    ],
+)
+def test_a_scene_runs_with_other_values_and_is_not_compared_with_known_ones(
+    user_folder, tmp_path, name, assignments, values, comparison
+):
+    """The value of a parameter that is not changed stays known."""
+    options = [word for text in assignments for word in ("--set", text)]
+    done = harness(user_folder, "run", name, *options, "--json", "--out", tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")
+    content = json.loads(done.stdout)
+    assert content["quantities"]
+    assert [row["name"] for row in (content["comparison"] or {"values": []})["values"]] == comparison
+    effective = load_result(tmp_path / name).parameters
+    assert {key: effective[key] for key in values} == values
