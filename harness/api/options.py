@@ -52,6 +52,7 @@ def apply_options(
     rtol: float | None = None,
     interface: str | None = None,
     timeout: float | None = None,
+    lenient: bool = False,
 ) -> "RunSpec":
     """Return a run with those of the options that are not None."""
     from ..running.resolve import METHOD, set_rtol
@@ -66,5 +67,6 @@ def apply_options(
         outputs=spec.outputs if outputs is None else tuple(outputs),
         exchange=spec.exchange if interface is None else interface == "ModelExchange",
         timeout=spec.timeout if timeout is None else timeout,
+        lenient=spec.lenient or lenient,
     )
     return spec if rtol is None else set_rtol(spec, rtol)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..arguments import (
     FINITE,
+    FLAG,
     INCREASING_ROW,
     INTERFACE,
     METHOD,
@@ -49,6 +50,7 @@ if TYPE_CHECKING:
     rtol=POSITIVE,
     interface=INTERFACE,
     timeout=POSITIVE,
+    lenient=FLAG,
     progress=PROGRESS,
 )
 @with_progress_bar
@@ -66,6 +68,7 @@ def simulate(
     interface: str | None = None,
     inputs: "Mapping[str, ArrayLike] | pandas.DataFrame | xarray.Dataset | None" = None,
     timeout: float | None = None,
+    lenient: bool = False,
     progress: Progress | bool | None = None,
 ) -> "Trajectory":
     """Run a model, a scene or an FMU once.
@@ -101,6 +104,8 @@ def simulate(
     timeout : float, optional
         Seconds allowed for one call of an FMU that is not of this project, or for 1/4096 of the run of an FMU of this
         project; 60 by default.
+    lenient : bool
+        Whether to run an FMU that violates the FMI standard.
     progress : callable or False, optional
         Receives the progress from 0 to 1. By default a terminal or a notebook shows a bar after two seconds; False
         switches it off.
@@ -134,7 +139,7 @@ def simulate(
         spec = replace(spec, start=start)
     if times is not None:
         spec = replace(spec, times=tuple(times.tolist()))  # type: ignore[union-attr] # a row by its rule
-    spec = apply_options(spec, stop, interval, outputs, method, rtol, interface, timeout)
+    spec = apply_options(spec, stop, interval, outputs, method, rtol, interface, timeout, lenient)
     if interval is not None and spec.inputs:
         spec = replace(spec, grid=choose_fine_step(spec, interval))
     trajectory = runner.run(spec, reporter(progress))
@@ -143,7 +148,9 @@ def simulate(
     return trajectory
 
 
-@check_arguments(a=SIDE, b=SIDE, stop=FINITE, rtol=POSITIVE, interface=INTERFACE, timeout=POSITIVE, progress=PROGRESS)
+@check_arguments(
+    a=SIDE, b=SIDE, stop=FINITE, rtol=POSITIVE, interface=INTERFACE, timeout=POSITIVE, lenient=FLAG, progress=PROGRESS
+)
 @with_progress_bar
 def compare(
     a: "str | Path | Trajectory | pandas.DataFrame | pandas.Series | Mapping[str, ArrayLike]",
@@ -153,6 +160,7 @@ def compare(
     rtol: float | None = None,
     interface: str | None = None,
     timeout: float | None = None,
+    lenient: bool = False,
     progress: Progress | bool | None = None,
 ) -> "ComparisonResult":
     """Compare two trajectories variable by variable and event by event.
@@ -163,7 +171,7 @@ def compare(
         Trajectories, tables whose columns have the names of outputs, result folders, files (fmpy, OpenModelica, Dymola,
         any table with the time in its first column), FMUs or scenes. FMUs and scenes are run at the times of the other
         side.
-    stop, rtol, interface, timeout
+    stop, rtol, interface, timeout, lenient
         Options for FMUs and scenes that have to be run, as in `simulate`; refused if both sides are recorded.
     progress : callable or False, optional
         Receives the progress from 0 to 1. By default a terminal or a notebook shows a bar after two seconds; False
@@ -184,7 +192,7 @@ def compare(
     from ..studies.compare.result import ComparisonResult
     from ..studies.compare.trajectory_sources import display_names, load_both
 
-    options = {"stop": stop, "interface": interface, "timeout": timeout, "rtol": rtol}
+    options = {"stop": stop, "interface": interface, "timeout": timeout, "rtol": rtol, "lenient": lenient or None}
     first, second = load_both(
         tuple(str(side) if isinstance(side, str | Path) else convert_to_signals(side) for side in (a, b)),
         RunOptions(stop=stop),

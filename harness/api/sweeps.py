@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from ..arguments import (
     FINITE,
+    FLAG,
     INTERFACE,
     NAMES,
     NATURAL,
@@ -44,6 +45,7 @@ GRID = mapping(Rule("numbers", lambda values: values), "numbers")  # the axes ch
     rtol=POSITIVE,
     interface=INTERFACE,
     timeout=POSITIVE,
+    lenient=FLAG,
     workers=WORKERS,
     scheduler=TEXT,
     folder=PATH,
@@ -62,6 +64,7 @@ def sweep(
     rtol: float | None = None,
     interface: str | None = None,
     timeout: float | None = None,
+    lenient: bool = False,
     workers: int | None = None,
     scheduler: str | None = None,
     folder: "str | Path | None" = None,
@@ -86,7 +89,7 @@ def sweep(
     measures : sequence of str
         Measures, as ``"final"``, ``"period"`` or ``"steps"``; by default the final values, and events if the FMU
         counts them.
-    stop, rtol, interface, timeout
+    stop, rtol, interface, timeout, lenient
         As in `simulate`.
     workers : int, optional
         Number of worker processes; by default all runs are done in this process.
@@ -125,7 +128,7 @@ def sweep(
     if workers is not None and scheduler is not None:
         raise SceneError("workers has no effect with scheduler, whose cluster has its own workers: leave one out")
     run = RunSpec(find_fmu(str(source)), values=dict(values or {}), follow=False)
-    run = apply_options(run, stop=stop, rtol=rtol, interface=interface, timeout=timeout)
+    run = apply_options(run, stop=stop, rtol=rtol, interface=interface, timeout=timeout, lenient=lenient)
     if twice := set(grid) & set(run.values):
         raise SceneError(f"{min(twice)} is varied by grid and has a value for all runs: remove one")
     labels = read_labels(run) if any(map(list_labels, grid.values())) else {}

@@ -10,6 +10,7 @@ from .terminal import (
     NONNEGATIVE,
     SectionedCommand,
     Terminal,
+    is_given,
     refuse_ignored_options,
     refuse_options,
     result_options,
@@ -32,7 +33,7 @@ def compare(
     within: float | None,
     atol: float | None,
     terminal: Terminal,
-    **options: Any,
+    **_: Any,
 ) -> None:
     """Compare A and B, variable by variable.  Each is an FMU (FMI 2.0 or 3.0), a scene, a result folder, or a file:
     CSV of fmpy, .csv or .mat of OpenModelica or Dymola, or any table whose first column is time.
@@ -49,20 +50,25 @@ def compare(
       friction-fmus compare results/smd measured.csv --within 1e-3 --atol 1e-6
     """
     with terminal.progress(1) as report:  # the imports take most of a second
+        from ..api import compare as compare_sides
+        from ..results.provenance import describe_sources
+        from ..results.result import save_result
         from ..running.resolve import FMU_SUFFIXES
         from ..running.trajectory import Trajectory
         from ..scenes.fmu_files import find_fmu
-        from ..scenes.run_spec import RunOptions
-        from ..studies.compare import study
-        from ..studies.compare.trajectory_sources import RUN_SUFFIXES
+        from ..studies.compare.trajectory_sources import RUN_SUFFIXES, display_names
 
         suffixes = [Path(source).suffix for source in (first, second)]
         if all(Path(source).exists() for source in (first, second)) and not {*suffixes} & {*RUN_SUFFIXES}:
             refuse_options(context, "on stored results and files", "stop")
         fmus = [find_fmu(source) for source in (first, second) if Path(source).suffix in FMU_SUFFIXES]
         refuse_ignored_options(context, fmus)
-        rtol, spec = options.pop("rtol"), RunOptions(**options)
-        comparison, folder = study.run_comparison((first, second), spec, rtol, terminal.out, partial(report, "compare"))
+        options = {name: context.params[name] for name in ("stop", "rtol", "interface", "lenient", "timeout")}
+        given = {name: value for name, value in options.items() if is_given(context, name)}
+        compute = partial(compare_sides, first, second, **given, progress=partial(report, "compare"))
+        folder = terminal.out / "compare" / "-".join(display_names((first, second))).replace("/", "-")
+        source = describe_sources(first, second)
+        comparison = save_result(folder, compute, "compare", source, scene=options)
     runs = [side for side in (comparison.one, comparison.two) if isinstance(side, Trajectory)]
     failed = [run.failure for run in runs if run.failure]
     if within is not None or atol is not None:

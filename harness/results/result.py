@@ -244,13 +244,13 @@ def save_result(folder: Path, compute: Callable[[], ResultType], study: str, sou
     source : str
         Source of the result, as given on the command line.
     **origin
-        Further arguments of `write_provenance`: files, parameters, run and scene.
+        Arguments of `write_provenance` that the result does not know: files, parameters, run and scene.
     """
     from .registry import find_study
 
     with replace_folder(folder, find_study(study).files, source) as new_folder:
         result = compute()
         result.write(new_folder)
-        write_provenance(new_folder, source=source, **origin)
+        write_provenance(new_folder, **result.origin() | origin | {"source": source})
         write_summary(new_folder, result.summary())
     return result
