@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from math import pi
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -22,13 +23,15 @@ SCALES = (  # exponents of 2 of the units of mass, length and time
     (40, 20, 10),
     (-30, -30, -20),
 )
+REVOLUTIONS_ADDED = (1, -100, 10_000)
 LARGEST_STEPS = (10.0, 1e4)  # of the duration; a tenth of it by default
 TIME, UNITS, MIRROR, ORDER, FRAME = "start time", "units", "mirror", "order", "frame"
-LARGEST_STEP, LONG = "largest step", "long run"
-KINDS = (TIME, UNITS, MIRROR, ORDER, FRAME, LARGEST_STEP, LONG)
+LARGEST_STEP, REVOLUTIONS, LONG = "largest step", "revolutions", "long run"
+KINDS = (TIME, UNITS, MIRROR, ORDER, FRAME, LARGEST_STEP, REVOLUTIONS, LONG)
 
 # tolerances relative to that of the method: another order changes roundings, another frame the error of each step
 START_SLACK, ORDER_SLACK, FRAME_SLACK, LARGEST_STEP_SLACK = 10.0, 100.0, 1000.0, 1000.0
+REVOLUTIONS_SLACK = 100.0  # the size of an angle, by which its first steps are controlled, is that of one radian
 
 
 @dataclass(frozen=True)
@@ -119,6 +122,29 @@ def raise_largest_step(values: Mapping[str, Any], duration: float) -> list[Chang
         )
         for step in steps
     ]
+
+
+def add_revolutions(
+    runs: "FmuRuns", values: Mapping[str, Any], duration: float, angles: Mapping[str, str]
+) -> list[Change]:
+    """Return changes by whole revolutions of each angle, by the parameter that sets its start value."""
+    changes = []
+    for angle, setter in angles.items():
+        for n in REVOLUTIONS_ADDED:
+            turn = 2.0 * pi * n
+            start = values.get(setter, runs.start_value(setter)) + turn
+            changes.append(
+                Change(
+                    REVOLUTIONS,
+                    f"{angle} {n:+d} revolution{'s' * (n != 1)}",
+                    {**values, setter: start},
+                    0.0,
+                    duration,
+                    slack=REVOLUTIONS_SLACK,
+                    moving={angle: (angle, -turn, 0.0)},
+                )
+            )
+    return changes
 
 
 def move_to_frame(

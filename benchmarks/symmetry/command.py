@@ -67,8 +67,8 @@ def symmetry(
     as_json: bool,
 ) -> None:
     """Run models under a change of the start time, of the units, of all signs, of the order of declarations, of the
-    frame of reference, and of the largest step.  None of these may change a motion.  Without arguments, run all models
-    of the project.
+    frame of reference, of the largest step, and of angles by whole revolutions.  None of these may change a motion.
+    Without arguments, run all models of the project.
 
     The table has the number of runs that differ and the number of runs.  The list below it has the first difference of
     each run.

@@ -6,6 +6,7 @@ The equations are evaluated at random states, before and after a change of value
 import random
 from collections.abc import Iterator, Mapping
 from itertools import product
+from math import pi
 from pathlib import Path
 from typing import Any, cast
 
@@ -100,6 +101,45 @@ class Equations:
                 if a != 0.0 and not is_close(b, a * slip_factors.setdefault(k, b / a)):
                     return "a slip contains a number with a unit"
         return ""
+
+    def find_angles(self, runs: FmuRuns, values: Mapping[str, Any]) -> dict[str, str]:
+        """Return the angles of which whole revolutions change no rate, slip and margin, each with its start parameter.
+
+        The parameter sets the start value of one angle and enters no equation.
+        """
+        start, turn, found = model_values(runs, values), 2.0 * pi, {}
+        for setter in (name for name in start if getattr(runs.variables[name], "unit", None) == "rad"):
+            model, turned = self.instantiate(start), self.instantiate(start | {setter: start[setter] + turn})
+            if model is None or turned is None:
+                continue
+            starts = as_tuple(model.initial_state(0.0)), as_tuple(turned.initial_state(0.0))
+            shifts = [b - a for a, b in zip(*starts, strict=True)]
+            if sorted(shifts)[:-1] != [0.0] * (len(shifts) - 1) or not is_close(max(shifts), turn):
+                continue
+            place = shifts.index(max(shifts))
+            points = list(self.random_points())
+            images = [(t, (*y[:place], y[place] + turn, *y[place + 1 :]), modes) for t, y, modes in points]
+            if all(
+                self.are_equal(self.evaluate_all(model, a), self.evaluate_all(turned, b))
+                for a, b in zip(points, images, strict=True)
+            ):
+                found[self.states[place]] = setter
+        return found
+
+    def evaluate_all(self, model: Any, point: Point) -> Numbers:
+        """Return rates, slips and margins of conditions; none if they are undefined."""
+        t, states, modes = point
+        rates, slips = self.evaluate(model, point)
+        if not model.has_conditions or not rates:
+            return rates + slips
+        margins = model.condition_margins(t, *states, *map(int, modes))
+        return rates + slips + margins[: len(margins) // 2]
+
+    @staticmethod
+    def are_equal(a: Numbers, b: Numbers) -> bool:
+        """Return whether numbers are equal up to rounding, relative to the largest."""
+        size = max(map(abs, a), default=0.0)
+        return len(a) == len(b) and all(abs(x - y) <= ROUNDING * size for x, y in zip(a, b, strict=True))
 
     def find_odd_variables(self, runs: FmuRuns, values: Mapping[str, Any]) -> tuple[list[str], dict[str, int]] | str:
         """Return the parameters and inputs to invert, and the signs of the states; or why there is no mirror image.

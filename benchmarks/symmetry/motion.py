@@ -247,8 +247,9 @@ def find_state_difference(base: Motion, changed: Motion, change: Change, states:
     for name in states:
         expected = change.map_column(name, base)
         found = change.restore_column(name, changed)
-        computed = change.moving[name][0] if name in change.moving else name  # in a frame, from larger values
-        size = max(np.abs(expected).max(), np.abs(changed.columns.get(computed, found)).max())
+        other = change.moving[name][0] if name in change.moving else name
+        computed = found if other == name else changed.columns.get(other, found)  # in a frame, from larger values
+        size = max(np.abs(expected).max(), np.abs(computed).max())
         if size == 0.0:
             continue
         rate = np.abs(np.diff(expected) / np.maximum(np.diff(base.time), 1e-300)).max() if len(expected) > 1 else 0.0

@@ -22,11 +22,13 @@ from .changes import (
     LONG,
     ORDER,
     ORDER_SLACK,
+    REVOLUTIONS,
     SCALES,
     START_TIMES,
     TIME,
     UNITS,
     Change,
+    add_revolutions,
     invert_signs,
     move_to_frame,
     raise_largest_step,
@@ -274,6 +276,13 @@ class Model:
             return [(other, move_to_frame(other, self.frame, base, values, duration))]
         if isinstance(self.equations, str):
             return self.equations
+        if kind == REVOLUTIONS:
+            angles = self.equations.find_angles(runs, values)
+            if law != HYBRID:
+                return f"the law {law} chatters"
+            if not angles:
+                return "no start value is an angle that enters the equations by periodic functions only"
+            return [(runs, change) for change in add_revolutions(runs, values, duration, angles)]
         if kind == UNITS:
             hidden = self.equations.find_hidden_unit(runs, values)
             if hidden:

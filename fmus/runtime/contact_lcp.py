@@ -53,13 +53,16 @@ class CoupledFriction(DryFriction):
     def slip_magnitudes(self, t: float, y: StateVector) -> ContactVector:
         """Return the sums of their absolute terms."""
 
+    def slip_roundings(self, t: float, y: StateVector) -> ContactVector:
+        """Return the scales of their rounding errors, which for an angle of many revolutions are larger than these."""
+
     def slip_deviations(self, t: float, y: StateVector) -> ContactVector:
         """Return how far new values of inputs move the slips without a jump, because their rates have changed."""
 
     def contact_forces(
         self, t: float, y: StateVector, modes: ContactVector
-    ) -> tuple[ContactVector, ContactVector, ContactVector]:
-        """Return forces, holding limits, and the sums of the absolute terms of both."""
+    ) -> tuple[ContactVector, ContactVector, ContactVector, ContactVector]:
+        """Return forces, holding limits, and of both together the sums of absolute terms and the rounding scales."""
 
     def contact_rates(
         self, t: float, y: StateVector, modes: ContactVector
@@ -76,27 +79,30 @@ class CoupledFriction(DryFriction):
 def update_contact_event_functions(model, location, t, y: StateVector, modes: ContactVector):
     """Evaluate the event functions of all contacts, with margins for rounding errors."""
     slips = model.slip_velocities(t, y)
-    slip_terms = model.slip_magnitudes(t, y)
+    sizes = model.slip_magnitudes(t, y)
+    roundings = model.slip_roundings(t, y)
     for i in contact_indices:
-        location.scales[i] = location.scales[len(modes) + i] = slip_terms[i]
-        location.values[i] = modes[i] * slips[i] + ROUNDOFF_MARGIN * slip_terms[i]
+        location.scales[i] = location.scales[len(modes) + i] = sizes[i]
+        location.roundings[i] = location.roundings[len(modes) + i] = roundings[i]
+        location.values[i] = modes[i] * slips[i] + ROUNDOFF_MARGIN * roundings[i]
         location.values[len(modes) + i] = 1.0
         if model.friction != HYBRID or location.is_frictionless[i] > 0.0:
             location.values[i] = 1.0
     if model.friction == HYBRID and any_of(modes == STUCK):
-        force, limit, terms = model.contact_forces(t, y, modes)
+        force, limit, load_sizes, terms = model.contact_forces(t, y, modes)
         for i in contact_indices:
             if modes[i] == STUCK:
                 widened_limit = limit[i] + ROUNDOFF_MARGIN * terms[i]
-                location.scales[i] = location.scales[len(modes) + i] = terms[i]
+                location.scales[i] = location.scales[len(modes) + i] = load_sizes[i]
+                location.roundings[i] = location.roundings[len(modes) + i] = terms[i]
                 location.values[i] = widened_limit - force[i]
                 location.values[len(modes) + i] = widened_limit + force[i]
 
 
 def find_frictionless_contacts(model, location, step):
     """Note which contacts have no friction in a step: a reversal of their slips is no event."""
-    force, limit, _terms = model.contact_forces(step.t0, step.y0, step.modes0)
-    force_at_end, limit_at_end, _terms_at_end = model.contact_forces(step.t1, step.y1, step.modes0)
+    force, limit, _sizes, _terms = model.contact_forces(step.t0, step.y0, step.modes0)
+    force_at_end, limit_at_end, _sizes_at_end, _terms_at_end = model.contact_forces(step.t1, step.y1, step.modes0)
     for i in contact_indices:
         sizes = fabs(force[i]) + limit[i] + fabs(force_at_end[i]) + limit_at_end[i]
         location.is_frictionless[i] = 1.0 if step.modes0[i] != STUCK and sizes == 0.0 else 0.0
@@ -110,25 +116,26 @@ def resolve_after_event(model, step, h, ends: ContactVector, tie_tolerance) -> t
     t = step.t1
     slips = model.slip_velocities(t, step.y1)
     terms = model.slip_magnitudes(t, step.y1)
+    roundings = model.slip_roundings(t, step.y1)
     floors = slip_floors(model, step, t, step.y1)
-    force, limit, _ = model.contact_forces(t, step.y1, step.modes0)
+    force, limit, _sizes, _terms = model.contact_forces(t, step.y1, step.modes0)
     delta = PREDICTION_SHARE * step.time_scale()
     status, new_modes = contact_vector(), contact_vector()
     y = step.y1
     for i in contact_indices:
         status[i], new_modes[i] = SLIPPING, step.modes0[i]
-        size = terms[i] + step.event_location.peaks[i]
+        size, rounding = terms[i] + step.event_location.peaks[i], ROUNDOFF_MARGIN * roundings[i]
         if new_modes[i] == STUCK:
             status[i] = AT_LIMIT if ends[i] <= h else AT_REST
         elif not (force[i] == 0.0 and limit[i] == 0.0):
             if new_modes[i] * slips[i] < -REVERSED_SHARE * (size + floors[i]):
                 new_modes[i] = sign(slips[i])  # it reversed without friction, which has returned
-            elif ends[i] <= h or new_modes[i] * slips[i] <= SIMULTANEITY_MARGIN * size:
+            elif ends[i] <= h or new_modes[i] * slips[i] <= SIMULTANEITY_MARGIN * size + rounding:
                 depth = inf
                 if fabs(force[i]) >= EQUAL_SHARE * limit[i]:
                     depth = reversal_depth(model, t, y, step.modes0, delta, limit[i], i)
                 if depth <= tie_tolerance * (terms[i] + start_slip(model, step, i) + floors[i]):
-                    y = raise_slip(model, t, y, step.modes0, 2.0 * depth + ROUNDOFF_MARGIN * terms[i], i)
+                    y = raise_slip(model, t, y, step.modes0, 2.0 * depth + rounding, i)
                 else:
                     status[i], new_modes[i] = AT_REST, STUCK
     return resolve_contacts(model, t, y, step.modes0, new_modes, status, delta, tie_tolerance)
@@ -230,13 +237,14 @@ def resolve_at_start(
     """
     slips = model.slip_velocities(t, y)
     terms = model.slip_magnitudes(t, y)
+    roundings = model.slip_roundings(t, y)
     floors = slip_floors(model, step, t, y)
-    force, limit, _ = model.contact_forces(t, y, modes)
+    force, limit, _sizes, _terms = model.contact_forces(t, y, modes)
     status, new_modes = contact_vector(), contact_vector()
     for i in contact_indices:
-        zero_level = ROUNDOFF_MARGIN * terms[i]
+        zero_level = ROUNDOFF_MARGIN * roundings[i]
         if modes[i] * slips[i] <= 0.0:
-            zero_level = (tie_tolerance if modes[i] == STUCK else reach) * (terms[i] + floors[i])
+            zero_level += (tie_tolerance if modes[i] == STUCK else reach) * (terms[i] + floors[i])
         status[i], new_modes[i] = SLIPPING, sign(slips[i])
         if modes[i] != STUCK and force[i] == 0.0 and limit[i] == 0.0:
             new_modes[i] = modes[i]
@@ -278,7 +286,7 @@ def resolve_contacts(
     """
     if model.has_variable_levers:
         slips = model.slip_velocities(t, y)
-        _force, limit, terms = model.contact_forces(t, y, new_modes)
+        _force, limit, _sizes, terms = model.contact_forces(t, y, new_modes)
         moving_modes, _consistent = solve_modes(model, t, y, new_modes, status, delta, tie_tolerance)
         slips_ahead = predict_slips(model, t, y, moving_modes, delta)
         for i in contact_indices:
@@ -305,10 +313,10 @@ def stop_slips(model, t, y: StateVector, modes: ContactVector) -> StateVector:
             if modes[i] == STUCK and slips[i] != 0.0:
                 at_rest = False
         if model.has_variable_levers and not at_rest:  # products with levers have rounding errors
-            terms = model.slip_magnitudes(t, y)
+            roundings = model.slip_roundings(t, y)
             at_rest = True
             for i in contact_indices:
-                if modes[i] == STUCK and fabs(slips[i]) > 4.0 * EPSILON * terms[i]:
+                if modes[i] == STUCK and fabs(slips[i]) > 4.0 * EPSILON * roundings[i]:
                     at_rest = False
         if at_rest:
             break
@@ -392,7 +400,7 @@ def contact_balance_ahead(
     """
     f = model.rates(t, y, modes)
     y2 = y + delta * f
-    force, limit, terms = model.contact_forces(t + delta, y2, modes)
+    force, limit, _sizes, terms = model.contact_forces(t + delta, y2, modes)
     force_rate, limit_rate, _residual_force, residual_force_rate = model.contact_rates(t + delta, y2, modes)
     return force, limit, terms, force_rate, limit_rate, residual_force_rate
 
@@ -436,7 +444,7 @@ def most_held(
                     n_sliding += 1
             if n_sliding == n:
                 if are_consistent(model, t, y, trial_modes, status, delta, tie_tolerance):
-                    force, limit, _terms = model.contact_forces(t, y, trial_modes)
+                    force, limit, _sizes, _terms = model.contact_forces(t, y, trial_modes)
                     highest = 0.0
                     for i in contact_indices:
                         if status[i] != SLIPPING and trial_modes[i] == STUCK:
@@ -473,7 +481,7 @@ def violations(
     terms and, if they decrease, the relative error `tie_tolerance`.  A contact also sticks where its load only touches
     the limit: it does not exceed the limit now, nor a short time ahead, where it does not approach the limit either.
     """
-    force, limit, terms = model.contact_forces(t, y, modes)
+    force, limit, _sizes, terms = model.contact_forces(t, y, modes)
     force_rate, limit_rate, residual_force, residual_force_rate = model.contact_rates(t, y, modes)
     later_force, later_limit, later_terms, later_force_rate, later_limit_rate, later_residual_rate = (
         contact_balance_ahead(model, t, y, modes, delta)

@@ -42,15 +42,15 @@ class EventLocation:
     phase_f: RateVector
 
     def __init__(self, n):
-        # value and scale (sum of absolute terms) of each event function at the latest evaluation
-        self.values, self.scales = [0.0] * n, [0.0] * n
+        # of each event function at the latest evaluation: value, size (of its terms), scale of its rounding errors
+        self.values, self.scales, self.roundings = [0.0] * n, [0.0] * n, [0.0] * n
         self.near_middle = [0.0] * n  # values after 0.4 of the step
         self.cubic_errors = [0.0] * n  # differences from a cubic polynomial, as shares of the range in the step
         # Bernstein coefficients of the cubic Hermite polynomial; largest scale since the last event; first zero, in
         # seconds after the start of the step: a resolution that does not depend on the time
         self.start, self.early, self.late, self.end = [0.0] * n, [0.0] * n, [0.0] * n, [0.0] * n
         self.peaks, self.times = [0.0] * n, [inf] * n
-        # conditions: left minus right side, sum of absolute terms; 1.0 if true else -1.0, before and after t1
+        # conditions: left minus right side, scale of rounding errors; 1.0 if true else -1.0, before and after t1
         self.margins, self.margin_scales = [0.0] * n, [0.0] * n
         self.sides_before, self.sides_after = [1.0] * n, [1.0] * n
         self.is_frictionless = [0.0] * n  # of each contact: 1.0 if it neither slides nor holds with a force
@@ -86,12 +86,12 @@ def update_event_functions(model, location, t, y: StateVector, modes: ContactVec
         conditions.update_margins(model, location, t, y, modes)
         for j in range(model.n_event_functions - model.first_condition):
             k = model.first_condition + j
-            location.scales[k] = location.margin_scales[j]
+            location.scales[k] = location.roundings[k] = location.margin_scales[j]
             if model.has_pieces and is_edge(model, k):  # the margin is relative to the current piece
-                location.values[k] = location.margins[j] + CONDITION_MARGIN * location.margin_scales[j] + TINY
+                location.values[k] = location.margins[j] + CONDITION_MARGIN * location.roundings[k] + TINY
             else:
                 location.values[k] = (
-                    model.condition_sides[j] * location.margins[j] + CONDITION_MARGIN * location.margin_scales[j] + TINY
+                    model.condition_sides[j] * location.margins[j] + CONDITION_MARGIN * location.roundings[k] + TINY
                 )
 
 
@@ -168,10 +168,15 @@ def evaluate_on_cubic(model, step):
         location.late[j] = (18.0 * two_thirds - 5.0 * end - 9.0 * third + 2.0 * start) / 6.0
         value_range = largest_of(start, third, two_thirds, end) - smallest_of(start, third, two_thirds, end)
         cubic = 0.216 * start + 0.432 * location.early[j] + 0.288 * location.late[j] + 0.064 * end
-        excess = fabs(location.near_middle[j] - cubic) - ROUNDOFF_MARGIN * location.peaks[j]
+        excess = fabs(location.near_middle[j] - cubic) - ROUNDOFF_MARGIN * rounding_scale(location, j)
         location.cubic_errors[j] = excess / value_range if excess > 0.0 and value_range > 0.0 else 0.0
         if location.scales[j] > location.peaks[j]:
             location.peaks[j] = location.scales[j]
+
+
+def rounding_scale(location, j):
+    """Return the scale of the rounding errors of an event function since the last event."""
+    return location.peaks[j] if location.peaks[j] > location.roundings[j] else location.roundings[j]
 
 
 def examine_cubic(location, step, j):
@@ -231,7 +236,7 @@ def search_polynomial(model, step, j):
     largest_curvature = 0.0
     for k in range(DEGREE - 1):
         largest_curvature += (k + 2.0) * (k + 1.0) * fabs(location.polynomial[k + 2])
-    least = CONDITION_MARGIN * location.peaks[j]  # smaller values are rounding errors
+    least = CONDITION_MARGIN * rounding_scale(location, j)  # smaller values are rounding errors
     u = START_OF_SLIP if location.start[j] <= least else 0.0
     error = ERROR_FACTOR * step.tolerance * location.peaks[j]
     if location.start[j] <= error and location.early[j] > location.start[j]:

@@ -188,7 +188,7 @@ def update_indicators(run, model):
     if solver.step.is_hybrid:
         if model.is_coupled:
             slips = model.slip_velocities(solver.t, solver.y)
-            force, limit, terms = model.contact_forces(solver.t, solver.y, solver.modes)
+            force, limit, _sizes, terms = model.contact_forces(solver.t, solver.y, solver.modes)
             if model.has_prescribed_slips and run.phase != EVENT:
                 for i in contact_indices:
                     exchange.slip_errors[i] = fabs(slips[i]) if solver.modes[i] == STUCK else 0.0

@@ -37,6 +37,7 @@ class Oscillator(VariableOwner):
 
     states: dict[str, str] = {"x": "v", "v": "a"}  # state -> its rate, which may be a state
     contacts: dict[str, str] = {}  # mode -> state that is the slip velocity of the contact
+    angles: tuple[str, ...] = ()  # states in rad that enter the equations by periodic functions only
     has_dry_friction = False  # friction with modes (stick_slip.py)
     has_other_laws = False  # friction laws without stick and slip: law_modes() is defined
     rests_when_stuck = False  # a single body: nothing moves while its contact sticks
@@ -85,7 +86,7 @@ class Oscillator(VariableOwner):
     def condition_margins(
         self, t: float, y: StateVector, modes: ContactVector
     ) -> tuple[ConditionVector, ConditionVector]:
-        """Return the margins of the conditions, if there are any, and the sums of the absolute terms of each."""
+        """Return the margins of the conditions, if there are any, and the scales of their rounding errors."""
 
     def update_pieces(self, t: float, y: StateVector, modes: ContactVector) -> None:
         """Find the pieces of tables that contain their arguments, if there are any."""

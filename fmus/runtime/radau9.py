@@ -20,6 +20,7 @@ from .vectors import (
     complete_rates,
     dynamic_part,
     elementwise_max,
+    error_size,
     factorize,
     factorize_complex,
     inlined,
@@ -191,7 +192,7 @@ class Radau9:
         pair1 = factorize_complex(re_1, im_1, J)
         pair2 = factorize_complex(re_2, im_2, J)
         shift = 1.0 / (GAMMA * h)
-        scale = magnitude(y)
+        scale = error_size(y)
         scale = elementwise_max(control.error_scale_floor, scale)
         tolerance = NEWTON_TOLERANCE * step.tolerance
         has_converged, last_change, quotient, share, iterations = False, 1.0, 1.0, 1.0, 0
@@ -268,7 +269,7 @@ class Radau9:
             f + (E1 * z1 + E2 * z2 + E3 * z3 + E4 * z4 + E5 * z5) / h,
         )
         e = solve_factored(real, r)
-        size = magnitude(y6)
+        size = error_size(y6)
         size = elementwise_max(size, scale)
         d = magnitude(e)
         d = d / size

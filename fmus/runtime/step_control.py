@@ -24,6 +24,7 @@ from .vectors import (
     contact_vector,
     dynamic_part,
     elementwise_max,
+    error_size,
     kinematic_rates,
     magnitude,
     max_of,
@@ -152,7 +153,7 @@ class InternalStep:
         """Start an empty step at t, given the previous modes; choose a step size unless nothing moves."""
         self.roundoff.t1 = self.roundoff.x1 = 0.0
         self.t1, self.y1 = t, y
-        size = magnitude(self.y1)
+        size = error_size(self.y1)
         self.active_method.raise_scale_floor(model, size)
         if model.has_conditions:
             conditions.initialize(model, self.event_location, t, self.y1, modes)
@@ -356,7 +357,7 @@ class InternalStep:
         remaining = self.t_end - t - roundoff.t0
         last = 1.1 * h_new >= remaining
         h = remaining if last else h_new
-        scale = magnitude(y)
+        scale = error_size(y)
         method = self.active_method
         method.raise_scale_floor(model, scale)
         scale = elementwise_max(method.error_scale_floor, scale)
@@ -364,7 +365,7 @@ class InternalStep:
         while True:
             y1, f1, e = method.propose(model, self, modes, t, y, f, h)
             self.n_rhs += method.stages
-            size1 = magnitude(y1)
+            size1 = error_size(y1)
             size2 = elementwise_max(size1, scale)
             d = magnitude(e)
             e = d / size2
@@ -485,9 +486,9 @@ class InternalStep:
             modes = STUCK * modes
         y2, _f2, e = method.propose(model, self, modes, self.t0, self.y0, self.f0, h)
         self.n_rhs += method.stages
-        scale = magnitude(self.y0)
+        scale = error_size(self.y0)
         scale = elementwise_max(method.error_scale_floor, scale)
-        size2 = magnitude(y2)
+        size2 = error_size(y2)
         scale = elementwise_max(size2, scale)
         e = magnitude(e) / scale
         difference = y2 - y_end
@@ -591,7 +592,7 @@ class InternalStep:
 
     def initial_step_size(self):
         """Estimate the first step h from the slopes at t1."""
-        size1 = magnitude(self.y1)
+        size1 = error_size(self.y1)
         size1 = elementwise_max(size1, self.active_method.error_scale_floor)
         rate1 = magnitude(self.f1)
         if self.active_method.floor_share > 0.0:

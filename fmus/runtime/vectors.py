@@ -30,6 +30,7 @@ contact_indices: list[int] = []
 slip_index: list[int] = []
 position_index: list[int] = []
 is_dynamic: list[bool] = []  # for each state: whether its rate is computed, not a state
+is_angle: list[bool] = []  # for each state: whether it is an angle that enters by periodic functions only
 rate_index: list[int] = []  # index of the rate, where it is a state
 
 
@@ -45,6 +46,15 @@ def contact_vector() -> ContactVector:
 
 def magnitude(a):
     return np.where(a > 0.0, a, -a)
+
+
+def error_size(a):
+    """Return the magnitudes to which the errors of states are relative: of angles at most 1 rad.
+
+    Whole revolutions of an angle that enters the equations by periodic functions only do not change the motion.
+    """
+    size = magnitude(a)
+    return np.where(is_angle & (size > 1.0), 1.0, size)
 
 
 def elementwise_max(a, b):

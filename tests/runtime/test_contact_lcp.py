@@ -34,7 +34,8 @@ class Chain(CoupledFriction):
         return np.linalg.solve(np.where(slides[:, None], np.eye(self.n), self.A), np.where(slides, modes * slide, b))
 
     def contact_forces(self, t, y, modes):
-        return self.solved(modes, self.b, self.slide), self.limit, np.abs(self.b) + self.limit
+        size = np.abs(self.b) + self.limit
+        return self.solved(modes, self.b, self.slide), self.limit, size, size
 
     def contact_rates(self, t, y, modes):
         force, rate = self.solved(modes, self.b, self.slide), self.solved(modes, self.b_rate, 0.0)
@@ -161,6 +162,6 @@ def test_a_contact_without_a_lever_holds_nothing():
     chain.b = chain.A @ (0.5 * chain.limit)
     chain.has_variable_levers = True
     assert chain.answer() == ((0,), True)
-    force, limit, _ = chain.contact_forces(0.0, None, np.zeros(1))
-    chain.contact_forces = lambda t, y, modes: (force, limit, np.full(1, 1e20))
+    force, limit, size, _ = chain.contact_forces(0.0, None, np.zeros(1))
+    chain.contact_forces = lambda t, y, modes: (force, limit, size, np.full(1, 1e20))
     assert chain.answer() == ((1,), True)

@@ -10,6 +10,7 @@ from fmus.runtime.vectors import (
     RateVector,
     StateVector,
     contact_indices,
+    is_angle,
     is_dynamic,
     position_index,
     rate_index,
@@ -34,6 +35,7 @@ def to_array_model(model, run):
     velocity_indices[:] = [states.index(name) for name in states if name in rates]
     slip_index[:] = [states.index(name) if name in states else -1 for name in slips]
     position_index[:] = [rates.index(name) if name in rates else -1 for name in slips]
+    is_angle[:] = [name in model.angles for name in states]
     is_dynamic[:] = [name not in states for name in rates]
     rate_index[:] = [states.index(name) if name in states else -1 for name in rates]
     store_vectors_as_arrays(run.solver)

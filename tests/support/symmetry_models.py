@@ -10,12 +10,12 @@ from models import MODELS
 from native_fmus import build_native_fmus
 
 from benchmarks.symmetry.builds import FMI3, NATIVE, PYTHON, all_models, build_fmu, find_source, model_label
-from benchmarks.symmetry.changes import FRAME, LARGEST_STEP, MIRROR, ORDER, TIME, UNITS
+from benchmarks.symmetry.changes import FRAME, LARGEST_STEP, MIRROR, ORDER, REVOLUTIONS, TIME, UNITS
 from benchmarks.symmetry.command import describe
 from benchmarks.symmetry.study import Model, Options, run_model
 
 LABELS = [model_label(path) for path in all_models()]
-KINDS = (TIME, UNITS, MIRROR, ORDER, FRAME, LARGEST_STEP)
+KINDS = (TIME, UNITS, MIRROR, ORDER, FRAME, LARGEST_STEP, REVOLUTIONS)
 SHIPPED = {
     PYTHON: lambda: build_cache.build_once("fmi2"),
     NATIVE: build_native_fmus,

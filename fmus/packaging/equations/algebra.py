@@ -356,13 +356,31 @@ def is_factor(e: Operand, leaf: Expression) -> bool:
     )
 
 
+def magnitudes(expressions: Sequence[Operand]) -> list[Operand]:
+    """Return the sizes of expressions: the sums of their absolute terms, also where these cancel.
+
+    Whole revolutions of an angle do not change them.
+    """
+    return _fold_scales(expressions, _term_magnitude)
+
+
 def rounding_scale(e: Operand) -> Operand:
-    """Return a bound on the magnitude of the terms of e; rounding errors of e are relative to it."""
+    """Return a bound on the magnitude of e to which its rounding errors are relative."""
     return rounding_scales([e])[0]
 
 
 def rounding_scales(expressions: Sequence[Operand]) -> list[Operand]:
-    """Return the rounding scales of expressions."""
+    """Return the rounding scales of expressions: to first order, the errors are a few EPSILON times these.
+
+    Every variable has a rounding error, relative to itself, and so has every operation (N. J. Higham, Accuracy and
+    Stability of Numerical Algorithms, 3.3).  The sine of an angle of many revolutions has the large error of the angle,
+    but a product of such sines is no product of large errors.
+    """
+    return _fold_scales(expressions, _term_rounding_scale)
+
+
+def _fold_scales(expressions: Sequence[Operand], term_scale: Callable[[Term, Memo], Operand]) -> list[Operand]:
+    """Return the scales of expressions, given that of a term with the scales of its operands, by identity."""
     result: Memo = {}
     for part in operands_first(*expressions, operands_of=value_operands):
         if not isinstance(part, Expression):
@@ -374,7 +392,7 @@ def rounding_scales(expressions: Sequence[Operand]) -> list[Operand]:
         elif isinstance(part, Parameter) and (part.low >= 0.0 or part.above >= 0.0):
             scale = part
         elif isinstance(part, Term):
-            scale = _term_rounding_scale(part, result)
+            scale = term_scale(part, result)
             scale = part if is_same_expression(scale, part) else scale
         else:
             scale = Term("fabs", part)
@@ -382,7 +400,7 @@ def rounding_scales(expressions: Sequence[Operand]) -> list[Operand]:
     return [result[id(e)] for e in expressions]
 
 
-def _term_rounding_scale(e: Term, scales: Memo) -> Operand:
+def _term_magnitude(e: Term, scales: Memo) -> Operand:
     a, b = e.args[0], e.args[-1]
     if isinstance(e.op, Coefficient) and e.op.kind == EDGE:
         return e.op.table.scale
@@ -391,9 +409,40 @@ def _term_rounding_scale(e: Term, scales: Memo) -> Operand:
             return build_term("*" if e.op == "*" else "+", scales[id(a)], scales[id(b)])
         case "/":
             return build_term("/", scales[id(a)], scales[id(b)] if not isinstance(b, Term) else Term("fabs", b))
-        case "neg" | "fabs" | "sin" | "atan" | "tanh":  # slope at most 1, zero at zero
+        case "neg" | "fabs" | "atan" | "tanh":  # slope at most 1, zero at zero
             return scales[id(a)]
         case "choose":
             return build_term("choose", a, scales[id(e.args[1])], scales[id(b)])
+        case "sin" | "tan":
+            return Term("fabs", e)
+        case "cos":  # at its zeros, it is not small
+            return build_term("+", Term("fabs", e), Term("fabs", Term("sin", a)))
+    return _error_through_function(e, scales)
+
+
+def _term_rounding_scale(e: Term, scales: Memo) -> Operand:
+    a, b = e.args[0], e.args[-1]
+    scale_a, scale_b = scales.get(id(a), 0.0), scales.get(id(b), 0.0)
+    match e.op:
+        case "*" if not (_is_size(scale_a, a) or _is_size(scale_b, b)):
+            return build_term("+", build_term("*", scale_a, Term("fabs", b)), build_term("*", Term("fabs", a), scale_b))
+        case "/" if not _is_size(scale_b, b):
+            error = build_term("*", Term("fabs", e), scale_b)
+            return build_term("/", build_term("+", scale_a, error), Term("fabs", b))
+        case "sin":  # slope at most 1, zero at zero; this evaluates no cosine
+            return scale_a
+        case "cos" | "tan" | "atan" | "tanh":
+            return _error_through_function(e, scales)
+    return _term_magnitude(e, scales)
+
+
+def _error_through_function(e: Term, scales: Memo) -> Operand:
+    """Return the magnitude of a function, and that of its change by the scale of its argument."""
+    a = e.args[0]
     slope = build_term("*", Term("fabs", FUNCTIONS[e.op](a, e)), scales[id(a)]) if e.op in FUNCTIONS else 0.0
     return build_term("+", Term("fabs", e), slope)
+
+
+def _is_size(scale: Operand, e: Operand) -> bool:
+    """Return whether a scale is the magnitude of the expression itself, as that of a variable."""
+    return not isinstance(e, Term) or scale is e or is_same_expression(scale, Term("fabs", e))

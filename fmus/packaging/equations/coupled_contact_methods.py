@@ -8,7 +8,7 @@ derivatives and impulses of the forces satisfy systems with the same matrix.
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from .algebra import build_term, is_same_expression, rounding_scales, substitute
+from .algebra import build_term, is_same_expression, magnitudes, rounding_scales, substitute
 from .codegen_context import CodegenContext, emit_return, emit_scales, method_source
 from .contact_analysis import SMALLEST_DIVISOR
 from .expression_printer import ExpressionPrinter
@@ -38,7 +38,8 @@ def coupled_contact_methods(context: CodegenContext) -> list[str]:
     slips = [c.slip for c in context.analysis.contacts]
     return [
         method_source("slip_velocities", ["t", *context.states], context.return_lines(context.printer(), slips)),
-        slip_scale_method(context),
+        slip_scale_method(context, "slip_magnitudes", magnitudes(slips)),
+        slip_scale_method(context, "slip_roundings", rounding_scales(slips)),
         *slip_deviation_method(context),
         forces_method(context),
         force_rates_method(context),
@@ -194,12 +195,13 @@ def emit_friction_forces(context: CodegenContext, printer: ExpressionPrinter) ->
                 printer.emit(f"{c.name} = threshold(0.0, 1.0, {c.name}, 0.0, {limit})")
 
 
-def slip_scale_method(context: CodegenContext) -> str:
-    """Rounding scales of the slips."""
+def slip_scale_method(context: CodegenContext, name: str, scales: list[Operand]) -> str:
+    """Return the source of a method for scales of the slips."""
     printer = context.printer()
-    sizes = emit_scales(context, printer, rounding_scales([c.slip for c in context.analysis.contacts]))
+    sizes = emit_scales(context, printer, scales)
     context.emit_driver(printer, sizes)
-    return method_source("slip_magnitudes", ["t", *context.states], emit_return(printer, sizes))
+    printer.count_uses(*sizes)
+    return method_source(name, ["t", *context.states], emit_return(printer, sizes))
 
 
 def slip_deviation_method(context: CodegenContext) -> list[str]:
@@ -223,14 +225,14 @@ def slip_deviation_method(context: CodegenContext) -> list[str]:
 
 
 def forces_method(context: CodegenContext) -> str:
-    """Forces, limits, and rounding scales of both together."""
+    """Forces, limits, and of both together sizes and rounding scales, larger than the limits where terms cancel."""
     analysis, printer, forces = context.analysis, context.printer(), force_unknown(context)
-    scales = rounding_scales([analysis.load.get(c, analysis.slip_rate[c]) for c in analysis.contacts])
+    loads = [analysis.load.get(c, analysis.slip_rate[c]) for c in analysis.contacts]
     limits = [analysis.holding_limit[c] for c in analysis.contacts]
-    limit_scales = rounding_scales(limits)  # larger than the limits where terms of these cancel
     sizes = [
-        build_term("+", scale if c in analysis.load else build_term("/", scale, analysis.divisor(c)), limit_scale)
-        for c, scale, limit_scale in zip(analysis.contacts, scales, limit_scales, strict=True)
+        build_term("+", of_load if c in analysis.load else build_term("/", of_load, analysis.divisor(c)), of_limit)
+        for scales in (magnitudes, rounding_scales)
+        for c, of_load, of_limit in zip(analysis.contacts, scales(loads), scales(limits), strict=True)
     ]
     context.emit_driver(printer, [*forces.terms, *limits])
     printer.count_uses(*forces.terms, *limits, *sizes)

@@ -10,6 +10,7 @@ from .algebra import (
     has_condition_on,
     is_same_expression,
     negate,
+    operands,
     operands_first,
     unconditional_quotients,
     variables_in,
@@ -18,9 +19,10 @@ from .conditions import Condition, find_conditions
 from .contact_analysis import ContactAnalysis
 from .declaration_checks import METHODS, check_declarations
 from .expressions import Expression, ModelError, Operand, Term, is_among
-from .model_declaration import Contact, Fixed, Input, Mode, Model, Parameter, Rule, Variable
+from .model_declaration import Contact, Fixed, Input, Mode, Model, Parameter, Rule, State, Variable
 from .model_roles import TIME
 
+PERIODIC = ("sin", "cos", "tan")
 STEEP_FUNCTIONS = ("exp", "tanh", "atan", "sinh", "cosh", "/")
 ANALYSES: dict[type, "ModelAnalysis"] = {}  # of lowered model classes; no attribute of them, see reserved_names.py
 # methods for some models only, with the default methods of these models
@@ -97,6 +99,19 @@ class ModelAnalysis(ContactAnalysis):
     def has_pieces(self) -> bool:
         """Whether the piece of a table may change during a step."""
         return any(condition.piece is not None for condition in self.switches)
+
+    @property
+    def angles(self) -> list[State]:
+        """States in rad that enter the equations of motion by periodic functions only, and by at least one of these."""
+        equations = self._dynamic_expressions()
+        margins = [condition.margin for condition in self.conditions]
+
+        def operands_outside(e: Operand) -> tuple[Operand, ...]:
+            return () if isinstance(e, Term) and e.op in PERIODIC else operands(e)
+
+        outside = {id(e) for e in operands_first(*equations, *margins, operands_of=operands_outside)}
+        inside = {id(e) for e in operands_first(*equations)}
+        return [s for s in self.states if s.unit == "rad" and id(s) in inside - outside]
 
     def _keeps_closed_form(self, e: Input) -> bool:
         """Return whether breakaway and motion keep their closed form while the input changes."""

@@ -166,6 +166,8 @@ def class_attribute_lines(analysis: ModelAnalysis) -> list[str]:
             for c in analysis.contacts
         )
         lines.append(f"contacts = {{{slips}}}")
+    if analysis.angles:
+        lines.append(f"angles = ({', '.join(string_literal(s.name) for s in analysis.angles)},)")
     states_and_drivers = (*analysis.states, *analysis.drivers)
     moving = (*analysis.time_varying, *analysis.input_rates)
     nominal_velocities = [s.nominal_velocity for s in states_and_drivers if s.nominal_velocity is not None]

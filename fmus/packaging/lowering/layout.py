@@ -26,6 +26,7 @@ class ModelLayout:
     zeros       entries of the Jacobian (index of a state, index of a state) that are always zero
     n_conditions
                 number of conditions of the equations
+    angles      states that are angles and enter the equations by periodic functions only
     """
 
     states: dict[str, str]
@@ -36,6 +37,7 @@ class ModelLayout:
     methods: dict[str, str] = field(default_factory=dict)
     zeros: frozenset[tuple[int, int]] = frozenset()
     n_conditions: int = 0
+    angles: tuple[str, ...] = ()
 
     def component_names(self, kind: str) -> list[str]:
         """Return the names of the states or modes."""
@@ -54,6 +56,11 @@ class ModelLayout:
     def kinematic_states(self) -> list[int]:
         """Indices of states whose rates are states."""
         return [place for place, rate in enumerate(self.states.values()) if rate in self.states]
+
+    @property
+    def angle_states(self) -> list[int]:
+        """Indices of the angles that enter the equations by periodic functions only."""
+        return [place for place, state in enumerate(self.states) if state in self.angles]
 
     @property
     def velocity_states(self) -> list[int]:

@@ -53,7 +53,7 @@ def model_layout(source: ModelFile, features: FeatureSelection) -> ModelLayout:
     )
     zeros = zero_jacobian_entries(source.generated_source, layout)
     n_conditions = model.n_event_functions - model.first_condition
-    return replace(layout, zeros=zeros, n_conditions=n_conditions)
+    return replace(layout, zeros=zeros, n_conditions=n_conditions, angles=model.angles)
 
 
 def zero_jacobian_entries(text: str, spec: ModelLayout) -> frozenset[tuple[int, int]]:

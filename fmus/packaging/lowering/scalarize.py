@@ -7,7 +7,7 @@ from ..syntax_trees import TranslationError, TreeTransformer, all_nodes, is_same
 from .constant_folding import ConstantFolder
 from .elimination import LoweredSystem, tuple_or_single
 from .layout import CONDITIONS, STATES, ModelLayout
-from .source_symbols import ELEMENTWISE, SELECTIONS, SourceSymbols, annotated_kind
+from .source_symbols import ELEMENTWISE, ERROR_SIZE_OF_ANGLE, SELECTIONS, SourceSymbols, annotated_kind
 
 REDUCTIONS = {"max_of": ">", "min_of": "<"}  # reductions to one component
 ALLOCATORS = ("state_vector", "contact_vector")
@@ -140,8 +140,11 @@ class Scalarizer(ConstantFolder):
             case ast.Call(func=ast.Name(id=name), args=args) if name in ELEMENTWISE:
                 if not all(isinstance(argument, (ast.Name, ast.Attribute)) for argument in args):
                     raise self.error(node)
+                template = ELEMENTWISE[name]
+                if name == "error_size" and place in self.spec.angle_states:
+                    template = ERROR_SIZE_OF_ANGLE
                 return parse_expression(
-                    ELEMENTWISE[name].format(*(ast.unparse(self.component(argument, place)) for argument in args))
+                    template.format(*(ast.unparse(self.component(argument, place)) for argument in args))
                 )
             case ast.Call(func=function, args=args) if self.is_elementwise(node):
                 return ast.Call(function, [self.component(argument, place) for argument in args], [])

@@ -12,7 +12,9 @@ from .layout import CONDITIONS, CONTACTS, STATES
 ELEMENTWISE = {
     "magnitude": "{0} if {0} > 0.0 else -{0}",
     "elementwise_max": "{0} if {0} > {1} else {1}",
+    "error_size": "{0} if {0} > 0.0 else -{0}",
 }
+ERROR_SIZE_OF_ANGLE = "1.0 if {0} > 1.0 or {0} < -1.0 else {0} if {0} > 0.0 else -{0}"
 SELECTIONS = ("select_kinematic", "dynamic_part", "kinematic_rates", "complete_rates")
 Key = TypeVar("Key", str, int)
 VECTOR_KINDS = {"StateVector": STATES, "RateVector": STATES, "ContactVector": CONTACTS, "ConditionVector": CONDITIONS}
