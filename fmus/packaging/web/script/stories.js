@@ -61,7 +61,7 @@ export const OPENING = {
       ${row("speed", (run) => bold(formatQuantity(Math.abs(last("v")(run)), "m/s")))}
       ${row("force of the spring", (run) => newtons(last("F_spring")(run)))}
       ${row("friction", (run) => newtons(last("F_friction")(run)))}</tbody></table>
-      <p>The tolerance sets the error; the law sets the work: with 10<sup>−4</sup>, true sticking takes ${count(stepsOf(fineTrue))} steps and ends ${metres(errorOf(runs, fineTrue))} off, sign(v) ${count(stepsOf(fineSign))} and ${metres(errorOf(runs, fineSign))}. The default method of this FMU is the closed form: ${countOf(stepsOf(reference), "step")}, exact to rounding. Other tools hold a body exactly as well: scipy, PathSim and Drake do, once their user programs stick and slip as events. In these FMUs, the model contains the events.</p>`;
+      <p>The tolerance sets the error; the law sets the work: with 10<sup>−4</sup>, true sticking takes ${countOf(stepsOf(fineTrue), "step")} and ends ${metres(errorOf(runs, fineTrue))} off, sign(v) ${count(stepsOf(fineSign))} and ${metres(errorOf(runs, fineSign))}. The default method of this FMU is the closed form: ${countOf(stepsOf(reference), "step")}, exact to rounding. Other tools hold a body exactly as well: scipy, PathSim and Drake do, once their user programs stick and slip as events. In these FMUs, the model contains the events.</p>`;
   },
 };
 
