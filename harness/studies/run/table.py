@@ -18,11 +18,7 @@ OTHER_MACHINE = "other CPU: the published run time was measured on another machi
 RUN_TIME = "run time"
 CHATTERING_LAWS = ("sign", "threshold")
 STEP_QUANTITIES = ("steps", "mean_step")
-KINDS = {  # of known values, and their meaning
-    "published": "published values",
-    "reference": "closed forms or certified results",
-    "parameter": "parameters that were set",
-}
+KINDS = ("published", "reference", "parameter")  # of known values, as in the table
 ALWAYS_SHOWN = ("steps", "mean_step", "run_time")  # shown for all scenes, even without a known value
 
 
@@ -197,15 +193,13 @@ def explain_chatter(outcomes: Iterable[SceneOutcome]) -> str:
 
 
 def conclude(outcomes: Iterable[SceneOutcome]) -> Text:
-    """Return what was checked: one line, in green if all cases agree with their known values and in red otherwise."""
+    """Return what was checked: one line, in green if all cases agree with their known values; otherwise in red, with
+    those that differ."""
     judged = judge_outcomes(outcomes)
     if not judged:
         return Text()
-    good = [(name, outcome) for name, outcome in judged if outcome.is_good]
     counts = {kind: sum(outcome.kind == kind for _, outcome in judged) for kind in KINDS}
-    parts = [f"{counts[kind]} with {meaning}" for kind, meaning in KINDS.items() if counts[kind]]
-    text = f"{len(good)} of {len(judged)} cases agree within {MAX_DEVIATION:g} %: {', '.join(parts)}"
-    if differing := [f"{name}: {outcome.text}" for name, outcome in judged if not outcome.is_good]:
-        return Text(f"{text}. {'; '.join(differing)}.", style="red")
-    name, worst = max(good, key=lambda pair: abs(pair[1].deviation or 0.0))
-    return Text(f"{text}; the largest difference is {worst.value} ({name}).", style="green")
+    kinds = ", ".join(f"{count} {kind}" for kind, count in counts.items() if count)
+    differing = [f"{name}: {outcome.text}" for name, outcome in judged if not outcome.is_good]
+    text = f"{len(judged) - len(differing)} of {len(judged)} cases agree within {MAX_DEVIATION:g} % ({kinds})."
+    return Text("\n".join((text, *differing)), style="red" if differing else "green")
