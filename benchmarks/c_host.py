@@ -13,8 +13,8 @@ import fmpy
 from harness.errors import HarnessError
 from harness.process.subprocess_runner import run_subprocess
 from harness.process.temporary_directory import temporary_directory
-from harness.running.fmu_archive import PROCESS_RESOURCES, is_python_fmu, unpack
-from harness.running.whole_run import COMPILER
+from harness.simulation.fmu_archive import PROCESS_RESOURCES, is_python_fmu, unpack
+from harness.simulation.whole_run import COMPILER
 
 PYTHON_LIBRARY = Path(sysconfig.get_config_var("LIBDIR") or "", sysconfig.get_config_var("INSTSONAME") or "none")
 HEADERS = Path(fmpy.__file__).parent / "c-code"

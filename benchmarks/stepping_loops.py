@@ -9,9 +9,9 @@ from pathlib import Path
 
 import fmpy
 
-from harness.running.runner import open_instance, read_own_description, run_own_fmu
-from harness.running.timing import time_fastest_call
 from harness.scenes.run_spec import RunSpec
+from harness.simulation.runner import open_instance, read_own_description, run_own_fmu
+from harness.simulation.timing import time_fastest_call
 
 COMMUNICATION_STEPS = 1600
 REPEATS = 10

@@ -37,9 +37,9 @@ if TYPE_CHECKING:
     from .analyses.decay.identification import DecayIdentification
     from .analyses.fit.parameter_fit import ParameterFit
     from .records.record import Record
-    from .running.fmu_variables import FmuDescription
-    from .running.signals import ModeChanges, Signals
-    from .running.trajectory import Trajectory
+    from .simulation.fmu_variables import FmuDescription
+    from .simulation.signals import ModeChanges, Signals
+    from .simulation.trajectory import Trajectory
     from .studies.compare.difference import Comparison
     from .studies.compare.result import ComparisonResult
     from .studies.curve.result import CurveResult
@@ -90,17 +90,17 @@ TYPES = {
     "CurveIdentification": "harness.analyses.curve.identification",
     "CurveResult": "harness.studies.curve.result",
     "FitResult": "harness.studies.fit.result",
-    "FmuDescription": "harness.running.fmu_variables",
+    "FmuDescription": "harness.simulation.fmu_variables",
     "DecayIdentification": "harness.analyses.decay.identification",
     "DecayResult": "harness.studies.decay.result",
-    "ModeChanges": "harness.running.signals",
+    "ModeChanges": "harness.simulation.signals",
     "ParameterFit": "harness.analyses.fit.parameter_fit",
     "PrecisionResult": "harness.studies.precision.result",
     "Record": "harness.records.record",
-    "Signals": "harness.running.signals",
+    "Signals": "harness.simulation.signals",
     "StabilityResult": "harness.studies.stability.result",
     "SweepResult": "harness.studies.sweep.result",
-    "Trajectory": "harness.running.trajectory",
+    "Trajectory": "harness.simulation.trajectory",
 }
 
 

@@ -14,11 +14,11 @@ from harness.references.models import CASES, MODELS
 from harness.references.ode_problem import OdeProblem
 from harness.references.piecewise_linear import mp
 from harness.references.reference_trajectory import CommunicationGrid, compute_reference, motion_error
-from harness.running.embedded_model import EmbeddedModel, load_model_class
-from harness.running.fmu_info import FmuInfo, read_info
-from harness.running.step_sequence import RefusedRun, run_steps
 from harness.scenes.fmu_files import find_fmu
 from harness.scenes.run_spec import RunSpec
+from harness.simulation.embedded_model import EmbeddedModel, load_model_class
+from harness.simulation.fmu_info import FmuInfo, read_info
+from harness.simulation.step_sequence import RefusedRun, run_steps
 
 from .benchmark import SETTINGS, Baseline, Benchmark
 

@@ -17,10 +17,10 @@ from harness.process.subprocess_runner import run_subprocess
 from harness.process.temporary_directory import temporary_directory
 from harness.references.certified_reference import relative_errors
 from harness.references.models import MODELS
-from harness.running.runner import run_own_fmu
-from harness.running.signals import sample_at
-from harness.running.trajectory import Trajectory
 from harness.scenes.fmu_files import find_fmu, fmi3_path
+from harness.simulation.runner import run_own_fmu
+from harness.simulation.signals import sample_at
+from harness.simulation.trajectory import Trajectory
 
 from ..c_host import Library, MissingToolError, compile_source, load_library
 from .benchmark import SETTINGS, Baseline, Benchmark

@@ -11,8 +11,8 @@ import numpy as np
 
 from harness.references.certified_reference import POINTS, ReferenceCase
 from harness.references.reference_trajectory import CommunicationGrid, compute_reference
-from harness.running.fmu_info import read_info
 from harness.scenes.run_spec import RunSpec
+from harness.simulation.fmu_info import read_info
 
 from .native import CASES_BY_NAME
 

@@ -14,10 +14,10 @@ from harness.references.models.pacejka import PacejkaProblem
 from harness.references.models.smd import SmdProblem
 from harness.references.models.stickslip import StickslipProblem
 from harness.references.ode_problem import OdeProblem
-from harness.running.embedded_model import EmbeddedModel, create_run, load_model_class
-from harness.running.fmu_archive import read_description
-from harness.running.timing import time_call, time_fastest_call
 from harness.scenes.fmu_files import find_fmu
+from harness.simulation.embedded_model import EmbeddedModel, create_run, load_model_class
+from harness.simulation.fmu_archive import read_description
+from harness.simulation.timing import time_call, time_fastest_call
 
 from .. import stepping_loops
 from ..stepping_loops import COMMUNICATION_STEPS

@@ -9,8 +9,8 @@ from harness.results.files import write_csv_rows
 from harness.results.folder import replace_folder
 from harness.results.provenance import prefix_parameters, write_provenance
 from harness.results.summary import write_summary
-from harness.running.fmu_archive import declared_parameters
 from harness.scenes.fmu_files import find_fmu
+from harness.simulation.fmu_archive import declared_parameters
 
 from .benchmark import Benchmark
 from .table import summarize_benchmarks

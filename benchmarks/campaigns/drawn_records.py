@@ -54,7 +54,7 @@ def draw_record(group, simulator, random, max_samples=20_000):
     Parameters
     ----------
     group : Group
-    simulator : harness.running.whole_run.Simulator
+    simulator : harness.simulation.whole_run.Simulator
         Of the model that makes the record.
     random : numpy.random.Generator
     max_samples : int

@@ -23,8 +23,8 @@ from harness.process.subprocess_runner import run_module
 from harness.process.temporary_directory import temporary_directory
 from harness.records.record import Record
 from harness.records.table_files import Table
-from harness.running.whole_run import open_simulator
 from harness.scenes.run_spec import RunSpec
+from harness.simulation.whole_run import open_simulator
 from harness.studies.fit.request import FitRequest, make_task
 from harness.studies.fit.study import fit_samples
 

@@ -38,8 +38,8 @@ from scipy.optimize import differential_evolution
 
 import harness
 from harness.process.temporary_directory import temporary_directory
-from harness.running.whole_run import open_simulator
 from harness.scenes.run_spec import RunSpec
+from harness.simulation.whole_run import open_simulator
 
 from . import fit_modestpy
 from .drawn_records import GROUPS, draw_record

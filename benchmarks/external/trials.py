@@ -24,8 +24,8 @@ from harness import load_result
 from harness.errors import HarnessError, first_line
 from harness.process.subprocess_runner import PROJECT_ROOT
 from harness.results.files import write_csv_rows
-from harness.running.fmu_archive import read_description
-from harness.running.trajectory import Trajectory
+from harness.simulation.fmu_archive import read_description
+from harness.simulation.trajectory import Trajectory
 
 COMMANDS = ("run", "exchange", "compare", "sweep", "fit")
 RIGHT, INEXACT, REFUSED, SLOW, FAULT = "right", "inexact", "refused", "slow", "FAULT"

@@ -14,9 +14,9 @@ from zipfile import ZipFile
 
 from harness.errors import HarnessError, install_command
 from harness.process.worker import Worker, WorkerError
-from harness.running.fmu_archive import read_description
-from harness.running.whole_run import COMPILER
 from harness.scenes.run_spec import RunSpec
+from harness.simulation.fmu_archive import read_description
+from harness.simulation.whole_run import COMPILER
 
 from ..c_host import PYTHON_LIBRARY
 from . import c_adapter

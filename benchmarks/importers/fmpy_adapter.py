@@ -10,7 +10,7 @@ from fmpy import fmi2
 from fmpy.fmi1 import FMICallException
 from fmpy.logging import addLoggerProxy
 
-from harness.running.fmu_archive import read_description, unpack_once
+from harness.simulation.fmu_archive import read_description, unpack_once
 
 from .request import ImporterReply, ImporterRequest
 

@@ -17,8 +17,8 @@ from typing import Any
 from fmu_manipulation_toolbox.cli.fmucontainer import fmucontainer
 
 from harness.process.temporary_directory import temporary_directory
-from harness.running.fmu_archive import PROCESS_RESOURCES, read_description
-from harness.running.mtime_cache import cached_by_mtime
+from harness.simulation.fmu_archive import PROCESS_RESOURCES, read_description
+from harness.simulation.mtime_cache import cached_by_mtime
 
 from . import fmpy_adapter
 from .request import ImporterReply, ImporterRequest

@@ -10,8 +10,8 @@ from typing import Any
 
 from fmuloader.fmi2 import Fmi2Error, Fmi2Slave, Fmi2Status, Fmi2Type
 
-from harness.running.fmu_archive import read_description, unpack_once
-from harness.running.fmu_instance import FMICallException
+from harness.simulation.fmu_archive import read_description, unpack_once
+from harness.simulation.fmu_instance import FMICallException
 
 from .fmpy_adapter import run_instances
 from .request import ImporterReply, ImporterRequest

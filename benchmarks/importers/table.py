@@ -15,7 +15,7 @@ from harness.results.files import write_csv_rows
 from harness.results.folder import replace_folder
 from harness.results.provenance import describe_sources, prefix_parameters, write_provenance
 from harness.results.summary import Summary, make_table, write_summary
-from harness.running.fmu_archive import declared_parameters
+from harness.simulation.fmu_archive import declared_parameters
 
 from .checks import (
     CHECKS,

@@ -28,9 +28,9 @@ from harness.results.files import column_heading, write_csv_rows
 from harness.results.folder import replace_folder
 from harness.results.provenance import write_provenance
 from harness.results.summary import Summary, make_table, write_summary
-from harness.running.embedded_model import EmbeddedModel, load_model_class, load_more_model, method_numbers
-from harness.running.solution import Solution
 from harness.scenes.fmu_files import find_fmu
+from harness.simulation.embedded_model import EmbeddedModel, load_model_class, load_more_model, method_numbers
+from harness.simulation.solution import Solution
 
 from .problems import BeltBlock, ChatteringOscillator, ChatteringOscillatorSign, SmoothedBeltBlock
 

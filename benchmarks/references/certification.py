@@ -5,9 +5,9 @@ from pathlib import Path
 from harness.references.certification import CertifiedFile, certify_default_run, write_references
 from harness.references.certified_reference import FOLDER
 from harness.references.models import CASES
-from harness.running.embedded_model import load_model_class
-from harness.running.solution import Solution
 from harness.scenes.fmu_files import find_fmu
+from harness.simulation.embedded_model import load_model_class
+from harness.simulation.solution import Solution
 
 from .event_located import PROBLEMS, certify_by_two_routes
 from .generation import generate_reference

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from harness.references.certified_reference import POINTS, relative_errors
-from harness.running.solution import Solution
+from harness.simulation.solution import Solution
 
 StateVector = Sequence[float] | np.ndarray
 OVERLOAD = 1e-9  # a load that exceeds its limit by a smaller share is at the limit

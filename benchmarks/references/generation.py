@@ -19,7 +19,7 @@ from harness.references.ode_problem import OdeProblem
 from harness.references.peer_solvers import solve
 from harness.references.reference_trajectory import mode_changes, sample_segments
 from harness.references.segments import Segment
-from harness.running.solution import Solution
+from harness.simulation.solution import Solution
 
 from .pendulum_series import solve_pendulum
 

@@ -6,7 +6,7 @@ import numpy as np
 from mpmath import cos, findroot, mpf, odefun, sign, sin, sqrt, workdps
 
 from harness.references.models.pendulum import PendulumProblem, PendulumReactionProblem
-from harness.running.solution import Solution
+from harness.simulation.solution import Solution
 
 DIGITS = 25
 TURNING_POINT_BRACKET = (0.25, 0.45)  # s: around half a period, so that it holds one turning point

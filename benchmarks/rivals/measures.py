@@ -5,7 +5,7 @@ from math import inf, nan
 
 import numpy as np
 
-from harness.running.solution import Events, Solution
+from harness.simulation.solution import Events, Solution
 
 from .child import RivalReply
 from .reference_motions import FINE

@@ -9,7 +9,7 @@ import numpy as np
 from benchmarks.references import event_located
 from harness.references import peer_solvers
 from harness.references.reference_trajectory import CommunicationGrid, compute_reference
-from harness.running.solution import Solution
+from harness.simulation.solution import Solution
 
 from .scenes import BELT, PENDULUM, REST, SLED, Scene
 

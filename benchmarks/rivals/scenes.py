@@ -21,8 +21,8 @@ from benchmarks.literature.problems import BeltBlock
 from harness.references.models.coulomb import CoulombProblem
 from harness.references.models.pendulum import PendulumProblem
 from harness.references.models.stickslip import StickslipProblem
-from harness.running.solution import Events as Events
-from harness.running.solution import Solution as Solution
+from harness.simulation.solution import Events as Events
+from harness.simulation.solution import Solution as Solution
 
 Setting = dict[str, float | str]  # options of an engine by name; empty for its defaults
 

@@ -11,8 +11,8 @@ from harness.results.files import write_csv_rows
 from harness.results.folder import replace_folder
 from harness.results.provenance import write_provenance
 from harness.results.summary import Summary, read_cells, write_summary
-from harness.running.solution import Solution
 from harness.scenes.fmu_files import find_fmu
+from harness.simulation.solution import Solution
 
 from .catalogue import Rival, find_rivals
 from .child import RivalCase, RivalReply, run_case

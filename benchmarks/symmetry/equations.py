@@ -10,8 +10,8 @@ from math import pi
 from pathlib import Path
 from typing import Any, cast
 
-from harness.running.embedded_model import OK, load_model_class
-from harness.running.variable_values import convert_value
+from harness.simulation.embedded_model import OK, load_model_class
+from harness.simulation.variable_values import convert_value
 
 from .changes import scale_values
 from .motion import FmuRuns

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from harness.errors import HarnessError
-from harness.running.fmu_instance import CALL_FAILURES
-from harness.running.recorder import Recorder
-from harness.running.variable_values import convert_value
+from harness.simulation.fmu_instance import CALL_FAILURES
+from harness.simulation.recorder import Recorder
+from harness.simulation.variable_values import convert_value
 
 from .motion import FmuRuns
 

@@ -11,12 +11,12 @@ from typing import Any, Self
 import numpy as np
 
 from harness.errors import HarnessError
-from harness.running.fmu_archive import read_description, unpack
-from harness.running.fmu_instance import CALL_FAILURES, FmuInstance
-from harness.running.recorder import default_outputs
-from harness.running.session import Session
-from harness.running.variable_values import enumeration_labels
 from harness.scenes.run_spec import RunSpec
+from harness.simulation.fmu_archive import read_description, unpack
+from harness.simulation.fmu_instance import CALL_FAILURES, FmuInstance
+from harness.simulation.recorder import default_outputs
+from harness.simulation.session import Session
+from harness.simulation.variable_values import enumeration_labels
 
 from .changes import Change
 

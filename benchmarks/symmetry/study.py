@@ -12,8 +12,8 @@ from typing import Any
 from fmus.packaging import BuildError
 from harness.errors import HarnessError
 from harness.process.temporary_directory import temporary_directory
-from harness.running.fmu_instance import capture_stderr
-from harness.running.variable_values import enumeration_labels
+from harness.simulation.fmu_instance import capture_stderr
+from harness.simulation.variable_values import enumeration_labels
 
 from .builds import PYTHON, model_label
 from .changes import (

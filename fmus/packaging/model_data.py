@@ -8,7 +8,7 @@ from .equations.model_analysis import ModelAnalysis
 from .fmi_variables import Variables, fixed_choices, mode_names
 from .model_description import type_attributes
 
-MODEL_DATA_FILE = "resources/model_data.json"  # harness/running/model_data.py reads it
+MODEL_DATA_FILE = "resources/model_data.json"  # harness/simulation/model_data.py reads it
 
 
 def model_data(model: type[VariableOwner], declared: Variables, analysis: ModelAnalysis) -> bytes:

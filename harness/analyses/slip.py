@@ -10,8 +10,8 @@ import numpy as np
 
 from ..errors import HarnessError
 from ..results.quantity import AnalysisResult, Quantity
-from ..running.signals import check_sampling, column_of_role
-from ..running.trajectory import Trajectory, get_parameter
+from ..simulation.signals import check_sampling, column_of_role
+from ..simulation.trajectory import Trajectory, get_parameter
 
 
 def analyse(run: Trajectory) -> AnalysisResult:

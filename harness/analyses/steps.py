@@ -4,8 +4,8 @@ import numpy as np
 
 from ..errors import HarnessError
 from ..results.quantity import AnalysisResult, step_size_quantities
-from ..running.signals import column_of_role
-from ..running.trajectory import Trajectory
+from ..simulation.signals import column_of_role
+from ..simulation.trajectory import Trajectory
 
 NEIGHBOUR_STEPS = 5  # steps on either side of a reversal that count as near it
 

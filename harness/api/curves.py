@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from ..records.record import Record
-    from ..running.trajectory import Trajectory
+    from ..simulation.trajectory import Trajectory
     from ..studies.curve.result import CurveResult
 
 

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
     from ..records.columns import ColumnOptions
     from ..records.record import Record
-    from ..running.trajectory import Trajectory
+    from ..simulation.trajectory import Trajectory
     from ..studies.decay.result import DecayResult
 
 

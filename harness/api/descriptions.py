@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 from ..arguments import PATH, check_arguments
 
 if TYPE_CHECKING:
-    from ..running.fmu_variables import FmuDescription
+    from ..simulation.fmu_variables import FmuDescription
 
 
 @check_arguments(source=PATH)
@@ -35,7 +35,7 @@ def describe(source: "str | Path") -> "FmuDescription":
     >>> describe("stickslip").methods  # doctest: +SKIP
     ('exact', 'ode23', 'ode45', 'dop853', 'rodas')
     """
-    from ..running.fmu_variables import describe_fmu
     from ..scenes.fmu_files import find_fmu
+    from ..simulation.fmu_variables import describe_fmu
 
     return describe_fmu(find_fmu(str(source)))

@@ -55,7 +55,7 @@ def apply_options(
     lenient: bool = False,
 ) -> "RunSpec":
     """Return a run with those of the options that are not None."""
-    from ..running.resolve import METHOD, set_rtol
+    from ..simulation.resolve import METHOD, set_rtol
 
     spec = replace(
         spec,

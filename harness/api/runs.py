@@ -33,8 +33,8 @@ if TYPE_CHECKING:
     import xarray
     from numpy.typing import ArrayLike
 
-    from ..running.trajectory import Trajectory
     from ..scenes.run_spec import RunSpec
+    from ..simulation.trajectory import Trajectory
     from ..studies.compare.result import ComparisonResult
 
 
@@ -127,8 +127,8 @@ def simulate(
     >>> sled = simulate("stickslip", {"mu_s": 0.8}, stop=8.0)  # doctest: +SKIP
     >>> sled["x"][-1]  # doctest: +SKIP
     """
-    from ..running import runner
-    from ..running.resolve import resolve
+    from ..simulation import runner
+    from ..simulation.resolve import resolve
 
     spec = resolve(source)
     if values:
@@ -219,8 +219,8 @@ def choose_fine_step(spec: "RunSpec", interval: float) -> float:
     """Return a communication step in s for inputs: an integer fraction of the interval, at most 1/4096 of the run."""
     from math import ceil
 
-    from ..running.fmu_archive import read_description, resolve_time_span
     from ..scenes.run_spec import DEFAULT_EQUAL_STEPS
+    from ..simulation.fmu_archive import read_description, resolve_time_span
 
     start, stop = resolve_time_span(spec, read_description(spec.fmu, spec.lenient))
     return interval / ceil(interval * DEFAULT_EQUAL_STEPS / (stop - start))

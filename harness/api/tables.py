@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from ..records.columns import ColumnOptions
     from ..records.record import Record
     from ..records.table_files import Table
-    from ..running.signals import Signals
+    from ..simulation.signals import Signals
 
 KINDS = "a record, a file, a table of pandas or xarray, columns, a trajectory, or times and values as in (t, x)"
 SIGNAL = "signal"  # heading of values without a name
@@ -40,7 +40,7 @@ def is_series(value: Any) -> bool:
 
 def is_signals(value: Any) -> bool:
     """Return whether a value is a Trajectory, or signals of a comparison."""
-    from ..running.signals import Signals
+    from ..simulation.signals import Signals
 
     return isinstance(value, Signals)
 
@@ -256,7 +256,7 @@ def convert_to_signals(source: Any) -> "Signals":
     from ..records.columns import ColumnOptions, find_column, list_columns, parse_numbers
     from ..records.headings import TIME_NAME
     from ..records.units import TIMES
-    from ..running.signals import Signals
+    from ..simulation.signals import Signals
 
     if is_signals(source):
         signals: Signals = source

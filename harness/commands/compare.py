@@ -53,9 +53,9 @@ def compare(
         from ..api import compare as compare_sides
         from ..results.provenance import describe_sources
         from ..results.result import save_result
-        from ..running.resolve import FMU_SUFFIXES
-        from ..running.trajectory import Trajectory
         from ..scenes.fmu_files import find_fmu
+        from ..simulation.resolve import FMU_SUFFIXES
+        from ..simulation.trajectory import Trajectory
         from ..studies.compare.trajectory_sources import RUN_SUFFIXES, display_names
 
         suffixes = [Path(source).suffix for source in (first, second)]

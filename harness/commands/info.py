@@ -28,8 +28,8 @@ def info(model: str | None, quiet: bool, as_json: bool) -> None:
         list_sources(terminal)
         return
     from ..results.summary import make_terminal_table
-    from ..running.fmu_variables import HEADINGS, describe_fmu
     from ..scenes.fmu_files import find_fmu
+    from ..simulation.fmu_variables import HEADINGS, describe_fmu
 
     description = describe_fmu(find_fmu(model))
     blocks: list[object] = [*description.sentences()]

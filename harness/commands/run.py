@@ -44,9 +44,9 @@ def run(
       friction-fmus run ./my-scene.toml --out elsewhere
       friction-fmus run other.fmu --set mass=2 --stop 10 --rtol 1e-4
     """
-    from ..running.resolve import find_source
     from ..scenes.assignments import parse_assignments
     from ..scenes.scene import change_values
+    from ..simulation.resolve import find_source
     from ..studies.run import study
     from ..studies.run.table import results_table
 
@@ -68,9 +68,9 @@ def run(
 
 def run_fmu_file(path: Path, values: tuple[str, ...], options: dict[str, Any], terminal: Terminal) -> None:
     """Run one FMU and print the first, last, smallest and largest value of each output."""
-    from ..running.resolve import set_rtol
     from ..scenes.assignments import parse_assignments
     from ..scenes.run_spec import DEFAULT_EQUAL_STEPS, RunSpec
+    from ..simulation.resolve import set_rtol
     from ..studies.run.study import run_fmu
 
     rtol = options.pop("rtol")

@@ -86,10 +86,10 @@ def sweep(
         refuse_options(context, "with --scheduler: the cluster has its own workers", "workers")
     if find_spec("xarray") is None:  # checked before the runs
         raise HarnessError(f"a sweep needs xarray: {install_command('sweep')}")
-    from ..running.resolve import set_rtol
     from ..scenes.assignments import parse_assignments
     from ..scenes.fmu_files import check_built, find_fmu
     from ..scenes.run_spec import RunSpec
+    from ..simulation.resolve import set_rtol
     from ..studies.sweep.labels import read_labels, replace_labels_in_text
     from ..studies.sweep.runner import SweepSpec
     from ..studies.sweep.sampling import SweepPoints, parse_axis

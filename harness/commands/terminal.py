@@ -179,8 +179,8 @@ def refuse_ignored_options(
     timeout_is_ignored : bool
         Whether the command limits no time of FMUs of this project.
     """
-    from ..running.fmu_archive import exposes_solver_steps, read_description
-    from ..running.model_data import read_model_data
+    from ..simulation.fmu_archive import exposes_solver_steps, read_description
+    from ..simulation.model_data import read_model_data
 
     files, uses_exchange = list(fmus), context.params["interface"] == MODEL_EXCHANGE
     if not files:

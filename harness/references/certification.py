@@ -13,9 +13,9 @@ import numpy as np
 
 from ..errors import HarnessError
 from ..results.files import column_heading, write_csv_rows
-from ..running.embedded_model import EmbeddedModel, load_model_class, method_numbers
-from ..running.solution import Solution
 from ..scenes.fmu_files import find_fmu
+from ..simulation.embedded_model import EmbeddedModel, load_model_class, method_numbers
+from ..simulation.solution import Solution
 from .certified_reference import ERROR_LABEL, FOLDER, POINTS, event_time_error, max_relative_difference
 from .reference_trajectory import CommunicationGrid
 from .segments import ParameterSpan, ParameterValues

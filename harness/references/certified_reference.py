@@ -12,8 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ..running.solution import Solution
 from ..scenes.run_spec import RunSpec
+from ..simulation.solution import Solution
 from .ode_problem import OdeProblem
 
 FOLDER = Path(__file__).parents[2] / "fmus"

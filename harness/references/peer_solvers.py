@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import HarnessError
-from ..running.solution import Solution
+from ..simulation.solution import Solution
 from .ode_problem import OdeProblem, RhsFunction, StateVector
 
 SCIPY = ("RK23", "RK45", "DOP853", "Radau", "LSODA")

@@ -11,7 +11,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from ..running.solution import Solution
+from ..simulation.solution import Solution
 from .models import MODEL_MODULES
 from .segments import ParameterSpan, Segment
 

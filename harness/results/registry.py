@@ -66,11 +66,11 @@ STUDIES = (
     Study(
         "run",
         "run",
-        "running.trajectory:Trajectory",
+        "simulation.trajectory:Trajectory",
         ("trajectory.csv", "steps.csv", "events.csv", "quantities.csv", PICTURE),
         "Runs",
         "Scenes, models and FMUs that you ran.",
-        reader="running.trajectory_files:read_run",
+        reader="simulation.trajectory_files:read_run",
     ),
     Study(
         "decay",

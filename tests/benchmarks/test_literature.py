@@ -14,7 +14,7 @@ from benchmarks.literature.problems import (
     SmoothedBeltBlock,
 )
 from harness.references import peer_solvers
-from harness.running.embedded_model import EmbeddedModel, load_more_model, method_numbers
+from harness.simulation.embedded_model import EmbeddedModel, load_more_model, method_numbers
 
 pytestmark = pytest.mark.slow
 

@@ -338,7 +338,7 @@ def test_a_scene_imports_only_the_modules_it_needs(user_folder, tmp_path):
 
 
 def test_no_temporary_fmu_files_remain_of_a_failed_run(user_folder, tmp_path):
-    """Nor of others: tests/running/test_paths.py."""
+    """Nor of others: tests/simulation/test_paths.py."""
     temporary = tmp_path / "temporary"
     temporary.mkdir()
     (tmp_path / "mine.toml").write_text(BASE + "[values]\nmu_d = 0.95")

@@ -16,8 +16,8 @@ from prescribed_motion import BLOCK, belt_rising, belt_shaking, solve_block
 import harness
 from fmus.packaging import BuildError
 from fmus.packaging.model_lookup import find_model
-from harness.running.whole_run import open_simulator
 from harness.scenes.run_spec import RunSpec
+from harness.simulation.whole_run import open_simulator
 
 RISING = {"k": 60.0, "f_s": 10.0, "f_d": 6.0}  # parameters with several phases of stick and slip
 SHAKING = {"k": 30.0, "f_s": 12.0, "f_d": 8.0}

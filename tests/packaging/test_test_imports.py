@@ -16,8 +16,8 @@ process: interrupt interruptible_wait subprocess_runner temporary_directory work
 records: columns extraction headings record samples size_limits text_table
 references: certified_reference models peer_solvers reference_trajectory
 results: folder quantity registry style
-running: embedded_model native_equivalent runner whole_run
-running.external: step_refinement
+simulation: embedded_model native_equivalent runner whole_run
+simulation.external: step_refinement
 scenes: run_spec
 studies.precision: advice law_deviations study
 studies.stability: study

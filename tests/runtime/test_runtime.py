@@ -24,7 +24,7 @@ from models import (
 from fmus.packaging.lowering import lowered_files, lowered_model
 from fmus.packaging.model_lookup import find_model
 from fmus.runtime.codes import EPSILON
-from harness.running.embedded_model import create_run, load_model_class
+from harness.simulation.embedded_model import create_run, load_model_class
 
 FMI_SIDE = [
     *("__init__", "failure_handling", "fmu_instance", "messages", "method_registry", "pythonfmu_workarounds"),

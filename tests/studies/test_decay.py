@@ -112,7 +112,8 @@ draws, draw = [], Figure.draw
 Figure.draw = lambda *arguments: draws.append(draw(*arguments))
 identify(decay_record(0.02)).write(Path.cwd())
 unnecessary = ("fmpy", "scipy.stats", "scipy.signal")
-unnecessary += ("harness.running.runner", "harness.running.session", "harness.scenes.run_spec", "harness.scenes.scene")
+unnecessary += ("harness.simulation.runner", "harness.simulation.session")
+unnecessary += ("harness.scenes.run_spec", "harness.scenes.scene")
 print(len(draws), [name for name in unnecessary if name in sys.modules])
 """
     done = commands.run_python(tmp_path, "-c", program)

@@ -16,8 +16,8 @@ import harness
 from benchmarks.campaigns.drawn_records import GROUPS, draw_record
 from benchmarks.campaigns.fit_campaign import SOURCES
 from harness import HarnessError, SceneError
-from harness.running.whole_run import open_simulator
 from harness.scenes.run_spec import RunSpec
+from harness.simulation.whole_run import open_simulator
 
 pytestmark = pytest.mark.usefixtures("in_workspace")
 

@@ -21,7 +21,7 @@ from harness import HarnessError, PrecisionResult
 from harness.references import peer_solvers
 from harness.references.certified_reference import compute_errors, load_reference, relative_errors
 from harness.references.models import CASES
-from harness.running.embedded_model import EmbeddedModel, load_model_class, load_more_model, method_numbers
+from harness.simulation.embedded_model import EmbeddedModel, load_model_class, load_more_model, method_numbers
 from harness.studies.precision import advice, law_deviations
 from harness.studies.precision.study import (
     FMI3_TOOLS,

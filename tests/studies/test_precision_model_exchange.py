@@ -18,9 +18,9 @@ from harness import HarnessError
 from harness.references import peer_solvers
 from harness.references.certified_reference import load_reference
 from harness.references.models import CASES
-from harness.running.embedded_model import load_model_class
-from harness.running.runner import run_own_fmu
 from harness.scenes.run_spec import RunSpec
+from harness.simulation.embedded_model import load_model_class
+from harness.simulation.runner import run_own_fmu
 from harness.studies.precision import advice, study
 from harness.studies.precision.study import (
     CS,

@@ -201,7 +201,7 @@ def test_a_refused_number_needs_its_name_in_the_message_and_no_values(case, monk
     read_refusal = study.inject_nonfinite.__globals__["read_refusal"]
     summary = study.inject_nonfinite(case.run)
     assert summary.failures == ()
-    read = "harness.running.step_sequence.read_refusal"
+    read = "harness.simulation.step_sequence.read_refusal"
     monkeypatch.setattr(read, lambda session: replace(read_refusal(session), **wrong))
     assert len(study.inject_nonfinite(case.run).failures) == summary.n_tried > 0
 

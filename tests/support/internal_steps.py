@@ -7,7 +7,7 @@ from array_model import to_array_model
 
 from fmus.packaging.lowering import component_name
 from fmus.runtime import vectors
-from harness.running.embedded_model import create_run
+from harness.simulation.embedded_model import create_run
 
 COUNTS = ("n_accepted", "n_rejected", "n_rhs")
 

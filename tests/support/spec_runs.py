@@ -1,6 +1,6 @@
 """Runs of specifications, and callbacks for their progress."""
 
-from harness.running import runner
+from harness.simulation import runner
 
 
 def ignore_progress(*report):

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from harness.running.runner import run_own_fmu as run_fmu
 from harness.scenes.fmu_files import check_built, find_fmu
 from harness.scenes.run_spec import RunSpec
+from harness.simulation.runner import run_own_fmu as run_fmu
 
 from ..scenes import Scene, Setting, Solution
 

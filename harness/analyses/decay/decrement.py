@@ -19,11 +19,11 @@ import numpy as np
 
 from ...errors import HarnessError
 from ...results.quantity import Quantity
-from ...running.signals import check_sampling, column_of_role
+from ...simulation.signals import check_sampling, column_of_role
 from .law import damping_ratio, friction_from_envelope
 
 if TYPE_CHECKING:
-    from ...running.trajectory import Trajectory
+    from ...simulation.trajectory import Trajectory
 
 
 FORCES = {"f": ("N", "friction force", False), "T_f": ("N.m", "joint torque", True)}  # unit, text, is a rotation
@@ -93,7 +93,7 @@ def analyse(run: "Trajectory", gives: str, first: int = 0, cycles: float | None 
 
 def stiffness(run: "Trajectory", is_rotation: bool, purpose: str) -> float:
     """Return k of a spring or m g a of a pendulum; HarnessError with the `purpose` if the model has neither."""
-    from ...running.trajectory import get_parameter
+    from ...simulation.trajectory import get_parameter
 
     return prod(get_parameter(run, name, purpose) for name in (("m", "g", "a") if is_rotation else ("k",)))
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from ...errors import HarnessError, SceneError, option_text
 from ...records.extraction import Samples
-from ...running.whole_run import Simulator
+from ...simulation.whole_run import Simulator
 from .fit_problem import FitProblem, Selection
 from .measured_record import MAX_AVERAGING_ERROR, MeasuredRecord
 from .profile_likelihood import profile_bound, search_bound

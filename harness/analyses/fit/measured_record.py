@@ -7,8 +7,8 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from ...records.extraction import Samples
-from ...running.stepping import merge_points
-from ...running.whole_run import Run, Simulator
+from ...simulation.stepping import merge_points
+from ...simulation.whole_run import Run, Simulator
 from .noise import bin_means, estimate_noise
 from .parameter_fit import FittedRecord
 

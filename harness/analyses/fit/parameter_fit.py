@@ -6,7 +6,7 @@ from math import isfinite, log
 import numpy as np
 
 from ...errors import check_names
-from ...running.model_data import LookupTable
+from ...simulation.model_data import LookupTable
 from ..estimation.estimate import ColumnResiduals, Estimate
 
 CLEAR_DIFFERENCE = 6.0  # of two BIC, which is strong evidence

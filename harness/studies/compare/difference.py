@@ -9,8 +9,8 @@ import numpy as np
 from ...arguments import NONNEGATIVE, check_arguments
 from ...errors import HarnessError
 from ...records.units import conversion_factor
-from ...running.signals import Signals
-from ...running.trajectory import Trajectory
+from ...simulation.signals import Signals
+from ...simulation.trajectory import Trajectory
 from .event_pairs import EventPairs, match_events, stack_events
 from .interpolation import SignalInterpolant, ValueBounds
 from .trajectory_sources import common_span

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...running.signals import ModeChanges
+from ...simulation.signals import ModeChanges
 
 MAX_LISTED = 3  # unmatched events listed in the summary
 

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
 
 from ...records.units import is_rate_unit
-from ...running.signals import Signals
+from ...simulation.signals import Signals
 
 TIME_ROUNDING = 8 * np.finfo(float).eps  # times that differ by this fraction are equal but for rounding
 LARGE_VALUE, REDUCTION = 1e150, 2.0**-600  # larger values are scaled to avoid overflow

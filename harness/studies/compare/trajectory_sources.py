@@ -8,14 +8,14 @@ from pathlib import Path
 import numpy as np
 
 from ...errors import HarnessError, SceneError
-from ...running.external.step_refinement import communication_step, declared_step
-from ...running.fmu_archive import read_description, resolve_stop, resolve_time_span
-from ...running.resolve import FMU_SUFFIXES, resolve
-from ...running.runner import DEFAULT_COMMUNICATION_STEPS, run
-from ...running.session import ProgressCallback
-from ...running.signals import Signals
-from ...running.trajectory_files import read_signals
 from ...scenes.run_spec import RunOptions, RunSpec
+from ...simulation.external.step_refinement import communication_step, declared_step
+from ...simulation.fmu_archive import read_description, resolve_stop, resolve_time_span
+from ...simulation.resolve import FMU_SUFFIXES, resolve
+from ...simulation.runner import DEFAULT_COMMUNICATION_STEPS, run
+from ...simulation.session import ProgressCallback
+from ...simulation.signals import Signals
+from ...simulation.trajectory_files import read_signals
 
 FILE_SUFFIXES = (".csv", ".txt", ".mat", ".xlsx", ".ods", ".npz")
 RUN_SUFFIXES = (*FMU_SUFFIXES, ".toml")  # sources that are run

@@ -13,7 +13,7 @@ from ...records.columns import ColumnOptions
 from ...records.record import Record, load_record
 
 if TYPE_CHECKING:
-    from ...running.trajectory import Trajectory
+    from ...simulation.trajectory import Trajectory
 
 
 def is_record_file(source: str) -> bool:
@@ -36,9 +36,9 @@ def load_source(source: str, columns: ColumnOptions, report: Callable[[float], N
         return load_record(source, columns)
     if Path(source).is_dir():
         raise SceneError(f"{source} is a folder; give a file in it")
-    from ...running.runner import run
     from ...scenes.fmu_files import check_built
     from ...scenes.scene import load_scene
+    from ...simulation.runner import run
 
     scene = load_scene(source)
     check_built(scene.run.fmu)

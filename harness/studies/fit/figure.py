@@ -12,8 +12,8 @@ from ...analyses.estimation.figure import plot_legend, plot_record, plot_residua
 from ...analyses.fit.parameter_fit import FittedRecord, ParameterFit, Profile
 from ...results.quantity import display_unit
 from ...results.style import GREEN, GREY, HEIGHT, ORANGE, WIDTH, Axes, Figure, axis_label, set_size
-from ...running.model_data import LookupTable
-from ...running.plot import draw_table
+from ...simulation.model_data import LookupTable
+from ...simulation.plot import draw_table
 
 MAX_COLUMNS, MAX_PROFILES = 6, 12  # drawn at most
 COLOURS = (ORANGE, GREEN, "#CC79A7", "#56B4E9")  # of the laws

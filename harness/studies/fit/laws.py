@@ -5,7 +5,7 @@ from itertools import chain
 from pathlib import Path
 
 from ...errors import SceneError, check_names, option_text
-from ...running.fmu_archive import read_description
+from ...simulation.fmu_archive import read_description
 from .request import (
     READABLE,
     FitRequest,

@@ -7,9 +7,9 @@ from ...errors import SceneError, option_text
 from ...records.columns import Column, find_column, find_time_column, list_columns
 from ...records.record import Record
 from ...records.units import conversion_factor
-from ...running.fmu_archive import read_description
-from ...running.whole_run import real_variables
 from ...scenes.roles import ROLES, find_roles
+from ...simulation.fmu_archive import read_description
+from ...simulation.whole_run import real_variables
 from .request import FitRequest
 
 

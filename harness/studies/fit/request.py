@@ -13,11 +13,11 @@ from ...errors import SceneError, check_names, format_value, option_text
 from ...records.extraction import Samples
 from ...records.motion import MIN_SAMPLES
 from ...records.record import SignalSource
-from ...running.fmu_archive import default_stop, read_description
-from ...running.model_data import read_model_data
-from ...running.variable_values import convert_value, enumeration_labels
-from ...running.whole_run import RealVariable, real_variables
 from ...scenes.run_spec import RunSpec
+from ...simulation.fmu_archive import default_stop, read_description
+from ...simulation.model_data import read_model_data
+from ...simulation.variable_values import convert_value, enumeration_labels
+from ...simulation.whole_run import RealVariable, real_variables
 
 SAMPLES_PER_UNKNOWN = 4
 GAIN_RANGE = (0.5, 2.0)

@@ -17,9 +17,9 @@ from ...errors import HarnessError, SceneError, format_value, option_text
 from ...records.columns import ColumnOptions
 from ...records.extraction import Samples
 from ...records.record import Record, load_record
-from ...running.model_data import read_tables_with
-from ...running.native_equivalent import native_equivalent
-from ...running.whole_run import open_simulator
+from ...simulation.model_data import read_tables_with
+from ...simulation.native_equivalent import native_equivalent
+from ...simulation.whole_run import open_simulator
 from .request import FitTask, make_unknowns, span_remarks
 from .result import FitResult
 

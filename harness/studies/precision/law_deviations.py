@@ -17,8 +17,8 @@ from ...analyses.slip import upward_crossings
 from ...references import peer_solvers
 from ...references.certified_reference import POINTS, ReferenceCase, compute_errors, load_reference
 from ...references.ode_problem import OdeProblem, RhsFunction
-from ...running.embedded_model import EmbeddedModel
-from ...running.solution import Solution
+from ...simulation.embedded_model import EmbeddedModel
+from ...simulation.solution import Solution
 
 FINE = 16001  # points used to find peaks and slips
 TOLERANCE = 1e-8

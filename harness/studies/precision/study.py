@@ -22,13 +22,13 @@ from ...references.certification import solve_by_two_methods
 from ...references.certified_reference import ReferenceCase, compute_errors, load_reference
 from ...references.models import CASES
 from ...references.ode_problem import UnspecifiedProblem
-from ...running.embedded_model import EmbeddedModel, load_model_class, method_numbers
-from ...running.runner import run_own_fmu
-from ...running.signals import Signals, sample_at
-from ...running.solution import Solution
-from ...running.timing import time_call
 from ...scenes.fmu_files import find_fmu, fmi3_path
 from ...scenes.run_spec import RunSpec
+from ...simulation.embedded_model import EmbeddedModel, load_model_class, method_numbers
+from ...simulation.runner import run_own_fmu
+from ...simulation.signals import Signals, sample_at
+from ...simulation.solution import Solution
+from ...simulation.timing import time_call
 
 MAX_REPEATS = 20  # maximum number of timed runs per point
 

@@ -14,9 +14,9 @@ from ...results.folder import replace_folder
 from ...results.provenance import load_provenance, write_provenance
 from ...results.registry import find_study
 from ...results.summary import write_summary
-from ...running.embedded_model import load_model_class, load_more_model
-from ...running.fmu_archive import declared_parameters
 from ...scenes.fmu_files import find_fmu
+from ...simulation.embedded_model import load_model_class, load_more_model
+from ...simulation.fmu_archive import declared_parameters
 from . import law_deviations
 from .advice import recommend
 from .result import PrecisionResult

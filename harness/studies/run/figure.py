@@ -26,12 +26,12 @@ from ...results.style import (
     mask_undrawable,
     open_figure,
 )
-from ...running.fmu_archive import exposes_solver_steps, read_description
-from ...running.model_data import LookupTable, read_model_data
-from ...running.plot import contact_of, draw_sticking, draw_table
-from ...running.runner import run_own_fmu
-from ...running.trajectory import Trajectory
 from ...scenes.scene import MAX_DEFAULT_PLOTS, KnownValues, is_panel
+from ...simulation.fmu_archive import exposes_solver_steps, read_description
+from ...simulation.model_data import LookupTable, read_model_data
+from ...simulation.plot import contact_of, draw_sticking, draw_table
+from ...simulation.runner import run_own_fmu
+from ...simulation.trajectory import Trajectory
 
 RIGHT_COLUMN = ("phase", "steps")  # plots in the right column; plots over time are in the left column
 CONTACT_HEIGHT = 0.12  # of a row of the panel with all contacts, in heights of a panel

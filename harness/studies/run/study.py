@@ -16,12 +16,12 @@ from ...results.provenance import describe_sources, write_provenance
 from ...results.quantity import Quantity
 from ...results.registry import find_study
 from ...results.summary import write_summary
-from ...running import runner
-from ...running.plot import choose_outputs, contact_of
-from ...running.trajectory import Trajectory, summarize_run
 from ...scenes.fmu_files import check_built
 from ...scenes.run_spec import RunSpec
 from ...scenes.scene import MAX_DEFAULT_PLOTS, Scene, default_plots, is_panel, load_scene, shipped_scenes
+from ...simulation import runner
+from ...simulation.plot import choose_outputs, contact_of
+from ...simulation.trajectory import Trajectory, summarize_run
 from .table import SceneOutcome, summarize_quantities, write_quantities
 
 STUDY = find_study("run")

@@ -11,8 +11,8 @@ from rich.text import Text
 from ...results.files import write_csv_rows
 from ...results.quantity import Quantity, format_number
 from ...results.summary import MAX_DEVIATION, STEPS_TABLE, Outcome, Summary, make_table
-from ...running.trajectory import Trajectory
 from ...scenes.scene import KnownValues, Scene
+from ...simulation.trajectory import Trajectory
 
 OTHER_MACHINE = "other CPU: the published run time was measured on another machine"
 RUN_TIME = "run time"

@@ -8,9 +8,9 @@ from typing import Any
 
 from ...references.reference_trajectory import CommunicationGrid
 from ...references.segments import ParameterSpan
-from ...running.fmu_info import FmuInfo
 from ...scenes.fmu_files import find_fmu
 from ...scenes.run_spec import RunSpec
+from ...simulation.fmu_info import FmuInfo
 
 FILE = Path(__file__).with_name("stability.toml")
 RTOL = 1e-6

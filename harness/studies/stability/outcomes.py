@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...running.trajectory import Trajectory
+from ...simulation.trajectory import Trajectory
 from .cases import StabilityCase
 
 FINISHED, REFUSED, WRONG = "finished", "refused", "wrong"

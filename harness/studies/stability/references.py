@@ -7,9 +7,9 @@ from ...references.certification import compute_by_two_methods
 from ...references.models import MODELS
 from ...references.reference_trajectory import CommunicationGrid, compute_reference
 from ...references.segments import ParameterSpan
-from ...running.embedded_model import load_model_class
-from ...running.solution import Solution
 from ...scenes.fmu_files import find_fmu
+from ...simulation.embedded_model import load_model_class
+from ...simulation.solution import Solution
 
 
 def solve_reference(model: str, spans: list[ParameterSpan], grid: CommunicationGrid) -> Solution:

@@ -23,12 +23,12 @@ from ...results.folder import replace_folder
 from ...results.provenance import prefix_parameters, write_provenance
 from ...results.registry import find_study
 from ...results.summary import write_summary
-from ...running.fmu_archive import declared_parameters
-from ...running.fmu_info import FmuInfo, read_info
-from ...running.solution import Solution
-from ...running.step_sequence import CommunicationSteps, RefusalSummary, RefusedRun, inject_nonfinite, run_steps
-from ...running.trajectory import Trajectory
 from ...scenes.fmu_files import check_built, find_fmu
+from ...simulation.fmu_archive import declared_parameters
+from ...simulation.fmu_info import FmuInfo, read_info
+from ...simulation.solution import Solution
+from ...simulation.step_sequence import CommunicationSteps, RefusalSummary, RefusedRun, inject_nonfinite, run_steps
+from ...simulation.trajectory import Trajectory
 from .cases import StabilityCase, generic_scenes, load_scenes, scene_cases
 from .outcomes import FINISHED, REFUSED, WRONG, CaseOutcome, StabilityRegion
 from .references import find_modes, solve_reference

@@ -15,8 +15,8 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 
 from ...results.style import BLUE, HEIGHT, WIDTH, Figure, axis_label, is_drawable, set_size
-from ...running.model_data import LookupTable, parse_table
-from ...running.plot import draw_table
+from ...simulation.model_data import LookupTable, parse_table
+from ...simulation.plot import draw_table
 
 FAILED_COLOUR = "#bbbbbb"
 LOG_RATIO = 100.0  # ratio of largest to smallest value from which an axis is logarithmic

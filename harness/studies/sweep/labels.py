@@ -4,9 +4,9 @@ from collections.abc import Mapping
 from typing import Any
 
 from ...errors import SceneError, unknown_name_message
-from ...running.fmu_archive import read_description
-from ...running.variable_values import enumeration_labels
 from ...scenes.run_spec import RunSpec
+from ...simulation.fmu_archive import read_description
+from ...simulation.variable_values import enumeration_labels
 
 Labels = Mapping[str, Mapping[str, int]]  # numbers of the labels of each enumeration
 

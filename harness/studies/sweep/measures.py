@@ -14,10 +14,10 @@ from ...analyses.decay.decrement import find_extrema_from_velocity
 from ...analyses.decay.law import damping_ratio, friction_from_envelope
 from ...analyses.slip import peak_value, slips_from_modes, upward_crossings
 from ...errors import HarnessError
-from ...running.signals import column_of_role
-from ...running.trajectory import Trajectory, get_parameter
-from ...running.variable_values import variable_unit
 from ...scenes.roles import find_roles
+from ...simulation.signals import column_of_role
+from ...simulation.trajectory import Trajectory, get_parameter
+from ...simulation.variable_values import variable_unit
 
 N_STEPS = 400  # communication steps along a trajectory, in addition to the internal steps
 

@@ -11,14 +11,14 @@ from time import perf_counter
 from typing import Any
 
 from ...errors import HarnessError, check_names
-from ...running.fmu_archive import read_description, resolve_time_span
-from ...running.fmu_instance import CALL_FAILURES
-from ...running.recorder import default_outputs
-from ...running.runner import open_session, runs_in_process
-from ...running.session import Session
-from ...running.variable_values import variable_unit
 from ...scenes.roles import find_roles
 from ...scenes.run_spec import RunSpec
+from ...simulation.fmu_archive import read_description, resolve_time_span
+from ...simulation.fmu_instance import CALL_FAILURES
+from ...simulation.recorder import default_outputs
+from ...simulation.runner import open_session, runs_in_process
+from ...simulation.session import Session
+from ...simulation.variable_values import variable_unit
 from .measures import (
     DEFAULT_MEASURES,
     FINAL_MEASURES,

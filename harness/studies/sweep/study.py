@@ -26,10 +26,10 @@ from ...results.files import column_heading
 from ...results.folder import replace_folder
 from ...results.provenance import describe_sources, write_provenance
 from ...results.summary import write_summary
-from ...running.fmu_archive import read_description
-from ...running.model_data import LookupTable, read_tables_with
-from ...running.variable_values import REAL_TYPES, variable_unit
 from ...scenes.fmu_files import check_built
+from ...simulation.fmu_archive import read_description
+from ...simulation.model_data import LookupTable, read_tables_with
+from ...simulation.variable_values import REAL_TYPES, variable_unit
 from .checkpoint import Checkpoint
 from .dispatch import Sweep, run_pending
 from .labels import describe_labels

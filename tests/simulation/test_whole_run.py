@@ -12,9 +12,9 @@ from native_fmus import build_native_fmus, require_compiler
 from scipy.integrate import solve_ivp
 from spec_runs import run_spec
 
-from harness.running.native_equivalent import native_equivalent
-from harness.running.whole_run import open_simulator
 from harness.scenes.run_spec import RunSpec
+from harness.simulation.native_equivalent import native_equivalent
+from harness.simulation.whole_run import open_simulator
 
 T = np.linspace(0.0, 8.0, 401)
 
@@ -166,7 +166,7 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 import numpy as np
-from harness.running.whole_run import Simulator
+from harness.simulation.whole_run import Simulator
 from harness.scenes.run_spec import RunSpec
 
 simulator = Simulator(RunSpec(Path(sys.argv[1])))

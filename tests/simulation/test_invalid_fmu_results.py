@@ -9,8 +9,8 @@ import pytest
 from external_fmus import build_external_fmus, edited_copy
 
 import harness
-from harness.running.external.step_refinement import RefinementRun, refine
 from harness.scenes.run_spec import RunSpec
+from harness.simulation.external.step_refinement import RefinementRun, refine
 
 EARLY, ENDS, NO_TEXT, BAD_TEXT = 1, 2, 3, 4  # faults of Ticking
 TERMINATES, UNSETTLED, NEXT_EVENT, IMMEDIATE, LOGS = 1, 2, 3, 4, 5  # faults of Bouncing

@@ -15,8 +15,8 @@ import numpy as np
 import pytest
 
 from harness import describe, load_result
-from harness.running.external.step_refinement import RefinementRun, refine
 from harness.scenes.run_spec import RunSpec
+from harness.simulation.external.step_refinement import RefinementRun, refine
 
 
 @pytest.fixture(scope="module")
