@@ -22,12 +22,11 @@ def make_getter(kind: str, blank: object) -> Any:
 
     @signal_safe
     def get(slave: VariableAccess, references: list[int]) -> list[Any]:
-        compiled = None
         try:
             last_readers, values, counts, ahead = slave.last_readers[kind]
             if last_readers != references:
                 last_readers, values, counts, ahead = slave.compile_reader(kind, references, blank)
-            compiled, run = values, slave.run
+            run = slave.run
             if not run.outputs_current and not run.has_failed:
                 slave.update_outputs()
             if counts and run.outputs_current:
@@ -35,7 +34,10 @@ def make_getter(kind: str, blank: object) -> Any:
             return values(slave.model, run)
         except BaseException as error:  # an exception outside Python would crash the host
             slave.handle_exception(error)  # sets calculated values to NaN; parameters read what was set
-            return compiled(slave.model, slave.run) if compiled else [blank for _ in references]
+            last_readers, values, *_ = slave.last_readers[kind]
+            if last_readers == references:
+                return values(slave.model, slave.run)
+            return [blank for _ in references]
 
     return get
 
