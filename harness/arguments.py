@@ -5,6 +5,7 @@ A function of the API names the rule of each argument in `check_arguments`; an o
 need.
 """
 
+import os
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from datetime import date
@@ -178,8 +179,8 @@ def text(value: Any) -> str:
 
 
 def path(value: Any) -> str | Path:
-    """Return a name, or a path."""
-    name = text(str(value) if isinstance(value, Path) else value)
+    """Return a name, or a path, whose bytes may be no text."""
+    name = text(os.fsencode(value).decode(errors="replace") if isinstance(value, Path) else value)
     if any(len(part.encode()) > MAX_NAME_BYTES for part in Path(name).parts):
         raise ValueError
     return value

@@ -65,7 +65,8 @@ def compare(
         refuse_ignored_options(context, fmus)
         options = {name: context.params[name] for name in ("stop", "rtol", "interface", "lenient", "timeout")}
         given = {name: value for name, value in options.items() if is_given(context, name)}
-        compute = partial(compare_sides, first, second, **given, progress=partial(report, "compare"))
+        sides = [Path(source) if Path(source).is_file() else source for source in (first, second)]
+        compute = partial(compare_sides, *sides, **given, progress=partial(report, "compare"))
         folder = terminal.out / "compare" / "-".join(display_names((first, second))).replace("/", "-")
         source = describe_sources(first, second)
         comparison = save_result(folder, compute, "compare", source, scene=options)

@@ -232,13 +232,13 @@ def test_randomly_mutated_scenes_run_or_are_refused(workspace):
 
 
 UNREADABLE = "\udcff\udcfe"
-TABLES = '"tables": [{"headings": ["a"], "rows": [["b", "c"]]}]'
+ONE_TABLE = '"tables": [{"headings": ["a"], "rows": [["b", "c"]]}]'
 RESULTS = {
     "smd/summary.json": ["", "{}", "[]", '"', "\0", "[" * 100_000],
     "decay/mine/summary.json": ['{"version": 1}', '{"version": 2}', '{"version": "1"}', "null", "{"],
     "compare/a-b/summary.json": ['{"version": 1, "study": "compare", "title": 1, "tables": {}}'],
     "stability/summary.json": ['{"version": 1, "study": "stability", "title": "t", "outcome": 1}'],
-    "importers/summary.json": ['{"version": 1, "study": "importers", "title": "t", ' + TABLES + "}"],
+    "importers/summary.json": ['{"version": 1, "study": "importers", "title": "t", ' + ONE_TABLE + "}"],
     "sweep/mine/summary.json": ['{"version": 1, "study": "sweep", "title": "t", "files": ["../a.csv"]}'],
     "precision/smd/figure.svg": ["", "no picture"],
 }
