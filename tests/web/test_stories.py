@@ -34,6 +34,15 @@ def test_the_opening_claims_that_real_things_stop_and_counts_the_steps_of_both_m
     ]
 
 
+def test_a_mass_under_sign_never_sticks_on_the_page(still):
+    """Also where its speed, and so its mode, is zero: at the start."""
+    labels = "svgs => [...svgs].map(svg => /sticks|slips/.exec(svg.textContent)?.[0])"
+    for t, expected in ((4.3, ["sticks", "slips"]), (0.0, ["slips", "slips"])):
+        still.run(f"app.opening.seek({t})")
+        still.run(web_page.DRAWN)
+        assert still.run(f"({labels})(document.querySelectorAll('#opening .mechanism svg'))") == expected
+
+
 def test_the_opening_plays_once_at_load_and_not_under_reduced_motion(page, still):
     assert still.run("[app.opening.playing, app.opening.state.t]") == [False, 4.3]
     page.browser.call("Emulation.setEmulatedMedia", features=[])

@@ -22,7 +22,7 @@ from .model_json import ModelJson, build_model_json
 FILE, MORE_FILE = "index.html", "more.html"  # pages of the shipped models and of those in fmus/more
 HERE = Path(__file__).parent
 MODULES = (
-    *("numbers", "libc", "fmu", "run", "state", "library", "run_set", "measure", "plot", "panels", "controls"),
+    *("numbers", "libc", "fmu", "state", "run", "library", "run_set", "measure", "plot", "panels", "controls"),
     *("diagrams", "tables", "export", "mechanism", "drag", "scene", "explore"),
     *("story", "stories", "main"),
 )

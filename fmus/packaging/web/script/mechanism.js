@@ -103,6 +103,7 @@ export class Mechanism {
   // Scale the drawing to the range of a run. A scale that still suits the run stays, and so does any while a body is
   // dragged: otherwise the body would move away from the pointer.
   fit(run) {
+    this.canStick = run.itemLabel("friction") !== "sign"; // whose mode is 0 at a speed of 0
     if (this.held) return;
     for (const part of this.parts.filter(({ body }) => body.kind === "block")) {
       const names = [part.body.position, part.body.driver].filter(Boolean);
@@ -137,7 +138,7 @@ export class Mechanism {
     for (const part of this.parts) {
       const { body } = part;
       const position = limited(body.position);
-      const stuck = body.mode && value(body.mode) === 0;
+      const stuck = body.mode && this.canStick && value(body.mode) === 0;
       part.moving.classList.toggle("stuck", Boolean(stuck));
       part.moving.classList.toggle("slipping", Boolean(body.friction) && !stuck);
       Object.assign(part, { position, stuck });

@@ -30,9 +30,8 @@ function significantDigits(run) {
 // Model, friction law, method and tolerance of a run.
 export function describeSettings(run) {
   const values = effectiveValues(run.fmu.modelInfo, run.setting.values);
-  const label = (name) => run.fmu.variables.get(name)?.items.find(({ value }) => value === values[name])?.label;
   const rtol = values["solver.rtol"] ? `rtol ${formatScientific(values["solver.rtol"])}` : "";
-  return [run.fmu.modelInfo.name, label("friction"), label("solver.method"), rtol].filter(Boolean).join(", ");
+  return [run.fmu.modelInfo.name, run.itemLabel("friction"), run.itemLabel("solver.method"), rtol].filter(Boolean).join(", ");
 }
 
 // Steps, run times and errors of the runs.
