@@ -24,7 +24,7 @@ SCALES = (  # exponents of 2 of the units of mass, length and time
     (-30, -30, -20),
 )
 REVOLUTIONS_ADDED = (1, -100, 10_000)
-LARGEST_STEPS = (10.0, 1e4)  # of the duration; a tenth of it by default
+LARGEST_STEPS = (1.0, 1e3, 1e6)  # of the duration; a tenth of it by default
 TIME, UNITS, MIRROR, ORDER, FRAME = "start time", "units", "mirror", "order", "frame"
 LARGEST_STEP, REVOLUTIONS, LONG = "largest step", "revolutions", "long run"
 KINDS = (TIME, UNITS, MIRROR, ORDER, FRAME, LARGEST_STEP, REVOLUTIONS, LONG)

@@ -5,14 +5,16 @@ piece of a table, a number that two conditions have as their side: they hold abo
 Limits are conditions that must hold during the whole run.
 """
 
-from math import inf
+from math import fabs, inf
 
 from .codes import CHATTERING, EPSILON, OK
 from .vectors import ContactVector, StateVector
 
 CONDITION_MARGIN, TINY = 4.0 * EPSILON, 1e-300  # margins of conditions: relative and absolute
-# share of the largest step; number of such short times in succession, below the limit of steps that stall
-SHORTEST_DWELL, MAX_CHATTER = 1e-9, 50
+# A condition chatters if it changes again within a share of the time in which the smooth motion changes, or, in model
+# exchange, of the time since the start.  So many such changes in succession are an error; steps would stall after more.
+BRIEF_SHARE, SHORTEST_DWELL, MAX_CHATTER = 0.01, 1e-9, 50
+RESOLUTION = 1e-12  # share of a step; rounding errors decide changes that follow each other faster
 
 
 def update_margins(model, location, t, y: StateVector, modes: ContactVector):
@@ -63,21 +65,38 @@ def begin_step(model, location):
         model.condition_sides[j] = location.sides_before[j] = location.sides_after[j]
 
 
-def update_at_event(model, location, t, y: StateVector, modes: ContactVector, h_max):
-    """Determine the conditions after an event.
-
-    Returns
-    -------
-    int
-        Status: OK, or CHATTERING if a condition keeps changing.
-    """
+def update_at_event(model, location, t, y: StateVector, modes: ContactVector):
+    """Determine the conditions after an event."""
     for j in range(model.n_switches):
         location.sides_before[j] = model.condition_sides[j]
     update_sides(model, location, t, y, modes)
-    if have_changed(model, location):
-        is_quick = t - location.t_condition <= SHORTEST_DWELL * h_max
-        location.n_chatter = location.n_chatter + 1 if is_quick else 0
-        location.t_condition = t
+
+
+def note_distance(location, j, distance):
+    """Note how far a condition is from its edge."""
+    distance = fabs(distance)
+    location.distances[j] = distance if distance > location.distances[j] else location.distances[j]
+    location.largest_distances[j] = (
+        distance if distance > location.largest_distances[j] else location.largest_distances[j]
+    )
+
+
+def stayed_at_edge(model, location, tolerance):
+    """Return whether a condition that changes has not left its edge by more than the tolerance since it changed."""
+    stayed = False
+    for j in range(model.n_switches):
+        if location.sides_after[j] != location.sides_before[j]:
+            is_near = location.distances[j] <= tolerance * location.largest_distances[j]
+            # the pieces of a table are continuous at their edge
+            stayed = stayed or (is_near and not (model.has_pieces and model.condition_pieces[j] >= 0.0))
+            location.distances[j] = 0.0
+    return stayed
+
+
+def count_changes(location, t, is_brief):
+    """Count changes of conditions in brief succession.  Returns a status: OK, or CHATTERING after too many."""
+    location.n_chatter = location.n_chatter + 1 if is_brief else 0
+    location.t_condition = t
     return CHATTERING if location.n_chatter > MAX_CHATTER else OK
 
 

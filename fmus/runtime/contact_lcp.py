@@ -15,6 +15,7 @@ from math import fabs, inf
 
 from .codes import BACKWARD, EPSILON, FORWARD, HYBRID, ROUNDOFF_MARGIN, STUCK
 from .stick_slip import DryFriction, sign
+from .time_scale import time_scale
 from .vectors import (
     ContactIndex,
     ContactVector,
@@ -119,7 +120,7 @@ def resolve_after_event(model, step, h, ends: ContactVector, tie_tolerance) -> t
     roundings = model.slip_roundings(t, step.y1)
     floors = slip_floors(model, step, t, step.y1)
     force, limit, _sizes, _terms = model.contact_forces(t, step.y1, step.modes0)
-    delta = PREDICTION_SHARE * step.time_scale()
+    delta = PREDICTION_SHARE * time_scale(model, step, t, step.y1, step.modes0)
     status, new_modes = contact_vector(), contact_vector()
     y = step.y1
     for i in contact_indices:
@@ -240,8 +241,9 @@ def resolve_at_start(
     roundings = model.slip_roundings(t, y)
     floors = slip_floors(model, step, t, y)
     force, limit, _sizes, _terms = model.contact_forces(t, y, modes)
-    status, new_modes = contact_vector(), contact_vector()
+    status, new_modes, sliding_modes = contact_vector(), contact_vector(), contact_vector()
     for i in contact_indices:
+        sliding_modes[i] = sign(slips[i]) if slips[i] != 0.0 else sign(force[i]) if force[i] != 0.0 else FORWARD
         zero_level = ROUNDOFF_MARGIN * roundings[i]
         if modes[i] * slips[i] <= 0.0:
             zero_level += (tie_tolerance if modes[i] == STUCK else reach) * (terms[i] + floors[i])
@@ -250,7 +252,7 @@ def resolve_at_start(
             new_modes[i] = modes[i]
         elif fabs(slips[i]) <= zero_level:
             status[i], new_modes[i] = AT_REST, STUCK
-    delta = PREDICTION_SHARE * step.time_scale()
+    delta = PREDICTION_SHARE * time_scale(model, step, t, y, sliding_modes)  # stuck loads may have no lever
     return resolve_contacts(model, t, y, modes, new_modes, status, delta, tie_tolerance)
 
 

@@ -55,7 +55,8 @@ class EventLocation:
         self.sides_before, self.sides_after = [1.0] * n, [1.0] * n
         self.is_frictionless = [0.0] * n  # of each contact: 1.0 if it neither slides nor holds with a force
         self.t_condition = -inf  # time of the last change of a condition
-        self.n_chatter = 0  # changes of a condition in quick succession
+        self.n_chatter = 0  # changes of a condition in brief succession
+        self.distances, self.largest_distances = [0.0] * n, [0.0] * n  # from its edge: since its last change; ever
         self.violated = -1  # condition that must hold but does not; -1 if there is none
         # nodes (fractions of a step) of the polynomial through an event function, and its coefficients
         self.nodes, self.samples, self.polynomial = [0.0] * (DEGREE + 1), [0.0] * (DEGREE + 1), [0.0] * (DEGREE + 1)
@@ -67,6 +68,7 @@ class EventLocation:
         self.tolerance_factor, self.tolerance = 1.0, 0.0  # now; tolerance of the run, if the factor is less
         self.t_doubt = 0.0  # end of the step that was in doubt
         self.in_doubt = self.must_repeat = self.must_shorten = False
+        self.n_halvings = 0  # of the current step, for event functions
         self.must_search = False  # inputs of higher order: no cubic polynomial resembles the motion
         self.load_series = PowerSeries()  # of a load, for inputs of higher order
         self.feature_width = inf  # slip velocity below which friction varies

@@ -26,8 +26,8 @@ from .variable_declarations import VariableDeclaration
 RUN_MESSAGES = {
     codes.DIVERGED: "the solution diverges after t = {t0!r} s, or an equation has no finite value there, such as the "
     "square root of a negative number; reduce the excitation or check the parameters",
-    codes.STALLED: "the solver stalls after t = {t0!r} s: its step has shrunk to 4e-15 of the largest step, which is "
-    "solver.h_max or a tenth of the run; raise solver.rtol or choose another solver.method",
+    codes.STALLED: "the solver stalls after t = {t0!r} s: its step has shrunk to 4e-15 of the time since "
+    "the start of the run; raise solver.rtol or choose another solver.method",
     codes.TOO_MANY_STEPS: f"more than {MAX_STEPS} internal steps or {MAX_EVALUATIONS} right-hand sides within one "
     "communication step after t = {now!r} s; choose another solver.method, raise solver.rtol or take shorter "
     "communication steps",

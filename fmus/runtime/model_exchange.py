@@ -16,6 +16,7 @@ from math import fabs, inf, nan
 
 from . import call_sequence, conditions, contact_lcp, event_location, stick_slip
 from .codes import DIVERGED, EPSILON, EVENT, MODEL_EXCHANGE, NO_CONSISTENT_MODES, OK, ROUNDOFF_MARGIN, RUNNING, STUCK
+from .conditions import SHORTEST_DWELL
 from .run_state import RunState
 from .step_control import OVERFLOW_LIMIT, TIE_FACTOR
 from .vectors import (
@@ -93,6 +94,7 @@ def begin(run, model):
     start_counters = step.start_counters
     start_counters.n_accepted = start_counters.n_rejected = start_counters.n_rhs = 0
     step.t0, step.t1 = solver.t, nan
+    step.h_next = 0.0
     run.model_exchange.time = solver.start_time + solver.t
     step.active_method.error_scale_floor = DEFAULT_NOMINAL  # the importer's solver works with nominal values
     update_nominals(run, model)
@@ -256,13 +258,14 @@ def handle_event(run, model):
     exchange.nominals_changed = exchange.nominal_velocity != nominal_velocity
     exchange.states_changed, run.values_changed = run.values_changed, False
     if model.has_conditions:
-        status = conditions.update_at_event(
-            model, solver.step.event_location, solver.t, solver.y, solver.modes, solver.step.h_max
-        )
-        if status != OK:
-            return status
-        if conditions.have_changed(model, solver.step.event_location):
+        location = solver.step.event_location
+        conditions.update_at_event(model, location, solver.t, solver.y, solver.modes)
+        if conditions.have_changed(model, location):
             exchange.states_changed = True
+            is_brief = solver.t - location.t_condition <= SHORTEST_DWELL * solver.t
+            status = conditions.count_changes(location, solver.t, is_brief)
+            if status != OK:
+                return status
     if model.has_dry_friction:
         solver.step.has_consistent_modes = True
     if solver.step.is_hybrid:

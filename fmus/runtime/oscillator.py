@@ -80,6 +80,9 @@ class Oscillator(VariableOwner):
     def jacobian(self, t: float, y: StateVector, modes: ContactVector) -> Derivatives:
         """Return the derivatives of these rates by t and by the states, for implicit methods."""
 
+    def fastest_clock(self, t: float, y: StateVector, modes: ContactVector) -> float:
+        """Return the largest rate (1/s) at which clocks, states with constant rates, change functions, or 0."""
+
     def compute_outputs(self, t: float, y: StateVector, modes: ContactVector) -> bool:
         """Set the outputs; return whether all are finite."""
 

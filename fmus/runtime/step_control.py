@@ -7,7 +7,7 @@ integration method that meets the tolerance.  The step size is controlled as in 
 
 from math import inf
 
-from . import conditions, contact_lcp, event_location, phase_repetition, step_limits, stick_slip
+from . import conditions, contact_lcp, event_location, phase_repetition, step_limits, stick_slip, time_scale
 from .active_method import ActiveMethod
 from .codes import DIVERGED, EPSILON, EXACT, NEEDS_REPETITION, NO_CONSISTENT_MODES, OK, ROUNDOFF_MARGIN, STALLED, STUCK
 from .event_location import INTERPOLANT_SHARE, NEAR_ZERO_SHARE, EventLocation
@@ -35,13 +35,12 @@ from .vectors import (
 )
 
 OVERFLOW_LIMIT = 1e100  # larger states are treated as divergence: squares, as in an energy, would overflow
-MAX_TRIES = 200  # attempts for one step; each one halves the step size
+MAX_TRIES = 60  # attempts for one step; each one halves the step size
 MAX_REPEATED_STEPS = 1_000_000  # steps of a motion that is repeated
-START_SHARE = 1e-4  # of the largest step: the first step takes what a state moves in this time for its magnitude
 
 ROUGH_ERROR, ROUGH_CHANGE = 0.5, 10.0  # relative error and change of states in a proposal that is roughly right
 MAX_STALLED_STEPS = 100  # consecutive steps that hardly advance the time
-SHORTEST_STEP = 16.0 * EPSILON  # share of the largest step; the solver stalls at shorter ones
+SHORTEST_STEP = 16.0 * EPSILON  # share of the time since the start; the solver stalls at shorter ones
 # Rounding error of a rate, relative to the sum of its absolute terms, below which no step is rejected.  A product and a
 # sum round by half EPSILON each, as does each operand.  With 128 EPSILON, dop853 was allowed errors of 4e-10 in pacejka
 # at any tolerance below 1e-12.
@@ -51,7 +50,7 @@ TIE_FACTOR = 30.0  # tolerance for ties between stick and slip, relative to the 
 
 
 class StepCounters:
-    """Counters at the start of the step, and the scale floor there if a proposal was rejected since.
+    """Counters at the start of the step, and the scale floor there if a proposal or an estimate has raised it since.
 
     `h_next` is the step size to try there, `h_last` the size of the previous step, `n_stalled` the number of
     consecutive steps that hardly advanced the time, `t_event` the time of the last change of mode (or of the start).
@@ -62,6 +61,7 @@ class StepCounters:
     def __init__(self):
         self.n_accepted = self.n_rejected = self.n_rhs = self.n_events = self.n_stalled = 0
         self.error_scale_floor = 0.0
+        self.has_raised_floor = False
         self.h_next = self.h_last = self.t_event = 0.0
 
 
@@ -142,7 +142,7 @@ class InternalStep:
         self.n_accepted = self.n_rejected = self.n_rhs = counters.n_events = counters.n_stalled = 0
         self.h_next = counters.h_last = 0.0
         counters.t_event = 0.0
-        self.event_at_end = False
+        counters.has_raised_floor = self.event_at_end = False
         self.modes0 = STUCK
         if model.has_other_laws and not self.is_hybrid:
             self.y1 = y
@@ -164,8 +164,8 @@ class InternalStep:
         self.update_end_rates(model)
         if not (model.rests_when_stuck and self.is_hybrid and all_of(self.modes1 == STUCK)):
             if self.h_next == 0.0 and self.active_method.method_number != EXACT:
-                self.h_next = self.initial_step_size()
-                size = START_SHARE * self.h_max * magnitude(self.f1)
+                self.h_next, size = time_scale.initial_step(model, self, t, self.y1, self.f1, self.modes1)
+                self.save_scale_floor()
                 self.active_method.raise_scale_floor(model, size)
         self.t0 = t
         self.save_counters()
@@ -183,13 +183,19 @@ class InternalStep:
     def restore_counters(self):
         """Restore the counters at t0 and discard those of the step."""
         counters = self.start_counters
-        if self.n_rejected > counters.n_rejected:
-            self.active_method.error_scale_floor = counters.error_scale_floor
         self.n_accepted, self.n_rejected = counters.n_accepted, counters.n_rejected
         self.n_rhs, self.h_next = counters.n_rhs, counters.h_next
 
+    def save_scale_floor(self):
+        """Save the scale floor before an estimate raises it, to restore it after the step."""
+        if not self.start_counters.has_raised_floor:
+            self.start_counters.error_scale_floor = self.active_method.error_scale_floor
+            self.start_counters.has_raised_floor = True
+
     def compute_next(self, model):
         """Compute the internal step that starts at t1, repeating it where that is needed.  Returns a status."""
+        if model.has_dry_friction or model.has_conditions:
+            self.event_location.n_halvings = 0
         status = self.try_next(model)
         if (model.has_dry_friction or model.has_conditions) and status == NEEDS_REPETITION:
             status = self.repeat_steps(model)
@@ -225,11 +231,13 @@ class InternalStep:
         else:
             status = self.advance_with_method(model)
         self.n_accepted += 1
+        if counters.has_raised_floor and status != NEEDS_REPETITION:
+            counters.has_raised_floor, self.active_method.error_scale_floor = False, counters.error_scale_floor
         if model.has_other_laws and not self.is_hybrid and status == OK:
             self.update_law_modes(model)
         if model.has_conditions:
             conditions.select_sides(model, self.event_location, False)
-        if self.t1 - self.t0 > SHORTEST_STEP * self.h_max:
+        if self.t1 - self.t0 > SHORTEST_STEP * self.t0:
             counters.n_stalled = 0
         else:
             counters.n_stalled += 1
@@ -244,11 +252,13 @@ class InternalStep:
         for _ in range(MAX_REPEATED_STEPS):
             if location.must_shorten:
                 step_limits.shorten_step(self)
-            elif location.must_repeat:
-                phase_repetition.repeat_phase(self)
-                repeats = True
-            elif not repeats or self.t1 > t_reported:
-                break
+            else:
+                location.n_halvings = 0
+                if location.must_repeat:
+                    phase_repetition.repeat_phase(self)
+                    repeats = True
+                elif not repeats or self.t1 > t_reported:
+                    break
             status = self.try_next(model)
             if status != OK and status != NEEDS_REPETITION:
                 break
@@ -283,11 +293,6 @@ class InternalStep:
             for i in contact_indices:
                 self.modes1[i] = directions[i]
             self.restart_after_event(model)
-            for i in contact_indices:
-                if self.modes1[i] != STUCK:
-                    a = model.breakaway_acceleration(end, self.y1, self.modes1, i)
-                    # rounding, as in update_end_rates(): the slip would end at once, again and again
-                    self.f1[slip_index[i]] = a if self.modes1[i] * a > 0.0 else 0.0
         else:
             self.t1, self.f1 = self.t_end, 0.0
         return OK
@@ -345,13 +350,15 @@ class InternalStep:
         if model.has_other_laws and not self.is_hybrid:
             modes = STUCK * modes
         tolerance = self.tolerance
-        h_min = SHORTEST_STEP * self.h_max
+        h_min = SHORTEST_STEP * t
         roundoff = self.roundoff
         roundoff.t0 = roundoff.t1
         h_new = self.h_next if self.h_next < self.h_max else self.h_max
         if model.has_nominal_velocity and self.is_hybrid:
             y1 = y + h_new * f
             h_new *= step_limits.narrow_feature_share(model, self, h_new, y1, f)
+        if model.has_conditions or (model.is_coupled and any_of(modes == STUCK)):
+            h_new = step_limits.limit_by_clocks(model, self, h_new)
         if h_new < h_min:
             h_new = h_min
         remaining = self.t_end - t - roundoff.t0
@@ -385,7 +392,7 @@ class InternalStep:
                     break
             self.n_rejected += 1
             if attempts == 0:
-                self.start_counters.error_scale_floor = method.error_scale_floor
+                self.save_scale_floor()
             attempts += 1
             if error * tolerance < ROUGH_ERROR:
                 # The proposal shows how large states become that are zero so far, and whose error is always large
@@ -398,6 +405,7 @@ class InternalStep:
                 excess = change - ROUGH_CHANGE * h * most
                 d = rate1 / size2
                 if h * max_of(d) < ROUGH_CHANGE and max_of(excess) <= 0.0:
+                    method.error_scale_floor = self.start_counters.error_scale_floor
                     method.raise_scale_floor(model, size1)
                     scale = elementwise_max(method.error_scale_floor, scale)
             if h <= h_min or attempts == MAX_TRIES:
@@ -468,6 +476,9 @@ class InternalStep:
             if model.is_coupled and self.is_hybrid:
                 self.y1 = contact_lcp.stop_slips(model, self.t1, self.y1, modes)
                 self.f1 = complete_rates(self.y1, self.f1)
+            if model.has_conditions:
+                for j in range(model.n_switches):
+                    conditions.note_distance(self.event_location, j, self.event_location.end[model.first_condition + j])
             phase_repetition.end_phase_in_doubt(model, self)
         return OK
 
@@ -477,9 +488,9 @@ class InternalStep:
         Friction that varies within a small range of slip velocities, or a condition that changes, may lie between the
         stages of a long step, whose error estimate does not see it.  A step that ends at the event does.
         """
-        method = self.active_method
-        if h <= step_limits.SHORTEST_STEP * self.h_max:
+        if self.event_location.n_halvings == step_limits.MAX_HALVINGS:
             return True
+        method = self.active_method
         y_end = self.state_after(model, h)
         modes = self.modes0
         if model.has_other_laws and not self.is_hybrid:
@@ -498,6 +509,11 @@ class InternalStep:
 
     def end_at(self, model, h):
         """End the step at an event, h seconds after its start."""
+        if model.has_conditions:
+            y2 = self.state_after(model, 0.5 * h)
+            conditions.update_margins(model, self.event_location, self.t0 + 0.5 * h, y2, self.modes0)
+            for j in range(model.n_switches):
+                conditions.note_distance(self.event_location, j, self.event_location.margins[j])
         self.y1 = self.state_after(model, h)
         self.t1 = end = self.roundoff.event_time(self.t0, h)
         if model.has_slip_conditions:
@@ -505,9 +521,12 @@ class InternalStep:
                 self.y1 = contact_lcp.stop_slips(model, end, self.y1, self.modes0)
             slips = model.slip_velocities(end, self.y1)
         if model.has_conditions:
-            status = conditions.update_at_event(model, self.event_location, end, self.y1, self.modes0, self.h_max)
-            if status != OK:
-                return status
+            conditions.update_at_event(model, self.event_location, end, self.y1, self.modes0)
+            if conditions.have_changed(model, self.event_location):
+                is_brief = self.is_brief(model, end)
+                status = conditions.count_changes(self.event_location, end, is_brief)
+                if status != OK:
+                    return status
         if self.is_hybrid:
             location = self.event_location
             ends = contact_vector()
@@ -527,6 +546,18 @@ class InternalStep:
                     if ends[i] <= h:
                         self.y1[slip_index[i]] = 0.0
         return self.end_at_event(model)
+
+    def is_brief(self, model, t):
+        """Return whether conditions change at t without a motion away from their edge since the last change.
+
+        Rounding errors decide changes that follow each other faster than they are located in a step.
+        """
+        dwell = t - self.event_location.t_condition
+        stayed = conditions.stayed_at_edge(model, self.event_location, self.tolerance)
+        if stayed:
+            rate = time_scale.smooth_rate(model, self.t0, self.y0, self.f0, self.modes0)
+            stayed = dwell * rate < conditions.BRIEF_SHARE
+        return stayed or dwell <= conditions.RESOLUTION * self.h_full
 
     def end_at_event(self, model):
         """Resolve the event at t1: a slip velocity is zero, or a load has reached its limit."""
@@ -585,34 +616,16 @@ class InternalStep:
         if model.has_conditions:
             conditions.check_limits(model, self.event_location, self.t1, self.y1, self.modes1)
         self.update_end_rates(model)
+        if model.rests_when_stuck and self.is_stuck:
+            for i in contact_indices:
+                if self.modes1[i] != STUCK:
+                    a = model.breakaway_acceleration(self.t1, self.y1, self.modes1, i)
+                    # rounding, as in update_end_rates(): the slip would end at once, again and again
+                    self.f1[slip_index[i]] = a if self.modes1[i] * a > 0.0 else 0.0
         if self.h_next == 0.0 and self.active_method.method_number != EXACT:
-            self.h_next = self.initial_step_size()
+            self.h_next, _size = time_scale.initial_step(model, self, self.t1, self.y1, self.f1, self.modes1)
         if model.has_dry_friction or model.has_conditions:
             phase_repetition.begin_phase(model, self)
-
-    def initial_step_size(self):
-        """Estimate the first step h from the slopes at t1."""
-        size1 = error_size(self.y1)
-        size1 = elementwise_max(size1, self.active_method.error_scale_floor)
-        rate1 = magnitude(self.f1)
-        if self.active_method.floor_share > 0.0:
-            size2 = START_SHARE * self.h_max * rate1
-            size1 = elementwise_max(size1, size2)
-        relative_rate = rate1 / size1
-        rate = max_of(relative_rate)
-        h = self.active_method.safety * self.tolerance**self.active_method.power
-        return h / rate if h < rate * self.h_max else self.h_max
-
-    def time_scale(self):
-        """Return the time in which the motion changes by its own size: the step to try at a relative tolerance of 1.
-
-        It follows the motion.  The largest step limits it from above, and is used where no step was tried.
-        """
-        if self.h_next == 0.0:
-            return self.h_max
-        method = self.active_method
-        scale = self.h_next / (method.safety * self.tolerance**method.power)
-        return scale if scale < self.h_max else self.h_max
 
     def state_at(self, model, t) -> StateVector:
         """Interpolate the state at t inside the step."""

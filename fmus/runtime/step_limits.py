@@ -10,11 +10,12 @@ from . import contact_lcp
 from .codes import ROUNDOFF_MARGIN, STUCK
 from .event_location import update_event_functions
 from .interpolant import largest_of, smallest_of
+from .time_scale import time_scale
 from .vectors import RateVector, StateVector, contact_indices, contact_vector, select_kinematic, slip_index
 
 MAX_CUBIC_ERROR = 0.02  # share of the range of an event function by which it may differ from a cubic polynomial
-SHORTEST_STEP = 1e-6  # share of the largest step; shorter steps are not shortened for an event function
-DIFFERENCE_STEP, FIRST_CHANGE = 1e-5, 0.3  # share of the largest step for differences; change in the first step
+MAX_HALVINGS = 20  # of one step; an event function with a kink resembles no polynomial
+DIFFERENCE_STEP, FIRST_CHANGE = 1e-5, 0.3  # share of the time scale for differences; change in the first step
 # Narrow features, in widths: slips at which they limit a step; where a step from outside is to end, and may end
 FEATURE_RANGE, APPROACH, NEAREST_APPROACH = 5.0, 4.5, 3.5
 RESOLVED_SHARE = 0.5  # of a step, in which a slip that begins and ends is resolved
@@ -32,7 +33,7 @@ def limit_step(model, step):
     if model.is_coupled and largest > MAX_CUBIC_ERROR:
         ignore_rounding_errors(model, step)
         largest = largest_cubic_error(model, location)
-    if largest > MAX_CUBIC_ERROR and step.h_full > SHORTEST_STEP * step.h_max:
+    if largest > MAX_CUBIC_ERROR and location.n_halvings < MAX_HALVINGS:
         location.must_shorten = True
     elif largest > 0.0:
         h = 0.8 * step.h_full * sqrt(sqrt(MAX_CUBIC_ERROR / largest))  # the error grows with h^4
@@ -71,9 +72,9 @@ def is_slip_unresolved(model, step, end):
 
     The error control of the step does not see such a slip, so that the interpolant is no motion of the body.
     """
-    if end >= RESOLVED_SHARE * step.h_full or step.h_full <= SHORTEST_STEP * step.h_max:
-        return False
     location = step.event_location
+    if end >= RESOLVED_SHARE * step.h_full or location.n_halvings == MAX_HALVINGS:
+        return False
     t = step.t0 + 0.5 * end
     y2 = step.state_after(model, 0.5 * end)
     slips = model.slip_velocities(t, y2)
@@ -86,17 +87,32 @@ def is_slip_unresolved(model, step, end):
     return is_unresolved
 
 
+def limit_by_clocks(model, step, h):
+    """Limit a step so that no clock moves the argument of a function by more than its event functions resolve.
+
+    An event function at rest varies by clocks alone.  A longer step may pass a short dip of a periodic function.
+    """
+    rate = model.fastest_clock(step.t0, step.y0, step.modes0)
+    return 1.0 / rate if h * rate > 1.0 else h
+
+
 def limit_first_step(model, step):
     """Limit the first step after an event, so that no load or condition changes by more than a share of its scale.
 
     The slopes of the states do not show how fast a load changes that follows a clock.
     """
+    if step.h_next == 0.0:
+        return  # there is no first step
     location = step.event_location
-    delta = DIFFERENCE_STEP * step.h_max
+    delta = DIFFERENCE_STEP * time_scale(model, step, step.t1, step.y1, step.modes1)
     update_event_functions(model, location, step.t1, step.y1, step.modes1)
     for j in range(model.n_event_functions):
         location.start[j] = location.values[j]
         location.peaks[j] = location.scales[j]
+    y4 = step.y1 + step.h_next * step.f1
+    update_event_functions(model, location, step.t1 + step.h_next, y4, step.modes1)
+    for j in range(model.n_event_functions):  # a function that starts at zero is as large as it becomes in the step
+        location.peaks[j] = location.scales[j] if location.scales[j] > location.peaks[j] else location.peaks[j]
     y2 = step.y1 + delta * step.f1
     update_event_functions(model, location, step.t1 + delta, y2, step.modes1)
     for j in range(model.n_event_functions):
@@ -115,14 +131,13 @@ def limit_first_step(model, step):
             largest = rate if rate > largest else largest
     if largest > 0.0:
         h = FIRST_CHANGE / largest
-        least = SHORTEST_STEP * step.h_max
-        h = h if h > least else least
         step.h_next = h if h < step.h_next else step.h_next
 
 
 def shorten_step(step):
     """Go back to the start of the step, to try half of it."""
     step.event_location.must_shorten = False
+    step.event_location.n_halvings += 1
     step.h_next = 0.5 * step.h_full
     step.t1, step.roundoff.t1 = step.t0, step.roundoff.t0
     step.y1, step.f1, step.modes1 = step.y0, step.f0, step.modes0

@@ -127,6 +127,14 @@ def inlined(function):
     return function
 
 
+def multiply(J, a: StateVector) -> StateVector:
+    """Multiply a vector by the derivatives of all rates; each row sums its terms in order."""
+    entries, result = matrix_entries(J), kinematic_rates(a)
+    for i in computed_states():
+        result[i] = sum(entries[i, j] * a[j] for j in state_indices)
+    return result
+
+
 def factorize(g, h, J):
     """Factorize 1 - g h J."""
     w = linear_solver.Entries()

@@ -9,14 +9,13 @@ from models import LARGER_MODELS, model_class, runtime
 from fmus.packaging.lowering import lowered_model, sibling_module
 
 
-def test_a_step_of_the_smallest_size_that_fails_is_not_tried_again():
+def test_a_first_step_that_fails_is_shortened_no_more_than_max_tries():
     model = model_class("smd")()
     solver = prepared_run(model, {"solver.method": 2}).solver
     solver.start(model, 1.0, 0.1, 0.0, 5.0, 1e-6)
     model.k = nan
     assert solver.step.compute_next(model) == runtime("smd", "codes").DIVERGED
-    halvings = 60  # of h_max, until it has the size of rounding errors
-    assert 0 < solver.step.n_rejected < halvings < runtime("smd", "step_control").MAX_TRIES
+    assert 0 < solver.step.n_rejected <= runtime("smd", "step_control").MAX_TRIES
 
 
 def test_pivots_that_do_not_end_change_one_contact_at_a_time(monkeypatch):

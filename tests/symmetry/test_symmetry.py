@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from symmetry_models import KINDS, LABELS, examine, open_model
 
 from benchmarks.symmetry.builds import FMI3, NATIVE
-from benchmarks.symmetry.changes import FRAME, LARGEST_STEP, LONG, MIRROR, REVOLUTIONS, TIME, UNITS
+from benchmarks.symmetry.changes import FRAME, LONG, MIRROR, REVOLUTIONS, TIME, UNITS
 from benchmarks.symmetry.command import describe
 from benchmarks.symmetry.study import Options, list_choices
 
@@ -36,8 +36,6 @@ HAVE_NONE = {  # no mirror image: a constant of one sign, or a number as start v
     MIRROR: ("bumper", "clutch", "forced", "joint", "lift", "viscous_pendulum"),
     FRAME: ("spring",),
 }
-# from rest in a very long run: the first magnitude of the integral of the controller is too large (accuracy.md)
-NEED_A_LARGEST_STEP = ("servo",)
 
 
 @pytest.mark.parametrize("label", FEW_MODELS)
@@ -48,9 +46,8 @@ def test_a_motion_depends_on_no_time_unit_sign_order_or_frame(label):
 
 
 def check_all_changes(label, **options):
-    kinds = [kind for kind in KINDS if kind != LARGEST_STEP or label not in NEED_A_LARGEST_STEP]
-    examined, differences = examine(label, kinds=kinds, **options)
-    expected = {kind for kind in kinds if label not in HAVE_NONE.get(kind, ())}
+    examined, differences = examine(label, **options)
+    expected = {kind for kind in KINDS if label not in HAVE_NONE.get(kind, ())}
     assert {*examined} == (expected if label in HAVE_ANGLES else expected - {REVOLUTIONS})
     assert not differences
 

@@ -1,6 +1,6 @@
 """Generates the methods for integrators: rates, Jacobian, coefficients of the linear closed form."""
 
-from .algebra import build_term, depends_on, rounding_scales, substitute
+from .algebra import build_term, depends_on, is_same_expression, operands_first, rounding_scales, substitute
 from .codegen_context import CodegenContext, emit_return, emit_scales, method_source
 from .coupled_contact_methods import (
     derivative_unknown,
@@ -10,7 +10,7 @@ from .coupled_contact_methods import (
     slips_of_laws,
 )
 from .expression_printer import ExpressionPrinter
-from .expressions import Expression, Operand, Term
+from .expressions import FUNCTIONS, Expression, Operand, Term
 from .model_declaration import THRESHOLD, Contact
 from .single_contact_methods import threshold_call
 
@@ -25,6 +25,7 @@ def rate_methods(context: CodegenContext) -> list[str]:
         rates_method(context),
         rates_method(context, of_terms=True),
         jacobian_method(context),
+        fastest_clock_method(context),
         *closed_form_methods(context),
     ]
 
@@ -131,6 +132,42 @@ def clipped_force_derivative(context: CodegenContext, c: Contact, by: dict[Expre
     return build_term(
         "*", Term("copysign", 1.0, clipped_force), context.analysis.derivative(context.analysis.holding_limit[c], by)
     )
+
+
+def fastest_clock_method(context: CodegenContext) -> str:
+    """Largest rate at which clocks change functions; a clock is a state with a constant rate.
+
+    Its reciprocal is the time in which the argument of sin or cos changes by 2, a divisor by half of its size, and the
+    argument u of another function, such as exp, by (1 + |u|)/2: where u is large, the function is nearly constant.
+    """
+    analysis, printer = context.analysis, context.printer()
+    varying = (*analysis.time_varying, *analysis.input_symbols, *analysis.contacts)
+    clocks = analysis.explicit_time_derivatives | {
+        s: analysis.rate[s] for s in analysis.states if not depends_on(analysis.rate[s], varying)
+    }
+    roots: list[Operand] = [rate.expression for rate in context.rate_outputs]
+    for c in analysis.contacts:
+        roots += [c.slip, c.slide, analysis.holding_limit[c], *analysis.load_expressions(c)]
+    roots += [condition.margin for condition in analysis.conditions]
+    terms: list[Operand] = []
+    for e in operands_first(*roots):
+        if isinstance(e, Term) and (e.op == "/" or (e.op in FUNCTIONS and e.op not in ("fabs", "sqrt"))):
+            argument = e.args[-1]
+            slope = analysis.derivative(argument, clocks)
+            if not is_same_expression(slope, 0.0):
+                size = Term("fabs", argument)
+                change = {"sin": 4.0, "cos": 4.0, "tan": 4.0, "/": size}.get(e.op, build_term("+", 1.0, size))
+                terms.append(build_term("/", build_term("*", 2.0, Term("fabs", slope)), change))
+    context.emit_driver(printer, terms)
+    printer.count_uses(*terms)
+    rates = list(dict.fromkeys(map(printer.text, terms))) or ["0.0"]
+    largest, rate = printer.fresh_name("largest"), printer.fresh_name("rate")
+    printer.emit(f"{largest} = {rates[0]}")
+    for text in rates[1:]:
+        printer.emit(f"{rate} = {text}")
+        printer.emit(f"{largest} = {rate} if {rate} > {largest} else {largest}")
+    printer.emit(f"return {largest}")
+    return method_source("fastest_clock", context.arguments, printer.lines)
 
 
 def closed_form_methods(context: CodegenContext) -> list[str]:

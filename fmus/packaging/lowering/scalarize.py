@@ -302,6 +302,11 @@ class Scalarizer(ConstantFolder):
                 self.systems[s] = LoweredSystem(s, self.spec, arguments, name == "factorize_complex")
                 return self.systems[s].factorize()
             case ast.Assign(
+                targets=[ast.Name() as target],
+                value=ast.Call(func=ast.Name(id="multiply"), args=[ast.Name(id=J), vector]),
+            ) if J in self.jacobians:
+                return self.lower_product(target, J, vector)
+            case ast.Assign(
                 targets=[target],
                 value=ast.Call(func=ast.Name(id="solve_factored" | "solve_complex"), args=[ast.Name(id=s), *right]),
             ):
@@ -378,7 +383,7 @@ class Scalarizer(ConstantFolder):
         for target, value, kind in zip(left, right, kinds, strict=True):
             for i in self.own_indices(target, kind) if kind else [-1]:
                 number = self.component(value, i) if kind else self.visit(value)
-                if isinstance(target, ast.Name) and kind and isinstance(number, ast.Constant) and number.value == 0.0:
+                if isinstance(target, ast.Name) and kind and is_zero(number):
                     self.known_zeros.add(self.spec.component_name(target.id, kind, i))
                 else:
                     pairs.append((self.component(target, i) if kind else self.visit(target), number))
@@ -436,6 +441,27 @@ class Scalarizer(ConstantFolder):
             names += [named[i], *("_" if at in self.spec.zeros else self.spec.entry_name(J, *at) for at in entries)]
         return [ast.Assign([tuple_or_single([ast.Name(name) for name in names])], self.visit(call))]
 
+    def lower_product(self, target: ast.Name, J: str, vector: ast.expr) -> list[ast.stmt]:
+        """Rewrite a = multiply(J, b): the sum over a row, or the rate of a state whose rate is a state."""
+        self.record_kinds([target], [STATES])
+        statements: list[ast.stmt] = []
+        for i in self.all_indices(STATES):
+            name = self.spec.component_name(target.id, STATES, i)
+            if i in self.spec.kinematic_states:
+                terms = [self.component(vector, self.spec.rate_place(i))]
+            else:
+                terms = [
+                    fold_zero(ast.Name(self.spec.entry_name(J, i, j)), ast.Mult(), self.component(vector, j))
+                    for j in self.all_indices(STATES)
+                    if (i, j) not in self.spec.zeros
+                ]
+            terms = [term for term in terms if not is_zero(term)]
+            if terms:
+                statements.append(ast.Assign([ast.Name(name)], parse_expression(" + ".join(map(ast.unparse, terms)))))
+            else:
+                self.known_zeros.add(name)
+        return statements
+
     def has_name_clash(self) -> bool:
         """Return whether a scalar has the name of a component in some model."""
         prefixes = tuple(f"{name}_" for name in (*self.vector_kinds, *self.jacobians, *self.systems))
@@ -464,9 +490,14 @@ def dotted_name(node: ast.expr) -> str:
     return node.id if isinstance(node, ast.Name) else ast.unparse(node)
 
 
+def is_zero(node: ast.expr) -> bool:
+    """Return whether an expression is the number 0.0."""
+    return isinstance(node, ast.Constant) and node.value == 0.0
+
+
 def fold_zero(left: ast.expr, op: ast.operator, right: ast.expr) -> ast.expr:
     """Return left op right, simplified where an operand is zero."""
-    zero = [isinstance(operand, ast.Constant) and operand.value == 0.0 for operand in (left, right)]
+    zero = [is_zero(left), is_zero(right)]
     if isinstance(op, ast.Mult) and any(zero):
         return ast.Constant(0.0)
     return left if isinstance(op, (ast.Add, ast.Sub)) and zero[1] else ast.BinOp(left, op, right)
