@@ -314,7 +314,8 @@ def test_events_of_several_contacts_are_matched_per_contact_and_named():
     two = signals("two", t, {"x": t}, {"x": "m"}, mode_changes(swapped, names))
     comparison = compare(one, two)
     assert comparison.events == (
-        "2 changes of mode in both, at most 0.75 s apart; only in one: F_lower to 0 at t = 3 s"
+        "2 changes of mode in both, at most 0.75 s apart; only in one: F_lower to 0 at t = 3 s; "
+        "the first that differs is F_lower to 1 at t = 1 s in one and 1.75 s in two"
     )
     assert comparison["only_one"] == [[3.0, 0.0, "F_lower"]]
 
@@ -534,3 +535,30 @@ def test_differences_near_overflow_have_a_relative_value():
     one, two = ({"x": np.full(20, value)} for value in (1e308, -1e308))
     comparison = compare(signals("one", t, one, {"x": "m"}), signals("two", t, two, {"x": "m"}))
     assert comparison.worst == 2.0
+
+
+def test_a_comparison_first_says_what_differs_in_the_events():
+    """Changes of mode; slips, which need no modes; the sticks of one side, if there is no driver."""
+    t = np.linspace(0.0, 4.0, 4001)
+    units = {"v": "m/s", "x_driver": "m"}
+
+    def pulled(name, shift, events=None, driver=True):
+        columns = {"v": 0.1 - 0.2 * np.cos(np.pi * (t - shift))} | ({"x_driver": 0.1 * t} if driver else {})
+        return Signals(t, columns, units, events=events, label=name)
+
+    def modes(*times):
+        return ModeChanges(np.array([0.0, *times]), {"F": np.arange(len(times) + 1) % 2})
+
+    both = compare(pulled("one", 0.0, modes(1.0, 2.0)), pulled("two", 0.0, modes(1.0, 2.5)))
+    assert both.events == (
+        "2 changes of mode in both, at most 0.5 s apart; "
+        "the first that differs is to 0 at t = 2 s in one and 2.5 s in two"
+    )
+    slips = compare(pulled("one", 0.0, modes(1.0, 2.0)), pulled("two", 0.125))
+    assert slips.events == (
+        "4 starts and ends of slips, at the speed of the driver, in both, at most 0.125 s apart; "
+        "the first that differs is the start at t = 0.5 s in one and 0.625 s in two"
+    )
+    sticks = compare(pulled("one", 0.0, modes(1.0, 2.0)), pulled("two", 0.125, driver=False))
+    assert sticks.events == "one sticks from t = 0 to 1 s, from t = 2 to 4 s; two has no modes"
+    assert slips.pairs is sticks.pairs is sticks.slips is None

@@ -6,15 +6,17 @@ from math import isnan
 
 import numpy as np
 
+from ...analyses.slip import upward_crossings
 from ...arguments import NONNEGATIVE, check_arguments
 from ...errors import HarnessError
 from ...records.units import conversion_factor
-from ...simulation.signals import Signals
+from ...simulation.signals import Signals, column_of_role
 from ...simulation.trajectory import Trajectory
-from .event_pairs import EventPairs, match_events, stack_events
+from .event_pairs import END, MAX_LISTED, START, EventPairs, match_events, stack_events
 from .interpolation import SignalInterpolant, ValueBounds
 from .trajectory_sources import common_span
 
+DRIVER = "x_driver"  # output: position of the driver that pulls a body at a constant speed
 MIN_COMMON = 0.5  # fraction of common times from which no interpolation is needed
 TIME_TOLERANCE = 1e-9  # times closer than this fraction of the time span are equal
 
@@ -69,7 +71,9 @@ class Comparison:
     left_out : tuple of str
         Remarks on variables that are skipped, converted or only on one side.
     pairs : EventPairs or None
-        Matched events; None if a side has none.
+        Matched changes of mode; None if a side has none.
+    slips : EventPairs or None
+        Without these, matched starts and ends of slips against a driver; None if a side has no driver.
     """
 
     one: Trajectory | Signals
@@ -79,6 +83,7 @@ class Comparison:
     differences: tuple[Difference, ...]
     left_out: tuple[str, ...]
     pairs: EventPairs | None
+    slips: EventPairs | None = None
 
     @property
     def worst(self) -> float:
@@ -97,13 +102,17 @@ class Comparison:
         nonfinite = [variable.name for variable in self.differences if isnan(variable.largest)]
         messages += [f"{name} has values that are not finite" for name in nonfinite]
         if self.pairs and isnan(self.pairs.shift):
-            messages.append(f"their events do not match: {self.events}")
+            messages.append(f"their events do not match: {self.pairs.summary((self.one.name, self.two.name))}")
         return messages
 
     @property
     def events(self) -> str:
-        """Return a summary of the events; empty if they are unknown."""
-        return self.pairs.summary((self.one.name, self.two.name)) if self.pairs else ""
+        """Return what differs in the events: changes of mode, slips, or sticks of one side; empty if none is known."""
+        names = self.one.name, self.two.name
+        if pairs := self.pairs or self.slips:
+            return "; ".join(filter(None, (pairs.summary(names), pairs.describe_first_difference(names))))
+        sides = ((self.one, self.two), (self.two, self.one))
+        return next((describe_sticks(side, other) for side, other in sides if side.events and not other.events), "")
 
 
 def compare(one: Signals, two: Signals) -> Comparison:
@@ -140,7 +149,41 @@ def compare(one: Signals, two: Signals) -> Comparison:
     for side, other in ((one, two), (two, one)):
         unmatched = [name for name in side.columns if name not in other.columns]
         left_out += [f"only in {side.name}: {', '.join(unmatched)}"] if unmatched else []
-    return Comparison(one, two, time, interpolated, tuple(differences), tuple(left_out), pairs)
+    slips = None if pairs else pair_slips(one, two, begin, end)
+    return Comparison(one, two, time, interpolated, tuple(differences), tuple(left_out), pairs, slips)
+
+
+def pair_slips(one: Signals, two: Signals, begin: float, end: float) -> EventPairs | None:
+    """Match the starts and ends of slips between two times in s; None if a side has no moving driver or no speed.
+
+    A slip lasts while the body is faster than its driver, which needs no modes.
+    """
+    stacked: list[np.ndarray] = []
+    for side in (one, two):
+        if not {DRIVER, side.motion_outputs.get("velocity", "")} <= {*side.columns}:
+            return None
+        position = side.columns[DRIVER]
+        driver = float(position[-1] - position[0]) / float(side.time[-1] - side.time[0])
+        if not driver:
+            return None
+        relative_speed = column_of_role(side, "velocity") * np.sign(driver) - abs(driver)
+        starts, ends = (upward_crossings(side.time, sign * relative_speed) for sign in (1.0, -1.0))
+        rows = [[t, state, 0.0] for times, state in ((starts, START), (ends, END)) for t in times if begin <= t <= end]
+        stacked.append(np.array(sorted(rows)).reshape(-1, 3))
+    left, right = stacked
+    return match_events(left, right, has_slips=True)
+
+
+def describe_sticks(side: Signals, other: Signals) -> str:
+    """Return when the contacts of a side stick, where the law of the other one has no modes."""
+    rests = [(name, *rest) for name, intervals in side.sticking.items() for rest in intervals]
+    listed = [
+        f"{f'{name} ' if len(side.sticking) > 1 else ''}from t = {begin:.6g} to {end:.6g} s"
+        for name, begin, end in rests[:MAX_LISTED]
+    ]
+    more = [f"{len(rests) - MAX_LISTED} more"] * (len(rests) > MAX_LISTED)
+    text = f"{side.name} sticks {', '.join(listed + more)}" if rests else f"{side.name} never sticks"
+    return f"{text}; {other.name} has no modes"
 
 
 def compare_units(one: Signals, two: Signals, name: str) -> tuple[str | None, float, str]:

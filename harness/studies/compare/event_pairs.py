@@ -8,11 +8,13 @@ import numpy as np
 from ...simulation.signals import ModeChanges
 
 MAX_LISTED = 3  # unmatched events listed in the summary
+SAME_TIME = 1e-9  # of the time of an event: a smaller difference is not stated
+START, END = 1.0, 0.0  # of a slip, in place of a mode
 
 
 @dataclass(frozen=True)
 class EventPairs:
-    """Matched changes of mode.
+    """Matched changes of mode, or starts and ends of slips.
 
     Attributes
     ----------
@@ -22,12 +24,15 @@ class EventPairs:
         The other events (m, 3) of each side.
     contacts : tuple of str
         Names of the contacts by number; empty for a single contact.
+    has_slips : bool
+        Whether the events are starts and ends of slips, with START or END in place of a mode.
     """
 
     one: np.ndarray
     two: np.ndarray
     unmatched: tuple[np.ndarray, np.ndarray]
     contacts: tuple[str, ...] = ()
+    has_slips: bool = False
 
     @property
     def shift(self) -> float:
@@ -51,7 +56,13 @@ class EventPairs:
 
     def summary(self, names: tuple[str, str]) -> str:
         """Return a summary of matched and unmatched events."""
-        count = f"{len(self.one)} change{'s' * (len(self.one) != 1)} of mode in both"
+        plural = "s" * (len(self.one) != 1)
+        events = (
+            f"start{plural} and end{plural} of slips, at the speed of the driver,"
+            if self.has_slips
+            else f"change{plural} of mode"
+        )
+        count = f"{len(self.one)} {events} in both"
         parts = [f"{count}, at most {self.largest_shift:.3g} s apart" if len(self.one) else count]
         for name, rows in zip(names, self.unmatched, strict=True):
             listed = [f"{self.state(mode, contact)} at t = {t:.6g} s" for t, mode, contact in rows[:MAX_LISTED]]
@@ -59,8 +70,21 @@ class EventPairs:
             parts += [f"only in {name}: {', '.join(listed + more)}"] if listed else []
         return "; ".join(parts)
 
+    def describe_first_difference(self, names: tuple[str, str]) -> str:
+        """Return the first matched event whose times differ; empty if there is none."""
+        different = np.flatnonzero(np.abs(self.one[:, 0] - self.two[:, 0]) > SAME_TIME * np.abs(self.one[:, 0]))
+        if not len(different):
+            return ""
+        (t, mode, contact), (other, *_) = self.one[different[0]], self.two[different[0]]
+        return (
+            f"the first that differs is {self.state(mode, contact)} at t = {t:.6g} s in {names[0]} and "
+            f"{other:.6g} s in {names[1]}"
+        )
+
     def state(self, mode: float, contact: float) -> str:
-        """Return the mode after an event, with the name of the contact if there are several."""
+        """Return the mode after an event, with the name of the contact if there are several, or the part of a slip."""
+        if self.has_slips:
+            return "the start" if mode == START else "the end"
         return f"{self.contacts[int(contact)]} to {mode:g}" if self.contacts else f"to {mode:g}"
 
     def list_rows(self, rows: np.ndarray) -> list[list[float | str]]:
@@ -80,7 +104,7 @@ def stack_events(changes: ModeChanges, contacts: Sequence[str], begin: float, en
     return rows[np.argsort(rows[:, 0], kind="stable")]
 
 
-def match_events(one: np.ndarray, two: np.ndarray, contacts: Sequence[str] = ()) -> EventPairs:
+def match_events(one: np.ndarray, two: np.ndarray, contacts: Sequence[str] = (), has_slips: bool = False) -> EventPairs:
     """Match the events of two trajectories, (n, 3) and (m, 3), sorted by time.
 
     If both sequences of modes are equal, events are matched in order. Otherwise mutual nearest neighbours of the same
@@ -88,7 +112,7 @@ def match_events(one: np.ndarray, two: np.ndarray, contacts: Sequence[str] = ())
     """
     names = tuple(contacts)
     if len(one) == len(two) and (one[:, 1:] == two[:, 1:]).all():
-        return EventPairs(one, two, (one[:0], two[:0]), names)
+        return EventPairs(one, two, (one[:0], two[:0]), names, has_slips)
     matches: list[tuple[int, int]] = []
     for kind in np.unique(one[:, 1:], axis=0):
         i, j = (np.flatnonzero((rows[:, 1:] == kind).all(axis=1)) for rows in (one, two))
@@ -98,7 +122,8 @@ def match_events(one: np.ndarray, two: np.ndarray, contacts: Sequence[str] = ())
         mutual = np.flatnonzero(in_one[in_two] == np.arange(len(i)))
         matches += zip(i[mutual].tolist(), j[in_two[mutual]].tolist(), strict=True)
     left, right = np.array(sorted(matches), int).reshape(-1, 2).T
-    return EventPairs(one[left], two[right], (np.delete(one, left, axis=0), np.delete(two, right, axis=0)), names)
+    others = np.delete(one, left, axis=0), np.delete(two, right, axis=0)
+    return EventPairs(one[left], two[right], others, names, has_slips)
 
 
 def find_nearest(times: np.ndarray, candidates: np.ndarray) -> np.ndarray:

@@ -40,7 +40,7 @@ class ComparisonResult(Result, Comparison):
         return f"{names}; worst relative difference {self.worst:.3g}"
 
     def summary(self) -> Summary:
-        sentences = filter(None, (self.one.accuracy, self.two.accuracy, self.events))
+        sentences = filter(None, (self.events, self.one.accuracy, self.two.accuracy))
         picture = f"{self.title}, and their difference"
         return Summary("compare", self.title, tuple(sentences), read_cells(self.table()), picture)
 
@@ -60,13 +60,13 @@ class ComparisonResult(Result, Comparison):
         grid = "those of the coarser side; the other one is interpolated" if self.interpolated else "common to both"
         nonfinite = [variable for variable in self.differences if isnan(variable.largest)]
         return [
+            *([self.events, ""] if self.events else []),
             self.table(),
             "",
             *(f"{side.name}: {side.accuracy}" for side in (self.one, self.two) if side.accuracy),
             f"Compared at {len(self.time)} times ({grid}).",
             *(f"{variable.name} is not a finite number at t = {variable.at:g} s" for variable in nonfinite),
             *self.left_out,
-            *filter(None, [self.events]),
         ]
 
     def rows(self) -> tuple[list[Mapping[str, Any]], str]:
@@ -90,7 +90,7 @@ class ComparisonResult(Result, Comparison):
         """
         pairs = self.pairs
         if pairs is None:
-            return {"events": "", "event_shift": None}
+            return {"events": self.events, "event_shift": None}
         return {
             "events": self.events,
             "event_shift": pairs.shift,
