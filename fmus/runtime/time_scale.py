@@ -82,11 +82,14 @@ def rate_of_rate(f1, f2, f3, f4):
 
 
 def slower_change(f1, f2, f3, f4):
-    """Return the lower of the relative changes of the first and the second derivative, which may be rounding errors."""
+    """Return the lowest of the relative changes of the derivatives, of which the first ones may be rounding errors."""
     change = larger_of(fabs(f2 / f1), sqrt(fabs(f3 / f1))) if f1 != 0.0 else inf
     if f2 != 0.0:
         later_change = larger_of(fabs(f3 / f2), sqrt(fabs(f4 / f2)))
         change = later_change if later_change < change else change
+    if f1 == 0.0 and f3 != 0.0:  # of a position at rest; that of its speed counts as well
+        latest_change = fabs(f4 / f3)
+        change = latest_change if latest_change < change else change
     return change
 
 

@@ -44,5 +44,5 @@ def test_a_dense_record_gives_the_law_and_says_how_it_was_thinned(step):
 
 def test_a_dense_record_without_oscillation_is_refused():
     t = np.linspace(0.0, 1.0, 20_000)
-    with pytest.raises(HarnessError, match="turning points"):
+    with pytest.raises(HarnessError, match="has 1 turning point above the noise"):
         identify(Signal(t, t))
