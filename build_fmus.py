@@ -30,11 +30,11 @@ from hashlib import sha256
 
 import click
 
-from fmus.packaging import BuildError, __version__
+from fmus.compiler import BuildError, __version__
+from fmus.compiler.equations.model_file import ModelFile
+from fmus.compiler.lowering import LAWS, METHODS
+from fmus.compiler.model_lookup import find_model, model_names, more_model_names
 from fmus.packaging.archive import build, measure_import_time
-from fmus.packaging.equations.model_file import ModelFile
-from fmus.packaging.lowering import LAWS, METHODS
-from fmus.packaging.model_lookup import find_model, model_names, more_model_names
 from harness.process.temporary_directory import temporary_directory
 
 LOG = logging.getLogger("fmus.build")
@@ -219,14 +219,14 @@ def build_native(
     real_only: bool,
 ) -> Path:
     """Build the native FMU; the import is in the function because it needs optional packages."""
-    from fmus.packaging.native import build
+    from fmus.packaging.native.native_fmu import build
 
     return build(model, folder, methods, laws, platforms, fmi, real_only)
 
 
 def release_archive(folder: Path) -> Path:
     """Build the release archive."""
-    from fmus.packaging.release import build_release
+    from fmus.page.release import build_release
 
     try:
         with show_progress("building everything") as status:
@@ -239,7 +239,7 @@ def build_page(
     models: list[ModelFile], folder: Path, methods: tuple[str, ...], laws: tuple[str, ...], more: bool
 ) -> Path:
     """Build the web page that runs the models; the page of fmus/more has a file name of its own."""
-    from fmus.packaging.web import FILE, MORE_FILE, build
+    from fmus.page import FILE, MORE_FILE, build
 
     try:
         return build(models, folder, methods, laws, MORE_FILE if more else FILE)

@@ -145,7 +145,7 @@ def enumerations(fmus: Path) -> str:
 
 def declaration_options() -> str:
     """Return the table of the options of declarations in model files."""
-    from fmus.packaging.equations.declaration_options import OPTIONS
+    from fmus.compiler.equations.declaration_options import OPTIONS
 
     rows = [
         (f"`{name}`", {float: "a number", str: "a string"}[option.type], option.text)

@@ -9,7 +9,7 @@ from math import pi
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from .packaging.equations.expressions import (
+    from .compiler.equations.expressions import (
         acos,
         asin,
         atan,
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
         tan,
         tanh,
     )
-    from .packaging.equations.model_declaration import (
+    from .compiler.equations.model_declaration import (
         HYBRID,
         SIGN,
         THRESHOLD,
@@ -40,7 +40,7 @@ if TYPE_CHECKING:
         Rule,
         State,
     )
-    from .packaging.equations.tables import Table
+    from .compiler.equations.tables import Table
 
 __all__ = [
     "HYBRID",
@@ -78,7 +78,7 @@ __all__ = [
 def __getattr__(name: str) -> Any:
     """Import a name at its first use, so that `import fmus.runtime` loads nothing else."""
     for module in ("expressions", "model_declaration", "tables") if name in __all__ else ():
-        names = vars(import_module(f".packaging.equations.{module}", __name__))
+        names = vars(import_module(f".compiler.equations.{module}", __name__))
         if name in names:
             return names[name]
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

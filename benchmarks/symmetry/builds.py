@@ -5,9 +5,9 @@ from functools import cache
 from hashlib import sha256
 from pathlib import Path
 
-from fmus.packaging import BuildError
+from fmus.compiler import BuildError
+from fmus.compiler.model_lookup import MORE, find_model, model_names, more_model_names
 from fmus.packaging import __file__ as packaging_file
-from fmus.packaging.model_lookup import MORE, find_model, model_names, more_model_names
 from harness.errors import HarnessError
 
 ROOT = Path(__file__).parents[2]
@@ -67,7 +67,7 @@ def build_fmu(folder: Path, source: Path, backend: str) -> Path:
 
             build_python(source, out, (), (), (PLATFORM,))
         else:
-            from fmus.packaging.native import build as build_native  # needs optional packages
+            from fmus.packaging.native.native_fmu import build as build_native  # needs optional packages
 
             build_native(source, out, (), (), (PLATFORM,), "3" if backend == FMI3 else "2")
     return fmu

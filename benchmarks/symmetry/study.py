@@ -9,7 +9,7 @@ from math import floor
 from pathlib import Path
 from typing import Any
 
-from fmus.packaging import BuildError
+from fmus.compiler import BuildError
 from harness.errors import HarnessError
 from harness.process.temporary_directory import temporary_directory
 from harness.simulation.fmu_instance import capture_stderr

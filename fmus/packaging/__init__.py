@@ -1,9 +1,1 @@
-"""Build-time package: turns a declared model into an FMU file."""
-
-# The only definition of the version; pyproject.toml and every model description read it.
-__version__ = "0.2.0"
-__date__ = "2026-11-22"  # of this version; FMUs that are built without SOURCE_DATE_EPOCH carry it
-
-
-class BuildError(Exception):
-    """Raised when an FMU cannot be built; the message is one sentence for the user."""
+"""Writes FMU files: model description, documentation, archive, and the FMI functions in C."""

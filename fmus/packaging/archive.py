@@ -25,13 +25,13 @@ from stat import S_IFREG
 from tempfile import TemporaryDirectory
 from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
 
-from . import BuildError, __date__
+from ..compiler import BuildError, __date__
+from ..compiler.embedded_modules import digest, embedded_files, installed_package
+from ..compiler.lowering import lowered_files, lowered_model, select_features
+from ..compiler.model_lookup import find_model
 from .documentation_page import extra_files
-from .embedded_modules import digest, embedded_files, installed_package
 from .fmi_variables import declared_variables
-from .lowering import lowered_files, lowered_model, select_features
 from .model_description import describe
-from .model_lookup import find_model
 
 HOST_REQUIREMENTS = """\
 CPython 3.9 or newer, 64 bit, with its standard library; no other packages.

@@ -14,9 +14,9 @@ from pathlib import Path
 from typing import Any
 from xml.etree.ElementTree import Element, SubElement
 
-from . import BuildError
+from ..compiler import BuildError
+from ..compiler.text_output import xml_bytes
 from .fmi_variables import Variables, friction_laws, integrated_states
-from .text_output import xml_bytes
 
 RESULT_FOLDER = "extra/org.fmi-standard.fmi-ls-ref"
 NAMESPACE = "http://fmi-standard.org/fmi-ls-manifest"

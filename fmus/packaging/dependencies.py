@@ -4,13 +4,13 @@ The mode of a contact depends on its slip and, if it can stick, on its load, its
 which decide ties.  For contacts that share bodies it depends on those of all these contacts.
 """
 
+from ..compiler.equations.algebra import differentiate, substitute, variables_in
+from ..compiler.equations.expressions import Expression, Operand
+from ..compiler.equations.model_analysis import ANALYSES
+from ..compiler.equations.model_declaration import HYBRID, SIGN, THRESHOLD, Contact
+from ..compiler.equations.model_roles import TIME
 from ..runtime.variable_access import SETTABLE_CAUSALITIES
 from ..runtime.variable_declarations import VariableOwner
-from .equations.algebra import differentiate, substitute, variables_in
-from .equations.expressions import Expression, Operand
-from .equations.model_analysis import ANALYSES
-from .equations.model_declaration import HYBRID, SIGN, THRESHOLD, Contact
-from .equations.model_roles import TIME
 from .fmi_variables import Variables, friction_laws
 
 

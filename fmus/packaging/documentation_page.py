@@ -6,16 +6,16 @@ from html import escape
 from inspect import cleandoc
 from pathlib import Path
 
+from ..compiler import __version__
+from ..compiler.equations.model_analysis import ModelAnalysis
+from ..compiler.equations.tables import PCHIP, Table
+from ..compiler.units import unit_of
 from ..runtime.variable_access import SETTABLE_CAUSALITIES
 from ..runtime.variable_declarations import VariableDeclaration, VariableOwner, exported_name
-from . import __version__
 from .certified_result import RESULT_FOLDER, CertifiedResult, find_certified_result, result_files
-from .equations.model_analysis import ModelAnalysis
-from .equations.tables import PCHIP, Table
 from .fmi_variables import Variables, fixed_choices, integrated_states
 from .model_data import MODEL_DATA_FILE, model_data
 from .svg_chart import draw_chart
-from .units import unit_of
 
 GREEK = {"theta": "theta", "omega": "omega", "alpha": "alpha", "mu": "mu", "eps": "epsilon", "phi": "phi", "pi": "pi"}
 CURVE_POINTS = 200  # of a table that is not linear

@@ -3,8 +3,8 @@
 import json
 from typing import Any
 
+from ..compiler.equations.model_analysis import ModelAnalysis
 from ..runtime.variable_declarations import VariableOwner, exported_name
-from .equations.model_analysis import ModelAnalysis
 from .fmi_variables import Variables, fixed_choices, mode_names
 from .model_description import type_attributes
 

@@ -11,11 +11,13 @@ from typing import Any
 from uuid import NAMESPACE_OID, uuid5
 from xml.etree.ElementTree import Element, SubElement, tostring
 
+from ..compiler import __version__
+from ..compiler.equations.declaration_options import OPTIONS
+from ..compiler.text_output import xml_bytes
+from ..compiler.units import BASE_UNITS, UNITS, Unit, unit_of
 from ..runtime.variable_access import SETTABLE_CAUSALITIES
 from ..runtime.variable_declarations import VariableDeclaration, VariableOwner, exported_name
-from . import __version__
 from .dependencies import output_dependencies
-from .equations.declaration_options import OPTIONS
 from .fmi_variables import (
     DERIVATIVE_NAME,
     TIME,
@@ -26,8 +28,6 @@ from .fmi_variables import (
     event_indicator_indices,
     has_step_events,
 )
-from .text_output import xml_bytes
-from .units import BASE_UNITS, UNITS, Unit, unit_of
 
 STEPPING_CAPABILITIES = {
     "needsExecutionTool": "false",

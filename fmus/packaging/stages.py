@@ -12,16 +12,16 @@ from collections.abc import Iterator, Sequence
 from itertools import count
 from pathlib import Path
 
-from .equations.algebra import differentiate, operands_first
-from .equations.dimensions import term_operands
-from .equations.expression_printer import ExpressionPrinter
-from .equations.expressions import Operand, Term
-from .equations.model_analysis import ModelAnalysis
-from .equations.model_declaration import Output, Variable
-from .equations.model_file import ModelFile
-from .equations.model_roles import TIME
-from .lowering import lowered_files, lowered_model, select_features
-from .native.sources import collect_sources
+from ..compiler.equations.algebra import differentiate, operands_first
+from ..compiler.equations.dimensions import term_operands
+from ..compiler.equations.expression_printer import ExpressionPrinter
+from ..compiler.equations.expressions import Operand, Term
+from ..compiler.equations.model_analysis import ModelAnalysis
+from ..compiler.equations.model_declaration import Output, Variable
+from ..compiler.equations.model_file import ModelFile
+from ..compiler.equations.model_roles import TIME
+from ..compiler.lowering import lowered_files, lowered_model, select_features
+from .native.c_sources import collect_sources
 
 MAX_LENGTH = 3000  # characters of an expression inside of another one
 

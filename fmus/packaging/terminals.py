@@ -3,8 +3,8 @@
 from pathlib import Path
 from xml.etree.ElementTree import Element, SubElement
 
+from ..compiler.text_output import xml_bytes
 from .fmi_variables import Variables
-from .text_output import xml_bytes
 
 FOLDER, FILE = "terminalsAndIcons", "terminalsAndIcons.xml"
 CORNERS = {"x1": "-100", "y1": "-100", "x2": "100", "y2": "100"}

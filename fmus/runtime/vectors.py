@@ -1,7 +1,7 @@
 """Vector operations of the numerics, implemented on numpy arrays.
 
 A vector runs over the states or over the contacts of a model.  At build time the sources are unrolled to scalars
-(packaging/lowering), so FMUs do not carry this module.  It allows tests to run the sources as they are, for one model
+(compiler/lowering), so FMUs do not carry this module.  It allows tests to run the sources as they are, for one model
 at a time: tests/support/array_model.py fills the index lists below.
 """
 

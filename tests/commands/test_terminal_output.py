@@ -16,7 +16,7 @@ from build_cache import ROOT
 from models import MODELS
 from rich.console import Console
 
-from fmus.packaging.model_lookup import more_model_names
+from fmus.compiler.model_lookup import more_model_names
 from harness import HarnessError, PrecisionResult
 from harness.commands import commands
 from harness.studies.precision.law_deviations import LawDeviation

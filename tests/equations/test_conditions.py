@@ -14,7 +14,7 @@ from row_comparison import assert_identical
 from scipy.integrate import solve_ivp
 from worker_client import FmiError, FmpyError
 
-from fmus.packaging.model_lookup import find_model
+from fmus.compiler.model_lookup import find_model
 
 METHODS = (ODE23, ODE45, DOP853, RODAS)
 LABELS = [f"--method={label}" for label in ("ode23", "ode45", "dop853", "rodas")]

@@ -10,10 +10,10 @@ import pytest
 from models import EXAMPLE_MODELS, LARGER_MODELS, MODELS, ROOT
 
 import fmus
-from fmus.packaging.equations.algebra import ARITHMETIC, rounding_scale
-from fmus.packaging.equations.dimensions import expression_text
-from fmus.packaging.equations.expressions import FUNCTIONS, Term
-from fmus.packaging.equations.model_declaration import (
+from fmus.compiler.equations.algebra import ARITHMETIC, rounding_scale
+from fmus.compiler.equations.dimensions import expression_text
+from fmus.compiler.equations.expressions import FUNCTIONS, Term
+from fmus.compiler.equations.model_declaration import (
     Choice,
     Contact,
     Model,
@@ -23,7 +23,7 @@ from fmus.packaging.equations.model_declaration import (
     SettableVariable,
     Variable,
 )
-from fmus.packaging.model_lookup import find_model
+from fmus.compiler.model_lookup import find_model
 
 SOURCES = [*MODELS, *EXAMPLE_MODELS]
 EVERY_SOURCE = pytest.mark.parametrize("source", SOURCES, ids=lambda source: getattr(source, "stem", source))

@@ -7,10 +7,10 @@ from contextlib import contextmanager
 
 import pytest
 
-from fmus.packaging import BuildError
-from fmus.packaging.equations.model_file import load_model_file
-from fmus.packaging.lowering import lowered_files, lowered_model, select_features
-from fmus.packaging.native.sources import collect_sources
+from fmus.compiler import BuildError
+from fmus.compiler.equations.model_file import load_model_file
+from fmus.compiler.lowering import lowered_files, lowered_model, select_features
+from fmus.packaging.native.c_sources import collect_sources
 
 MODEL = '''
 from fmus import *
@@ -152,7 +152,7 @@ def test_a_chain_of_too_many_cases_is_refused(tmp_path):
 
 
 def test_cases_that_share_branches_are_refused_before_they_multiply(tmp_path, monkeypatch):
-    monkeypatch.setattr("fmus.packaging.equations.expression_printer.MAX_LINES", 2000)
+    monkeypatch.setattr("fmus.compiler.equations.expression_printer.MAX_LINES", 2000)
     path = tmp_path / "multiplied.py"
     step = "choose(r > 0.1 * i, 2.0 * values[-1], r) + choose(v > 0.0, 3.0 * values[-1], r)"
     path.write_text(MODEL.format(n=30, step=step, force=LAST, slide="f"), encoding="utf-8")

@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import harness
-from fmus.packaging import BuildError
+from fmus.compiler import BuildError
 from fmus.packaging.archive import build
 
 MODEL = '''

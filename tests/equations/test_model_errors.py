@@ -7,8 +7,8 @@ import pytest
 from commands import build
 
 import fmus
-from fmus.packaging import BuildError
-from fmus.packaging.model_lookup import find_model
+from fmus.compiler import BuildError
+from fmus.compiler.model_lookup import find_model
 
 HEAD = '''"""A model."""
 from fmus import *

@@ -10,9 +10,9 @@ from native_fmus import require_compiler
 
 import fmus
 import harness
-from fmus.packaging import BuildError
-from fmus.packaging.lowering import lowered_model
-from fmus.packaging.model_lookup import find_model
+from fmus.compiler import BuildError
+from fmus.compiler.lowering import lowered_model
+from fmus.compiler.model_lookup import find_model
 
 HEAD = """from fmus import HYBRID, SIGN, Contact, Input, Mode, Model, Output, Parameter, State, choose
 

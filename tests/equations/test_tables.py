@@ -20,8 +20,8 @@ from scipy.interpolate import PchipInterpolator
 from worker_client import FmiError
 
 import harness
-from fmus.packaging import BuildError
-from fmus.packaging.model_lookup import find_model
+from fmus.compiler import BuildError
+from fmus.compiler.model_lookup import find_model
 from fmus.runtime.variable_declarations import declarations
 
 KINDS = {

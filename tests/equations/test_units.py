@@ -12,9 +12,9 @@ from fmpy.validation import validate_fmu
 from scipy.integrate import solve_ivp
 
 import harness
-from fmus.packaging import BuildError
+from fmus.compiler import BuildError
+from fmus.compiler.units import parse_unit
 from fmus.packaging.archive import build
-from fmus.packaging.units import parse_unit
 
 BRAKE = '''
 from fmus import Contact, Fixed, Mode, Model, Output, Parameter, State

@@ -17,10 +17,10 @@ from row_comparison import assert_identical
 from scipy.integrate import solve_ivp
 from worker_client import FmiError
 
-from fmus.packaging import BuildError
+from fmus.compiler import BuildError
+from fmus.compiler.model_lookup import find_model
 from fmus.packaging.archive import build
 from fmus.packaging.model_description import REAL_ONLY_HINT
-from fmus.packaging.model_lookup import find_model
 from harness import describe
 
 EVERY_FILE = pytest.mark.parametrize("path", EXAMPLE_MODELS, ids=lambda path: path.stem)

@@ -14,7 +14,7 @@ from models import MODELS, model_class, outputs, runtime
 from row_comparison import assert_identical
 from worker_client import FmiError, Worker
 
-from fmus.packaging.lowering import sibling_module
+from fmus.compiler.lowering import sibling_module
 
 TIMES = 10_000 // len(MODELS)
 EVERY_MODEL = pytest.mark.parametrize("name", MODELS)

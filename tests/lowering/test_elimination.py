@@ -6,8 +6,8 @@ from math import fabs, nan
 import numpy as np
 import pytest
 
-from fmus.packaging.lowering.elimination import LoweredSystem
-from fmus.packaging.lowering.layout import ModelLayout
+from fmus.compiler.lowering.elimination import LoweredSystem
+from fmus.compiler.lowering.layout import ModelLayout
 from fmus.runtime import vectors
 
 BODIES = {

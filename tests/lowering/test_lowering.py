@@ -10,16 +10,16 @@ import pytest
 from internal_steps import array_steps, prepared_run, scalar_steps
 from models import CASES, LARGER_MODELS, MODELS, ROOT, label, model_class
 
-from fmus.packaging import BuildError
-from fmus.packaging.lowering import function_tree, lowered_files, lowered_model, select_features
-from fmus.packaging.lowering.emit_source import FileLowerer
-from fmus.packaging.lowering.layout import ModelLayout, component_name
-from fmus.packaging.lowering.lowered_sources import lower_all
-from fmus.packaging.lowering.scalarize import fold_zero
-from fmus.packaging.lowering.source_symbols import SourceSymbols
-from fmus.packaging.lowering.unused_code import remove_unused_code
-from fmus.packaging.model_lookup import find_model
-from fmus.packaging.syntax_trees import TranslationError, nested_statements
+from fmus.compiler import BuildError
+from fmus.compiler.lowering import function_tree, lowered_files, lowered_model, select_features
+from fmus.compiler.lowering.layout import ModelLayout, component_name
+from fmus.compiler.lowering.lowered_modules import lower_all
+from fmus.compiler.lowering.module_lowering import FileLowerer
+from fmus.compiler.lowering.scalarize import fold_zero
+from fmus.compiler.lowering.unused_code import remove_unused_code
+from fmus.compiler.lowering.vector_symbols import SourceSymbols
+from fmus.compiler.model_lookup import find_model
+from fmus.compiler.syntax_trees import TranslationError, nested_statements
 from fmus.runtime import stick_slip
 from fmus.runtime.vectors import ContactIndex, ContactVector, StateVector
 

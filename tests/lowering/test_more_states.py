@@ -8,8 +8,8 @@ from contact_references import CONTACT_REFERENCES, reference_events, solve_lugre
 from internal_steps import array_steps, bits, components, compute_step, prepared_run, scalar_steps, start
 from models import DOP853, LARGER_MODELS, ODE23, ODE45, RADAU9, RODAS, ROOT
 
-from fmus.packaging.lowering import lowered_model, select_features
-from fmus.packaging.model_lookup import find_model
+from fmus.compiler.lowering import lowered_model, select_features
+from fmus.compiler.model_lookup import find_model
 
 WITH_CONDITIONS = (ROOT / "tests" / "example_models" / "bumper.py", ROOT / "fmus" / "more" / "elastoplastic.py")
 FILES = {path.stem: path for path in (*LARGER_MODELS, *WITH_CONDITIONS)}

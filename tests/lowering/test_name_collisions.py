@@ -7,9 +7,9 @@ from build_cache import build_user_model
 from internal_steps import prepared_run, start
 from models import DOP853, LARGER_MODELS, RODAS
 
+from fmus.compiler.lowering import LAWS, METHODS, lowered_model, select_features, sibling_module
+from fmus.compiler.model_lookup import find_model
 from fmus.packaging.fmi_variables import declared_variables, fixed_choices
-from fmus.packaging.lowering import LAWS, METHODS, lowered_model, select_features, sibling_module
-from fmus.packaging.model_lookup import find_model
 from fmus.packaging.native.model_header import render_model_header
 
 BELT = '''"""A model."""

@@ -7,7 +7,7 @@ from internal_steps import components, prepared_run, start
 from models import DOP853, LARGER_MODELS, write_growing_friction_model
 from scipy.integrate import solve_ivp
 
-from fmus.packaging.lowering import lowered_model, model_exchange_run, sibling_module
+from fmus.compiler.lowering import lowered_model, model_exchange_run, sibling_module
 
 FILES = {path.stem: path for path in LARGER_MODELS}
 

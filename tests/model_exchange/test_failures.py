@@ -7,7 +7,7 @@ from model_exchange_client import DRIVEN, handle_event_at, single_error
 from models import MODELS, declared, model_class, outputs, push, runtime
 from worker_client import FmiError
 
-from fmus.packaging.lowering import model_exchange_run
+from fmus.compiler.lowering import model_exchange_run
 from fmus.runtime.codes import DIVERGED, OK
 
 EVERY_MODEL = pytest.mark.parametrize("name", MODELS)

@@ -4,8 +4,8 @@ import pytest
 from internal_steps import components, compute_step, prepared_run, start
 from models import DOP853, LARGER_MODELS, MODELS, ODE45, RODAS, declared
 
-from fmus.packaging.lowering import component_name, lowered_model, model_exchange_run, sibling_module
-from fmus.packaging.model_lookup import find_model
+from fmus.compiler.lowering import component_name, lowered_model, model_exchange_run, sibling_module
+from fmus.compiler.model_lookup import find_model
 from fmus.runtime.codes import NO_CONSISTENT_MODES
 
 FILES = {path.stem: path for path in LARGER_MODELS}

@@ -28,7 +28,7 @@ from models import (
 )
 from worker_client import FmiError
 
-from fmus.packaging.lowering import component_name
+from fmus.compiler.lowering import component_name
 from fmus.runtime.variable_declarations import Choice
 
 EVERY_MODEL = pytest.mark.parametrize("name", MODELS)

@@ -14,9 +14,9 @@ import pytest
 from fmi3_as_fmi2 import Slave
 from models import MODELS, ROOT, declared, model_class, outputs, push
 
+from fmus.compiler.lowering import lowered_model
 from fmus.packaging.dependencies import output_dependencies
 from fmus.packaging.fmi_variables import declared_variables
-from fmus.packaging.lowering import lowered_model
 
 EVERY_MODEL = pytest.mark.parametrize("name", MODELS)
 SITUATIONS = 150

@@ -12,7 +12,7 @@ from native_fmus import require_compiler
 from row_comparison import assert_identical
 
 from benchmarks.references import event_located
-from fmus.packaging.model_lookup import find_model, more_model_names
+from fmus.compiler.model_lookup import find_model, more_model_names
 from fmus.runtime.variable_declarations import Output, variables
 from harness.references.certified_reference import event_time_error, load_reference, relative_errors
 

@@ -14,8 +14,8 @@ from native_fmus import require_compiler
 from prescribed_motion import BLOCK, belt_rising, belt_shaking, solve_block
 
 import harness
-from fmus.packaging import BuildError
-from fmus.packaging.model_lookup import find_model
+from fmus.compiler import BuildError
+from fmus.compiler.model_lookup import find_model
 from harness.scenes.run_spec import RunSpec
 from harness.simulation.whole_run import open_simulator
 

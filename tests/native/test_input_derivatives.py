@@ -15,8 +15,8 @@ from row_comparison import assert_close, assert_identical
 from scipy.integrate import solve_ivp
 from worker_client import FmiError
 
-from fmus.packaging.lowering import lowered_model, sibling_module
-from fmus.packaging.model_lookup import find_model
+from fmus.compiler.lowering import lowered_model, sibling_module
+from fmus.compiler.model_lookup import find_model
 from fmus.runtime.codes import INITIALISING, OK
 
 DAMPING = {  # stiffness, damping

@@ -23,8 +23,9 @@ from models import MODELS, ROOT, model_class
 from native_fmus import build_for_all_platforms, build_native_fmus
 from native_host import compiler, unpack_cached
 
-from fmus.packaging import BuildError, native
-from fmus.packaging.native.compiler import (
+from fmus.compiler import BuildError
+from fmus.packaging import native
+from fmus.packaging.native.binaries import (
     DEFAULT_PLATFORMS,
     LARGE_SOURCE,
     PLATFORMS,
@@ -32,7 +33,7 @@ from fmus.packaging.native.compiler import (
     compile_and_link,
     compile_libraries,
 )
-from fmus.packaging.native.sources import FMI_HEADERS, MAIN_SOURCE, OWN_HEADERS
+from fmus.packaging.native.c_sources import FMI_HEADERS, MAIN_SOURCE, OWN_HEADERS
 
 pytestmark = pytest.mark.slow
 
@@ -344,7 +345,7 @@ def test_the_compiler_cache_works_without_a_home_and_stays_clean(monkeypatch):
 
     for name in ("HOME", "ZIG_LOCAL_CACHE_DIR"):
         monkeypatch.delenv(name, raising=False)
-    monkeypatch.setattr("fmus.packaging.native.compiler.subprocess.run", run)
+    monkeypatch.setattr("fmus.packaging.native.binaries.subprocess.run", run)
     with pytest.raises(BuildError, match=r"a.so does not compile"):
         compile_and_link({}, "a.c", "x86_64-linux-gnu.2.17", "a.so", ())
     assert Path(outputs["HOME"]).is_dir()

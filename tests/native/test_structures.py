@@ -5,10 +5,10 @@ from dataclasses import replace
 import pytest
 from model_text import remove_unused
 
-from fmus.packaging.lowering import lowered_model
-from fmus.packaging.lowering.feature_selection import select_features
-from fmus.packaging.model_lookup import find_model
-from fmus.packaging.native.sources import collect_sources
+from fmus.compiler.lowering import lowered_model
+from fmus.compiler.lowering.feature_selection import select_features
+from fmus.compiler.model_lookup import find_model
+from fmus.packaging.native.c_sources import collect_sources
 
 MODEL = """from fmus import HYBRID, SIGN, THRESHOLD, choose, fabs
 from fmus import Contact, Input, Mode, Model, Output, Parameter, State, Table

@@ -5,11 +5,11 @@ import math
 import pytest
 from models import MODELS, model_class
 
-from fmus.packaging.native.c_types import FLOAT
-from fmus.packaging.native.call_graph import CallGraph
-from fmus.packaging.native.sources import collect_sources
-from fmus.packaging.native.struct_layout import AttributeTypeError
-from fmus.packaging.syntax_trees import TranslationError
+from fmus.compiler.c.c_types import FLOAT
+from fmus.compiler.c.call_graph import CallGraph
+from fmus.compiler.c.struct_layout import AttributeTypeError
+from fmus.compiler.syntax_trees import TranslationError
+from fmus.packaging.native.c_sources import collect_sources
 from tests.native.test_language_subset import THIRD, Allowed, Part, half
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from build_cache import ROOT
 
-from fmus.packaging.model_lookup import model_names
+from fmus.compiler.model_lookup import model_names
 
 BLOCK = re.compile(r"^```(\w+) ?(\S*)\n(.*?)^```$", re.M | re.S)
 CHANGE = re.compile(r"((?:^-.*\n)+)((?:^\+.*\n)+)", re.M)

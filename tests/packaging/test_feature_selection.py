@@ -10,9 +10,9 @@ from fmpy import read_model_description
 from models import EXACT, FEW_CASES, MODELS, counts, declared, label, outputs
 from row_comparison import assert_identical
 
+from fmus.compiler.lowering import LAWS, METHODS, lowered_files
+from fmus.compiler.lowering.feature_selection import FeatureSelection
 from fmus.packaging import archive
-from fmus.packaging.lowering import LAWS, METHODS, lowered_files
-from fmus.packaging.lowering.feature_selection import FeatureSelection
 from harness import describe, simulate
 
 LABELS = {"solver.method": "--method", "friction": "--law"}

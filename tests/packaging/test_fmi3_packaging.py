@@ -18,10 +18,10 @@ from lxml import etree
 from models import ROOT, declared, model_class
 from PIL import Image
 
+from fmus.compiler.lowering import model_exchange_run
+from fmus.compiler.model_lookup import find_model, model_names
 from fmus.packaging.fmi_variables import declared_variables
-from fmus.packaging.lowering import model_exchange_run
-from fmus.packaging.model_lookup import find_model, model_names
-from fmus.packaging.native.sources import FMI_HEADERS, OWN_HEADERS
+from fmus.packaging.native.c_sources import FMI_HEADERS, OWN_HEADERS
 from fmus.runtime.variable_declarations import variables
 from tests.packaging.test_packaging import (  # noqa: F401
     EVERY_MODEL,

@@ -21,12 +21,12 @@ from commands import build as command
 from fmpy.validation import validate_fmu
 from models import declared
 
-from fmus.packaging import BuildError
+from fmus.compiler import BuildError
+from fmus.compiler.embedded_modules import embedded_files, installed_package
+from fmus.compiler.model_lookup import find_model, model_names, more_model_names
 from fmus.packaging.archive import write, zip_entries
-from fmus.packaging.embedded_modules import embedded_files, installed_package
 from fmus.packaging.fmi_variables import declared_variables
 from fmus.packaging.model_description import REAL_ONLY_HINT, describe
-from fmus.packaging.model_lookup import find_model, model_names, more_model_names
 from fmus.runtime.integrator import Integrator
 from fmus.runtime.oscillator import Oscillator
 from fmus.runtime.run_state import RunState

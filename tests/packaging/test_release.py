@@ -10,7 +10,8 @@ from click.testing import CliRunner
 from fmpy import read_model_description
 
 import build_fmus
-from fmus.packaging import __version__, release
+from fmus.compiler import __version__
+from fmus.page import release
 
 SCENES = sorted((ROOT / "harness" / "scenes").glob("*.toml"))
 

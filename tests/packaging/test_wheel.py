@@ -10,8 +10,8 @@ from environments import build_wheel, call, install, make_environment
 from models import ROOT
 from native_fmus import build_for_all_platforms
 
-from fmus.packaging import __date__
-from fmus.packaging.native.compiler import DEFAULT_PLATFORMS, PLATFORMS
+from fmus.compiler import __date__
+from fmus.packaging.native.binaries import DEFAULT_PLATFORMS, PLATFORMS
 
 pytestmark = pytest.mark.slow
 

@@ -6,7 +6,7 @@ from math import nan
 from internal_steps import prepared_run
 from models import LARGER_MODELS, model_class, runtime
 
-from fmus.packaging.lowering import lowered_model, sibling_module
+from fmus.compiler.lowering import lowered_model, sibling_module
 
 
 def test_a_first_step_that_fails_is_shortened_no_more_than_max_tries():

@@ -4,7 +4,7 @@ import pytest
 from internal_steps import prepared_run, start
 from models import DOP853, ODE23, ODE45, RODAS
 
-from fmus.packaging.lowering import lowered_model, sibling_module
+from fmus.compiler.lowering import lowered_model, sibling_module
 
 BELTS = '''
 from fmus import Contact, Fixed, Mode, Model, Output, Parameter, State, choose

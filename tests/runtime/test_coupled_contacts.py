@@ -12,9 +12,9 @@ from model_text import remove_unused
 from models import DOP853, LARGER_MODELS, ODE23, ODE45, RODAS, SIGN, THRESHOLD
 from scipy.integrate import quad
 
-from fmus.packaging.lowering import component_name, lowered_model
-from fmus.packaging.lowering.feature_selection import select_features
-from fmus.packaging.model_lookup import find_model
+from fmus.compiler.lowering import component_name, lowered_model
+from fmus.compiler.lowering.feature_selection import select_features
+from fmus.compiler.model_lookup import find_model
 
 NAMES = ("ode23", "ode45", "dop853", "rodas")
 FILES = {path.stem: path for path in LARGER_MODELS}

@@ -5,7 +5,7 @@ import pytest
 from internal_steps import prepared_run, start
 from models import DOP853, ODE23, ODE45, RODAS
 
-from fmus.packaging.lowering import lowered_model
+from fmus.compiler.lowering import lowered_model
 
 PUSHED = '''
 from fmus import Contact, Mode, Model, Output, Parameter, State, cos

@@ -21,8 +21,8 @@ from models import (
     runtime,
 )
 
-from fmus.packaging.lowering import lowered_files, lowered_model
-from fmus.packaging.model_lookup import find_model
+from fmus.compiler.lowering import lowered_files, lowered_model
+from fmus.compiler.model_lookup import find_model
 from fmus.runtime.codes import EPSILON
 from harness.simulation.embedded_model import create_run, load_model_class
 

@@ -9,7 +9,7 @@ from build_cache import build_once
 from native_fmus import require_compiler
 from worker_client import FmiError
 
-from fmus.packaging.model_lookup import find_model
+from fmus.compiler.model_lookup import find_model
 
 STARTS = (1.0, 1e6, -1e3)
 PLACES = 4  # units in the last place of the time

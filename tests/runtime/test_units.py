@@ -3,8 +3,8 @@
 import pytest
 from build_cache import build_once
 
-from fmus.packaging.model_lookup import find_model
-from fmus.packaging.units import parse_unit
+from fmus.compiler.model_lookup import find_model
+from fmus.compiler.units import parse_unit
 from fmus.runtime.variable_declarations import Fixed, Input, Parameter, variables
 
 MORE = ("forced", "joint", "sleds", "stacked")

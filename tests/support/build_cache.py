@@ -19,7 +19,7 @@ from unittest.mock import patch
 import commands
 from commands import ROOT, SUPPORT
 
-from fmus.packaging.native import compiler
+from fmus.packaging.native import binaries as compiler
 
 shared_folder = Path()  # of this test run; set by conftest.py
 kept_folder = Path()  # of all test runs with the same sources; set by conftest.py

@@ -55,12 +55,12 @@ def prepare():
     """Import what commands and pages import, read the sources of the runtime for builds, and replace the figures."""
     sys.argv[0] = "friction-fmus"  # by which harness.__main__ names the command
     names = ["build_fmus", "pandas", "run_blocks", "harness.__main__"]
-    for package in ("harness", "fmus.packaging"):
+    for package in ("harness", "fmus.compiler", "fmus.packaging", "fmus.page"):
         names += [module.name for module in walk_packages(import_module(package).__path__, f"{package}.")]
     for name in names:
         if not name.endswith(".worker_process"):  # which is a script
             import_module(name)
-    import_module("fmus.packaging.lowering.lowered_sources").runtime_symbols()
+    import_module("fmus.compiler.lowering.lowered_modules").runtime_symbols()
     import_module("commands").blank_figures().start()
     gc.freeze()  # a collection in a child would copy the memory of the server
 

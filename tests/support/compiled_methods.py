@@ -12,9 +12,9 @@ from pathlib import Path
 from native_host import compiler
 
 import fmus.packaging.native as native
-from fmus.packaging.native.c_types import FLOAT, FloatArray, ScalarTuple, StructPointer
-from fmus.packaging.native.call_graph import CallGraph
-from fmus.packaging.native.compiler import BIT_EXACT, STRICT
+from fmus.compiler.c.c_types import FLOAT, FloatArray, ScalarTuple, StructPointer
+from fmus.compiler.c.call_graph import CallGraph
+from fmus.packaging.native.binaries import BIT_EXACT, STRICT
 
 FAULT_EXCEPTIONS = (ArithmeticError, ValueError, IndexError)  # the C code sets the fault flag for these
 VALUES = [0.0, -0.0, 1.0, -1.0, 0.3, -2.5, 7.0, 1e-5, 1e5, 710.0, 5e-324, 1e-300, 1e300, math.inf, -math.inf, math.nan]

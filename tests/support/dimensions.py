@@ -8,7 +8,7 @@ import operator
 import sys
 from fractions import Fraction
 
-from fmus.packaging.units import unit_of
+from fmus.compiler.units import unit_of
 
 BASES = ("kg", "m", "s", "A", "K")
 ANY = (0.0, math.inf)  # zero and infinity match every dimension

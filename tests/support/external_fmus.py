@@ -56,7 +56,7 @@ def main(out):
     import pythonfmu3
 
     from benchmarks.c_host import HEADERS
-    from fmus.packaging.native.compiler import compile_binaries
+    from fmus.packaging.native.binaries import compile_binaries
 
     for source in sorted(SOURCES.glob("*.py")):
         package = pythonfmu3 if "pythonfmu3" in source.read_text() else pythonfmu

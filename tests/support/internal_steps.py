@@ -5,7 +5,7 @@ import struct
 import numpy as np
 from array_model import to_array_model
 
-from fmus.packaging.lowering import component_name
+from fmus.compiler.lowering import component_name
 from fmus.runtime import vectors
 from harness.simulation.embedded_model import create_run
 

@@ -7,9 +7,9 @@ from itertools import product
 import pytest
 from build_cache import ROOT
 
+from fmus.compiler.lowering import lowered_model, sibling_module
+from fmus.compiler.model_lookup import find_model
 from fmus.packaging.fmi_variables import declared_variables
-from fmus.packaging.lowering import lowered_model, sibling_module
-from fmus.packaging.model_lookup import find_model
 from fmus.runtime.variable_declarations import Choice, Input, Output, Parameter
 
 MODELS = sorted(path.stem for path in (ROOT / "fmus").glob("*.py") if path.stem != "__init__")

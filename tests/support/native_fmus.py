@@ -8,7 +8,7 @@ from functools import cache
 import build_cache
 import pytest
 
-from fmus.packaging.native.compiler import PLATFORMS
+from fmus.packaging.native.binaries import PLATFORMS
 
 
 def require_compiler():

@@ -13,7 +13,7 @@ import fmpy
 import pytest
 from models import declared, model_class, outputs
 
-from fmus.packaging.native.compiler import STRICT
+from fmus.packaging.native.binaries import STRICT
 
 HEADERS = Path(fmpy.__file__).parent / "c-code"
 HOST_SOURCE = Path(__file__).with_name("host.c")

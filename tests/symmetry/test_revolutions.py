@@ -13,7 +13,7 @@ from benchmarks.symmetry.builds import NATIVE, PYTHON
 from benchmarks.symmetry.changes import REVOLUTIONS, REVOLUTIONS_ADDED
 from benchmarks.symmetry.command import describe
 from benchmarks.symmetry.study import run_model
-from fmus.packaging.model_lookup import find_model
+from fmus.compiler.model_lookup import find_model
 
 HEAD = """from fmus import Contact, Fixed, Mode, Model, Output, Parameter, State, choose, cos, sin, sqrt
 

@@ -4,7 +4,7 @@ import re
 
 from commands import build
 
-from fmus.packaging.web.html_page import HERE, MODULES
+from fmus.page.html_page import HERE, MODULES
 
 
 def test_five_models_take_less_than_600_kb_and_load_nothing(page):

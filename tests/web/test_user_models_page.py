@@ -6,8 +6,8 @@ from build_cache import ROOT
 from model_text import CURVE
 from models import EXAMPLE_MODELS, LARGER_MODELS
 
-from fmus.packaging.model_lookup import find_model, more_model_names
-from fmus.packaging.web.model_json import list_bodies
+from fmus.compiler.model_lookup import find_model, more_model_names
+from fmus.page.model_json import list_bodies
 
 
 def test_moving_bodies_of_any_model_are_read_from_its_declaration():

@@ -7,9 +7,9 @@ import struct
 
 import pytest
 
-from fmus.packaging.native.compiler import INTRINSICS
-from fmus.packaging.native.expressions import ARGUMENT_COUNTS, MAY_RAISE, NEVER_RAISING
-from fmus.packaging.web.html_page import HERE
+from fmus.compiler.c.c_expressions import ARGUMENT_COUNTS, MAY_RAISE, NEVER_RAISING
+from fmus.packaging.native.binaries import INTRINSICS
+from fmus.page.html_page import HERE
 
 FUNCTIONS = [function for function in (*NEVER_RAISING, *MAY_RAISE) if function not in INTRINSICS]
 AT = (0.0, -0.0, 1e-300, 1e-9, 0.3, -0.7, 1.0, -1.0, 2.5, -20.0, 700.0, 1e22, math.inf, -math.inf, math.nan)

@@ -24,12 +24,12 @@ from math import fabs
 from types import FunctionType
 from typing import Any
 
-from ..equations.expression_printer import ExpressionPrinter
-from ..equations.expressions import FUNCTIONS, Expression, Term
-from ..equations.model_analysis import ANALYSES
+from ...compiler.equations.expression_printer import ExpressionPrinter
+from ...compiler.equations.expressions import FUNCTIONS, Expression, Term
+from ...compiler.equations.model_analysis import ANALYSES
+from ...compiler.lowering import component_name, function_tree
+from ...compiler.lowering.import_hook import TREE_NAME
 from ..fmi_variables import DERIVATIVE_NAME, Variables
-from ..lowering import component_name, function_tree
-from ..lowering.import_hook import TREE_NAME
 
 # Prefix of tangents, and the parameter that holds the direction and the results. No variable of a model starts with _.
 PREFIX, TANGENT = "_d_", "_tangent"

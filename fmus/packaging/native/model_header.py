@@ -5,6 +5,10 @@ from collections.abc import Mapping, Sequence
 from string import Formatter
 from typing import Any
 
+from ...compiler.c.c_types import BOOL, FLOAT, INT, CType, StructPointer, c_literal
+from ...compiler.c.call_graph import CallGraph
+from ...compiler.lowering import component_name, model_exchange_run, sibling_module
+from ...compiler.text_output import c_comment, c_string_literal
 from ...runtime import codes
 from ...runtime.codes import INTERRUPTED
 from ...runtime.failure_handling import lacks_value_after_failure
@@ -23,10 +27,6 @@ from ..fmi_variables import (
     derivative_indices,
     event_indicator_indices,
 )
-from ..lowering import component_name, model_exchange_run, sibling_module
-from ..text_output import c_comment, c_string_literal
-from .c_types import BOOL, FLOAT, INT, CType, StructPointer, c_literal
-from .call_graph import CallGraph
 from .directional_derivative import Tangent, build_tangent_functions, tangent_fields
 
 # Filled by str.format.  Jinja2 would save the doubled braces, but its {{ begins nested initializers in C, and the rows

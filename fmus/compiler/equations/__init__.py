@@ -16,7 +16,7 @@
     codegen_context.py          shared by the generators of methods
     setup_methods.py, rate_methods.py, single_contact_methods.py, coupled_contact_methods.py, output_methods.py
                                 generate the methods of a model class
-    model_source.py             generates the module
+    model_class.py              generates the module
 
 In these modules e is an expression, s a state, and c and d are contacts; `by` gives the derivatives of the variables
 along which an expression is differentiated.

@@ -23,8 +23,8 @@ from .declaration_checks import check_use
 from .dimensions import check_frequencies, check_units
 from .expressions import ModelError
 from .model_analysis import ModelAnalysis
+from .model_class import model_source
 from .model_declaration import Model
-from .model_source import model_source
 from .python_errors import check_statements, explain
 from .start_values import check_evaluation, check_friction_forces, check_state_ranges
 

@@ -15,20 +15,20 @@ from datetime import datetime
 from pathlib import Path
 from xml.etree.ElementTree import SubElement, fromstring
 
+from ...compiler import BuildError
+from ...compiler.embedded_modules import digest
+from ...compiler.lowering import lowered_model, model_exchange_run, select_features
+from ...compiler.model_lookup import find_model
+from ...compiler.text_output import xml_bytes
 from ...runtime.variable_declarations import VariableOwner
-from .. import BuildError
 from ..archive import build_date, license_files, write, zip_entries
 from ..documentation_page import extra_files
-from ..embedded_modules import digest
 from ..fmi_variables import declared_variables
-from ..lowering import lowered_model, model_exchange_run, select_features
 from ..model_description import describe
 from ..model_description_fmi3 import describe as describe3
-from ..model_lookup import find_model
 from ..terminals import terminals
-from ..text_output import xml_bytes
-from .compiler import DEFAULT_PLATFORMS, PLATFORMS, compile_binaries
-from .sources import MAIN_SOURCE, collect_sources, render_build_description, render_guid_header
+from .binaries import DEFAULT_PLATFORMS, PLATFORMS, compile_binaries
+from .c_sources import MAIN_SOURCE, collect_sources, render_build_description, render_guid_header
 
 LICENSE = "documentation/licenses/license.txt"
 ICON_PATHS = {"2": "model.png", "3": "terminalsAndIcons/icon.png"}

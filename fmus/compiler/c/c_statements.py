@@ -12,6 +12,7 @@ from types import FunctionType
 from ..equations.reserved_names import C_NAMES
 from ..lowering import function_tree
 from ..syntax_trees import replace_fields
+from .c_expressions import FAULT_CHECK, UNARY, CExpression, ExpressionTranslator, Specialise, make_tuple
 from .c_types import (
     INT,
     CompileTimeValue,
@@ -23,7 +24,6 @@ from .c_types import (
     c_spelling,
     source_location,
 )
-from .expressions import FAULT_CHECK, UNARY, CExpression, ExpressionTranslator, Specialise, make_tuple
 from .struct_layout import StructLayout
 
 ASSIGNMENT = re.compile(r" *(const [\w ]+[ *])?(\w+) = (.*);")  # type of a constant, name, value

@@ -4,8 +4,8 @@ from itertools import count
 from types import FunctionType
 
 from ...runtime.step_control import InternalStep
+from .c_statements import FunctionTranslator
 from .c_types import CFunction, CType, ScalarTuple
-from .statements import FunctionTranslator
 from .struct_layout import StructLayout
 
 # Inlined into `compute_next`, it would make every step of ode23 save registers: 20 instructions, 3 % of a step.

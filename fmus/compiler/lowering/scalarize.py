@@ -7,7 +7,7 @@ from ..syntax_trees import TranslationError, TreeTransformer, all_nodes, is_same
 from .constant_folding import ConstantFolder
 from .elimination import LoweredSystem, tuple_or_single
 from .layout import CONDITIONS, STATES, ModelLayout
-from .source_symbols import ELEMENTWISE, ERROR_SIZE_OF_ANGLE, SELECTIONS, SourceSymbols, annotated_kind
+from .vector_symbols import ELEMENTWISE, ERROR_SIZE_OF_ANGLE, SELECTIONS, SourceSymbols, annotated_kind
 
 REDUCTIONS = {"max_of": ">", "min_of": "<"}  # reductions to one component
 ALLOCATORS = ("state_vector", "contact_vector")

@@ -6,7 +6,7 @@ from ..syntax_trees import parsed_module, replace_fields
 from .constant_folding import known_truth
 from .layout import ModelLayout
 from .scalarize import LOOP_RANGES, METHOD_LOOP, Scalarizer
-from .source_symbols import SourceSymbols, annotated_kind, annotated_results, is_marked, item_label, pair_rates
+from .vector_symbols import SourceSymbols, annotated_kind, annotated_results, is_marked, item_label, pair_rates
 
 SOLVER_IMPORTS = ("fabs", "nan")  # names of math in the statements of elimination.py
 

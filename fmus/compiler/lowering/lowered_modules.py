@@ -10,11 +10,11 @@ from ...runtime.oscillator import Oscillator
 from .. import __version__
 from ..equations.model_file import ModelFile
 from ..syntax_trees import all_nodes, parsed_nodes
-from .emit_source import FileLowerer
 from .feature_selection import EXACT, HYBRID, FeatureSelection
 from .layout import ModelLayout
-from .source_symbols import SourceSymbols
+from .module_lowering import FileLowerer
 from .unused_code import remove_unused_code
+from .vector_symbols import SourceSymbols
 
 FMUS_FOLDER = Path(__file__).resolve().parents[2]
 BUILD_TIME_ONLY = ("vectors.py", "linear_solver.py", "method_registry.py")  # never embedded

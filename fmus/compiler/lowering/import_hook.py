@@ -20,7 +20,7 @@ from ..equations.model_file import ModelFile
 from ..model_lookup import FMUS, find_model
 from ..syntax_trees import child_nodes
 from .feature_selection import FeatureSelection, select_features
-from .lowered_sources import lower_all, lowered_texts
+from .lowered_modules import lower_all, lowered_texts
 
 TREE_NAME = "written_out"  # attribute of lowered modules: the tree with source line numbers
 

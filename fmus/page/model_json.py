@@ -5,15 +5,15 @@ from inspect import cleandoc
 from math import isfinite
 from typing import Any
 
-from ...runtime.variable_declarations import VariableDeclaration, VariableOwner, exported_name
-from ..documentation_page import format_paragraph, readable_unit, table_figure, typeset
-from ..equations.algebra import depends_on, differentiate, is_same_expression, variables_in
-from ..equations.expressions import Operand
-from ..equations.model_analysis import ModelAnalysis
-from ..equations.model_declaration import Contact, Fixed, Output, Parameter, State
-from ..equations.model_file import ModelFile
-from ..fmi_variables import declared_variables
-from ..units import BASE_UNITS, unit_of
+from ..compiler.equations.algebra import depends_on, differentiate, is_same_expression, variables_in
+from ..compiler.equations.expressions import Operand
+from ..compiler.equations.model_analysis import ModelAnalysis
+from ..compiler.equations.model_declaration import Contact, Fixed, Output, Parameter, State
+from ..compiler.equations.model_file import ModelFile
+from ..compiler.units import BASE_UNITS, unit_of
+from ..packaging.documentation_page import format_paragraph, readable_unit, table_figure, typeset
+from ..packaging.fmi_variables import declared_variables
+from ..runtime.variable_declarations import VariableDeclaration, VariableOwner, exported_name
 
 FORCES = ("N", "N.m")
 ModelJson = dict[str, Any]  # an object of the JSON data in the page

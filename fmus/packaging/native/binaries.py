@@ -11,8 +11,8 @@ from pathlib import Path
 from struct import pack, unpack_from
 from tempfile import TemporaryDirectory, gettempdir
 
-from .. import BuildError
-from .expressions import MAY_RAISE, NEVER_RAISING
+from ...compiler import BuildError
+from ...compiler.c.c_expressions import MAY_RAISE, NEVER_RAISING
 
 LOG = logging.getLogger(__name__)
 

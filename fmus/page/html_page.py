@@ -10,13 +10,13 @@ from pathlib import Path
 from string import Template
 from xml.etree.ElementTree import fromstring
 
-from .. import __version__
-from ..archive import build_date, write
-from ..equations.model_file import ModelFile
-from ..lowering import lowered_model, select_features
-from ..native.compiler import compile_and_link
-from ..native.fmu import generate_c_sources
-from ..native.sources import MAIN_SOURCE
+from ..compiler import __version__
+from ..compiler.equations.model_file import ModelFile
+from ..compiler.lowering import lowered_model, select_features
+from ..packaging.archive import build_date, write
+from ..packaging.native.binaries import compile_and_link
+from ..packaging.native.c_sources import MAIN_SOURCE
+from ..packaging.native.native_fmu import generate_c_sources
 from .model_json import ModelJson, build_model_json
 
 FILE, MORE_FILE = "index.html", "more.html"  # pages of the shipped models and of those in fmus/more

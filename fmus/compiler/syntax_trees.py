@@ -25,8 +25,8 @@ class TranslationError(BuildError):
     def __init__(self, location: str, node: ast.AST) -> None:
         text = ast.unparse(node).partition("\n")[0]
         super().__init__(
-            f"{location}: '{text}' cannot be translated; fmus/packaging/lowering/__init__.py and "
-            "fmus/packaging/native/__init__.py describe what can."
+            f"{location}: '{text}' cannot be translated; fmus/compiler/lowering/__init__.py and "
+            "fmus/compiler/c/__init__.py describe what can."
         )
 
 

@@ -3,9 +3,9 @@
 from pathlib import Path
 from xml.etree.ElementTree import Element, SubElement
 
+from ...compiler.embedded_modules import installed_package
+from ...compiler.text_output import xml_bytes
 from ...runtime.variable_declarations import VariableOwner
-from ..embedded_modules import installed_package
-from ..text_output import xml_bytes
 from .model_header import render_model_header
 
 MAIN_SOURCE = {"2": "fmi2.c", "3": "fmi3.c"}  # by version of FMI; includes all other files

@@ -5,12 +5,12 @@ from hashlib import sha256
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from . import __version__
-from .archive import build, build_date, license_files, write, zip_entries
-from .model_lookup import find_model, model_names, more_model_names
-from .native import build as build_native
-from .web import FILE, MORE_FILE
-from .web import build as build_page
+from ..compiler import __version__
+from ..compiler.model_lookup import find_model, model_names, more_model_names
+from ..packaging.archive import build, build_date, license_files, write, zip_entries
+from ..packaging.native.native_fmu import build as build_native
+from . import FILE, MORE_FILE
+from . import build as build_page
 
 CHECKSUMS = "SHA256SUMS"
 README = f"""\

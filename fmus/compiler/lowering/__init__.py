@@ -2,13 +2,13 @@
 
     layout.py              facts fixed by model and features; names of vector components: y2_x, y2_v of y2
     feature_selection.py   the integration methods and friction laws that an FMU includes
-    source_symbols.py      attributes, results and constants found in the sources
+    vector_symbols.py      attributes, results and constants found in the sources
     scalarize.py           expressions and statements of a function, component by component
     elimination.py         the linear systems of rodas and radau9
     constant_folding.py    replaces flags, choices and dependent tests by constants
-    emit_source.py         a file, statement by statement
+    module_lowering.py     a file, statement by statement
     unused_code.py         removes functions that nothing calls, and unused imports
-    lowered_sources.py     lowers all files of the runtime and the model
+    lowered_modules.py     lowers all files of the runtime and the model
     import_hook.py         imports the lowered model into this process
 
 An annotation such as `e: StateVector` of a parameter, result or class attribute declares a vector; results of vector
