@@ -143,7 +143,9 @@ def test_a_cluster_with_a_killed_worker_finishes(harness, undisturbed, tmp_path,
 def test_an_unresponsive_scheduler_is_reported(fmus, monkeypatch):
     """After 10 s, shortened to 1 s here."""
     client, address = distributed.Client, "tcp://127.0.0.1:1"
-    monkeypatch.setattr(distributed, "Client", lambda address, timeout: client(address, timeout=timeout / 10))
+    monkeypatch.setattr(
+        distributed, "Client", lambda address, timeout, **options: client(address, timeout=timeout / 10, **options)
+    )
     with pytest.raises(HarnessError, match=f"no scheduler found at {address}"):
         sweep(fmus / "smd.fmu", {"k": [1.0]}, scheduler=address)
 
