@@ -34,13 +34,10 @@ export function describeSettings(run) {
   return [run.fmu.modelInfo.name, run.itemLabel("friction"), run.itemLabel("solver.method"), rtol].filter(Boolean).join(", ");
 }
 
-// Steps, run times and errors of the runs.
+// Steps and errors of the runs.
 export function costTable({ runs: { main, comparison, reference }, body }) {
   const runs = [main, comparison].filter(Boolean);
-  const rows = [
-    ...Object.entries(COUNTS).map(([name, label]) => [label, ...runs.map((run) => String(run.counts?.[name] ?? ""))]),
-    ["run time, including grid points", ...runs.map((run) => `${formatNumber(1000 * run.seconds, 2)} ms`)],
-  ];
+  const rows = Object.entries(COUNTS).map(([name, label]) => [label, ...runs.map((run) => String(run.counts?.[name] ?? ""))]);
   const hasFailed = [main, comparison, reference].some((run) => run?.failure);
   const failure = (run) => (!run.failure ? "" : run.time.length ? `at ${formatNumber(run.time.at(-1))} s` : "does not start");
   if (runs.some((run) => run.failure)) rows.unshift(["fails", ...runs.map(failure)]);
