@@ -263,7 +263,12 @@ def draw_friction_laws(folder: Path) -> None:
 def draw_stability(folder: Path) -> None:
     """Draw the error of each stiff or extreme case of stickslip as a share of its bound, for each method."""
     run_command(folder, "harness stability stickslip")
-    with (folder / "results" / "stability" / "stability.csv").open(newline="") as file:
+    plot_stability(folder / "results" / "stability" / "stability.csv", IMAGES / "stability.svg")
+
+
+def plot_stability(table: Path, path: Path) -> None:
+    """Plot the cases of stickslip in a table of `stability`."""
+    with table.open(newline="") as file:
         cases = list(csv.DictReader(file))
     finished = [case for case in cases if case["expected"].startswith("finished within ") and case["error [1]"]]
     methods = list(dict.fromkeys(case["method"] for case in finished))
@@ -281,7 +286,7 @@ def draw_stability(folder: Path) -> None:
         axis.set(yticks=range(len(methods)), yticklabels=methods, xlim=(5e-7, 20.0), ylim=(len(methods) - 0.5, -0.5))
         axis.set_xlabel("error / bound (1e-6 and less at the left edge)")
         axis.set_title(f"stickslip: {len(finished)} stiff and extreme cases; {refused} more are refused")
-        figure.savefig(IMAGES / "stability.svg", metadata={"Date": None})
+        figure.savefig(path, metadata={"Date": None})
     plt.close(figure)
 
 

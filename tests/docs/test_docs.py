@@ -11,6 +11,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from build_cache import build_once
 from commands import harness as harness_command
 from commands import run_process
 
@@ -50,9 +51,15 @@ def run_page(page, folder, environment):
     assert done.returncode == 0, done.stderr
 
 
-def figure_texts(svg):
-    """Return the texts of a figure as one string; tick labels that are powers are comments, and left out."""
-    return " ".join(map(html.unescape, re.findall(r"<text[^>]*>([^<]+)</text>", svg)))
+def figure_words(figure, leave_out):
+    """Return the words of a figure without tick labels that are powers and texts that match an expression.
+
+    The texts of a figure whose letters are paths are comments.
+    """
+    svg = figure.read_text(encoding="utf-8")
+    texts = re.findall(r"<text[^>]*>([^<]+)</text>", svg) or re.findall(r"<!--\s*([^$]+?)\s*-->", svg)
+    kept = [html.unescape(text) for text in texts if not re.fullmatch(leave_out, text)]
+    return {word for text in kept for word in text.split()}
 
 
 def is_number(word):
@@ -60,12 +67,13 @@ def is_number(word):
     return re.fullmatch(r"[-+\d.e]+", word.replace("\N{MINUS SIGN}", "-")) is not None
 
 
-def assert_same_texts(picture, figure):
+def assert_same_texts(picture, figure, leave_out=""):
     """The picture of the pages has the texts of the figure of a run; only its tick labels differ."""
-    shown, drawn = (figure_texts(path.read_text(encoding="utf-8")).split() for path in (picture, figure))
+    shown, drawn = (figure_words(path, leave_out) for path in (picture, figure))
+    assert drawn, f"{figure.name} has no text"
     message = f"{picture.name} shows another run: python docs/make_images.py {picture.stem}"
-    assert set(drawn) - set(shown) == set(), message
-    assert {word for word in set(shown) - set(drawn) if not is_number(word)} == set(), message
+    assert drawn - shown == set(), message
+    assert {word for word in shown - drawn if not is_number(word)} == set(), message
 
 
 @pytest.mark.slow
@@ -85,6 +93,42 @@ def test_the_picture_of_a_scene_is_that_of_its_run(name, workspace):
     done = harness_command(workspace, *command.split()[1:])
     assert done.returncode == 0, done.stderr
     assert_same_texts(DOCS / "images" / f"{name}.svg", workspace / file)
+
+
+@pytest.fixture
+def images(fmus, tmp_path, monkeypatch):
+    """The script that draws pictures, which reads the FMUs of the tests and writes into the folder of the test."""
+    script = load("make_images")
+    (tmp_path / "fmus").mkdir()
+    for file in fmus.glob("*.fmu"):
+        (tmp_path / "fmus" / file.name).symlink_to(file)
+    monkeypatch.setattr(script, "FMUS", tmp_path / "fmus")
+    monkeypatch.setattr(script, "IMAGES", tmp_path)
+    return script
+
+
+def test_the_picture_of_the_laws_is_that_of_its_script(images, tmp_path):
+    images.draw_laws(tmp_path)
+    assert_same_texts(DOCS / "images" / "laws.svg", tmp_path / "laws.svg")
+
+
+@pytest.mark.slow
+def test_the_picture_of_four_laws_is_that_of_their_runs(images, tmp_path):
+    (tmp_path / "fmus" / "more").symlink_to(build_once("more-bristles", "lugre", "elastoplastic"))
+    images.draw_friction_laws(tmp_path)
+    assert_same_texts(DOCS / "images" / "friction-laws.svg", tmp_path / "friction-laws.svg")
+
+
+@pytest.mark.slow
+def test_the_first_picture_is_that_of_its_runs_and_its_description_has_the_same_counts(images, tmp_path):
+    images.draw_stick(tmp_path)
+    for name in ("stick-light.svg", "stick-dark.svg"):
+        assert_same_texts(DOCS / "images" / name, tmp_path / name)
+    counts = re.findall(r"<!-- (about [\d ]+) -->", (tmp_path / "stick-light.svg").read_text(encoding="utf-8"))
+    assert len(counts) == 2
+    for page in (ROOT / "README.md", DOCS / "index.md", DOCS / "explanation" / "accuracy.md"):
+        text = " ".join(page.read_text(encoding="utf-8").split())
+        assert all(count in text for count in counts), f"{page.name} has other counts of steps than {counts}"
 
 
 @pytest.mark.slow

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from commands import run_process
 
-from tests.docs.test_docs import ROOT, run_page, scripts
+from tests.docs.test_docs import DOCS, ROOT, assert_same_texts, load, run_page, scripts
 
 README = ROOT / "README.md"
 
@@ -18,8 +18,14 @@ def test_readme_is_short():
 
 
 @pytest.mark.slow
-def test_readme_code_blocks_run(workspace, environment):
+def test_readme_code_blocks_run_and_draw_its_pictures(workspace, environment):
     run_page(README, workspace, environment)
+    images = load("make_images")
+    _, precision = images.FIGURES_OF_COMMANDS["precision"]
+    timed = r"\w+: \w+"  # the labels of the fastest methods
+    assert_same_texts(DOCS / "images" / "precision.svg", workspace / precision, leave_out=timed)
+    images.plot_stability(workspace / "results/stability/stability.csv", workspace / "stability.svg")
+    assert_same_texts(DOCS / "images" / "stability.svg", workspace / "stability.svg")
 
 
 @pytest.mark.slow
@@ -37,6 +43,8 @@ def test_the_measured_pendulum_gives_the_quoted_output(tmp_path):
     assert done.returncode == 0, done.stderr
     flags = ELLIPSIS | NORMALIZE_WHITESPACE
     assert OutputChecker().check_output(quoted.text, done.stdout, flags), done.stdout
+    (figure,) = tmp_path.glob("results/decay/*/figure.svg")
+    assert_same_texts(DOCS / "images" / "measured.svg", figure)
     amplitude = np.abs(np.loadtxt(record, delimiter=",", skiprows=1)[:, 1]).max()
     assert f"explains {100 * amplitude**2 / 16:.2f} %" in README.read_text(encoding="utf-8")
 
