@@ -16,6 +16,7 @@ from commands import harness as harness_command
 from commands import run_process
 
 import harness
+from benchmarks.campaigns.__main__ import CAMPAIGNS
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
@@ -166,17 +167,29 @@ SEEDS = {"fit_campaign": r" --seed \d+ --records \d+", "decay_defects": r" \d+ \
 CAMPAIGN = re.compile(r"python -m benchmarks\.campaigns\.(\w+)([^`]*)`")
 
 
+def find_campaigns(page):
+    """Return names and arguments of the campaigns of a page; a line of the text may end in the command."""
+    found = CAMPAIGN.findall(page.read_text(encoding="utf-8"))
+    return {(name, " ".join(arguments.split())) for name, arguments in found}
+
+
 def test_each_campaign_on_a_page_exists_and_names_its_seed():
-    """So that its table can be made again; also inside of the text, where a line may end in the command."""
-    found = {
-        (name, " ".join(arguments.split()))
-        for page in PAGES
-        for name, arguments in CAMPAIGN.findall((DOCS / page).read_text(encoding="utf-8"))
-    }
+    """So that its table can be made again."""
+    found = {campaign for page in PAGES for campaign in find_campaigns(DOCS / page)}
     assert {name for name, _ in found} >= {"fit_campaign", "decay_defects", "low_speed_friction", "curve_coverage"}
     for name, arguments in found:
         assert (ROOT / "benchmarks" / "campaigns" / f"{name}.py").is_file()
         assert re.fullmatch(SEEDS.get(name, ".*").strip(), arguments), f"{name} {arguments}: name the seed"
+
+
+def test_campaigns_with_a_seed_have_that_of_the_table_everywhere():
+    in_pages = {campaign for page in PAGES for campaign in find_campaigns(DOCS / page)}
+    recommended = {(name, arguments.split(" --log")[0]) for name, arguments in find_campaigns(ROOT / "CONTRIBUTING.md")}
+    run = {(name, " ".join(arguments)) for name, (_, _, *arguments) in CAMPAIGNS.items()}
+    for campaigns in (recommended, run):
+        assert {campaign for campaign in campaigns if campaign[0] in SEEDS} == {
+            campaign for campaign in in_pages if campaign[0] in SEEDS
+        }
 
 
 @pytest.mark.slow
