@@ -25,7 +25,16 @@ from .fmu_instance import CALL_FAILURES, FmuInstance, call_all
 from .model_data import read_model_data
 from .recorder import Columns, Recorder, ShapedVariable, c_type, read_rows
 from .signals import ModeChanges
-from .stepping import CoSimulation, TimeGrid, check_inputs, check_rates, input_signals, make_grid, step_to_stop
+from .stepping import (
+    CoSimulation,
+    TimeGrid,
+    check_inputs,
+    check_rates,
+    input_signals,
+    make_grid,
+    split_kinks,
+    step_to_stop,
+)
 from .trajectory import SolverSteps, Statistics, Trajectory
 from .variable_values import REAL_TYPES, convert_value, effective_value, enumeration_labels, variable_unit
 
@@ -115,6 +124,8 @@ class Session:
     ) -> None:
         self.instance, self.variables = instance, instance.variables
         self.grid = plan_grid(spec, instance)
+        inputs, self.note = split_kinks(spec.inputs, read_model_data(spec.fmu).rate_inputs)
+        spec = replace(spec, inputs=inputs or spec.inputs)
         settings = resolve_settings(spec, self.variables)
         values = {variable.name: value for variable, value in settings}
         effective = {variable.name: effective_value(variable, value) for variable, value in settings}
@@ -258,6 +269,7 @@ class Session:
             spec=spec,
             parameters=effective,
             steps=steps,
+            note=self.note,
             statistics=replace(read_statistics(self.instance, seconds), evaluations=recorded.evaluations),
         )
 

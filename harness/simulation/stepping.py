@@ -26,6 +26,10 @@ Inputs = Mapping[str, Sequence[float] | np.ndarray]  # "time" in s, and the valu
 TIME = "time"
 POINT_TOLERANCE = 1e-9  # relative to the communication step; times this close coincide
 EVEN_TOLERANCE = 1e-6  # relative to the communication step; the last step may differ this much from the others
+# An interval of a table has a kink if its slope differs from the rate by this share of the change of the rate, and by
+# this many times what it differs in most intervals. More than a share of such intervals are no kinks.
+KINK_SHARE, KINK_GAP, MAX_KINKS = 0.25, 20.0, 0.1
+ROUNDING = 1e-9  # of the largest rate
 
 
 @dataclass(frozen=True)
@@ -263,6 +267,51 @@ def check_rates(fmu: Path, inputs: Inputs, values: Mapping[str, Any]) -> None:
                 f"inputs: {name} varies, but {missing[0]} is missing, the rate by which the FMU continues it: add a "
                 f"column for {missing[0]}, or let {name} jump at times that occur twice"
             )
+
+
+def split_kinks(inputs: Inputs, rate_inputs: Mapping[str, Sequence[str]]) -> tuple[dict[str, np.ndarray], str]:
+    """Return inputs in which a rate jumps at a kink of its input, and a sentence; empty if no kink lacks a row.
+
+    A kink needs two rows of one time: between rows a rate is interpolated, and with one row it is no longer the slope
+    of its input. There the slope counts.
+
+    Parameters
+    ----------
+    inputs : mapping
+        The table, as `check_inputs` describes it.
+    rate_inputs : mapping
+        Names of the inputs on which the declared rate of an input depends. If it is only one, and the slope agrees with
+        it in most intervals, the rate is that input itself.
+    """
+    time = np.asarray(inputs.get(TIME, ()), dtype=float)
+    columns = {name: np.asarray(column, dtype=float) for name, column in inputs.items() if name != TIME}
+    begin = {name: column[:-1].copy() for name, column in columns.items()}
+    end = {name: column[1:].copy() for name, column in columns.items()}
+    intervals, notes = np.diff(time), []
+    moves = intervals > 0
+    for name, rates in rate_inputs.items():
+        if len(rates) != 1 or name not in columns or rates[0] not in columns or not moves.any():
+            continue
+        rate = columns[rates[0]]
+        slope = np.divide(np.diff(columns[name]), intervals, out=np.zeros(len(intervals)), where=moves)
+        gap = np.where(moves, np.abs(slope - (rate[:-1] + rate[1:]) / 2), 0.0)
+        least = max(KINK_GAP * np.quantile(gap[moves], 0.25, method="lower"), ROUNDING * np.abs(rate).max())
+        is_kink = (gap > KINK_SHARE * np.abs(np.diff(rate))) & (gap > least)
+        if not 0 < is_kink.sum() <= max(2, MAX_KINKS * len(is_kink)):
+            continue
+        begin[rates[0]][is_kink] = end[rates[0]][is_kink] = slope[is_kink]
+        first = int(np.argmax(is_kink))
+        notes.append(
+            f"{name} and its rate {rates[0]} disagree in {is_kink.sum()} of {len(is_kink)} intervals, first from t = "
+            f"{time[first]:.6g} to {time[first + 1]:.6g} s: the slope of {name} is used there; write two rows of one "
+            "time at a kink"
+        )
+    if not notes:
+        return {}, ""
+    split = {TIME: np.repeat(time, 2)[1:-1]} | {
+        name: np.column_stack([begin[name], end[name]]).ravel() for name in columns
+    }
+    return split, "; ".join(notes)
 
 
 def values_of_steps(inputs: Inputs, points: np.ndarray, continued: Collection[str] = ()) -> np.ndarray:

@@ -129,7 +129,7 @@ class Trajectory(Signals, Result):
     @property
     def accuracy(self) -> str:
         """Return the estimated accuracy, or the settings of the solver of an FMU of this project."""
-        return self.note or (f"solver: {self.settings_label}" if self.settings_label else "")
+        return "; ".join(filter(None, [self.note, f"solver: {self.settings_label}" if self.settings_label else ""]))
 
     @property
     def settings_label(self) -> str:

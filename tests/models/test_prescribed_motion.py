@@ -247,6 +247,34 @@ def test_a_table_with_the_rates_drives_the_block_as_the_belt_does(backend, inter
     assert np.abs(found - expected).max() < 1e-4
 
 
+@pytest.mark.parametrize("at_kink", [0.0, 0.05, 0.1])
+def test_a_kink_with_one_row_is_an_event_as_one_with_two_rows(at_kink):
+    """Between rows the rate is interpolated; at one row it cannot have the values before and after the kink."""
+    t = np.round(np.arange(0.0, 4.05, 0.1), 1)
+    late = np.maximum(t - 1.0, 0.0)
+    table = {"time": t, "x_belt": 0.2 * t + 0.05 * late**2, "v_belt": 0.2 + 0.1 * late, "a_belt": 0.1 * (t > 1.0)}
+    two_rows = {name: np.insert(column, 10, column[10]) for name, column in table.items()}
+    two_rows["a_belt"][11] = 0.1
+    one_row = table | {"a_belt": np.where(t == 1.0, at_kink, table["a_belt"])}
+    fmu = build(BLOCK, "native", method="ode45")
+    expected, run = (harness.simulate(fmu, inputs=inputs, stop=4.0, rtol=1e-9) for inputs in (two_rows, one_row))
+    assert expected.note == ""
+    assert run.note.startswith("v_belt and its rate a_belt disagree in ")
+    assert run["x"][-1] == pytest.approx(expected["x"][-1], abs=1e-9)
+    assert run.events.t == pytest.approx(expected.events.t, abs=1e-9)
+    assert run.statistics.evaluations < 1.05 * expected.statistics.evaluations
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-3, 0.1])
+@pytest.mark.parametrize("count", [5, 40, 1000])
+def test_a_smooth_or_noisy_table_has_no_kinks(count, noise):
+    t = np.linspace(0.0, 4.0, count)
+    random = np.random.default_rng(count)
+    columns = zip(INPUTS, belt_shaking(t)[:3], strict=True)
+    inputs = {"time": t} | {name: column + noise * random.standard_normal(count) for name, column in columns}
+    assert harness.simulate(build(BLOCK, "native", method="ode45"), inputs=inputs, stop=4.0).note == ""
+
+
 @pytest.mark.parametrize("backend", BACKENDS)
 def test_a_table_without_the_rate_of_an_input_that_varies_is_refused(backend):
     table = {name: column for name, column in TABLE.items() if name in ("time", "v_belt")}
