@@ -10,6 +10,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 from build_cache import build_once
 from commands import harness as harness_command
@@ -17,6 +18,10 @@ from commands import run_process
 
 import harness
 from benchmarks.campaigns.__main__ import CAMPAIGNS
+from benchmarks.rivals import figure as rivals_figure
+from benchmarks.rivals.catalogue import RIVALS
+from benchmarks.rivals.comparison import Comparison
+from benchmarks.rivals.scenes import SCENES
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
@@ -130,6 +135,32 @@ def test_the_first_picture_is_that_of_its_runs_and_its_description_has_the_same_
     for page in (ROOT / "README.md", DOCS / "index.md", DOCS / "explanation" / "accuracy.md"):
         text = " ".join(page.read_text(encoding="utf-8").split())
         assert all(count in text for count in counts), f"{page.name} has other counts of steps than {counts}"
+
+
+def read_errors_of_figure(panel):
+    """Return the errors of a panel of the figure of rivals, sorted, from the heights of its markers."""
+    (frame,) = re.findall(r'<g id="patch_\d+">\s*<path d="([^"]+)"', panel)[:1]
+    heights = [float(y) for y in re.findall(r"[ML] \S+ (\S+)", frame)]
+    markers = re.findall(r'<g clip-path[^>]*>\s*<use xlink:href="#\w+" x="[^"]+" y="([^"]+)"', panel)
+    low, high = np.log10([0.3 * rivals_figure.FLOOR, 3.0])
+    return np.sort(10.0 ** np.interp([-float(y) for y in markers], [-max(heights), -min(heights)], [low, high]))
+
+
+def test_the_picture_of_rivals_has_the_texts_of_its_script_and_the_errors_of_the_table(tmp_path):
+    """Its run needs the other engines."""
+    picture = DOCS / "images" / "rivals.svg"
+    rivals_figure.draw(Comparison(tuple(RIVALS.values()), ()), tmp_path / "rivals.svg")
+    assert_same_texts(picture, tmp_path / "rivals.svg")
+    page = (DOCS / "explanation" / "rivals.md").read_text(encoding="utf-8")
+    (table,) = re.findall(r"^\| engine \|( `rest`.*?)\n\n", page, re.M | re.S)
+    heading, _, *rows = table.splitlines()
+    assert len(rows) == len(RIVALS)
+    panels = re.split(r'<g id="axes_\d+">', picture.read_text(encoding="utf-8"))[1:]
+    shown = dict(zip(SCENES, panels, strict=True))
+    for column, name in enumerate(re.findall(r"`(\w+)`", heading)):
+        cells = [row.strip("| ").split(" | ")[column + 1] for row in rows]
+        errors = [float(word) for cell in cells for word in cell.split(" / ") if word != "-"]
+        assert read_errors_of_figure(shown[name]) == pytest.approx(np.sort(errors), rel=0.05), name
 
 
 @pytest.mark.slow
