@@ -6,6 +6,7 @@ friction-laws also those of fmus/more; the pictures of the live page and of the 
 """
 
 import csv
+import html
 import os
 import re
 import shutil
@@ -314,14 +315,25 @@ def draw_live_page(folder: Path) -> None:
 
 
 def draw_report(folder: Path) -> None:
-    """Save a screenshot of the beginning of a report."""
-    for command in ("run coulomb", "decay coulomb", "report"):
-        run_command(folder, f"harness {command}")
-    save_screenshot(folder / "results" / "report.html", IMAGES / "report.png", folder, 1250)
+    """Save a screenshot of the report of the page on reports, up to the end of its first section, with its text."""
+    run_blocks_of_page("how-to/report.md", folder)
+    report = folder / "results" / "report.html"
+    save_screenshot(report, IMAGES / "report.png", folder, 930, read_text_of_report(report))
 
 
-def save_screenshot(page: Path, picture: Path, folder: Path, height: int) -> None:
-    """Save a screenshot of a page by chromium; `height` is in pixels."""
+def read_text_of_report(report: Path) -> str:
+    """Return the text of a report up to the end of its first section.
+
+    It has no texts of the figure and of collapsed parts, no date and version, and no number that is a rounding error.
+    """
+    page, _, _ = report.read_text(encoding="utf-8").partition("</section>")
+    page = re.sub(r"<(head|svg|script|style|details)\b.*?</\1>|<[^>]+>", " ", page, flags=re.DOTALL)
+    text = " ".join(html.unescape(page).split())
+    return re.sub(r"Written on .*? by \S+ \S+ |\S+·10⁻¹\S+ ", "", text)
+
+
+def save_screenshot(page: Path, picture: Path, folder: Path, height: int, text: str = "") -> None:
+    """Save a screenshot of a page by chromium; `height` is in pixels, and `text` is stored as its description."""
     chromium = next((path for word in ("chromium", "google-chrome") if (path := shutil.which(word))), None)
     if chromium is None:
         print(f"{picture.name}: skipped, chromium is not installed")
@@ -334,10 +346,12 @@ def save_screenshot(page: Path, picture: Path, folder: Path, height: int) -> Non
         f"--user-data-dir={folder / 'profile'}",
     ]
     subprocess.run([chromium, *options, page.as_uri()], check=True, capture_output=True, timeout=120)
-    from PIL import Image
+    from PIL import Image, PngImagePlugin
 
-    image = Image.open(folder / picture.name).convert("RGB")
-    image.quantize(64).save(picture, optimize=True)
+    image, information = Image.open(folder / picture.name).convert("RGB"), PngImagePlugin.PngInfo()
+    if text:
+        information.add_itxt("Description", text)
+    image.quantize(64).save(picture, optimize=True, pnginfo=information)
 
 
 def run_notebook(folder: Path) -> None:

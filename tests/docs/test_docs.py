@@ -15,6 +15,7 @@ import pytest
 from build_cache import build_once
 from commands import harness as harness_command
 from commands import run_process
+from PIL import Image
 
 import harness
 from benchmarks.campaigns.__main__ import CAMPAIGNS
@@ -90,6 +91,10 @@ def test_code_blocks_run_and_draw_the_pictures_of_the_page(page, workspace, envi
         if source == page:
             (figure,) = workspace.glob(file)
             assert_same_texts(DOCS / "images" / f"{name}.svg", figure)
+    if page == "how-to/report.md":
+        with Image.open(DOCS / "images" / "report.png") as picture:
+            shown = picture.text["Description"]
+        assert load("make_images").read_text_of_report(workspace / "results/report.html") == shown
 
 
 @pytest.mark.slow
