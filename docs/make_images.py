@@ -307,33 +307,47 @@ def draw_measured(folder: Path) -> None:
 
 
 def draw_live_page(folder: Path) -> None:
-    """Save a screenshot of the beginning of the live page."""
+    """Save a screenshot of the beginning of the live page, with the text of its opening."""
     build = [sys.executable, "-m", "build_fmus", "--web", "--out", str(folder / "live")]
     environment = os.environ | {"PYTHONPATH": str(DOCS.parent)}
     subprocess.run(build, cwd=folder, check=True, env=environment, capture_output=True)
-    save_screenshot(folder / "live" / "index.html", IMAGES / "live.png", folder, 900)
+    save_screenshot(folder / "live" / "index.html", IMAGES / "live.png", folder, 900, read_text_of_opening)
+
+
+def read_text_of_opening(page: str) -> str:
+    """Return the title, the introduction and the counts of steps of the live page, in HTML as the browser shows it."""
+    (opening,) = re.findall(r'<h1 id="claim">.*?<div class="transport">', page, re.DOTALL)
+    text = read_text(opening)
+    return re.sub(r"\d+ \d{3}", lambda count: round_count(float(count[0].replace(" ", ""))), text)
+
+
+def read_text(page: str) -> str:
+    """Return the text of a part of an HTML page, without figures, scripts and collapsed parts."""
+    page = re.sub(r"<(head|svg|script|style|details)\b.*?</\1>|<[^>]+>", " ", page, flags=re.DOTALL)
+    return " ".join(html.unescape(page).split())
 
 
 def draw_report(folder: Path) -> None:
     """Save a screenshot of the report of the page on reports, up to the end of its first section, with its text."""
     run_blocks_of_page("how-to/report.md", folder)
     report = folder / "results" / "report.html"
-    save_screenshot(report, IMAGES / "report.png", folder, 930, read_text_of_report(report))
+    save_screenshot(report, IMAGES / "report.png", folder, 930, read_text_of_report)
 
 
-def read_text_of_report(report: Path) -> str:
+def read_text_of_report(page: str) -> str:
     """Return the text of a report up to the end of its first section.
 
-    It has no texts of the figure and of collapsed parts, no date and version, and no number that is a rounding error.
+    It has no date and version, and no number that is a rounding error.
     """
-    page, _, _ = report.read_text(encoding="utf-8").partition("</section>")
-    page = re.sub(r"<(head|svg|script|style|details)\b.*?</\1>|<[^>]+>", " ", page, flags=re.DOTALL)
-    text = " ".join(html.unescape(page).split())
+    text = read_text(page.partition("</section>")[0])
     return re.sub(r"Written on .*? by \S+ \S+ |\S+·10⁻¹\S+ ", "", text)
 
 
-def save_screenshot(page: Path, picture: Path, folder: Path, height: int, text: str = "") -> None:
-    """Save a screenshot of a page by chromium; `height` is in pixels, and `text` is stored as its description."""
+def save_screenshot(page: Path, picture: Path, folder: Path, height: int, read: Callable[[str], str]) -> None:
+    """Save a screenshot of a page by chromium; its description is what `read` returns of the HTML that it shows.
+
+    `height` is in pixels.
+    """
     chromium = next((path for word in ("chromium", "google-chrome") if (path := shutil.which(word))), None)
     if chromium is None:
         print(f"{picture.name}: skipped, chromium is not installed")
@@ -342,15 +356,15 @@ def save_screenshot(page: Path, picture: Path, folder: Path, height: int, text: 
     options += [
         "--virtual-time-budget=8000",
         "--force-prefers-reduced-motion",  # shows the first animation of the live page at its end
-        f"--screenshot={folder / picture.name}",
         f"--user-data-dir={folder / 'profile'}",
     ]
-    subprocess.run([chromium, *options, page.as_uri()], check=True, capture_output=True, timeout=120)
+    for action in (f"--screenshot={folder / picture.name}", "--dump-dom"):
+        command = [chromium, *options, action, page.as_uri()]
+        done = subprocess.run(command, check=True, capture_output=True, text=True, timeout=120)
     from PIL import Image, PngImagePlugin
 
     image, information = Image.open(folder / picture.name).convert("RGB"), PngImagePlugin.PngInfo()
-    if text:
-        information.add_itxt("Description", text)
+    information.add_itxt("Description", read(done.stdout))
     image.quantize(64).save(picture, optimize=True, pnginfo=information)
 
 

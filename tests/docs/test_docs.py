@@ -83,6 +83,12 @@ def assert_same_texts(picture, figure, leave_out=""):
     assert {word for word in shown - drawn if not is_number(word)} == set(), message
 
 
+def read_description(name):
+    """Return the text that a PNG picture of the pages shows."""
+    with Image.open(DOCS / "images" / f"{name}.png") as picture:
+        return picture.text["Description"]
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("page", [page for page in PAGES if runnable(page)])
 def test_code_blocks_run_and_draw_the_pictures_of_the_page(page, workspace, environment):
@@ -92,9 +98,8 @@ def test_code_blocks_run_and_draw_the_pictures_of_the_page(page, workspace, envi
             (figure,) = workspace.glob(file)
             assert_same_texts(DOCS / "images" / f"{name}.svg", figure)
     if page == "how-to/report.md":
-        with Image.open(DOCS / "images" / "report.png") as picture:
-            shown = picture.text["Description"]
-        assert load("make_images").read_text_of_report(workspace / "results/report.html") == shown
+        report = (workspace / "results/report.html").read_text(encoding="utf-8")
+        assert load("make_images").read_text_of_report(report) == read_description("report")
 
 
 @pytest.mark.slow

@@ -5,6 +5,8 @@ import re
 import pytest
 import web_page
 
+from tests.docs.test_docs import load, read_description
+
 pytestmark = pytest.mark.slow
 
 STORIES = ("stops", "chatters", "squeaks", "creeps", "swings")
@@ -32,6 +34,11 @@ def test_the_opening_claims_that_real_things_stop_and_counts_the_steps_of_both_m
         "at rest",
         "slips",
     ]
+
+
+def test_the_picture_of_the_live_page_shows_its_opening(still):
+    opening = still.run("document.querySelector('#opening').outerHTML")
+    assert load("make_images").read_text_of_opening(opening) == read_description("live"), "run docs/make_images.py live"
 
 
 def test_a_mass_under_sign_never_sticks_on_the_page(still):
