@@ -15,7 +15,7 @@ CAMPAIGNS = {  # name -> command, after the path of Python
     "fit_campaign": ("-m", "benchmarks.campaigns.fit_campaign", "--seed", "58", "--records", "200"),
     "interval_coverage": ("-m", "benchmarks.campaigns.interval_coverage", "100"),
     "decay_defects": ("-m", "benchmarks.campaigns.decay_defects", "200", "4813"),
-    "low_speed_friction": ("-m", "benchmarks.campaigns.low_speed_friction", "10"),
+    "low_speed_friction": ("-m", "benchmarks.campaigns.low_speed_friction", "4"),
     "curve_coverage": ("-m", "benchmarks.campaigns.curve_coverage", "300"),
     "decay_times": ("-m", "benchmarks.campaigns.decay_times"),
 }

@@ -204,7 +204,11 @@ def test_each_python_or_sh_block_that_is_not_run_has_a_reason():
             assert not block.skipped or len(block.skipped.split()) >= 3, f"{page}, line {block.line}: give a reason"
 
 
-SEEDS = {"fit_campaign": r" --seed \d+ --records \d+", "decay_defects": r" \d+ \d+"}  # others have fixed seeds
+SEEDS = {  # arguments; others have fixed seeds
+    "fit_campaign": r" --seed \d+ --records \d+",
+    "decay_defects": r" \d+ \d+",
+    "low_speed_friction": r" \d+",
+}
 CAMPAIGN = re.compile(r"python -m benchmarks\.campaigns\.(\w+)([^`]*)`")
 
 
