@@ -70,7 +70,7 @@ def check_names(model: Any, fmu: Path) -> None:
             getattr(solver, component_name("y", name))
     except (AttributeError, ImportError, TypeError):
         raise HarnessError(
-            f"{fmu.name} was built by another version of this project: build it again, as with `python build_fmus.py`"
+            f"{fmu.name} was built by another version of this project: build it again, as with `friction-fmus build`"
         ) from None
 
 

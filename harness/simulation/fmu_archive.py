@@ -64,9 +64,12 @@ def read_description(path: Path, lenient: bool = False) -> Any:
 
 
 def describe_lenient() -> str:
-    """Return how to run an FMU that violates the standard; the Python API has no option for it."""
+    """Return how to run an FMU that violates the standard."""
     in_scene = "lenient = true in a scene"
-    return by_interface(f"use --lenient (run, compare, sweep), or {in_scene}", f"set {in_scene}")
+    return by_interface(
+        f"use --lenient (run, compare, sweep), or {in_scene}",
+        f"use lenient=True (harness.simulate, harness.compare, harness.sweep), or {in_scene}",
+    )
 
 
 @cached_by_mtime

@@ -113,7 +113,7 @@ class FmuInstance:
         clocks = clocks_of(description)
         if clocks and not ticks_clocks:
             names = ", ".join(clock.name for clock in clocks)
-            raise HarnessError(f"it has clocks ({names}), which only run, compare and sweep tick")
+            raise HarnessError(f"it has clocks ({names}), which only single runs, comparisons and sweeps tick")
         self.ticks_clocks = bool(clocks) and (exchange or description.coSimulation.hasEventMode)
         self.uses_event_mode = self.ticks_clocks and not exchange
         self.description, self.exchange, self.log = description, exchange, log or LogCapture()

@@ -28,7 +28,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..errors import HarnessError, SceneError, check_names
+from ..errors import HarnessError, SceneError, by_interface, check_names
 from ..scenes.run_spec import RunSpec
 from .array_elements import whole_arrays
 from .fmu_instance import WARNING, FMICallException, FmuInstance, PreparedCall, call_all
@@ -116,9 +116,13 @@ def default_outputs(description: Any, values: Mapping[str, Any] | None = None) -
             if variable.causality == causality and variable.variability != "constant" and variable.type in C_TYPES
         }
         if (count := sum(map(prod, shapes.values()))) > MAX_DEFAULT_OUTPUTS:
+            remedy = by_interface(
+                "run it as a scene that names those to record, as in outputs = ['x']",
+                "name those to record, as in outputs=['x'] of harness.simulate",
+            )
             raise HarnessError(
                 f"{description.modelName} has {count} {causality}s, more than the {MAX_DEFAULT_OUTPUTS} that are "
-                "recorded by default: run it as a scene that names those to record, as in outputs = ['x']"
+                f"recorded by default: {remedy}"
             )
         if count:
             return tuple(element for name, shape in shapes.items() for element in element_names(name, shape))

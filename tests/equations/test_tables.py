@@ -481,6 +481,10 @@ WRONG = {
         'Table([0.0, 1.0], [1.0, 2.0], "s", "1", low=0.0)',
         'low = 0.0 has no effect on constant values: add values="tunable", or leave it out',
     ),
+    "a limit of a curve, whose values are always constant": (
+        'Table([0.0, 1.0, 2.0], [1.0, 2.0, 2.0], "s", "1", interpolation="pchip", low=0.0)',
+        "low = 0.0 has no effect on constant values: leave it out",
+    ),
     "a value below the limit": (
         'Table([0.0, 1.0], [1.0, -2.0], "s", "1", values="fixed", low=0.0)',
         "T.y[2] has the start value -2.0; it must be at least 0.0.",

@@ -132,7 +132,7 @@ def test_a_host_that_repeats_its_mistake_gets_one_message(fmus, worker):
             "--method ode23 and exact: an FMU with Reals only has one: give --",
         ),
         (("--law", "hybrid", "--law", "sign"), "--law hybrid and sign: an FMU with Reals only has one: give --"),
-        (("--law", "sign"), "the method 'exact' needs the law 'hybrid'"),
+        (("--law", "sign"), "the method 'exact' needs the law 'hybrid': give --law hybrid instead"),
         (("--web",), "--web writes a page, not FMUs: remove --native, --real-only"),
     ],
 )

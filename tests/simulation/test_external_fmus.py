@@ -122,7 +122,9 @@ def test_clocks_that_cannot_tick_are_refused(run, external_fmu_folder, tmp_path)
     assert_refused(done, 1, "its clock sample has an interval of 0.0 s; it must be positive")
     (tmp_path / "x.csv").write_text("time,x\n" + "".join(f"{0.1 * i},{exp(-0.2 * i)}\n" for i in range(21)))
     done = commands.harness(tmp_path, "fit", external_fmu_folder / "Ticking.fmu", "x.csv", "--free", "k")
-    assert_refused(done, 1, "it has clocks (sample, timeout, growing, fifth), which only run, compare and sweep tick")
+    assert_refused(
+        done, 1, "it has clocks (sample, timeout, growing, fifth), which only single runs, comparisons and sweeps tick"
+    )
 
 
 def test_an_fmu_with_a_fixed_internal_step_is_reported_as_such_also_in_its_result(run, tmp_path):

@@ -106,9 +106,8 @@ class Table(Expression):
         if values != CONSTANT:
             self.declare_values(VALUE_KINDS[values], unit_x, unit_y, low)
         elif low != -math.inf:
-            raise ModelError(
-                f'low = {describe(low)} has no effect on constant values: add values="tunable", or leave it out'
-            )
+            remedy = 'add values="tunable", or leave it out' if interpolation == LINEAR else "leave it out"
+            raise ModelError(f"low = {describe(low)} has no effect on constant values: {remedy}")
         self.unit_x, self.unit_y = unit_x, unit_y
         self.interpolation, self.ends = interpolation, ends
         self.parameters = tuple(value for value in self.y if isinstance(value, SettableVariable))

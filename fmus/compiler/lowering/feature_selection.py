@@ -74,8 +74,8 @@ def select_features(
     if ruling and HYBRID not in ruling:  # the closed form requires the hybrid law
         selection = tuple(label for label in selection if label != EXACT)
         if not selection:
+            remedy = f"give --law {HYBRID} instead" if real_only else f"add --law {HYBRID}"
             raise BuildError(
-                f"{source.name}: the method {EXACT!r} needs the law {HYBRID!r}: add --law {HYBRID}, or give another "
-                "--method."
+                f"{source.name}: the method {EXACT!r} needs the law {HYBRID!r}: {remedy}, or give another --method."
             )
     return FeatureSelection(selection, ruling, real_only)
