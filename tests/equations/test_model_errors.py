@@ -482,6 +482,16 @@ WRONG = {
         "q has the unit 'm/s^2': write \"m/s2\"",
     ),
     "degrees": (RATE + '    q = Parameter(1.0, "deg", "q")\n', 17, "q has the unit 'deg': use rad instead of deg"),
+    "degrees in a speed": (
+        RATE + '    q = Parameter(1.0, "deg/s", "q")\n',
+        17,
+        """q has the unit 'deg/s': use rad/s instead of deg/s, and display="deg/s" to show degrees""",
+    ),
+    "degrees of a temperature": (
+        RATE + '    q = Parameter(1.0, "deg C", "q")\n',
+        17,
+        "q has the unit 'deg C': use K for temperatures",
+    ),
     "no unit": (RATE + '    q = Parameter(1.0, "", "q")\n', 17, "q has the unit '': a pure number has the unit \"1\""),
     "a description for a unit": (
         RATE + '    q = Parameter(1.0, "mass", "kg")\n',

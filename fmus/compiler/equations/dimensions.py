@@ -6,7 +6,7 @@ from fractions import Fraction
 from typing import Any
 
 from .. import BuildError
-from ..units import BASE_UNITS, SYMBOLS, parse_unit, unit_of
+from ..units import BASE_UNITS, SYMBOLS, UNITS, parse_unit, unit_of
 from .algebra import operands_first
 from .conditions import is_absolute_value
 from .expression_printer import COMPARISON_OPERATORS
@@ -159,10 +159,13 @@ def unit_hint(unit: str, text: str) -> str:
     """Return what to write instead of an unknown unit, or an empty text."""
     if parse_unit(text):
         return "the unit comes before the description, so exchange them"
-    if re.search(r"\bdeg(ree)?s?\b", unit):
-        return 'use rad instead of deg, and display="deg" to show degrees'
-    if re.search(r"\bdeg\.?C\b|°C|\bcelsius\b", unit, re.IGNORECASE):
+    if re.search(r"\bdeg[. ]?C\b|°C|\bcelsius\b", unit, re.IGNORECASE):
         return "use K for temperatures and for their differences"
+    display, n_degrees = re.subn(r"\bdeg(ree)?s?\b", "deg", unit)
+    if n_degrees:
+        symbol = next((name for name, known in UNITS.items() if known.display == display), None)
+        remedy = f', and display="{display}" to show degrees' if symbol else ""
+        return f"use {symbol or 'rad'} instead of {display if symbol else 'deg'}{remedy}"
     if unit.strip() in ("", "-"):
         return 'a pure number has the unit "1"'
     symbol = unit.strip().replace("**", "").replace("^", "")
