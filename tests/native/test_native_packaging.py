@@ -25,6 +25,7 @@ from native_host import compiler, unpack_cached
 
 from fmus.compiler import BuildError
 from fmus.packaging import native
+from fmus.packaging.native import native_fmu
 from fmus.packaging.native.binaries import (
     DEFAULT_PLATFORMS,
     LARGE_SOURCE,
@@ -328,7 +329,7 @@ def test_a_missing_compiler_error_says_what_to_install(tmp_path, monkeypatch):
     """As an error that the command prints like that of an unknown platform."""
     monkeypatch.setitem(sys.modules, "ziglang", None)
     with pytest.raises(BuildError, match=r"pip install 'friction-fmus\[native\]'"):
-        native.build("smd", tmp_path)
+        native_fmu.build("smd", tmp_path)
     assert list(tmp_path.iterdir()) == []
 
 
