@@ -36,7 +36,7 @@ FIGURES_OF_PAGES = {
     "compare-laws": ("tutorials/first_run.md", "results/compare/*/figure.svg"),
     "cart": ("tutorials/own_model.md", "results/cart/figure.svg"),
     "shaken": ("tutorials/own_model.md", "results/shaken/figure.svg"),
-    "chain": ("tutorials/own_model.md", "results/speeds/figure.svg"),
+    "chain": ("tutorials/contacts_and_events.md", "results/speeds/figure.svg"),
     "decay": ("tutorials/identify_decay.md", "results/decay/record/figure.svg"),
     "curve": ("how-to/friction_curve.md", "results/curve/bench/figure.svg"),
     "fit": ("tutorials/fit_parameters.md", "results/fit/pulled_block/figure.svg"),
