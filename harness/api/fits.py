@@ -108,7 +108,7 @@ def fit(
     observe, inputs : sequence or mapping
         Measured outputs and driven inputs of the FMU, with the headings of their columns. By default a column
         that is named like an output is taken, of several the position, or else the only column whose unit fits one
-        output; ``notes`` states the choice.
+        output, and all columns that are named like inputs; ``notes`` states the choice.
     values : mapping, optional
         Values of other parameters.
     sigma : mapping, optional
@@ -158,7 +158,7 @@ def fit(
     from ..scenes.run_spec import RunSpec
     from ..studies.fit import study
     from ..studies.fit.laws import make_tasks
-    from ..studies.fit.observed import choose_observed
+    from ..studies.fit.observed import choose_columns
     from ..studies.fit.options import read_fitted_values, select_starts
     from ..studies.fit.request import FitRequest
 
@@ -201,5 +201,5 @@ def fit(
     fitted, predicted = load(records, UNNAMED), load(validate, "the validation record")
     if not fitted:
         raise SceneError("records is empty: give at least one record")
-    request, choice = choose_observed(request, fitted[0])
-    return study.fit_laws(make_tasks(request, choice), fitted, predicted, reporter(progress))
+    request, choices = choose_columns(request, fitted + predicted)
+    return study.fit_laws(make_tasks(request, choices), fitted, predicted, reporter(progress))

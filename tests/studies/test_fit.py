@@ -577,10 +577,10 @@ def test_slips_that_an_input_makes_irregular_are_described_by_the_fit_alone():
     random, t = np.random.default_rng(1), np.linspace(0.0, 30.0, 3001)
     force = np.interp(t, np.arange(0.0, 31.0, 1.5), random.uniform(-30.0, 30.0, 21))
     run = harness.simulate(native("stickslip"), times=t, inputs={"time": t, "F_ext": force})
-    frame = {"t [s]": t, "F_spring [N]": run["F_spring"] + random.normal(size=len(t)), "F_ext [N]": force}
+    frame = {"t [s]": t, "F_spring [N]": run["F_spring"] + random.normal(size=len(t))}
     without, with_input = (
-        harness.fit(native("stickslip"), frame, {"mu_s": (0.85, 0.95)}, observe="F_spring", inputs=inputs)
-        for inputs in ((), "F_ext")
+        harness.fit(native("stickslip"), table, {"mu_s": (0.85, 0.95)}, observe="F_spring")
+        for table in (frame, frame | {"F_ext [N]": force})
     )
     assert "slips of F_spring in the record are irregular" in without.remarks[0]
     assert (with_input.slips, [text for text in with_input.remarks if "irregular" in text]) == ((), [])

@@ -93,6 +93,19 @@ def test_a_column_that_fits_is_observed_and_named(tmp_path, columns, units, sent
     assert json.loads(done.stdout)["notes"][0] == fit.notes[0].replace("`observe`", "--observe")
 
 
+def test_a_column_with_the_name_of_an_input_drives_the_runs():
+    """Without it, the fit would explain the motion by other parameters."""
+    push = {"time": T, "F_ext": 3.0 * np.sin(11.0 * T)}
+    run = harness.simulate(native("coulomb"), {"f": 0.2}, times=T, inputs=push)
+    records = [{**push, "x": run["x"]}] * 2
+    chosen = harness.fit(native("coulomb"), records, ["f", "k"])
+    named = harness.fit(native("coulomb"), records, ["f", "k"], inputs=["F_ext"])
+    assert [estimate.value for estimate in chosen.estimates] == [estimate.value for estimate in named.estimates]
+    assert "the runs are driven by F_ext, because a column has its name; `inputs` selects others." in chosen.notes
+    lacking = harness.fit(native("coulomb"), [records[0], {"time": T, "x": run["x"]}], ["f", "k"])
+    assert not any("driven by" in note for note in lacking.notes)
+
+
 @pytest.mark.parametrize(
     ("model", "units", "words"),
     [

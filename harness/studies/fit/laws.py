@@ -19,8 +19,8 @@ from .request import (
 )
 
 
-def make_tasks(request: FitRequest, note: str = "") -> tuple[FitTask, ...]:
-    """Return the fit of each FMU of a request, the FMU of the request first; the first one has the note, if any.
+def make_tasks(request: FitRequest, own_notes: tuple[str, ...] = ()) -> tuple[FitTask, ...]:
+    """Return the fit of each FMU of a request, the FMU of the request first, which has these notes.
 
     Raises
     ------
@@ -30,7 +30,6 @@ def make_tasks(request: FitRequest, note: str = "") -> tuple[FitTask, ...]:
     """
     fmus = [request.run.fmu, *request.against]
     names = law_names(fmus)
-    own_notes = (note,) if note else ()
     if len(fmus) == 1:
         return (replace(make_task(request), notes=own_notes),)
     descriptions = [read_description(fmu) for fmu in fmus]

@@ -1,6 +1,6 @@
-"""Choice of the observed outputs where the user names none."""
+"""Choice of the observed outputs and of the inputs where the user names none."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from ...errors import SceneError, option_text
@@ -11,6 +11,45 @@ from ...scenes.roles import ROLES, find_roles
 from ...simulation.fmu_archive import read_description
 from ...simulation.whole_run import real_variables
 from .request import FitRequest
+
+
+def choose_columns(request: FitRequest, records: Sequence[Record]) -> tuple[FitRequest, tuple[str, ...]]:
+    """Return a request that observes outputs and names the inputs of the records, and a sentence on each choice.
+
+    Raises
+    ------
+    SceneError
+        If no output is named, and no column is that of an output.
+    """
+    request, driven = choose_inputs(request, records)
+    request, observed = choose_observed(request, records[0])
+    return request, tuple(filter(None, (observed, driven)))
+
+
+def choose_inputs(request: FitRequest, records: Sequence[Record]) -> tuple[FitRequest, str]:
+    """Return a request with the columns that are named like inputs of all FMUs, and a sentence; empty without any.
+
+    All records must have the column, because the same headings apply to all.
+    """
+    if request.inputs:
+        return request, ""
+    inputs = set.intersection(
+        *(
+            {name for name, variable in real_variables(read_description(fmu)).items() if variable.causality == "input"}
+            for fmu in (request.run.fmu, *request.against)
+        )
+    )
+    headings = [
+        {column.name: column.heading for column in list_columns(record.table) if column.name in inputs}
+        for record in records
+    ]
+    named = {name: heading for name, heading in headings[0].items() if all(name in others for others in headings[1:])}
+    if not named:
+        return request, ""
+    names = ", ".join(named)
+    columns = "the record has columns of these names" if len(named) > 1 else "a column has its name"
+    sentence = f"the runs are driven by {names}, because {columns}; {option_text('inputs')} selects others."
+    return replace(request, inputs=named), sentence
 
 
 def choose_observed(request: FitRequest, record: Record) -> tuple[FitRequest, str]:
