@@ -291,5 +291,5 @@ def test_site_builds_without_warnings(tmp_path):
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, env=ENVIRONMENT, timeout=300)
     assert (done.returncode, done.stderr) == (0, ""), done.stdout + done.stderr
     assert (tmp_path / "reference" / "commands" / "index.html").is_file()
-    page = (tmp_path / "reference" / "python" / "index.html").read_text(encoding="utf-8")
-    assert [name for name in harness.__all__ if f'id="harness.{name}"' not in page] == []
+    pages = [(tmp_path / "reference" / name / "index.html").read_text("utf-8") for name in ("python", "python_results")]
+    assert [name for name in harness.__all__ if f'id="harness.{name}"' not in "".join(pages)] == []
