@@ -16,8 +16,9 @@ FILE = click.Path(exists=True, dir_okay=False, path_type=Path)
 def references(files: tuple[Path, ...], quiet: bool, as_json: bool) -> None:
     """Compute the certified result of the model in each FILE.py and write it to FILE.csv.  The FMU must be built.
 
-    Two methods that share no formula solve the default run.  If they agree, FILE.csv is written, and for a model that
-    sticks FILE-events.csv with the changes of mode; the next build includes both in the FMU and on its page.
+    Two methods that share no formula solve the default run, one of them also with a thirtieth of the largest step.  If
+    all agree, FILE.csv is written, and for a model that sticks FILE-events.csv with the changes of mode; the next build
+    includes both in the FMU and on its page.
 
     \b
     Example:

@@ -109,7 +109,13 @@ class EmbeddedModel:
 
     @classmethod
     def create(
-        cls, model: type, values: dict[str, float], method: str | None, rtol: float, atol: float = 0.0
+        cls,
+        model: type,
+        values: dict[str, float],
+        method: str | None,
+        rtol: float,
+        atol: float = 0.0,
+        h_max: float = 0.0,
     ) -> "EmbeddedModel":
         """Create a model and set its values.
 
@@ -121,8 +127,8 @@ class EmbeddedModel:
             Parameters and inputs by name.
         method : str or None
             Integration method; None for the default of the model.
-        rtol, atol : float
-            Tolerances; 0 for the defaults.
+        rtol, atol, h_max : float
+            Tolerances, and largest step in s; 0 for the defaults.
 
         Raises
         ------
@@ -134,7 +140,7 @@ class EmbeddedModel:
         attributes = {getattr(declared, "element", ""): name for name, declared in vars(model).items()}
         for name, value in values.items():
             setattr(instance, attributes.get(name, name), value)
-        run.solver.rtol, run.solver.atol = rtol, atol
+        run.solver.rtol, run.solver.atol, run.solver.h_max = rtol, atol, h_max
         if method:
             run.solver.method = method_numbers(model)[method]
         violated = instance.prepare() or run.solver.check_method(instance)

@@ -11,7 +11,7 @@ import pytest
 from build_cache import ROOT, build_user_model
 from fmpy import read_model_description, simulate_fmu
 from fmpy.validation import validate_fmu
-from model_text import BLOCK
+from model_text import BLOCK, PULSES
 from models import EXAMPLE_MODELS, model_class
 from row_comparison import assert_identical
 from scipy.integrate import solve_ivp
@@ -21,7 +21,7 @@ from fmus.compiler import BuildError
 from fmus.compiler.model_lookup import find_model
 from fmus.packaging.archive import build
 from fmus.packaging.model_description import REAL_ONLY_HINT
-from harness import describe
+from harness import describe, simulate
 
 EVERY_FILE = pytest.mark.parametrize("path", EXAMPLE_MODELS, ids=lambda path: path.stem)
 KINDS = {
@@ -259,6 +259,18 @@ def test_a_run_on_which_two_methods_disagree_is_not_certified(oil, text, reason)
     assert run.returncode == 1
     assert run.stderr.startswith(f"Error: case.py: dop853 and rodas {reason}")
     assert not (oil / "case.csv").exists()
+
+
+def test_a_pulse_that_both_methods_miss_is_not_certified(oil):
+    (oil / "pulses.py").write_text(PULSES)
+    assert command("pulses.py", cwd=oil).returncode == 0
+    for method in ("dop853", "rodas"):
+        motion = simulate(oil / "pulses.fmu", {"solver.method": method}, rtol=1e-12, progress=False)
+        assert motion["x"][-1] == 0.0
+    run = harness("references", "pulses.py", cwd=oil)
+    assert run.returncode == 1
+    assert run.stderr.startswith("Error: pulses.py: dop853 with a thirtieth of the largest step differs by ")
+    assert not (oil / "pulses.csv").exists()
 
 
 def test_an_invalid_result_is_refused(oil):

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from itertools import pairwise
+from math import cos, exp
 from shutil import copy
 
 import independent_pendulum
@@ -13,8 +14,10 @@ from mpmath import mpf
 from PIL import Image
 
 from benchmarks.literature.problems import BeltBlock, ChatteringOscillatorSign, SmoothedBeltBlock
+from benchmarks.references import event_located
 from benchmarks.references.generation import CLOSED_FORMS, evaluate_closed_form
 from benchmarks.references.icon import draw_missing_icon
+from harness.errors import HarnessError
 from harness.references.certified_reference import (
     FOLDER,
     POINTS,
@@ -187,6 +190,35 @@ def test_event_times_are_compared_only_where_the_modes_agree():
     assert np.isnan(event_time_error([(1.0, 1)], truth))
     assert np.isnan(event_time_error([(1.0, -1), (2.0, 0)], truth))
     assert event_time_error([], []) == 0.0
+
+
+class Pulses(event_located.HybridProblem):
+    """Block under a constant load, whose holding limit has a short dip in each turn of a phase."""
+
+    start, stop, first = (0.5, 0.0, 0.0), 10.0, (0,)
+
+    def rates(self, t, y, modes):
+        return [2.0, y[2], 3.0 - modes[0] * self.limit(y[0]) if modes[0] else 0.0]
+
+    def limit(self, phase):
+        return 5.0 * (1.0 - 0.8 * exp(-2e4 * (1.0 - cos(phase))))
+
+    def contacts(self, t, y, modes):
+        return [(y[2], 3.0, self.limit(y[0]))]
+
+    def stop_slip(self, y, modes):
+        if modes[0] == 0:
+            y[2] = 0.0
+
+
+@pytest.mark.slow
+def test_a_pulse_that_the_steps_of_scipy_pass_is_not_certified():
+    """There are three pulses, with two events each."""
+    problem = Pulses()
+    _, events = event_located.solve(problem, [0.0, problem.stop], "DOP853", 3e-14, 1e-17)
+    assert len(events) < 6
+    with pytest.raises(HarnessError, match="find different changes of mode, so the result is not certified"):
+        event_located.certify_problem("pulses", problem)
 
 
 def test_a_model_without_an_icon_gets_the_curve_of_its_result(tmp_path):

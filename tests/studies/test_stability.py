@@ -14,6 +14,7 @@ import independent_solution
 import numpy as np
 import pytest
 from build_cache import ROOT, build_user_model
+from model_text import PULSES
 from models import EXAMPLE_MODELS, LARGER_MODELS, MODELS, declared
 from spec_runs import ignore_progress
 
@@ -304,6 +305,17 @@ def test_a_model_without_position_and_speed_is_refused_by_stability_but_not_by_p
     done = commands.harness(tmp_path, "precision", "relax.py", "--quick")
     assert (done.returncode, done.stderr) == (0, "")
     assert (tmp_path / "results/precision/relax/points.csv").is_file()
+
+
+def test_a_case_whose_reference_misses_a_pulse_is_wrong(tmp_path):
+    (tmp_path / "pulses.py").write_text(PULSES)
+    assert commands.build("pulses.py", folder=tmp_path).returncode == 0
+    groups = grouped_cases(models=[str(tmp_path / "pulses.fmu")])
+    cases = [case for group in groups for case in group if case.title == "as it comes"]
+    with study.Worker() as worker:
+        rows = list(study.run_group(cases, worker))
+    assert {(row.has_passed, row.ended) for row in rows} == {(False, WRONG)}
+    assert all("dop853 with a thirtieth of the largest step differs by " in row.text for row in rows)
 
 
 def test_a_hang_is_the_outcome_of_its_case(case, monkeypatch):

@@ -45,3 +45,24 @@ class Block(Model):
     a = Output("m/s2", "acceleration", (-k * x - F_friction) / m, rate_of=v)
     stop_time = 2.0
 '''
+PULSES = '''
+from fmus import Contact, Mode, Model, Output, Parameter, State, cos, exp
+
+class Pulses(Model):
+    """Block whose holding limit dips over a phase that no clock gives, because its rate depends on itself."""
+
+    m = Parameter(1.0, "kg", "mass", above=0.0)
+    load = Parameter(3.0, "N", "load")
+    limit = Parameter(5.0, "N", "holding limit", low=0.0)
+    p = Parameter(2000.0, "1", "sharpness", low=0.0)
+    Om = Parameter(2.0, "rad/s", "frequency")
+    T = Parameter(1e12, "s", "time constant", above=0.0)
+    phase = State("rad", "phase", start=0.5)
+    x = State("m", "position")
+    v = State("m/s", "speed", rate_of=x)
+    mode = Mode()
+    F = Contact("N", "friction", mode=mode, slip=v, slide=limit * (1.0 - 0.8 * exp(-p * (1.0 - cos(phase)))))
+    phase_rate = Output("rad/s", "rate of the phase", Om - phase / T, rate_of=phase)
+    a = Output("m/s2", "acceleration", (load - F) / m, rate_of=v)
+    stop_time, method = 40.0, "dop853"
+'''

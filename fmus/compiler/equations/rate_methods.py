@@ -11,6 +11,7 @@ from .coupled_contact_methods import (
 )
 from .expression_printer import ExpressionPrinter
 from .expressions import FUNCTIONS, Expression, Operand, Term
+from .model_analysis import ModelAnalysis
 from .model_declaration import THRESHOLD, Contact
 from .single_contact_methods import threshold_call
 
@@ -135,39 +136,67 @@ def clipped_force_derivative(context: CodegenContext, c: Contact, by: dict[Expre
 
 
 def fastest_clock_method(context: CodegenContext) -> str:
-    """Largest rate at which clocks change functions; a clock is a state with a constant rate.
+    """Largest rate at which clocks change functions; in event functions, also that of positions at their speeds.
 
-    Its reciprocal is the time in which the argument of sin or cos changes by 2, a divisor by half of its size, and the
+    In its reciprocal, the argument of sin or cos changes by no more than 2, a divisor by half of its size, and the
     argument u of another function, such as exp, by (1 + |u|)/2: where u is large, the function is nearly constant.
     """
     analysis, printer = context.analysis, context.printer()
-    varying = (*analysis.time_varying, *analysis.input_symbols, *analysis.contacts)
-    clocks = analysis.explicit_time_derivatives | {
-        s: analysis.rate[s] for s in analysis.states if not depends_on(analysis.rate[s], varying)
-    }
-    roots: list[Operand] = [rate.expression for rate in context.rate_outputs]
+    rates = clock_rates(analysis)
+    accelerations = {clock: analysis.derivative(rate, rates) for clock, rate in rates.items()}
+    positions = (
+        {x: analysis.rate[x] for x in analysis.positions}
+        if analysis.conditions or context.single_contact is None
+        else {}
+    )
+    events: list[Operand] = [condition.margin for condition in analysis.conditions]
     for c in analysis.contacts:
-        roots += [c.slip, c.slide, analysis.holding_limit[c], *analysis.load_expressions(c)]
-    roots += [condition.margin for condition in analysis.conditions]
+        events += [analysis.holding_limit[c], *analysis.load_expressions(c)]
+    in_events = {id(e) for e in operands_first(*events)}
+    others = [
+        *(rate.expression for rate in context.rate_outputs),
+        *(e for c in analysis.contacts for e in (c.slip, c.slide)),
+    ]
     terms: list[Operand] = []
-    for e in operands_first(*roots):
+    for e in operands_first(*others, *events):
         if isinstance(e, Term) and (e.op == "/" or (e.op in FUNCTIONS and e.op not in ("fabs", "sqrt"))):
             argument = e.args[-1]
-            slope = analysis.derivative(argument, clocks)
+            size = Term("fabs", argument)
+            change = {"sin": 4.0, "cos": 4.0, "tan": 4.0, "/": size}.get(e.op, build_term("+", 1.0, size))
+            slope = analysis.derivative(argument, positions | rates if id(e) in in_events else rates)
+            bend = analysis.derivative(argument, accelerations)
+            rate: Operand = 0.0  # r with |slope| / r + |bend| / (2 r r) <= change / 2
             if not is_same_expression(slope, 0.0):
-                size = Term("fabs", argument)
-                change = {"sin": 4.0, "cos": 4.0, "tan": 4.0, "/": size}.get(e.op, build_term("+", 1.0, size))
-                terms.append(build_term("/", build_term("*", 2.0, Term("fabs", slope)), change))
+                rate = build_term("/", build_term("*", 2.0, Term("fabs", slope)), change)
+            if not is_same_expression(bend, 0.0):
+                rate = build_term("+", rate, Term("sqrt", build_term("/", Term("fabs", bend), change)))
+            if not is_same_expression(rate, 0.0):
+                terms.append(rate)
     context.emit_driver(printer, terms)
     printer.count_uses(*terms)
-    rates = list(dict.fromkeys(map(printer.text, terms))) or ["0.0"]
-    largest, rate = printer.fresh_name("largest"), printer.fresh_name("rate")
-    printer.emit(f"{largest} = {rates[0]}")
-    for text in rates[1:]:
-        printer.emit(f"{rate} = {text}")
-        printer.emit(f"{largest} = {rate} if {rate} > {largest} else {largest}")
+    texts = list(dict.fromkeys(map(printer.text, terms))) or ["0.0"]
+    largest, other = printer.fresh_name("largest"), printer.fresh_name("rate")
+    printer.emit(f"{largest} = {texts[0]}")
+    for text in texts[1:]:
+        printer.emit(f"{other} = {text}")
+        printer.emit(f"{largest} = {other} if {other} > {largest} else {largest}")
     printer.emit(f"return {largest}")
     return method_source("fastest_clock", context.arguments, printer.lines)
+
+
+def clock_rates(analysis: ModelAnalysis) -> dict[Expression, Operand]:
+    """Return the rate of each clock: a driver, an input with derivatives, or a state whose rate is known at rest.
+
+    The rate of such a state depends on parameters, inputs and other clocks only.
+    """
+    rates: dict[Expression, Operand] = {**analysis.explicit_time_derivatives, **analysis.input_derivatives}
+    moving: set[Expression] = {*analysis.contacts, *analysis.modes, *analysis.states}
+    for _ in analysis.states:
+        for state, rate in analysis.rate.items():
+            if not depends_on(rate, moving):
+                rates[state] = rate
+                moving.discard(state)
+    return rates
 
 
 def closed_form_methods(context: CodegenContext) -> list[str]:
