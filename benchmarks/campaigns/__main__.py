@@ -17,6 +17,7 @@ CAMPAIGNS = {  # name -> command, after the path of Python
     "decay_defects": ("-m", "benchmarks.campaigns.decay_defects", "200", "4813"),
     "low_speed_friction": ("-m", "benchmarks.campaigns.low_speed_friction", "4"),
     "curve_coverage": ("-m", "benchmarks.campaigns.curve_coverage", "300"),
+    "hidden_defects": ("-m", "benchmarks.campaigns.hidden_defects", "60"),
     "decay_times": ("-m", "benchmarks.campaigns.decay_times"),
 }
 FOLDER = Path("results/campaigns")

@@ -1,6 +1,6 @@
 """Identification of friction over velocity: law, constants, outliers and remarks."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -9,50 +9,20 @@ import numpy as np
 from ...arguments import TEXT, check_arguments
 from ...errors import HarnessError, SceneError, check_names, option_text
 from ..estimation.estimate import Estimate
-from .law_fit import LawFit, count_speeds, fit_law, group_speeds
-from .laws import LAWS
+from .law_fit import LawFit, count_speeds, fit_law, linearise
+from .laws import LAWS, Law
 from .outliers import find_outliers
+from .points import CurvePoints, Effect, find_dependences
 
 MIN_POINTS = 6
 OUTLIER_COST = 3.0  # unknowns for which an outlier counts: its size, and twice the choice of the point among n
 MIN_SIZE, MAX_SIZE = 1e-100, 1e100  # of the largest velocity or force; their squares are finite
 MAX_BIAS = 1e3  # of the largest force
 CLEAR_DIFFERENCE = 6.0  # of two BIC
-SIGNIFICANT_RUNS = 0.002  # probability of as few runs of signs in independent residuals
-
-
-@dataclass(frozen=True)
-class CurvePoints:
-    """Points of friction over velocity.
-
-    Attributes
-    ----------
-    name : str
-        Name of the record.
-    v, force : numpy.ndarray
-        Velocities and forces (n,) in SI units; a driving force, with the sign of the velocity.
-    velocity_unit, force_unit : str
-        m/s or rad/s, and N or N.m.
-    labels : tuple of str
-        Name of each point: its row in the table, or the times of its plateau.
-    notes : tuple of str
-        Assumptions made when reading.
-    """
-
-    name: str
-    v: np.ndarray
-    force: np.ndarray
-    velocity_unit: str = "m/s"
-    force_unit: str = "N"
-    labels: tuple[str, ...] = ()
-    notes: tuple[str, ...] = ()
-
-    @property
-    def units(self) -> dict[str, str]:
-        """Return the unit of each constant."""
-        force, velocity = self.force_unit, self.velocity_unit
-        viscous = f"{force}.s/{velocity.removesuffix('/s')}"
-        return {"F_c": force, "F_s": force, "F_v": viscous, "v_s": velocity, "bias": force}
+SIGNIFICANT_CORRELATION = 3.1  # standard deviations of the correlation of independent neighbours
+MAX_EFFECTS = 4
+MAX_LISTED = 5  # points that do not fit
+REACHES = 5.0  # reaches of presliding after which less than 1 % of it is left
 
 
 @dataclass(frozen=True)
@@ -138,17 +108,28 @@ def identify(points: CurvePoints, bias: float | None = None, mass: float | None 
         If the force does not oppose the velocity.
     """
     points, bias = check_points(points, bias)
-    used = find_used_points(points, bias)
-    fits, unavailable = [], {}
-    for law in LAWS:
-        fit = fit_law(law, points.v[used], points.force[used], bias, points.units)
-        if isinstance(fit, str):
-            unavailable[law.name] = fit
-        else:
-            fits.append(fit)
+    points, effects, remark = leave_out_presliding(points, bias)
+    effects, used = find_used_points(points, bias, effects)
+    fitted = points.select(used)
+    fits, unavailable = fit_laws(fitted, bias, effects)
     fits.sort(key=lambda fit: fit.bic)
-    result = CurveIdentification(points, used, tuple(fits), unavailable, mass)
-    return replace(result, remarks=tuple(find_remarks(result)))
+    best = fits[0]
+    widening = widen_by_neighbours(fitted, linearise(best, fitted)[0])
+    full = (fit_law(fit.law, fitted, bias, effects, True, widening) for fit in fits)
+    corrected = replace(points, force=points.force - best.effect_force(points))
+    result = CurveIdentification(
+        corrected, used, tuple(fit for fit in full if isinstance(fit, LawFit)), unavailable, mass
+    )
+    return replace(result, remarks=(*remark, *find_remarks(result, widening)))
+
+
+def fit_laws(
+    points: CurvePoints, bias: float | None, effects: Sequence[Effect], laws: Sequence[Law] = LAWS
+) -> tuple[list[LawFit], dict[str, str]]:
+    """Return the fits of laws without intervals, and the reasons why the others are not fitted."""
+    results = {law.name: fit_law(law, points, bias, effects, has_intervals=False) for law in laws}
+    fits = [fit for fit in results.values() if not isinstance(fit, str)]
+    return fits, {name: reason for name, reason in results.items() if isinstance(reason, str)}
 
 
 def check_points(points: CurvePoints, bias: float | None) -> tuple[CurvePoints, float | None]:
@@ -171,7 +152,8 @@ def check_points(points: CurvePoints, bias: float | None) -> tuple[CurvePoints, 
             raise SceneError(f"{name}: the largest {label} is {size:.3g} {unit}, outside {span}: check its unit")
     count = int((~moving).sum())
     notes = [f"{count} points have the velocity 0 and are left out."] if count else []
-    v, force = points.v[moving], points.force[moving]
+    points = points.select(moving)
+    v, force = points.v, points.force
     if len(v) < MIN_POINTS:
         raise SceneError(f"{name} has {len(v)} points with velocity; at least {MIN_POINTS} are required")
     if count_speeds(v) < 2:
@@ -188,12 +170,9 @@ def check_points(points: CurvePoints, bias: float | None) -> tuple[CurvePoints, 
     if float(np.ptp(force)) == 0.0:
         raise HarnessError(f"{name}: the force is {force[0]:.4g} {points.force_unit} at all points")
     if drives_backward(is_forward, force, bias, points):
-        force, bias = -force, None if bias is None else -bias
+        points, bias = points.reverse(), None if bias is None else -bias
         notes.append("The force opposes the velocity; its sign is reversed, so that it drives the motion.")
-    all_labels = points.labels or [f"point {i + 1}" for i in range(len(moving))]
-    labels = tuple(label for label, is_kept in zip(all_labels, moving, strict=True) if is_kept)
-    units = points.velocity_unit, points.force_unit
-    return CurvePoints(name, v, force, *units, labels, (*points.notes, *notes)), bias
+    return replace(points, notes=(*points.notes, *notes)), bias
 
 
 def drives_backward(is_forward: np.ndarray, force: np.ndarray, bias: float | None, points: CurvePoints) -> bool:
@@ -210,14 +189,73 @@ def drives_backward(is_forward: np.ndarray, force: np.ndarray, bias: float | Non
     return max(friction) < 0
 
 
-def find_used_points(points: CurvePoints, bias: float | None) -> np.ndarray:
+def leave_out_presliding(points: CurvePoints, bias: float | None) -> tuple[CurvePoints, tuple[Effect, ...], list[str]]:
+    """Return the points beyond the distance in which the force builds up after a reversal, and their other effects.
+
+    The last result is a remark, if there are such points.
+    """
+    distance, length = 0.0, points.velocity_unit.removesuffix("/s")
+    for _ in range(MAX_EFFECTS):
+        effects = find_effects(points, bias)
+        reach = next((effect.reach for effect in effects if effect.reach), 0.0)
+        is_beyond = points.travelled > max(REACHES * reach, distance) if reach else np.zeros(0, bool)
+        if is_beyond.all() or is_beyond.sum() < len(points.v) / 2:
+            break
+        distance, points = max(REACHES * reach, distance), points.select(is_beyond)
+    if not distance:
+        return points, effects, []
+    option = option_text("backlash", float(f"{distance:.2g}"))
+    return (
+        points,
+        effects,
+        [
+            "After a reversal the force is lower than friction, as in presliding or backlash: points within "
+            f"{distance:.2g} {length} are left out, as {option} does."
+        ],
+    )
+
+
+def find_used_points(
+    points: CurvePoints, bias: float | None, effects: tuple[Effect, ...]
+) -> tuple[tuple[Effect, ...], np.ndarray]:
+    """Return the effects of the points without outliers, and their mask (n,); `effects` are those of all points."""
+    while True:
+        used = find_fitting_points(points, bias, effects)
+        if len(effects) >= len(again := find_effects(points.select(used), bias)):
+            return again, used
+        effects = again
+
+
+def find_effects(points: CurvePoints, bias: float | None) -> tuple[Effect, ...]:
+    """Return the effects besides the velocity on which the residuals of the best law depend.
+
+    They are searched from the best symmetric law and from the best of all, because a difference of the directions may
+    be a drift.
+    """
+    results = []
+    for laws in ([law for law in LAWS if law.is_symmetric], LAWS):
+        effects: tuple[Effect, ...] = ()
+        while fits := fit_laws(points, bias, effects, laws)[0]:
+            best = min(fits, key=lambda fit: fit.bic)
+            residuals, jacobian, _ = linearise(best, points)
+            found = find_dependences(points, residuals, jacobian, effects)
+            trials = [(fit_law(best.law, points, bias, (*effects, effect), False), effect) for effect in found]
+            scored = [(fit.bic, effect) for fit, effect in trials if isinstance(fit, LawFit) and fit.bic < best.bic]
+            if not scored or len(effects) == MAX_EFFECTS:
+                results.append((best.bic, effects))
+                break
+            effects = (*effects, min(scored)[1])
+    return min(results, default=(0.0, ()))[1]
+
+
+def find_fitting_points(points: CurvePoints, bias: float | None, effects: Sequence[Effect]) -> np.ndarray:
     """Return the mask (n,) of the points without the outliers of the law that describes the points best.
 
     An outlier counts as further unknowns, so that a law that needs many outliers does not win.
     """
     n, best = len(points.v), (np.inf, np.ones(len(points.v), bool))
     for law in LAWS:
-        found = find_outliers(law, points.v, points.force, bias, points.units)
+        found = find_outliers(law, points, bias, effects)
         if isinstance(found, str):
             continue
         fit, used = found
@@ -230,15 +268,28 @@ def find_used_points(points: CurvePoints, bias: float | None) -> np.ndarray:
     return best[1]
 
 
-def find_remarks(result: CurveIdentification) -> list[str]:
+def widen_by_neighbours(points: CurvePoints, residuals: np.ndarray) -> float:
+    """Return the factor by which the variance grows, because residuals (n,) follow each other over velocity or time."""
+    factor = 1.0
+    for order in (points.v, points.elapsed):
+        if len(order):
+            e = residuals[np.argsort(order, kind="stable")]
+            rho = float(e[:-1] @ e[1:]) / float(e @ e + 1e-300)
+            if rho > SIGNIFICANT_CORRELATION / np.sqrt(len(e)):
+                factor = max(factor, (1 + rho) / (1 - rho))
+    return factor
+
+
+def find_remarks(result: CurveIdentification, widening: float) -> list[str]:
     """Return the reasons to doubt a result."""
     best, points, used = result.best, result.points, result.used
-    v, residuals = points.v[used], result.residuals[used]
-    remarks = []
+    v = points.v[used]
+    remarks = [describe_effect(result, effect) for effect in best.effects]
     outliers = np.flatnonzero(~used)
     if len(outliers):
-        listed = ", ".join(describe_point(result, int(i)) for i in outliers)
-        remarks.append(f"{len(outliers)} of {len(v) + len(outliers)} points do not fit and are left out: {listed}.")
+        listed = ", ".join(describe_point(result, int(i)) for i in outliers[:MAX_LISTED])
+        more = f", and {len(outliers) - MAX_LISTED} more" * (len(outliers) > MAX_LISTED)
+        remarks.append(f"{len(outliers)} of {len(points.v)} points do not fit and are left out: {listed}{more}.")
     for name in ("v_s", "v_s+", "v_s-"):
         if name in best.values and not np.isfinite(result[name].high):
             remarks.append(
@@ -255,17 +306,51 @@ def find_remarks(result: CurveIdentification) -> list[str]:
             remarks.append(f"{estimate.name} is negative: the points are not those of a friction force.")
         if estimate.name.startswith("F_v") and estimate.high < 0:
             remarks.append(f"{estimate.name} is negative: friction falls with the speed; no model takes such a value.")
+    is_forward = points.v[np.argsort(points.elapsed)] > 0 if len(points.elapsed) else np.zeros(0, bool)
+    if (np.diff(is_forward) != 0).sum() == 1 and (not best.law.is_symmetric or "bias" in best.values):
+        remarks.append(
+            "Each direction was measured once, at another time: a difference of the directions or a bias may be a "
+            "drift of friction; measure the directions in turn."
+        )
     if not best.law.is_symmetric:
         remarks.append(
             "The directions differ by more than a constant bias; half of the difference of their Coulomb friction may "
             "be a bias, which the points cannot separate."
         )
-    if has_few_runs(v, residuals):
+    if widening > 1:
         remarks.append(
-            "Residuals of neighbouring points have the same sign: no law follows the curve, and the intervals are too "
-            "narrow; use the table."
+            "Residuals of neighbouring points have the same sign: no law follows the curve. The intervals are "
+            f"{np.sqrt(widening):.2g} times as wide as without; use the table."
         )
     return remarks
+
+
+def describe_effect(result: CurveIdentification, effect: Effect) -> str:
+    """Return the sentence on an effect that the fit contains."""
+    points, values = result.points, result.best.values
+    value = np.mean([values[name] for name in values if name.rstrip("+-") == effect.name])
+    length = points.velocity_unit.removesuffix("/s")
+    match effect.name:
+        case "lag":
+            return f"The force lags the velocity by {value:.3g} s, as behind a filter; the fit contains this lag."
+        case "inertia":
+            option = option_text("mass", float(f"{value:.3g}"))
+            return (
+                f"The force rises with the acceleration, as that of {value:.3g} {points.units['inertia']} of inertia "
+                f"or of a lag; the fit contains this part, and {option} removes it before."
+            )
+        case "presliding":
+            return (
+                f"After a reversal the force is lower than friction, over about {effect.reach:.2g} {length}, as in "
+                f"presliding or backlash; {option_text('backlash', float(f'{3 * effect.reach:.2g}'))} leaves it out."
+            )
+    name = effect.name.removeprefix("drift of ")
+    change, unit = value * float(np.ptp(points.elapsed)), points.units[name]
+    cause = "a sensor that warms up" if name == "bias" else "friction that warms up"
+    return (
+        f"{name} drifts by {change:+.2g} {unit} over the record, as with {cause}; its value is that in the middle of "
+        "the record."
+    )
 
 
 def describe_point(result: CurveIdentification, i: int) -> str:
@@ -275,20 +360,3 @@ def describe_point(result: CurveIdentification, i: int) -> str:
         f"{points.labels[i]} ({points.v[i]:.4g} {points.velocity_unit}, {points.force[i]:.4g} {points.force_unit}, "
         f"{result.residuals[i]:+.2g} {points.force_unit} from the law)"
     )
-
-
-def has_few_runs(v: np.ndarray, residuals: np.ndarray) -> bool:
-    """Return whether residuals (n,) over the velocity v (n,) change their sign too seldom for independent ones."""
-    from scipy.special import ndtr
-
-    groups = group_speeds(v)
-    means = [residuals[group[np.sign(v[group]) == sign]] for sign in (-1, 1) for group in groups]
-    signs = np.sign([float(values.mean()) for values in means if len(values)])
-    positive, negative = int((signs > 0).sum()), int((signs < 0).sum())
-    n = positive + negative
-    if min(positive, negative) < 4:
-        return False
-    runs = 1 + int((np.diff(signs) != 0).sum())
-    mean = 1 + 2 * positive * negative / n
-    deviation = np.sqrt((mean - 1) * (mean - 2) / (n - 1))
-    return bool(ndtr((runs + 0.5 - mean) / deviation) < SIGNIFICANT_RUNS)

@@ -6,26 +6,34 @@ sum of squares of at most the smallest one times 1 + t^2/(n - p), with Student's
 linear law.
 """
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..estimation.estimate import Estimate, student_quantile
 from .laws import BY_NAME, Law
+from .points import CurvePoints, Effect
 
 COARSE, FINE = 64, 256  # values of v_s, in its range and in its interval
 ZOOM, ZOOMS = 25, 3  # values of v_s about the best one, and number of repetitions
 ROUNDOFF = 1e-12  # relative to the largest force: smaller residuals are rounding errors
 MIN_FREEDOM = 2  # points beyond the number of constants
-MIN_POINTS_PER_CONSTANT = 1.5  # with fewer, the BIC prefers laws with too many constants
+MIN_POINTS_PER_CONSTANT = 2.0  # with fewer, the BIC prefers laws with too many constants
 MIN_SPEEDS = {0: 1, 1: 4, 2: 4}  # different speeds of one direction, by the exponent of the law
 SAME_SPEED = 0.05  # relative distance of speeds that are one
 TEXTS = {
     "F_c": "Coulomb friction",
     "F_s": "static friction",
-    "F_v": "viscous friction",
     "v_s": "Stribeck velocity",
+    "F_v": "viscous friction",
     "bias": "constant bias or gravity",
+    "drift of F_c": "rate of the Coulomb friction",
+    "drift of F_v": "rate of the viscous friction",
+    "drift of bias": "rate of the bias",
+    "lag": "lag of the force behind the velocity",
+    "inertia": "inertia",
+    "presliding": "loss of force after a reversal",
 }
 DIRECTIONS = {1: ("+", ", forward"), -1: ("-", ", backward"), 0: ("", "")}  # suffixes of a symbol and of its text
 
@@ -48,6 +56,8 @@ class LawFit:
         Number of fitted points.
     bic : float
         Bayesian information criterion.
+    effects : tuple of Effect
+        Other forces that were fitted.
     """
 
     name: str
@@ -56,6 +66,7 @@ class LawFit:
     sum_of_squares: float
     points: int
     bic: float
+    effects: tuple[Effect, ...] = ()
 
     @property
     def law(self) -> Law:
@@ -92,6 +103,15 @@ class LawFit:
         """Return the force (n,) at velocities v (n,), with the bias."""
         return self.friction(v) + self.bias
 
+    def effect_force(self, points: CurvePoints) -> np.ndarray:
+        """Return the force (n,) of the other effects in points."""
+        force, values = np.zeros(len(points.v)), self.values
+        for suffix, sign in (("", 0), ("+", 1), ("-", -1)):
+            for effect in self.effects:
+                mask = sign * points.v >= 0
+                force[mask] += values.get(effect.name + suffix, 0.0) * points.column(effect)[mask]
+        return force
+
 
 @dataclass
 class Grid:
@@ -106,12 +126,23 @@ class Grid:
 class Part:
     """The points to which a law fits one set of constants: those of one direction, or of both."""
 
-    def __init__(self, law: Law, v: np.ndarray, force: np.ndarray, direction: int, has_bias: bool) -> None:
-        self.law, self.v, self.y, self.direction, self.has_bias = law, v, force, direction, has_bias
-        self.symbols = (*law.symbols, *(["bias"] if has_bias else []))
+    def __init__(
+        self,
+        law: Law,
+        points: CurvePoints,
+        effects: Sequence[Effect],
+        known_bias: float,
+        direction: int,
+        has_bias: bool,
+    ) -> None:
+        self.law, self.direction, self.has_bias = law, direction, has_bias
+        self.v, self.y = points.v, points.force - known_bias
+        self.nodes, self.weights = points.nodes
+        self.effects = np.stack([points.column(effect) for effect in effects], axis=-1) if effects else None
+        self.symbols = (*law.symbols, *(["bias"] if has_bias else []), *(effect.name for effect in effects))
         self.count = len(self.symbols) + bool(law.exponent)
         if law.exponent:
-            self.low, self.high = law.stribeck_range(np.abs(v))
+            self.low, self.high = law.stribeck_range(np.abs(self.v))
             coarse = self.evaluate(np.geomspace(self.low, self.high, COARSE))
             self.best = self.locate(coarse)
         else:
@@ -124,13 +155,20 @@ class Part:
         """Return whether a v_s gives friction that falls from F_s to F_c."""
         return bool(np.isfinite(self.best.squares[0]))
 
+    def design(self, v_s: np.ndarray) -> np.ndarray:
+        """Return the matrices (k, n, symbols) of the linear constants with each v_s (k,)."""
+        design = self.law.design(self.nodes, v_s, self.has_bias, self.weights)
+        if self.effects is None:
+            return design
+        return np.concatenate([design, np.broadcast_to(self.effects, (len(v_s), *self.effects.shape))], axis=-1)
+
     def evaluate(self, v_s: np.ndarray) -> Grid:
         """Fit the law with each v_s (k,)."""
-        design = self.law.design(self.v, v_s, self.has_bias)
+        design = self.design(v_s)
         scale = np.linalg.norm(design, axis=1) + 1e-300
         q, r = np.linalg.qr(design / scale[:, None, :])
         diagonal = np.abs(np.einsum("kii->ki", r)).min(axis=1)
-        inverse = np.linalg.inv(r + np.where(diagonal < 1e-13, 1.0, 0.0)[:, None, None] * np.eye(r.shape[1]))
+        inverse = np.linalg.inv(np.where((diagonal < 1e-13)[:, None, None], np.eye(r.shape[1]), r))
         constants = np.einsum("kij,klj,l->ki", inverse, q, self.y) / scale
         residuals = self.y - np.einsum("kij,kj->ki", design, constants)
         squares = np.where(diagonal < 1e-13, np.inf, (residuals**2).sum(axis=1))
@@ -162,19 +200,18 @@ class Part:
         item = slice(i, i + 1)
         return Grid(grid.v_s[item], grid.constants[item], grid.spread[item], squares[item])
 
-    def estimates(self, margin: float, variance: float, units: dict[str, str]) -> list[Estimate]:
+    def estimates(self, margin: float, units: dict[str, str]) -> list[Estimate]:
         """Return the constants with the intervals in which the sum of squares rises by at most `margin`."""
         values = dict(zip(self.symbols, self.best.constants[0], strict=True))
         if self.law.exponent:
             values["v_s"] = float(self.best.v_s[0])
         intervals = dict.fromkeys(values, (np.nan, np.nan)) if np.isnan(margin) else self.intervals(values, margin)
-        errors = self.standard_errors(variance)
-        order = [symbol for symbol in ("F_c", "F_s", "v_s", "F_v", "bias") if symbol in values]
+        order = sorted(values, key=[*TEXTS].index)
         suffix, text = DIRECTIONS[self.direction]
         estimates = []
         for symbol in order:
-            value, error, (low, high) = float(values[symbol]), float(errors[symbol]), map(float, intervals[symbol])
-            estimates.append(Estimate(symbol + suffix, value, error, low, high, units[symbol], TEXTS[symbol] + text))
+            value, (low, high) = float(values[symbol]), map(float, intervals[symbol])
+            estimates.append(Estimate(symbol + suffix, value, np.nan, low, high, units[symbol], TEXTS[symbol] + text))
         return estimates
 
     def intervals(self, values: dict[str, float], margin: float) -> dict[str, tuple[float, float]]:
@@ -210,82 +247,107 @@ class Part:
             grid = self.evaluate(np.union1d(np.geomspace(*ends, FINE), self.best.v_s))
         return grid
 
-    def standard_errors(self, variance: float) -> dict[str, float]:
-        """Return the standard errors of the constants from the linearised law."""
-        v_s = self.best.v_s
-        jacobian = self.law.design(self.v, v_s, self.has_bias)[0]
-        symbols = self.symbols
-        if self.law.exponent:
-            step = 1e-5 * v_s
-            ends = (self.law.design(self.v, v_s + sign * step, self.has_bias)[0] for sign in (1.0, -1.0))
-            difference = next(ends) - next(ends)
-            slope = difference @ self.best.constants[0] / (2 * step[0])
-            jacobian, symbols = np.column_stack([jacobian, slope]), (*symbols, "v_s")
-        scale = np.linalg.norm(jacobian, axis=0) + 1e-300
-        covariance = np.linalg.pinv((jacobian / scale).T @ (jacobian / scale))
-        return dict(zip(symbols, np.sqrt(variance * np.diag(covariance)) / scale, strict=True))
-
 
 def fit_law(
     law: Law,
-    v: np.ndarray,
-    force: np.ndarray,
+    points: CurvePoints,
     known_bias: float | None,
-    units: dict[str, str],
+    effects: Sequence[Effect] = (),
     has_intervals: bool = True,
+    widening: float = 1.0,
 ) -> LawFit | str:
-    """Fit a law to forces (n,) at velocities v (n,) that are not zero.
+    """Fit a law to points.
 
     Parameters
     ----------
     known_bias : float or None
         Constant force that is no friction; None to fit it, with a symmetric law.
-    units : dict
-        Units of F_c, F_s, F_v, v_s and bias.
+    effects : sequence of Effect
+        Other forces that are fitted.
     has_intervals : bool
         Whether intervals are calculated, which takes most of the time; otherwise they are NaN.
+    widening : float
+        Factor of the variance, for residuals that are not independent.
 
     Returns
     -------
     LawFit or str
         The fit, or the reason why the law cannot be fitted.
     """
-    bias = 0.0 if known_bias is None else known_bias
-    parts = build_parts(law, v, force - bias, known_bias is None)
+    n, bias = len(points.v), 0.0 if known_bias is None else known_bias
+    parts = build_parts(law, points, effects, known_bias)
     if isinstance(parts, str):
         return parts
     count = sum(part.count for part in parts)
     required = max(count + MIN_FREEDOM, int(np.ceil(MIN_POINTS_PER_CONSTANT * count)))
-    if len(v) < required:
+    if n < required:
         return f"with {count} constants at least {required} points are required"
     if not all(part.is_valid for part in parts):
         return "friction does not fall with the speed"
-    floor = len(v) * (ROUNDOFF * float(np.abs(force).max())) ** 2
+    floor = n * (ROUNDOFF * float(np.abs(points.force).max())) ** 2
     squares = max(sum(float(part.best.squares[0]) for part in parts), floor)
-    variance = squares / (len(v) - count)
-    margin = variance * student_quantile(len(v) - count) ** 2 if has_intervals else np.nan
-    estimates = tuple(estimate for part in parts for estimate in part.estimates(margin, variance, units))
-    return LawFit(law.name, estimates, bias, squares, len(v), information_criterion(squares, len(v), count))
+    variance = widening * squares / (n - count)
+    margin = variance * student_quantile(n - count) ** 2 if has_intervals else np.nan
+    estimates = tuple(estimate for part in parts for estimate in part.estimates(margin, points.units))
+    fit = LawFit(law.name, estimates, bias, squares, n, information_criterion(squares, n, count), tuple(effects))
+    return with_errors(fit, points, variance) if has_intervals else fit
 
 
-def build_parts(law: Law, v: np.ndarray, force: np.ndarray, fits_bias: bool) -> list[Part] | str:
+def with_errors(fit: LawFit, points: CurvePoints, variance: float) -> LawFit:
+    """Return a fit with the standard errors of its linearised law."""
+    _, jacobian, names = linearise(fit, points)
+    scale = np.linalg.norm(jacobian, axis=0) + 1e-300
+    covariance = np.linalg.pinv((jacobian / scale).T @ (jacobian / scale))
+    errors = dict(zip(names, np.sqrt(variance * np.diag(covariance)) / scale, strict=True))
+    return replace(fit, estimates=tuple(replace(item, error=float(errors[item.name])) for item in fit.estimates))
+
+
+def build_parts(law: Law, points: CurvePoints, effects: Sequence[Effect], known_bias: float | None) -> list[Part] | str:
     """Return the parts of a law, or the reason why the points do not suffice for it."""
-    directions = [direction for direction in (1, -1) if (direction * v > 0).any()]
+    v, bias = points.v, known_bias or 0.0
     required = MIN_SPEEDS[law.exponent] + (law.is_viscous and not law.exponent)
     if law.is_symmetric:
         if count_speeds(v) < required:
             return f"points at {required} different speeds are required"
-        return [Part(law, v, force, 0, fits_bias)]
-    if len(directions) < 2:
+        return [Part(law, points, effects, bias, 0, known_bias is None)]
+    if len(set(np.sign(v))) < 2:
         return "points of both directions are required"
-    if fits_bias and not law.is_viscous:
+    if known_bias is None and not law.is_viscous:
         return "a bias in the law coulomb has the same effect"
-    masks = [direction * v > 0 for direction in directions]
-    if min(count_speeds(v[mask]) for mask in masks) < required:
+    directions = [points.select(direction * v > 0) for direction in (1, -1)]
+    if min(count_speeds(part.v) for part in directions) < required:
         return f"points at {required} different speeds in each direction are required"
-    return [
-        Part(law, v[mask], force[mask], direction, False) for direction, mask in zip(directions, masks, strict=True)
-    ]
+    # in one direction, a drift of the bias is one of F_c
+    own = [effect for effect in effects if effect.name != "drift of bias" or Effect("drift of F_c") not in effects]
+    return [Part(law, part, own, bias, sign, False) for part, sign in zip(directions, (1, -1), strict=True)]
+
+
+def linearise(fit: LawFit, points: CurvePoints) -> tuple[np.ndarray, np.ndarray, list[str]]:
+    """Return the residuals (n,) of a law, the derivatives (n, p) of its forces, and the names of its constants."""
+    v, law, blocks, names = points.v, fit.law, [], list[str]()
+    force = fit.known_bias + fit.effect_force(points)
+    nodes, weights = points.nodes
+    for suffix, sign in (("", 0),) if law.is_symmetric else (("+", 1), ("-", -1)):
+        mask = sign * v >= 0
+        constants = np.array([fit.values[name + suffix] for name in law.symbols])
+        v_s = np.array([fit.values.get(f"v_s{suffix}", 1.0)])
+        columns = [*law.design(nodes, v_s, False, weights)[0].T]
+        names += [name + suffix for name in law.symbols]
+        if "bias" in fit.values:
+            names.append("bias")
+            columns.append(np.ones(len(v)))
+            constants = np.append(constants, fit.values["bias"])
+        force = force + mask * (np.array(columns).T @ constants)
+        if law.exponent:
+            names.append(f"v_s{suffix}")
+            step = 1e-5 * v_s
+            ends = (law.design(nodes, v_s + side * step, False, weights)[0] for side in (1, -1))
+            columns.append((next(ends) - next(ends)) @ constants[: len(law.symbols)] / (2 * step[0]))
+        effects = [effect for effect in fit.effects if effect.name + suffix in fit.values]
+        columns += [points.column(effect) for effect in effects]
+        names += [effect.name + suffix for effect in effects]
+        blocks.append(mask[:, None] * np.array(columns).T)
+    return points.force - force, np.concatenate(blocks, axis=1), names
 
 
 def count_speeds(v: np.ndarray) -> int:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+ONE = np.ones(1)
 RESIDUE = 0.01  # of the decrease at the lowest speed: with a smaller v_s the measurement does not show the decrease
 
 
@@ -45,13 +46,16 @@ class Law:
             *(["F_v"] if self.is_viscous else []),
         )
 
-    def design(self, v: np.ndarray, v_s: np.ndarray, has_bias: bool) -> np.ndarray:
-        """Return the matrices (len(v_s), len(v), constants) of the law, at velocities v for each v_s.
+    def design(self, v: np.ndarray, v_s: np.ndarray, has_bias: bool, weights: np.ndarray = ONE) -> np.ndarray:
+        """Return the matrices (len(v_s), n, constants) of the law, at velocities v (n,) for each v_s.
 
-        Their columns belong to the `symbols`, and to the bias.
+        Their columns belong to the `symbols`, and to the bias.  Of velocities (k, n), the law has the mean with
+        `weights` (k,).
         """
+        v = np.atleast_2d(v)
+        fall = sum(weight * self.decrease(np.abs(part) / v_s[:, None]) for weight, part in zip(weights, v, strict=True))
+        v = weights @ v
         sign = np.sign(v) * np.ones((len(v_s), 1))
-        fall = self.decrease(np.abs(v) / v_s[:, None])
         columns = [sign * (1.0 - fall)]
         columns += [sign * fall] if self.exponent else []
         columns += [v * np.ones_like(sign)] if self.is_viscous else []

@@ -4,18 +4,24 @@ B. Rosner, Technometrics 25 (1983) 165-172: points are removed one by one, each 
 all of them up to the last significant one are outliers, so that they do not hide each other.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 from scipy import special
 
-from .law_fit import MIN_FREEDOM, LawFit, fit_law
+from .law_fit import MIN_FREEDOM, LawFit, fit_law, linearise
 from .laws import Law
+from .points import CurvePoints, Effect
 
 SIGNIFICANCE = 0.001  # of all points together
 MAX_SHARE = 0.2  # of the points
+SMALL = 2.5  # standard deviations: a largest residual below hides no further outlier
+STEP, MAX_FITS = 5.0, 10  # ratio of the residuals that are left out after one fit, and number of fits
+MIN_WEIGHT = 1e-6  # of a point that the fit does not follow
 
 
 def find_outliers(
-    law: Law, v: np.ndarray, force: np.ndarray, known_bias: float | None, units: dict[str, str]
+    law: Law, points: CurvePoints, known_bias: float | None, effects: Sequence[Effect]
 ) -> tuple[LawFit, np.ndarray] | str:
     """Fit a law to the points that fit it.
 
@@ -24,25 +30,41 @@ def find_outliers(
     (LawFit, numpy.ndarray) or str
         The fit, and the mask (n,) of the fitted points; or the reason why the law cannot be fitted.
     """
-    fit = fit_law(law, v, force, known_bias, units, has_intervals=False)
-    if isinstance(fit, str):
-        return fit
-    used, best = np.ones(len(v), bool), (fit, np.ones(len(v), bool))
-    for _ in range(int(MAX_SHARE * len(v))):
-        freedom = int(used.sum()) - len(fit.estimates)
+    used, best = np.ones(len(points.v), bool), None
+    for _ in range(MAX_FITS):
+        fit = fit_law(law, points.select(used), known_bias, effects, has_intervals=False)
+        if isinstance(fit, str):
+            return fit
+        residuals, jacobian, _ = linearise(fit, points)
+        best, used = (fit, used), find_fitting(residuals, jacobian, float(np.abs(residuals[used]).max()) / STEP)
+        if (used == best[1]).all():
+            break
+    return best or "the points do not suffice"
+
+
+def find_fitting(e: np.ndarray, jacobian: np.ndarray, smallest: float) -> np.ndarray:
+    """Return the mask (n,) of the values e (n,) without the outliers of the linear model with a jacobian (n, p).
+
+    Residuals below `smallest` are left in: a fit without the larger ones shows whether they are outliers.
+    """
+    n, p = jacobian.shape
+    used = best = np.ones(n, bool)
+    scale = np.linalg.norm(jacobian, axis=0) + 1e-300
+    for _ in range(int(MAX_SHARE * n)):
+        freedom = int(used.sum()) - p
         if freedom <= MIN_FREEDOM:
             break
-        residuals = np.where(used, np.abs(force - fit.force(v)), 0.0)
-        worst = int(np.argmax(residuals))
-        remaining = used.copy()
-        remaining[worst] = False
-        reduced = fit_law(law, v[remaining], force[remaining], known_bias, units, has_intervals=False)
-        if isinstance(reduced, str):
-            break
+        q, _ = np.linalg.qr(jacobian[used] / scale)
+        residuals = e[used] - q @ (q.T @ e[used])
+        drops = residuals**2 / np.maximum(1 - (q**2).sum(axis=1), MIN_WEIGHT)
+        worst = int(np.argmax(drops))
         # the drop of the sum of squares by a point is an F-distributed multiple of the remaining variance
-        variance = reduced.sum_of_squares / (freedom - 1)
-        deviation = float(np.sqrt(max(fit.sum_of_squares - reduced.sum_of_squares, 0.0) / variance))
-        fit, used = reduced, remaining
+        variance = max(float(residuals @ residuals - drops[worst]), 1e-24 * float(e @ e)) / (freedom - 1)
+        used = used.copy()
+        used[np.flatnonzero(used)[worst]] = False
+        deviation = float(np.sqrt(drops[worst] / (variance + 1e-300)))
         if 2 * special.stdtr(freedom - 1, -deviation) * (used.sum() + 1) < SIGNIFICANCE:
-            best = (fit, used)
+            best = used
+        if deviation < SMALL or drops[worst] < smallest**2:
+            break
     return best
