@@ -163,7 +163,8 @@ def fastest_clock_method(context: CodegenContext) -> str:
             argument = e.args[-1]
             size = Term("fabs", argument)
             change = {"sin": 4.0, "cos": 4.0, "tan": 4.0, "/": size}.get(e.op, build_term("+", 1.0, size))
-            slope = analysis.derivative(argument, positions | rates if id(e) in in_events else rates)
+            has_positions = id(e) in in_events and e.op != "/"  # a lever, as a divisor, passes zero at a dead point
+            slope = analysis.derivative(argument, positions | rates if has_positions else rates)
             bend = analysis.derivative(argument, accelerations)
             rate: Operand = 0.0  # r with |slope| / r + |bend| / (2 r r) <= change / 2
             if not is_same_expression(slope, 0.0):
