@@ -12,7 +12,6 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as in a command; must be s
 import build_cache
 import pytest
 from browser import CHROMIUM, Browser
-from firefox import FIREFOX, Firefox
 from native_fmus import backend_fmus  # noqa: F401 - a fixture of all tests
 from worker_client import Worker
 
@@ -27,10 +26,20 @@ def pytest_configure(config):
         folder = TemporaryDirectory()
         config.add_cleanup(folder.cleanup)
         build_cache.shared_folder = Path(folder.name)
-        cache = getattr(config, "cache", None)  # absent with -p no:cacheprovider, as in a read-only checkout
-        parent = cache.mkdir("builds") if cache else build_cache.shared_folder
+        try:
+            (parent := config.rootpath / "build" / "tests").mkdir(parents=True, exist_ok=True)
+        except OSError:  # a checkout that cannot be written
+            parent = build_cache.shared_folder
         build_cache.kept_folder, lock = build_cache.open_kept_folder(parent)
         config.add_cleanup(lock.close)
+
+
+@pytest.hookimpl(tryfirst=True)  # before tests are deselected by their marks
+def pytest_collection_modifyitems(items):
+    """Mark the tests in a browser as slow."""
+    for item in items:
+        if "browser" in item.fixturenames:
+            item.add_marker(pytest.mark.slow)
 
 
 @pytest.hookimpl(optionalhook=True)  # of pytest-xdist
@@ -122,15 +131,6 @@ def browser(browser_process):
     """The same browser, which shows an empty page after a module: an animation takes half a core."""
     yield browser_process
     browser_process.open("about:blank")
-
-
-@pytest.fixture(scope="session")
-def firefox():
-    if FIREFOX is None:
-        pytest.skip("there is no firefox here")
-    firefox = Firefox()
-    yield firefox
-    firefox.close()
 
 
 @pytest.fixture

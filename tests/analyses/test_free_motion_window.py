@@ -6,6 +6,7 @@ Some fits omit the laws with drag, which take most of the time.
 import numpy as np
 import pytest
 from decays import OMEGA, Signal, decay_record, identify, remarks_text, values
+from variants import slow_after
 
 from harness.analyses.decay import decay_problem, signal_model
 
@@ -53,7 +54,7 @@ def held_in_mid_swing(swings, noise, zeta=0.015, end=2.0, hold=1e-5, rng=4):
     return Signal(t, x), stop
 
 
-@pytest.mark.parametrize("swings", [9.4, 45.4])
+@pytest.mark.parametrize("swings", slow_after(1, [9.4, 45.4]))
 def test_a_motion_held_in_mid_swing_is_cut_and_reported(swings):
     """The noise of the whole record is that of the hold, and a short motion has few turning points before it."""
     record, stop = held_in_mid_swing(swings, 1e-3)

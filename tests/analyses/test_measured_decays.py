@@ -6,6 +6,7 @@ from itertools import combinations, pairwise
 import numpy as np
 import pytest
 from measured_records import find_record, missing
+from variants import slow_after
 
 from harness import identify_decay
 
@@ -28,7 +29,7 @@ def fits(name):
     return whole, parts
 
 
-@pytest.mark.parametrize("name", RECORDS)
+@pytest.mark.parametrize("name", slow_after(1, RECORDS))
 def test_the_losses_of_halves_and_thirds_of_a_measured_record_agree(name):
     _, parts = fits(name)
     for windows in parts:

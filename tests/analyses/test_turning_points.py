@@ -3,12 +3,13 @@
 import numpy as np
 import pytest
 from decays import TERMS, decay_record, identify, remarks_text, values
+from variants import slow_after
 
 import harness
 from harness import HarnessError
 
 
-@pytest.mark.parametrize(("sine", "a"), [(False, 0.1), (True, 0.1), (True, 2.0)])
+@pytest.mark.parametrize(("sine", "a"), slow_after(2, [(False, 0.1), (True, 0.1), (True, 2.0)]))
 def test_turning_points_alone_give_the_same_estimates(sine, a):
     fit = identify(decay_record(0.02, 0.003, 0.02, sine, a=a, t=np.linspace(0, 5, 2001)), pendulum=sine)
     expected = {"zeta": 0.02, "r": 0.003, "b": 0.02, "rest": 0.02}
@@ -19,7 +20,7 @@ def test_turning_points_alone_give_the_same_estimates(sine, a):
     assert {"zeta", "r"} <= set(values(fit.extrema_estimates))
 
 
-@pytest.mark.parametrize("a", [0.1, 2.5])
+@pytest.mark.parametrize("a", [2.5])
 @pytest.mark.parametrize("term", TERMS)
 def test_two_peaks_of_a_pendulum_identify_a_single_loss(term, a):
     truth = {term: {"zeta": 0.01, "r": 0.003, "b": 0.05}[term]}

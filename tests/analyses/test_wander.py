@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from decays import decay_record, identify
+from variants import slow_after
 
 T = np.linspace(0.0, 30.0, 1800)
 TRUTH = {"omega": 12.566, "zeta": 0.001, "r": 1e-4, "b": 0.0}
@@ -24,7 +25,9 @@ def errors(fit):
     return [abs(fit[name].value - value) / fit[name].error for name, value in TRUTH.items()]
 
 
-@pytest.mark.parametrize(("defect", "cause"), [("clock", "a clock whose rate varies"), ("gain", "another law")])
+@pytest.mark.parametrize(
+    ("defect", "cause"), slow_after(1, [("clock", "a clock whose rate varies"), ("gain", "another law")])
+)
 def test_a_wander_near_the_noise_is_reported_and_covered(defect, cause):
     fits = [swung(seed, **{defect: 2e-4}) for seed in range(4)]
     assert sum(cause in " ".join(fit.remarks) for fit in fits) >= 3

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from decays import decay_record
+from native_fmus import build_native_fmus
 
 import harness
 from harness import identify_curve, identify_decay, read_record
@@ -56,9 +57,11 @@ def test_a_friction_curve_is_that_of_its_file(files, kind):
 
 
 @EVERY_KIND
-def test_a_fit_is_that_of_its_file(fmus, files, kind):
+def test_a_fit_is_that_of_its_file(files, kind):
     def fit(record):
-        return numbers(harness.fit(fmus / "smd.fmu", record, {"k": (50, 500)}, observe={"x": "laser"}, end=1.0))
+        return numbers(
+            harness.fit(build_native_fmus() / "smd.fmu", record, {"k": (50, 500)}, observe={"x": "laser"}, end=1.0)
+        )
 
     assert fit(KINDS[kind](files / "decay.csv")) == fit(files / "decay.csv")
 
@@ -70,7 +73,7 @@ def test_a_comparison_is_that_of_its_file(files, kind):
     assert result.to_pandas()["largest"].tolist() == [0.0]
 
 
-def test_options_of_a_record_hold_in_every_function(fmus, files, tmp_path):
+def test_options_of_a_record_hold_in_every_function(files, tmp_path):
     """Unit, interval and column are those given to `read_record`, unless the call replaces them."""
     path = tmp_path / "bare.csv"
     pandas.DataFrame({"t [s]": T, "other": T, "laser": 1e3 * X}).to_csv(path, index=False)
@@ -80,7 +83,7 @@ def test_options_of_a_record_hold_in_every_function(fmus, files, tmp_path):
     assert np.array_equal(record.x, whole.x)
     assert numbers(identify_decay(record)) == numbers(identify_decay(files / "decay.csv", begin=0.5, end=4.0))
     free = {"k": (50, 500), "x0": (-1, 1), "v0": (-5, 5)}
-    fits = [harness.fit(fmus / "smd.fmu", one, free) for one in (record, record.select(0.5, 1.5))]
+    fits = [harness.fit(build_native_fmus() / "smd.fmu", one, free) for one in (record, record.select(0.5, 1.5))]
     assert [(one.records[0].t[0], one.records[0].t[-1]) for one in fits] == [(0.5, 4.0), (0.5, 1.5)]
     assert np.ptp(fits[0].records[0].y) == pytest.approx(np.ptp(record.x))
     assert identify_decay(record, end=3.0).record.t[-1] <= 3.0

@@ -2,6 +2,7 @@
 
 import commands
 import pytest
+from variants import slow_after
 
 SCRIPT = """
 import sys
@@ -16,7 +17,15 @@ harness.simulate("coulomb", stop=2.0{options})
 
 @pytest.mark.parametrize(
     ("terminal", "delay", "options", "is_shown"),
-    [(True, 0.0, "", True), (True, 1e3, "", False), (False, 0.0, "", False), (True, 0.0, ", progress=False", False)],
+    slow_after(
+        2,
+        [
+            (True, 0.0, "", True),
+            (True, 1e3, "", False),
+            (False, 0.0, "", False),
+            (True, 0.0, ", progress=False", False),
+        ],
+    ),
     ids=["terminal", "short", "no terminal", "switched off"],
 )
 def test_a_bar_is_shown_in_a_terminal_for_long_calls(workspace, terminal, delay, options, is_shown):

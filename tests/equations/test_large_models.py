@@ -6,6 +6,7 @@ import sys
 from contextlib import contextmanager
 
 import pytest
+from variants import slow_after
 
 from fmus.compiler import BuildError
 from fmus.compiler.equations.model_file import load_model_file
@@ -82,7 +83,7 @@ def shallow_stack(depth):
     sys.setrecursionlimit(limit)
 
 
-@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize("shape", slow_after(3, SHAPES))
 def test_work_grows_no_faster_than_n_log_n(tmp_path, shape):
     """Work that does not depend on n is subtracted by differences: w(4n) - w(2n) over w(2n) - w(n)."""
     work = []
@@ -93,6 +94,7 @@ def test_work_grows_no_faster_than_n_log_n(tmp_path, shape):
     assert (work[2] - work[1]) / (work[1] - work[0]) < limit
 
 
+@pytest.mark.slow
 def test_lowering_and_translation_grow_no_faster_than_n_log_n(tmp_path):
     """The first translation of a process fills caches, and is not counted."""
     work = []

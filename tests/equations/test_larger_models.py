@@ -8,6 +8,7 @@ from contact_references import CONTACT_REFERENCES, reference_events, solve_lugre
 from fmpy import read_model_description
 from models import LARGER_MODELS, write_growing_friction_model
 from row_comparison import assert_identical
+from variants import slow_after
 from worker_client import FmiError
 
 STOP, DOP853 = 8.0, 4
@@ -27,6 +28,7 @@ def test_three_states_agree_with_an_independent_formulation(worker):
     assert np.abs(final - solve_lugre(STOP)).max() < 1e-9
 
 
+@pytest.mark.slow
 def test_a_certified_result_has_all_states_and_precision_accepts_it(tmp_path):
     """LuGre, with its own column names."""
     folder = built("lugre", "").parent
@@ -67,14 +69,12 @@ def run(fmu, physics, changes):
     return events, fmu.get(*physics.states)
 
 
-CHANGED = [
-    pytest.param(name, one.changes, marks=pytest.mark.slow) for name, one in CONTACT_REFERENCES.items() if one.changes
-]
+CHANGED = [(name, one.changes) for name, one in CONTACT_REFERENCES.items() if one.changes]
 RUNS = [*((name, ()) for name in CONTACT_REFERENCES), *CHANGED]
 
 
 @pytest.mark.parametrize(
-    ("name", "changes"), RUNS, ids=lambda one: one if isinstance(one, str) else f"changed{len(one)}"
+    ("name", "changes"), slow_after(3, RUNS), ids=lambda one: one if isinstance(one, str) else f"changed{len(one)}"
 )
 def test_contacts_stick_and_slip_as_in_an_independent_formulation(worker, name, changes):
     """On a belt, in a clutch, on separate bodies or shared ones: every event and the final state; also with a change

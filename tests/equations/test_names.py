@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from build_cache import build_user_model
 from native_fmus import require_compiler
+from variants import slow_after
 
 import fmus
 import harness
@@ -94,7 +95,7 @@ def refusal(name, role, body, folder):
     return ""
 
 
-@pytest.mark.parametrize("body", [ALONE, TOGETHER])
+@pytest.mark.parametrize("body", slow_after(1, [ALONE, TOGETHER]))
 def test_an_attribute_of_a_generated_class_is_no_name_of_a_variable(body, tmp_path):
     """But the names of constants, as limit or A_F_F, are those that no variable has."""
     attributes, _ = used_names(body, tmp_path)
@@ -105,9 +106,10 @@ def test_an_attribute_of_a_generated_class_is_no_name_of_a_variable(body, tmp_pa
     assert {"rates", "stop_time", "condition_texts", "inconsistent_input"} <= {*attributes} - accepted
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("backend", "turn"),
-    [("", 0), *(pytest.param(*case, marks=pytest.mark.slow) for case in OTHER_CASES)],
+    [("", 0), *OTHER_CASES],
 )
 def test_any_other_name_gives_the_same_motion(backend, turn, tmp_path):
     """Each name that the generated methods use, in each role."""

@@ -382,7 +382,7 @@ def test_calls_with_arrays_have_one_value_per_element(tunable_fmus, tmp_path):
         assert fmu.getFloat64([mu], 5) == [*FRICTION[1]]
 
 
-@pytest.mark.parametrize("kind", ["native", "native/fmi3"])
+@pytest.mark.parametrize("kind", ["native/fmi3"])
 def test_a_fit_finds_values_of_a_table(tunable_fmus, kind):
     """Without ranges to search: one of them starts at zero, and both have the scale of the table."""
     run = harness.simulate(tunable_fmus["native"], FITTED, times=np.linspace(0.0, STOP, 101), rtol=1e-10)

@@ -12,6 +12,7 @@ from fmpy import read_model_description
 from fmpy.validation import validate_fmu
 from native_fmus import require_compiler
 from prescribed_motion import BLOCK, belt_rising, belt_shaking, solve_block
+from variants import slow_after
 
 import harness
 from fmus.compiler import BuildError
@@ -247,7 +248,7 @@ def test_a_table_with_the_rates_drives_the_block_as_the_belt_does(backend, inter
     assert np.abs(found - expected).max() < 1e-4
 
 
-@pytest.mark.parametrize("at_kink", [0.0, 0.05, 0.1])
+@pytest.mark.parametrize("at_kink", slow_after(1, [0.0, 0.05, 0.1]))
 def test_a_kink_with_one_row_is_an_event_as_one_with_two_rows(at_kink):
     """Between rows the rate is interpolated; at one row it cannot have the values before and after the kink."""
     t = np.round(np.arange(0.0, 4.05, 0.1), 1)
@@ -265,8 +266,7 @@ def test_a_kink_with_one_row_is_an_event_as_one_with_two_rows(at_kink):
     assert run.statistics.evaluations < 1.05 * expected.statistics.evaluations
 
 
-@pytest.mark.parametrize("noise", [0.0, 1e-3, 0.1])
-@pytest.mark.parametrize("count", [5, 40, 1000])
+@pytest.mark.parametrize(("count", "noise"), slow_after(1, [(1000, 1e-3), (5, 0.0), (40, 0.1)]))
 def test_a_smooth_or_noisy_table_has_no_kinks(count, noise):
     t = np.linspace(0.0, 4.0, count)
     random = np.random.default_rng(count)
@@ -386,7 +386,7 @@ TWO_WITH_BELT = (
 SPEEDS = ((0.0, 4.0), (0.5, -6.0), (1.5, 6.0), (2.5, -4.0))  # time and acceleration of the belt from then on
 
 
-@pytest.mark.parametrize("backend", ["python", "native"])
+@pytest.mark.parametrize("backend", slow_after(1, ["python", "native"]))
 def test_two_contacts_agree_with_the_belt_as_a_state_of_the_same_model(worker, backend):
     """Only the acceleration is set, four times; both FMUs then have the same motion between communication points."""
     rows = []

@@ -1,7 +1,6 @@
 """FMUs with Reals only, for hosts that read or set every variable as a Real.
 
-The variables are chosen before any translation, so that native FMUs are built of two models only, with and without
-friction modes.
+The variables are chosen before any translation, so that two models are enough, with and without friction modes.
 """
 
 from math import isnan
@@ -12,7 +11,8 @@ import native_fmus
 import pytest
 from commands import build
 from fmpy import read_model_description
-from models import HYBRID, MODELS, declared, outputs
+from models import HYBRID, declared, outputs
+from variants import slow_after
 
 from fmus.runtime.codes import NO_VALUE
 from harness import SceneError, describe, simulate, sweep
@@ -28,12 +28,15 @@ EVERYTHING = {
     "FMI 3.0": fmi3_fixtures.build_fmi3_fmus,
 }
 REAL = {"python": "Real", "native": "Real", "FMI 3.0": "Float64"}
-NATIVE_MODELS = ("coulomb", "pacejka")
+REDUCED_MODELS = ("coulomb", "pacejka")
 STEP, STEPS = 0.05, 40
-FMI2 = pytest.mark.parametrize("backend", ["python", "native"], indirect=True, scope="module")  # with internal steps
+BACKENDS = slow_after(2, ["python", "FMI 3.0", "native"])
+FMI2 = pytest.mark.parametrize(
+    "backend", slow_after(1, ["python", "native"]), indirect=True, scope="module"
+)  # with internal steps
 
 
-@pytest.fixture(scope="module", params=OPTIONS)
+@pytest.fixture(scope="module", params=BACKENDS)
 def backend(request):
     return request.param
 
@@ -43,9 +46,8 @@ def folders(backend):
     """Return the folders with the FMUs that have all variables, and with those that have Reals only."""
     if backend != "python":
         native_fmus.require_compiler()
-    models = NATIVE_MODELS if OPTIONS[backend] else ()
     name, options = backend.replace(" ", ""), ("--real-only", *OPTIONS[backend])
-    return EVERYTHING[backend](), build_cache.build_once(f"reals-{name}", *models, *options)
+    return EVERYTHING[backend](), build_cache.build_once(f"reals-{name}", *REDUCED_MODELS, *options)
 
 
 def motion(fmu, names):
@@ -58,12 +60,7 @@ def motion(fmu, names):
     return rows
 
 
-@pytest.mark.parametrize(
-    ("backend", "name"),
-    [(backend, name) for backend in OPTIONS for name in (NATIVE_MODELS if OPTIONS[backend] else MODELS)],
-    indirect=["backend"],
-    scope="module",
-)
+@pytest.mark.parametrize("name", REDUCED_MODELS)
 def test_the_variables_are_reals_and_have_the_same_values(folders, backend, worker, name):
     everything, reals = (folder / f"{name}.fmu" for folder in folders)
     description = read_model_description(reals)

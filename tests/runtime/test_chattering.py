@@ -3,6 +3,7 @@
 import pytest
 from internal_steps import prepared_run, start
 from models import DOP853, ODE23, ODE45, RODAS
+from variants import slow_after
 
 from fmus.compiler.lowering import lowered_model, sibling_module
 
@@ -65,7 +66,7 @@ def follow(cls, values, duration, most):
     return status, step.t1, step.n_accepted
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", slow_after(2, METHODS))
 def test_a_block_that_two_belts_push_to_their_edge_ends_the_run(build, method):
     """Its swings shrink, and their number grows without limit."""
     cls = build("belts", BELTS)

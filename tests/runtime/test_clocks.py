@@ -90,9 +90,9 @@ def count_dips(cls, values):
     return slides
 
 
-@pytest.mark.parametrize("rtol", [1e-4, 1e-6, 1e-9])
-@pytest.mark.parametrize("method", [ODE23, ODE45, DOP853, RODAS])
-@pytest.mark.parametrize("p", [50.0, 200.0, 1000.0])
+@pytest.mark.parametrize(
+    ("method", "rtol", "p"), [(ODE23, 1e-4, 1000.0), (ODE45, 1e-6, 200.0), (DOP853, 1e-9, 1000.0), (RODAS, 1e-4, 50.0)]
+)
 def test_no_dip_of_a_limit_is_missed(held, method, rtol, p):
     """The block starts in a dip, and there are 12 more in 40 s, each shorter than 10 % of the period."""
     for h_max in (0.0, 1e4):

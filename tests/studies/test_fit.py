@@ -11,6 +11,7 @@ import pytest
 from fmpy import read_model_description
 from native_fmus import build_native_fmus, require_compiler
 from shared_keys import check_shared_keys
+from variants import slow_after
 
 import harness
 from benchmarks.campaigns.drawn_records import GROUPS, draw_record
@@ -521,7 +522,14 @@ def test_a_peer_that_fails_has_its_reason_in_the_table(capsys):
 
 @pytest.mark.parametrize(
     ("model", "omega", "free"),
-    [("smd", 6.0, {"k": (1.0, 100.0)}), ("smd", 2.0, {"k": (1.0, 100.0)}), ("coulomb", 5.0, {"k": None, "f": None})],
+    slow_after(
+        1,
+        [
+            ("smd", 6.0, {"k": (1.0, 100.0)}),
+            ("smd", 2.0, {"k": (1.0, 100.0)}),
+            ("coulomb", 5.0, {"k": None, "f": None}),
+        ],
+    ),
 )
 def test_one_noise_of_all_samples_does_not_move_the_fit(model, omega, free):
     """Of models that describe the record well and poorly; where the noise is large, nothing is determined."""

@@ -12,6 +12,7 @@ import pytest
 from build_cache import ROOT, build_user_model
 from matplotlib.figure import Figure
 from matplotlib.text import Text
+from variants import slow_after
 
 import harness
 
@@ -56,7 +57,7 @@ def is_title_covered(axes):
     return bool(legend and legend.get_window_extent().overlaps(title.get_window_extent()))
 
 
-@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize("name", slow_after(2, SCENES))
 def test_a_curve_is_smooth_despite_large_steps(draw, name):
     _, panels = draw(name)
     for t, _ in curves(panels).values():

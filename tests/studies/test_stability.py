@@ -24,7 +24,6 @@ from harness.studies.stability import study
 from harness.studies.stability.study import FINISHED, REFUSED, WRONG, grouped_cases, run_stability
 
 SCENES = tomllib.loads((ROOT / "harness/studies/stability/stability.toml").read_text())
-SLOW = pytest.mark.slow
 QUICK = (
     "c = {} N.s/m: damping ratio c/20",
     "f just below k x0: it moves by some bits",
@@ -264,7 +263,8 @@ def test_every_case_of_a_shipped_model_ends_as_expected(user_folder, tmp_path, m
     assert len({row.case.title for row in rows}) == sum(n_values)
 
 
-@pytest.mark.parametrize("name", ["rotor_brake", *(pytest.param(name, marks=SLOW) for name in ("sleds", "belt"))])
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["rotor_brake", "sleds", "belt"])
 def test_a_user_model_passes_the_standard_scenes(tmp_path, name):
     """Its values, its tolerances and nonfinite numbers, by every method; a rule between two values may refuse them,
     and a belt adds energy."""

@@ -1,7 +1,7 @@
 """Build each set of FMUs once. All test processes share two folders; the first one that needs a set builds it.
 
-One folder lasts for the test run. The other keeps what is built from the sources alone, in the cache of pytest, so that
-later runs find it there until a source or an installed package changes; `pytest --cache-clear` empties it.
+One folder lasts for the test run. The other, in `build/tests`, keeps what is built from the sources alone, so that
+later runs find it there until a source or an installed package changes.
 """
 
 import json
