@@ -17,7 +17,7 @@ from benchmarks.literature.problems import BeltBlock, ChatteringOscillatorSign, 
 from benchmarks.references import event_located
 from benchmarks.references.generation import CLOSED_FORMS, evaluate_closed_form
 from benchmarks.references.icon import draw_missing_icon
-from harness.errors import HarnessError
+from harness import HarnessError
 from harness.references.certified_reference import (
     FOLDER,
     POINTS,
