@@ -30,12 +30,12 @@ from math import inf, isnan
 from pathlib import Path
 
 import build_cache
-import independent_contacts
 import numpy as np
-import random_models
-from independent_contacts import solve
-from random_models import STOP, perturb, random_structure, random_values, to_system, write_model
 from worker_client import FmiError, Worker
+
+from benchmarks.campaigns import independent_contacts, random_models
+from benchmarks.campaigns.independent_contacts import solve
+from benchmarks.campaigns.random_models import STOP, perturb, random_structure, random_values, to_system, write_model
 
 ROOT = Path(__file__).resolve().parents[2]
 METHODS = {2: "ode23", 3: "ode45", 4: "dop853", 5: "rodas", 6: "radau9"}

@@ -4,11 +4,11 @@ import build_cache
 import numpy as np
 import pytest
 from contact_references import reference_events
-from independent_contacts import Contact, Spring, System, solve
 from native_fmus import require_compiler
-from random_models import random_structure
 
 from benchmarks.campaigns import random_campaign
+from benchmarks.campaigns.independent_contacts import Contact, Spring, System, solve
+from benchmarks.campaigns.random_models import random_structure
 
 GRAVITY = 9.81
 LITERATURE = {

@@ -6,6 +6,7 @@ from contact_references import CONTACT_REFERENCES, integrate_events
 from internal_steps import components, prepared_run, start
 from models import DOP853, LARGER_MODELS, write_growing_friction_model
 from scipy.integrate import solve_ivp
+from variants import slow_after
 
 from fmus.compiler.lowering import lowered_model, model_exchange_run, sibling_module
 
@@ -65,7 +66,7 @@ def integrate_with_indicators(name, stop):
             events.append((t, *modes))
 
 
-@pytest.mark.parametrize("name", CONTACT_REFERENCES)
+@pytest.mark.parametrize("name", slow_after(3, CONTACT_REFERENCES))
 def test_modes_follow_at_the_events_located_by_an_importer(name):
     """A second update changes nothing."""
     true, end = integrate_events(CONTACT_REFERENCES[name]())

@@ -5,12 +5,12 @@ import numpy as np
 import pytest
 from build_cache import ROOT, build_once
 from fmpy.validation import validate_fmu
-from independent_contacts import Contact, Spring, System
-from independent_contacts import solve as solve_by_taylor_series
 from models import DOP853
 from native_fmus import require_compiler
 from row_comparison import assert_identical
 
+from benchmarks.campaigns.independent_contacts import Contact, Spring, System
+from benchmarks.campaigns.independent_contacts import solve as solve_by_taylor_series
 from benchmarks.references import event_located
 from fmus.compiler.model_lookup import find_model, more_model_names
 from fmus.runtime.variable_declarations import Output, variables
@@ -115,7 +115,7 @@ def test_the_belt_follows_each_law(worker, law):
 
 @pytest.mark.slow
 def test_two_sleds_have_the_events_of_a_taylor_series(worker):
-    """The system of tests/support/independent_contacts.py, solved by series of order 24: within 1e-10."""
+    """The system of benchmarks/campaigns/independent_contacts.py, solved by series of order 24: within 1e-10."""
     sleds = System(
         masses=(12.5, 8.0),
         springs=(Spring((-1.0, 0.0), 742.5, drive=-1.0), Spring((1.0, -1.0), 1100.0)),

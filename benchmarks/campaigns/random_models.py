@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 from math import pi
 
 import numpy as np
-from independent_contacts import Contact, Spring, System
+
+from benchmarks.campaigns.independent_contacts import Contact, Spring, System
 
 STOP = 4.0  # s
 GROUND, DRIVER = -1, -2  # ends of springs that are not bodies
