@@ -29,13 +29,25 @@ if sys.argv[:1] == ["-m"]:  # python -m harness: no file of the working folder, 
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from .api import compare, describe, fit, identify_curve, identify_decay, load_result, read_record, simulate, sweep
+from .api import (
+    compare,
+    describe,
+    fit,
+    identify_curve,
+    identify_decay,
+    load_result,
+    measure,
+    read_record,
+    simulate,
+    sweep,
+)
 from .errors import HarnessError, SceneError
 
 if TYPE_CHECKING:
     from .analyses.curve.identification import CurveIdentification
     from .analyses.decay.identification import DecayIdentification
     from .analyses.fit.parameter_fit import ParameterFit
+    from .analyses.motion import MotionMeasures
     from .records.record import Record
     from .simulation.fmu_variables import FmuDescription
     from .simulation.signals import ModeChanges, Signals
@@ -63,6 +75,7 @@ __all__ = [
     "FmuDescription",
     "HarnessError",
     "ModeChanges",
+    "MotionMeasures",
     "ParameterFit",
     "PrecisionResult",
     "Record",
@@ -78,6 +91,7 @@ __all__ = [
     "identify_curve",
     "identify_decay",
     "load_result",
+    "measure",
     "read_record",
     "simulate",
     "sweep",
@@ -94,6 +108,7 @@ TYPES = {
     "DecayIdentification": "harness.analyses.decay.identification",
     "DecayResult": "harness.studies.decay.result",
     "ModeChanges": "harness.simulation.signals",
+    "MotionMeasures": "harness.analyses.motion",
     "ParameterFit": "harness.analyses.fit.parameter_fit",
     "PrecisionResult": "harness.studies.precision.result",
     "Record": "harness.records.record",

@@ -7,6 +7,7 @@ from .curves import identify_curve
 from .decay import identify_decay
 from .descriptions import describe
 from .fits import fit
+from .measures import measure
 from .records import read_record
 from .results import load_result
 from .runs import compare, simulate
@@ -19,6 +20,7 @@ __all__ = [
     "identify_curve",
     "identify_decay",
     "load_result",
+    "measure",
     "read_record",
     "simulate",
     "sweep",
