@@ -31,9 +31,10 @@ ACCEPTED = {  # arguments by function, and the values that they may have; None a
         "rtol": ABOVE_ZERO,
         "inputs": {"{}"},
         "timeout": ABOVE_ZERO,
+        "lenient": FLAG,
         "progress": {"type"},
     },
-    "compare": {"stop": ABOVE_ZERO, "rtol": ABOVE_ZERO, "timeout": ABOVE_ZERO, "progress": {"type"}},
+    "compare": {"stop": ABOVE_ZERO, "rtol": ABOVE_ZERO, "timeout": ABOVE_ZERO, "lenient": FLAG, "progress": {"type"}},
     "identify_decay": {
         "unit": {"'x'", "'8'", "long text"},  # a unit that is not known is that of a sensor
         "k": ABOVE_ZERO,
@@ -75,10 +76,12 @@ ACCEPTED = {  # arguments by function, and the values that they may have; None a
         "stop": ABOVE_ZERO,
         "rtol": ABOVE_ZERO,
         "timeout": ABOVE_ZERO,
+        "lenient": FLAG,
         "folder": {"'x'", "'8'", "Path"},
         "progress": {"type"},
     },
     "load_result": {},
+    "measure": {"unit": {"'x'", "'8'", "long text"}},
     "read_record": {
         "unit": {"'x'", "'8'", "long text"},
         "rate": ABOVE_ZERO,
