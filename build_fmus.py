@@ -1,28 +1,55 @@
 """Build FMUs: python build_fmus.py [NAME | FILE.py ...] [--fmi 3] [--native] [--web] [--method M] [--law L] ..."""
 
 import gc
+import os
+import signal
 import sys
 from pathlib import Path
 from typing import Any
 
-if __name__ == "__main__" and Path(sys.path[0]) != Path(__file__).parent:  # run by -m: a model may be called math.py
-    sys.path += [str(Path(__file__).parent), sys.path.pop(0)]
-
-from harness.__main__ import run_command
-
 if __name__ == "__main__":
+    if Path(sys.path[0]) != Path(__file__).parent:  # run by -m: a model may be called math.py
+        sys.path += [str(Path(__file__).parent), sys.path.pop(0)]
+
+    def interrupt(number: int, _: object) -> None:
+        """Raise KeyboardInterrupt for a signal."""
+        raise KeyboardInterrupt(number)
+
+    def run_command() -> int:
+        """Run the command and return its exit status. Ctrl-C, SIGTERM and expected errors end it with a sentence."""
+        for number in (signal.SIGINT, signal.SIGTERM):
+            if signal.getsignal(number) != signal.SIG_IGN:
+                signal.signal(number, interrupt)
+        try:
+            import click  # imported here, where signals are handled
+
+            from build_fmus import main
+
+            try:
+                with main.make_context(Path(sys.argv[0]).name, sys.argv[1:]) as context:
+                    main.invoke(context)
+            except click.ClickException as error:
+                error.show()
+                return error.exit_code
+            except click.exceptions.Exit:  # of --help
+                pass
+            sys.stdout.flush()
+        except KeyboardInterrupt as error:
+            number = error.args[0]
+            print(f"Error: {'interrupted' if number == signal.SIGINT else 'terminated'}", file=sys.stderr)
+            return 128 + number
+        except OSError as error:
+            os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # Python flushes standard output, which may be full, again
+            if not isinstance(error, BrokenPipeError):
+                prefix = f"{error.filename}: " if error.filename else ""
+                print(f"Error: {prefix}{error.strerror or error}", file=sys.stderr)
+            return 1
+        return 0
+
     gc.disable()  # objects of a build live until its end; collecting garbage takes a tenth of the build time
-
-    def load_command() -> Any:
-        from build_fmus import main  # imported here, where run_command handles signals: it takes half a second
-
-        return main
-
-    run_command(load_command, Path(sys.argv[0]).name)
-    sys.exit()
+    sys.exit(run_command())
 
 import logging
-import os
 import tempfile
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager
@@ -35,7 +62,6 @@ from fmus.compiler.equations.model_file import ModelFile
 from fmus.compiler.lowering import LAWS, METHODS
 from fmus.compiler.model_lookup import find_model, model_names, more_model_names
 from fmus.packaging.archive import build, measure_import_time
-from harness.process.temporary_directory import temporary_directory
 
 LOG = logging.getLogger("fmus.build")
 HERE = Path(__file__).parent
@@ -260,8 +286,8 @@ def temporary_files() -> Iterator[None]:
     The C compiler caches its own parts in the home directory or, if there is none, in the temporary directory.
     """
     os.environ.setdefault("HOME", tempfile.gettempdir())
-    with temporary_directory("build-") as directory:
-        former, tempfile.tempdir = tempfile.tempdir, str(directory)
+    with tempfile.TemporaryDirectory(prefix="fmu-build-") as directory:
+        former, tempfile.tempdir = tempfile.tempdir, directory
         try:
             yield
         finally:

@@ -8,9 +8,8 @@ import os
 import signal
 import sys
 
-if sys.orig_argv[1:3] in (["-m", "harness"], ["-m", "build_fmus"]) or "".join(sys.orig_argv[1:2]).endswith(
-    ("friction-fmus", "build_fmus.py")
-):  # a command: after these imports, `interruptible` handles both signals
+if sys.orig_argv[1:3] == ["-m", "harness"] or "".join(sys.orig_argv[1:2]).endswith("friction-fmus"):
+    # a command: after these imports, `interruptible` handles both signals
 
     def exit_early(number: int, frame: object) -> None:
         """End a command at a signal with the message and the exit status of `interruptible`."""

@@ -45,22 +45,6 @@ def test_a_signal_ends_a_build_and_leaves_nothing_behind(temporary, tmp_path, op
     assert not (tmp_path / "out").exists()
 
 
-def test_the_directory_of_a_killed_build_is_removed_by_the_next_run_and_that_of_a_running_one_kept(temporary, tmp_path):
-    with started_build(tmp_path, "--native") as killed, started_build(tmp_path, "--native") as running:
-        directories = [wait_for_line(process, "temporary directory").split()[2] for process in (killed, running)]
-        os.killpg(running.pid, signal.SIGSTOP)
-        os.killpg(killed.pid, signal.SIGKILL)
-        killed.wait()
-        program = "from harness.process.temporary_directory import temporary_directory as create\nwith create(): pass"
-        environment = os.environ | {"TMPDIR": str(temporary)}
-        subprocess.run([sys.executable, "-c", program], cwd=ROOT, env=environment, check=True, timeout=60)
-        assert [str(path) for path in temporary.iterdir()] == directories[1:]
-        os.killpg(running.pid, signal.SIGCONT)
-        os.killpg(running.pid, signal.SIGTERM)
-        running.communicate(timeout=60)
-    assert not list(temporary.iterdir())
-
-
 def test_standard_output_that_is_full_is_one_sentence():
     with open("/dev/full", "w") as full:
         command = [sys.executable, ROOT / "build_fmus.py", "--help"]

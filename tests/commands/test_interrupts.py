@@ -278,6 +278,6 @@ def test_a_signal_while_a_library_is_imported_ends_a_command_like_any_other(tmp_
 @pytest.mark.parametrize(
     "arguments", [["-m", "harness"], ["friction-fmus"], [str(ROOT / "build_fmus.py")], ["-m", "build_fmus"]]
 )
-def test_a_signal_while_the_harness_is_imported_ends_a_command_like_any_other(tmp_path, arguments, number, sentence):
+def test_a_signal_during_the_first_imports_ends_a_command_like_any_other(tmp_path, arguments, number, sentence):
     (tmp_path / "friction-fmus").write_text("from harness.__main__ import main\nmain()\n")
     assert interrupt_import(tmp_path, "dataclasses", arguments, number) == (128 + number, "", sentence)
