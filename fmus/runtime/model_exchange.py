@@ -40,7 +40,7 @@ DEFAULT_NOMINAL = 1e-3  # nominal position (m, rad) and velocity (m/s, rad/s) by
 DEFAULT_TOLERANCE = 1e-4  # relative tolerance if the importer gives none
 
 
-class ModelExchange:
+class ExchangeBuffers:
     """Buffers of the model-exchange interface.
 
     `states`, `rates` and `nominals` run over the continuous states, `indicators` over the event indicators: first
@@ -79,7 +79,7 @@ class ModelExchangeRun(RunState):
 
     def __init__(self, model):
         super().__init__(model)
-        self.model_exchange = ModelExchange(model)
+        self.model_exchange = ExchangeBuffers(model)
 
 
 def enable(run):

@@ -96,7 +96,7 @@ class SavedStateAccess(VariableAccess):
             run = dict(read_numbers(self.run, self.run_tree), outputs_current=False)
             state = {"run": run, "origin": __name__, "invalid_values": dict(self.invalid_values)}
             return state | {"model": read_numbers(self.model, self.model_tree)}
-        except BaseException as error:  # as in fmu_instance.py
+        except BaseException as error:  # as in model_instance.py
             self.handle_exception(error)
             return {}
 
@@ -140,7 +140,7 @@ class SavedStateAccess(VariableAccess):
             own = type(state) is dict and state.get("origin") == __name__
             if own:
                 self.restore(state)
-        except BaseException as error:  # as in fmu_instance.py
+        except BaseException as error:  # as in model_instance.py
             self.handle_exception(error)
         else:
             if not own:

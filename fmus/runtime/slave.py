@@ -8,7 +8,7 @@ from typing import Any
 from pythonfmu.fmi2slave import Fmi2Slave, Fmi2Status
 
 from . import call_sequence
-from .fmu_instance import FmuInstance, make_fmu_class
+from .model_instance import ModelInstance, make_fmu_class
 from .pythonfmu_workarounds import signal_safe
 from .variable_access import make_getter, make_setter
 from .variable_declarations import VariableOwner
@@ -19,7 +19,7 @@ def make_slave_class(model: type[VariableOwner]) -> Any:
     return make_fmu_class(Slave, model)
 
 
-class Slave(FmuInstance, Fmi2Slave):
+class Slave(ModelInstance, Fmi2Slave):
     """Instance of a model with the methods that the native layer of pythonfmu calls."""
 
     @signal_safe
@@ -29,7 +29,7 @@ class Slave(FmuInstance, Fmi2Slave):
         try:
             stop_time, tolerance = inf if stop_time is None else stop_time, tolerance or 0.0
             call_sequence.set_experiment(self.run, start_time, stop_time, tolerance)
-        except BaseException as error:  # as in fmu_instance.py
+        except BaseException as error:  # as in model_instance.py
             self.handle_exception(error)
 
     # No variable is a Boolean or a String; these methods report an error instead of crashing the host.

@@ -5,7 +5,7 @@
     tables.py                   lookup tables
     model_file.py               loads a model file and reports errors with file and line
     algebra.py                  substitution, differentiation, solving for a variable, rounding scales
-    conditions.py               conditions of the equations that may change during a step
+    model_conditions.py         conditions of the equations that may change during a step
     model_roles.py, declaration_checks.py, contact_analysis.py, model_analysis.py
                                 structural analysis: roles of variables, contact loads, applicable solvers
     dimensions.py               checks the units of expressions

@@ -13,10 +13,10 @@ from .algebra import (
     unconditional_operands,
     unconditional_quotients,
 )
-from .conditions import LIMITED_DOMAIN
 from .expression_printer import INDENT, ExpressionPrinter
 from .expressions import Expression, Operand, Term
 from .model_analysis import ModelAnalysis
+from .model_conditions import LIMITED_DOMAIN
 from .model_declaration import Contact
 from .model_roles import TIME
 

@@ -19,8 +19,8 @@ from .algebra import (
     substitute,
     variables_in,
 )
-from .conditions import HOLD_TOLERANCE, Condition, is_nonnegative, table_limits
 from .expressions import Expression, ModelError, Operand, Term, is_among
+from .model_conditions import HOLD_TOLERANCE, Condition, is_nonnegative, table_limits
 from .model_declaration import Contact, Rule, State
 from .model_roles import TIME, ModelRoles
 

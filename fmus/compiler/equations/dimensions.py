@@ -8,10 +8,10 @@ from typing import Any
 from .. import BuildError
 from ..units import BASE_UNITS, SYMBOLS, UNITS, parse_unit, unit_of
 from .algebra import operands_first
-from .conditions import is_absolute_value
 from .expression_printer import COMPARISON_OPERATORS
 from .expressions import Expression, ModelError, Operand, Term
 from .model_analysis import ModelAnalysis
+from .model_conditions import is_absolute_value
 from .model_declaration import Choice, Contact, Input, Mode, Output, State, Variable
 from .tables import EDGE, KNOT, Coefficient, Piece, Table, find_table_call
 

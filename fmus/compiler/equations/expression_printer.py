@@ -10,8 +10,8 @@ from typing import Any
 
 from ...runtime.variable_declarations import VariableDeclaration
 from .algebra import operands, operands_first, unconditional_operands
-from .conditions import Signs
 from .expressions import Expression, ModelError, Operand, Term
+from .model_conditions import Signs
 from .model_declaration import Choice, Output, SettableVariable
 from .tables import Coefficient, Piece
 

@@ -15,10 +15,10 @@ from .algebra import (
     unconditional_quotients,
     variables_in,
 )
-from .conditions import Condition, find_conditions
 from .contact_analysis import ContactAnalysis
 from .declaration_checks import METHODS, check_declarations
 from .expressions import Expression, ModelError, Operand, Term, is_among
+from .model_conditions import Condition, find_conditions
 from .model_declaration import Contact, Fixed, Input, Mode, Model, Parameter, Rule, State, Variable
 from .model_roles import TIME
 

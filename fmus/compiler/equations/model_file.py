@@ -18,12 +18,12 @@ from typing import Any
 from ...runtime.codes import MODEL_RULE, OK
 from ...runtime.variable_declarations import VariableOwner
 from .. import BuildError
-from .conditions import add_liftoff, locate_kinks
 from .declaration_checks import check_use
 from .dimensions import check_frequencies, check_units
 from .expressions import ModelError
 from .model_analysis import ModelAnalysis
 from .model_class import model_source
+from .model_conditions import add_liftoff, locate_kinks
 from .model_declaration import Model
 from .python_errors import check_statements, explain
 from .start_values import check_evaluation, check_friction_forces, check_state_ranges

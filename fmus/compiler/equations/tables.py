@@ -6,7 +6,7 @@ A table is a polynomial in its argument u whose coefficients are constant in eac
 
 The expression contains the piece as a term of u, and each coefficient as a term of the piece.  So derivatives and
 rounding scales follow from the rules for sums and products.  In generated code, the coefficients are constant arrays.
-The piece keeps its value during a step; its change is an event (conditions.py).
+The piece keeps its value during a step; its change is an event (model_conditions.py).
 """
 
 import csv

@@ -202,7 +202,7 @@ fmi2Status fmi2NewDiscreteStates(fmi2Component component, fmi2EventInfo *eventIn
     REQUIRE_PHASE(component, 1 << EVENT);
     REQUIRE_ADDRESS(eventInfo);
     fmi2Status status = handle_event(self);
-    const struct ModelExchange *exchange = &self->state.run.model_exchange;
+    const struct ExchangeBuffers *exchange = &self->state.run.model_exchange;
     *eventInfo = (fmi2EventInfo){.terminateSimulation = status != fmi2OK,
                                  .nominalsOfContinuousStatesChanged = exchange->nominals_changed,
                                  .valuesOfContinuousStatesChanged = exchange->states_changed,

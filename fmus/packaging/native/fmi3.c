@@ -285,7 +285,7 @@ fmi3Status fmi3UpdateDiscreteStates(fmi3Instance instance, fmi3Boolean *discrete
     REQUIRE_ADDRESS(nextEventTimeDefined);
     REQUIRE_ADDRESS(nextEventTime);
     fmi3Status status = handle_event(self);
-    const struct ModelExchange *exchange = &self->state.run.model_exchange;
+    const struct ExchangeBuffers *exchange = &self->state.run.model_exchange;
     *discreteStatesNeedUpdate = false;
     *terminateSimulation = status != fmi3OK;
     *nominalsOfContinuousStatesChanged = exchange->nominals_changed;
@@ -313,7 +313,7 @@ fmi3Status fmi3EnterStepMode(fmi3Instance instance)
 static void call_intermediate_update(Instance *self, double t, bool finished)
 {
     const Run *run = &self->state.run; /* its solver counts time from the start of the run */
-    struct ModelExchange *exchange = &self->state.run.model_exchange;
+    struct ExchangeBuffers *exchange = &self->state.run.model_exchange;
     bool is_before_t = current_time(run) < t, return_requested = false;
     double now = is_before_t ? t : current_time(run), return_time = now;
     if (!self->host.intermediate_update) return;
@@ -346,7 +346,7 @@ fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoi
         *lastSuccessfulTime = current_time(&state->run);
         return status;
     }
-    struct ModelExchange *exchange = &state->run.model_exchange;
+    struct ExchangeBuffers *exchange = &state->run.model_exchange;
     bool event_passed = false;
     if (!self->host.event_mode_used) store_discrete_values(self);
     int64_t status = early_return_begin_step(&state->run, &state->model, t, h, &fault);

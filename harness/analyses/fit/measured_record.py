@@ -16,7 +16,7 @@ MAX_SAMPLES = 2500  # twice as many are averaged to this number of means of neig
 MAX_AVERAGING_ERROR = 0.3  # of a mean of neighbouring samples, in units of the noise
 INPUT_POINTS = 500  # of an input that suffice for a search
 MAX_PARTS = 32  # in the cache of a record
-SHORTEST_STEP = 1e-6  # between communication points, in intervals between samples
+SHORTEST_INTERVAL = 1e-6  # between communication points, in intervals between samples
 
 
 @dataclass(frozen=True)
@@ -141,7 +141,7 @@ class MeasuredRecord:
         their last value after the record, which a negative delay needs.
         """
         t, begin = self.t[index], self.t[0]
-        shortest = SHORTEST_STEP * (self.t[-1] - begin) / len(self.t)  # an FMU may refuse tiny steps
+        shortest = SHORTEST_INTERVAL * (self.t[-1] - begin) / len(self.t)  # an FMU may refuse tiny steps
         shifted = [t - delays.get(j, 0.0) for j in range(len(self.simulator.spec.outputs))]
         sensor_times = [np.where(times - begin > shortest, times, begin) for times in shifted]
         knots, inputs = self.t[[0, index[-1]]], {}

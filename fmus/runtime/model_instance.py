@@ -22,7 +22,7 @@ from .saved_state import SavedStateAccess, attribute_tree
 from .variable_declarations import VariableOwner, fmi_variables
 
 
-def make_fmu_class(slave: type[FmuInstance], model: type[VariableOwner]) -> Any:
+def make_fmu_class(slave: type[ModelInstance], model: type[VariableOwner]) -> Any:
     """Make the FMU class of a model class, with the same name.
 
     A temporary instance is inspected for the variables: CPython 3.11 reads attributes half as fast once __dict__ of an
@@ -43,7 +43,7 @@ def make_fmu_class(slave: type[FmuInstance], model: type[VariableOwner]) -> Any:
     return fmu_class
 
 
-class FmuInstance(SavedStateAccess):
+class ModelInstance(SavedStateAccess):
     """Instance of the model class `Model`.
 
     A base class that follows in the MRO has `instance_name` and log(message, status).
