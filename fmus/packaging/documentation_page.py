@@ -34,7 +34,7 @@ CAPABILITIES = """\
 | model exchange: event indicators, time events, nominal values | | yes | yes |
 | partial derivatives, also with respect to start values and parameters | | yes | yes, also adjoint |
 | derivatives of outputs (order 1) | | yes | yes |
-| derivatives of inputs up to order 8 | | yes | |
+| first derivatives of inputs | | yes | |
 | event mode, early return at stick and slip | | | yes |
 | intermediate update after each internal step, where inputs can be set | | | yes |
 | terminal `flange`: position, speed, force | | | yes |

@@ -114,6 +114,14 @@ def all_variables(model: Any) -> Variables:
     return [*declared, *added, (TIME, TimeVariable("s", "the independent variable"))]
 
 
+def interpolated_inputs(model: Any) -> list[str]:
+    """Return the names of inputs whose derivative an importer of FMI 2.0 may set: those that have no declared rate."""
+    instance = model()
+    prescribed = [name for name, _ in instance.prescribed_inputs]
+    inputs = [name for name, meaning in declared_variables(model) if meaning.causality == "input"]
+    return [name for name in inputs if name not in prescribed and hasattr(instance, f"{name}_polynomial")]
+
+
 def derivative_indices(declared: Variables) -> dict[int, int]:
     """Return {index of derivative: index of its state}: states in order of declaration, then drivers."""
     names = {name: index for index, (name, _) in enumerate(declared)}

@@ -27,6 +27,7 @@ from .fmi_variables import (
     derivative_indices,
     event_indicator_indices,
     has_step_events,
+    interpolated_inputs,
 )
 
 STEPPING_CAPABILITIES = {
@@ -39,7 +40,7 @@ STEPPING_CAPABILITIES = {
 }
 DIRECTIONAL_DERIVATIVES = {"providesDirectionalDerivative": "true"}
 OUTPUT_DERIVATIVES = {"maxOutputDerivativeOrder": "1"}
-INPUT_INTERPOLATION = {"canInterpolateInputs": "true"}  # as polynomials
+INPUT_INTERPOLATION = {"canInterpolateInputs": "true"}  # linearly
 EXCHANGE_CAPABILITIES = {  # for model exchange: the same without communication steps
     **{key: able for key, able in STEPPING_CAPABILITIES.items() if "Communication" not in key},
     **DIRECTIONAL_DERIVATIVES,
@@ -77,10 +78,11 @@ def describe(model: Any, name: str, code: str, date: datetime, nominals: Sequenc
         root.set("numberOfEventIndicators", str(len(event_indicator_indices(declared))))
         step_report = {} if has_step_events(model) else {"completedIntegratorStepNotNeeded": "true"}
         SubElement(root, "ModelExchange", EXCHANGE_CAPABILITIES | step_report, modelIdentifier=name)
+    inputs = [name for name, meaning in declared if meaning.causality == "input"]
     stepping = (
         STEPPING_CAPABILITIES
         | (DIRECTIONAL_DERIVATIVES | OUTPUT_DERIVATIVES if exchanging else {})
-        | (INPUT_INTERPOLATION if exchanging and model.has_input_derivatives else {})
+        | (INPUT_INTERPOLATION if exchanging and inputs and interpolated_inputs(model) == inputs else {})
     )
     SubElement(root, "CoSimulation", stepping, modelIdentifier=name)
     add_units(root, declared)

@@ -20,7 +20,7 @@ BUFFER_TOO_SMALL, WRONG_TOKEN, WRONG_LENGTH = 20, 21, 22
 NO_PARTIAL_DERIVATIVE, NO_OUTPUT_DERIVATIVE, NO_INPUT_DERIVATIVE = 23, 24, 25
 CHATTERING = 26  # of a condition
 NEEDS_REPETITION = 27  # of an internal step
-MAX_INPUT_ORDER = 8  # highest derivative of an input: the order of dop853, which gains nothing from more
+MAX_INPUT_ORDER = 3  # highest derivative of an input, of the chain of position, speed, acceleration and jerk
 # Rules that the values violate; a model has their messages by status
 FIRST_RULE = 101
 HYBRID_LAW_ONLY, NO_CONSISTENT_MODES = 101, 102  # method exact with another law; no stick and slip balances the forces

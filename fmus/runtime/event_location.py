@@ -15,7 +15,6 @@ from . import conditions, contact_lcp, stick_slip
 from .codes import EPSILON, ROUNDOFF_MARGIN
 from .conditions import CONDITION_MARGIN, TINY
 from .interpolant import largest_of, smallest_of
-from .power_series import PowerSeries
 from .vectors import ContactVector, RateVector, StateVector, contact_indices, slip_index
 
 DEGREE = 8  # of the polynomial through an event function; interpolants have degree 7 at most
@@ -69,8 +68,7 @@ class EventLocation:
         self.t_doubt = 0.0  # end of the step that was in doubt
         self.in_doubt = self.must_repeat = self.must_shorten = False
         self.n_halvings = 0  # of the current step, for event functions
-        self.must_search = False  # inputs of higher order: no cubic polynomial resembles the motion
-        self.load_series = PowerSeries()  # of a load, for inputs of higher order
+        self.must_search = False  # inputs move: a body may rest and start again within a long step
         self.feature_width = inf  # slip velocity below which friction varies
 
 

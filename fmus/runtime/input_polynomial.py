@@ -1,6 +1,7 @@
 """Polynomial in time for an input between two settings, given by its derivatives.
 
-A prescribed motion is an input whose declared rate, another input, continues it.
+A prescribed motion is an input whose declared rate, another input, continues it. Where a model declares no rate, an
+importer of FMI 2.0 may set the first derivative.
 """
 
 from math import fabs
@@ -35,16 +36,7 @@ class InputPolynomial:
 
         There is no loop, because every evaluation of the right-hand side calls this.
         """
-        return (
-            self.c[0]
-            if self.order == 0
-            else self.c[0] + s * (self.c[1] if self.order == 1 else self.higher_order_change(s))
-        )
-
-    def higher_order_change(self, s):
-        """Return (u(s) - u(0)) / s."""
-        c = self.c[4] + s * (self.c[5] + s * (self.c[6] + s * (self.c[7] + s * self.c[8])))
-        return self.c[1] + s * (self.c[2] + s * (self.c[3] + s * c))
+        return self.c[0] if self.order == 0 else self.c[0] + s * (self.c[1] + s * (self.c[2] + s * self.c[3]))
 
     def rate_at(self, s):
         """Return the first derivative at s."""
@@ -75,7 +67,6 @@ class PrescribedMotion(InputPolynomial):
 
     def __init__(self):
         super().__init__()
-        self.importer_order = 0  # highest order that the importer has set; the rate gives the derivatives above
         # before the last change: value at the previous change and time since then; the continued value and its rate
         self.last_value = self.elapsed = self.continued_value = self.continued_rate = 0.0
         # how far changes of the rate move the value: since it was set, up to now and up to the previous change; until
@@ -94,11 +85,10 @@ class PrescribedMotion(InputPolynomial):
         self.n_jumps = 0
 
     def continue_by(self, n, value):
-        """Set the n-th derivative according to the rate, unless the importer sets it."""
-        if n > self.importer_order:
-            self.derivatives[n] = value
-            if n > self.order:
-                self.order = n
+        """Set the n-th derivative according to the rate."""
+        self.derivatives[n] = value
+        if n > self.order:
+            self.order = n
 
     def shift_to(self, s):
         """Move the origin to s: update all derivatives there and return the value."""

@@ -9,7 +9,6 @@ from math import fabs, inf, nan
 from . import conditions, contact_lcp, ode23, phase_repetition
 from .active_method import METHOD_ITEMS
 from .codes import DIVERGED, EXACT, HYBRID, HYBRID_LAW_ONLY, OK, STUCK, TOO_MANY_STEPS
-from .linear_closed_form import HIGHER_ORDER_INPUT
 from .step_control import OVERFLOW_LIMIT, InternalStep
 from .variable_declarations import Choice, Count, Fixed, Local, VariableOwner
 from .vectors import (
@@ -169,10 +168,8 @@ class Integrator(VariableOwner):
         if model.is_linear:
             mass, damping, stiffness, drift = model.linear_coefficients()
             step.active_method.exact.prepare(mass, damping, stiffness, drift)
-            if model.has_input_derivatives and model.has_higher_order():
-                step.active_method.exact.regime = HIGHER_ORDER_INPUT
-            elif model.has_input_derivatives:
-                step.active_method.exact.set_force_rate(model.applied_acceleration_derivative(self.t, 1))
+            if model.has_input_derivatives:
+                step.active_method.exact.set_force_rate(model.applied_acceleration_rate(self.t))
 
     # ---- current time
 

@@ -8,8 +8,7 @@ With z = c/(2 m), n^2 = k/m, p = F/m and the impulse response G (G'' + 2 z G' + 
 Each damping regime has its own form of G, G', I and J, which keeps full precision near critical damping and with a weak
 spring or none (L. Meirovitch, Fundamentals of Vibrations, chapters 2 and 4, has the usual forms).  An equilibrium that
 moves at the velocity u (a driver that pulls the spring) is supported without damping only.  The rate q of the force is
-zero unless inputs have derivatives.  For inputs of higher order the motion is computed by power series, interval by
-interval.
+zero unless inputs have rates.
 
 With negative damping or stiffness the motion grows, and x = x0 + v0 G + (p - n^2 x0) I + q J is used instead, because a
 body in an equilibrium then stays there exactly.  q includes the moving equilibrium, n^2 u.
@@ -17,11 +16,10 @@ body in an equilibrium then stays there exactly.  q includes the moving equilibr
 
 from math import atan2, copysign, cos, exp, expm1, fabs, fmod, inf, log1p, pi, sin, sqrt
 
-from .codes import EPSILON, MAX_INPUT_ORDER, ROUNDOFF_MARGIN
-from .power_series import TERMS, PowerSeries
+from .codes import EPSILON, ROUNDOFF_MARGIN
 from .vectors import StateVector
 
-UNDAMPED, UNDERDAMPED, OVERDAMPED, FREE, HIGHER_ORDER_INPUT, GROWING = 1, 2, 3, 4, 5, 6
+UNDAMPED, UNDERDAMPED, OVERDAMPED, FREE, GROWING = 1, 2, 3, 4, 5
 MAX_ITERATIONS, MAX_DOUBLINGS = 200, 1000
 MAX_LOG_GROWTH = 30.0  # of a growing motion in one segment, so that a divergence is noticed before any overflow
 
@@ -39,8 +37,6 @@ class LinearClosedForm:
         self.max_duration = self.horizon = inf  # of a segment that grows, and of the current one
         self.may_end_early = False  # the next segment need not reach a standstill
         self.x0 = self.v0 = self.a0 = self.p = self.net = self.x_roundoff = 0.0
-        if self.has_input_derivatives:
-            self.velocity_series = PowerSeries()  # of the velocity, for inputs of higher order
 
     def prepare(self, m, c, k, drift):
         """Set the coefficients.
@@ -115,8 +111,6 @@ class LinearClosedForm:
                 self.x0 + (self.v0 * g + self.a0 * one_minus_cos / self.n2 + self.drift * lag + self.x_roundoff),
                 self.v0 * (1.0 - one_minus_cos) + self.a0 * g + self.drift * one_minus_cos,
             )
-        if self.has_input_derivatives and self.regime == HIGHER_ORDER_INPUT:
-            return self.evaluate_series(t)
         if self.has_input_derivatives and self.q != 0.0 and self.regime != GROWING:
             return self.evaluate_ramp(t)
         if self.regime == UNDERDAMPED:
@@ -211,33 +205,6 @@ class LinearClosedForm:
             self.x0 + (self.v0 * g + self.net * g_integral + self.q * g_integral2),
             self.v0 * slope + self.net * g + self.q * g_integral,
         )
-
-    def expand_series(self, model, t, duration):
-        """Expand v'' + 2 z v' + n^2 v = p' in a power series from t on, over `duration` seconds."""
-        series = self.velocity_series
-        series.duration = duration
-        series.c[0], series.c[1] = self.v0, self.a0 * duration
-        scale = duration * duration
-        force_term = self.n2 * self.drift
-        for k in range(TERMS - 1):
-            if k < MAX_INPUT_ORDER:
-                force_term += model.applied_acceleration_derivative(t, k + 1)
-            damping_and_spring = (
-                2.0 * self.z * duration * (k + 1) * series.c[k + 1] + self.n2 * duration * duration * series.c[k]
-            )
-            series.c[k + 2] = (force_term * scale - damping_and_spring) / ((k + 1) * (k + 2.0))
-            force_term = 0.0
-            scale *= duration / (k + 1)
-
-    def evaluate_series(self, t) -> StateVector:
-        """Return position and velocity from the power series."""
-        series = self.velocity_series
-        mean = v = 0.0
-        for i in range(TERMS + 1):
-            k = TERMS - i
-            v = series.c[k] + v * t / series.duration
-            mean = series.c[k] / (k + 1) + mean * t / series.duration
-        return self.x0 + mean * t, v
 
     def overdamped_response(self, t):
         """Return G, G' and I from the two real roots, which coincide at critical damping."""

@@ -62,7 +62,7 @@ CALL_MESSAGES = {
     codes.NO_OUTPUT_DERIVATIVE: "{function} is refused: value reference {reference} has no such derivative; outputs "
     "have derivatives of order 1",
     codes.NO_INPUT_DERIVATIVE: "{function} is refused: value reference {reference} accepts no such derivative; an "
-    f"input without a range accepts finite derivatives of orders 1 to {codes.MAX_INPUT_ORDER}; leave out higher orders "
+    "input without a range and without a declared rate accepts a finite derivative of order 1; leave out the others "
     "and take shorter communication steps",
     codes.WRONG_LENGTH: "{function} is refused: {word} is wrong",
 }

@@ -361,5 +361,5 @@ def next_breakaway(model, solver):
         return inf
     ends, directions = contact_vector(), contact_vector()
     for i in contact_indices:
-        ends[i], directions[i] = stick_slip.breakaway_time(model, solver.step, solver.t, solver.y, i)
+        ends[i], directions[i] = stick_slip.breakaway_time(model, solver.t, solver.y, i)
     return min_of(ends)

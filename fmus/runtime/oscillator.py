@@ -47,7 +47,7 @@ class Oscillator(VariableOwner):
     has_nominal_velocity = False  # nominal_velocity() is defined
     checks_event_steps = False  # steps to events are checked: see InternalStep.is_accurate_at
     has_driver = False  # the driver is at x_base at time t_base and moves at driver_velocity()
-    has_input_derivatives = False  # inputs are polynomials around t_base; has_higher_order() if any order exceeds 1
+    has_input_derivatives = False  # inputs are polynomials around t_base
     prescribed_inputs: tuple[tuple[str, str], ...] = ()  # names of each input with a declared rate, and of its rate
     counts_jumps = False  # the importer sets some of these rates: count_jumps() is defined
     has_prescribed_slips = False  # some of them are part of a slip: slip_deviations() is defined
@@ -100,8 +100,8 @@ class Oscillator(VariableOwner):
     def applied_acceleration(self, t: float, modes: ContactVector) -> float:
         """Return the acceleration of a linear model due to forces, at x = v = 0."""
 
-    def applied_acceleration_derivative(self, t: float, n: int) -> float:
-        """Return the n-th derivative of that, if inputs have derivatives."""
+    def applied_acceleration_rate(self, t: float) -> float:
+        """Return the rate of that, if inputs have derivatives."""
 
     def set_input_rates(self, t: float) -> None:
         """Set the rates of inputs with derivatives."""
@@ -109,8 +109,8 @@ class Oscillator(VariableOwner):
     def count_jumps(self) -> None:
         """Note the input that jumps at many communication points in succession, against its rate."""
 
-    def has_higher_order(self) -> bool:
-        """Return whether the polynomial of an input has an order above 1."""
+    def has_moving_inputs(self) -> bool:
+        """Return whether an input varies between settings."""
 
     def nominal_velocity(self):
         """Return the velocity (m/s or rad/s) that the absolute tolerance must resolve; inf if there is none."""

@@ -23,7 +23,7 @@ def begin_phase(model, step):
     location.in_doubt = location.must_repeat = False
     step.largest_slip = 0.0
     if model.has_dry_friction and model.has_input_derivatives and not model.is_coupled:
-        location.must_search = model.has_higher_order()
+        location.must_search = model.has_moving_inputs()
         if location.must_search:
             step.largest_slip = inf  # every step is examined
             for i in contact_indices:

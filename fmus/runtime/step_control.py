@@ -12,7 +12,6 @@ from .active_method import ActiveMethod
 from .codes import DIVERGED, EPSILON, EXACT, NEEDS_REPETITION, NO_CONSISTENT_MODES, OK, ROUNDOFF_MARGIN, STALLED, STUCK
 from .event_location import INTERPOLANT_SHARE, NEAR_ZERO_SHARE, EventLocation
 from .interpolant import Interpolant, largest_of
-from .linear_closed_form import HIGHER_ORDER_INPUT
 from .vectors import (
     ContactVector,
     RateVector,
@@ -224,10 +223,7 @@ class InternalStep:
         if model.rests_when_stuck and self.is_hybrid and (all_of(self.modes0 == STUCK) or self.grazes_at_end):
             status = self.advance_stuck(model)
         elif model.is_linear and self.active_method.method_number == EXACT:
-            if model.has_input_derivatives and self.active_method.exact.regime == HIGHER_ORDER_INPUT:
-                status = self.advance_power_series(model)
-            else:
-                status = self.advance_linear_segment(model)
+            status = self.advance_linear_segment(model)
         else:
             status = self.advance_with_method(model)
         self.n_accepted += 1
@@ -286,7 +282,7 @@ class InternalStep:
             self.y1[slip_index[i]] = 0.0
         ends, directions = contact_vector(), contact_vector()
         for i in contact_indices:
-            ends[i], directions[i] = stick_slip.breakaway_time(model, self, self.t0, self.y1, i)
+            ends[i], directions[i] = stick_slip.breakaway_time(model, self.t0, self.y1, i)
         end = min_of(ends)
         if end <= self.t_end and end < inf:
             self.t1 = end
@@ -319,30 +315,6 @@ class InternalStep:
             if not sum_of(magnitude(self.y1)) < OVERFLOW_LIMIT:
                 return DIVERGED
         return OK
-
-    def advance_power_series(self, model):
-        """Follow a power series over one interval or up to the next standstill, for inputs of higher order."""
-        exact = self.active_method.exact
-        duration = self.h_max if self.h_max * exact.max_rate < 1.0 else 1.0 / exact.max_rate
-        remaining = self.t_end - self.t0
-        last = duration >= remaining
-        if last:
-            duration = remaining
-        exact.start_segment(self.y0, self.f0, 0.0, 0.0)
-        exact.expand_series(model, self.t0, duration)
-        self.t1 = self.t_end if last else self.t0 + duration
-        if model.has_dry_friction:
-            fraction, has_zero = exact.velocity_series.first_zero(self.modes0)
-            if fraction < 1.0:
-                self.t1 = self.t0 + fraction * duration
-            if has_zero:
-                self.y1 = exact.evaluate(fraction * duration)
-                for i in contact_indices:
-                    self.y1[slip_index[i]] = 0.0
-                return self.end_at_event(model)
-        self.y1 = exact.evaluate(self.t1 - self.t0)
-        self.f1 = model.rates(self.t1, self.y1, self.modes1)
-        return OK if sum_of(magnitude(self.y1)) < OVERFLOW_LIMIT else DIVERGED
 
     def advance_with_method(self, model):
         """Compute a step of the method that meets the tolerance; end it at a change of mode."""

@@ -15,7 +15,6 @@ from .codes import (
     FORWARD,
     HYBRID,
     HYBRID_LAW_ONLY,
-    MAX_INPUT_ORDER,
     NO_CONSISTENT_MODES,
     ROUNDOFF_MARGIN,
     SIGN,
@@ -72,9 +71,6 @@ class DryFriction(Oscillator):
 
     def load_magnitude(self, t: float, y: StateVector, i: ContactIndex) -> float:
         """Return the sum of the absolute terms of the load, which scales its rounding error."""
-
-    def load_derivative(self, t: float, y: StateVector, n: int, i: ContactIndex) -> float:
-        """Return the n-th derivative of the load, if inputs have derivatives."""
 
     def law_modes(self, t: float, y: StateVector) -> ContactVector:
         """Return the directions of slip under the laws sign and threshold, whose forces do not depend on modes."""
@@ -179,35 +175,14 @@ def is_consistent(model, t, y: StateVector, modes: ContactVector, i: ContactInde
     return modes[i] * forward >= -rounding
 
 
-def breakaway_time(model, step, t, y: StateVector, i: ContactIndex):
+def breakaway_time(model, t, y: StateVector, i: ContactIndex):
     """Return when a contact breaks away if nothing moves (inf if never), and the direction."""
     load, rate, limit = model.stick_load(t, y, i)
-    if model.has_input_derivatives and model.has_higher_order():
-        return breakaway_time_by_series(model, step, t, y, load, rate, limit, i)
     if rate == 0.0:
         return inf, STUCK
     direction = FORWARD if rate > 0.0 else BACKWARD
     delay = (limit - direction * load) / fabs(rate)
     return t + (delay if delay > 0.0 else 0.0), direction
-
-
-def breakaway_time_by_series(model, step, t, y: StateVector, load, rate, limit, i: ContactIndex):
-    """Return the same for inputs of higher order; direction 0 if the search must continue from that time."""
-    series = step.event_location.load_series
-    duration = scale = step.h_max
-    series.c[1] = rate * duration
-    for n in range(2, MAX_INPUT_ORDER + 1):
-        scale *= duration / n
-        series.c[n] = model.load_derivative(t, y, n, i) * scale
-    series.c[0] = load - limit if load < limit else 0.0
-    up, forward = series.first_zero(BACKWARD)
-    series.c[0] = load + limit if load > -limit else 0.0
-    down, backward = series.first_zero(FORWARD)
-    if forward and up <= down:
-        return t + up * duration, FORWARD
-    if backward and down <= up:
-        return t + down * duration, BACKWARD
-    return t + (up if up < down else down) * duration, STUCK
 
 
 def update_contact_event_functions(model, location, t, y: StateVector, modes: ContactVector):

@@ -52,7 +52,7 @@ CAPABILITIES = {  # names as they begin in the model descriptions of both versio
     "model exchange: event indicators, time events, nominal values": ("ModelExchange", "modelIdentifier"),
     "partial derivatives, also with respect to start values and parameters": ("CoSimulation", "providesDirectional"),
     "derivatives of outputs (order 1)": ("CoSimulation", "maxOutputDerivativeOrder"),
-    "derivatives of inputs up to order 8": (
+    "first derivatives of inputs": (
         "CoSimulation",
         "canInterpolateInputs",
     ),

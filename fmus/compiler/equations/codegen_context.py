@@ -135,15 +135,6 @@ class CodegenContext:
                 f"{self.driver.name} = self.x_base + self.{self.driver.constant_rate.name} * (t - self.t_base)"
             )
 
-    def nth_derivative_method(self, name: str, arguments: Sequence[str], targets: Sequence[Operand]) -> str:
-        """Generate a method that returns targets with the n-th derivatives of inputs in place of their rates."""
-        printer = self.printer()
-        n = printer.fresh_name("n")
-        for e, rate in self.analysis.input_rates.items():
-            printer.bound_names[rate] = rate.name
-            printer.emit(f"{rate.name} = self.{e.name}_polynomial.derivative_at(t - self.t_base, {n})")
-        return method_source(name, [*arguments, n], self.return_lines(printer, targets))
-
     @property
     def single_contact(self) -> Contact | None:
         """The contact of a single-body model, which rests while stuck, or None."""

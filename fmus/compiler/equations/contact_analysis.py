@@ -147,6 +147,7 @@ class ContactAnalysis(ModelRoles):
         slopes = [self.derivative(self.load[c], {e: 1.0}) for e in prescribed]
         return (
             not any(depends_on(e, by_time) for e in changes)
+            and self.is_ramp(self.load[c])
             and not depends_on(self.holding_limit[c], prescribed)
             and not any(depends_on(slope, (*by_time, *self.inputs)) for slope in slopes)
             and not any(

@@ -136,7 +136,10 @@ class ModelAnalysis(ContactAnalysis):
         result = self._linear_coefficients()
         if result is None:
             return None
-        is_linear = all(self._has_constant_effect(e, result) for e in self.prescribed_inputs)
+        is_linear = all(
+            self._has_constant_effect(e, result) and all(map(self.is_ramp, self.rate_outputs.values()))
+            for e in self.prescribed_inputs
+        )
         has_condition = any(has_condition_on(rate, self.prescribed_inputs) for rate in self.rate_outputs.values())
         return result if is_linear and not has_condition else None
 

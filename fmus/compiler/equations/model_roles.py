@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from math import isfinite
 from typing import Any
 
+from ...runtime.codes import MAX_INPUT_ORDER
 from .algebra import depends_on, differentiate, has_condition_on, is_same_expression, variables_in
 from .expressions import Expression, ModelError, Operand, describe, is_among
 from .model_declaration import Choice, Contact, Fixed, Input, Mode, Model, Output, Parameter, Rule, State, Variable
@@ -52,6 +53,7 @@ class ModelRoles:
         self.prescribed_inputs = [e for e in self.inputs if e.declared_rate is not None]
         for e in self.prescribed_inputs:
             self._check_declared_rate(e)
+        self.input_orders = self._input_orders()
         # symbols for the first derivatives of inputs, and for the second ones of those with a declared rate
         self.input_rates = {
             e: derivative_symbol(e, "rate")
@@ -129,10 +131,26 @@ class ModelRoles:
             return [expression for expression in (e.mode, e.slip, e.slide, e.hold, e.eps) if expression is not None]
         return []
 
+    def _input_orders(self) -> dict[Input, int]:
+        """Return the order of the polynomial that continues each input with a declared rate."""
+        orders: dict[Input, int] = {}
+        for e in self.prescribed_inputs:  # a rate is declared before its input
+            order_of_rate = max((orders[one] for one in orders if depends_on(e.declared_rate, (one,))), default=0)
+            orders[e] = min(1 + order_of_rate, MAX_INPUT_ORDER)
+        return orders
+
     def _accepts_derivatives(self, e: Input) -> bool:
-        """Return whether the importer may set derivatives of an input: no range, and names that are not in use."""
+        """Return whether the importer may set the derivative of an input.
+
+        An input with a range may not leave it, and one that is the rate of another input would raise its order.
+        """
         is_taken = any(variable.name in derivative_names(e) for variable in self.declared)
-        return not is_taken and not has_range(e)
+        is_rate = any(depends_on(one.declared_rate, (e,)) for one in self.prescribed_inputs)
+        return not is_taken and not is_rate and not has_range(e)
+
+    def is_ramp(self, e: Operand) -> bool:
+        """Return whether an expression is linear in time as far as it depends on inputs with declared rates."""
+        return not depends_on(e, [one for one, order in self.input_orders.items() if order > 1])
 
     def _check_declared_rate(self, e: Input) -> None:
         """Raise ModelError for a rate by which an input cannot be continued as a polynomial in time."""

@@ -212,7 +212,8 @@ def closed_form_methods(context: CodegenContext) -> list[str]:
     ]
     if context.analysis.input_rates:
         slope = context.analysis.derivative(context.rate_outputs[0].expression, context.analysis.input_rates)
-        methods.append(context.nth_derivative_method("applied_acceleration_derivative", ["t"], [slope]))
+        lines = context.return_lines(context.printer(), [slope])
+        methods.append(method_source("applied_acceleration_rate", ["t"], lines))
     lines = context.return_lines(context.printer(), [substitute(e, at_zero) for e in targets])
     return [*methods, method_source("applied_acceleration", ["t", *context.modes], lines)]
 

@@ -2,7 +2,6 @@
 
 from collections.abc import Collection
 
-from ...runtime.codes import MAX_INPUT_ORDER
 from .algebra import depends_on, differentiate, subexpressions
 from .codegen_context import CodegenContext, method_source, rule_status
 from .expression_printer import INDENT, ExpressionPrinter
@@ -99,23 +98,20 @@ def prepare_method(context: CodegenContext) -> str:
 def emit_input_polynomials(context: CodegenContext, printer: ExpressionPrinter) -> None:
     """Emit the polynomials of inputs; a declared rate, which is declared before its input, gives the derivatives."""
     analysis = context.analysis
-    orders: dict[Expression, int] = {}  # of the polynomial, at most
     for e in analysis.input_rates:
         polynomial = f"self.{e.name}_polynomial"
         if not is_among(e, analysis.prescribed_inputs):
-            orders[e] = MAX_INPUT_ORDER
             printer.emit(f"{polynomial}.set_value(self.{e.name})")
             continue
-        inputs = [one for one in orders if depends_on(e.declared_rate, (one,))]
-        orders[e] = min(1 + max((orders[one] for one in inputs), default=0), MAX_INPUT_ORDER)
-        for n in range(orders[e]):
+        inputs = [one for one in analysis.input_orders if depends_on(e.declared_rate, (one,))]
+        for n in range(analysis.input_orders[e]):
             value = derivative_of_rate(analysis.names, e, inputs, n, printer)
             printer.emit(f"{polynomial}.continue_by({n + 1}, {value})")
         printer.emit(f"{polynomial}.set_motion(self.{e.name})")
 
 
 def derivative_of_rate(
-    names: dict[Expression, str], e: Input, inputs: list[Expression], n: int, printer: ExpressionPrinter
+    names: dict[Expression, str], e: Input, inputs: list[Input], n: int, printer: ExpressionPrinter
 ) -> str:
     """Return the text of the n-th derivative of the declared rate of an input; its inputs have polynomials."""
     if n == 0:
@@ -155,7 +151,7 @@ def driver_method(context: CodegenContext) -> list[str]:
 
 
 def input_polynomial_methods(context: CodegenContext) -> list[str]:
-    """For inputs with derivatives: move the time base to t, set input rates, test for derivatives above order 1."""
+    """For inputs with derivatives: move the time base to t, set input rates, test whether an input moves."""
     if not context.analysis.input_rates:
         return []
     base, rates = context.printer(), context.printer()
@@ -164,13 +160,12 @@ def input_polynomial_methods(context: CodegenContext) -> list[str]:
         rates.emit(f"self.{rate.name} = self.{e.name}_polynomial.rate_at(t - self.t_base)")
     base.emit("super().rebase(t)")
     base.emit("self.t_base = t")
-    higher_order = context.printer()
-    higher_order.emit(
-        "return " + " or ".join(f"self.{e.name}_polynomial.order > 1" for e in context.analysis.input_rates)
-    )
-    printers = {"rebase": base, "set_input_rates": rates, "has_higher_order": higher_order}
+    moving = context.printer()
+    moving.emit("return " + " or ".join(f"self.{e.name}_polynomial.order > 0" for e in context.analysis.input_rates))
     return [
-        method_source(name, ["t"] * (name != "has_higher_order"), printer.lines) for name, printer in printers.items()
+        method_source("rebase", ["t"], base.lines),
+        method_source("set_input_rates", ["t"], rates.lines),
+        method_source("has_moving_inputs", (), moving.lines),
     ]
 
 

@@ -15,7 +15,6 @@ def single_contact_methods(context: CodegenContext) -> list[str]:
         if c is None
         else [
             load_method(context, c),
-            *load_rate_method(context, c),
             load_scale_method(context, c),
             *breakaway_method(context, c),
         ]
@@ -31,22 +30,6 @@ def load_method(context: CodegenContext, c: Contact) -> str:
         analysis.holding_limit[c],
     ]
     return method_source("stick_load", ["t", *context.states], context.return_lines(context.printer(), targets))
-
-
-def load_rate_method(context: CodegenContext, c: Contact) -> list[str]:
-    """The n-th derivative of the load caused by inputs."""
-    input_rates = context.analysis.input_rates
-    return (
-        [
-            context.nth_derivative_method(
-                "load_derivative",
-                ["t", *context.states],
-                [context.analysis.derivative(context.analysis.load[c], input_rates)],
-            )
-        ]
-        if input_rates
-        else []
-    )
 
 
 def load_scale_method(context: CodegenContext, c: Contact) -> str:

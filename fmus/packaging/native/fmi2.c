@@ -150,7 +150,7 @@ fmi2Status fmi2GetBooleanStatus(fmi2Component component, const fmi2StatusKind s,
     return fmi2OK;
 }
 
-/* Set derivatives of inputs at the current point. Each input follows its polynomial until it is set again. */
+/* Set first derivatives of inputs at the current point. Each input is linear in time until it is set again. */
 fmi2Status fmi2SetRealInputDerivatives(fmi2Component component, const fmi2ValueReference vr[], size_t nvr,
                                        const fmi2Integer order[], const fmi2Real value[])
 {
@@ -160,22 +160,17 @@ fmi2Status fmi2SetRealInputDerivatives(fmi2Component component, const fmi2ValueR
     bool fault = false;
     if (nvr && (!vr || !order || !value)) return refuse(self, NULL_POINTER, __func__, "vr, order or value");
     for (size_t i = 0; i < nvr; i++) {
-        bool has_derivatives = vr[i] < VARIABLES && variables[vr[i]].order_offset != NO_OFFSET;
-        if (has_derivatives && 1 <= order[i] && order[i] <= MAX_INPUT_ORDER && isfinite(value[i])) continue;
+        bool has_derivative = vr[i] < VARIABLES && variables[vr[i]].derivatives_offset != NO_OFFSET;
+        if (has_derivative && order[i] == 1 && isfinite(value[i])) continue;
         return refuse_call(self, NO_INPUT_DERIVATIVE, &(Call){.function = __func__, .reference = vr[i]});
     }
     for (size_t i = 0; i < nvr && !fault; i++) {
         const Variable *variable = &variables[vr[i]];
-        int64_t *highest = input_order(state, variable);
-        double *derivative = (double *)((char *)state + variable->derivatives_offset) + order[i];
-        if (*derivative == value[i] && *highest <= order[i]) continue; /* unchanged */
+        double *derivative = (double *)((char *)state + variable->derivatives_offset) + 1;
+        if (*derivative == value[i]) continue; /* unchanged */
         call_sequence_note_change(&state->run, &state->model, &fault);
         *derivative = value[i];
-        if (*highest < order[i]) *highest = order[i];
-        if (variable->importer_order_offset != NO_OFFSET) {
-            int64_t *importer_order = (int64_t *)((char *)state + variable->importer_order_offset);
-            if (*importer_order < order[i]) *importer_order = order[i];
-        }
+        *input_order(state, variable) = 1;
         state->run.outputs_current = false;
     }
     return finish_call(self, OK, fault, NAN, NAN);

@@ -1,7 +1,7 @@
 """Generates model.h: the numerics of a model and of its FMI calls, its variables and the messages."""
 
 import inspect
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from string import Formatter
 from typing import Any
 
@@ -26,6 +26,7 @@ from ..fmi_variables import (
     declared_variables,
     derivative_indices,
     event_indicator_indices,
+    interpolated_inputs,
 )
 from .directional_derivative import Tangent, build_tangent_functions, tangent_fields
 
@@ -147,7 +148,6 @@ DERIVATIVE_ATTRIBUTES = (
     "rate",
     "polynomial.order",
     "polynomial.derivatives",
-    "polynomial.importer_order",
 )  # attributes of an input with derivatives
 
 
@@ -164,7 +164,7 @@ def render_model_header(model: Any, fmi: str) -> str:
     for function, arg_types in entry_point_types(model, StructPointer(type(run)), call_graph.layout.model, fmi).items():
         call_graph.add_entry_point(function, arg_types)
     layout = call_graph.layout
-    names = [name for name, _ in declared]
+    names, interpolated = [name for name, _ in declared], interpolated_inputs(model)
     references = array_starts(declared) if fmi == "3" else [*range(len(declared))]
     sizes = [references.count(index) for index in range(len(declared))]
     roots = [("run", type(run)), ("model", type(instance))]
@@ -203,7 +203,7 @@ def render_model_header(model: Any, fmi: str) -> str:
                 size,
                 attribute_path(model, name),
                 tangent_fields(declared),
-                getattr(instance, f"{name}_polynomial", None),
+                derivative_attributes(instance, name, interpolated),
             )
             for (name, meaning), size in zip(declared, sizes, strict=True)
         ),
@@ -215,6 +215,13 @@ def render_model_header(model: Any, fmi: str) -> str:
         phases=", ".join(c_string_literal(PHASE_NAMES[phase]) for phase in range(len(PHASE_NAMES))),
         count_of_phases=len(PHASE_NAMES),
     )
+
+
+def derivative_attributes(instance: VariableOwner, name: str, interpolated: Collection[str]) -> tuple[str, ...]:
+    """Return those of DERIVATIVE_ATTRIBUTES that a variable has: the last one if the importer may set derivatives."""
+    if not hasattr(instance, f"{name}_polynomial"):
+        return ()
+    return DERIVATIVE_ATTRIBUTES if name in interpolated else DERIVATIVE_ATTRIBUTES[:-1]
 
 
 def rate_warnings(prescribed_inputs: Sequence[tuple[str, str]]) -> dict[int, str]:
@@ -251,9 +258,14 @@ def _items_array_name(name: str) -> str:
 
 
 def _variable_row(
-    name: str, meaning: VariableDeclaration, size: int, path: str, tangent_fields: dict[str, str], polynomial: object
+    name: str,
+    meaning: VariableDeclaration,
+    size: int,
+    path: str,
+    tangent_fields: dict[str, str],
+    derivatives: Collection[str],
 ) -> str:
-    """Return the table row of a variable."""
+    """Return the table row of a variable; `derivatives` are those of DERIVATIVE_ATTRIBUTES that it has."""
     texts = (exported_name(name, meaning), meaning.text, meaning.unit_suffix, meaning.allowed)
     flags = (
         meaning.type == "Real",
@@ -271,7 +283,6 @@ def _variable_row(
         if meaning.items
         else "NULL, NULL"
     )
-    existing_parts = ["rate", *(f"polynomial.{part}" for part in vars(polynomial))] if polynomial else []
     parts = [
         *map(c_string_literal, texts),
         str(size),
@@ -279,7 +290,7 @@ def _variable_row(
         f"offsetof(struct Tangent, {tangent_fields[name]})" if name in tangent_fields else "NO_OFFSET",
         *map(c_literal, flags),
         ", ".join(
-            f"offsetof(State, model.{name}_{part})" if part in existing_parts else "NO_OFFSET"
+            f"offsetof(State, model.{name}_{part})" if part in derivatives else "NO_OFFSET"
             for part in DERIVATIVE_ATTRIBUTES
         ),
         *(c_literal(float(bound)) for bound in bounds),

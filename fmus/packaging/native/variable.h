@@ -24,10 +24,9 @@ typedef struct {
     bool is_updated_on_read;       /* solver and event statistics */
     bool is_state_or_input;
     bool is_real_parameter;        /* others have partial derivatives by it, as by states and inputs */
-    /* Of an input that can be interpolated, in State: its time derivative, the order of its polynomial and the
-     * polynomial's derivatives, and, if it has a declared rate, the highest order that the importer has set; otherwise
-     * NO_OFFSET. */
-    size_t rate_offset, order_offset, derivatives_offset, importer_order_offset;
+    /* Of an input that varies between settings, in State: its time derivative and the order of its polynomial; the
+     * polynomial's derivatives, if the importer may set the first one; otherwise NO_OFFSET. */
+    size_t rate_offset, order_offset, derivatives_offset;
     double low, high, above, below;   /* low <= value <= high, above < value < below */
     const int64_t *items, *items_end; /* values of an enumeration */
 } Variable;
