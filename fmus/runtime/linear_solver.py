@@ -4,7 +4,7 @@ A state p whose rate is the state q has k_p = g (r_p + h k_q).  The remaining sy
 A pivot gives NaN and rejects the step if it is zero or amplifies rounding errors, that is, if its elimination changes a
 later pivot by a large multiple of that, a ratio without units.  A smaller h brings the matrix closer to 1.
 
-The functions run on numbers (vectors.py), and at build time on names, which gives the statements of an FMU
+The functions run on numbers, in tests, and at build time on names, which gives the statements of an FMU
 (compiler/lowering/elimination.py).  Vectors are dictionaries by index of a state, matrices by row and column; what is
 always zero is missing.  In a chain of n bodies this leaves out most of n^3 operations, and it changes no number.
 `computed` are the states whose rate is computed; `moved` maps each other state to the one that is its rate.

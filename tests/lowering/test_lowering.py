@@ -1,4 +1,4 @@
-"""The lowered numerics: the same bits as the vector sources on arrays, removed code, and unsupported constructs."""
+"""The lowered numerics: the same bits as the vector sources on lists, removed code, and unsupported constructs."""
 
 import ast
 import traceback
@@ -7,7 +7,7 @@ from itertools import product
 from pathlib import Path
 
 import pytest
-from internal_steps import array_steps, prepared_run, scalar_steps
+from internal_steps import list_steps, prepared_run, scalar_steps
 from models import CASES, LARGER_MODELS, MODELS, ROOT, label, model_class
 
 from fmus.compiler import BuildError
@@ -30,10 +30,10 @@ EVERY_MODEL = pytest.mark.parametrize("name", MODELS)
 
 
 @pytest.mark.parametrize("case", CASES, ids=label)
-def test_arrays_and_scalars_give_the_same_bits_at_every_step(case):
+def test_lists_and_scalars_give_the_same_bits_at_every_step(case):
     name, values, stop = case
     scalars = scalar_steps(model_class(name)(), values, stop, STEPS)
-    assert scalars == array_steps(find_model(name).model(), values, stop, STEPS)
+    assert scalars == list_steps(find_model(name), values, stop, STEPS)
     assert scalars
 
 

@@ -5,7 +5,7 @@ from itertools import cycle, product
 import numpy as np
 import pytest
 from contact_references import CONTACT_REFERENCES, reference_events, solve_lugre
-from internal_steps import array_steps, bits, components, compute_step, prepared_run, scalar_steps, start
+from internal_steps import bits, components, compute_step, list_steps, prepared_run, scalar_steps, start
 from models import DOP853, LARGER_MODELS, ODE23, ODE45, RADAU9, RODAS, ROOT
 
 from fmus.compiler.lowering import lowered_model, select_features
@@ -30,11 +30,11 @@ def complete_model(file):
 @pytest.mark.parametrize(
     ("name", "method"), [*product(("sleds", "bumper"), RTOL), *zip(STOPS, cycle(RTOL), strict=False)]
 )
-def test_arrays_and_scalars_give_the_same_bits_at_every_step(name, method):
+def test_lists_and_scalars_give_the_same_bits_at_every_step(name, method):
     file, stop = FILES[name], STOPS[name]
     values = {"solver.method": method, "solver.rtol": 1e-5}
     scalars = scalar_steps(complete_model(file)(), values, stop, STEPS)
-    assert scalars == array_steps(find_model(file).model(), values, stop, STEPS)
+    assert scalars == list_steps(find_model(file), values, stop, STEPS)
     assert len(scalars) > 10
 
 

@@ -1,12 +1,10 @@
-"""Record internal steps in Python: of the emitted scalar code of a model, and of the vector sources on numpy arrays."""
+"""Record internal steps in Python: of the emitted scalar code of a model, and of the vector sources on lists."""
 
 import struct
 
-import numpy as np
-from array_model import to_array_model
+import list_vectors
 
 from fmus.compiler.lowering import component_name
-from fmus.runtime import vectors
 from harness.simulation.embedded_model import create_run
 
 COUNTS = ("n_accepted", "n_rejected", "n_rhs")
@@ -51,18 +49,18 @@ def scalar_steps(model, values, stop, most):
     return list(steps(model, run, row, stop, most))
 
 
-def array_steps(model, values, stop, most):
-    """Return the same for the vector sources."""
+def list_steps(source, values, stop, most):
+    """Return the same for the vector sources, of a model file."""
+    model = list_vectors.load_vector_model(source)
     run = prepared_run(model, values)
-    model = to_array_model(model, run)
     start(model, run, [model.initial_state(0.0)], stop)
 
     def row(step):
         middle = step.state_at(model, 0.5 * (step.t0 + step.t1))
-        return [step.t1, *step.y1, *step.f1[vectors.is_dynamic], *step.modes1, step.h_next, *counts(step), *middle]
+        rates = [step.f1[i] for i in list_vectors.computed_states()]
+        return [step.t1, *step.y1, *rates, *step.modes1, step.h_next, *counts(step), *middle]
 
-    with np.errstate(all="ignore"):
-        return list(steps(model, run, row, stop, most))
+    return list(steps(model, run, row, stop, most))
 
 
 def compute_step(model, run):

@@ -21,7 +21,7 @@ A ConditionVector is stored in a list, as in margins[:] = model.condition_margin
 A loop over contact_indices, state_indices or velocity_indices is unrolled; a function with a parameter
 `i: ContactIndex` is written once for each contact.  A loop over the methods is unrolled for the methods that the FMU
 offers; a loop that tests each of them becomes a chain of conditions.
-Tests check that arrays, scalars and C give the same bits (tests/lowering/test_lowering.py).
+Tests check that the vectors as lists, scalars and C give the same bits (tests/lowering/test_lowering.py).
 """
 
 from .feature_selection import LAWS, METHODS, select_features
