@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from commands import harness
 from decays import Signal, identify
+from variants import slow_after
 
 from harness import HarnessError
 
@@ -28,7 +29,9 @@ SHARES, BEGINS = [0.45, 0.95, 1.3, 3.3], [0.1, 0.3, 1.2, 2.2]
 
 @pytest.mark.parametrize(  # each share and each begin with noise and without
     ("share", "begin", "noise"),
-    [(s, BEGINS[(i + j) % 4], noise) for i, s in enumerate(SHARES) for j, noise in enumerate((0.0, 1e-4))],
+    slow_after(
+        3, [(s, BEGINS[(i + j) % 4], noise) for i, s in enumerate(SHARES) for j, noise in enumerate((0.0, 1e-4))]
+    ),
 )
 def test_a_pause_of_any_length_does_not_bias_the_fit(begin, share, noise):
     """Without the laws with drag, which take most of the time of a fit and follow the pause handling; some tests
@@ -39,7 +42,7 @@ def test_a_pause_of_any_length_does_not_bias_the_fit(begin, share, noise):
     assert estimates["omega"].error < 1e-3 * OMEGA
 
 
-@pytest.mark.parametrize("share", [0.35, 0.7])
+@pytest.mark.parametrize("share", slow_after(1, [0.35, 0.7]))
 def test_a_pause_without_a_turning_point_costs_no_other_samples(share):
     fit = identify(paused(0.55, share))
     assert fit.t[0] == 0.0

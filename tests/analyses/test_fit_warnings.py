@@ -5,6 +5,7 @@ import contextlib
 import numpy as np
 import pytest
 from decays import OMEGA, Signal, T, decay_record, identify, remarks_text
+from variants import slow_after
 
 from harness import HarnessError, identify_decay
 
@@ -80,14 +81,16 @@ def test_a_refusal_names_what_was_assumed_in_reading(tmp_path):
 
 @pytest.mark.parametrize(
     ("sine", "order", "drift", "drag"),
-    [
-        (False, 0, 1.0, False),
-        (False, 2, 0.05, False),
-        *(
-            pytest.param(*values, marks=pytest.mark.slow)
-            for values in ((False, 0, 0.05, True), (True, 0, 0.05, True), (False, 2, 1.0, False))
-        ),
-    ],
+    slow_after(
+        1,
+        [
+            (False, 0, 1.0, False),
+            (False, 2, 0.05, False),
+            (False, 0, 0.05, True),
+            (True, 0, 0.05, True),
+            (False, 2, 1.0, False),
+        ],
+    ),
 )
 def test_a_drift_too_large_to_fit_is_reported_with_a_remedy(sine, order, drift, drag):
     size = 0.1 * OMEGA**order

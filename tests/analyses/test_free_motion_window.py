@@ -34,6 +34,7 @@ def test_a_push_before_the_motion_is_excluded_and_reported():
     assert "The free decay from t = 1.3" in remarks_text(fit)
 
 
+@pytest.mark.slow
 def test_a_motion_stopped_from_outside_is_cut_and_reported():
     t = np.linspace(0, 8, 1500)
     x = decay_record(0.005, 0.0003, turn=0.0, t=t, noise=1e-4).x
@@ -74,7 +75,7 @@ def test_a_half_without_motion_is_reported():
     assert "do not rely on these values" in remarks_text(identify(record))
 
 
-@pytest.mark.parametrize("drag", [True, False])
+@pytest.mark.parametrize("drag", slow_after(1, [True, False]))
 def test_repeated_samples_before_and_after_the_motion_are_excluded(drag):
     """They are longer than the motion and interrupt it in mid-swing."""
     record = decay_record(0.01, 0.001, turn=0.0, noise=1e-4)

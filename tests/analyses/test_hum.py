@@ -5,6 +5,7 @@ import re
 import numpy as np
 import pytest
 from decays import decay_record, identify, remarks_text, values
+from variants import slow_after
 
 T = np.linspace(0.0, 12.0, 4801)
 LAW = {"zeta": 0.005, "r": 2e-4, "t": T, "noise": 1e-4}  # about 2 Hz, with a first amplitude of 0.1
@@ -21,7 +22,9 @@ def widths(fit):
     return np.array([fit[name].high - fit[name].low for name in TRUTH])
 
 
-@pytest.mark.parametrize(("size", "times"), [(1e-4, "even"), (0.03, "even"), (1e-4, "uneven"), (1e-3, "uneven")])
+@pytest.mark.parametrize(
+    ("size", "times"), slow_after(1, [(1e-4, "even"), (0.03, "even"), (1e-4, "uneven"), (1e-3, "uneven")])
+)
 def test_values_and_intervals_are_those_without_hum(size, times):
     record = decay_record(**LAW)
     if times == "uneven":
@@ -45,6 +48,7 @@ def test_hum_of_a_velocity_of_a_pendulum_is_subtracted():
     assert "0.05 rad/s" in remarks_text(fit)
 
 
+@pytest.mark.slow
 def test_the_start_time_does_not_matter():
     record = with_hum(decay_record(**LAW), 1e-3)
     fits = [identify(record._replace(t=record.t + start)) for start in (0.0, 4096.0)]
@@ -52,7 +56,7 @@ def test_the_start_time_does_not_matter():
     assert later == pytest.approx(first, rel=1e-5)
 
 
-@pytest.mark.parametrize("motion", ["noise", "distorted", "ringing"])
+@pytest.mark.parametrize("motion", slow_after(1, ["noise", "distorted", "ringing"]))
 def test_a_residual_that_belongs_to_the_motion_is_no_hum(motion):
     """A distorted motion has harmonics; a ringing fades."""
     record = decay_record(**LAW)

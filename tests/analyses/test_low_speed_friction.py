@@ -36,6 +36,7 @@ def test_a_rise_of_the_size_of_the_friction_or_more_is_not_mentioned():
     assert "at low speed" not in remarks_text(fit)
 
 
+@pytest.mark.slow
 def test_a_rise_is_shown_by_a_record_that_is_cut_where_it_departs():
     """The part before the departure follows a law of its own, with too much dry friction."""
     fit = fit_rise(1.67, 1e-4, zeta=0.003, speed=0.125)
@@ -45,6 +46,7 @@ def test_a_rise_is_shown_by_a_record_that_is_cut_where_it_departs():
     assert fit["r"].low < R * AMPLITUDE < fit["r"].value
 
 
+@pytest.mark.slow
 def test_a_record_cut_for_another_reason_excludes_no_rise():
     """Stopped by hand, it would not show any rise that acts after the cut."""
     t = np.linspace(0, 8, 1500)

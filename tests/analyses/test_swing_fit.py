@@ -22,6 +22,7 @@ def test_the_swings_give_the_law_of_a_clean_record():
     assert not any("departs" in remark or "swings" in remark for remark in fit.remarks)
 
 
+@pytest.mark.slow
 def test_an_error_of_the_clock_does_not_change_the_estimates_from_the_swings():
     """Whose phase the whole signal cannot follow."""
     clean, wrong = swung(), swung(lambda t: t + 0.004 * np.sin(1.3 * t))

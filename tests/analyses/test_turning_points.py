@@ -20,8 +20,8 @@ def test_turning_points_alone_give_the_same_estimates(sine, a):
     assert {"zeta", "r"} <= set(values(fit.extrema_estimates))
 
 
-@pytest.mark.parametrize("a", [2.5])
-@pytest.mark.parametrize("term", TERMS)
+@pytest.mark.parametrize("a", slow_after(1, [2.5]))
+@pytest.mark.parametrize("term", slow_after(1, TERMS))
 def test_two_peaks_of_a_pendulum_identify_a_single_loss(term, a):
     truth = {term: {"zeta": 0.01, "r": 0.003, "b": 0.05}[term]}
     fit = identify(decay_record(**truth, sine=True, a=a, t=np.linspace(0, 4, 401), noise=1e-5 * a), pendulum=True)

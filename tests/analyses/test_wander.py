@@ -35,6 +35,7 @@ def test_a_wander_near_the_noise_is_reported_and_covered(defect, cause):
     assert max(max(errors(fit)) for fit in fits) < 4
 
 
+@pytest.mark.slow
 def test_white_noise_is_no_wander():
     fits = [swung(seed) for seed in range(4)]
     assert not any("departs slowly" in " ".join(fit.remarks) for fit in fits)

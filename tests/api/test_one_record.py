@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from decays import decay_record
 from native_fmus import build_native_fmus
+from variants import slow_after
 
 import harness
 from harness import identify_curve, identify_decay, read_record
@@ -56,7 +57,7 @@ def test_a_friction_curve_is_that_of_its_file(files, kind):
     assert numbers(identify_curve(KINDS[kind](path))) == numbers(identify_curve(path))
 
 
-@EVERY_KIND
+@pytest.mark.parametrize("kind", slow_after(1, KINDS))
 def test_a_fit_is_that_of_its_file(files, kind):
     def fit(record):
         return numbers(

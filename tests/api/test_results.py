@@ -10,6 +10,7 @@ import pytest
 from commands import harness as harness_command
 from external_fmus import build_external_fmus
 from native_fmus import build_native_fmus
+from variants import slow_after
 
 import harness
 
@@ -135,7 +136,9 @@ def test_a_decay_is_identified_from_any_source(tmp_path):
         _ = identification["mu"]
 
 
-@pytest.mark.parametrize("values", [{}, {"solver.method": "dop853", "solver.rtol": 0.1}], ids=["exact", "long steps"])
+@pytest.mark.parametrize(
+    "values", slow_after(1, [{}, {"solver.method": "dop853", "solver.rtol": 0.1}]), ids=["exact", "long steps"]
+)
 def test_a_sweep_measures_what_single_runs_measure(values):
     """Also where steps are as long as the run allows."""
     pytest.importorskip("xarray")
@@ -177,6 +180,7 @@ def test_a_sweep_takes_enumerations_by_label(in_workspace):
     assert stored["final_x"].values.tolist() == sweep["final_x"].values.tolist()
 
 
+@pytest.mark.slow
 def test_the_tolerance_of_a_sweep_is_that_of_its_runs():
     pytest.importorskip("xarray")
     fmu = build_external_fmus() / "Midpoint.fmu"
@@ -185,6 +189,7 @@ def test_the_tolerance_of_a_sweep_is_that_of_its_runs():
         assert float(data["final_x"][0]) == harness.simulate(fmu, {"k": 40.0}, rtol=rtol)["x"][-1]
 
 
+@pytest.mark.slow
 def test_samples_are_reproducible_and_stored():
     pytest.importorskip("xarray")
     first = harness.sweep("smd", {"k": (100.0, 200.0), "c": (0.0, 3.0)}, samples=8, seed=3, folder="kept")

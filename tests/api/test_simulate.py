@@ -103,8 +103,10 @@ def test_an_fmu_of_fmi3_runs_at_its_internal_steps_as_in_fmi2(model, options):
         assert np.array_equal(three.events.mode, two.events.mode)
 
 
-@pytest.mark.parametrize("interface", ["CoSimulation", "ModelExchange"])
-@pytest.mark.parametrize("folder", [native_fmus.build_native_fmus, fmi3_fixtures.build_fmi3_fmus], ids=["fmi2", "fmi3"])
+@pytest.mark.parametrize("interface", slow_after(1, ["CoSimulation", "ModelExchange"]))
+@pytest.mark.parametrize(
+    "folder", slow_after(1, [native_fmus.build_native_fmus, fmi3_fixtures.build_fmi3_fmus]), ids=["fmi2", "fmi3"]
+)
 def test_input_signals_drive_every_interface(folder, interface):
     time = np.linspace(0.0, 2.0, 201)
     table = {"time": time, "F_ext": np.sin(pi * time)}

@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 from build_cache import ROOT
 from commands import harness
+from variants import slow_after
 
 pytestmark = pytest.mark.usefixtures("in_workspace")
 
@@ -157,7 +158,7 @@ def test_any_file_content_is_a_scene_or_is_refused(workspace):
         assert status, file[:100]
 
 
-@pytest.mark.parametrize("title", ["$x_{$", "$", "\\$", "a_{b^c", "\u5b57\u0378", "%d {0} {x}"])
+@pytest.mark.parametrize("title", slow_after(2, ["$x_{$", "$", "\\$", "a_{b^c", "\u5b57\u0378", "%d {0} {x}"]))
 def test_a_title_is_drawn_literally(workspace, title):
     text = scene_text(SCENE | {"title": f"'{title}'", "plots": '["position"]'})
     (workspace / "mine.toml").write_text(text, encoding="utf-8")
@@ -281,13 +282,16 @@ FULL = "Error: No space left on device\n"
 
 @pytest.mark.parametrize(
     ("command", "shell", "status", "message"),
-    [
-        (("info",), "| head -1", 0, ""),
-        (("info",), ">&- 2>&-", 0, ""),
-        (("info", "--json"), "> /dev/full", 1, FULL),
-        (("run", "mine.toml"), ">&-", 0, ""),
-        (("run", "mine.toml"), "> /dev/full", 1, FULL),
-    ],
+    slow_after(
+        2,
+        [
+            (("info",), "| head -1", 0, ""),
+            (("info",), ">&- 2>&-", 0, ""),
+            (("info", "--json"), "> /dev/full", 1, FULL),
+            (("run", "mine.toml"), ">&-", 0, ""),
+            (("run", "mine.toml"), "> /dev/full", 1, FULL),
+        ],
+    ),
 )
 def test_an_unwritable_standard_output_is_no_crash(workspace, command, shell, status, message):
     (workspace / "mine.toml").write_text(scene_text(SCENE))

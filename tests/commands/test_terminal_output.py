@@ -15,6 +15,7 @@ import pytest
 from build_cache import ROOT
 from models import MODELS
 from rich.console import Console
+from variants import slow_after
 
 from fmus.compiler.model_lookup import more_model_names
 from harness import HarnessError, PrecisionResult
@@ -39,13 +40,16 @@ def assert_fits(output, *headings):
 
 @pytest.mark.parametrize(
     ("arguments", "headings"),
-    [
-        (("info",), ("scene", *SCENES)),
-        (("run", "stickslip"), ("compared with", "0.430665996656")),
-        (("run", "coulomb-sign"), ("half of smd's",)),
-        (("decay", "coulomb"), ("two peaks",)),
-        (("compare", "fmus/coulomb.fmu", "fmus/smd.fmu"), ("at t [s]",)),
-    ],
+    slow_after(
+        2,
+        [
+            (("info",), ("scene", *SCENES)),
+            (("run", "stickslip"), ("compared with", "0.430665996656")),
+            (("run", "coulomb-sign"), ("half of smd's",)),
+            (("decay", "coulomb"), ("two peaks",)),
+            (("compare", "fmus/coulomb.fmu", "fmus/smd.fmu"), ("at t [s]",)),
+        ],
+    ),
 )
 def test_command_tables_fit_into_80_columns(workspace, arguments, headings):
     done = harness(workspace, *arguments, **PLAIN)

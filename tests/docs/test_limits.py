@@ -88,6 +88,7 @@ def path_end(F, f, phi0):
     return t, x, y
 
 
+@pytest.mark.slow
 def test_a_body_on_a_plane_stops_by_the_closed_form_and_holds_within_a_circle(build_model):
     disc = build_model("disc")
     for F, phi0 in ((1.0, np.pi / 2), (1.9, np.pi / 2), (0.1, 2.0), (1.0, 3.0)):

@@ -32,6 +32,7 @@ def read_table(file):
     return heads.tolist(), np.array([[float(cell or "nan") for cell in row] for row in rows])
 
 
+@pytest.mark.slow
 def test_the_force_of_the_drawn_block_swings_as_in_the_closed_form():
     """While it slides, the force swings about that of friction; it begins with the rate of the motor, k v."""
     block = make_records.PulledBlock()

@@ -12,6 +12,7 @@ from model_text import remove_unused
 from models import DOP853, ODE23, ODE45, RODAS
 from row_comparison import assert_identical
 from scipy.integrate import solve_ivp
+from variants import slow_after
 from worker_client import FmiError, FmpyError
 
 from fmus.compiler.model_lookup import find_model
@@ -182,10 +183,7 @@ def piecewise_solution(name):
 
 @pytest.mark.parametrize(
     "name",
-    [
-        pytest.param(name, marks=() if name in ("relay", "nested", "notch", "domain") else pytest.mark.slow)
-        for name in PIECES
-    ],
+    slow_after(2, ["nested", "domain", *(name for name in PIECES if name not in ("nested", "domain"))]),
 )
 def test_the_error_is_proportional_to_the_tolerance(launch, name):
     """Each method, with jumps and kinks of the force, nested conditions, and operations with a limited domain."""

@@ -5,6 +5,7 @@ from math import copysign
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from variants import slow_after
 
 import harness
 from fmus.compiler import BuildError
@@ -167,7 +168,7 @@ BY_MEAN = """R = Contact("N.m", "mean friction", mode=mode, slip=omega, slide=0.
     T_friction = Output("N.m", "friction", R + 0.5 * (up - down))"""
 
 
-@pytest.mark.parametrize("slope", [10.0, -10.0])
+@pytest.mark.parametrize("slope", slow_after(1, [10.0, -10.0]))
 def test_a_gear_with_the_split_that_its_refusal_advises_breaks_away_at_the_force_of_its_direction(tmp_path, slope):
     path = tmp_path / "gear.py"
     path.write_text(GEAR.format(law=BY_DIRECTION), encoding="utf-8")

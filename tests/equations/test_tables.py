@@ -17,6 +17,7 @@ from native_fmus import require_compiler
 from row_comparison import assert_identical
 from scipy.integrate import solve_ivp
 from scipy.interpolate import PchipInterpolator
+from variants import slow_after
 from worker_client import FmiError
 
 import harness
@@ -176,7 +177,7 @@ def test_values_are_those_of_numpy_and_scipy_in_each_kind_of_fmu(worker, tmp_pat
 # ---- motions
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", slow_after(1, KINDS))
 def test_the_error_is_proportional_to_the_tolerance(worker, tmp_path, kind):
     """Each method, against a solution from one point of the tables to the next: position and changes of the mode."""
     if kind:
@@ -382,6 +383,7 @@ def test_calls_with_arrays_have_one_value_per_element(tunable_fmus, tmp_path):
         assert fmu.getFloat64([mu], 5) == [*FRICTION[1]]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["native/fmi3"])
 def test_a_fit_finds_values_of_a_table(tunable_fmus, kind):
     """Without ranges to search: one of them starts at zero, and both have the scale of the table."""

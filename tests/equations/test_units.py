@@ -145,6 +145,7 @@ def test_a_brake_fades_and_stops_as_scipy_says(tmp_path):
     assert frame["mode"].iloc[-1] == 0
 
 
+@pytest.mark.slow
 def test_a_motor_turns_at_the_speed_at_which_torques_balance(tmp_path):
     path = tmp_path / "motor.py"
     path.write_text(MOTOR, encoding="utf-8")

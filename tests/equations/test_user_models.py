@@ -15,6 +15,7 @@ from model_text import BLOCK, PULSES
 from models import EXAMPLE_MODELS, model_class
 from row_comparison import assert_identical
 from scipy.integrate import solve_ivp
+from variants import slow_after
 from worker_client import FmiError
 
 from fmus.compiler import BuildError
@@ -248,7 +249,9 @@ LIMIT = BLOCK.replace('1.5, "N"', '1.99999999999975, "N"')  # the spring pulls w
 
 @pytest.mark.parametrize(
     ("text", "reason"),
-    [(DUFFING, "differ by "), (LIMIT, "find different changes of mode, so the result is not certified: ")],
+    slow_after(
+        1, [(DUFFING, "differ by "), (LIMIT, "find different changes of mode, so the result is not certified: ")]
+    ),
     ids=["chaos", "limit of friction"],
 )
 def test_a_run_on_which_two_methods_disagree_is_not_certified(oil, text, reason):
@@ -340,7 +343,7 @@ def puck(tmp_path):
     return tmp_path / "puck.py"
 
 
-@pytest.mark.parametrize("kind", ["", "native"])
+@pytest.mark.parametrize("kind", slow_after(1, ["", "native"]))
 def test_a_model_may_have_one_state(puck, kind):
     """It slows by f / m, and comes to rest after m / f."""
     run = simulate_fmu(
@@ -379,7 +382,7 @@ def run_with_a_change(fmu, before, during):
     fmu.step(0.1, 0.1)
 
 
-@pytest.mark.parametrize("kind", ["", "native"])
+@pytest.mark.parametrize("kind", slow_after(1, ["", "native"]))
 def test_parameters_with_which_friction_drives_are_refused(puck, worker, kind):
     """Where no range of the parameter excludes them: before the run, and during it."""
     puck.write_text(PUCK.replace(", low=0.0", "").replace(", above=0.0", ""))
@@ -415,7 +418,7 @@ class Texts(Model):
 """
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", slow_after(1, KINDS))
 def test_any_printable_text_survives_in_every_backend(kind, tmp_path, worker):
     """Trigraphs, delimiters and format fields of C, XML and Python; in descriptions and messages."""
     (tmp_path / "texts.py").write_text(TEXTS, encoding="utf-8")
@@ -461,7 +464,7 @@ class Divisors(Model):
 '''
 
 
-@pytest.mark.parametrize("kind", ["", "native"])
+@pytest.mark.parametrize("kind", slow_after(1, ["", "native"]))
 def test_a_parameter_that_divides_is_refused_at_zero(kind, tmp_path, worker):
     """With its name, unless choose() excludes the division."""
     (tmp_path / "divisors.py").write_text(DIVISORS)

@@ -46,6 +46,7 @@ def couple(folder, monkeypatch):
     return module.couple
 
 
+@pytest.mark.slow
 def test_two_equal_masses_converge_to_their_closed_form_in_proportion_to_the_step(couple):
     """From x and -x both have the stiffness k + 2 k_spring."""
     errors = []

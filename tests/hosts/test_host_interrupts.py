@@ -8,6 +8,7 @@ import zipfile
 import pytest
 from build_cache import SUPPORT
 from interrupted_host import HANDLERS
+from variants import slow_after
 from worker_client import run_script_with_stderr
 
 from tests.hosts.test_python_hosts import PYTHONS, interpreter
@@ -18,7 +19,7 @@ def fmu(fmus):
     return fmus / "smd.fmu"
 
 
-@pytest.mark.parametrize("handler", HANDLERS)
+@pytest.mark.parametrize("handler", slow_after(1, HANDLERS))
 def test_an_interrupt_ends_a_step_and_reaches_the_host(fmu, handler):
     """The host gets the exception that its signal handler raised, once, and no later than at the end of the call."""
     answer, stderr = run_script_with_stderr("interrupted_host.py", "interrupt_long_step", fmu, handler)

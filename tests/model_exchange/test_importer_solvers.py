@@ -19,6 +19,7 @@ import pytest
 from build_cache import ROOT
 from independent_solution import ClosedFormMotion, spans
 from models import MODELS, SIGN, declared, model_class, outputs
+from variants import slow_after
 from worker_client import FmpyError
 
 from fmus.runtime.codes import OUT_OF_RANGE
@@ -227,9 +228,9 @@ CHANGES = {
 }
 
 
-@pytest.mark.parametrize("change", CHANGES.values(), ids=CHANGES)
+@pytest.mark.parametrize("change", slow_after(2, CHANGES))
 def test_a_tunable_changed_in_event_mode_acts_from_then_on(worker, fmus, change):
-    variable, before, t, after = change
+    variable, before, t, after = CHANGES[change]
     truth = ClosedFormMotion(spans(independent_solution.stickslip, {}, {t: {variable: after}}), 0.0, 0.0, 16.0)
     signal = [[variable], [[0.0, before], [t, after], [16.0, after]]]
     columns, evaluations = exchange(worker, fmus / "stickslip.fmu", "stickslip", relative_tolerance=1e-9, input=signal)

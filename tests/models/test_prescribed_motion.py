@@ -68,7 +68,7 @@ def launch(worker, backend, values, stop, belt=belt_rising):
     return worker.instantiate(build(BLOCK, backend)).begin(available(backend, values | start), stop=stop)
 
 
-@pytest.mark.parametrize("backend", BACKENDS)
+@pytest.mark.parametrize("backend", slow_after(1, BACKENDS))
 def test_a_linear_speed_is_followed_exactly_at_any_communication_step(worker, backend):
     """Stick, slip and stick again on a belt that speeds up; the rate of the speed is set, but never changes."""
     events, motion = solve_block(belt_rising, 5.0, k=60.0, hold=10.0, slide=6.0)
@@ -175,7 +175,7 @@ def test_rare_jumps_are_not_warned_of(worker):
     fmu.free()
 
 
-@pytest.mark.parametrize("backend", ["python", "native"])
+@pytest.mark.parametrize("backend", slow_after(1, ["python", "native"]))
 def test_a_speed_with_the_rate_zero_is_constant_between_jumps(worker, backend):
     """A staircase whose steps are too high for friction, without a warning."""
     text = BLOCK.replace("rate=a_belt", "rate=0.0").replace(
@@ -197,7 +197,7 @@ TABLE = {"time": (times := np.linspace(0.0, 5.0, 11))} | dict(
 
 
 @pytest.mark.parametrize("interface", ["CoSimulation", "ModelExchange", "whole runs of a fit"])
-@pytest.mark.parametrize("backend", BACKENDS)
+@pytest.mark.parametrize("backend", slow_after(1, BACKENDS))
 def test_a_table_with_the_rates_drives_the_block_as_the_belt_does(backend, interface):
     """The inputs are continued from the start of a step: set to their means, the belt would jump at each step."""
     if (backend, interface) == ("python", "ModelExchange"):
@@ -243,7 +243,7 @@ def test_a_smooth_or_noisy_table_has_no_kinks(count, noise):
     assert harness.simulate(build(BLOCK, "native", method="ode45"), inputs=inputs, stop=4.0).note == ""
 
 
-@pytest.mark.parametrize("backend", BACKENDS)
+@pytest.mark.parametrize("backend", slow_after(1, BACKENDS))
 def test_a_table_without_the_rate_of_an_input_that_varies_is_refused(backend):
     table = {name: column for name, column in TABLE.items() if name in ("time", "v_belt")}
     with pytest.raises(harness.SceneError, match="v_belt varies, but a_belt is missing"):
@@ -297,6 +297,7 @@ def test_fmpy_runs_model_exchange_with_a_rising_speed(worker, kind):
     assert columns["events.count"][-1] == 2
 
 
+@pytest.mark.slow
 def test_errors_of_the_importers_solver_are_no_jump(worker):
     """An event of another contact leaves a stuck contact alone, although the state has drifted from the belt."""
     fmu = worker.exchange(build(TWO, "native/fmi3", "two")).begin({"v_belt": 1.0})
@@ -441,7 +442,7 @@ class Pulled(Model):
 '''
 
 
-@pytest.mark.parametrize("backend", ["python", "native"])
+@pytest.mark.parametrize("backend", slow_after(1, ["python", "native"]))
 def test_a_load_follows_a_position_with_its_speed_and_acceleration(worker, backend):
     """The end of the spring moves as 0.01 t + 0.02 t^2 m; all inputs are set once."""
     fmu = worker.instantiate(build(PULLED, backend, "pulled"))

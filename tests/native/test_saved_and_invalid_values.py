@@ -13,6 +13,7 @@ from fmpy.fmi2 import FMU2Slave
 from models import MODELS, declared, model_class
 from native_fmus import build_native_fmus
 from native_host import compiler
+from variants import slow_after
 from worker_client import Worker
 
 CHECKSUM_SIZE = 8
@@ -66,7 +67,7 @@ def test_a_power_of_two_has_as_few_digits_as_in_python(unpacked, fmu, capfd, exp
     assert f"m = {-(2.0**exponent)!r} kg is refused" in capfd.readouterr().err
 
 
-@pytest.mark.parametrize("name", MODELS)
+@pytest.mark.parametrize("name", slow_after(2, MODELS))
 def test_values_do_not_depend_on_the_order_in_which_a_call_reads_them(name):
     """Some are calculated only when they are read."""
     names = [v for v, declaration in declared(name).items() if declaration.type == "Real"]

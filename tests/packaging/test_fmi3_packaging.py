@@ -17,6 +17,7 @@ from fmpy.validation import validate_fmu
 from lxml import etree
 from models import ROOT, declared, model_class
 from PIL import Image
+from variants import slow_after
 
 from fmus.compiler.lowering import model_exchange_run
 from fmus.compiler.model_lookup import find_model, model_names
@@ -297,7 +298,7 @@ def test_an_unavailable_option_is_refused_in_one_sentence_and_nothing_is_built(a
 
 @pytest.mark.parametrize(
     ("name", "gone"),
-    [("stickslip", {"Exact", "Ode45", "Dop853", "Rodas"}), ("coulomb", {"Exact", "Ode45", "Dop853"})],
+    slow_after(1, [("stickslip", {"Exact", "Ode45", "Dop853", "Rodas"}), ("coulomb", {"Exact", "Ode45", "Dop853"})]),
 )
 def test_a_reduced_fmu_carries_only_its_selection_and_runs_both_ways(name, gone):
     """In model exchange, fmpy records a second row at an event, here a change of mode."""

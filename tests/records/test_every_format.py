@@ -9,6 +9,7 @@ import pytest
 import record_formats
 from decays import Signal, identify
 from record_formats import FORMATS, LIBRARIES, OMEGA, ZETA, T
+from variants import slow_after
 
 from harness import SceneError, read_record
 
@@ -95,7 +96,7 @@ def load_from_mat(path, add_table_attrs):
 """
 
 
-@pytest.mark.parametrize("attribute", ["varUnits", "VariableUnits"])
+@pytest.mark.parametrize("attribute", slow_after(1, ["varUnits", "VariableUnits"]))
 def test_units_of_a_matlab_table_are_read(tmp_path, monkeypatch, attribute):
     """From a table with units as the library reads it, which cannot write one."""
     path = write(tmp_path, next(form for form in FORMATS if form.file == "timetable.mat"))

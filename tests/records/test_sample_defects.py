@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from decays import Signal, decay_record, identify, random_record
+from variants import slow_after
 
 from harness import SceneError, read_record
 from harness.records.samples import find_saturated, mark_dropouts, mark_sentinels, sort_times
@@ -132,7 +133,7 @@ def test_a_saturated_sensor_is_named_and_does_not_change_the_damping(tmp_path, l
     assert fit(record)["zeta"].value == pytest.approx(ZETA, rel=0.03)
 
 
-@pytest.mark.parametrize("order", [0, 1, 2])
+@pytest.mark.parametrize("order", slow_after(1, [0, 1, 2]))
 def test_a_rounded_or_held_motion_has_no_defects(order):
     rng = np.random.default_rng(order)
     for seed in range(60):

@@ -88,6 +88,7 @@ def held_below(eps, stop):
         go(1, LinearSegment(sled, pull(t, x) - sled.slide, v), lambda t, x, v: v <= eps, "1e-3")
 
 
+@pytest.mark.slow
 def test_the_threshold_reference_is_the_double_nearest_to_its_segments():
     truth = load_reference("stickslip-threshold")
     pieces = held_below(mpf(1e-7), 16)

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from fmpy import read_model_description
 from models import MODELS
+from variants import slow_after
 
 from harness import HarnessError, load_result, simulate
 from harness.results.folder import replace_folder
@@ -136,15 +137,18 @@ ONCE = ("--vary", "c=2,3", "--workers", "1", "--name", "c")
 
 @pytest.mark.parametrize(
     ("first", "second", "folder"),
-    [
-        (("run", "coulomb"), ("run", "fmus/coulomb.fmu"), "coulomb"),
-        (("run", "fmus/coulomb.fmu"), ("run", "coulomb"), "coulomb"),
-        (("run", "a/mine.toml"), ("run", "b/mine.toml"), "mine"),
-        (("run", "fmus/smd.fmu"), ("run", "a/smd.fmu"), "smd"),
-        (("decay", "coulomb", "--no-drag"), ("decay", "a/coulomb.csv", "--no-drag"), "decay/coulomb"),
-        (("compare", "smd", "a/smd.fmu"), ("compare", "smd", "b/a/smd.fmu"), "compare/scene-smd-a-smd"),
-        (("sweep", "a/smd.fmu", *ONCE), ("sweep", "b/smd.fmu", *ONCE), "sweep/c"),
-    ],
+    slow_after(
+        4,
+        [
+            (("run", "coulomb"), ("run", "fmus/coulomb.fmu"), "coulomb"),
+            (("run", "fmus/coulomb.fmu"), ("run", "coulomb"), "coulomb"),
+            (("run", "a/mine.toml"), ("run", "b/mine.toml"), "mine"),
+            (("run", "fmus/smd.fmu"), ("run", "a/smd.fmu"), "smd"),
+            (("decay", "coulomb", "--no-drag"), ("decay", "a/coulomb.csv", "--no-drag"), "decay/coulomb"),
+            (("compare", "smd", "a/smd.fmu"), ("compare", "smd", "b/a/smd.fmu"), "compare/scene-smd-a-smd"),
+            (("sweep", "a/smd.fmu", *ONCE), ("sweep", "b/smd.fmu", *ONCE), "sweep/c"),
+        ],
+    ),
 )
 def test_a_result_of_another_scene_is_replaced_only_with_overwrite(workspace, fmus, first, second, folder):
     for subfolder in ("a", "b", "b/a"):

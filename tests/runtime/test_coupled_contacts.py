@@ -509,7 +509,7 @@ LAWS = {
 }
 
 
-@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("law", slow_after(1, LAWS))
 def test_laws_without_sticking_depend_on_each_slip(custom_model, law):
     """Rates, outputs and Jacobian are those of the modes given by the slips; the threshold law holds at most the
     limit."""

@@ -7,6 +7,7 @@ import independent_solution
 import pytest
 from independent_solution import ClosedFormMotion, spans
 from models import EXACT, ODE23
+from variants import slow_after
 
 SCENES = {
     "smd, everything in turn": (
@@ -52,10 +53,10 @@ def assert_agrees_with_reference(launch, name, values, changes, solvers):
             assert last == pytest.approx(float(motion.events[-1][0]), rel=max(bound / 10, 1e-14))
 
 
-@pytest.mark.parametrize("scene", SCENES.values(), ids=SCENES)
+@pytest.mark.parametrize("scene", slow_after(4, SCENES))
 def test_a_changed_value_acts_from_its_communication_point_on(launch, scene):
     solvers = [({"solver.method": EXACT}, 1e-13), ({"solver.method": ODE23, "solver.rtol": 1e-8}, 1e-5)]
-    assert_agrees_with_reference(launch, *scene, solvers)
+    assert_agrees_with_reference(launch, *SCENES[scene], solvers)
 
 
 @pytest.mark.parametrize("seed", range(6))

@@ -7,6 +7,7 @@ import pytest
 from internal_steps import components, prepared_run
 from models import DOP853, RADAU9, RODAS, ROOT, model_class, runtime
 from scipy.integrate import solve_ivp
+from variants import slow_after
 
 STAGES = range(1, 6)
 LUGRE = ROOT / "fmus" / "more" / "lugre.py"
@@ -205,7 +206,7 @@ def truth():
     return solve
 
 
-@pytest.mark.parametrize("x_m", [1e-2, 1e-4])
+@pytest.mark.parametrize("x_m", slow_after(1, [1e-2, 1e-4]))
 @pytest.mark.parametrize("rtol", [1e-2, 1e-4, 1e-6, 1e-8])
 def test_the_error_is_below_the_tolerance_at_every_width_of_the_friction_curve(truth, x_m, rtol):
     rows, _ = integrate("pacejka", {"x_m": x_m, "solver.method": RADAU9, "solver.rtol": rtol}, 6.0)
@@ -237,6 +238,7 @@ def test_radau9_takes_fewer_steps_than_rodas_for_a_smaller_error(truth, rtol):
 # ---- friction with a kink
 
 
+@pytest.mark.slow
 def test_a_kink_of_the_rates_costs_less_than_ten_tolerances():
     """LuGre, three stops and restarts; the reference is an explicit method of order 8.
 

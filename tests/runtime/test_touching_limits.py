@@ -8,6 +8,7 @@ from build_cache import build_user_model
 from models import DOP853, ODE23, ODE45, RADAU9, RODAS
 from native_fmus import require_compiler
 from scipy.integrate import solve_ivp
+from variants import slow_after
 
 METHODS = (ODE23, ODE45, DOP853, RODAS, RADAU9)
 LABELS = [f"--method={label}" for label in ("ode23", "ode45", "dop853", "rodas", "radau9")]
@@ -134,6 +135,7 @@ def solve_dips(push):
         events.append((t, mode))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("depth", [0.3, pytest.param(0.01, marks=pytest.mark.slow)])
 def test_a_limit_that_falls_below_the_load_releases_the_contact(worker, built, depth, kind):
@@ -151,7 +153,7 @@ def test_a_limit_that_falls_below_the_load_releases_the_contact(worker, built, d
     fmu.free()
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", slow_after(1, KINDS))
 def test_friction_that_vanishes_for_longer_ends_mode_0(worker, built, kind):
     """It vanishes while cos(angle) > 0.5: from -60 to 60 degrees of each turn."""
     fmu = worker.instantiate(built("lifting_block", kind))

@@ -71,6 +71,7 @@ def test_the_interface_of_the_command_line_is_used(harness, external_fmu_folder)
     assert "offers co-simulation; model exchange is not among them" in done.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stop", [10, pytest.param(9.95, marks=pytest.mark.slow)])
 def test_fmus_with_one_fixed_internal_step_agree_on_a_shared_grid(harness, external_fmu_folder, tmp_path, stop):
     """FMI 3.0 can declare the step, FMI 2.0 cannot; each way round."""

@@ -5,6 +5,7 @@ import json
 import commands
 import numpy as np
 import pytest
+from variants import slow_after
 
 import harness
 
@@ -25,7 +26,9 @@ def write_points(file, headings, backward, v=V):
 
 @pytest.mark.parametrize(
     ("headings", "backward", "speed", "force"),
-    [("v [m/s],F [N]", FORWARD, "v", "F_friction"), ("w [rad/s],T [N.m]", BACKWARD, "omega", "T_friction")],
+    slow_after(
+        1, [("v [m/s],F [N]", FORWARD, "v", "F_friction"), ("w [rad/s],T [N.m]", BACKWARD, "omega", "T_friction")]
+    ),
 )
 def test_the_fmu_of_the_model_file_has_the_friction_of_the_best_law(tmp_path, headings, backward, speed, force):
     write_points(tmp_path / "bench.csv", headings, backward)

@@ -117,7 +117,10 @@ DRIVEN = {"mu_d": 0.5, "v_driver": 0.04}
 
 @pytest.mark.parametrize(
     ("displacement", "undetermined", "is_remarked"),
-    [(0.0, {"mu_s", "mu_d", "v_driver"}, False), (1e-4, {"mu_s", "mu_d", "v_driver"}, False), (2e-4, set(), True)],
+    slow_after(
+        1,
+        [(0.0, {"mu_s", "mu_d", "v_driver"}, False), (1e-4, {"mu_s", "mu_d", "v_driver"}, False), (2e-4, set(), True)],
+    ),
 )
 def test_values_that_the_last_samples_alone_exclude_are_remarked(displacement, undetermined, is_remarked):
     """The block slips once. Whether it begins to slip a second time decides about all values but k."""
@@ -220,6 +223,7 @@ def test_a_sensor_with_offset_and_gain_is_identified():
         assert holds(fit[name], truth)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("delay", [0.084, pytest.param(-0.1, marks=pytest.mark.slow)])
 def test_the_delay_of_a_sensor_is_identified(delay):
     """The delayed signal is interpolated from a run with 20 times as many samples."""
@@ -304,6 +308,7 @@ def test_a_profile_crosses_its_limit_where_the_interval_ends():
         assert np.interp([estimate.low, estimate.high], value, root) == pytest.approx([-1.0, 1.0], abs=0.05)
 
 
+@pytest.mark.slow
 def test_outliers_count_little_in_a_robust_fit():
     frame = pull()
     frame.loc[::25, "x"] += 0.3
@@ -453,6 +458,7 @@ def compared():
     return [harness.fit(one, frame, ["mu_s", "f_s"], against=two, **options) for one, two in (fmus, fmus[::-1])]
 
 
+@pytest.mark.slow
 def test_a_bic_is_that_of_white_residuals_of_a_linear_model(compared):
     """For n residuals of variance s2 and k unknowns, BIC = n ln(s2) + k ln(n)."""
     fit = compared[0]
@@ -581,6 +587,7 @@ def test_regular_slips_are_described_by_the_fit_alone():
     assert fit.slips == ()
 
 
+@pytest.mark.slow
 def test_slips_that_an_input_makes_irregular_are_described_by_the_fit_alone():
     random, t = np.random.default_rng(1), np.linspace(0.0, 30.0, 3001)
     force = np.interp(t, np.arange(0.0, 31.0, 1.5), random.uniform(-30.0, 30.0, 21))

@@ -6,6 +6,7 @@ import commands
 import numpy as np
 import pytest
 from native_fmus import build_native_fmus
+from variants import slow_after
 
 import harness
 from harness import SceneError
@@ -36,6 +37,7 @@ def driven_record(lost=()):
     return frame({"t": T, "x": x, "force": force}, {"t": "s", "x": "m", "force": "N"})
 
 
+@pytest.mark.slow
 def test_missing_samples_of_a_signal_take_none_of_the_input():
     """Half of a pulse lies where x is missing."""
     options = {"free": {"k": (50.0, 200.0), "f": (0.1, 2.0)}, "observe": "x", "inputs": {"F_ext": "force"}}
@@ -74,11 +76,22 @@ def test_a_record_without_noise_is_fitted(model, free):
 
 @pytest.mark.parametrize(
     ("columns", "units", "sentence"),
-    [
-        ({"laser": 0.5, "x": 1.0}, {"x": "m", "laser": "m"}, "x is observed, because a column has its name; `observe`"),
-        ({"v": 1.0, "x": 1.0}, {"x": "m", "v": "m/s"}, "x is observed, because a column has its name, and v not;"),
-        ({"laser": 1e3, "load": 1.0}, {"laser": "mm", "load": "kg"}, "x is observed in laser [mm], the only column"),
-    ],
+    slow_after(
+        1,
+        [
+            (
+                {"laser": 0.5, "x": 1.0},
+                {"x": "m", "laser": "m"},
+                "x is observed, because a column has its name; `observe`",
+            ),
+            ({"v": 1.0, "x": 1.0}, {"x": "m", "v": "m/s"}, "x is observed, because a column has its name, and v not;"),
+            (
+                {"laser": 1e3, "load": 1.0},
+                {"laser": "mm", "load": "kg"},
+                "x is observed in laser [mm], the only column",
+            ),
+        ],
+    ),
 )
 def test_a_column_that_fits_is_observed_and_named(tmp_path, columns, units, sentence):
     x = harness.simulate(native("smd"), times=T)["x"]

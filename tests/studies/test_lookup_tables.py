@@ -53,6 +53,7 @@ def draw(result):
     return {axes.get_title(): axes for axes in figure.get_axes()}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("truth", "free"),
     [({"F_0": 12.0, "F_1": 10.0}, ["F_0", "F_1"]), ({"scale": 0.8}, ["scale"])],

@@ -177,6 +177,7 @@ def test_each_contact_force_is_shaded_where_its_own_contact_sticks(blocks_run):
         _ = run.events.mode
 
 
+@pytest.mark.slow
 def test_the_order_of_declaration_does_not_exchange_the_contacts(tmp_path):
     """Modes declared in another order than the contacts belong to the contacts that name them."""
     source = (CONTACTS / "sleds.py").read_text(encoding="utf-8").replace("mode1, mode2 =", "mode2, mode1 =")
@@ -212,6 +213,7 @@ class Named(Model):
 """
 
 
+@pytest.mark.slow
 def test_an_output_takes_precedence_over_the_panel_of_its_name(tmp_path):
     """Each is drawn as a curve over time, also by a scene, and no panel is drawn in its place."""
     text = OUTPUTS_NAMED_LIKE_PANELS.replace(

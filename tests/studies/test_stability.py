@@ -108,6 +108,7 @@ def test_the_pendulum_agrees_with_the_independent_one(reaction):
     assert [mode for _, mode in solution.events] == [mode for _, mode in swing.events]
 
 
+@pytest.mark.slow
 def test_the_smooth_sled_creates_no_energy():
     """Radau against the power balance: the work of pull and friction changes the kinetic energy."""
     values = defaults("pacejka")

@@ -10,6 +10,7 @@ import external_fmus
 import numpy as np
 import pytest
 from sweep_results import open_sweep, sweep_folder
+from variants import slow_after
 
 import harness
 
@@ -240,7 +241,7 @@ def test_values_that_are_too_large_for_an_axis_are_results(fmus, grid):
     pyplot.close("all")
 
 
-@pytest.mark.parametrize("workers", [None, 1])
+@pytest.mark.parametrize("workers", slow_after(1, [None, 1]))
 def test_one_run_that_works_is_a_sweep(sweep, workers):
     """Wherever it is among runs that fail."""
     mu_d = [0.95, 0.6, 0.96, 0.97, 0.98]  # mu_s is 0.9

@@ -8,6 +8,7 @@ import commands
 import numpy as np
 import pytest
 from symmetry_models import build, examine
+from variants import slow_after
 
 from benchmarks.symmetry.builds import PYTHON, all_models, find_source
 from benchmarks.symmetry.changes import FRAME, MIRROR, ORDER, TIME, UNITS, Change
@@ -79,10 +80,13 @@ def test_an_fmu_without_its_model_file_is_examined(tmp_path, fmus):
 
 @pytest.mark.parametrize(
     ("number", "reason"),
-    [
-        ({"start": ", start=0.1"}, "the start value of x is a number with a unit"),
-        ({"more": 'y = State("m", "position of the driver", rate=0.5)', "term": "+ k * y / m"}, RATE),
-    ],
+    slow_after(
+        1,
+        [
+            ({"start": ", start=0.1"}, "the start value of x is a number with a unit"),
+            ({"more": 'y = State("m", "position of the driver", rate=0.5)', "term": "+ k * y / m"}, RATE),
+        ],
+    ),
 )
 def test_a_number_with_a_unit_is_no_silent_pass(tmp_path, number, reason):
     done = run_command(tmp_path, write_cart(tmp_path, **number), "--backend", "python", "--change", UNITS)
