@@ -14,6 +14,7 @@ import subprocess
 import sys
 from base64 import b64decode, b64encode
 from collections.abc import Callable
+from importlib.util import find_spec
 from io import BytesIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -420,7 +421,9 @@ def main() -> None:
                     (figure,) = Path(folder).glob(file)
                     copy_figure(figure, IMAGES / f"{name}.svg")
     for name, (command, file) in FIGURES_OF_COMMANDS.items():
-        if name in names:
+        if name == "rivals" and find_spec("mujoco") is None:
+            print("rivals.svg: skipped, the extra rivals is not installed")
+        elif name in names:
             with TemporaryDirectory() as folder:
                 run_command(Path(folder), command)
                 copy_figure(Path(folder, file), IMAGES / f"{name}.svg")
