@@ -16,7 +16,7 @@ CAMPAIGNS = {  # name -> command, after the path of Python
     "interval_coverage": ("-m", "benchmarks.campaigns.interval_coverage", "100"),
     "decay_defects": ("-m", "benchmarks.campaigns.decay_defects", "200", "4813"),
     "low_speed_friction": ("-m", "benchmarks.campaigns.low_speed_friction", "4"),
-    "curve_coverage": ("-m", "benchmarks.campaigns.curve_coverage", "300"),
+    "curve_coverage": ("-m", "benchmarks.campaigns.curve_coverage", "900"),
     "hidden_defects": ("-m", "benchmarks.campaigns.hidden_defects", "60"),
     "decay_times": ("-m", "benchmarks.campaigns.decay_times"),
 }

@@ -1,6 +1,6 @@
 """Coverage of the 95 % intervals of identified friction: `python -m benchmarks.campaigns.curve_coverage [RECORDS]`.
 
-RECORDS points of friction over velocity (default: 300) are drawn, from each law in turn, every fifth as a record over
+RECORDS points of friction over velocity (default: 900) are drawn, from each law in turn, every fifth as a record over
 time with inertia, noise and ramps between its plateaus. The table states how often the drawn law has the smallest BIC,
 and how often the intervals of the drawn law contain the drawn constants. The coverage of n records has a standard
 deviation of sqrt(0.95 0.05/n).
@@ -103,5 +103,5 @@ def table_lines(rows):
 
 
 if __name__ == "__main__":
-    count = int((sys.argv[1:] or [300])[0])
+    count = int((sys.argv[1:] or [900])[0])
     print(*table_lines([check_record(number) for number in range(count)]), sep="\n")

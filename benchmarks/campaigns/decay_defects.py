@@ -100,8 +100,8 @@ def table_lines(rows):
 
 
 if __name__ == "__main__":
-    count = int(sys.argv[1]) if len(sys.argv) > 1 else 67
-    seed = int(sys.argv[2]) if len(sys.argv) > 2 else 2026
+    count = int(sys.argv[1]) if len(sys.argv) > 1 else 200
+    seed = int(sys.argv[2]) if len(sys.argv) > 2 else 4813
     rows = []
     tasks = [(number, seed) for number in range(count * len(DEFECTS))]
     with suppress(KeyboardInterrupt), ProcessPoolExecutor(2) as pool:

@@ -59,7 +59,7 @@ def table_lines(rows):
 if __name__ == "__main__":
     rows = []
     with suppress(KeyboardInterrupt), ProcessPoolExecutor(2) as pool:
-        for row in pool.map(check_record, range(int((sys.argv[1:] or [1000])[0]) * len(CASES)), chunksize=8):
+        for row in pool.map(check_record, range(int((sys.argv[1:] or [100])[0]) * len(CASES)), chunksize=8):
             rows.append(row)
     print(*table_lines(rows), sep="\n")
     sys.exit(any(text.startswith("off by") for _, text in rows))

@@ -3,7 +3,7 @@
 RECORDS are simulated by scipy for each rise (friction at standstill over that at high speed), speed v_s (relative to
 the first peak speed) and noise (relative to the first amplitude), with viscous damping or without.  The table gives the
 records in which `decay` shows the rise, how often the 95 % intervals of zeta and r hold, the records with any remark,
-and the limit below which a rise is not excluded where none is shown (median).  A rise of 1 is none.
+and the limit below which a rise with a v_s of 0.1 is not excluded where none is shown (median).  A rise of 1 is none.
 """
 
 import sys
@@ -73,7 +73,7 @@ def check_record(task):
 
 
 if __name__ == "__main__":
-    count = int(sys.argv[1]) if len(sys.argv) > 1 else 20
+    count = int(sys.argv[1]) if len(sys.argv) > 1 else 4
     print(f"{'rise':>4} {'speed':>5} {'noise':>6} {'fitted':>6} {'shown':>5} {'holds':>6} {'remark':>6}  limit")
     with ProcessPoolExecutor(2) as pool:
         for case in CASES:

@@ -228,14 +228,30 @@ def test_each_campaign_on_a_page_exists_and_names_its_seed():
         assert re.fullmatch(SEEDS.get(name, ".*").strip(), arguments), f"{name} {arguments}: name the seed"
 
 
-def test_campaigns_with_a_seed_have_that_of_the_table_everywhere():
-    in_pages = {campaign for page in PAGES for campaign in find_campaigns(DOCS / page)}
-    recommended = {(name, arguments.split(" --log")[0]) for name, arguments in find_campaigns(ROOT / "CONTRIBUTING.md")}
-    run = {(name, " ".join(arguments)) for name, (_, _, *arguments) in CAMPAIGNS.items()}
-    for campaigns in (recommended, run):
-        assert {campaign for campaign in campaigns if campaign[0] in SEEDS} == {
-            campaign for campaign in in_pages if campaign[0] in SEEDS
-        }
+def test_each_campaign_has_the_same_arguments_everywhere():
+    arguments = {name: {" ".join(words)} for name, (_, _, *words) in CAMPAIGNS.items() if name != "tests"}
+    for page in (ROOT / "CONTRIBUTING.md", *(DOCS / page for page in PAGES)):
+        for name, words in find_campaigns(page):
+            if name in arguments:
+                arguments[name].add(words.split(" --log")[0])
+    assert {name: words for name, words in arguments.items() if len(words) > 1} == {}
+
+
+def test_the_errors_of_the_magic_formula_on_the_page_are_those_of_default_runs(fmus):
+    text = (DOCS / "explanation" / "accuracy.md").read_text(encoding="utf-8")
+    widths, stated = re.search(r"\| magic formula, x_m = (.*?) m/s \|.*\| (.*?) \|\n", text).groups()
+    summary = re.search(r"`pacejka` \| radau9 \| (\S+) of the states", text)[1]
+    errors = []
+    for width in widths.split(" / "):
+        file = ROOT / "fmus" / f"pacejka{'' if width == '0.01' else f'-{width}'}.csv"
+        t, *states = np.loadtxt(file, delimiter=",", skiprows=2, unpack=True)
+        run = harness.simulate(fmus / "pacejka.fmu", {"x_m": float(width)}, stop=t[-1], interval=t[1] - t[0])
+        rows = np.searchsorted(run.time, t - 1e-9)
+        errors.append(
+            max(np.abs(run[name][rows] - y).max() / np.abs(y).max() for name, y in zip("xv", states, strict=True))
+        )
+    assert [f"{error:.2g}" for error in errors] == [f"{float(number):.2g}" for number in stated.split(" / ")]
+    assert f"{max(errors):.0e}".replace("e-0", "e-") == summary
 
 
 @pytest.mark.slow

@@ -4,7 +4,7 @@ import numpy as np
 
 from ...analyses.curve.identification import CurveIdentification
 from ...analyses.curve.law_fit import LawFit, group_speeds
-from ...errors import by_interface, option_text
+from ...errors import option_text
 
 LINEAR_FORCE = "N"  # unit of the force of these models
 LAWS = ("stribeck", "viscous", "coulomb")  # that these models have, with the same constants in both directions
@@ -47,11 +47,8 @@ def model_values(result: CurveIdentification) -> dict[str, Values]:
 
 
 def assignments(values: Values) -> str:
-    """Return values as options of `run`, `sweep` and `fit`, as in "--set F_c=1.2 --set F_s=1.5", or as an argument."""
-    return by_interface(
-        " ".join(option_text("values", {name: value}) for name, value in values.items()),
-        option_text("values", dict(values)),
-    )
+    """Return values as an option of `run`, `sweep` and `fit`, as in "--set F_c=1.2,F_s=1.5", or as an argument."""
+    return option_text("values", dict(values))
 
 
 def tabulate(result: CurveIdentification) -> dict[str, np.ndarray]:
