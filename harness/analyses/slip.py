@@ -31,9 +31,11 @@ def analyse(run: Trajectory) -> AnalysisResult:
     relative_speed = v * np.sign(driver) - abs(driver)  # speed of the sled relative to the driver
     if run.events is not None and len(run.events.t) > 1:
         starts, durations = slips_from_modes(run.events.t, run.events.mode)
+        first = "first slip"
         ends = starts[: len(durations)] + durations
     else:
         starts, durations = upward_crossings(run.time, relative_speed), np.array([])
+        first = "first time as fast as the driver"
         ends = upward_crossings(run.time, -relative_speed)
         ends = ends[np.searchsorted(ends, starts[:1]).sum() :]  # ignore a slip that began before the run
     if len(starts) < 2:
@@ -42,7 +44,7 @@ def analyse(run: Trajectory) -> AnalysisResult:
     slipping = relative_speed >= 0
     quantities = [
         Quantity("slips", len(starts), "", "slips"),
-        Quantity("first_slip", float(starts[0]), "s", "first slip"),
+        Quantity("first_slip", float(starts[0]), "s", first),
         Quantity("period", float(np.mean(np.diff(starts))), "s", "slip period"),
     ]
     if len(durations):

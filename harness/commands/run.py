@@ -6,7 +6,7 @@ from typing import Any
 
 import click
 
-from .terminal import SectionedCommand, Terminal, refuse_ignored_options, refuse_options, result_options, run_options
+from .terminal import SectionedCommand, Terminal, refuse_ignored_options, result_options, run_options
 
 
 @click.command(cls=SectionedCommand)
@@ -30,8 +30,8 @@ def run(
     """Run a model, a scene or an FMU.
 
     The argument is the name of a scene or a model (see info), the path of a scene file or a model file, or the path of
-    an FMU.  A name that a scene and a model share means the scene.  A scene with other values by --set is not compared
-    with its published or reference values.
+    an FMU.  A name that a scene and a model share means the scene.  A scene with other values by --set, or another
+    --stop, is not compared with its published or reference values.
 
     An FMU that does not expose its solver steps is run with successively halved communication steps, until halving
     changes no output by more than the tolerance, or cannot reach it. The achieved error is stated. A run that misses
@@ -45,7 +45,7 @@ def run(
       friction-fmus run other.fmu --set mass=2 --stop 10 --rtol 1e-4
     """
     from ..scenes.assignments import parse_assignments
-    from ..scenes.scene import change_values
+    from ..scenes.scene import change_scene
     from ..simulation.resolve import find_source
     from ..studies.run import study
     from ..studies.run.table import results_table
@@ -55,8 +55,7 @@ def run(
     if isinstance(item, Path):
         run_fmu_file(item, values, options, terminal)
         return
-    refuse_options(context, "without an FMU; a scene sets it in its file", "stop")
-    item = change_values(item, parse_assignments("--set", values))
+    item = change_scene(item, parse_assignments("--set", values), options["stop"])
     with terminal.progress(1) as report:
         outcome = study.run_scene(item, terminal.out, partial(report, item.name))
     table = results_table([outcome], everything=True)

@@ -185,7 +185,11 @@ def refuse_ignored_options(
     files, uses_exchange = list(fmus), context.params["interface"] == MODEL_EXCHANGE
     if not files:
         options = ("rtol", "interface", "lenient", "timeout")
-        refuse_options(context, "without an FMU; a scene sets it in its file", *options)
+        refuse_options(
+            context,
+            "with a scene, which sets it in its file; give the FMU of the model instead, as in fmus/stickslip.fmu",
+            *options,
+        )
     elif (is_given(context, "rtol") or is_given(context, "timeout")) and not uses_exchange:
         descriptions = [read_description(file, context.params["lenient"]) for file in files]
         if all(map(exposes_solver_steps, descriptions)):

@@ -257,15 +257,18 @@ def build_scene(path: Path, table: dict[str, Any], source: str) -> Scene:
     return scene
 
 
-def change_values(scene: Scene, values: Mapping[str, Any]) -> Scene:
-    """Return a scene with other values of variables; its known values hold no longer, but for parameters it keeps."""
-    if not values:
+def change_scene(scene: Scene, values: Mapping[str, Any], stop: float | None) -> Scene:
+    """Return a scene with other values of variables, or another stop time in s.
+
+    Its known values hold no longer, but for parameters it keeps.
+    """
+    if not values and stop is None:
         return scene
     known = scene.known
     if known:
         kept = {name: value for name, value in known.values.items() if known.kind == "parameter" and name not in values}
         known = replace(known, values=kept) if kept else None
-    run = replace(scene.run, values={**scene.run.values, **values})
+    run = replace(scene.run, values={**scene.run.values, **values}, stop=scene.run.stop if stop is None else stop)
     return replace(scene, run=run, known=known, remark=scene.remark if known == scene.known else "")
 
 

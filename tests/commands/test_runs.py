@@ -355,7 +355,7 @@ def test_a_run_that_hardly_advances_ends_at_its_time_limit(workspace):
     assert done.returncode == 1
     (line,) = done.stderr.splitlines()
     assert line.startswith("Error: stickslip.fmu is at t = ")
-    assert line.endswith("advances by less than 1/4096 of the run in 0.5 s: choose an earlier stop or a longer timeout")
+    assert line.endswith("advances by less than 1/4096 of the run in 0.5 s: shorten the run, or allow a longer timeout")
     done = commands.harness(workspace, "run", "fmus/stickslip.fmu", "--stop", 20, "--timeout", 5)
     assert (done.returncode, done.stderr) == (0, "")
 
@@ -400,3 +400,18 @@ def test_a_scene_runs_with_other_values_and_is_not_compared_with_known_ones(
     assert [row["name"] for row in (content["comparison"] or {"values": []})["values"]] == comparison
     effective = load_result(tmp_path / name).parameters
     assert {key: effective[key] for key in values} == values
+
+
+def test_a_scene_runs_to_another_stop_and_is_not_compared_then(workspace):
+    done = harness(workspace, "run", "stickslip", "--stop", 9)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "reference" not in done.stdout
+    assert re.search(r"slips +2 ", done.stdout)
+    assert load_result(workspace / "results" / "stickslip").time[-1] == 9.0
+
+
+def test_the_first_slip_without_modes_is_named_as_what_is_measured(workspace):
+    """A sled that creeps breaks away at no time; it becomes as fast as the driver later than a stick ends."""
+    texts = [harness(workspace, "run", name, "--stop", 9).stdout for name in ("stickslip", "pacejka-0.001")]
+    names = ("first slip", "first time as fast as the driver")
+    assert [[name in text for name in names] for text in texts] == [[True, False], [False, True]]
