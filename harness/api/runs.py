@@ -98,9 +98,10 @@ def simulate(
         Interface to use if the FMU offers both; co-simulation by default.
     inputs : mapping, DataFrame or Dataset, optional
         Input signals: the column ``time`` in s and a column for each input. Values between two rows are interpolated;
-        a time that occurs twice is a jump. In co-simulation an input is constant within a communication step and has
-        its value at the middle of the step; an input whose rate the model declares starts with its value and is
-        continued by the rate, which needs a column as well.
+        a time that occurs twice is a jump, as in `fit`. FMUs that interpolate inputs, as the native ones for FMI 2.0,
+        follow them within a communication step. In co-simulation of others an input has its value at the middle of the
+        step, which shifts an event by up to half a step, at most 1/8192 of the run with `interval`; an input whose rate
+        the model declares starts with its value and is continued by the rate, which needs a column as well.
     timeout : float, optional
         Seconds allowed for one call of an FMU that is not of this project, or for 1/4096 of the run of an FMU of this
         project; 60 by default.

@@ -84,11 +84,11 @@ def test_a_refusal_states_whether_a_bound_is_excluded(folder):
     [
         ("stickslip", {"rtol": 1e-9}),
         ("pacejka", {"stop": 2.0}),
-        ("coulomb", {"inputs": {"time": [0.0, 1.0, 1.0, 2.0], "F_ext": [0.0, 1.0, 2.0, 3.0]}, "method": "dop853"}),
+        ("coulomb", {"inputs": {"time": [0.0, 1.0, 1.0, 2.0], "F_ext": [1.0, 1.0, 2.0, 2.0]}, "method": "dop853"}),
     ],
 )
 def test_an_fmu_of_fmi3_runs_at_its_internal_steps_as_in_fmi2(model, options):
-    """Also its events are listed, and its solver is the one that a tolerance is for."""
+    """Also its events are listed, and its solver is the one that a tolerance is for. Its inputs have no slopes."""
     two, three = (
         harness.simulate(build() / f"{model}.fmu", **options)
         for build in (native_fmus.build_native_fmus, fmi3_fixtures.build_fmi3_fmus)
@@ -138,6 +138,15 @@ def test_outputs_at_a_jump_have_the_input_after_it(interface, at_jump):
     assert sampled_force == pytest.approx([0.0, 5.0, 5.0], abs=1e-12)
     assert force[run.time == 1.0] == pytest.approx(at_jump, abs=1e-12)
     assert force[run.time != 1.0] == pytest.approx(np.where(run.time[run.time != 1.0] > 1.0, 5.0, 0.0), abs=1e-12)
+
+
+def test_a_native_fmu_breaks_away_where_a_ramp_between_rows_reaches_the_limit():
+    """Closed form: F_ext = 2 t reaches the limit of 0.7 N at 0.35 s. A Python FMU holds F_ext within a step."""
+    table, values = {"time": [0.0, 1.0], "F_ext": [0.0, 2.0]}, {"x0": 0.0, "v0": 0.0, "f": 0.7}
+    sources = native_fmus.build_native_fmus() / "coulomb.fmu", "coulomb"
+    native, python = (harness.simulate(fmu, values, stop=1.0, interval=0.5, inputs=table) for fmu in sources)
+    assert native.events.t[1] == pytest.approx(0.35, abs=1e-12)
+    assert python.events.t[1] == pytest.approx(0.35, abs=0.5 / 4096)
 
 
 @pytest.mark.parametrize("interval", [0.25, 0.3, 2.0])
