@@ -116,8 +116,10 @@ def _binaries(name: str, platforms: Sequence[str]) -> dict[str, bytes]:
         raise BuildError(f"The installed {PYTHONFMU} has no binaries: try 'pip install --force-reinstall {PYTHONFMU}'.")
     for platform in platforms:
         if platform not in libraries:
-            platform_names = ", ".join(libraries)
-            raise BuildError(f"{PYTHONFMU} has no binary for {platform}, only for {platform_names}: add --native.")
+            raise BuildError(
+                f"{PYTHONFMU} has no binary for {platform!r}: choose from {', '.join(libraries)}; --native has other "
+                "platforms."
+            )
     selection = [libraries[platform] for platform in platforms or libraries]
     return {f"binaries/{path.parent.name}/{name}{path.suffix}": path.read_bytes() for path in selection}
 

@@ -27,10 +27,10 @@ RUN_MESSAGES = {
     codes.DIVERGED: "the solution diverges after t = {t0!r} s, or an equation has no finite value there, such as the "
     "square root of a negative number; reduce the excitation or check the parameters",
     codes.STALLED: "the solver stalls after t = {t0!r} s: its step has shrunk to 4e-15 of the time since "
-    "the start of the run; raise solver.rtol or choose another solver.method",
+    "the start of the run; raise solver.rtol, or choose another solver.method if the FMU has one",
     codes.TOO_MANY_STEPS: f"more than {MAX_STEPS} internal steps or {MAX_EVALUATIONS} right-hand sides within one "
-    "communication step after t = {now!r} s; choose another solver.method, raise solver.rtol or take shorter "
-    "communication steps",
+    "communication step after t = {now!r} s; take shorter communication steps, raise solver.rtol, or choose another "
+    "solver.method if the FMU has one",
     codes.CHATTERING: "a condition of choose() changes again and again at t = {t0!r} s, because the motion returns to "
     "it from both sides; declare dry friction as a Contact, or make the transition continuous",
     codes.BAD_STEP: "a communication step of {h!r} s from t = {t!r} s is refused: it must be positive, start at the "

@@ -61,7 +61,7 @@ class DryFriction(Oscillator):
     has_dry_friction = rests_when_stuck = True
     rules: dict[int, str] = {
         HYBRID_LAW_ONLY: "friction = {friction} with solver.method = 1 (exact) is refused: the closed form covers the "
-        "hybrid law only; set friction to 1 (hybrid), or solver.method to 2 (ode23)",
+        "hybrid law only; set friction to 1 (hybrid), or choose another solver.method if the FMU has one",
         NO_CONSISTENT_MODES: "no combination of stick and slip satisfies the force balance: a contact slides with a "
         "larger force than it holds; set no sliding force above the holding force",
     }

@@ -137,7 +137,8 @@ def sweep(
     points = SweepPoints(axes, samples, seed)
     spec = SweepSpec(run, points.names, tuple(measures))
     with temporary_directory("sweep-") if folder is None else nullcontext(Path(folder)) as directory:
-        result = run_sweep(spec, points, None, directory, scheduler, workers, reporter(progress))
+        resume = "they are lost, because `folder` is not set" if folder is None else "repeat the call to resume"
+        result = run_sweep(spec, points, None, directory, scheduler, workers, reporter(progress), resume)
         result.data  # noqa: B018 - loads it before a temporary folder is removed
     if folder is None:
         result.folder = None

@@ -106,6 +106,8 @@ def sweep(
     points = SweepPoints(axes, samples, seed)
     with terminal.progress(1) as report:
         spec, progress = SweepSpec(run, points.names, measured), partial(report, model)
-        result = run_sweep(spec, points, name, terminal.out, scheduler, workers, progress)
+        result = run_sweep(
+            spec, points, name, terminal.out, scheduler, workers, progress, "repeat the command to resume"
+        )
     failed = [*result.describe_failures()]
     terminal.print_result(result.as_json(), *result.blocks(), folder=result.folder, failed=failed)

@@ -10,6 +10,7 @@ from ..errors import SceneError, option_text
 
 SYMBOLS = ("x", "v", "a")
 RATE_SUFFIXES = ("", "/s", "/s2")  # of the unit, by the order of the derivative
+NO_UNIT = "units"  # of a position without a unit
 MIN_SAMPLES = 12  # samples
 MAX_VALUE = 1e100  # its square is finite
 MIN_DURATION = 1e-30  # s; the squares of frequencies are finite

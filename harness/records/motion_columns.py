@@ -19,12 +19,11 @@ from .columns import (
 )
 from .extraction import Source, extract, find_time_axis, has_times
 from .headings import FORCE_NAME, MAGNITUDE_NAME, TIME_NAME, order_from_name
-from .motion import RATE_SUFFIXES, Motion, check_samples
+from .motion import NO_UNIT, RATE_SUFFIXES, Motion, check_samples
 from .samples import leave_out_saturated
 from .table_files import Table
 from .units import COUNT_NAMES, find_unit, is_force_unit, parse_per_count
 
-NO_UNIT = "units"  # of a position without a unit
 EXAMPLE_UNITS = (("mm", "deg"), ("mm/s", "deg/s"), ("m/s2", "g"))  # by the order of the derivative
 
 

@@ -134,7 +134,7 @@ def solve_by_two_methods(
     """
     if missing := METHODS.keys() - method_numbers(model):
         methods = ", ".join(sorted(missing))
-        raise HarnessError(f"{file.with_suffix('.fmu')} does not offer {methods}: build it with all of its methods")
+        raise HarnessError(f"{file.with_suffix('.fmu')} does not offer {methods}: build it without --method")
     times = np.linspace(0.0, model.stop_time, POINTS).tolist() if times is None else times
     tolerance = METHODS["dop853"]
     runs = [EmbeddedModel.create(model, values or {}, method, rtol) for method, rtol in METHODS.items()]

@@ -42,7 +42,7 @@ def read_data(kind: type[T], file: Path) -> T:
         return result
     except Exception as error:  # a damaged file may cause any exception in zipfile and numpy
         reason = first_line(error) or type(error).__name__
-        raise SceneError(f"{file} cannot be read ({reason}): repeat the command that wrote it") from None
+        raise SceneError(f"{file} cannot be read ({reason}): write it again") from None
 
 
 def simplify(value: Any, arrays: list[np.ndarray]) -> Any:

@@ -1,6 +1,7 @@
 """Locations of built FMUs."""
 
 import ast
+import shlex
 from pathlib import Path
 
 from ..errors import HarnessError, SceneError, format_value, unknown_source_message
@@ -54,16 +55,34 @@ def _names_in(folders: tuple[Path, ...]) -> set[str]:
     return {file.stem for folder in folders for pattern in ("*.fmu", "[!_]*.py") for file in folder.glob(pattern)}
 
 
+def build_command(fmu: Path, options: str = "") -> str:
+    """Return the command that builds the FMU of this path, in quotes; empty if its model is not known.
+
+    Parameters
+    ----------
+    fmu : path
+        Path of the FMU, built or not.
+    options : str
+        Other options of the command, as in ``"--fmi 3"``.
+    """
+    model = fmu.with_suffix(".py")
+    default_models, more_models = ({file.stem for file in folder.glob("[!_]*.py")} for folder in (PROJECT, MORE[1]))
+    if fmu.stem in default_models and fmu.parent in FOLDERS:
+        arguments = []
+    elif fmu.stem in more_models and fmu.parent in MORE:
+        arguments = [fmu.stem]
+    elif model.is_file():
+        arguments = [shlex.quote(str(model))]
+    elif fmu.stem in default_models | more_models:
+        arguments = [fmu.stem, "--out", shlex.quote(str(fmu.parent))]
+    else:
+        return ""
+    return f"`{' '.join(['friction-fmus build', *arguments, *options.split()])}`"
+
+
 def check_built(fmu: Path, error: type[HarnessError] = HarnessError) -> None:
     """Raise an error that names the build command if the FMU does not exist."""
     if not fmu.is_file():
-        model = fmu.with_suffix(".py")
-        if fmu.parent in MORE:
-            object_name, argument = "it", f" {fmu.stem}"
-        elif model.is_file() and fmu.parent not in FOLDERS:
-            object_name, argument = "it", f" {model}"
-        else:
-            object_name, argument = "the FMUs", ""
-        raise error(
-            f"there is no {fmu}: build {object_name} with `friction-fmus build{argument}`, or specify another file"
-        )
+        command = build_command(fmu)
+        remedy = f"build it with {command}, or specify another file" if command else "specify another file"
+        raise error(f"there is no {fmu}: {remedy}")

@@ -15,7 +15,7 @@ import numpy as np
 from ..errors import HarnessError
 from ..process.subprocess_runner import run_module
 from ..process.temporary_directory import temporary_directory
-from ..scenes.fmu_files import check_built
+from ..scenes.fmu_files import build_command, check_built
 from .fmu_archive import REQUIRED_VARIABLES, SCRIPT_NAME_FILE, read_description, unpack
 from .mtime_cache import cached_by_mtime
 from .solution import Solution
@@ -44,7 +44,7 @@ def import_model_class(fmu: Path) -> type:
     with unpack(fmu) as directory:
         resources = directory / "resources"
         if not (resources / SCRIPT_NAME_FILE).is_file():
-            raise HarnessError(f"{fmu.name} is a native FMU; give the Python FMU, which `friction-fmus build` builds")
+            raise HarnessError(f"{fmu.name} is a native FMU; give the Python FMU of its model, built without --native")
         package = (resources / SCRIPT_NAME_FILE).read_text(encoding="utf-8").removesuffix("_fmu")
         sys.path.insert(0, str(resources))
         try:
@@ -69,8 +69,9 @@ def check_names(model: Any, fmu: Path) -> None:
         for name in model.states:
             getattr(solver, component_name("y", name))
     except (AttributeError, ImportError, TypeError):
+        command = build_command(fmu)
         raise HarnessError(
-            f"{fmu.name} was built by another version of this project: build it again, as with `friction-fmus build`"
+            f"{fmu.name} was built by another version of this project: build it again{command and f' with {command}'}"
         ) from None
 
 

@@ -85,7 +85,7 @@ class ProgressMonitor:
             t, stop = self.grid.start + share * self.grid.duration, self.grid.stop
             raise HarnessError(
                 f"{self.spec.fmu.name} is at t = {t:.6g} s of {stop:.6g} s, and advances by less than 1/4096 of the "
-                f"run in {self.spec.timeout:g} s: choose an earlier stop or a longer timeout"
+                f"run in {self.spec.timeout:g} s: shorten the run, or allow a longer timeout"
             )
 
 
@@ -295,7 +295,7 @@ def plan_grid(spec: RunSpec, instance: FmuInstance) -> TimeGrid:
     if (points := grid.duration / grid.h) > MAX_POINTS:
         key, step = ("grid", grid.h) if spec.interval is None else ("interval", spec.interval)
         sentence = f"{key} = {step!r} s makes {points:.6g} points from {start!r} s to {stop!r} s"
-        raise SceneError(f"{sentence}; the limit is {MAX_POINTS}: choose a larger {key}")
+        raise SceneError(f"{sentence}; the limit is {MAX_POINTS}: choose a larger {key} or a shorter run")
     return grid
 
 

@@ -17,7 +17,8 @@ SIMULATE = [  # changes of harness.simulate("smd"), and words of the sentence
     ({"stop": -1.0}, "stop = -1.0 s is not after start"),
     (
         {"interval": 1e-12},
-        "interval = 1e-12 s makes 4e+12 points from 0.0 s to 4.0 s; the limit is 10000000: choose a larger interval",
+        "interval = 1e-12 s makes 4e+12 points from 0.0 s to 4.0 s; the limit is 10000000: "
+        "choose a larger interval or a shorter run",
     ),
     ({"interval": 0.0}, "interval = 0.0 must be a finite number above 0"),
     ({"times": [0.0, 2.0, 1.0]}, "times: 1.0 at index 2 is not after 2.0"),

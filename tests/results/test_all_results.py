@@ -206,7 +206,7 @@ def test_damaged_data_are_reported(study):
     data = Path("kept/data.npz")
     for content in (b"", data.read_bytes()[:-200], data.read_bytes().replace(b"content", b"another")):
         data.write_bytes(content)
-        with pytest.raises(harness.SceneError, match=r"data\.npz cannot be read .*: repeat the command"):
+        with pytest.raises(harness.SceneError, match=r"data\.npz cannot be read .*: write it again"):
             harness.load_result("kept")
 
 

@@ -214,7 +214,7 @@ def test_the_command_writes_every_point_and_advice_and_keeps_results_of_other_mo
     rows, later = (list(csv.DictReader(text.splitlines())) for text in texts)
     tools = {FMU, FMPY, *FMI3_TOOLS, "scipy", "cvode"} - peer_solvers.missing_packages().keys()
     assert {row["tool"] for row in rows} == tools
-    unbuilt = "not built: fmus/native/fmi3/smd.fmu (friction-fmus build --fmi 3)"
+    unbuilt = "not built: fmus/native/fmi3/smd.fmu (`friction-fmus build --fmi 3`)"
     assert [row["failure"] for row in later if row["tool"] in FMI3_TOOLS] == [unbuilt, unbuilt]
     (unrun,) = (item for item in json.loads(incomplete)["missing"] if item.startswith("Not run: "))
     assert unrun.count(unbuilt) == 1

@@ -29,10 +29,12 @@ FUNCTIONS: dict[str, Callable[[Operand, Operand], Operand]] = {
 COMPARISONS = ("<", "<=", ">", ">=", "==")
 MAX_VALUE_LENGTH = 60  # characters of a value in a message
 POWERS: dict[object, str] = {
-    **{n: " * ".join(["{0}"] * n) for n in range(2, 7)},
-    **{-n: f"1.0 / ({' * '.join(['{0}'] * n)})" for n in range(2, 7)},
-    **{0.5: "sqrt({0})", -1: "1.0 / {0}", 1.5: "{0} * sqrt({0})", -0.5: "1.0 / sqrt({0})"},
+    **{n: " * ".join(["{0}"] * n) for n in range(1, 11)},
+    **{-n: f"1.0 / ({' * '.join(['{0}'] * n)})" for n in range(2, 11)},
+    **{n + 0.5: " * ".join(["{0}"] * n + ["sqrt({0})"]) for n in range(4)},
+    **{0: "1.0", -1: "1.0 / {0}", -0.5: "1.0 / sqrt({0})"},
 }
+GENERAL_POWER = "exp({1} * log({0})), for {0} > 0"
 NO_VALUE = (
     "{name} has no value at build time, so functions of math and numpy do not take it: import functions from fmus, "
     f"which has {', '.join(FUNCTIONS)}"
@@ -128,12 +130,12 @@ class Expression:
 
     def __pow__(self, exponent: Hashable) -> Never:
         x = self.name or "x"
-        instead = POWERS.get(exponent, "exp(n * log({0}))")
-        raise ModelError(
-            f"** is not supported, because its rounding differs between platforms: write {instead.format(x)}"
-        )
+        power = POWERS.get(exponent, GENERAL_POWER).format(x, exponent if isinstance(exponent, int | float) else "n")
+        raise ModelError(f"** is not supported, because its rounding differs between platforms: write {power}")
 
-    __rpow__ = _refusal("** is not supported, because its rounding differs between platforms: write exp(x * log(a))")
+    __rpow__ = _refusal(
+        "** is not supported, because its rounding differs between platforms: write exp(x * log(a)), for a > 0"
+    )
     __bool__ = _refusal(NO_TRUTH)
     __float__ = _refusal(NO_VALUE)
     __mod__ = __rmod__ = __floordiv__ = __rfloordiv__ = __divmod__ = __rdivmod__ = __matmul__ = __rmatmul__ = _refusal(

@@ -24,7 +24,7 @@ from functools import cached_property
 import numpy as np
 
 from ...errors import HarnessError, check_names, option_text
-from ...records.motion import Motion
+from ...records.motion import NO_UNIT, RATE_SUFFIXES, Motion
 from ..estimation.estimate import Estimate
 from . import thresholds
 from .decay_problem import DecayProblem, FitError
@@ -278,10 +278,11 @@ def identify_record(
     by_unknown = make_estimates(record, problem, reported, full, uncertainty)
     estimates = tuple(by_unknown.values())
     remarks = [*decay.notes, *free_motion.notes, *make_remarks(record, problem, laws, full, uncertainty)]
-    if record.base not in ("m", "rad") and (parameters.k or parameters.m):
+    if record.base not in ("m", "rad", NO_UNIT) and (parameters.k or parameters.m):
+        size = option_text("per_count", f"0.5mm{RATE_SUFFIXES[record.order]}")
         remarks.append(
-            f"The forces f, c and q need a position in m or rad, and that of {record.name} is in {record.base}: "
-            f"they are left out; {option_text('unit')} sets the unit."
+            f"The forces f, c and q need a motion in a unit of length or angle, and that of {record.name} is in "
+            f"{record.unit}: they are left out; convert it, as by {size}."
         )
     if uncertainty.is_correlated and uncertainty.rms > thresholds.ROUGH * problem.noise:
         estimates, disagreements = compare_halves(problem, full, estimates)

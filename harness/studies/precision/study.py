@@ -22,7 +22,7 @@ from ...references.certification import solve_by_two_methods
 from ...references.certified_reference import ReferenceCase, compute_errors, load_reference
 from ...references.models import CASES
 from ...references.ode_problem import UnspecifiedProblem
-from ...scenes.fmu_files import find_fmu, fmi3_path
+from ...scenes.fmu_files import build_command, find_fmu, fmi3_path
 from ...scenes.run_spec import RunSpec
 from ...simulation.embedded_model import EmbeddedModel, load_model_class, method_numbers
 from ...simulation.runner import run_own_fmu
@@ -234,7 +234,7 @@ class CaseRunner:
         spec = replace(self.case.run, fmu=file, outputs=states + modes, stop=stop, grid=grid, follow=False)
         spec = replace(spec, exchange=True, tolerance=rtol) if exchange else spec
         if not file.is_file():
-            raise HarnessError(f"not built: {file} (friction-fmus build --fmi 3)")
+            raise HarnessError(f"not built: {file} ({build_command(self.file, '--fmi 3')})")
         recording = run_own_fmu(spec, limit_run_time(settings.timeout, stop))
         assert recording.statistics  # FMUs of this project report it
         repeat = repeats(recording.statistics.seconds, settings.budget)

@@ -34,7 +34,7 @@ class DaskCluster:
         if size:
             self.last_seen = monotonic()
         elif monotonic() > self.last_seen + WORKER_TIMEOUT:
-            raise HarnessError(f"the scheduler at {self.address} has lost its workers; repeat the command to resume")
+            raise HarnessError(f"the scheduler at {self.address} has lost its workers")
         return size
 
     def submit(self, function: Callable[..., Any], *arguments: Any) -> Future[Any]:

@@ -100,9 +100,17 @@ def open_workers(
 
 
 def run_pending(
-    sweep: Sweep, checkpoint: Checkpoint, scheduler: str | None, workers: int | None, report: Callable[[float], None]
+    sweep: Sweep,
+    checkpoint: Checkpoint,
+    scheduler: str | None,
+    workers: int | None,
+    report: Callable[[float], None],
+    resume: str,
 ) -> float:
-    """Do the missing runs and add them to the checkpoint; return the elapsed time in s."""
+    """Do the missing runs and add them to the checkpoint; return the elapsed time in s.
+
+    `resume` states, in the message of a sweep that ends early, what becomes of the finished runs.
+    """
     start, total = perf_counter(), len(sweep.points)
     spans = checkpoint.missing_spans
     if not spans:
@@ -114,10 +122,12 @@ def run_pending(
                 LOG.debug("%d of %d runs are finished", checkpoint.n_done, total)
                 report(checkpoint.n_done / total)
     except BaseException as error:  # an interrupt may cause any exception
-        if not (RECEIVED_SIGNALS or isinstance(error, KeyboardInterrupt)):
-            raise
-        state = f"{checkpoint.n_done} of {total} runs are finished"
-        raise CommandInterruptedError(f"interrupted: {state}; repeat the command to resume") from None
+        state = f"{checkpoint.n_done} of {total} runs are finished; {resume}"
+        if RECEIVED_SIGNALS or isinstance(error, KeyboardInterrupt):
+            raise CommandInterruptedError(f"interrupted: {state}") from None
+        if isinstance(error, HarnessError) and checkpoint.n_done:
+            raise HarnessError(f"{error}; {state}") from None
+        raise
     return perf_counter() - start
 
 
@@ -160,7 +170,7 @@ def completed_blocks(
             except workers.death_errors:
                 deaths += 1
                 if deaths > MAX_DEATHS:
-                    raise HarnessError(f"workers died {deaths} times; repeat the command to resume") from None
+                    raise HarnessError(f"workers died {deaths} times") from None
                 if is_isolated and end == first + 1:
                     yield first, np.full((1, sweep.columns), np.nan), {0: WORKER_DIED}
                 else:

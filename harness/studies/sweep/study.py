@@ -80,8 +80,9 @@ def run_sweep(
     scheduler: str | None,
     workers: int | None,
     report: Callable[[float], None],
+    resume: str,
 ) -> SweepResult:
-    """Run the sweep and write its files to out/sweep/<name>."""
+    """Run the sweep and write its files to out/sweep/<name>; `resume` is as in `run_pending`."""
     file = runs.run.fmu
     check_built(file)
     about = describe(runs, points)
@@ -98,7 +99,7 @@ def run_sweep(
     # opened before the runs, so that conflicts are reported at once
     with checkpoint.open(), replace_folder(folder, STUDY.files, source) as new_folder:
         n_resumed = checkpoint.n_done
-        seconds = run_pending(sweep, checkpoint, scheduler, workers, report)
+        seconds = run_pending(sweep, checkpoint, scheduler, workers, report, resume)
         failures = group_failures(sweep, checkpoint.messages)
         if len(checkpoint.messages) == len(points):
             checkpoint.clear()  # all runs are repeated
