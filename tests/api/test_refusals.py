@@ -13,27 +13,18 @@ SIMULATE = [  # changes of harness.simulate("smd"), and words of the sentence
     ({"values": {"kk": 1.0}}, "'kk' (nearest: 'k')"),
     ({"values": {"m": -1.0}}, "m = -1.0 is outside its range"),
     ({"values": {"m": float("nan")}}, "m = nan"),
-    ({"stop": "8"}, "stop = '8' must be a finite number"),
     ({"stop": -1.0}, "stop = -1.0 s is not after start"),
     (
         {"interval": 1e-12},
         "interval = 1e-12 s makes 4e+12 points from 0.0 s to 4.0 s; the limit is 10000000: "
         "choose a larger interval or a shorter run",
     ),
-    ({"interval": 0.0}, "interval = 0.0 must be a finite number above 0"),
     ({"times": [0.0, 2.0, 1.0]}, "times: 1.0 at index 2 is not after 2.0"),
     ({"times": [0.0, float("nan")]}, "times: nan at index 1 is not a finite number"),
-    ({"times": ["soon"]}, "times = ['soon'] must be a row of finite numbers"),
-    ({"times": []}, "times = [] must be a row of finite numbers, at least one"),
-    ({"times": [[0.0, 1.0], [2.0, 3.0]]}, "must be a row of finite numbers"),
-    ({"outputs": []}, "outputs = [] must be"),
     ({"times": [-1.0, 1.0]}, "times has -1.0 s, outside the run from 0.0 s to 1.0 s"),
     ({"times": [1.0, 2.0], "stop": 1.5}, "times has 2.0 s, outside the run from 0.0 s to 1.5 s"),
     ({"times": [1.0, 2.0], "interval": 0.5}, "times and interval exclude each other"),
-    ({"rtol": float("inf")}, "rtol = inf must be a finite number above 0"),
-    ({"timeout": -1}, "timeout = -1 must be"),
     ({"method": "rk4"}, "'rk4'"),
-    ({"interface": "me"}, "unknown interface 'me'; allowed: CoSimulation, ModelExchange"),
     ({"interface": "ModelExchange"}, "model exchange is not among them"),
     ({"outputs": ["y"]}, "unknown output 'y'"),
     ({"inputs": {"F_ext": [1.0]}}, "inputs has no column 'time'"),
@@ -49,34 +40,12 @@ SIMULATE = [  # changes of harness.simulate("smd"), and words of the sentence
 ]
 DECAY = np.linspace(0.0, 10.0, 101), np.exp(-0.1 * np.linspace(0.0, 10.0, 101)) * np.cos(6.0 * np.linspace(0, 10, 101))
 SWING = np.cos(DECAY[0])
-COMPARE = [  # changes of harness.compare("smd.fmu", "smd.fmu")
-    ({"rtol": 0.0}, "rtol = 0.0 must be a finite number above 0"),
-    (
-        {"a": 3},
-        "a = 3 must be a name, a record, a file, a table of pandas or xarray, a mapping of columns, or a trajectory",
-    ),
-]
 IDENTIFY_DECAY = [
     ({"record": [0.0, 1.0]}, "x is missing"),
     ({"record": [0.0, 1.0], "x": [1.0, 2.0]}, "unit is missing"),
     ({"record": [0.0, 1.0], "x": [1.0], "unit": "m"}, "rows of the same length"),
     ({"record": "nowhere.csv"}, "cannot read nowhere.csv"),
     ({"record": np.arange(20.0), "x": np.arange(20.0), "unit": "m", "k": 1.0, "mass": 1.0}, "leave one out"),
-    ({"record": "nowhere.csv", "rate": 0.0}, "rate = 0.0 must be a finite number above 0"),
-    *(
-        (
-            {"record": DECAY[0], "x": DECAY[1], "unit": "m", name: value},
-            f"{name} = {value!r} must be a finite number above",
-        )
-        for name, value in (
-            ("mass", -1),
-            ("k", -3),
-            ("mass", 0),
-            ("mass", float("nan")),
-            ("k", float("inf")),
-            ("k", True),
-        )
-    ),
     ({"record": DECAY[0], "x": DECAY[1], "unit": "m", "column": "x"}, "column = 'x' has no effect on arrays"),
     ({"record": "nowhere.csv", "x": DECAY[1]}, "x has no effect, because the record has columns"),
     ({"record": "nowhere.csv", "begin": 2.0, "end": 1.0}, "begin = 2.0 s must be before end = 1.0 s"),
@@ -118,8 +87,6 @@ SWEEP = [  # changes of harness.sweep("smd", {"k": [1.0]})
     ({"grid": {"k": ["stiff"]}}, "must be numbers"),
     ({"grid": {"kk": [1.0]}}, "'kk' (nearest: 'k')"),
     ({"grid": {"k": [1.0, 2.0, 3.0]}, "samples": 4}, "its lower and its upper bound"),
-    ({"workers": 0}, "workers = 0 must be a whole number from 1 to 1024"),
-    ({"workers": -1}, "workers = -1 must be a whole number"),
     ({"grid": {"k": [[1.0, 2.0], [3.0, 4.0]]}}, "grid: k = [[1.0, 2.0], [3.0, 4.0]] must be numbers, one or a row"),
     ({"values": {"k": 2.0}}, "k is varied by grid and has a value for all runs: remove one"),
 ]
@@ -142,7 +109,6 @@ FIT = [  # changes of a fit of mu_s of the sled to its position
         ({"sigma": {"x": sigma}}, "give the standard deviation of the noise, from 2e-50 to 2e+50")
         for sigma in (5e-324, 1e160)
     ),
-    ({"sigma": {"x": 0.0}}, "sigma: x = 0.0 must be a finite number above 0"),
     ({"free": {"delay(x)": (0.0, 20.0)}}, "delay(x) = 0.0:20.0 reaches beyond the record, which lasts 16 s"),
     ({"free": ["delay(x)"], "start": {"delay(x)": 5.0}}, "the start value 5.0 of delay(x) is outside its range"),
     ({"free": ["delay(y)"]}, "unknown parameter 'delay(y)' (nearest: 'delay(x)')"),
@@ -154,10 +120,6 @@ FIT = [  # changes of a fit of mu_s of the sled to its position
         "6 unknowns need at least 24 samples, and there are",
     ),
     ({"records": "missing.csv"}, "missing.csv"),
-    (
-        {"records": 3},
-        "records = 3 must be a record, a file, a table of pandas or xarray, columns, a trajectory, or times",
-    ),
     ({"against": "stickslip"}, "stickslip is to be compared with itself: give another FMU"),
     ({"against": "pendulum", "free": ["m"]}, "unknown output of pendulum 'x'"),
     (
@@ -170,7 +132,6 @@ FIT = [  # changes of a fit of mu_s of the sled to its position
 ]
 CALLS = [
     *((harness.simulate, {"source": "smd"}, *row) for row in SIMULATE),
-    *((harness.compare, {"a": "fmus/smd.fmu", "b": "fmus/smd.fmu"}, *row) for row in COMPARE),
     *((harness.identify_decay, {}, *row) for row in IDENTIFY_DECAY),
     *((harness.identify_curve, {}, *row) for row in CURVE),
     *((harness.sweep, {"source": "smd", "grid": {"k": [1.0]}}, *row) for row in SWEEP),
