@@ -4,7 +4,7 @@ No internal step passes an event.  An event may be deferred until the importer h
 those before the event.
 """
 
-from . import call_sequence, conditions
+from . import call_sequence, conditions, step_control
 from .codes import BAD_STEP, FAILED, OK, TOO_MANY_STEPS
 from .integrator import MAX_EVALUATIONS, MAX_STEPS
 
@@ -41,7 +41,7 @@ def next_internal_step(run, model, defer_events):
     run.outputs_current = False
     status = call_sequence.prepare_to_step(run, model)  # an input may have changed
     if status == OK and solver.t >= step.t1:
-        status = step.compute_next(model)
+        status = step_control.compute_next(model, step)
     if status != OK:
         return status
     exchange.n_internal_steps += 1

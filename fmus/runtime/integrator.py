@@ -6,10 +6,11 @@ ahead of t does not show.
 
 from math import fabs, inf, nan
 
-from . import conditions, contact_lcp, ode23, phase_repetition
+from . import conditions, contact_lcp, ode23, phase_repetition, step_control, step_end
 from .active_method import METHOD_ITEMS
 from .codes import DIVERGED, EXACT, HYBRID, HYBRID_LAW_ONLY, OK, STUCK, TOO_MANY_STEPS
-from .step_control import OVERFLOW_LIMIT, InternalStep
+from .internal_step import InternalStep
+from .step_end import OVERFLOW_LIMIT
 from .variable_declarations import Choice, Count, Fixed, Local, VariableOwner
 from .vectors import (
     ContactVector,
@@ -147,7 +148,7 @@ class Integrator(VariableOwner):
         if model.has_prescribed_slips and step.is_hybrid:
             deviations = model.slip_deviations(self.t, self.y)
             self.y = contact_lcp.follow_inputs(model, self.t, self.y, self.previous_modes, deviations)
-        step.start_empty_step(model, self.t, self.y, self.previous_modes, step.tie_tolerance(model))
+        step.start_empty_step(model, self.t, self.y, self.previous_modes, step_end.tie_tolerance(model, step))
         if model.has_dry_friction and any_of(step.modes1 != self.previous_modes):
             step.count_event()
         self.move_to_step_end(model)
@@ -177,7 +178,7 @@ class Integrator(VariableOwner):
         """Advance the current time to t, in seconds since the start.  Returns a status."""
         step = self.step
         if step.t1 < t:
-            status = step.compute_next(model)
+            status = step_control.compute_next(model, step)
             if status == OK and step.t1 < t:
                 status = self.advance_past(model, t)
             if status != OK:
@@ -210,7 +211,7 @@ class Integrator(VariableOwner):
         limit = step.n_rhs + step.interpolant.n_event_evals + MAX_EVALUATIONS
         for _ in range(MAX_BATCHES):
             for _ in range(BATCH_STEPS):
-                status = step.compute_next(model)
+                status = step_control.compute_next(model, step)
                 if status != OK or step.t1 >= t:
                     return status
             if step.n_rhs + step.interpolant.n_event_evals > limit:
@@ -223,7 +224,7 @@ class Integrator(VariableOwner):
         for _ in range(BATCH_STEPS):  # at most the last of them has a length
             if not (self.t >= step.t1 and step.t1 < step.t_end):
                 break
-            status = step.compute_next(model)
+            status = step_control.compute_next(model, step)
             if status != OK:
                 if not step.t1 <= self.t:  # discard the failed step, so that a communication step fails there again
                     step.t1, step.y1, step.f1, step.modes1 = step.t0, step.y0, step.f0, step.modes0

@@ -18,7 +18,7 @@ from . import call_sequence, conditions, contact_lcp, event_location, stick_slip
 from .codes import DIVERGED, EPSILON, EVENT, MODEL_EXCHANGE, NO_CONSISTENT_MODES, OK, ROUNDOFF_MARGIN, RUNNING, STUCK
 from .conditions import SHORTEST_DWELL
 from .run_state import RunState
-from .step_control import OVERFLOW_LIMIT, TIE_FACTOR
+from .step_end import OVERFLOW_LIMIT, TIE_FACTOR
 from .vectors import (
     ContactVector,
     all_of,

@@ -45,7 +45,7 @@ class Oscillator(VariableOwner):
     has_variable_levers = False  # the lever of a contact force changes with the motion, and may vanish
     has_slip_conditions = False  # a slip velocity depends on conditions, with which it may jump
     has_nominal_velocity = False  # nominal_velocity() is defined
-    checks_event_steps = False  # steps to events are checked: see InternalStep.is_accurate_at
+    checks_event_steps = False  # steps to events are checked: see method_step.is_accurate_at
     has_driver = False  # the driver is at x_base at time t_base and moves at driver_velocity()
     has_input_derivatives = False  # inputs are polynomials around t_base
     prescribed_inputs: tuple[tuple[str, str], ...] = ()  # names of each input with a declared rate, and of its rate

@@ -10,8 +10,18 @@ from . import contact_lcp
 from .codes import ROUNDOFF_MARGIN, STUCK
 from .event_location import update_event_functions
 from .interpolant import largest_of, smallest_of
+from .step_kind import has_narrow_features
 from .time_scale import time_scale
-from .vectors import RateVector, StateVector, contact_indices, contact_vector, select_kinematic, slip_index
+from .vectors import (
+    ContactVector,
+    RateVector,
+    StateVector,
+    any_of,
+    contact_indices,
+    contact_vector,
+    select_kinematic,
+    slip_index,
+)
 
 MAX_CUBIC_ERROR = 0.02  # share of the range of an event function by which it may differ from a cubic polynomial
 MAX_HALVINGS = 20  # of one step; an event function with a kink resembles no polynomial
@@ -85,6 +95,16 @@ def is_slip_unresolved(model, step, end):
         ends = step.modes0[i] != STUCK and location.times[i] == end
         is_unresolved = is_unresolved or (ends and location.start[i] <= least and fabs(slips[i]) <= least)
     return is_unresolved
+
+
+def limit_proposal(model, step, modes: ContactVector, h):
+    """Limit the step that is proposed first, by narrow features and by clocks."""
+    if has_narrow_features(model, step):
+        y1 = step.y0 + h * step.f0
+        h *= narrow_feature_share(model, step, h, y1, step.f0)
+    if model.has_conditions or (model.is_coupled and any_of(modes == STUCK)):
+        h = limit_by_clocks(model, step, h)
+    return h
 
 
 def limit_by_clocks(model, step, h):

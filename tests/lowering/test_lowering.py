@@ -23,7 +23,10 @@ from fmus.compiler.syntax_trees import TranslationError, nested_statements
 from fmus.runtime import stick_slip
 from fmus.runtime.vectors import ContactIndex, ContactVector, StateVector
 
-NUMERICS = ("step_control.py", "stick_slip.py", "integrator.py")
+NUMERICS = (
+    *("step_control.py", "internal_step.py", "rest_step.py", "closed_form_step.py", "method_step.py", "step_end.py"),
+    *("stick_slip.py", "integrator.py"),
+)
 STEPS = 150  # of a run, enough for some events
 VECTORS, DECLARATIONS = ((ROOT / "fmus" / "runtime" / name).read_text() for name in ("vectors.py", "oscillator.py"))
 EVERY_MODEL = pytest.mark.parametrize("name", MODELS)

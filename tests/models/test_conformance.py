@@ -305,7 +305,7 @@ def test_the_methods_preserve_dimensions(physics, name):
     a, h = model.rates(t, x, v, *modes), Quantity(1e-4, 0, 0, 1)
     for file in [item for item, number, _ in declared(name)["solver.method"].items if number != EXACT]:
         method = getattr(runtime(name, file), file.capitalize())()
-        step = runtime(name, "step_control").InternalStep(model)
+        step = runtime(name, "internal_step").InternalStep(model)
         x1, v1, a1, e_x, e_v = method.propose(model, step, *modes, t, x, v, a, h)
         assert [assert_dimension(*pair) for pair in ((x1, x), (v1, v), (a1, a), (e_x, x / h), (e_v, v / h))] == [
             True

@@ -3,7 +3,7 @@
 from itertools import pairwise
 from math import nan
 
-from internal_steps import prepared_run
+from internal_steps import compute_step, prepared_run
 from models import LARGER_MODELS, model_class, runtime
 
 from fmus.compiler.lowering import lowered_model, sibling_module
@@ -11,11 +11,12 @@ from fmus.compiler.lowering import lowered_model, sibling_module
 
 def test_a_first_step_that_fails_is_shortened_no_more_than_max_tries():
     model = model_class("smd")()
-    solver = prepared_run(model, {"solver.method": 2}).solver
+    run = prepared_run(model, {"solver.method": 2})
+    solver = run.solver
     solver.start(model, 1.0, 0.1, 0.0, 5.0, 1e-6)
     model.k = nan
-    assert solver.step.compute_next(model) == runtime("smd", "codes").DIVERGED
-    assert 0 < solver.step.n_rejected <= runtime("smd", "step_control").MAX_TRIES
+    assert compute_step(model, run) == runtime("smd", "codes").DIVERGED
+    assert 0 < solver.step.n_rejected <= runtime("smd", "method_step").MAX_TRIES
 
 
 def test_pivots_that_do_not_end_change_one_contact_at_a_time(monkeypatch):

@@ -1,7 +1,7 @@
 """A motion that returns to the edge of a condition from both sides ends the run; other small motions do not."""
 
 import pytest
-from internal_steps import prepared_run, start
+from internal_steps import compute_step, prepared_run, start
 from models import DOP853, ODE23, ODE45, RODAS
 from variants import slow_after
 
@@ -62,7 +62,7 @@ def follow(cls, values, duration, most):
     start(model, run, model.initial_state(0.0), duration)
     step, status = run.solver.step, 0
     while step.t1 < duration and status == 0 and step.n_accepted < most:
-        status = step.compute_next(model)
+        status = compute_step(model, run)
     return status, step.t1, step.n_accepted
 
 

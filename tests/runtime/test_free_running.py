@@ -4,7 +4,7 @@ import random
 from math import cos, inf, nextafter, sin
 
 import pytest
-from internal_steps import prepared_run
+from internal_steps import compute_step, prepared_run
 from models import (
     CASES,
     DOP853,
@@ -220,11 +220,12 @@ def test_the_last_internal_step_ends_at_the_stop_time_without_another_one():
     draw = random.Random(1)
     for _ in range(100):
         model, start, stop = model_class("smd")(), draw.choice([0.0, draw.uniform(-1.0, 0.0)]), draw.uniform(0.5, 3.0)
-        solver = prepared_run(model, {"solver.method": DOP853, "solver.h_max": 1e3, "k": 1.0}).solver
+        run = prepared_run(model, {"solver.method": DOP853, "solver.h_max": 1e3, "k": 1.0})
+        solver = run.solver
         solver.start(model, start, *model.initial_state(start), stop, 1e-3)
         step = solver.step
         while step.t1 < step.t_end:
-            step.compute_next(model)
+            compute_step(model, run)
         assert step.t1 == step.t_end == stop - start
         assert step.t1 - step.t0 > 1e-3
 

@@ -70,7 +70,7 @@ class Solver:
     def step(self, model, t, x, v, h):
         """Take a step; return the new x, v and acceleration, and the error estimates. The interpolant is ready."""
         a = model.rates(t, x, v)
-        step = runtime(TWO_STATES, "step_control").InternalStep(model_class(TWO_STATES))
+        step = runtime(TWO_STATES, "internal_step").InternalStep(model_class(TWO_STATES))
         step.tolerance = 1e-12  # of the iteration of implicit methods, with a scale of 1
         step.active_method.error_scale_floor_x = step.active_method.error_scale_floor_v = 1.0
         new = self.method.propose(model, step, t, x, v, a, h)

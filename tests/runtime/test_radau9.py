@@ -96,7 +96,7 @@ def propose(model, x, v, h, tolerance=1e-10):
 
 def begin_step(model, tolerance):
     """Return the step of a solver of a model, with an error scale of 1."""
-    step = runtime("pacejka", "step_control").InternalStep(model)
+    step = runtime("pacejka", "internal_step").InternalStep(model)
     step.tolerance = tolerance
     step.active_method.error_scale_floor_x = step.active_method.error_scale_floor_v = 1.0
     return step

@@ -1,6 +1,7 @@
 """Record internal steps in Python: of the emitted scalar code of a model, and of the vector sources on lists."""
 
 import struct
+from importlib import import_module
 
 import list_vectors
 
@@ -65,7 +66,9 @@ def list_steps(source, values, stop, most):
 
 def compute_step(model, run):
     """Compute the next internal step of a model, as the integrator does. Returns a status."""
-    return run.solver.step.compute_next(model)
+    step = run.solver.step
+    step_control = import_module(type(step).__module__.replace("internal_step", "step_control"))
+    return step_control.compute_next(model, step)
 
 
 def counts(step):

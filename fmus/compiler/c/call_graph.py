@@ -3,13 +3,13 @@
 from itertools import count
 from types import FunctionType
 
-from ...runtime.step_control import InternalStep
+from ...runtime import step_control
 from .c_statements import FunctionTranslator
 from .c_types import CFunction, CType, ScalarTuple
 from .struct_layout import StructLayout
 
 # Inlined into `compute_next`, it would make every step of ode23 save registers: 20 instructions, 3 % of a step.
-RARELY_CALLED = {InternalStep.repeat_steps.__qualname__}
+RARELY_CALLED = {step_control.repeat_steps.__qualname__}
 
 
 class CallGraph:

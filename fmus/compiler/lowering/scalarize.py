@@ -1,7 +1,7 @@
 """Rewrites expressions and simple statements of one function from vectors to scalars."""
 
 import ast
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from ..syntax_trees import TranslationError, TreeTransformer, all_nodes, is_same_tree, replace_fields
 from .constant_folding import ConstantFolder
@@ -19,7 +19,7 @@ INDEX_LOOKUPS = {"slip_index": "slip", "position_index": "place"}
 class Substitution(TreeTransformer):
     """Replaces names by expressions."""
 
-    def __init__(self, expressions: dict[str, ast.expr]) -> None:
+    def __init__(self, expressions: Mapping[str, ast.expr]) -> None:
         self.expressions = expressions
 
     def visit_Name(self, node: ast.Name) -> ast.expr:
@@ -235,6 +235,8 @@ class Scalarizer(ConstantFolder):
             case ast.Call(func=ast.Name(id="tuple"), args=[ast.GeneratorExp(elt=item, generators=[each])]):
                 if isinstance(each.iter, ast.Name) and each.iter.id == METHOD_LOOP:
                     return ast.Tuple([self.visit_for_method(item, each.target, label) for label in self.spec.methods])
+            case ast.Call(func=ast.Name(id=name), args=args) if name in self.declared.inlined:
+                return self.inlined_test(name, args)
             case ast.Call(func=ast.Name(id="len"), args=[argument]) if kind := self.vector_kind(argument):
                 return ast.Constant(self.spec.size(kind))
             case ast.Call(func=ast.Name(id="sum_of"), args=args):
@@ -270,6 +272,14 @@ class Scalarizer(ConstantFolder):
         return replace_fields(
             node, func=self.visit(function), args=args, keywords=[self.visit(keyword) for keyword in node.keywords]
         )
+
+    def inlined_test(self, name: str, args: list[ast.expr]) -> ast.AST:
+        """Return the expression of a function of scalars, with the constants of its file as numbers."""
+        parameters, expression = self.declared.inlined[name]
+        names = {node.id for node in all_nodes(expression) if isinstance(node, ast.Name)} - {*parameters}
+        numbers = {one: ast.Constant(value) for one in names if (value := self.declared.constants.get(one)) is not None}
+        test = self.visit(Substitution(dict(zip(parameters, args, strict=True))).visit(expression))
+        return Substitution(numbers).visit(test)
 
     # ---- simple statements
 

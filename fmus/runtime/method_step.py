@@ -1,0 +1,243 @@
+"""A step of an integration method: proposals until one meets the tolerance, then the first event in it.
+
+The step size is controlled as in MATLAB's ode23 and ode45 (L. F. Shampine, M. W. Reichelt, The MATLAB ODE Suite,
+SIAM J. Sci. Comput. 18 (1997) 1-22).
+"""
+
+from math import inf
+
+from . import conditions, contact_lcp, event_location, phase_repetition, step_end, step_limits
+from .codes import DIVERGED, EPSILON, NEEDS_REPETITION, OK, STALLED, STUCK
+from .event_location import INTERPOLANT_SHARE, NEAR_ZERO_SHARE
+from .interpolant import largest_of
+from .step_end import OVERFLOW_LIMIT
+from .step_kind import has_law_without_sticking, has_narrow_features
+from .vectors import (
+    ContactVector,
+    RateVector,
+    StateVector,
+    complete_rates,
+    contact_indices,
+    dynamic_part,
+    elementwise_max,
+    error_size,
+    kinematic_rates,
+    magnitude,
+    max_of,
+    select_kinematic,
+    slip_index,
+    sum_of,
+)
+
+MAX_TRIES = 60  # attempts for one step; each one halves the step size
+ROUGH_ERROR, ROUGH_CHANGE = 0.5, 10.0  # relative error and change of states in a proposal that is roughly right
+SHORTEST_STEP = 16.0 * EPSILON  # share of the time since the start; the solver stalls at shorter ones
+# Rounding error of a rate, relative to the sum of its absolute terms, below which no step is rejected.  A product and a
+# sum round by half EPSILON each, as does each operand.  With 128 EPSILON, dop853 was allowed errors of 4e-10 in pacejka
+# at any tolerance below 1e-12.
+RATE_ROUNDING = 2.0 * EPSILON
+INTERPOLATION_ERROR = 10.0  # of a state at an event, relative to the solver tolerance
+
+
+def advance_with_method(model, step):
+    """Compute a step that meets the tolerance, and end it at the first event in it.  Returns a status."""
+    status = accept_proposal(model, step)
+    if status != OK:
+        return status
+    if model.has_dry_friction and step.is_hybrid and not model.is_coupled and not model.has_conditions:
+        # Most steps end here.  The Bernstein coefficients of the cubic Hermite polynomial of the slip velocity are
+        # compared with their sum, which bounds the largest.  Without calls: these take a tenth of a step of ode23.
+        for i in contact_indices:
+            mode = step.modes0[i]
+            start, end, third = mode * step.y0[slip_index[i]], mode * step.y1[slip_index[i]], mode * step.h_full / 3.0
+            early, late = start + third * step.f0[slip_index[i]], end - third * step.f1[slip_index[i]]
+            total = start + early + late + end
+            if total > step.largest_slip:
+                step.largest_slip = total
+            low = early if early < late else late
+            low = low if low < end else end
+            if low >= INTERPOLANT_SHARE * total and low >= NEAR_ZERO_SHARE * step.largest_slip:
+                return OK
+            location = step.event_location
+            location.start[i], location.early[i], location.late[i], location.end[i] = start, early, late, end
+            if step.largest_slip < inf:
+                location.peaks[i] = step.largest_slip
+            else:
+                location.peaks[i] = largest_of(total, start, end, location.peaks[i])
+    if step.is_hybrid or model.has_conditions:
+        return end_at_first_event(model, step)
+    return OK
+
+
+def accept_proposal(model, step):
+    """Propose steps, each one shorter than the last, until one meets the tolerance.  Returns a status."""
+    t, y, f, modes = step.t0, step.y0, step.f0, step.modes0
+    if has_law_without_sticking(model, step):
+        modes = STUCK * modes
+    method = step.active_method
+    roundoff = step.roundoff
+    tolerance = step.tolerance
+    roundoff.t0 = roundoff.t1
+    h_min = SHORTEST_STEP * t
+    h = step.h_next if step.h_next < step.h_max else step.h_max
+    if model.has_nominal_velocity or model.has_conditions or model.is_coupled:
+        h = step_limits.limit_proposal(model, step, modes, h)
+    if h < h_min:
+        h = h_min
+    remaining = step.t_end - t - roundoff.t0
+    last = 1.1 * h >= remaining
+    h = remaining if last else h
+    scale = error_size(y)
+    method.raise_scale_floor(model, scale)
+    scale = elementwise_max(method.error_scale_floor, scale)
+    attempts = 0
+    while True:
+        y1, f1, e = method.propose(model, step, modes, t, y, f, h)
+        step.n_rhs += method.stages
+        size1 = error_size(y1)
+        size2 = elementwise_max(size1, scale)
+        d = magnitude(e)
+        e = d / size2
+        error = h * max_of(e) / tolerance
+        if error > 1.0 and method.floor_share > 0.0:
+            e = relative_to_rounding(model, step, modes, y, d, size2, h)
+            error = h * max_of(e) / tolerance
+        share = 1.0
+        if error <= 1.0 and sum_of(size1, e) < OVERFLOW_LIMIT:  # False for NaN
+            if has_narrow_features(model, step):
+                share = step_limits.narrow_feature_share(model, step, h, y1, f1)
+            if not has_narrow_features(model, step) or share == 1.0 or h <= h_min:
+                break
+        step.n_rejected += 1
+        if attempts == 0:
+            step.save_scale_floor()
+        attempts += 1
+        if error * tolerance < ROUGH_ERROR:
+            raise_floor_by_proposal(model, step, h, y, f, y1, f1, size1, size2)
+            scale = elementwise_max(method.error_scale_floor, scale)
+        if h <= h_min or attempts == MAX_TRIES:
+            return STALLED if error < inf and sum_of(size1) < OVERFLOW_LIMIT else DIVERGED
+        shrink = method.safety * error**-method.power if 1.0 < error < inf and attempts == 1 else 0.5
+        shrink_limit = method.shrink if attempts == 1 else 0.5
+        h_new = h * (shrink if shrink > shrink_limit else shrink_limit)
+        if has_narrow_features(model, step) and share < 1.0:
+            h_new = h * share
+        h = h_min if h_new < h_min else h_new
+        last = False
+    if attempts == 0:
+        grow = method.safety * error**-method.power if error > 1e-9 else method.grow
+        step.h_next = h * (grow if grow < method.grow else method.grow)
+    else:
+        step.h_next = h * method.shrink_after_rejection
+    step.h_full = h
+    if last:
+        step.t1, roundoff.t1 = step.t_end, 0.0
+    else:
+        step.t1 = roundoff.end_time(t, h)
+    step.y1, step.f1 = y1, f1
+    return OK
+
+
+def relative_to_rounding(
+    model, step, modes: ContactVector, y: StateVector, d: StateVector, size: StateVector, h
+) -> StateVector:
+    """Return the errors d relative to the sizes of the states, of which rounding errors of the rates are a part.
+
+    They are errors of velocities, and of positions by these.
+    """
+    terms = model.rate_magnitudes(step.t0 + h, y, modes)  # the proposed state may be unstable
+    rounding = dynamic_part(RATE_ROUNDING * h / step.tolerance * terms)
+    least = select_kinematic(h * kinematic_rates(rounding), rounding)
+    return d / elementwise_max(size, least)
+
+
+def raise_floor_by_proposal(
+    model,
+    step,
+    h,
+    y: StateVector,
+    f: RateVector,
+    y1: StateVector,
+    f1: RateVector,
+    size1: StateVector,
+    size2: StateVector,
+):
+    """Raise the scale floor by a rejected proposal that is roughly right.
+
+    It shows how large states become that are zero so far, and whose error is always large relative to what they reach.
+    A rate that is large relative to that shows an unstable proposal.  So does a change that the rates at neither end
+    explain.
+    """
+    method = step.active_method
+    rate0, rate1 = magnitude(f), magnitude(f1)
+    change = y1 - y
+    change = magnitude(change)
+    most = elementwise_max(rate0, rate1)
+    excess = change - ROUGH_CHANGE * h * most
+    d = rate1 / size2
+    if h * max_of(d) < ROUGH_CHANGE and max_of(excess) <= 0.0:
+        method.error_scale_floor = step.start_counters.error_scale_floor
+        method.raise_scale_floor(model, size1)
+
+
+def end_at_first_event(model, step):
+    """End the accepted step at the first event in it.  Returns a status, or NEEDS_REPETITION.
+
+    The step is repeated in parts where it does not show the event functions, and with a tighter tolerance since the
+    last event where the error of the method decides whether there is an event.
+    """
+    location = step.event_location
+    h = step.h_full
+    if model.is_coupled or model.has_conditions:
+        event_location.evaluate_on_cubic(model, step)
+        step_limits.limit_step(model, step)
+        if location.must_shorten:
+            return NEEDS_REPETITION
+    end = event_location.locate_events(model, step)
+    if step.interpolant.ready:  # the event search built the interpolant
+        step.n_rhs += step.active_method.extra
+    phase_repetition.decide_repetition(step)
+    if location.must_repeat:
+        return NEEDS_REPETITION
+    if end <= h:
+        if model.is_coupled and step.is_hybrid:
+            location.must_shorten = step_limits.is_slip_unresolved(model, step, end)
+        if model.checks_event_steps and not location.must_shorten:
+            location.must_shorten = not is_accurate_at(model, step, end)
+        if location.must_shorten:
+            return NEEDS_REPETITION
+        return step_end.end_at(model, step, end)
+    if model.is_coupled and step.is_hybrid:
+        step.y1 = contact_lcp.stop_slips(model, step.t1, step.y1, step.modes0)
+        step.f1 = complete_rates(step.y1, step.f1)
+    if model.has_conditions:
+        for j in range(model.n_switches):
+            conditions.note_distance(location, j, location.end[model.first_condition + j])
+    phase_repetition.end_phase_in_doubt(model, step)
+    return OK
+
+
+def is_accurate_at(model, step, h):
+    """Return whether a step to an event after h seconds agrees with the interpolated state there.
+
+    Friction that varies within a small range of slip velocities, or a condition that changes, may lie between the
+    stages of a long step, whose error estimate does not see it.  A step that ends at the event does.
+    """
+    if step.event_location.n_halvings == step_limits.MAX_HALVINGS:
+        return True
+    method = step.active_method
+    y_end = step.state_after(model, h)
+    modes = step.modes0
+    if has_law_without_sticking(model, step):
+        modes = STUCK * modes
+    y2, _f2, e = method.propose(model, step, modes, step.t0, step.y0, step.f0, h)
+    step.n_rhs += method.stages
+    scale = error_size(step.y0)
+    scale = elementwise_max(method.error_scale_floor, scale)
+    size2 = error_size(y2)
+    scale = elementwise_max(size2, scale)
+    e = magnitude(e) / scale
+    difference = y2 - y_end
+    difference = magnitude(difference) / scale
+    step.h_full = h
+    return h * max_of(e) <= step.tolerance and max_of(difference) <= INTERPOLATION_ERROR * step.tolerance
