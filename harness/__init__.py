@@ -37,6 +37,7 @@ from .api import (
     load_result,
     measure,
     read_record,
+    sensitivity,
     simulate,
     sweep,
 )
@@ -57,6 +58,7 @@ if TYPE_CHECKING:
     from .studies.decay.result import DecayResult
     from .studies.fit.result import FitResult
     from .studies.precision.result import PrecisionResult
+    from .studies.sensitivity.result import SensitivityEvent, SensitivityResult
     from .studies.stability.result import StabilityResult
     from .studies.sweep.result import SweepResult
 
@@ -79,6 +81,8 @@ __all__ = [
     "PrecisionResult",
     "Record",
     "SceneError",
+    "SensitivityEvent",
+    "SensitivityResult",
     "Signals",
     "StabilityResult",
     "SweepResult",
@@ -92,6 +96,7 @@ __all__ = [
     "load_result",
     "measure",
     "read_record",
+    "sensitivity",
     "simulate",
     "sweep",
 ]
@@ -111,6 +116,8 @@ TYPES = {
     "ParameterFit": "harness.analyses.fit.parameter_fit",
     "PrecisionResult": "harness.studies.precision.result",
     "Record": "harness.records.record",
+    "SensitivityEvent": "harness.studies.sensitivity.result",
+    "SensitivityResult": "harness.studies.sensitivity.result",
     "Signals": "harness.simulation.signals",
     "StabilityResult": "harness.studies.stability.result",
     "SweepResult": "harness.studies.sweep.result",

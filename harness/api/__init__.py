@@ -11,6 +11,7 @@ from .measures import measure
 from .records import read_record
 from .results import load_result
 from .runs import compare, simulate
+from .sensitivities import sensitivity
 from .sweeps import sweep
 
 __all__ = [
@@ -22,6 +23,7 @@ __all__ = [
     "load_result",
     "measure",
     "read_record",
+    "sensitivity",
     "simulate",
     "sweep",
 ]

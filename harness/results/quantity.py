@@ -55,6 +55,14 @@ def display_unit(unit: str) -> tuple[str, float]:
     return (unit.replace("rad", "deg"), pi / 180) if unit in ("rad", "rad/s", "rad/s2") else (unit, 1.0)
 
 
+def divide_units(top: str, bottom: str) -> str:
+    """Return the unit of a derivative; the unit of a ratio is empty."""
+    if not bottom:
+        return top
+    top, bottom = (f"({unit})" if {*unit} & {*"./"} else unit for unit in (top or "1", bottom))
+    return f"{top}/{bottom}"
+
+
 def format_number(value: float, digits: int = 5) -> str:
     """Return a number with the given digits; an integer with all of its digits."""
     return str(value) if isinstance(value, int) else f"{value:.{digits}g}"

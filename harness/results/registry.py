@@ -122,6 +122,14 @@ STUDIES = (
         "Differences between two results or FMUs.",
     ),
     Study(
+        "sensitivity",
+        "sensitivity",
+        "studies.sensitivity.result:SensitivityResult",
+        ("sensitivity.csv", "events.csv", PICTURE),
+        "Derivatives",
+        "Derivatives of outputs by parameters, through stick and slip.",
+    ),
+    Study(
         "precision",
         "precision",
         "studies.precision.result:PrecisionResult",

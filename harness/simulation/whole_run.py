@@ -53,7 +53,7 @@ FUNCTIONS = {  # in the order of the structs in whole_run.c
     "3.0": ("SetFloat64", "EnterInitializationMode", "ExitInitializationMode", "GetFloat64", "DoStep"),
 }
 # without the runtime of the compiler, which would have to be built first
-OPTIONS = ("-std=c99", "-O2", "-shared", "-fPIC", "-nostdlib", "-lc")
+OPTIONS = ("-std=c99", "-O2", "-shared", "-fPIC", "-nostdlib", "-lc", "-lm")
 STEPS_PER_CHECK = 16
 MAX_PREPARED = 64  # runs in the cache of a worker process
 BUSY_TIME = 20.0  # s that a run in a worker process may take beyond its processor time, on a busy machine
@@ -220,7 +220,7 @@ class Simulator:
         except HarnessError as error:
             raise HarnessError(f"{self.spec.fmu.name} cannot be loaded: {error}") from None
         version, cosimulation = self.description.fmiVersion, self.description.coSimulation
-        self.loop = compile_loop()
+        self.loop = compile_library(SOURCE)
         self.interpolates_inputs = version == "2.0" and cosimulation.canInterpolateInputs
         self.functions = (c_void_p * len(FUNCTIONS[version]))(
             *(cast(instance.function(name), c_void_p) for name in FUNCTIONS[version])
@@ -359,14 +359,14 @@ def real_variables(description: Any) -> dict[str, RealVariable]:
 
 
 @cache
-def compile_loop() -> CDLL | None:
-    """Return the compiled loop of runs, None if there is no compiler."""
+def compile_library(source: Path) -> CDLL | None:
+    """Return the library of a C file, None if there is no compiler."""
     if find_spec("ziglang"):
         compiler = [sys.executable, "-m", "ziglang", "cc"]
     elif COMPILER:
         compiler = [COMPILER]
     else:
         return None
-    library = PROCESS_RESOURCES.enter_context(temporary_directory("loop-")) / "whole_run.so"
-    compilation = run_subprocess([*compiler, *OPTIONS, str(SOURCE), "-o", str(library)])
+    library = PROCESS_RESOURCES.enter_context(temporary_directory("loop-")) / f"{source.stem}.so"
+    compilation = run_subprocess([*compiler, *OPTIONS, str(source), "-o", str(library)])
     return None if compilation.returncode else CDLL(str(library))

@@ -10,6 +10,7 @@ from collections import defaultdict
 import argument_values
 import commands
 import pytest
+from native_fmus import build_native_fmus
 
 import harness
 
@@ -79,6 +80,17 @@ ACCEPTED = {  # arguments by function, and the values that they may have; None a
         "folder": {"'x'", "'8'", "Path"},
         "progress": {"type"},
     },
+    "sensitivity": {
+        "values": {"{}"},
+        "start": FINITE,
+        "stop": ABOVE_ZERO,
+        "outputs": {"'x'"},
+        "rtol": ABOVE_ZERO,
+        "inputs": {"{}"},
+        "timeout": ABOVE_ZERO,
+        "lenient": FLAG,
+        "progress": {"type"},
+    },
     "load_result": {},
     "measure": {"unit": {"'x'", "'8'", "long text"}},
     "read_record": {
@@ -100,6 +112,7 @@ def test_all_functions_are_called():
 def test_a_value_is_used_or_refused_in_one_sentence(fmus, tmp_path):
     """A refusal is a HarnessError within the time limit; nothing else is raised, and no process dies."""
     (tmp_path / "fmus").symlink_to(fmus)
+    (tmp_path / "native").symlink_to(build_native_fmus())
     program = [sys.executable, commands.SUPPORT / "argument_values.py", tmp_path]
     environment = os.environ | {"PYTHONPATH": str(commands.ROOT)}
     done = subprocess.run(program, env=environment, capture_output=True, text=True, timeout=3600)

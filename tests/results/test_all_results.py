@@ -65,6 +65,10 @@ def pulled_sled():
     return harness.simulate("stickslip", stop=6.0)
 
 
+def differentiated_sled():
+    return harness.sensitivity(build_native_fmus() / "stickslip.fmu", ["mu_s", "k"], stop=6.0)
+
+
 def measured_precision():
     """Points of one case by two methods, one of which failed once."""
     case = StudiedCase("smd", "linear", {"k": 100.0})
@@ -99,6 +103,7 @@ MAKERS = {
     "fit": fitted_parameters,
     "sweep": swept_parameters,
     "compare": compared_runs,
+    "sensitivity": differentiated_sled,
     "precision": measured_precision,
     "stability": judged_cases,
 }
@@ -191,9 +196,9 @@ def test_a_saved_result_holds_its_summary_and_origin(study):
 
 @every_study
 def test_a_result_of_another_source_is_replaced_only_on_request(study, monkeypatch):
-    monkeypatch.setattr("harness.results.result.Result.write_figure", lambda result, path: None)
     other = next(name for name in [*MAKERS][::-1] if name != study)
     shutil.copytree(saved(study), "kept")
+    monkeypatch.setattr("harness.results.result.Result.write_figure", lambda result, path: None)
     with pytest.raises(harness.HarnessError, match=r"kept holds"):
         result_of(other).save("kept")
     result_of(study).save("kept", overwrite=True)
@@ -301,6 +306,7 @@ OTHER_MAKERS = {
 }
 OPERATORS = {"__getitem__", "__contains__"}
 VALID = {"folder": "kept", "begin": 0.5, "end": 1.0, "contact": "F_friction", "stop": 1.0, "rtol": 0.0, "atol": 0.0}
+VALID |= {"output": "x", "parameter": "k"}
 WRONG = [
     5,
     -1.0,

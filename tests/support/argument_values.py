@@ -73,6 +73,7 @@ CALLS = {  # valid arguments, in which one is replaced
     "identify_curve": {"record": CURVE},
     "fit": {"source": "smd", "records": RECORD, "free": {"k": (20.0, 60.0)}, "values": {"c": 0.2, "x0": 1.0}},
     "sweep": {"source": "coulomb", "grid": {"f": [0.5]}, "stop": 0.2},
+    "sensitivity": {"source": "native/coulomb.fmu", "parameters": "f", "stop": 0.2},
     "load_result": {"folder": "result"},
     "measure": {"t": T, "x": X, "v": X, "unit": "m"},
     "read_record": {"source": Path(__file__).parents[2] / "docs/records/spring.csv"},
@@ -110,7 +111,8 @@ def answer(folder, connection):
     """Make the calls that the connection names, in a folder of its own."""
     warnings.simplefilter("ignore")
     os.chdir(tempfile.mkdtemp(dir=folder))
-    Path("fmus").symlink_to(Path(folder) / "fmus")
+    for name in ("fmus", "native"):
+        Path(name).symlink_to(Path(folder) / name)
     os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
     patch("harness.studies.fit.study.fit_records", begin_search).start()
     patch("harness.studies.fit.study.native_equivalent", lambda fmu: fmu).start()

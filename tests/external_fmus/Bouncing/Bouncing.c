@@ -6,7 +6,7 @@
 
 #include "fmi2Functions.h"
 
-enum { H, V, DER_H, DER_V, E, FAULT, VALUE, REALS };
+enum { H, V, DER_H, DER_V, E, FAULT, VALUE, G, REALS };
 enum { TERMINATES = 1, UNSETTLED, NEXT_EVENT, IMMEDIATE, LOGS };
 
 typedef struct {
@@ -15,14 +15,22 @@ typedef struct {
     fmi2CallbackLogger log;
 } Ball;
 
+static const Ball start = {{1.0, 0.0, 0.0, 0.0, 0.7, 0.0, 0.0, 9.81}, 0.0, 0, NULL};
+
 fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, fmi2String resources,
                               const fmi2CallbackFunctions *functions, fmi2Boolean visible, fmi2Boolean logging) {
-    static const Ball start = {{1.0, 0.0, 0.0, 0.0, 0.7, 0.0, 0.0}, 0.0, 0, NULL};
     Ball *ball = type == fmi2ModelExchange ? malloc(sizeof *ball) : NULL;
     if (!ball) return NULL;
     *ball = start;
     ball->log = functions->logger;
     return ball;
+}
+
+fmi2Status fmi2Reset(fmi2Component c) {
+    const fmi2CallbackLogger log = ((Ball *)c)->log;
+    *(Ball *)c = start;
+    ((Ball *)c)->log = log;
+    return fmi2OK;
 }
 
 void fmi2FreeInstance(fmi2Component c) { free(c); }
@@ -75,7 +83,7 @@ fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n,
 fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2Real value[]) {
     Ball *ball = c;
     ball->real[DER_H] = ball->real[V];
-    ball->real[DER_V] = -9.81;
+    ball->real[DER_V] = -ball->real[G];
     for (size_t i = 0; i < n; i++) value[i] = ball->real[vr[i]];
     return fmi2OK;
 }
@@ -97,6 +105,36 @@ fmi2Status fmi2GetNominalsOfContinuousStates(fmi2Component c, fmi2Real x[], size
     return fmi2OK;
 }
 
+/* Of h and v by themselves, and of their derivatives by v and g. */
+fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReference of[], size_t m,
+                                        const fmi2ValueReference by[], size_t n, const fmi2Real seed[], fmi2Real value[]) {
+    for (size_t i = 0; i < m; i++) {
+        value[i] = 0.0;
+        for (size_t j = 0; j < n; j++) {
+            if (of[i] == by[j] || (of[i] == DER_H && by[j] == V)) value[i] += seed[j];
+            if (of[i] == DER_V && by[j] == G) value[i] -= seed[j];
+        }
+    }
+    return fmi2OK;
+}
+
+fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *state) {
+    if (!*state && !(*state = malloc(sizeof(Ball)))) return fmi2Error;
+    *(Ball *)*state = *(Ball *)c;
+    return fmi2OK;
+}
+
+fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate state) {
+    *(Ball *)c = *(Ball *)state;
+    return fmi2OK;
+}
+
+fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *state) {
+    free(*state);
+    *state = NULL;
+    return fmi2OK;
+}
+
 /* What it has not got, and has to have all the same. */
 
 #define NONE(name, ...) \
@@ -108,14 +146,8 @@ NONE(GetString, const fmi2ValueReference vr[], size_t n, fmi2String value[])
 NONE(SetInteger, const fmi2ValueReference vr[], size_t n, const fmi2Integer value[])
 NONE(SetBoolean, const fmi2ValueReference vr[], size_t n, const fmi2Boolean value[])
 NONE(SetString, const fmi2ValueReference vr[], size_t n, const fmi2String value[])
-NONE(GetFMUstate, fmi2FMUstate *state)
-NONE(SetFMUstate, fmi2FMUstate state)
-NONE(FreeFMUstate, fmi2FMUstate *state)
 NONE(SerializedFMUstateSize, fmi2FMUstate state, size_t *size)
 NONE(SerializeFMUstate, fmi2FMUstate state, fmi2Byte bytes[], size_t size)
 NONE(DeSerializeFMUstate, const fmi2Byte bytes[], size_t size, fmi2FMUstate *state)
-NONE(GetDirectionalDerivative, const fmi2ValueReference of[], size_t m, const fmi2ValueReference by[], size_t n,
-     const fmi2Real seed[], fmi2Real value[])
-fmi2Status fmi2Reset(fmi2Component c) { return fmi2Error; }
 const char *fmi2GetTypesPlatform(void) { return fmi2TypesPlatform; }
 const char *fmi2GetVersion(void) { return fmi2Version; }

@@ -1,0 +1,76 @@
+"""sensitivity: derivatives of a motion by parameters."""
+
+from functools import partial
+from typing import Any
+
+import click
+
+from .terminal import FINITE, POSITIVE, SectionedCommand, Terminal, is_given, result_options
+
+
+def split_names(context: click.Context, option: click.Parameter, text: str | None) -> list[str] | None:
+    """Return the names in a text."""
+    return None if text is None else [name.strip() for name in text.split(",")]
+
+
+@click.command(cls=SectionedCommand)
+@click.argument("source", metavar="MODEL|SCENE|FMU")
+@click.option(
+    *("--by", "parameters"),
+    required=True,
+    metavar="NAME,...",
+    callback=split_names,
+    help="Parameters, start values, inputs.",
+)
+@click.option(
+    *("--set", "values"),
+    multiple=True,
+    metavar="NAME=VALUE,...",
+    help="Parameters and start values; those of a scene are replaced. Repeatable.",
+)
+@click.option("--outputs", metavar="NAME,...", callback=split_names, help="Outputs; by default all Reals.")
+@click.option("--stop", type=FINITE, help="Stop time in s. Default: that of the FMU.")
+@click.option("--rtol", type=POSITIVE, help="Relative tolerance of the integration.  [default: 1e-11]")
+@click.option("--lenient", is_flag=True, help="Run the FMU even if it violates the FMI standard.")
+@click.option(
+    "--timeout",
+    type=POSITIVE,
+    default=60.0,
+    show_default=True,
+    help="Seconds in which an FMU that is not of this project must advance.",
+)
+@result_options
+@click.pass_context
+def sensitivity(
+    context: click.Context,
+    source: str,
+    parameters: list[str],
+    values: tuple[str, ...],
+    terminal: Terminal,
+    **options: Any,
+) -> None:
+    """Print the derivatives of the outputs by parameters, through stick, slip and other events.
+
+    The FMU needs model exchange with directional derivatives, as native FMUs of this project have; of a model, its
+    native FMU is run.  The results are the outputs and their derivatives over time, and the times of the events with
+    their derivatives.  Where no derivative exists, the command says from which time on.
+
+    \b
+    Examples:
+      friction-fmus sensitivity stickslip --by mu_s,k
+      friction-fmus sensitivity pendulum --by mu,theta0 --outputs theta --stop 3
+    """
+    from ..api import sensitivity as compute_sensitivity
+    from ..results.provenance import describe_sources
+    from ..results.result import save_result
+    from ..scenes.assignments import parse_assignments
+    from ..simulation.resolve import resolve
+
+    given = {name: value for name, value in options.items() if is_given(context, name)}
+    settings = parse_assignments("--set", values)
+    with terminal.progress(1) as report:
+        progress = partial(report, source)
+        compute = partial(compute_sensitivity, source, parameters, settings, **given, progress=progress)
+        folder = terminal.out / "sensitivity" / resolve(source).model
+        result = save_result(folder, compute, "sensitivity", describe_sources(source))
+    terminal.print_result(result.as_json(), *result.blocks(), folder=folder)

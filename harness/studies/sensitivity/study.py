@@ -1,0 +1,184 @@
+"""Derivatives of the outputs of an FMU by parameters: checks the request, and runs the FMU."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...errors import HarnessError, SceneError, check_names, format_value
+from ...process.worker import WorkerDiedError, WorkerTimeoutError, call_once
+from ...scenes.fmu_files import check_built
+from ...scenes.run_spec import RunSpec
+from ...simulation.array_elements import is_own
+from ...simulation.external.simulation import convert_values
+from ...simulation.fmu_archive import read_description, resolve_time_span, unpack_once
+from ...simulation.fmu_instance import capture_stderr
+from ...simulation.fmu_variables import LAW
+from ...simulation.model_data import read_model_data
+from ...simulation.native_equivalent import native_equivalent
+from ...simulation.session import resolve_settings
+from ...simulation.stepping import TIME, check_inputs, check_rates
+from ...simulation.variable_values import REAL_TYPES, effective_value, enumeration_labels, variable_unit
+from ...simulation.variational import DEFAULT_RTOL, VariationalSolution, differentiate, has_derivatives, state_variables
+from .result import SensitivityEvent, SensitivityResult
+
+DEFAULT_POINTS = 1001  # recorded times
+HYBRID = "hybrid"  # the friction law with events
+
+
+def compute_sensitivity(
+    spec: RunSpec, parameters: Sequence[str], report: Callable[[float], None] = lambda share: None
+) -> SensitivityResult:
+    """Run an FMU with the derivatives of its outputs by parameters.
+
+    Parameters
+    ----------
+    spec : RunSpec
+        The run; its `tolerance` is that of the integration.
+    parameters : sequence of str
+        Parameters, inputs, or states whose start values can be set.
+    report : callable
+        Receives the progress from 0 to 1.
+
+    Raises
+    ------
+    SceneError
+        If a name, a value or a time is not valid.
+    HarnessError
+        If the FMU has no directional derivatives, or the run fails.
+    """
+    source, spec = spec, replace(spec, fmu=find_native(spec))
+    description = read_description(spec.fmu, spec.lenient)
+    variables = {variable.name: variable for variable in description.modelVariables}
+    start, stop = resolve_time_span(spec, description)
+    times = np.asarray(spec.times, dtype=float) if len(spec.times) else np.linspace(start, stop, DEFAULT_POINTS)
+    for t in times[[0, -1]].tolist():
+        if not start <= t <= stop:
+            raise SceneError(f"times has {t!r} s, outside the run from {start!r} s to {stop!r} s")
+    check_inputs(spec.inputs, variables, spec.values)
+    check_rates(spec.fmu, spec.inputs, spec.values)
+    outputs = choose_outputs(description, parameters, spec.outputs)
+    if is_own(description):
+        values = {variable.name: value for variable, value in resolve_settings(spec, variables)}
+        check_law(spec, variables, values)
+    else:
+        values = convert_values(spec, variables)
+    tolerance = spec.tolerance or DEFAULT_RTOL
+    run = replace(spec, outputs=outputs, values=values, times=times, start=start, stop=stop, tolerance=tolerance)
+    solution = run_isolated(run, tuple(parameters), is_own(description), report)
+    driven = [name for name in parameters if name in spec.inputs]
+    effective = {name: float(values.get(name, variables[name].start or 0.0)) for name in parameters}
+    units = {name: variable_unit(variables[name]) for name in (*outputs, *parameters)}
+    return SensitivityResult(
+        replace(source, outputs=outputs, times=(), start=start, stop=stop),
+        times,
+        outputs,
+        effective | dict.fromkeys(driven, 1.0),
+        units | dict.fromkeys(driven, ""),
+        solution.values,
+        solution.left,
+        solution.right,
+        describe_events(spec.fmu, solution, parameters),
+        describe_exceptions(spec.fmu, solution, parameters),
+        {
+            variable.name: effective_value(variable, values.get(variable.name, variable.start))
+            for variable in description.modelVariables
+            if variable.causality == "parameter"
+        },
+    )
+
+
+def find_native(spec: RunSpec) -> Path:
+    """Return the native FMU of the same model.
+
+    Raises
+    ------
+    HarnessError
+        If it has no directional derivatives for model exchange.
+    """
+    check_built(spec.fmu, SceneError)
+    fmu = native_equivalent(spec.fmu)
+    if not has_derivatives(unpack_once(fmu)):
+        raise HarnessError(
+            f"{fmu.name} has no directional derivatives for model exchange; native FMUs of this project have them: "
+            "build one with `friction-fmus build --native`"
+        )
+    return fmu
+
+
+def choose_outputs(description: Any, parameters: Sequence[str], outputs: Sequence[str]) -> tuple[str, ...]:
+    """Check the names of parameters and outputs; return the outputs, all Reals by default."""
+    states = [state.name for state in state_variables(description)]
+    reals = [item for item in description.modelVariables if item.type in REAL_TYPES and not item.dimensions]
+    starts = {item.name for item in reals if item.name in states and item.initial == "exact"}
+    known = {item.name for item in reals if item.causality in ("parameter", "input") and item.name != TIME}
+    check_names("parameter", parameters, known | starts)
+    declared = [item.name for item in reals if item.causality == "output"]
+    check_names("output", outputs, [*declared, *(name for name in states if name not in declared)])
+    return tuple(outputs or declared)
+
+
+def check_law(spec: RunSpec, variables: dict[str, Any], values: dict[str, Any]) -> None:
+    """Raise HarnessError for a friction law that has no events, and so no derivatives."""
+    label = read_model_data(spec.fmu).fixed_choices.get(LAW, (HYBRID, 0))[0]
+    if LAW in variables:
+        label = enumeration_labels(variables[LAW])[int(values.get(LAW, variables[LAW].start))]
+    if label != HYBRID:
+        reason = "its solution chatters, and has no derivatives"
+        raise HarnessError(f"{LAW} = {format_value(label)}: {reason}; choose {HYBRID!r}")
+
+
+def run_isolated(
+    spec: RunSpec, parameters: tuple[str, ...], is_own_fmu: bool, report: Callable[[float], None]
+) -> VariationalSolution:
+    """Run an FMU of this project in this process, any other in a worker process."""
+    folder = unpack_once(spec.fmu)
+    if is_own_fmu:
+        with capture_stderr() as stderr:
+            return differentiate(spec, folder, parameters, stderr, report)
+    try:
+        solution: VariationalSolution = call_once(differentiate, spec, folder, parameters, timeout=spec.timeout)
+    except WorkerTimeoutError:
+        raise HarnessError(f"{spec.fmu.name}: the run took longer than {spec.timeout:g} s") from None
+    except WorkerDiedError as error:
+        raise HarnessError(f"{spec.fmu.name}: its binary exited with status {error.status}") from None
+    return solution
+
+
+def describe_events(
+    fmu: Path, solution: VariationalSolution, parameters: Sequence[str]
+) -> tuple[SensitivityEvent, ...]:
+    """Return the events with the names of their contacts."""
+    contacts = list(read_model_data(fmu).contacts)
+    return tuple(
+        SensitivityEvent(
+            event.t,
+            name_indicator(contacts, event.indicator),
+            dict(zip(contacts, event.before, strict=True)),
+            dict(zip(contacts, event.after, strict=True)),
+            dict(zip(parameters, event.slopes.tolist(), strict=True)),
+        )
+        for event in solution.events
+    )
+
+
+def name_indicator(contacts: Sequence[str], indicator: int) -> str:
+    """Return the contact of an event indicator, or its number; FMUs of this project have two for each contact."""
+    count = len(contacts)
+    if 0 <= indicator < 2 * count:
+        return contacts[indicator % count]
+    return f"condition {indicator - 2 * count + 1}" if count else f"event indicator {indicator + 1}"
+
+
+def describe_exceptions(fmu: Path, solution: VariationalSolution, parameters: Sequence[str]) -> tuple[str, ...]:
+    """Return sentences on parameters without an effect, and on times without derivatives."""
+    unused = [name for name, is_used in zip(parameters, solution.used, strict=True) if not is_used]
+    remarks = [f"Nothing depends on {', '.join(unused)}: all derivatives are zero."] if unused else []
+    contacts = list(read_model_data(fmu).contacts)
+    for item in solution.undefined:
+        where, names = "at" if item.is_moment else "from", ", ".join(item.parameters)
+        name = f" ({name_indicator(contacts, item.indicator)})" if item.indicator >= 0 else ""
+        remarks.append(f"No derivative by {names} {where} t = {item.t:.9g} s: {item.reason}{name}.")
+    return tuple(remarks)
