@@ -10,6 +10,7 @@ from variants import slow_after
 from harness import HarnessError, identify_decay
 
 
+@pytest.mark.slow
 def test_drift_is_reported_and_fitted_on_request():
     record = decay_record(0.01, 0.001, drift=0.002, noise=1e-4)
     assert "drift=True fits" in remarks_text(identify(record))

@@ -77,6 +77,7 @@ def test_compare_takes_runs_folders_and_fmus():
         harness.compare(harness.simulate("smd", outputs=["F_damper"]), run)
 
 
+@pytest.mark.slow
 def test_a_fit_and_a_comparison_take_any_record():
     pandas = pytest.importorskip("pandas")
     fmu = build_native_fmus() / "coulomb.fmu"  # for speed

@@ -8,6 +8,7 @@ import native_fmus
 import numpy as np
 import pytest
 from commands import blank_figures
+from variants import slow_after
 
 import harness
 
@@ -47,7 +48,7 @@ def scene(in_workspace):
         yield
 
 
-@pytest.mark.parametrize("call", CALLS)
+@pytest.mark.parametrize("call", slow_after(6, CALLS))
 def test_a_stored_run_holds_its_specification_and_values(call):
     folders = {
         "native": native_fmus.build_native_fmus,

@@ -111,7 +111,7 @@ def test_lowering_and_translation_grow_no_faster_than_n_log_n(tmp_path):
     assert (work[3] - work[2]) / (work[2] - work[1]) < limit
 
 
-@pytest.mark.parametrize("shape", ["sum", "nested function", "shared cases"])
+@pytest.mark.parametrize("shape", slow_after(1, ["sum", "nested function", "shared cases"]))
 def test_equations_deeper_than_the_stack_of_python_build(tmp_path, shape):
     """The rate has the value that Python calculates; all conditions of a new model object hold."""
     n = 350

@@ -330,6 +330,7 @@ def fmpy_values(kind, values):
     return {"mu.y": [*values]} if kind == "native/fmi3" else dict(zip(ELEMENTS, values, strict=True))
 
 
+@pytest.mark.slow
 def test_values_of_a_table_have_structured_names(tunable_fmus):
     """Each kind is valid by the schema and fmpy; FMI 2.0 has scalars and FMI 3.0 an array of the same start values."""
     for kind, path in tunable_fmus.items():

@@ -355,6 +355,7 @@ TWO_WITH_BELT = (
 SPEEDS = ((0.0, 4.0), (0.5, -6.0), (1.5, 6.0), (2.5, -4.0))  # time and acceleration of the belt from then on
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("backend", slow_after(1, ["python", "native"]))
 def test_two_contacts_agree_with_the_belt_as_a_state_of_the_same_model(worker, backend):
     """Only the acceleration is set, four times; both FMUs then have the same motion between communication points."""
@@ -398,6 +399,7 @@ class Crank(Model):
 '''
 
 
+@pytest.mark.slow
 def test_positions_in_a_slip_and_rates_that_are_expressions_are_continued(worker):
     """The crank speeds up; the inputs are set once, at the start. The second solution is scipy with events."""
     motor, r, gear = 2.0, 0.3, 0.5

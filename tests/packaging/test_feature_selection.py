@@ -9,6 +9,7 @@ from commands import build as command
 from fmpy import read_model_description
 from models import EXACT, FEW_CASES, MODELS, counts, declared, label, outputs
 from row_comparison import assert_identical
+from variants import slow_after
 
 from fmus.compiler.lowering import LAWS, METHODS, lowered_files
 from fmus.compiler.lowering.feature_selection import FeatureSelection
@@ -40,7 +41,7 @@ def lean(tmp_path_factory):
     return build
 
 
-@pytest.mark.parametrize("case", FEW_CASES, ids=label)
+@pytest.mark.parametrize("case", slow_after(3, [(case,) for case in FEW_CASES]), ids=label)
 def test_a_reduced_fmu_carries_one_method_and_runs_alike(lean, launch, worker, case):
     name, values, stop = case
     path = lean(case)
@@ -81,7 +82,9 @@ def test_only_choices_with_alternatives_are_compared_in_a_run(name, methods, law
     assert ("def advance_with_method(" in text) == (methods != ("exact",))
 
 
-@pytest.mark.parametrize("options", [(), ("--native", "--platform", "linux64")], ids=["python", "native"])
+@pytest.mark.parametrize(
+    "options", slow_after(1, [((),), (("--native", "--platform", "linux64"),)]), ids=["python", "native"]
+)
 def test_an_enumeration_of_one_item_is_no_variable_and_stays_known(tmp_path, options):
     """The FMU says which law it has: one without stick and slip needs reports of steps, and has other dependencies."""
     if options:

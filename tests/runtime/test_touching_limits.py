@@ -89,6 +89,7 @@ def changes(fmu, values, method, rtol):
     return [tuple(after[1:]) for before, after in pairwise(rows) if after[0] != before[0]]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", [pytest.param("python", marks=pytest.mark.campaign), "native"])
 @pytest.mark.parametrize("name", ["touching_block", "touching_stack"])
 def test_a_contact_at_rest_stays_stuck_where_its_limit_touches_the_load(worker, built, name, kind):

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from build_cache import run_published_cases
 from scipy.io import savemat
+from variants import slow_after
 
 from harness import HarnessError, ModeChanges, Signals, compare
 
@@ -401,7 +402,7 @@ def modelica(file, rows, turned=True, version="4"):
     savemat(file, {key: np.array(texts) for key, texts in lines.items()} | tables, format=version)
 
 
-@pytest.mark.parametrize("version", ["4", "5"])
+@pytest.mark.parametrize("version", slow_after(1, ["4", "5"]))
 @pytest.mark.parametrize("turned", [True, False])
 def test_units_and_signs_of_a_modelica_result_are_read(tmp_path, turned, version):
     """In both of its layouts, and saved again by MATLAB."""

@@ -477,6 +477,7 @@ def test_residuals_count_as_those_of_the_law_with_the_smallest(compared):
             assert compared_law.bic == pytest.approx(n * np.log(law.squares / 81) + len(law.estimates) * np.log(n))
 
 
+@pytest.mark.slow
 def test_the_command_writes_the_compared_laws(tmp_path):
     frame = pull(t=T[:81]).rename(columns={"t": "t [s]", "x": "x [m]"})
     frame.to_csv("pull.csv", index=False)

@@ -188,6 +188,7 @@ def test_the_order_of_declaration_does_not_exchange_the_contacts(tmp_path):
     }
 
 
+@pytest.mark.slow
 def test_input_signals_are_plotted_with_the_outputs():
     run = harness.simulate(
         build_fmu(CONTACTS / "blocks.py"), inputs={"time": [0.0, 4.0, 8.0], "F_ext": [0.0, 5.0, 0.0]}

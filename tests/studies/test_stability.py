@@ -296,6 +296,7 @@ class Relax(Model):
 '''
 
 
+@pytest.mark.slow
 def test_a_model_without_position_and_speed_is_refused_by_stability_but_not_by_precision(tmp_path):
     (tmp_path / "relax.py").write_text(RELAX)
     assert commands.build("relax.py", folder=tmp_path).returncode == 0
