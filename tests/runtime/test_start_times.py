@@ -7,6 +7,7 @@ from math import ulp
 import pytest
 from build_cache import build_once
 from native_fmus import require_compiler
+from variants import slow_after
 from worker_client import FmiError
 
 from fmus.compiler.model_lookup import find_model
@@ -16,7 +17,7 @@ PLACES = 4  # units in the last place of the time
 KINDS = {"python": (), "native": ("--native", "--platform", "linux64")}
 
 
-@pytest.fixture(params=KINDS)
+@pytest.fixture(params=slow_after(1, KINDS))
 def kind(request):
     if request.param == "native":
         require_compiler()
