@@ -109,7 +109,7 @@ def test_an_attribute_of_a_generated_class_is_no_name_of_a_variable(body, tmp_pa
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("backend", "turn"),
-    [("", 0), *OTHER_CASES],
+    [("", 0), *(pytest.param(*case, marks=pytest.mark.campaign) for case in OTHER_CASES)],
 )
 def test_any_other_name_gives_the_same_motion(backend, turn, tmp_path):
     """Each name that the generated methods use, in each role."""

@@ -111,9 +111,8 @@ def test_slips_and_rests_of_the_sled_have_their_closed_form(ratio):
 VALUES = (2,)
 
 
-@pytest.mark.parametrize(
-    "number", [pytest.param(6, marks=pytest.mark.slow), pytest.param(22, marks=pytest.mark.campaign)]
-)
+@pytest.mark.campaign
+@pytest.mark.parametrize("number", [6, 22])
 def test_random_models_agree_with_an_independent_solver(worker, number):
     """Modes, events and states by every method at two tolerances, and all backends bit for bit."""
     require_compiler()

@@ -115,7 +115,7 @@ def largest_terms(start, s):
     )
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(2))
 @pytest.mark.parametrize("draw_motion", [draw_start, draw_decay])
 def test_the_closed_form_is_right_to_rounding(draw_motion, seed):
     """At short and long times, for all signs, with a force that has a rate and an equilibrium that moves."""
@@ -130,7 +130,7 @@ def test_the_closed_form_is_right_to_rounding(draw_motion, seed):
             assert error <= ROUNDING * scale, (start, s)
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 @pytest.mark.parametrize("draw_motion", [draw_start, draw_decay])
 def test_the_next_standstill_is_right_to_rounding(draw_motion, seed):
     """There is one exactly where the independent solution has one, before the horizon."""

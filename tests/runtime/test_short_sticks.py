@@ -635,7 +635,7 @@ def wrong_sets(worker, path, model, method, rtol):
     return wrong
 
 
-@pytest.mark.parametrize("rtol", [1e-6, 1e-11])
+@pytest.mark.parametrize("rtol", [1e-6, pytest.param(1e-11, marks=pytest.mark.campaign)])
 @pytest.mark.parametrize(
     ("model", "method"),
     [*itertools.product(MODES, [ODE23, ODE45, DOP853, RODAS]), ("belt", RADAU9), ("stack", RADAU9)],
