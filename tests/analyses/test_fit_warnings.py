@@ -123,6 +123,7 @@ def test_double_peaks_of_angular_acceleration_are_fitted_if_their_cycles_are_fou
     assert fit["omega"].value == pytest.approx(6.0, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_a_probable_pendulum_is_suggested():
     record = decay_record(0.005, 0.001, sine=True, a=1.5, noise=1e-3, t=np.linspace(0, 5, 700))
     with pytest.raises(HarnessError, match="add pendulum=True"):

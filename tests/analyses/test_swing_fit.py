@@ -31,6 +31,7 @@ def test_an_error_of_the_clock_does_not_change_the_estimates_from_the_swings():
     assert all(wrong[name].low <= value <= wrong[name].high for name, value in TRUTH.items())
 
 
+@pytest.mark.slow
 def test_a_loss_that_departs_from_the_law_is_reported_and_covered():
     fit = swung(gain=lambda t: 1.0 + 0.03 * np.sin(0.9 * t) + 0.02 * np.sin(2.3 * t + 1.0))
     assert "The loss per half cycle departs from every law by" in " ".join(fit.remarks)

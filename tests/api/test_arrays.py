@@ -87,6 +87,7 @@ def test_time_stamps_are_refused_with_what_to_do(user_folder, monkeypatch, zone)
                 call()
 
 
+@pytest.mark.slow
 def test_an_index_without_a_name_is_the_time_if_no_column_is(user_folder, monkeypatch):
     monkeypatch.chdir(user_folder)
     run = harness.simulate("smd", times=np.linspace(0.0, 4.0, 401), outputs=["x"])

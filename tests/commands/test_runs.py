@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from build_cache import ROOT, run_published_cases
 from models import MODELS, outputs
+from variants import slow_after
 
 from harness import load_result
 
@@ -288,13 +289,16 @@ def test_a_failing_case_does_not_lose_the_others(workspace, monkeypatch):
 
 @pytest.mark.parametrize(
     "arguments",
-    [
-        ["info"],
-        ["run", "nosuch"],
-        ["run", "mine.toml", "--json"],
-        ["decay", "swing.csv", "--no-drag", "--json"],
-        ["report", "--help"],
-    ],
+    slow_after(
+        3,
+        [
+            ["info"],
+            ["run", "nosuch"],
+            ["run", "mine.toml", "--json"],
+            ["decay", "swing.csv", "--no-drag", "--json"],
+            ["report", "--help"],
+        ],
+    ),
 )
 def test_a_command_runs_alike_in_a_process_of_its_own(workspace, arguments):
     """Most tests run commands in the process of pytest."""

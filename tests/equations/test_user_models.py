@@ -23,7 +23,7 @@ from fmus.packaging.archive import build
 from fmus.packaging.model_description import REAL_ONLY_HINT
 from harness import describe, simulate
 
-EVERY_FILE = pytest.mark.parametrize("path", EXAMPLE_MODELS, ids=lambda path: path.stem)
+EVERY_FILE = pytest.mark.parametrize("path", slow_after(1, EXAMPLE_MODELS), ids=lambda path: path.stem)
 KINDS = {
     "": [],
     "native/fmi3": ["--fmi", "3", "--platform", "linux64"],

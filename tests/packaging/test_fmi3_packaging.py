@@ -296,6 +296,7 @@ def test_an_unavailable_option_is_refused_in_one_sentence_and_nothing_is_built(a
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "gone"),
     slow_after(1, [("stickslip", {"Exact", "Ode45", "Dop853", "Rodas"}), ("coulomb", {"Exact", "Ode45", "Dop853"})]),

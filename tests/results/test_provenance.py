@@ -180,12 +180,15 @@ def test_a_result_with_other_values_is_not_replaced_silently(workspace):
 
 @pytest.mark.parametrize(
     ("arguments", "older", "newer", "had"),
-    [
-        (("run", "fmus/coulomb.fmu"), ("--set", "f=0.25"), ("--set", "f=0.5"), "f = 0.25 N"),
-        (("decay", "swing.csv"), (), ("--no-drag", "--end", "1.5"), "drag, no end"),
-        (("compare", "fmus/coulomb.fmu", "smd"), ("--stop", "2"), (), "stop = 2.0"),
-        (("sweep", "smd", *ONCE), ("--set", "m=2"), (), "m = 2.0 kg"),
-    ],
+    slow_after(
+        2,
+        [
+            (("run", "fmus/coulomb.fmu"), ("--set", "f=0.25"), ("--set", "f=0.5"), "f = 0.25 N"),
+            (("decay", "swing.csv"), (), ("--no-drag", "--end", "1.5"), "drag, no end"),
+            (("compare", "fmus/coulomb.fmu", "smd"), ("--stop", "2"), (), "stop = 2.0"),
+            (("sweep", "smd", *ONCE), ("--set", "m=2"), (), "m = 2.0 kg"),
+        ],
+    ),
 )
 def test_a_result_with_other_options_is_not_replaced_silently(workspace, arguments, older, newer, had):
     write_decay(workspace / "swing.csv")

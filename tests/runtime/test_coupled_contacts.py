@@ -367,6 +367,7 @@ def test_random_starts_hold_as_many_contacts_as_balance(custom_model):
     assert n_choices > 30
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("free", slow_after(1, "123"))
 def test_a_contact_without_friction_is_no_contact(custom_model, free):
     """The run is that of a model without it; it makes no events."""

@@ -118,6 +118,7 @@ def test_a_motion_from_rest_has_the_same_bits_in_runs_of_any_length(model, metho
     assert others == [first, first]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", [ODE45, DOP853, RODAS])
 def test_coupled_contacts_and_conditions_have_the_same_events_in_runs_of_any_length(model, method):
     """Where all contacts stick, a step may be as long as the largest, which changes the rounding of its end."""

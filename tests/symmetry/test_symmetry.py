@@ -39,7 +39,7 @@ HAVE_NONE = {  # no mirror image: a constant of one sign, or a number as start v
 }
 
 
-@pytest.mark.parametrize("label", slow_after(2, FEW_MODELS))
+@pytest.mark.parametrize("label", slow_after(1, FEW_MODELS))
 def test_a_motion_depends_on_no_time_unit_sign_order_or_frame(label):
     examined, differences = examine(label, methods=FEW_MODELS[label], **FEW)
     assert {*examined} == {kind for kind in KINDS if kind != REVOLUTIONS or label in HAVE_ANGLES}
