@@ -112,7 +112,7 @@ def check_decay(rng, kind):
         wander = np.interp(t, knots, 0.25 * rng.standard_normal(30))
         x = (1 + wander) * np.cos(omega * t) + 0.03 * rng.standard_normal(len(t))
         ranges = {"zeta": [0.0], "r": [0.0], "b": [0.0]}
-    fit = harness.identify_decay((t, x))
+    fit = harness.identify_decay((t, x), unit="m")
     return fit.estimates, ranges, fit.remarks
 
 
@@ -124,7 +124,9 @@ def check_fit(rng, kind):
     run = harness.simulate("coulomb", truth | {"x0": 0.0}, inputs={"time": t, "F_ext": force}, times=t)
     x = run["x"] + 1e-4 * np.ptp(run["x"]) * rng.standard_normal(len(t))
     noisy = force + 0.02 * np.ptp(force) * rng.standard_normal(len(t))
-    fit = harness.fit("coulomb", {"t [s]": t, "x [m]": x, "F_ext [N]": noisy}, ["f", "c"], values={"x0": 0.0})
+    fit = harness.fit(
+        "coulomb", {"t [s]": t, "x [m]": x, "F_ext [N]": noisy}, {"f": (0.1, 4.0), "c": (0.0, 4.0)}, values={"x0": 0.0}
+    )
     return fit.estimates, {name: [value] for name, value in truth.items()}, fit.remarks
 
 

@@ -16,6 +16,7 @@ from .terminal import (
     SectionedCommand,
     Terminal,
     result_options,
+    verbose_option,
 )
 
 
@@ -57,6 +58,7 @@ from .terminal import (
     "--timeout", type=POSITIVE, default=10.0, show_default=True, help="Seconds of processor time for one run."
 )
 @result_options
+@verbose_option
 def fit(
     model: str,
     records: tuple[str, ...],

@@ -32,7 +32,7 @@ SECTIONS = {  # of the help of a command: options that several commands share, e
         *("per_count", "time_unit", "headings", "rate", "begin", "end"),
     ),
     "Run": ("stop", "rtol", "interface", "lenient", "timeout"),
-    "Output": ("name", "out", "overwrite", "quiet", "as_json"),
+    "Output": ("name", "out", "overwrite", "quiet", "verbose", "as_json"),
 }
 
 
@@ -72,6 +72,20 @@ def allow_overwrite(context: click.Context, option: click.Parameter, requested: 
     allowed.set(allowed.get() or requested)
 
 
+def show_all_remarks(context: click.Context, option: click.Parameter, requested: bool) -> None:
+    """Print all remarks in this process."""
+    from ..results.summary import VERBOSE
+
+    VERBOSE.set(requested)
+
+
+verbose_option = click.option(
+    "--verbose",
+    is_flag=True,
+    expose_value=False,
+    callback=show_all_remarks,
+    help="Print all remarks, not only the five with the largest effect.",
+)
 overwrite_option = click.option(
     "--overwrite",
     is_flag=True,

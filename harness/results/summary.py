@@ -1,12 +1,13 @@
 """Summaries of results: every study writes summary.json in one schema, and the report reads nothing else."""
 
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from contextvars import ContextVar
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..errors import HarnessError, SceneError
+from ..errors import HarnessError, SceneError, by_interface
 from ..scenes.schema import parse_table
 from . import provenance
 from .files import to_json
@@ -18,6 +19,16 @@ SUMMARY_FILE, PICTURE_FILE = "summary.json", "figure.svg"
 VERSION = 1  # of the schema
 STEPS_TABLE, METHODS_TABLE = "Internal steps of the solver", "Fastest methods"
 MAX_DEVIATION = 5.0  # percent; a result agrees with its known values up to this difference
+MAX_REMARKS = 5  # that are printed; the first ones have the largest effect on the answer
+VERBOSE: ContextVar[bool] = ContextVar("VERBOSE", default=False)
+
+
+def limit_remarks(remarks: Sequence[str]) -> list[str]:
+    """Return the remarks to print, and a sentence on where the others are."""
+    shown = len(remarks) if VERBOSE.get() else MAX_REMARKS
+    others = by_interface("--verbose prints them", "`remarks` has them")
+    count = len(remarks) - shown
+    return [*remarks[:shown], *([f"{count} more remark{'s' * (count > 1)}: {others}."] if count > 0 else [])]
 
 
 @dataclass(frozen=True)

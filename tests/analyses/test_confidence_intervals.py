@@ -16,7 +16,7 @@ from harness.analyses.decay.intervals import (
     quasirandom_normal,
 )
 
-REST, OMEGA, ZETA = 2, 4, 5  # in the order of the unknowns
+T0, REST, OMEGA, ZETA = 0, 2, 4, 5  # in the order of the unknowns
 
 
 def test_nonnegative_intervals_cover_95_percent():
@@ -84,11 +84,13 @@ def test_the_draws_are_those_of_the_additive_recurrence_of_roberts():
 
 
 def test_unconstrained_values_are_those_of_least_squares_with_a_negative_loss():
-    t, unknowns, p = np.linspace(0.0, 10.0, 200), np.array([REST, ZETA]), np.zeros(8)
-    columns, p[OMEGA] = np.stack([np.ones_like(t), t], axis=1), 2.0
+    t, unknowns, p = np.linspace(0.0, 10.0, 200), np.array([T0, REST, ZETA]), np.zeros(8)
+    columns, p[OMEGA] = np.stack([np.cos(t), np.ones_like(t), t], axis=1), 2.0
     y = 1.0 - 0.3 * t + np.random.default_rng(1).normal(size=len(t))
     problem = SimpleNamespace(
         t=t,
+        x=y,
+        model=SimpleNamespace(t_mid=5.0),
         residual_floor=0.0,
         noise=0.0,
         unknowns=lambda terms: unknowns,
@@ -96,7 +98,7 @@ def test_unconstrained_values_are_those_of_least_squares_with_a_negative_loss():
     )
     expected = np.linalg.lstsq(columns, y, rcond=None)[0]
     assert estimate_uncertainty(problem, p, ("zeta",)).unconstrained == pytest.approx(expected, rel=1e-9)
-    assert expected[1] < -0.2
+    assert expected[2] < -0.2
 
 
 def test_the_product_of_a_loss_and_an_uncertain_factor_is_not_negative():

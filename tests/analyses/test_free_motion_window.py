@@ -72,7 +72,7 @@ def test_a_half_without_motion_is_reported():
     record, _ = held_in_mid_swing(
         43.37549190622319, 6.513497821427983e-4, 0.028280296634390842, 2.106056260519557, 1.7474075e-5, rng
     )
-    assert "do not rely on these values" in remarks_text(identify(record))
+    assert "something else acts on the oscillator too" in remarks_text(identify(record))
 
 
 @pytest.mark.parametrize("drag", slow_after(1, [True, False]))

@@ -1,9 +1,13 @@
 """Summaries of results: what is no summary is refused in one sentence, and the rest of the report is written."""
 
 import json
+from dataclasses import replace
 from html import unescape
 
 import commands
+import numpy as np
+
+import harness
 
 
 def text_with(**changes):
@@ -54,3 +58,14 @@ def test_what_is_no_summary_is_shown_with_its_reason_and_the_command_to_run(tmp_
         message, _, _ = text.partition("</p>")
         assert message.startswith(reason), i
         assert message.endswith(": run <code>python -m harness run smd</code> again."), i
+
+
+def test_five_remarks_are_printed_and_the_others_counted(tmp_path):
+    t = np.arange(0, 20, 0.01)
+    x = np.exp(-0.05 * t) * np.cos(5 * t) + 1e-3 * np.random.default_rng(1).standard_normal(len(t))
+    decay = harness.identify_decay((t, x), unit="m")
+    for count, last in ((5, "remark 4"), (8, "3 more remarks: `remarks` has them.")):
+        decay = replace(decay, remarks=tuple(f"remark {i}" for i in range(count)))
+        assert decay.blocks()[-1] == last
+    table = "t [s],x [m]\n" + "\n".join(f"{a:.3f},{b:.6f}" for a, b in zip(t, x, strict=True))
+    assert commands.harness(tmp_path, "decay", "-", "--verbose", text=table).returncode == 0

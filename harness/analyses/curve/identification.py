@@ -22,6 +22,15 @@ CLEAR_DIFFERENCE = 6.0  # of two BIC
 SIGNIFICANT_CORRELATION = 3.1  # standard deviations of the correlation of independent neighbours
 MAX_EFFECTS = 4
 MAX_LISTED = 5  # points that do not fit
+EFFECTS = {
+    "drift": "{constant} drifts by {change:+.2g} {unit} over the record, as with friction or a sensor that warms up; "
+    "its value is that in the middle of the record.",
+    "lag": "The force lags the velocity by {value:.3g} s, as behind a filter; the fit contains this lag.",
+    "inertia": "The force rises with the acceleration, as that of {value:.3g} {unit} of inertia or of a lag; the fit "
+    "contains this part, and {mass} removes it before.",
+    "presliding": "After a reversal the force is lower than friction, over about {length}, as in presliding or "
+    "backlash; {backlash} leaves it out.",
+}
 REACHES = 5.0  # reaches of presliding after which less than 1 % of it is left
 
 
@@ -109,7 +118,8 @@ def identify(points: CurvePoints, bias: float | None = None, mass: float | None 
     """
     points, bias = check_points(points, bias)
     points, effects, remark = leave_out_presliding(points, bias)
-    effects, used = find_used_points(points, bias, effects)
+    effects = find_effects(points.select(find_fitting_points(points, bias, effects)), bias)
+    used = find_fitting_points(points, bias, effects)
     fitted = points.select(used)
     fits, unavailable = fit_laws(fitted, bias, effects)
     fits.sort(key=lambda fit: fit.bic)
@@ -170,7 +180,8 @@ def check_points(points: CurvePoints, bias: float | None) -> tuple[CurvePoints, 
     if float(np.ptp(force)) == 0.0:
         raise HarnessError(f"{name}: the force is {force[0]:.4g} {points.force_unit} at all points")
     if drives_backward(is_forward, force, bias, points):
-        points, bias = points.reverse(), None if bias is None else -bias
+        points = replace(points, force=-force, slope=-points.slope)
+        bias = None if bias is None else -bias
         notes.append("The force opposes the velocity; its sign is reversed, so that it drives the motion.")
     return replace(points, notes=(*points.notes, *notes)), bias
 
@@ -215,22 +226,10 @@ def leave_out_presliding(points: CurvePoints, bias: float | None) -> tuple[Curve
     )
 
 
-def find_used_points(
-    points: CurvePoints, bias: float | None, effects: tuple[Effect, ...]
-) -> tuple[tuple[Effect, ...], np.ndarray]:
-    """Return the effects of the points without outliers, and their mask (n,); `effects` are those of all points."""
-    while True:
-        used = find_fitting_points(points, bias, effects)
-        if len(effects) >= len(again := find_effects(points.select(used), bias)):
-            return again, used
-        effects = again
-
-
 def find_effects(points: CurvePoints, bias: float | None) -> tuple[Effect, ...]:
-    """Return the effects besides the velocity on which the residuals of the best law depend.
+    """Return the effects on which the residuals of the best law, or of the best symmetric one, depend.
 
-    They are searched from the best symmetric law and from the best of all, because a difference of the directions may
-    be a drift.
+    A difference of the directions may be a drift.
     """
     results = []
     for laws in ([law for law in LAWS if law.is_symmetric], LAWS):
@@ -328,28 +327,17 @@ def find_remarks(result: CurveIdentification, widening: float) -> list[str]:
 def describe_effect(result: CurveIdentification, effect: Effect) -> str:
     """Return the sentence on an effect that the fit contains."""
     points, values = result.points, result.best.values
-    value = np.mean([values[name] for name in values if name.rstrip("+-") == effect.name])
-    length = points.velocity_unit.removesuffix("/s")
-    match effect.name:
-        case "lag":
-            return f"The force lags the velocity by {value:.3g} s, as behind a filter; the fit contains this lag."
-        case "inertia":
-            option = option_text("mass", float(f"{value:.3g}"))
-            return (
-                f"The force rises with the acceleration, as that of {value:.3g} {points.units['inertia']} of inertia "
-                f"or of a lag; the fit contains this part, and {option} removes it before."
-            )
-        case "presliding":
-            return (
-                f"After a reversal the force is lower than friction, over about {effect.reach:.2g} {length}, as in "
-                f"presliding or backlash; {option_text('backlash', float(f'{3 * effect.reach:.2g}'))} leaves it out."
-            )
-    name = effect.name.removeprefix("drift of ")
-    change, unit = value * float(np.ptp(points.elapsed)), points.units[name]
-    cause = "a sensor that warms up" if name == "bias" else "friction that warms up"
-    return (
-        f"{name} drifts by {change:+.2g} {unit} over the record, as with {cause}; its value is that in the middle of "
-        "the record."
+    value = float(np.mean([values[name] for name in values if name.rstrip("+-") == effect.name]))
+    constant = effect.name.removeprefix("drift of ")
+    kind = effect.name if constant == effect.name else "drift"
+    return EFFECTS[kind].format(
+        constant=constant,
+        value=value,
+        change=value * float(np.ptp(points.elapsed)),
+        unit=points.units[constant],
+        length=f"{effect.reach:.2g} {points.velocity_unit.removesuffix('/s')}",
+        mass=option_text("mass", float(f"{value:.3g}")),
+        backlash=option_text("backlash", float(f"{REACHES * effect.reach:.2g}")),
     )
 
 

@@ -289,7 +289,8 @@ def fit_law(
     variance = widening * squares / (n - count)
     margin = variance * student_quantile(n - count) ** 2 if has_intervals else np.nan
     estimates = tuple(estimate for part in parts for estimate in part.estimates(margin, points.units))
-    fit = LawFit(law.name, estimates, bias, squares, n, information_criterion(squares, n, count), tuple(effects))
+    criterion = float(n * np.log(squares / n) + count * np.log(n))
+    fit = LawFit(law.name, estimates, bias, squares, n, criterion, tuple(effects))
     return with_errors(fit, points, variance) if has_intervals else fit
 
 
@@ -366,8 +367,3 @@ def group_speeds(v: np.ndarray) -> list[np.ndarray]:
         else:
             groups.append([int(i)])
     return [np.array(group) for group in groups]
-
-
-def information_criterion(squares: float, points: int, constants: int) -> float:
-    """Return the Bayesian information criterion of a fit with unknown noise."""
-    return float(points * np.log(squares / points) + constants * np.log(points))

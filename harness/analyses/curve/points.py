@@ -69,10 +69,6 @@ class CurvePoints:
         parts = {name: values[mask] if len(values := getattr(self, name)) else values for name in names}
         return replace(self, labels=tuple(np.array(labels, object)[mask]), **parts)
 
-    def reverse(self) -> Self:
-        """Return the points with the opposite force."""
-        return replace(self, force=-self.force, slope=-self.slope)
-
     @property
     def units(self) -> dict[str, str]:
         """Return the unit of each constant."""

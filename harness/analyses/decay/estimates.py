@@ -20,7 +20,7 @@ from ...records.motion import Motion
 from ..estimation.estimate import Estimate
 from .decay_problem import DecayProblem, column_norms, least_squares
 from .extrema import Extrema
-from .intervals import FitUncertainty, confidence_interval, to_correlation
+from .intervals import FitUncertainty, confidence_interval, extend_interval, to_correlation
 from .law import (
     AMPLITUDE,
     DRIFT,
@@ -132,9 +132,8 @@ def make_estimates(
     errors = dict(zip(intervals, uncertainty.standard_errors.tolist(), strict=True))
     for unknown in quantity_labels(record):
         if unknown in intervals:  # otherwise it was not fitted
-            value, (low, high) = float(law.p[unknown]), intervals[unknown]
-            bounds = min(low, value), max(high, value)
-            estimates[unknown] = to_record_units(record, problem, unknown, value, errors[unknown], *bounds)
+            value, ends = float(law.p[unknown]), extend_interval(float(law.p[unknown]), *intervals[unknown])
+            estimates[unknown] = to_record_units(record, problem, unknown, value, errors[unknown], *ends)
     return estimates
 
 

@@ -15,8 +15,7 @@ from ..estimation.noise import robust_std
 from . import thresholds
 from .decay_problem import DecayProblem, prepare_problem
 from .extrema import Extrema
-from .hum import Hum, find_hums
-from .law import AMPLITUDE, OMEGA, T0, TERMS, UNKNOWNS, Terms
+from .law import OMEGA, T0, TERMS, UNKNOWNS, Terms
 from .sample_noise import estimate_noise
 
 
@@ -73,18 +72,6 @@ class FreeMotion:
     def residuals(self) -> np.ndarray:
         """Return the residuals (n,) of the selected samples."""
         return self.problem.residuals(self.p, self.terms)[0]
-
-    def find_hums(self, decay: Motion) -> list[Hum]:
-        """Return the hums in samples of the decay."""
-        problem = self.problem
-        t = decay.t - problem.time_origin
-        is_free = (t >= problem.t[0]) & (t <= problem.t[-1])
-        signal, _ = problem.model(self.p, problem.unknowns(()), t[is_free])
-        e = decay.x[is_free] - problem.offset - problem.scale * signal
-        is_certain = np.abs(e) <= thresholds.OUTLIER * robust_std(e)
-        smallest = thresholds.EXACT * problem.scale * float(self.p[AMPLITUDE])
-        frequency = float(self.p[OMEGA]) / (2 * np.pi)
-        return find_hums(decay.t[is_free][is_certain], e[is_certain], frequency, smallest)
 
     def add_note(self, note: str) -> Self:
         return replace(self, notes=(*self.notes, note))

@@ -3,12 +3,11 @@
 1. Find the free decay within the record (window.py) and thin it (thinning.py); locate and number its turning points
    (extrema.py).
 2. Estimate the losses from the energy lost per half cycle (energy_loss.py), then fit the numbered turning points.
-3. Fit the law (law.py) to every sample of the free motion (signal_model.py, free_motion.py).  If the residuals show
-   hum (hum.py), subtract it from the record and begin again.
+3. Fit the law (law.py) to every sample of the free motion (signal_model.py, free_motion.py).
 4. Fit and rank the seven laws (model_selection.py); the full law gives the uncertainty (intervals.py).
-5. Fit the law to the swings alone, as a second opinion (swing_fit.py).
-6. Look for friction that rises at low speed (low_speed_friction.py).
-7. Remark on what is doubtful and refuse what is not a free decay (remarks.py).
+5. Test the residuals against time (departures.py), and look for friction that rises at low speed
+   (low_speed_friction.py).
+6. Remark on what is doubtful and refuse what is not a free decay (remarks.py).
 
 References
 ----------
@@ -26,7 +25,6 @@ import numpy as np
 from ...errors import HarnessError, check_names, option_text
 from ...records.motion import NO_UNIT, RATE_SUFFIXES, Motion
 from ..estimation.estimate import Estimate
-from . import thresholds
 from .decay_problem import DecayProblem, FitError
 from .energy_loss import EnergyLoss, loss_fractions
 from .estimates import (
@@ -35,7 +33,6 @@ from .estimates import (
     estimate_from_two_peaks,
     force_estimates,
     make_estimates,
-    to_record_units,
 )
 from .extrema import Extrema, find_extrema
 from .free_motion import select_free_motion
@@ -43,9 +40,8 @@ from .intervals import FitUncertainty, estimate_uncertainty
 from .law import DRIFT, OMEGA, REST, TERMS, Terms
 from .low_speed_friction import LowSpeedRise, find_low_speed_rise, widen_losses
 from .model_selection import FittedLaw, fit_all_laws, select_reported_law
-from .remarks import check_fit, compare_halves, compare_swings, make_remarks, rise_remark
+from .remarks import ambiguity_remark, check_fit, is_unreliable, make_remarks, rise_remark
 from .sample_noise import estimate_noise, remove_spikes
-from .swing_fit import fit_swings
 from .thinning import block_size, thin, thinning_error
 from .window import select_decay
 
@@ -57,7 +53,7 @@ class DecayIdentification:
     Attributes
     ----------
     record : Motion
-        The record, without spikes and hum.
+        The record, without spikes.
     extrema : Extrema
         Its turning points.
     problem : DecayProblem
@@ -72,8 +68,6 @@ class DecayIdentification:
         Estimates from all turning points.
     two_peak_estimates : tuple of Estimate
         Estimates from the first and the last turning point.
-    swing_estimates : tuple of Estimate
-        Estimates of the losses from the swings between neighbouring turning points; empty if there are too few.
     rise : LowSpeedRise or None
         Rise of friction at low speed; None if there are too few half cycles.
     unavailable : dict
@@ -90,7 +84,6 @@ class DecayIdentification:
     estimates: tuple[Estimate, ...]
     extrema_estimates: tuple[Estimate, ...]
     two_peak_estimates: tuple[Estimate, ...]
-    swing_estimates: tuple[Estimate, ...]
     rise: LowSpeedRise | None
     unavailable: dict[str, str]
     remarks: tuple[str, ...]
@@ -246,26 +239,16 @@ def identify_record(
         )
     terms: Terms = TERMS if drag else ("zeta", "r")
     unknowns = 5 + len(terms) + drift
-    for _ in range(thresholds.HUM_PASSES):
-        whole_decay, half_period = select_decay(record, parameters.pendulum)
-        _, quantiser_step = estimate_noise(whole_decay.t, whole_decay.x)
-        thinned_record, decay = thin_around(record, whole_decay, half_period)
-        extrema = find_extrema(decay, half_period, quantiser_step, parameters.pendulum)
-        if len(decay.t) <= unknowns:
-            raise HarnessError(
-                f"{record.name} has {len(decay.t)} samples, too few to fit {unknowns} unknowns: sample finer"
-            )
-        report(0.1)
-        free_motion = select_free_motion(decay, extrema, terms, parameters.pendulum, drift)
-        hums = free_motion.find_hums(decay)
-        if hums and len(decay.t) < len(whole_decay.t):  # averages show another frequency
-            hums = free_motion.find_hums(whole_decay)
-        if not hums:
-            break
-        for hum in hums:
-            record = hum.subtract_from(record)
-    record = thinned_record
-    report(0.5)
+    whole_decay, half_period = select_decay(record, parameters.pendulum)
+    _, quantiser_step = estimate_noise(whole_decay.t, whole_decay.x)
+    record, decay = thin_around(record, whole_decay, half_period)
+    extrema = find_extrema(decay, half_period, quantiser_step, parameters.pendulum)
+    if len(decay.t) <= unknowns:
+        raise HarnessError(
+            f"{record.name} has {len(decay.t)} samples, too few to fit {unknowns} unknowns: sample finer"
+        )
+    report(0.1)
+    free_motion = select_free_motion(decay, extrema, terms, parameters.pendulum, drift)
     problem, extrema = free_motion.problem, free_motion.extrema
     report(0.5)
     amplitudes = np.abs(extrema.x - extrema.rest_positions(drift)) / problem.scale
@@ -277,25 +260,7 @@ def identify_record(
     reported = select_reported_law(laws, full, problem)
     by_unknown = make_estimates(record, problem, reported, full, uncertainty)
     estimates = tuple(by_unknown.values())
-    remarks = [*decay.notes, *free_motion.notes, *make_remarks(record, problem, laws, full, uncertainty)]
-    if record.base not in ("m", "rad", NO_UNIT) and (parameters.k or parameters.m):
-        size = option_text("per_count", f"0.5mm{RATE_SUFFIXES[record.order]}")
-        remarks.append(
-            f"The forces f, c and q need a motion in a unit of length or angle, and that of {record.name} is in "
-            f"{record.unit}: they are left out; convert it, as by {size}."
-        )
-    if uncertainty.is_correlated and uncertainty.rms > thresholds.ROUGH * problem.noise:
-        estimates, disagreements = compare_halves(problem, full, estimates)
-        remarks += disagreements
-    from_swings: tuple[Estimate, ...] = ()
-    swing_fit = fit_swings(problem, extrema, full.p, terms)
-    if swing_fit is not None:
-        from_swings = tuple(
-            to_record_units(record, problem, unknown, value, swing_fit.errors[unknown], *swing_fit.intervals[unknown])
-            for unknown, value in swing_fit.values.items()
-        )
-        estimates, disagreements = compare_swings(estimates, from_swings, swing_fit.departure)
-        remarks += disagreements
+    remarks = [*make_remarks(record, problem, full, uncertainty)]
     rise = find_low_speed_rise(problem, full.p, terms)
     if rise is not None and free_motion.whole is not None:  # the part left out may be where friction rises
         of_whole = find_low_speed_rise(*free_motion.whole, terms)
@@ -303,9 +268,18 @@ def identify_record(
     if rise is not None and rise.is_shown:
         estimates = widen_losses(estimates, rise)
         remarks.append(rise_remark(record, rise))
+    if is_unreliable(problem, uncertainty):
+        estimates = tuple(replace(estimate, error=np.nan, low=np.nan, high=np.nan) for estimate in estimates)
     by_unknown = dict(zip(by_unknown, estimates, strict=True))
     omega = by_unknown[OMEGA]
     estimates += force_estimates(record, omega, by_unknown, parameters)  # of the widened intervals
+    if record.base not in ("m", "rad", NO_UNIT) and (parameters.k or parameters.m):
+        size = option_text("per_count", f"0.5mm{RATE_SUFFIXES[record.order]}")
+        remarks.append(
+            f"The forces f, c and q need a motion in a unit of length or angle, and that of {record.name} is in "
+            f"{record.unit}: they are left out; convert it, as by {size}."
+        )
+    remarks += [*free_motion.notes, *decay.notes, *ambiguity_remark(problem, laws)]
     by_extrema, no_extrema = estimate_from_extrema(record, problem, extrema, laws[0], parameters, omega)
     by_two_peaks, no_peaks = estimate_from_two_peaks(record, problem, extrema, laws[0], parameters, omega)
     unavailable = {"turning points": no_extrema, "two peaks": no_peaks}
@@ -318,7 +292,6 @@ def identify_record(
         estimates,
         by_extrema,
         by_two_peaks,
-        from_swings,
         rise,
         unavailable,
         tuple(remarks),

@@ -2,8 +2,7 @@
 
 Correlated residuals carry less information than their number suggests.  With the scores g_i = J_i e_i summed over
 blocks, the covariance (J'J)^-1 (sum of g g' over blocks) (J'J)^-1 allows for that; of several block lengths, the
-largest variance counts.  Slow departures of phase and amplitude from the law (wander.py) add their variance if
-the residuals do not exceed the noise; otherwise their correlation shows them.
+largest variance counts.  Slow departures from the law (departures.py) add their variance to that of white residuals.
 
 The intervals of losses near zero, and of losses correlated with them, come from one joint normal measurement of all of
 them.  It starts from the values that the fit would have if losses could be negative: one linear step beyond the bound.
@@ -31,8 +30,8 @@ from ..estimation.estimate import NORMAL_QUANTILE, student_quantile
 from ..estimation.noise import block_scores, residual_correlation
 from . import thresholds
 from .decay_problem import DecayProblem, column_norms
+from .departures import Departures, find_departures
 from .law import OMEGA, ZETA, Terms
-from .wander import Wander, estimate_wander
 
 N_DRAWS = 1000
 
@@ -51,6 +50,8 @@ class FitUncertainty:
         Correlation matrix (n, n).
     unconstrained : numpy.ndarray
         Values (n,) that the fit would have if losses could be negative.
+    distance_from_losses : float
+        Distance of the unconstrained losses from the nearest that are not negative, in standard errors.
     rms : float
         Root mean square of the residuals.
     neighbour_correlation : float
@@ -59,27 +60,20 @@ class FitUncertainty:
         Whether the residuals differ significantly from white noise.
     degrees_of_freedom : int
         Number of samples less that of unknowns.
-    wander : Wander
-        Slow departures of phase and amplitude from the law.
+    departures : Departures
+        Slow departures from the law.
     """
 
     unknowns: np.ndarray
     standard_errors: np.ndarray
     correlation: np.ndarray
     unconstrained: np.ndarray
+    distance_from_losses: float
     rms: float
     neighbour_correlation: float
     is_correlated: bool
     degrees_of_freedom: int
-    wander: Wander
-
-    @property
-    def distance_from_losses(self) -> float:
-        """Distance of the unconstrained losses from the nearest that are not negative, in standard errors."""
-        losses = np.flatnonzero((self.unknowns >= ZETA) & (self.standard_errors > 0))
-        z = self.unconstrained[losses] / self.standard_errors[losses]
-        _, square = NonnegativeCone(self.correlation[np.ix_(losses, losses)]).nearest(z)
-        return float(np.sqrt(square))
+    departures: Departures
 
 
 def estimate_uncertainty(problem: DecayProblem, p: np.ndarray, terms: Terms) -> FitUncertainty:
@@ -94,30 +88,40 @@ def estimate_uncertainty(problem: DecayProblem, p: np.ndarray, terms: Terms) -> 
     half_period = np.pi / p[OMEGA]
     quarter = max(int(half_period / 4 / float(np.median(np.diff(problem.t)))), 1)
     neighbour_correlation, is_correlated = residual_correlation(e, [quarter])
-    variance = white
     rms = float(np.sqrt(np.mean(e**2)))
-    wander = Wander(0.0, 0.0, np.zeros(len(unknowns)))
-    if rms < thresholds.ROUGH * problem.noise:
-        wander = estimate_wander(problem, p, e, jacobian * scale, inverse / np.outer(scale, scale))
+    departures = find_departures(problem, p, e, jacobian * scale, inverse / np.outer(scale, scale))
+    variance = white
     if is_correlated:
         half_cycles = (problem.t[-1] - problem.t[0]) / half_period
         counts = {
             int(np.clip(share * half_cycles, thresholds.MIN_BLOCKS, thresholds.MAX_BLOCKS))
             for share in thresholds.BLOCKS_PER_HALF_CYCLE
         }
-        variance = np.max([white, *(block_variances(jacobian, e, inverse, count) for count in sorted(counts))], axis=0)
+        variance = np.max(
+            [variance, *(block_variances(jacobian, e, inverse, count) for count in sorted(counts))], axis=0
+        )
     unconstrained = p[unknowns] - inverse @ (jacobian.T @ e) / scale
     return FitUncertainty(
         unknowns,
-        np.sqrt(variance / scale**2 + wander.variances),
+        np.sqrt(np.maximum(variance, white + departures.variances * scale**2)) / scale,
         to_correlation(inverse),
         unconstrained,
+        distance_from_losses(unknowns, unconstrained, np.sqrt(variance) / scale, to_correlation(inverse)),
         rms,
         neighbour_correlation,
         is_correlated,
         degrees_of_freedom,
-        wander,
+        departures,
     )
+
+
+def distance_from_losses(
+    unknowns: np.ndarray, unconstrained: np.ndarray, errors: np.ndarray, correlation: np.ndarray
+) -> float:
+    """Return the distance of unconstrained values (n,) from nonnegative losses, in standard errors (n,)."""
+    losses = np.flatnonzero((unknowns >= ZETA) & (errors > 0))
+    z = unconstrained[losses] / errors[losses]
+    return float(np.sqrt(NonnegativeCone(correlation[np.ix_(losses, losses)]).nearest(z)[1]))
 
 
 def to_correlation(covariance: np.ndarray) -> np.ndarray:
@@ -163,6 +167,19 @@ def confidence_interval(
     joint = [i, *(j for j in np.flatnonzero(near_bound).tolist() if j != i)]
     low, high = nonnegative_interval(z[joint], correlation[np.ix_(joint, joint)])
     return float(low * wide[i]), float(high * wide[i])
+
+
+def extend_interval(value: float, low: float, high: float) -> tuple[float, float]:
+    """Return an interval that holds its value inside, unless that is a loss of zero.
+
+    A value is at an end where the bound of another loss acts, so that the interval, which comes from a linear law, may
+    lie on the wrong side of it. One without a width is undetermined.
+    """
+    if not high > low:
+        return (0.0 if value >= 0 else -np.inf), np.inf
+    if value <= low and value != 0:
+        low = value - (high - low) if value < 0 else max(value - (high - low), 0.0)
+    return low, value + (high - low) if value >= high else high
 
 
 def nonnegative_interval(z: np.ndarray, correlation: np.ndarray) -> tuple[float, float]:

@@ -49,8 +49,6 @@ LARGE_FIRST = 1.5  # times the median swing: a shorter decay from such a swing i
 IRREGULAR = 0.3  # standard deviation of the logarithm of the times between turning points
 SAWTOOTH = 2.0  # ratio of the times of rise and fall
 MAX_NODE_SWINGS = 6  # swings from the end of a decay to the node of a beat
-MIN_REGROWTH = 3  # swings in which a beat rises
-REGROWTH = 1.5  # ratio of the swings after and before a regrowth
 CONSTANT = 0.01  # standard error of the loss below which its absence is a constant amplitude
 LONG_REST = 2.4  # half periods before the first swing that are left out
 BEFORE_FIRST_TURN = 1.1  # half periods: the release before the first swing
@@ -104,17 +102,6 @@ BETTER_PART = 1.4  # ratio of the residuals of the whole record to those of an u
 BETTER_ROUGH_PART = 4.0  # the same if the part departs from the law as well
 PARTLY_DEPARTED = 0.05  # fraction of departed samples in the half cycle before it, from which on it departs as well
 
-# --- Hum (hum.py) ---
-HUM_PASSES = 3  # fits: the first one finds hum, and the next one may show what is left of it
-MAX_HUMS = 4  # in the residuals of a fit: hum has harmonics
-MAX_EMPTY_SLOTS = 8  # times the samples: in a sparser record no line is sought
-BACKGROUND_FREQUENCIES = 50  # whose median is the power around a line
-HUM_LINE = 30.0  # times the median power: white noise exceeds it in one of 1e9 frequencies
-STEADY_HUM = 0.3  # of the amplitude: the halves of a record differ by less
-MIN_HUM_FREQUENCY = 2.5  # times that of the motion: slower residuals belong to the motion
-MAX_HARMONIC = 7  # of the motion that its residuals may have
-HARMONIC_WIDTH = 2.0  # resolutions of the spectrum: width of a harmonic of a decay
-
 # --- Selection of the law (model_selection.py) ---
 MAX_REFITS = 2  # passes over all pairs of laws: each improves the fits of the one before
 EQUAL_DEVIANCE = 1.0  # of n ln(squares): no value of two such laws differs by more than a standard error
@@ -122,9 +109,9 @@ EQUAL_DEVIANCE = 1.0  # of n ln(squares): no value of two such laws differs by m
 # --- Intervals (intervals.py) ---
 BLOCKS_PER_HALF_CYCLE = (1.0, 0.3, 0.1, 0.03)  # lengths on which residuals may be correlated
 MIN_BLOCKS, MAX_BLOCKS = 24, 400  # fewer leave the variance uncertain; more are shorter than any correlation
-WANDER_PIECES = 8  # of the random walk of phase and amplitude over a record
-SEEN_WANDER = 1e-9  # of the largest eigenvalue: smaller ones are walks that the fitted values follow
-PROVEN_WANDER = 4.0  # of the logarithm of the likelihood: white noise exceeds it in one record of 400
+WALK_PIECES = 8  # of the random walk of phase, amplitude and rest position over a record
+SEEN_WALK = 1e-9  # of the largest eigenvalue: smaller ones are walks that the fitted values follow
+PROVEN_WALK = 4.0  # of the logarithm of the likelihood: white noise exceeds it in one record of 400
 NEGLIGIBLE_BOUND = 4.0  # standard errors above zero: the bound at zero no longer matters
 MAX_BOUND = 8.0  # standard errors above the most likely value: no end of an interval is beyond
 INTERVAL_PRECISION = 1e-4  # standard errors: of the ends of an interval, well below what the draws leave uncertain
@@ -138,27 +125,15 @@ LIMIT_SPEED = 0.1  # of RISE_SPEEDS: the one for which the limit is stated
 RISE_BLOCKS = (24, 100)  # of residuals that may be correlated
 MIN_SENSITIVITY = 1e-3  # of an amplitude to the first one
 
-# --- Fit of the swings (swing_fit.py) ---
-MAX_FITTED_SWINGS = 200  # the largest ones say most; the cost grows with the third power
-MIN_FITTED_SWINGS = 10  # for a variance of noise and one of the departure from the law
-MAX_CONDITION = 1e8  # of the equations of the swings: beyond, they are singular to rounding
-RIDGE = 1e-10  # of the mean variance: keeps matrices positive definite in rounding
-PROVEN_DEPARTURE = 4.0  # of the logarithm of the likelihood: no record of 14 without a departure exceeds 2.5
-SMALL_DEPARTURE = 0.01  # of the loss: a smaller departure from the law is not reported
-SWING_DISAGREEMENT = 4.0  # standard errors between the estimates from the signal and from the swings
-
 # --- Remarks and refusals (remarks.py) ---
 ROUGH = 1.5  # times the noise: larger residuals are not the noise of single samples
 NOT_A_DECAY = 0.1  # fraction of the motion: with larger residuals the record is refused
 NOT_NOISE = 2.0  # times the noise: smaller residuals are no reason to refuse a record
+UNRELIABLE = 0.05  # fraction of the motion: with larger residuals that are no noise, no interval is stated
 WARNED = 0.008  # fraction of the motion: with larger residuals the remark is a warning
 EXACT = 1e-9  # of the amplitude: smaller residuals are those of the model, and need no remark
 CLEAR_BIC = 6.0  # difference of BIC: odds of 20 to 1
 SIGNIFICANT_DEVIANCE = 4.0  # of n ln(squares): an unnecessary term exceeds it in one record of twenty
-SIGNIFICANT_DRIFT = 5.0  # standard errors
-BETTER_WITH_DRIFT = 0.5  # of the sum of squares: a drift that halves it is worth a remark
 SIGNIFICANT_GAIN = 5.0  # standard errors of the losses from the nearest ones that are not negative
-DISAGREEMENT = 3.0  # standard errors by which the halves of a record differ
-MIN_HALF_SAMPLES = 100  # in a half of the record that is fitted separately
 MIN_ROUNDED = 6  # turning points for a test of their positions between quantiser steps
 RAYLEIGH_LIMIT = 12.0  # of n R^2, R the mean of n positions on a circle: exceeded in one record of a hundred thousand

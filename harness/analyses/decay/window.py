@@ -7,6 +7,7 @@ what was measured of their swings: they grow, are constant, rise and fall again,
 
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import Self
 
 import numpy as np
 
@@ -55,6 +56,11 @@ class Swings:
     def is_regular(self) -> np.ndarray:
         """Whether each swing (n,) but the first takes about as long as the one before."""
         return are_regular(self.duration)
+
+    def reverse(self) -> Self:
+        """Return the swings in the opposite order of time."""
+        names = ("size", "rises", "shape_error", "is_hidden")
+        return replace(self, t=-self.t[::-1], **{name: getattr(self, name)[::-1] for name in names})
 
     def loss(self, first: int, last: int) -> tuple[float, float]:
         """Return the share that the swings lose from the first to the last, and its standard error."""
@@ -245,13 +251,13 @@ def check_motion(record: Motion, swings: Swings, best: Decay | None, pendulum: b
     if few and not is_large and len(size) >= thresholds.MANY_SWINGS and spread > thresholds.IRREGULAR:
         raise HarnessError(describe_shape(record, swings, slice(None), shape))
     if best is not None:
-        weighty = (decay for decay in find_decays(swings) if decay.weight >= thresholds.RIVAL * best.weight)
-        if rise := next(filter(None, (find_regrowth(swings, decay) for decay in weighty)), None):
+        if growth := find_regrowth(swings, thresholds.RIVAL * best.weight):
             raise HarnessError(
-                f"{name} beats: its swings fall to {size[rise[0]]:.3g} {unit} at "
-                f"t = {record.format_time(swings.t[rise[0]])} s and rise again to {size[rise[1]]:.3g} {unit} at "
-                f"t = {record.format_time(swings.t[rise[1]])} s, as those of two modes or of a drive do; fit a model "
-                f"with both by {command_text('fit')}, or select a decay of one mode with {selection_text()}"
+                f"{name} beats: its swings fall to {growth.swings.size[growth.last]:.3g} {unit} at "
+                f"t = {record.format_time(-growth.end)} s and rise again to "
+                f"{growth.swings.size[growth.first]:.3g} {unit} at t = {record.format_time(-growth.begin)} s, as those "
+                f"of two modes or of a drive do; fit a model with both by {command_text('fit')}, or select a decay of "
+                f"one mode with {selection_text()}"
             )
         return
     if len(regular) < thresholds.MANY_SWINGS:
@@ -309,19 +315,17 @@ def describe_shape(record: Motion, swings: Swings, part: slice, shape: float) ->
     )
 
 
-def find_regrowth(swings: Swings, best: Decay) -> tuple[int, int] | None:
-    """Return the smallest and the largest swing of a regular growth after the decay; None without one.
+def find_regrowth(swings: Swings, min_weight: float) -> Decay | None:
+    """Return a growth soon after a decay of such a weight, as a decay of the reversed swings; None without one.
 
-    A hand or a second release makes the swings grow at once; a beat takes several cycles.
+    A hand or a second release makes the swings grow at once; a beat, a drive or a wandering amplitude take several
+    cycles.
     """
-    size, regular = swings.size, swings.is_regular
-    for first in range(best.last, min(best.last + thresholds.MAX_NODE_SWINGS, len(size))):
-        last = first
-        while last + 1 < len(size) and regular[last + 1] and size[last + 1] > size[last]:
-            last += 1
-        if last - first >= thresholds.MIN_REGROWTH and size[last] > thresholds.REGROWTH * size[first]:
-            return first, last
-    return None
+    decays = [decay for decay in find_decays(swings) if decay.weight >= min_weight]
+    growths = [growth for growth in find_decays(swings.reverse()) if growth.weight >= thresholds.RIVAL * min_weight]
+    ends = len(swings.size) - 1 - np.array([decay.last for decay in decays])
+    pauses = ((growth, ends - growth.last) for growth in growths)
+    return next((growth for growth, n in pauses if ((n >= -1) & (n <= thresholds.MAX_NODE_SWINGS)).any()), None)
 
 
 def crop(record: Motion, best: Decay) -> Motion:

@@ -17,6 +17,7 @@ from .uncertainty import INDETERMINATE, Uncertainty, split_residuals
 
 UNFIT_SHARE, UNFIT_NOISE = 0.1, 2.0  # residuals as a share of the range, and in units of the noise
 REST_PARTS, AVERAGED = 20, 0.5  # means of noise over so many parts are smaller than this share of it
+EXPLAINED = 0.3  # share of the residuals that the noise of the inputs makes, from which it is named
 SHIFTED = 0.25  # share of a variance that the error of the inputs adds, from which there is a remark
 
 
@@ -153,6 +154,16 @@ def unfit_remark(columns: Sequence[ColumnResiduals]) -> list[str]:
     ]
 
 
+def describe_cause(problem: FitProblem, uncertainty: Uncertainty) -> str:
+    """Return the likely cause of residuals that are not white noise."""
+    noisy = {name: share for record in problem.records for name, share in record.noisy_inputs.items()}
+    rms = float(np.sqrt(np.mean(uncertainty.residuals**2)))
+    if noisy and uncertainty.input_noise > EXPLAINED * rms:
+        inputs = " and ".join(f"the input {name}, {100 * share:.2g} % of its range," for name, share in noisy.items())
+        return f"the noise of {inputs} makes residuals of this size; filter it, or sample it faster"
+    return "the noise is coloured, or the model lacks an effect"
+
+
 def fit_remarks(
     problem: FitProblem,
     raw_fit: RawFit,
@@ -167,8 +178,8 @@ def fit_remarks(
     if uncertainty.correlation or largest.residual > ROUGH * largest.noise:
         remarks.append(
             f"The residuals are not white noise (rms {largest.residual / largest.noise:.2g} times the scatter of "
-            f"neighbouring samples, correlation {uncertainty.correlation:.2g}): the noise is coloured, or the model "
-            "lacks an effect. The intervals are widened."
+            f"neighbouring samples, correlation {uncertainty.correlation:.2g}): "
+            f"{describe_cause(problem, uncertainty)}. The intervals are widened."
         )
     white = np.diag(uncertainty.covariance)
     shifted = [

@@ -9,12 +9,14 @@ from scipy.interpolate import CubicSpline
 from ...records.extraction import Samples
 from ...simulation.stepping import merge_points
 from ...simulation.whole_run import Run, Simulator
+from ..estimation.noise import interpolation_residuals, robust_std
 from .noise import bin_means, estimate_noise
 from .parameter_fit import FittedRecord
 
 MAX_SAMPLES = 2500  # twice as many are averaged to this number of means of neighbours
 MAX_AVERAGING_ERROR = 0.3  # of a mean of neighbouring samples, in units of the noise
 INPUT_POINTS = 500  # of an input that suffice for a search
+INPUT_NOISE = 1e-3  # of the range of an input with noise
 MAX_PARTS = 32  # in the cache of a record
 SHORTEST_INTERVAL = 1e-6  # between communication points, in intervals between samples
 
@@ -70,6 +72,7 @@ class MeasuredRecord:
             nearest = 0.0 if self.width == 1 else 0.5 * float(np.median(np.diff(input_t)))  # means at other times
             self.knots = merge_points(self.t, input_t[input_t < self.t[-1]], nearest)
         self.inputs = {name: np.interp(self.knots, input_t, u) for name, u in inputs.items()}
+        self.input_noise = {name: robust_std(interpolation_residuals(input_t, u)) for name, u in inputs.items()}
         self.rows = np.searchsorted(self.knots, self.t)
         scatter = [estimate_noise(self.t, column)[0] for column in self.y.T]
         self.scatter = np.maximum(scatter, self.step / 12**0.5)
@@ -115,6 +118,23 @@ class MeasuredRecord:
         if delays:
             return self.simulate_delayed(values, index, delays)
         return self.run(values) if len(index) == len(self.t) else self.part(index).run(values)
+
+    @property
+    def noisy_inputs(self) -> dict[str, float]:
+        """Return the noise of the inputs that have some, relative to their range."""
+        shares = {
+            name: noise / max(float(np.ptp(self.inputs[name])), 1e-300) for name, noise in self.input_noise.items()
+        }
+        return {name: share for name, share in shares.items() if share > INPUT_NOISE}
+
+    def simulate_noisy_inputs(self, values: Mapping[str, float], random: np.random.Generator) -> np.ndarray | None:
+        """Return the outputs (n, outputs) with further noise in the inputs, of the size that they have."""
+        inputs = {
+            name: u + self.input_noise.get(name, 0.0) * random.normal(size=len(u)) for name, u in self.inputs.items()
+        }
+        if self.subdivision > 1:
+            inputs = {name: CubicSpline(self.knots, u)(self.fine_t) for name, u in inputs.items()}
+        return self.prepare(self.t, self.fine_t, inputs)(values)
 
     def part(self, index: np.ndarray) -> RecordPart:
         """Return the data of a run for the samples `index`. They are cached, because many runs use the same index."""

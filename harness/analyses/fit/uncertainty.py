@@ -19,6 +19,7 @@ BLOCK_SIZES = (20, 60, 200, 600)
 MIN_BLOCKS, MAX_BLOCKS = 12, 400
 CORRELATED_DEGREES_OF_FREEDOM = 20  # of the intervals, where residuals are correlated
 QUANTISER_DRAWS = 60
+INPUT_DRAWS = 12
 ROUNDING = float(np.finfo(float).eps)  # of the largest value of a record: smallest standard deviation of its residuals
 
 
@@ -42,6 +43,8 @@ class Uncertainty:
         Correlation of neighbouring residuals; 0 if they are white.
     input_shift : numpy.ndarray
         Displacements (k,) by the error of the inputs between samples.
+    input_noise : float
+        Root mean square of the residuals by the noise of the inputs, in units of the noise.
     """
 
     squares: float
@@ -52,6 +55,7 @@ class Uncertainty:
     residuals: np.ndarray
     correlation: float
     input_shift: np.ndarray
+    input_noise: float = 0.0
 
     @property
     def quantile(self) -> float:
@@ -99,11 +103,31 @@ def estimate_uncertainty(
     if any((record.step > record.noise / 2).any() for record in problem.records):
         inflation = np.maximum(inflation, quantiser_variance(problem, z, jacobian, inverse, axes, eigenvalues) / white)
     shift = inverse @ (jacobian.T @ input_error)
-    inflation = inflation + shift**2 / white
+    draws = INPUT_DRAWS if correlation and any(record.noisy_inputs for record in problem.records) else 0
+    noise_shifts, noise_effect = input_noise_effect(problem, z, jacobian, inverse, draws)
+    inflation = np.maximum(inflation, 1 + noise_shifts / white) + shift**2 / white
     deviation = np.sqrt(variance * inflation.max() / eigenvalues)
     indeterminate = axes[:, deviation > INDETERMINATE]
     squares = float(e @ e)
-    return Uncertainty(squares, variance, inverse * variance, inflation, indeterminate, e, correlation, shift)
+    return Uncertainty(
+        squares, variance, inverse * variance, inflation, indeterminate, e, correlation, shift, noise_effect
+    )
+
+
+def input_noise_effect(
+    problem: FitProblem, z: np.ndarray, jacobian: np.ndarray, inverse: np.ndarray, draws: int
+) -> tuple[np.ndarray, float]:
+    """Return the variances (k,) by the noise of the inputs, and the root mean square of its residuals."""
+    random, shifts, squares = np.random.default_rng(0), [np.zeros(len(z))], [0.0]
+    for _ in range(draws):
+        values = [problem.values(z, i) for i in range(len(problem.records))]
+        runs = [(r, r.simulate_noisy_inputs(v, random), r.run(v)) for r, v in zip(problem.records, values, strict=True)]
+        parts = [((a - b) / record.noise).ravel() for record, a, b in runs if a is not None and b is not None]
+        if len(parts) == len(runs):
+            change = np.concatenate(parts)
+            shifts.append(inverse @ (jacobian.T @ change))
+            squares.append(float(change @ change) / len(change))
+    return np.square(shifts).sum(axis=0) / max(len(shifts) - 1, 1), max(squares) ** 0.5
 
 
 def rounding_variance(problem: FitProblem) -> float:

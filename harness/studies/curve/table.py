@@ -9,7 +9,7 @@ from ...analyses.curve.law_fit import LawFit
 from ...analyses.estimation.estimate import Estimate
 from ...errors import option_text
 from ...results.quantity import format_interval
-from ...results.summary import Summary, make_terminal_table, read_cells
+from ...results.summary import Summary, limit_remarks, make_terminal_table, read_cells
 from .model_file import LAW_MODEL
 from .model_values import LINEAR_FORCE, assignments, law_of_models, model_values
 
@@ -64,7 +64,12 @@ def sentences(identification: CurveIdentification) -> list[str]:
     for reason in dict.fromkeys(identification.unavailable.values()):
         laws = [name for name, text in identification.unavailable.items() if text == reason]
         lines.append(f"Not fitted: {', '.join(laws)}; {reason}.")
-    return [*lines, *describe_models(identification), *identification.remarks, *identification.points.notes]
+    return [
+        *lines,
+        *describe_models(identification),
+        *limit_remarks(identification.remarks),
+        *identification.points.notes,
+    ]
 
 
 def describe_models(identification: CurveIdentification) -> list[str]:

@@ -76,7 +76,6 @@ class DecayResult(Result, DecayIdentification):
                 "unit": record.base,
             },
             "turning_points": [asdict(estimate) for estimate in self.extrema_estimates],
-            "swings": [asdict(estimate) for estimate in self.swing_estimates],
             "low_speed_rise": {
                 "shown": self.rise.is_shown,
                 "size": self.rise.size,

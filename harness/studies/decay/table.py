@@ -7,7 +7,7 @@ from ...analyses.decay.identification import DecayIdentification
 from ...analyses.decay.thresholds import LIMIT_SPEED
 from ...analyses.estimation.estimate import Estimate
 from ...results.quantity import format_interval
-from ...results.summary import Summary, make_table, make_terminal_table
+from ...results.summary import Summary, limit_remarks, make_table, make_terminal_table
 
 CHECKS = ("turning points", "two peaks (rough)")  # values that check those of the whole signal
 
@@ -119,4 +119,4 @@ def summary_lines(identification: DecayIdentification) -> list[str]:
             f"{n_excluded} of {len(record.t)} samples are excluded (before release, after the last reliable cycle, or "
             "outliers)."
         )
-    return [*lines, *identification.remarks]
+    return [*lines, *limit_remarks(identification.remarks)]

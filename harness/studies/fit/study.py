@@ -146,7 +146,8 @@ def fit_samples(
     curves = read_tables_with(request.run.fmu, [estimate.name for estimate in fit.estimates], request.run.values)
     rough = {(column.record, column.name) for column in fit.columns if column.residual > ROUGH * column.noise}
     slips = tuple(one for one in slips if (one.record, one.column) in rough)  # an input may explain the others
-    remarks = [*doubts, *(one.remark for one in slips), *fit.remarks]
+    others = [*doubts, *(one.remark for one in slips)]
+    remarks = [*others, *fit.remarks] if fit.describes_record else [*fit.remarks, *others]
     fit = replace(fit, columns=set_units(fit.columns, units), remarks=tuple(remarks), slips=slips, tables=curves)
     if prediction:
         prediction = replace(prediction, columns=set_units(prediction.columns, units))

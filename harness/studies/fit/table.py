@@ -7,7 +7,7 @@ from rich.table import Table
 from ...analyses.estimation.estimate import ColumnResiduals, Estimate
 from ...analyses.fit.parameter_fit import ParameterFit
 from ...results.quantity import format_interval
-from ...results.summary import Summary, make_terminal_table, read_cells
+from ...results.summary import Summary, limit_remarks, make_terminal_table, read_cells
 
 
 def fit_table(fit: ParameterFit) -> Table:
@@ -63,7 +63,7 @@ def summary_lines(fit: ParameterFit) -> list[str]:
         describe_residuals(column, f"{column.record} (validation)")
         for column in (fit.validation.columns if fit.validation else ())
     ]
-    return [*lines, *fit.remarks, *fit.notes]
+    return [*lines, *limit_remarks(fit.remarks), *fit.notes]
 
 
 def describe_residuals(column: ColumnResiduals, record: str) -> str:
