@@ -143,9 +143,25 @@ def parse_table_file(data: bytes, name: str) -> Table:
             return table_from_arrays(arrays, name)
     headings, rows, line, interval, _ = text_table.parse_text_table(data, name)
     if isinstance(rows, np.ndarray):
-        headings = headings or [""] * rows.shape[1]
-        return Table(name, tuple(headings), tuple(np.ascontiguousarray(rows.T)), line, interval)
-    return replace(table_from_rows(headings, rows, line, name), interval=interval)
+        names = tuple(headings or [""] * rows.shape[1])
+        table = Table(name, names, tuple(np.ascontiguousarray(rows.T)), line, interval)
+    else:
+        table = replace(table_from_rows(headings, rows, line, name), interval=interval)
+    return note_title(
+        table, "" if any(headings) or not line else text_table.decode_text(data, name).splitlines()[line - 1]
+    )
+
+
+def note_title(table: Table, above: str) -> Table:
+    """Return a table with a note if the line above its numbers has one text, which may name any of its columns."""
+    text = above.strip()
+    if not text or any(map(text.count, ",;\t")) or text_table.is_comment(text) or len(table.columns) < 2:
+        return table
+    note = (
+        f"{table.name} has one text, {format_value(text)}, above {len(table.columns)} columns: it is taken for a "
+        f"title; {option_text('headings')} names the columns."
+    )
+    return replace(table, notes=(*table.notes, note))
 
 
 ARRAY_FORMATS = (

@@ -507,3 +507,12 @@ def test_fewer_names_than_columns_name_the_first_columns_with_a_note(tmp_path, c
     assert record.table.column_headings == (*names, *[""] * (4 - count))
     assert f"a.csv names {count} of 4 columns: the names are taken for the first ones." in record.notes
     assert record.x == pytest.approx(1e-3 * np.cos(t), abs=1e-12)
+
+
+@pytest.mark.parametrize("rows", [30, 6000])
+def test_one_text_above_several_columns_is_a_title_with_a_note(tmp_path, rows):
+    t = np.linspace(0.0, 6.0, rows)
+    np.savetxt(tmp_path / "a.csv", np.column_stack([t, np.cos(t)]), delimiter=",", header="Time", comments="")
+    record = read_record(tmp_path / "a.csv", unit="m")
+    assert "a.csv has one text, 'Time', above 2 columns: it is taken for a title" in " ".join(record.notes)
+    assert record.x == pytest.approx(np.cos(t), abs=1e-12)

@@ -1,0 +1,93 @@
+"""Writes the suite: a folder for each case, its index cases.json, and check.py.
+
+CASE/fmi2/MODEL.fmu, CASE/fmi3/MODEL.fmu    native FMUs, co-simulation and model exchange
+CASE/CASE_ref.opt       start, stop, communication step and tolerance, as in the FMI cross-check
+CASE/CASE_start.csv     start values other than those of the FMU: name, value
+CASE/CASE_in.csv        input, with two rows at a jump; only of some cases
+CASE/CASE_ref.csv       certified states and mode, after the events of each time
+CASE/CASE_events.csv    certified events: time, contact, mode before and after
+CASE/README.md          what the case catches
+"""
+
+import csv
+import json
+import shutil
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from harness.errors import HarnessError
+from harness.process.subprocess_runner import run_module
+
+from .cases import SuiteCase, modes_at
+
+RELATIVE_TOLERANCE = 1e-10  # requested from the solver, of the FMU or of the tool
+
+
+def write_suite(
+    cases: Sequence[SuiteCase], folder: Path, platforms: Sequence[str], report: Callable[[float], None]
+) -> None:
+    """Build the FMUs of the cases, and write all files to a folder."""
+    folder.mkdir(parents=True, exist_ok=True)
+    build = folder / "fmus"
+    models = [str(file) for file in dict.fromkeys(case.model_file for case in cases)]
+    options = [word for platform in platforms for word in ("--platform", platform)]
+    for number, version in enumerate(("2", "3"), 1):
+        done = run_module(
+            "build_fmus", *models, "--native", "--fmi", version, *options, "--out", str(build / f"fmi{version}")
+        )
+        if done.returncode:
+            raise HarnessError(f"the FMUs cannot be built: {(done.stderr.splitlines() or ['?'])[-1]}")
+        report(0.4 * number)
+    for number, case in enumerate(cases, 1):
+        write_case(case, folder / case.name, build)
+        report(0.8 + 0.2 * number / len(cases))
+    shutil.rmtree(build)
+    index = {case.name: {"model": case.model, "tolerance": case.tolerance, "catches": case.catches} for case in cases}
+    (folder / "cases.json").write_text(json.dumps(index, indent=2) + "\n", encoding="utf-8")
+    shutil.copy(Path(__file__).with_name("check.py"), folder)
+
+
+def write_case(case: SuiteCase, folder: Path, fmus: Path) -> None:
+    """Write the files of a case; `fmus` has the folders fmi2 and fmi3."""
+    file = f"{case.model}.fmu"
+    for version in ("fmi2", "fmi3"):
+        (folder / version).mkdir(parents=True, exist_ok=True)
+        shutil.copy(fmus / version / file, folder / version)
+    solution = case.solve(fmus / "fmi2" / file)
+    modes = modes_at(solution, solution.times)
+    columns = [solution.times, *solution.states.T, *([] if modes is None else [modes])]
+    headings = ["time", *case.states, *([] if modes is None else ["mode"])]
+    write_rows(folder / f"{case.name}_ref.csv", headings, zip(*(column.tolist() for column in columns), strict=True))
+    if modes is not None:
+        events = solution.events or []
+        before = [solution.start_mode, *(mode for _, mode in events)]
+        rows = [(t, "mode", old, new) for (t, new), old in zip(events, before, strict=False)]
+        write_rows(folder / f"{case.name}_events.csv", ["time", "contact", "from", "to"], rows)
+    write_rows(folder / f"{case.name}_start.csv", ["name", "value"], case.values.items())
+    if case.changes:
+        write_rows(folder / f"{case.name}_in.csv", ["time", "F_ext"], input_rows(case))
+    start, stop = float(solution.times[0]), float(solution.times[-1])
+    step = (stop - start) / (len(np.unique(solution.times)) - 1)
+    options = {"StartTime": start, "StopTime": stop, "StepSize": step, "RelTol": RELATIVE_TOLERANCE}
+    write_rows(folder / f"{case.name}_ref.opt", [], options.items())
+    (folder / "README.md").write_text(f"# {case.name}\n\n{case.catches}\n", encoding="utf-8")
+
+
+def input_rows(case: SuiteCase) -> list[tuple[float, float]]:
+    """Return the times in s and the values of the input, with two rows at a jump."""
+    rows: list[tuple[float, float]] = []
+    for t, value in case.changes.items():
+        rows += [(t, rows[-1][1])] if rows else []
+        rows.append((t, value))
+    assert case.stop is not None
+    return [*rows, (case.stop, rows[-1][1])]
+
+
+def write_rows(file: Path, headings: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
+    """Write a CSV file, whose numbers are read as the same doubles."""
+    with file.open("w", newline="", encoding="utf-8") as lines:
+        writer = csv.writer(lines, lineterminator="\n")
+        writer.writerows([headings] if headings else [])
+        writer.writerows(rows)

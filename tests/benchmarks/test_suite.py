@@ -1,0 +1,98 @@
+"""The friction suite: its files, the verdicts of check.py, and importers that are wrong on purpose."""
+
+import json
+import re
+import subprocess
+import sys
+
+import commands
+import numpy as np
+import pytest
+from native_fmus import require_compiler
+
+from benchmarks.suite import importers
+from benchmarks.suite.cases import CASES
+from benchmarks.suite.check import check_case, read_columns
+
+WRITTEN = ("rest", "jump_of_load", "late_start", "tie", "short_sticks", "stick_slip")
+
+
+@pytest.fixture(scope="module")
+def suite(tmp_path_factory):
+    require_compiler()
+    folder = tmp_path_factory.mktemp("suite")
+    words = [word for name in WRITTEN for word in ("--case", name)]
+    done = commands.benchmarks(folder, "suite", folder, "--platform", "linux64", *words)
+    assert (done.returncode, done.stderr) == (0, "")
+    return folder
+
+
+def verdict(suite, runner, name, tmp_path):
+    tolerance = json.loads((suite / "cases.json").read_text())[name]["tolerance"]
+    return importers.run_case(runner, suite / name, tmp_path, tolerance)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", WRITTEN)
+def test_fmpy_passes_each_case_and_check_py_says_so(suite, name, tmp_path):
+    assert verdict(suite, importers.run_fmpy, name, tmp_path) == "passed"
+    command = [sys.executable, "-I", suite / "check.py", tmp_path, name]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout.splitlines()[-1]) == (0, "0 of 1 cases failed")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("runner", "name"),
+    [
+        (importers.interpolate_across_events, "stick_slip"),
+        (importers.interpolate_across_events, "short_sticks"),
+        (importers.ignore_event_mode, "rest"),
+        (importers.ignore_event_mode, "stick_slip"),
+        (importers.ignore_start_time, "late_start"),
+    ],
+)
+def test_an_importer_that_is_wrong_on_purpose_fails(suite, runner, name, tmp_path):
+    assert re.match(r"failed: \d", verdict(suite, runner, name, tmp_path))
+
+
+def break_result(columns, name):
+    """Return a result with one mistake."""
+    at_rest = columns["mode"] == 0
+    match name:
+        case "creep":
+            return columns | {"x": columns["x"] + np.where(at_rest, 1e-10 * columns["time"], 0.0)}
+        case "late mode":
+            return columns | {"mode": np.roll(columns["mode"], 1)}
+        case "wrong motion":
+            return columns | {"x": columns["x"] * (1.0 + 1e-5)}
+        case "times in single precision":
+            return columns | {"time": (columns["time"] + 1e5).astype(np.float32) - 1e5}
+        case "no mode":
+            return {key: y for key, y in columns.items() if key != "mode"}
+    return columns
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("mistake", "failures"),
+    [
+        ("none", [False, False, False]),
+        ("creep", [False, False, True]),
+        ("late mode", [False, True, False]),
+        ("wrong motion", [True, False, False]),
+        ("times in single precision", [True, False, False]),
+        ("no mode", [False, True, False]),
+    ],
+)
+def test_each_verdict_finds_its_mistake(suite, mistake, failures, tmp_path):
+    columns = break_result(read_columns(suite / "rest" / "rest_ref.csv"), mistake)
+    rows = np.column_stack([*columns.values()])
+    np.savetxt(tmp_path / "rest_out.csv", rows, delimiter=",", header=",".join(columns), comments="", fmt="%.17g")
+    verdicts = check_case(suite, tmp_path, "rest", 1e-6)
+    assert [text.startswith("-") for text in verdicts] == failures
+
+
+def test_the_suite_has_twenty_cases_and_each_says_what_it_catches():
+    assert len({case.name for case in CASES}) == 20
+    assert len({case.catches for case in CASES}) == 20
