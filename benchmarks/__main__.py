@@ -28,6 +28,7 @@ from benchmarks.importers.command import importers
 from benchmarks.literature.command import literature
 from benchmarks.references.command import references
 from benchmarks.rivals.command import rivals
+from benchmarks.suite.command import suite
 from benchmarks.symmetry.command import symmetry
 from harness.commands import SectionedGroup
 
@@ -46,5 +47,5 @@ def main() -> None:
     """
 
 
-for command in (bench, external, hosts, importers, literature, references, rivals, symmetry):
+for command in (bench, external, hosts, importers, literature, references, rivals, suite, symmetry):
     main.add_command(command)
