@@ -1,8 +1,8 @@
 """Measured records, which are not a part of the project.
 
-The pendulum of the README is a reduced copy of a file of github.com/dynamicslab/MultiArm-Pendulum (MIT, Kaheman et al.,
-arXiv 2205.06231): the angle minus pi and the time minus 60 s, every 50th sample. The bicycle wheel, a torsion pendulum
-with a rate gyro, is a file of github.com/moorepants/resonance (MIT, Moore and Lyons).
+The pendulum of the page on decays is a reduced copy of a file of github.com/dynamicslab/MultiArm-Pendulum (MIT,
+Kaheman et al., arXiv 2205.06231): the angle minus pi and the time minus 60 s, every 50th sample. The bicycle wheel, a
+torsion pendulum with a rate gyro, is a file of github.com/moorepants/resonance (MIT, Moore and Lyons).
 """
 
 import os
