@@ -10,6 +10,13 @@ from fmus.runtime.codes import ROUNDOFF_MARGIN, STUCK
 from fmus.runtime.contact_lcp import AT_REST, CoupledFriction
 
 
+@pytest.fixture(autouse=True)
+def vectors_are_arrays(monkeypatch):
+    monkeypatch.setattr(contact_lcp, "contact_vector", lambda: np.zeros(len(vectors.contact_indices)))
+    monkeypatch.setattr(contact_lcp, "any_of", np.any)
+    monkeypatch.setattr(contact_lcp, "max_of", np.max)
+
+
 class Chain(CoupledFriction):
     """n contacts at rest: each body on the ground, or each on the previous one; slips accelerate with b - A F."""
 
