@@ -16,7 +16,7 @@
 
 enum { REACHED, EVENT, GRAZE, STEP_EVENT, TERMINATED, FAILED, TOO_MANY_STEPS };
 enum { WARNING = 1, STAGES = 12, EXTRA = 3, DENSE = 7, SAMPLES = 8, SECTIONS = 60, HALVINGS = 200, LEVELS = 6 };
-static const double SAFETY = 0.9, SHRINK = 0.2, GROW = 6.0, FLOOR = 1e-6, SMALL = 1e-3, CLEAR = 1e-5, GOLDEN = 0.6180339887498949;
+static const double SAFETY = 0.9, SHRINK = 0.2, GROW = 6.0, FLOOR = 1e-6, FLOOR_S = 1e-4, SMALL = 1e-3, CLEAR = 1e-5, GOLDEN = 0.6180339887498949;
 static const double FAR = 1e50; /* an indicator as large as this stands for no event */
 
 typedef void *Instance;
@@ -42,8 +42,8 @@ typedef struct {
     double rtol, graze;
     size_t max_steps, n_steps, n_rhs;
     double t, h, t_event; /* time, next step, and time of the event */
-    double *z, *z1, *k, *dense, *largest, *nominals, *g, *g1, *samples, *largest_g, *t_far, *g_far, *work;
-    /* t_far, g_far: last step at whose begin an indicator was not near zero, and its value there */
+    double *z, *z1, *k, *dense, *largest, *nominals, *g, *g1, *samples, *largest_g, *t_far, *g_far, *touch, *work;
+    /* touch: z at a graze; t_far, g_far: last step at whose begin an indicator was not near zero, and its value there */
     const double *times;
     size_t n_times, next;
     double *values;
@@ -165,7 +165,7 @@ static double size_of(const Run *run, size_t j)
         relative = fmax(relative, fmax(run->largest[first + l], fabs(run->z1[first + l])) /
                                       fmax(run->largest[l], FLOOR * run->nominals[l]));
     double value = run->parameters[first / n - 1].value;
-    return fmax(size, fmax(SMALL * relative, value != 0.0 ? FLOOR / fabs(value) : 0.0) * state);
+    return fmax(size, fmax(SMALL * relative, value != 0.0 ? FLOOR_S / fabs(value) : 0.0) * state);
 }
 
 static double step_error(const Run *run, double h)
@@ -424,13 +424,14 @@ int advance(Run *run, double target)
                 h = event, is_last = false, has_dense = false;
             }
             if (!step(run, h, run->m)) return FAILED;
-            if (found == GRAZE && !prepare_dense(run, h)) return FAILED;
+            if (found == GRAZE && !(has_dense = prepare_dense(run, h))) return FAILED;
             run->t_event = run->t + event;
         } else {
             run->t_event = run->t + high * h;
             if (failures == 0 || factor < 1.0) run->h = h * fmin(GROW, factor);
             failures = 0;
         }
+        if (found == GRAZE) dense_at(run, (run->t_event - run->t) / h, n, run->touch);
         if (!accept(run, h, is_last ? target : run->t + h, has_dense)) return FAILED;
         if (found == EVENT) {
             run->is_fresh = false;

@@ -58,8 +58,9 @@ SHIFT = 1e-3  # of a parameter, or of the largest value of a state, for differen
 JUMP_SHIFT = 1e-4  # the same for differences of the states after an event
 NEAR = 1e-10  # of the duration: times this close coincide
 TOUCH = 1e-9  # of the largest value of an indicator: one that turns this close to zero touches it
-SAME = 1e-6  # relative difference of derivatives of two event times that are the same
+SAME = 1e-5  # relative difference of derivatives that are the same
 TIGHTER = 1e-3  # factor of the tolerance that the FMU receives, for its own decisions on events
+MODE_UPDATES = 3  # until an FMU has the modes of a point: from sliding against its mode it first sticks
 RESET = 100.0  # in tolerances: smaller changes of the states at an event are errors of the integration
 
 
@@ -89,7 +90,7 @@ FUNCTIONS = {
 }
 ARRAYS = (
     *("z", "z1", "k", "dense", "largest", "nominals", "g", "g1", "samples"),
-    *("largest_g", "t_far", "g_far", "work"),
+    *("largest_g", "t_far", "g_far", "touch", "work"),
 )
 TABLEAU = {"a": "A", "c": "C", "b": "B", "e3": "E3", "e5": "E5", "a_extra": "A_EXTRA", "c_extra": "C_EXTRA", "d": "D"}
 
@@ -331,7 +332,7 @@ class VariationalRun:
             "values": np.full((len(self.times) + 1, 1 + m, len(self.spec.outputs)), nan),
             "table": np.zeros((2, 1 + len(self.inputs))),
         }
-        self.arrays |= {name: np.zeros(size) for name in ("z", "z1", "largest")}
+        self.arrays |= {name: np.zeros(size) for name in ("z", "z1", "largest", "touch")}
         self.arrays |= {name: np.zeros(max(q, 1)) for name in ("g", "g1", "largest_g", "t_far", "g_far")}
         self.arrays |= {name: np.ascontiguousarray(getattr(DOP853, key)) for name, key in TABLEAU.items()}
         groups["outputs"] = [instance.variables[name] for name in self.spec.outputs]
@@ -518,9 +519,7 @@ class VariationalRun:
             if status > GRAZE:
                 raise self.failure(self.describe_status(status))
             if status == GRAZE:
-                self.undefine(
-                    int(run.indicator), "a limit is touched, but not passed", np.full(self.m, nan), run.t_event
-                )
+                self.handle_touch(int(run.indicator))
             elif status == EVENT or target < end:
                 self.handle_event(int(run.indicator) if status == EVENT else -1, status == REACHED and target == row)
                 row = self.set_table(run.t) if run.t >= row else row
@@ -586,7 +585,8 @@ class VariationalRun:
         self.y[:] = new
         self.run.is_fresh = False
         new_rates, _, new_modes = self.read_point()
-        if not jumps and new_modes == modes and np.all(new_rates == rates):
+        differs = np.abs(new_rates - rates) > RESET * self.spec.rtol * np.maximum(np.abs(new_rates), np.abs(rates))
+        if not (jumps or new_modes != modes or differs.any()):
             return
         if jumps:
             self.slopes[:] = moved - np.outer(of_event, new_rates)
@@ -606,6 +606,24 @@ class VariationalRun:
         self.check_ties(indicator, of_event, speed)
         if row is not None and early is not None:
             self.split_row(row, of_event, indicator, early, self.record_outputs())
+
+    def handle_touch(self, k: int) -> None:
+        """Note the parameters that decide whether indicator k, which touches zero without an event, passes it."""
+        sides, saved = np.full(self.m, nan), self.save()
+        if saved is not None:
+            t, z = self.run.t, self.arrays["z"].copy()
+            self.run.t, self.arrays["z"][:] = self.run.t_event, self.arrays["touch"]
+            rates, values, _ = self.read_point()
+            slopes = self.gradients([k], rates)[0][:-1]
+            sizes = np.array([abs(known.value) or 1.0 for known in self.knowns])
+            is_zero = np.abs(slopes) * sizes <= SAME * self.largest_g[k]
+            sides = np.where(is_zero, 0.0, np.sign(slopes) * np.sign(values[k]))
+            self.run.t, self.arrays["z"][:] = t, z
+            self.fmu.setFMUState(saved)
+            self.fmu.freeFMUState(saved)
+            self.run.is_fresh = False
+            self.read_point()
+        self.undefine(k, "a limit is touched, but not passed", sides, self.run.t_event)
 
     def turning_depth(self, k: int, speed: float) -> float:
         """Return how far an indicator that passes zero at a speed goes until it turns, by a parabola; inf if never."""
@@ -632,7 +650,7 @@ class VariationalRun:
     def gradients(self, indicators: Sequence[int], rates: np.ndarray, is_before: bool = True) -> list[np.ndarray]:
         """Return the total derivatives (m + 1,) of indicators by the parameters and by time; enter event mode.
 
-        Just after an event (not `is_before`), no indicator is expected to depend directly on parameters that are fixed.
+        The present point is just before an event, or just after it.
         """
         result = [np.zeros(self.m + 1) for _ in indicators]
         pointer = c_void_p(np.ascontiguousarray(rates).ctypes.data)
@@ -645,10 +663,13 @@ class VariationalRun:
                     e = min(SHIFT / float(shares.max()) if shares.any() else inf, SHIFT if known.input >= 0 else inf)
                     gradient[i] = slope(run, c_size_t(k), c_size_t(i), c_double(e), 0, pointer, None)
             gradient[-1] = slope(run, c_size_t(k), c_size_t(self.m), shift, 0, pointer, None)
-        for i, known in enumerate(self.knowns if is_before else ()):
-            if indicators and known.is_set and not known.is_tunable:
-                for gradient, value in zip(result, self.fixed_slopes(known, rates)[list(indicators)], strict=True):
-                    gradient[i] += value
+        for i, known in enumerate(self.knowns if indicators else ()):
+            if known.is_set and not known.is_tunable:
+                slopes = self.fixed_slopes(known, rates, -1.0 if is_before else 1.0)
+                if slopes is None and is_before and self.enters_outputs(known):
+                    self.undefine(indicators[0], "the event may depend on a fixed parameter", self.only(i))
+                for k, gradient in zip(indicators, result, strict=True):
+                    gradient[i] += 0.0 if slopes is None else slopes[k]
         self.move_to(self.run.t, self.y)
         self.fmu.enterEventMode()
         for k, gradient in zip(indicators, result, strict=True):
@@ -662,47 +683,49 @@ class VariationalRun:
                 raise self.failure(f"an event indicator has no finite values at t = {self.run.t:.9g} s")
         return result
 
-    def fixed_slopes(self, known: Known, rates: np.ndarray) -> np.ndarray:
+    def only(self, i: int) -> np.ndarray:
+        """Return sides without derivatives by parameter i."""
+        return np.where(np.arange(self.m) == i, nan, 0.0)
+
+    def fixed_slopes(self, known: Known, rates: np.ndarray, side: float) -> np.ndarray | None:
         """Return the partial derivatives (q,) of the indicators by a parameter that can be set before the start only.
 
         For each value the FMU is initialized again, and moved to the present point in the present modes, which it takes
-        at a point just before.
+        at a point just before (`side` -1) or after (1). None if it takes others, or cannot save its state.
         """
-        saved, t, y, before = self.save(), self.run.t, self.y.copy(), 10.0 * self.time_shift(rates)
+        saved = self.save() if known.side is not None else None
+        if saved is None:
+            return None
+        t, y, ahead = self.run.t, self.y.copy(), 10.0 * side * self.time_shift(rates)
         values, table = self.read_point()[1], self.arrays["table"].copy()
 
-        def indicators(value: float) -> np.ndarray:
-            self.initialize(known, value)
+        def indicators(change: float) -> np.ndarray:
+            self.initialize(known, known.value + change)
             self.fmu.exitInitializationMode()
             update_discrete_states(self.update, self.start)
             self.fmu.enterContinuousTimeMode()
             self.arrays["table"][:] = table
-            self.move_to(t - before, y - before * rates)
-            self.fmu.enterEventMode()
-            update_discrete_states(self.update, t - before)
-            self.fmu.enterContinuousTimeMode()
+            for _ in range(MODE_UPDATES):
+                self.move_to(t + ahead, y + ahead * rates)
+                self.fmu.enterEventMode()
+                update_discrete_states(self.update, t + ahead)
+                self.fmu.enterContinuousTimeMode()
             return self.read_point()[1]
 
-        failure = self.failure(f"the event at t = {t:.9g} s may depend on {known.variable.name}, which is fixed")
-        if saved is None or known.side is None:
-            raise failure
-        h, side, result = 1e-2 * known.shift, float(known.side), np.zeros(self.q)
-        base = indicators(known.value)
-        if is_same := bool(np.allclose(base, values, rtol=1e-9, atol=1e-12)):
-            near, far = (
-                side * (indicators(known.value + side * e) - base) / e
-                if side
-                else (indicators(known.value + e) - indicators(known.value - e)) / (2.0 * e)
-                for e in (0.5 * h, h)
-            )
-            is_same = bool(np.allclose(near, far, rtol=1e-3, atol=1e-6 * np.abs(far).max()))
-            result = 2.0 * near - far if side else (4.0 * near - far) / 3.0
+        result, base, e = None, indicators(0.0), 1e-2 * known.shift
+        if np.allclose(base, values, rtol=1e-9, atol=1e-12):
+            if known.side:  # one-sided differences
+                near, far = ((indicators(known.side * h) - base) / (known.side * h) for h in (0.5 * e, e))
+                result = 2.0 * near - far
+            else:
+                near, far = ((indicators(h) - indicators(-h)) / (2.0 * h) for h in (0.5 * e, e))
+                result = (4.0 * near - far) / 3.0
+            if not np.allclose(near, far, rtol=1e-3, atol=1e-6 * np.abs(far).max()):
+                result = None
         self.fmu.setFMUState(saved)
         self.fmu.freeFMUState(saved)
         self.read_point()
-        if not is_same and self.enters_outputs(known):
-            raise failure
-        return result if is_same else np.zeros(self.q)
+        return result
 
     def enters_outputs(self, known: Known) -> bool:
         """Return whether a rate or an output depends on a parameter directly, at the present point."""
