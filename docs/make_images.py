@@ -49,6 +49,10 @@ FIGURES_OF_PAGES = {
 FIGURES_OF_COMMANDS = {
     "coulomb": ("harness run coulomb", "results/coulomb/figure.svg"),
     "pendulum": ("harness run pendulum", "results/pendulum/figure.svg"),
+    "derivatives": (
+        "harness sensitivity stickslip --by k --outputs x --stop 12",
+        "results/sensitivity/stickslip/figure.svg",
+    ),
     "precision": ("harness precision stickslip --quick", "results/precision/stickslip/figure.svg"),
     "rivals": ("benchmarks rivals", "results/rivals/figure.svg"),  # needs the extra rivals
 }

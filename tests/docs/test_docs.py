@@ -103,7 +103,7 @@ def test_code_blocks_run_and_draw_the_pictures_of_the_page(page, workspace, envi
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["coulomb", "pendulum"])
+@pytest.mark.parametrize("name", ["coulomb", "pendulum", "derivatives"])
 def test_the_picture_of_a_scene_is_that_of_its_run(name, workspace):
     command, file = load("make_images").FIGURES_OF_COMMANDS[name]
     done = harness_command(workspace, *command.split()[1:])

@@ -1,7 +1,7 @@
 """Derivatives through stick and slip, of built FMUs against closed forms with 40 digits and differences of runs."""
 
 from functools import partial
-from itertools import product
+from itertools import pairwise, product
 
 import mpmath
 import numpy as np
@@ -13,6 +13,7 @@ from models import MODELS
 from native_fmus import build_native_fmus
 
 import harness
+from benchmarks.campaigns.random_models import STOP, random_structure, random_values, write_model
 
 DOP853 = 4
 PAIR = '''"""Two blocks under one force."""
@@ -125,9 +126,9 @@ def test_derivatives_are_those_of_the_closed_form(closed_form):
             assert s[output, parameter] == pytest.approx(expected, rel=1e-9, abs=1e-11 * largest), (parameter, output)
 
 
-def differences(fmu, parameter, value, values, times, outputs):
+def differences(fmu, parameter, value, values, times, outputs, share=1e-4):
     """Return the derivatives (times, outputs) by a parameter, by differences of five runs of co-simulation."""
-    h, solver = 1e-4 * (abs(value) or 1.0), {"solver.method": DOP853, "solver.rtol": 1e-13}
+    h, solver = share * (abs(value) or 1.0), {"solver.method": DOP853, "solver.rtol": 1e-13}
 
     def run(change):
         trajectory = harness.simulate(fmu, values | solver | {parameter: value + change}, times=times, outputs=outputs)
@@ -238,6 +239,35 @@ def test_touches_and_ties_are_reported(pair, values, parameters, at, reason):
     assert remark.endswith(f" s: {reason}.")
     assert float(remark.split()[-len(reason.split()) - 2]) == pytest.approx(at, rel=1e-6)
     assert np.isnan(s["x1", parameters[0]]).tolist() == (s.t > at).tolist()
+    has_sides = [bool(np.isfinite(side).all()) for side in s.one_sided("x1", parameters[0])]
+    assert has_sides == ([True, False] if "touched" in reason else [False, False])  # a smaller force adds no event
+
+
+@pytest.mark.parametrize(
+    "seed",
+    [pytest.param(n, marks=pytest.mark.slow if n in (3, 8) else pytest.mark.campaign) for n in range(30)],
+)
+def test_derivatives_of_random_models_are_those_of_differences(seed, tmp_path):
+    """Up to three bodies and contacts, with belts, drivers, limited loads and falling friction.
+
+    The least error of three differences counts; three times what two of them differ is allowed as well.
+    """
+    structure = random_structure(seed)
+    path = tmp_path / f"{structure.name}.py"
+    path.write_text(write_model(structure))
+    fmu = build_user_model(path, "--native", "--platform", "linux64") / "native" / f"{structure.name}.fmu"
+    variables, times = {item.name for item in harness.describe(fmu).variables}, np.linspace(0.0, STOP, 9)[1:] * 0.983
+    values = {name: value for name, value in random_values(structure, 0)[0].items() if name in variables}
+    parameters = [name for name, value in values.items() if isinstance(value, float) and value]
+    s = harness.sensitivity(fmu, parameters, values, times=times, rtol=1e-12)
+    outputs = list(s.outputs)
+    largest = np.abs(s.values).max(axis=0)
+    for i, (parameter, value) in enumerate(s.parameters.items()):
+        found = [differences(fmu, parameter, value, values, times, outputs, h) for h in (1e-3, 1e-4, 1e-5)]
+        size = np.maximum(np.abs(found[1]).max(axis=0), 1e-2 * largest / abs(value)) + 1e-300
+        error = np.min([np.abs(s.left[:, i] - one) / size for one in found], axis=0)
+        allowed = 1e-8 + 3 * np.min([np.abs(a - b) / size for a, b in pairwise(found)], axis=0)
+        assert not np.any(error > allowed), (parameter, error.max())  # NaN: there is no derivative
 
 
 def test_parameters_without_an_effect_are_named_once(capsys):
