@@ -11,7 +11,7 @@ from .active_method import METHOD_ITEMS
 from .codes import DIVERGED, EXACT, HYBRID, HYBRID_LAW_ONLY, OK, STUCK, TOO_MANY_STEPS
 from .internal_step import InternalStep
 from .step_end import OVERFLOW_LIMIT
-from .variable_declarations import Choice, Count, Fixed, Local, VariableOwner
+from .variable_declarations import Count, Enumeration, Local, Setting, VariableOwner
 from .vectors import (
     ContactVector,
     StateVector,
@@ -35,15 +35,15 @@ MAX_EVALUATIONS = 8_000_000  # evaluations of the right-hand side and of event f
 class Integrator(VariableOwner):
     """Solver settings, counts, and the state at the current time."""
 
-    method = Choice(ode23.NUMBER, "integration method", METHOD_ITEMS)
-    rtol = Fixed(0.0, "1", "relative tolerance; 0 uses the tolerance of the importer", low=0.0, below=1.0)
-    atol = Fixed(
+    method = Enumeration(ode23.NUMBER, "integration method", METHOD_ITEMS)
+    rtol = Setting(0.0, "1", "relative tolerance; 0 uses the tolerance of the importer", low=0.0, below=1.0)
+    atol = Setting(
         0.0,
         "1",
         "absolute tolerance in SI units; 0 uses 3 % of rtol times the largest value of a state so far, less for creep",
         low=0.0,
     )
-    h_max = Fixed(0.0, "s", "largest internal step; 0 uses a tenth of the run", low=0.0)
+    h_max = Setting(0.0, "s", "largest internal step; 0 uses a tenth of the run", low=0.0)
     steps = Count("accepted internal steps up to the current time")
     rejected = Count("rejected internal steps up to the current time")
     evaluations = Count("evaluations of the right-hand side up to the current time")

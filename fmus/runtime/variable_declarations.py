@@ -2,7 +2,8 @@
 
 A declaration is a class attribute, whose name is the name of the variable.  Instances of the class start with plain
 numbers under the same names.  XML, documentation pages and error messages use the declarations.  A value of a table has
-an attribute that is an identifier, as mu_y1, and another name in the FMU, as mu.y[1].
+an attribute that is an identifier, as mu_y1, and another name in the FMU, as mu.y[1].  Model files declare variables by
+the classes of compiler/equations/model_declaration.py, for each of which the generated class has a VariableDeclaration.
 """
 
 from __future__ import annotations
@@ -18,13 +19,16 @@ def is_in_range(value: float, low: float, high: float, above: float, below: floa
 
 
 class VariableDeclaration:
-    """Declaration of a variable: unit, description, range; enumerations have `items` (label, value, description)."""
+    """Declaration of a variable: unit, description, range; enumerations have `items` (label, value, description).
+
+    Inputs are constant over a communication step unless they have rates.
+    """
 
     type = "Real"
     is_integer = False  # its value is stored as an integer, also if its type is Real
-    causality = ""
-    variability = ""
-    initial = ""
+    causality = "output"
+    variability = "continuous"
+    direct = False  # an output that depends on an input directly, without a step in between
     start: float = 0.0
     items: tuple[tuple[str, int, str], ...] = ()
     role = ""  # "state", or "contact" for the friction force of a contact
@@ -47,6 +51,11 @@ class VariableDeclaration:
         self.name = name
 
     @property
+    def initial(self) -> str:
+        """Return how the start value is defined; empty where FMI has no choice."""
+        return {"parameter": "exact", "output": "calculated", "local": "calculated"}.get(self.causality, "")
+
+    @property
     def unit_suffix(self) -> str:
         """Return the unit as a suffix of a number."""
         return "" if self.unit in ("", "1") else f" {self.unit}"
@@ -67,23 +76,17 @@ class VariableDeclaration:
         return is_in_range(value, self.low, self.high, self.above, self.below)
 
 
-class Parameter(VariableDeclaration):
-    """Parameter that is tunable at every communication point."""
+class Setting(VariableDeclaration):
+    """Parameter that is fixed after initialisation."""
 
-    causality, variability, initial = "parameter", "tunable", "exact"
+    causality, variability = "parameter", "fixed"
 
     def __init__(self, start: float, unit: str, text: str, **more: Any) -> None:
         super().__init__(unit, text, **more)
         self.start = start
 
 
-class Fixed(Parameter):
-    """Parameter that is fixed after initialisation."""
-
-    variability = "fixed"
-
-
-class Choice(Fixed):
+class Enumeration(Setting):
     """Enumeration that is fixed after initialisation; items are (label, value, description)."""
 
     type, is_integer = "Enumeration", True
@@ -93,54 +96,10 @@ class Choice(Fixed):
         self.items = items
 
 
-class Input(Parameter):
-    """Input, constant over a communication step unless derivatives are set."""
-
-    causality, variability, initial = "input", "continuous", ""
-
-
-class Output(VariableDeclaration):
-    """Output; `direct` if it depends on an input directly, without a step in between."""
-
-    causality, variability, initial = "output", "continuous", "calculated"
-
-    def __init__(self, unit: str, text: str, direct: bool = False, rate_of: str = "", **more: Any) -> None:
-        super().__init__(unit, text, **more)
-        self.direct, self.rate_of = direct, rate_of
-
-
-class State(Output):
-    """Continuous state."""
-
-    role = "state"
-
-    def __init__(self, unit: str, text: str, rate: str = "", **more: Any) -> None:
-        super().__init__(unit, text, **more)
-        self.rate = rate
-
-
-class Contact(Output):
-    """Friction force of a contact."""
-
-    role = "contact"
-
-    def __init__(self, unit: str, text: str, **more: Any) -> None:
-        super().__init__(unit, text, direct=True, **more)
-
-
-class Mode(Output):
-    """Mode of a contact: -1 sliding backward, 0 stuck, 1 sliding forward."""
-
-    type, is_integer, variability, start = "Integer", True, "discrete", 0
-
-    def __init__(self, text: str) -> None:
-        super().__init__("", text, direct=True, low=-1, high=1)
-
-
 class Local(VariableDeclaration):
     """Local variable, calculated, not recorded by default."""
 
-    causality, variability, initial = "local", "discrete", "calculated"
+    causality, variability = "local", "discrete"
 
 
 class Count(Local):

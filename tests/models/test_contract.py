@@ -4,11 +4,11 @@ from math import radians
 
 import pytest
 from fmpy import read_model_description
-from models import MODELS, Choice, Input, Output, Parameter, declared, model_class
+from models import MODELS, declared, model_class
 
 from fmus.runtime.codes import OUT_OF_RANGE
 from fmus.runtime.messages import value_message
-from fmus.runtime.variable_declarations import Count, Fixed, Local, VariableOwner
+from fmus.runtime.variable_declarations import Enumeration, Setting, VariableOwner
 
 POUND, INCH = 0.45359237, 0.0254
 SLED = {"m": 12.5, "k": 742.5, "mu_s": 0.9, "mu_d": 0.6, "g": 9.81, "v_driver": 0.034}
@@ -57,7 +57,7 @@ UNITS = {
 
 
 def starts(name, kind):
-    return {v: d.start for v, d in declared(name).items() if kind(d) and "." not in v and not isinstance(d, Choice)}
+    return {v: d.start for v, d in declared(name).items() if kind(d) and "." not in v and not d.items}
 
 
 def test_there_are_five_models():
@@ -67,26 +67,32 @@ def test_there_are_five_models():
 
 @pytest.mark.parametrize("name", TUNABLE)
 def test_parameters_and_inputs_have_their_names_and_defaults(name):
-    assert starts(name, lambda d: type(d) is Parameter) == pytest.approx(TUNABLE[name], rel=1e-15)
-    assert starts(name, lambda d: isinstance(d, Fixed)) == pytest.approx(FIXED[name], rel=1e-15)
+    assert starts(name, lambda d: (d.causality, d.variability) == ("parameter", "tunable")) == pytest.approx(
+        TUNABLE[name], rel=1e-15
+    )
+    assert starts(name, lambda d: d.variability == "fixed") == pytest.approx(FIXED[name], rel=1e-15)
     force = "T_ext" if name == "pendulum" else "F_ext"
-    assert starts(name, lambda d: isinstance(d, Input)) == {force: 0.0}
+    assert starts(name, lambda d: d.causality == "input") == {force: 0.0}
     assert model_class(name).stop_time == STOP[name]
 
 
 @pytest.mark.parametrize("name", OUTPUTS)
 def test_outputs_have_their_names(name):
-    assert [v for v, d in declared(name).items() if isinstance(d, Output)] == OUTPUTS[name].split()
+    assert [v for v, d in declared(name).items() if d.causality == "output"] == OUTPUTS[name].split()
 
 
 @pytest.mark.parametrize("name", TUNABLE)
 def test_the_solver_has_its_settings_and_counters(name):
-    settings = {v: d.start for v, d in declared(name).items() if v.startswith("solver.") and isinstance(d, Parameter)}
+    settings = {
+        v: d.start
+        for v, d in declared(name).items()
+        if v.startswith("solver.") and d.causality in ("parameter", "input")
+    }
     default = {"pacejka": "radau9", "pendulum": "dop853"}.get(name, "exact")
     assert settings == {"solver.method": METHODS[default], "solver.rtol": 0.0, "solver.atol": 0.0, "solver.h_max": 0.0}
     for label, value, _ in declared(name)["solver.method"].items:
         assert METHODS[label] == value
-    counts = [v for v, d in declared(name).items() if isinstance(d, (Local, Count))]
+    counts = [v for v, d in declared(name).items() if d.causality == "local"]
     expected = "solver.steps solver.rejected solver.evaluations solver.h solver.t_next events.count events.t_last"
     assert sorted(counts) == sorted(expected.split())
 
@@ -115,15 +121,15 @@ def test_units_match_the_quantities(name):
 def test_masses_are_positive_and_all_start_values_are_in_range(name):
     assert declared(name)["m"].above == 0.0
     assert not declared(name)["m"].accepts(0.0)
-    assert all(d.accepts(d.start) for d in declared(name).values() if isinstance(d, Parameter))
+    assert all(d.accepts(d.start) for d in declared(name).values() if d.causality in ("parameter", "input"))
 
 
 def test_a_declaration_states_its_allowed_range():
     class Sample(VariableOwner):
-        free = Parameter(1.0, "1", "a number")
-        mass = Parameter(1.0, "kg", "mass", above=0.0)
-        share = Parameter(0.5, "1", "share", low=0.0, below=1.0)
-        kind = Choice(2, "kind", (("one", 1, "first"), ("two", 2, "second")))
+        free = Setting(1.0, "1", "a number")
+        mass = Setting(1.0, "kg", "mass", above=0.0)
+        share = Setting(0.5, "1", "share", low=0.0, below=1.0)
+        kind = Enumeration(2, "kind", (("one", 1, "first"), ("two", 2, "second")))
 
     assert vars(Sample()) == {"free": 1.0, "mass": 1.0, "share": 0.5, "kind": 2}
     message = value_message(OUT_OF_RANGE, "mass", Sample.mass, -2.0)

@@ -30,7 +30,7 @@ from fmus.packaging.model_description import REAL_ONLY_HINT, describe
 from fmus.runtime.integrator import Integrator
 from fmus.runtime.oscillator import Oscillator
 from fmus.runtime.run_state import RunState
-from fmus.runtime.variable_declarations import Fixed, Output, Parameter, variables
+from fmus.runtime.variable_declarations import Setting, variables
 
 EVERY_MODEL = pytest.mark.parametrize("name", model_names())
 
@@ -157,7 +157,7 @@ def test_direct_outputs_depend_on_the_input_and_the_others_on_nothing(fmu, name)
     assert outputs == {
         index: str(force) if meaning.direct else ""
         for index, meaning in enumerate(meanings, 1)
-        if isinstance(meaning, Output)
+        if meaning.causality == "output"
     }
     unknowns = root.findall("ModelStructure/InitialUnknowns/Unknown")
     assert [int(u.get("index")) for u in unknowns] == sorted(outputs)
@@ -379,7 +379,7 @@ def sketch(**declared):
 
 
 def test_start_values_survive_the_xml_bit_for_bit():
-    text = sketch(m=Parameter(0.1 + 0.2, "kg", "A sum <&> 'more'."))
+    text = sketch(m=Setting(0.1 + 0.2, "kg", "A sum <&> 'more'."))
     root = ElementTree.parse(BytesIO(text.encode())).getroot()
     assert root.find("ModelVariables/ScalarVariable/Real").get("start") == "0.30000000000000004"
     assert root.find("ModelVariables/ScalarVariable").get("description") == "A sum <&> 'more'."
@@ -390,9 +390,9 @@ def test_the_guid_follows_the_content():
     def guid(text):
         return ElementTree.fromstring(text).get("guid")
 
-    first, second = sketch(m=Parameter(1.0, "kg", "Mass.")), sketch(m=Parameter(1.0, "kg", "Mass."))
+    first, second = sketch(m=Setting(1.0, "kg", "Mass.")), sketch(m=Setting(1.0, "kg", "Mass."))
     assert first == second
-    assert guid(first) != guid(sketch(m=Parameter(2.0, "kg", "Mass.")))
+    assert guid(first) != guid(sketch(m=Setting(2.0, "kg", "Mass.")))
     date = datetime(2024, 1, 1, tzinfo=UTC)
     codes = [guid(describe(Sketch, "sketch", code, date)) for code in ("a", "b")]
     assert codes[0] != codes[1]
@@ -400,6 +400,6 @@ def test_the_guid_follows_the_content():
 
 def test_an_unknown_unit_is_refused_by_the_name_of_its_variable():
     with pytest.raises(BuildError, match=r"w has the unit 'furlong'; allowed units are 1, s, kg"):
-        sketch(w=Fixed(1.0, "furlong", "Width."))
+        sketch(w=Setting(1.0, "furlong", "Width."))
     with pytest.raises(BuildError, match=r"phi has the display unit 'turn'; allowed for rad: 'rad' or 'deg'"):
-        sketch(phi=Fixed(1.0, "rad", "Angle.", display="turn"))
+        sketch(phi=Setting(1.0, "rad", "Angle.", display="turn"))

@@ -5,7 +5,7 @@ from build_cache import build_once
 
 from fmus.compiler.model_lookup import find_model
 from fmus.compiler.units import parse_unit
-from fmus.runtime.variable_declarations import Fixed, Input, Parameter, variables
+from fmus.runtime.variable_declarations import variables
 
 MORE = ("forced", "joint", "sleds", "stacked")
 ODE23, RODAS = 2, 5
@@ -26,7 +26,7 @@ def run(worker, fmus, name, method, *exponents):
     values = {
         variable: meaning.start * factor(meaning.unit, *exponents)
         for variable, meaning in declared.items()
-        if isinstance(meaning, (Parameter, Fixed, Input)) and meaning.type == "Real"
+        if meaning.causality in ("parameter", "input") and meaning.type == "Real"
     }
     stop = model.stop_time * factor("s", *exponents)
     fmu = worker.instantiate(

@@ -10,7 +10,6 @@ from build_cache import ROOT
 from fmus.compiler.lowering import lowered_model, sibling_module
 from fmus.compiler.model_lookup import find_model
 from fmus.packaging.fmi_variables import declared_variables
-from fmus.runtime.variable_declarations import Choice, Input, Output, Parameter
 
 MODELS = sorted(path.stem for path in (ROOT / "fmus").glob("*.py") if path.stem != "__init__")
 BODIES = [
@@ -43,13 +42,12 @@ def declared(name):
 
 def outputs(name):
     """Return the names of the outputs; position and speed come first."""
-    return [v for v, d in declared(name).items() if isinstance(d, Output)]
+    return [v for v, d in declared(name).items() if d.causality == "output"]
 
 
 def parameters(name):
     """Return names and declarations of the numeric parameters and inputs (no choices)."""
-    kinds = (Parameter, Input)
-    return {v: d for v, d in declared(name).items() if isinstance(d, kinds) and not isinstance(d, Choice)}
+    return {v: d for v, d in declared(name).items() if d.causality in ("parameter", "input") and not d.items}
 
 
 def tunable(name):
@@ -64,7 +62,7 @@ def is_allowed(choices):
 
 def combinations(name):
     """Return every valid combination of the choices of a model, as values to set."""
-    choices = {v: d for v, d in declared(name).items() if isinstance(d, Choice)}
+    choices = {v: d for v, d in declared(name).items() if d.items}
     items = [[value for _, value, _ in declaration.items] for declaration in choices.values()]
     return [
         values for values in (dict(zip(choices, row, strict=True)) for row in product(*items)) if is_allowed(values)
@@ -126,7 +124,7 @@ def counts(name):
 
 def push(name):
     """Return the input of a model and a value that overcomes its friction."""
-    entry = next((v for v, d in declared(name).items() if isinstance(d, Input)), None)
+    entry = next((v for v, d in declared(name).items() if d.causality == "input"), None)
     if entry is None:
         pytest.skip(f"{name} has no input")
     return entry, {"pendulum": 0.02}.get(name, 200.0)

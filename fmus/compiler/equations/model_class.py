@@ -17,7 +17,7 @@ from .expression_printer import INDENT
 from .expressions import is_among
 from .model_analysis import ModelAnalysis
 from .model_conditions import Condition
-from .model_declaration import Contact, Fixed, Input, Mode, Output, State, Variable
+from .model_declaration import Contact, Input, Mode, Output, State, Variable
 from .output_methods import condition_methods, law_modes_method, observe_method
 from .rate_methods import rate_methods
 from .reserved_names import IMPORTS, MATH
@@ -34,7 +34,7 @@ Generated from the equations in {file}; edit that file instead.
 
 
 class Solver(Integrator):
-    method = Choice({method}, "integration method", {items})
+    method = Enumeration({method}, "integration method", {items})
 
 
 class {name}({base_class}):
@@ -48,6 +48,10 @@ class {name}({base_class}):
 '''
 IMPORTS_MARK = "\0"  # marks the place of the imports; model texts cannot contain it
 WIDTH = 105
+DECLARED_ATTRIBUTES = (
+    *("start", *OPTIONS, "causality", "variability", "type", "is_integer"),
+    *("role", "direct", "rate_of", "rate", "element"),
+)
 RUN_SETTINGS = ("stop_time", "step_size", "tolerance")
 
 
@@ -111,49 +115,43 @@ def import_lines(text: str) -> str:
 
 def declaration_lines(analysis: ModelAnalysis) -> list[str]:
     """Declare the variables in the order of the model description."""
-    lines = [
-        f"{e.name} = {'Fixed' if isinstance(e, Fixed) else 'Parameter'}({float(e.start)!r}, {declaration_arguments(e)})"
-        for e in analysis.parameters
-    ]
+    lines = [f"{e.name} = {declaration(e)}" for e in analysis.parameters]
     if analysis.laws:
         items = ", ".join(f"{law.upper()}_LAW" for law in analysis.laws)
-        lines.append(f'friction = Choice(HYBRID, "friction law", ({items}{"," if len(analysis.laws) == 1 else ""}))')
+        lines.append(
+            f'friction = Enumeration(HYBRID, "friction law", ({items}{"," if len(analysis.laws) == 1 else ""}))'
+        )
     for e in analysis.choices:
         items = ", ".join(
             f"({string_literal(label)}, {value}, {string_literal(sentence)})" for label, value, sentence in e.items
         )
-        lines.append(f"{e.name} = Choice({e.start}, {string_literal(e.text)}, ({items},))")
-    lines += [f"{e.name} = Input({float(e.start)!r}, {declaration_arguments(e)})" for e in analysis.inputs]
+        lines.append(f"{e.name} = Enumeration({e.start}, {string_literal(e.text)}, ({items},))")
+    lines += [f"{e.name} = {declaration(e)}" for e in analysis.inputs]
     return lines + [f"{e.name} = {output_declaration(analysis, e)}" for e in analysis.ordered_outputs]
 
 
 def output_declaration(analysis: ModelAnalysis, e: Variable) -> str:
     """Return the declaration of a calculated variable."""
-    if isinstance(e, Mode):
-        return f"Mode({string_literal(e.text)})"
-    options = (
-        f", rate_of={string_literal(e.integrates.name)}"
-        if isinstance(e, (State, Output)) and e.integrates is not None
-        else ""
-    )
-    if isinstance(e, State):
-        options += f", rate={string_literal(e.constant_rate.name)}" if is_among(e, analysis.drivers) else ""
-        return f"State({declaration_arguments(e)}{options})"
-    if isinstance(e, Contact):
-        return f"Contact({declaration_arguments(e)})"
-    return f"Output({declaration_arguments(e)}{options}{', direct=True' if analysis.has_direct_feedthrough(e) else ''})"
+    options: dict[str, object] = {}
+    if isinstance(e, (State, Output)) and e.integrates is not None:
+        options["rate_of"] = e.integrates.name
+    if isinstance(e, State) and is_among(e, analysis.drivers):
+        options["rate"] = e.constant_rate.name
+    if isinstance(e, (Contact, Mode)) or (isinstance(e, Output) and analysis.has_direct_feedthrough(e)):
+        options["direct"] = True
+    return declaration(e, **options)
 
 
-def declaration_arguments(e: Variable) -> str:
-    """Return the arguments unit and description, and the options that differ from their defaults."""
+def declaration(e: Variable, **more: object) -> str:
+    """Return the declaration of a variable, with the attributes that differ from their defaults."""
     texts = [string_literal(e.unit), string_literal(e.text)]
-    for name, option in OPTIONS.items():
-        value = vars(e).get(name)
-        if value not in (None, getattr(VariableDeclaration, name, None)):
-            texts.append(f"{name}={string_literal(value) if option.type is str else repr(option.type(value))}")
-    if e.element:
-        texts.append(f"element={string_literal(e.element)}")
-    return ", ".join(texts)
+    for name in DECLARED_ATTRIBUTES:
+        value, default = more.get(name, getattr(e, name)), getattr(VariableDeclaration, name)
+        if name in OPTIONS and not e.is_integer:
+            value = OPTIONS[name].type(value)
+        if repr(value) != repr(default):
+            texts.append(f"{name}={string_literal(value) if isinstance(value, str) else repr(value)}")
+    return f"VariableDeclaration({', '.join(texts)})"
 
 
 def class_attribute_lines(analysis: ModelAnalysis) -> list[str]:

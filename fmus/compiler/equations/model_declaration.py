@@ -9,7 +9,7 @@ from linecache import getline
 from types import FunctionType, ModuleType
 from typing import Any, ClassVar, Unpack, get_args, get_type_hints
 
-from ...runtime import variable_declarations
+from ...runtime.variable_declarations import VariableDeclaration, exported_name
 from .declaration_options import OPTIONS, Options, SettableOptions
 from .expressions import Expression, ModelError, Operand, Term, as_operand, author_location, describe, is_comparison
 
@@ -28,7 +28,7 @@ def signature_text(function: Callable[..., object]) -> str:
     return f"({', '.join(texts)})"
 
 
-class Variable(Expression, variable_declarations.VariableDeclaration):
+class Variable(Expression, VariableDeclaration):
     """A declared variable: name, unit, description and options such as its range."""
 
     __signature__: ClassVar[Signature]
@@ -56,7 +56,7 @@ class Variable(Expression, variable_declarations.VariableDeclaration):
                     f"{word} of a declaration must be a string, got {describe(value)}: write "
                     f"{type(self).__name__}{signature_text(type(self))}"
                 )
-        variable_declarations.VariableDeclaration.__init__(self, unit, text, **options)
+        VariableDeclaration.__init__(self, unit, text, **options)
         self.location = author_location()
 
     def __set_name__(self, owner: object, name: str) -> None:
@@ -65,7 +65,7 @@ class Variable(Expression, variable_declarations.VariableDeclaration):
     @property
     def label(self) -> str:
         """Name in the FMU."""
-        return variable_declarations.exported_name(self.name, self)
+        return exported_name(self.name, self)
 
 
 class SettableVariable(Variable):
@@ -76,7 +76,7 @@ class SettableVariable(Variable):
         self.start = start
 
 
-class Parameter(SettableVariable, variable_declarations.Parameter):
+class Parameter(SettableVariable):
     """A parameter, tunable at every communication point.
 
     Parameters
@@ -91,8 +91,10 @@ class Parameter(SettableVariable, variable_declarations.Parameter):
         See the table of options.
     """
 
+    causality, variability = "parameter", "tunable"
 
-class Fixed(SettableVariable, variable_declarations.Fixed):
+
+class Fixed(SettableVariable):
     """A parameter that is fixed after initialization, such as the start value of a state.
 
     Parameters
@@ -103,8 +105,10 @@ class Fixed(SettableVariable, variable_declarations.Fixed):
         See the table of options.
     """
 
+    causality, variability = "parameter", "fixed"
 
-class Input(SettableVariable, variable_declarations.Input):
+
+class Input(SettableVariable):
     """An input, set by another FMU or by the importer during the run. ::
 
         F_ext = Input(0.0, "N", "external force on the mass")
@@ -125,6 +129,8 @@ class Input(SettableVariable, variable_declarations.Input):
         See the table of options.
     """
 
+    causality = "input"
+
     def __init__(
         self,
         start: float,
@@ -137,7 +143,7 @@ class Input(SettableVariable, variable_declarations.Input):
         self.declared_rate: Operand = None if rate is None else as_operand(rate)
 
 
-class Choice(Variable, variable_declarations.Choice):
+class Choice(Variable):
     """An enumeration, numbered from 1; the first item is the default.
 
     Parameters
@@ -147,6 +153,8 @@ class Choice(Variable, variable_declarations.Choice):
     **items
         Items as label="meaning".
     """
+
+    type, is_integer, causality, variability = "Enumeration", True, "parameter", "fixed"
 
     def __init__(self, text: str, **items: str) -> None:
         if not items:
@@ -166,7 +174,7 @@ class Choice(Variable, variable_declarations.Choice):
         return value
 
 
-class State(Variable, variable_declarations.Output):
+class State(Variable):
     """A continuous state. ::
 
         x = State("m", "position", start=0.1)
@@ -193,6 +201,8 @@ class State(Variable, variable_declarations.Output):
         See the table of options.
     """
 
+    role = "state"
+
     def __init__(
         self,
         unit: str,
@@ -208,7 +218,7 @@ class State(Variable, variable_declarations.Output):
         self.constant_rate: Operand = None if rate is None else as_operand(rate)
 
 
-class Output(Variable, variable_declarations.Output):
+class Output(Variable):
     """A calculated variable; its range is a property of the solution and is not enforced.
 
     Parameters
@@ -235,15 +245,17 @@ class Output(Variable, variable_declarations.Output):
         self.expression, self.integrates = as_operand(expression), rate_of
 
 
-class Mode(Variable, variable_declarations.Mode):
+class Mode(Variable):
     """The direction of sliding: -1, 0 while stuck, or 1."""
+
+    type, is_integer, variability, start = "Integer", True, "discrete", 0
 
     def __init__(self, text: str = "-1 sliding backward, 0 stuck, 1 sliding forward") -> None:
         Variable.__init__(self, "", text)
         self.low, self.high = -1, 1
 
 
-class Contact(Variable, variable_declarations.Output):
+class Contact(Variable):
     """The force of dry friction in a contact, an unknown of the equations; positive if it opposes a positive slip. ::
 
         mode = Mode()
@@ -275,6 +287,8 @@ class Contact(Variable, variable_declarations.Output):
         See the table of options.
     """
 
+    role = "contact"
+
     def __init__(
         self,
         unit: str,
@@ -304,9 +318,6 @@ class Contact(Variable, variable_declarations.Output):
             raise ModelError(f"laws must be (HYBRID,), (HYBRID, SIGN) or (HYBRID, THRESHOLD), got {laws!r}")
         if (eps is not None) != (THRESHOLD in laws):
             raise ModelError("eps is required with the law THRESHOLD and not allowed without it")
-
-
-KINDS = (Choice, Contact, Fixed, Input, Mode, Output, Parameter, State)  # of declarations
 
 
 class Rule:

@@ -8,7 +8,7 @@ from ...runtime.method_registry import methods
 from ...runtime.oscillator import Oscillator
 from ...runtime.stick_slip import DryFriction
 from .expressions import FUNCTIONS, Expression, ModelError
-from .model_declaration import KINDS, Model
+from .model_declaration import Model
 
 MATH = ("copysign", "inf", "nan", "pi", *FUNCTIONS)
 IMPORTS = {  # module -> names that generated code may import
@@ -17,7 +17,7 @@ IMPORTS = {  # module -> names that generated code may import
     "codes": ("EXACT", "HYBRID", "MODEL_RULE", "OK"),
     "input_polynomial": ("InputPolynomial", "PrescribedMotion"),
     "contact_lcp": ("CoupledFriction",),
-    "variable_declarations": tuple(kind.__name__ for kind in KINDS),
+    "variable_declarations": ("Enumeration", "VariableDeclaration"),
     "integrator": ("Integrator",),
     "active_method": ("EXACT_ITEM", "METHOD_ITEMS"),
     "oscillator": ("Oscillator",),

@@ -145,7 +145,7 @@ class FileLowerer:
         match node:
             case ast.Assign(
                 targets=[ast.Name(id=name)],
-                value=ast.Call(func=ast.Name(id="Choice"), args=[start, text, items]) as choice,
+                value=ast.Call(func=ast.Name(id="Enumeration"), args=[start, text, items]) as choice,
             ) if possible := self.spec.choices.get(name):
                 is_included = ast.unparse(start).removesuffix(".NUMBER") in self.spec.methods
                 if not is_included and self.declared.constants.get(getattr(start, "id", "")) not in possible:
