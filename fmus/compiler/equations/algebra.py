@@ -256,7 +256,7 @@ def differentiate(e: Operand, by: Mapping[Expression, Operand], names: dict[Expr
             new = result[id(part.expression)]
         else:
             assert isinstance(part, Term)
-            new = _differentiate_term(part, lambda operand: result[id(operand)])
+            new = differentiate_term(part, lambda operand: result[id(operand)])
         result[id(part)] = new
         name = (part.name or names.get(part, "")) if isinstance(part, (Term, Output)) and part not in by else ""
         if name and isinstance(new, Term) and not (new.name or new in names) and id(new) not in existing:
@@ -264,7 +264,8 @@ def differentiate(e: Operand, by: Mapping[Expression, Operand], names: dict[Expr
     return result[id(e)]
 
 
-def _differentiate_term(e: Term, slope: Callable[[Operand], Operand]) -> Operand:
+def differentiate_term(e: Term, slope: Callable[[Operand], Operand]) -> Operand:
+    """Return the derivative of a term, where `slope` returns those of its operands."""
     a, b = e.args[0], e.args[-1]
     if isinstance(e.op, (Piece, Coefficient)):  # constant between two points of a table
         return 0.0

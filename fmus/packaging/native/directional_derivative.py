@@ -7,8 +7,8 @@ inputs and parameters change in a given direction:
     propagate_constant_tangent  of the constants that prepare calculates: by parameters
     propagate_tangent           of outputs and derivatives, from compute_outputs: by states, driver, inputs, parameters
 
-They take the same branches as the functions of the model. Where friction sticks, the force equals the load, and their
-tangents are equal as well.
+The rules of derivatives are those of compiler/equations/algebra.py.  The functions take the same branches as those of
+the model.  Where friction sticks, the force equals the load, and their tangents are equal as well.
 
 References
 ----------
@@ -24,8 +24,9 @@ from math import fabs
 from types import FunctionType
 from typing import Any
 
-from ...compiler.equations.expression_printer import ExpressionPrinter
-from ...compiler.equations.expressions import FUNCTIONS, Expression, Term
+from ...compiler.equations.algebra import differentiate_term
+from ...compiler.equations.expression_printer import BINARY_OPERATORS, ExpressionPrinter
+from ...compiler.equations.expressions import FUNCTIONS, Expression, Operand, Term
 from ...compiler.equations.model_analysis import ANALYSES
 from ...compiler.lowering import component_name, function_tree
 from ...compiler.lowering.import_hook import TREE_NAME
@@ -34,6 +35,7 @@ from ..fmi_variables import DERIVATIVE_NAME, Variables
 # Prefix of tangents, and the parameter that holds the direction and the results. No variable of a model starts with _.
 PREFIX, TANGENT = "_d_", "_tangent"
 ARGUMENT = Expression()
+OPERATIONS = {type(operator): word for word, operator in BINARY_OPERATORS.items()}
 
 
 class Tangent:
@@ -250,9 +252,9 @@ class TangentWriter:
             case ast.Call(func=ast.Attribute(value=polynomial, attr="value_at")):
                 return self.tangent_of(polynomial)
             case ast.UnaryOp(op=ast.USub(), operand=inner):
-                return negate_term(self.tangent_of(inner))
+                return self.operation_tangent(e, "neg", inner)
             case ast.BinOp(left=a, op=op, right=b):
-                return self.binary_tangent(e, a, op, b)
+                return self.operation_tangent(e, OPERATIONS[type(op)], a, b)
             case ast.IfExp(test=test, body=yes, orelse=no):
                 branches = self.tangent_of(yes), self.tangent_of(no)
                 if branches == (None, None):
@@ -267,19 +269,20 @@ class TangentWriter:
                 return self.function_tangent(name, a)
         return None
 
-    def binary_tangent(self, e: ast.expr, a: ast.expr, op: ast.operator, b: ast.expr) -> ast.expr | None:
-        """Return the tangent of a sum, difference, product or quotient."""
-        da, db = self.tangent_of(a), self.tangent_of(b)
-        match op:
-            case ast.Add():
-                return add_terms(da, db)
-            case ast.Sub():
-                return add_terms(da, negate_term(db))
-            case ast.Mult():
-                return add_terms(multiply_terms(a, db), multiply_terms(b, da))
-        from_a = None if da is None else parse_expression(f"({source_of(da)}) / ({source_of(b)})")
-        from_b = None if db is None else parse_expression(f"-({source_of(e)}) * ({source_of(db)}) / ({source_of(b)})")
-        return add_terms(from_a, from_b)
+    def operation_tangent(self, e: ast.expr, word: str, *operands: ast.expr) -> ast.expr | None:
+        """Return the tangent of an operation, by the rules of derivatives for the equations."""
+        changes = [self.tangent_of(operand) for operand in operands]
+        if not any(changes):
+            return None
+        symbols, slopes = ([Expression() for _ in operands] for _ in range(2))
+        term = Term(word, *symbols)
+        rates: dict[int, Operand] = {
+            id(symbol): 0.0 if change is None else slope
+            for symbol, slope, change in zip(symbols, slopes, changes, strict=True)
+        }
+        texts = dict(zip([term, *symbols, *slopes], map(source_of, [e, *operands, *changes]), strict=True))
+        derivative = differentiate_term(term, lambda operand: rates[id(operand)])
+        return parse_expression(ExpressionPrinter(texts, (), (), 0).text(derivative))
 
 
 def derivative_factor(name: str, a: str) -> str:
@@ -314,13 +317,3 @@ def source_of(e: ast.expr | None) -> str:
 def add_terms(a: ast.expr | None, b: ast.expr | None) -> ast.expr | None:
     """Return a + b; None is zero."""
     return b if a is None else a if b is None else ast.BinOp(a, ast.Add(), b)
-
-
-def multiply_terms(a: ast.expr, b: ast.expr | None) -> ast.expr | None:
-    """Return a * b; None is zero."""
-    return None if b is None else ast.BinOp(a, ast.Mult(), b)
-
-
-def negate_term(e: ast.expr | None) -> ast.expr | None:
-    """Return -e; None is zero."""
-    return None if e is None else ast.UnaryOp(ast.USub(), e)
