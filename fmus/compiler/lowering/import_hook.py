@@ -18,10 +18,11 @@ from ..embedded_modules import digest
 from ..equations.model_analysis import ANALYSES
 from ..equations.model_file import ModelFile
 from ..model_lookup import FMUS, find_model
-from ..syntax_trees import child_nodes
 from .feature_selection import FeatureSelection, select_features
 from .lowered_modules import lower_all, lowered_texts
 
+LOAD, STORE = ast.Load(), ast.Store()
+GROUPS = (ast.Tuple, ast.List, ast.Starred)  # targets whose parts are targets
 TREE_NAME = "written_out"  # attribute of lowered modules: the tree with source line numbers
 
 
@@ -78,21 +79,28 @@ class LoweredModuleFinder(MetaPathFinder, Loader):
 
     def exec_module(self, module: ModuleType) -> None:
         path = self.path(module.__name__)
-        tree = ast.parse(self.texts[path], path)
-        copy_lines(tree, self.trees[path])
+        tree = complete_tree(self.trees[path])
         module.__file__ = str(self.places.get(path, FMUS / path))
         vars(module)[TREE_NAME] = tree
         exec(compile(tree, module.__file__, "exec", optimize=0), vars(module))
 
 
-def copy_lines(tree: ast.AST, source: ast.AST, line: int = 1) -> None:
-    """Copy the line numbers of a tree to the tree of its text; nodes without a number get that of their statement."""
-    line = getattr(source, "lineno", line)
-    if isinstance(tree, (ast.stmt, ast.expr, ast.excepthandler, ast.arg, ast.keyword, ast.alias)):
-        tree.lineno, tree.col_offset, tree.end_lineno, tree.end_col_offset = line, 0, None, None
-    parts = child_nodes(source)
-    for n, part in enumerate(child_nodes(tree)):
-        copy_lines(part, parts[n] if n < len(parts) else source, line)
+def complete_tree(node: Any, line: int = 1, context: ast.expr_context = LOAD) -> Any:
+    """Return a copy of a tree with line numbers and contexts, for the compiler; nodes without a line have that of their
+    statement."""
+    line, copy = getattr(node, "lineno", line), type(node)()
+    for name, value in ast.iter_fields(node):
+        inner = STORE if name in ("target", "targets") else context if isinstance(node, GROUPS) else LOAD
+        if isinstance(value, list):
+            value = [complete_tree(part, line, inner) if isinstance(part, ast.AST) else part for part in value]
+        elif isinstance(value, ast.AST) and name != "ctx":
+            value = complete_tree(value, line, inner)
+        setattr(copy, name, value)
+    if "ctx" in copy._fields:
+        copy.ctx = context
+    if "lineno" in copy._attributes:
+        copy.lineno, copy.col_offset = line, 0
+    return copy
 
 
 def sibling_module(model: type[VariableOwner], path: str) -> Any:
