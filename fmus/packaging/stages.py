@@ -1,11 +1,10 @@
 """Writes the texts of a model at every stage of code generation, for readers who want to follow an equation.
 
 1-declared.py       the model file
-2-expressions.txt   the expressions that its equations build
-3-analysis.txt      what the structural analysis derives from them
-4-model.py          the generated class of scalars
-5-lowered/          this class and the numerics, lowered to the states of the model
-6-c/                the same as C, with the FMI functions
+2-analysis.txt      the expressions that its equations build, and what the structural analysis derives from them
+3-model.py          the generated class of scalars
+4-lowered/          this class and the numerics, lowered to the states of the model
+5-c/                the same as C, with the FMI functions
 """
 
 from collections.abc import Iterator, Sequence
@@ -41,12 +40,11 @@ def write_stages(source: ModelFile, folder: Path, methods: Sequence[str] = (), l
     features = select_features(source, methods, laws)
     texts = {
         "1-declared.py": source.source,
-        "2-expressions.txt": "".join(f"{line}\n" for line in expression_lines(source.analysis)),
-        "3-analysis.txt": "".join(f"{line}\n" for line in analysis_lines(source.analysis)),
-        "4-model.py": source.generated_source,
+        "2-analysis.txt": "\n".join([*expression_lines(source.analysis), "", *analysis_lines(source.analysis), ""]),
+        "3-model.py": source.generated_source,
     }
-    texts |= {f"5-lowered/{path}": text for path, text in lowered_files(source, features).items()}
-    texts |= {f"6-c/{name}": text for name, text in collect_sources(lowered_model(source, features), "2").items()}
+    texts |= {f"4-lowered/{path}": text for path, text in lowered_files(source, features).items()}
+    texts |= {f"5-c/{name}": text for name, text in collect_sources(lowered_model(source, features), "2").items()}
     for name, text in texts.items():
         path = folder / source.name / name
         path.parent.mkdir(parents=True, exist_ok=True)
