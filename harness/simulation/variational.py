@@ -39,6 +39,7 @@ import numpy as np
 from lxml import etree
 
 from ..errors import HarnessError, install_command
+from ..process.interrupt import check_interrupt
 from ..scenes.run_spec import RunSpec
 from .array_elements import ArrayElement, split_own_arrays, start_values
 from .event_mode import MAX_EVENTS, update_discrete_states
@@ -52,7 +53,7 @@ from .whole_run import compile_library
 SOURCE = Path(__file__).with_name("variational.c")
 REACHED, EVENT, GRAZE, STEP_EVENT, TERMINATED, FAILED, TOO_MANY_STEPS = range(7)  # of variational.c
 EXTENDED, DENSE, SAMPLES = 16, 8, 9  # stages with those of the interpolant, rows of two buffers
-MAX_STEPS = 2_000_000
+MAX_STEPS, STEPS_PER_CHECK = 1_000_000, 1000
 DEFAULT_RTOL = 1e-11
 SHIFT = 1e-3  # of a parameter, or of the largest value of a state, for differences of an event indicator
 JUMP_SHIFT = 1e-4  # the same for differences of the states after an event
@@ -353,7 +354,7 @@ class VariationalRun:
             setattr(run, field, cast(references, c_void_p))
         for field, array in self.arrays.items():
             setattr(run, field, array.ctypes.data)
-        run.rtol, run.graze, run.max_steps = self.spec.rtol, TOUCH, MAX_STEPS
+        run.rtol, run.graze = self.spec.rtol, TOUCH
         self.y = self.arrays["z"][:n]
         self.slopes = self.arrays["z"][n : n * (1 + m)].reshape(m, n)  # of the states, by parameter
         self.sizes, self.largest_g = self.arrays["largest"][:n], self.arrays["largest_g"][:q]
@@ -513,9 +514,13 @@ class VariationalRun:
         run, row, last_t, n_at_once = self.run, self.set_table(self.start), self.start, 0
         end = self.stop + self.tolerance  # an event at the stop is found
         while run.t < end:
+            check_interrupt()
             report(min(1.0, (run.t - self.start) / (self.stop - self.start)))
             target = min(end, row, self.next_event)
+            run.max_steps = run.n_steps + STEPS_PER_CHECK
             status = self.library.advance(byref(run), c_double(target))
+            if status == TOO_MANY_STEPS and run.n_steps < MAX_STEPS:
+                continue
             if status > GRAZE:
                 raise self.failure(self.describe_status(status))
             if status == GRAZE:
