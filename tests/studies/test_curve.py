@@ -5,6 +5,7 @@ import json
 import commands
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from variants import slow_after
 
 import harness
@@ -134,3 +135,13 @@ def test_a_known_unit_outranks_names_and_names_outrank_a_default_unit(tmp_path, 
     curve = harness.identify_curve(record, constant=constant, points=True)
     assert (curve.points.velocity_unit, curve.points.force_unit) == units
     assert reason in " ".join(curve.points.notes)
+
+
+def test_the_drawn_laws_span_the_measured_speeds_of_both_directions():
+    v = np.array([sign * speed for speed in np.geomspace(0.01, 0.3, 12) for sign in (1.0, -1.0)])
+    axes = Figure().subplots()
+    harness.identify_curve((v, np.sign(v) * 1.2 + 2.0 * v)).plot(ax=axes)
+    laws = [np.array(line.get_xydata()) for line in axes.lines if line.get_linestyle() == "-"]  # the best one, twice
+    ends = sorted(tuple(law[i]) for law in laws for i in (0, -1))
+    expected = [(-0.3, -1.8), (-0.01, -1.22), (0.01, 1.22), (0.3, 1.8)]
+    assert np.array(ends) == pytest.approx(np.array(expected), rel=1e-9)
