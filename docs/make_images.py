@@ -62,7 +62,7 @@ def run_command(folder: Path, command: str) -> None:
     """Run a command of a package, as in "harness run coulomb", in a folder that has the built FMUs."""
     if not (folder / "fmus").exists():
         (folder / "fmus").symlink_to(FMUS.resolve())
-    arguments = [sys.executable, "-m", *command.split(), "--quiet"]
+    arguments = [sys.executable, "-m", *command.split()]
     subprocess.run(arguments, cwd=folder, check=True, env=os.environ | {"PYTHONPATH": str(DOCS.parent)})
 
 

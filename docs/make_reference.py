@@ -201,7 +201,7 @@ def result_files(fmus: Path) -> str:
         folder = Path(name)
         (folder / "fmus").symlink_to(fmus.resolve())
         for command in SAMPLES:
-            run(Block("sh", "", f"cd {folder} && friction-fmus {command} --quiet", 0, "", (0, 0), ""), folder, {})
+            run(Block("sh", "", f"cd {folder} && friction-fmus {command}", 0, "", (0, 0), ""), folder, {})
         for file in sorted(folder.glob("results/**/*.csv")):
             headings = next(line for line in file.read_text().splitlines() if not line.startswith("#"))
             columns = ", ".join(f"`{heading.strip()}`" for heading in headings.split(",") if heading.strip())
@@ -263,10 +263,7 @@ def record_formats() -> str:
 
     rows = []
     for record_format in FORMATS:
-        arguments = (
-            f"--{RECORD_OPTIONS.get(key, key)} {shlex.quote(f'{value}')}"
-            for key, value in record_format.options.items()
-        )
+        arguments = (f"--{key} {shlex.quote(f'{value}')}" for key, value in record_format.options.items())
         options = " ".join(f"`{argument}`" for argument in arguments)
         result = "read" + (f" with {options}" if options else "")
         if record_format.base == "units":
@@ -281,10 +278,6 @@ def record_formats() -> str:
     return format_table(("format", "example", "result"), rows)
 
 
-RECORD_OPTIONS = {
-    "time_unit": "time-unit",
-    "per_count": "per-count",
-}  # by the argument of read_record
 SAMPLES = (
     "run stickslip",
     "run fmus/pendulum.fmu",

@@ -52,12 +52,13 @@ if TYPE_CHECKING:
     from .simulation.fmu_variables import FmuDescription
     from .simulation.signals import ModeChanges, Signals
     from .simulation.trajectory import Trajectory
-    from .studies.compare.difference import Comparison
     from .studies.compare.result import ComparisonResult
+    from .studies.compare.study import Comparison
     from .studies.curve.result import CurveResult
     from .studies.decay.result import DecayResult
     from .studies.fit.result import FitResult
     from .studies.precision.result import PrecisionResult
+    from .studies.run.result import RunResult
     from .studies.sensitivity.result import SensitivityEvent, SensitivityResult
     from .studies.stability.result import StabilityResult
     from .studies.sweep.result import SweepResult
@@ -80,6 +81,7 @@ __all__ = [
     "ParameterFit",
     "PrecisionResult",
     "Record",
+    "RunResult",
     "SceneError",
     "SensitivityEvent",
     "SensitivityResult",
@@ -103,7 +105,7 @@ __all__ = [
 
 # Types of results: loaded on first use, because they import numpy, which `--help` does not need.
 TYPES = {
-    "Comparison": "harness.studies.compare.difference",
+    "Comparison": "harness.studies.compare.study",
     "ComparisonResult": "harness.studies.compare.result",
     "CurveIdentification": "harness.analyses.curve.identification",
     "CurveResult": "harness.studies.curve.result",
@@ -118,6 +120,7 @@ TYPES = {
     "Record": "harness.records.record",
     "SensitivityEvent": "harness.studies.sensitivity.result",
     "SensitivityResult": "harness.studies.sensitivity.result",
+    "RunResult": "harness.studies.run.result",
     "Signals": "harness.simulation.signals",
     "StabilityResult": "harness.studies.stability.result",
     "SweepResult": "harness.studies.sweep.result",

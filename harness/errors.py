@@ -13,7 +13,7 @@ MAX_LISTED_NAMES = 100  # names listed in a message
 COMMAND_LINE = ContextVar("command_line", default=False)  # whether a command runs, whose options messages name
 OPTIONS = {"inputs": "input", "values": "set", "folder": "out"}  # by the argument, where the names differ
 FUNCTIONS = {"curve": "identify_curve", "decay": "identify_decay"}  # by the command, where the names differ
-OF_READ_RECORD = ("headings", "per_count", "time_unit")  # arguments that no other function of the Python API has
+OF_READ_RECORD = ("headings",)  # arguments that no other function of the Python API has
 
 
 class HarnessError(Exception):
@@ -26,6 +26,14 @@ class SceneError(HarnessError):
     """The scene or another input is invalid."""
 
     status = 2
+
+
+class RunError(HarnessError):
+    """A run ended early; `run` holds it up to the failure."""
+
+    def __init__(self, message: str, run: Any) -> None:
+        super().__init__(message)
+        self.run = run
 
 
 def first_line(error: Exception) -> str:

@@ -1,31 +1,36 @@
 """Table of the benchmarks, and their summary."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from math import isnan
 
-from rich.table import Table
-from rich.text import Text
-
-from harness.results.summary import Summary, make_table, make_terminal_table
+from harness.results.summary import Summary, SummaryTable
+from harness.results.table import ResultColumn, ResultTable
 
 from .benchmark import Baseline, Benchmark
 
 
-def benchmark_table(benchmarks: Iterable[Benchmark]) -> Table:
+def benchmark_table(benchmarks: Sequence[Benchmark]) -> ResultTable:
     """Return the table of measured values, targets and baselines."""
-    table = make_terminal_table()
-    table.add_column("benchmark")
-    table.add_column("measured", justify="right", no_wrap=True)
-    table.add_column("target", justify="right", no_wrap=True)
-    table.add_column("verdict")
-    table.add_column("baseline")
-    for benchmark in benchmarks:
-        missed = Text("not measured", style="dim") if isnan(benchmark.value) else Text("missed", style="bold red")
-        verdict = Text("met") if benchmark.is_met else missed
-        baselines = "\n".join(format_baseline(benchmark, baseline) for baseline in benchmark.baselines)
-        values = (format_quantity(number, benchmark.unit) for number in (benchmark.value, benchmark.target))
-        table.add_row(benchmark.name, *values, verdict, baselines)
-    return table
+    return ResultTable(
+        benchmarks,
+        (
+            ResultColumn("benchmark", "{0.name}", is_text=True),
+            ResultColumn("measured", lambda benchmark: format_quantity(benchmark.value, benchmark.unit)),
+            ResultColumn("target", lambda benchmark: format_quantity(benchmark.target, benchmark.unit)),
+            ResultColumn("verdict", judge, is_text=True),
+            ResultColumn("baseline", list_baselines, is_text=True),
+        ),
+    )
+
+
+def judge(benchmark: Benchmark) -> str:
+    """Return whether the target is met."""
+    return "met" if benchmark.is_met else "not measured" if isnan(benchmark.value) else "missed"
+
+
+def list_baselines(benchmark: Benchmark) -> str:
+    """Return the baselines, one a line."""
+    return "\n".join(format_baseline(benchmark, baseline) for baseline in benchmark.baselines)
 
 
 def format_baseline(benchmark: Benchmark, baseline: Baseline) -> str:
@@ -48,14 +53,16 @@ def format_quantity(value: float, unit: str) -> str:
 
 def summarize_benchmarks(benchmarks: Iterable[Benchmark]) -> Summary:
     """Return the summary: the missed targets, those that are met, and what was not measured."""
-    groups: dict[str, list[tuple[str, ...]]] = {"": [], "Targets that are met": [], "Not measured": []}
+    groups: dict[str, list[Benchmark]] = {"": [], "Targets that are met": [], "Not measured": []}
     for benchmark in benchmarks:
         title = "Not measured" if isnan(benchmark.value) else "Targets that are met" if benchmark.is_met else ""
-        groups[title].append(summary_row(benchmark))
+        groups[title].append(benchmark)
     missed, met, _ = groups.values()
     sentences = (f"{len(met)} of {len(met) + len(missed)} targets met.", *["Targets that are missed:"][: len(missed)])
     headings = ("benchmark", "measured", "target", "unit", "baselines")
-    tables = tuple(table for title, rows in groups.items() for table in make_table(headings, rows, title))
+    tables = tuple(
+        SummaryTable(headings, tuple(map(summary_row, rows)), title) for title, rows in groups.items() if rows
+    )
     return Summary("bench", "Targets and measurements", sentences, tables)
 
 

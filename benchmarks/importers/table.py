@@ -14,7 +14,7 @@ from harness.process.interruptible_wait import map_in_threads
 from harness.results.files import write_csv_rows
 from harness.results.folder import replace_folder
 from harness.results.provenance import describe_sources, prefix_parameters, write_provenance
-from harness.results.summary import Summary, make_table, write_summary
+from harness.results.summary import Summary, SummaryTable, write_summary
 from harness.simulation.fmu_archive import declared_parameters
 
 from .checks import (
@@ -63,7 +63,8 @@ def run_importer_checks(fmus: Path, out: Path, report: Callable[[str, float], No
             source=describe_sources(str(fmus)),
             command=command_line(),
         )
-        write_summary(folder, Summary("importers", "Checks", tables=make_table(headings, rows)))
+        table = SummaryTable(tuple(headings), tuple(tuple(map(str, row)) for row in rows))
+        write_summary(folder, Summary("importers", "Checks", tables=(table,)))
     return results
 
 

@@ -27,7 +27,7 @@ from harness.references.ode_problem import OdeProblem
 from harness.results.files import column_heading, write_csv_rows
 from harness.results.folder import replace_folder
 from harness.results.provenance import write_provenance
-from harness.results.summary import Summary, make_table, write_summary
+from harness.results.summary import Summary, SummaryTable, write_summary
 from harness.scenes.fmu_files import find_fmu
 from harness.simulation.embedded_model import EmbeddedModel, load_model_class, load_more_model, method_numbers
 from harness.simulation.solution import Solution
@@ -82,7 +82,8 @@ def write_literature(runs: Sequence[LiteratureRun], folder: Path) -> None:
         ["" if value is None else f"{value:.4g}" if isinstance(value, float) else value for value in row]
         for row in cells
     )
-    write_summary(folder, Summary("precision", "Problems from the literature", tables=make_table(headings, rows)))
+    table = SummaryTable(tuple(headings), tuple(tuple(map(str, row)) for row in rows))
+    write_summary(folder, Summary("precision", "Problems from the literature", tables=(table,)))
 
 
 def solve_all() -> Iterator[LiteratureRun]:

@@ -1,28 +1,22 @@
 """Table of the problems from the literature."""
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 
-from rich.table import Table
-from rich.text import Text
-
-from harness.studies.precision.advice import format_power
-from harness.studies.precision.table import empty_table
+from harness.results.quantity import format_power
+from harness.results.table import ResultColumn, ResultTable
 
 from .study import LiteratureRun
 
+COLUMNS = (
+    ResultColumn("solver", "{0.solver}", is_text=True),
+    ResultColumn("method", "{0.method}", is_text=True),
+    ResultColumn("rtol", lambda run: format_power(run.rtol)),
+    ResultColumn("calls", lambda run: "-" if run.evaluations is None else str(run.evaluations)),
+    ResultColumn("error [SI]", lambda run: run.failure or f"{run.error:.1e}"),
+)
 
-def literature_table(rows: Iterable[LiteratureRun]) -> Table:
+
+def literature_table(runs: Sequence[LiteratureRun]) -> ResultTable:
     """Return the table of literature problems."""
-    table = empty_table("problems from the literature: right-hand side calls and final error", "solver")
-    table.add_column("method")
-    for name in ("rtol", "calls", "error [SI]"):
-        table.add_column(name, justify="right")
-    last = ""
-    for row in rows:
-        if row.problem != last:
-            table.add_section()
-            table.add_row(Text(row.problem, style="bold"))
-        calls = "-" if row.evaluations is None else f"{row.evaluations}"
-        table.add_row(f"  {row.solver}", row.method, format_power(row.rtol), calls, row.failure or f"{row.error:.1e}")
-        last = row.problem
-    return table
+    title = "problems from the literature: right-hand side calls and final error"
+    return ResultTable(runs, COLUMNS, title, group=lambda run: (run.problem,))

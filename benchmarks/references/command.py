@@ -2,14 +2,13 @@
 
 import click
 
-from harness.commands.terminal import Terminal, json_option, quiet_option
+from harness.commands.terminal import Terminal, json_option
 
 
 @click.command()
 @click.argument("models", metavar="MODEL...", nargs=-1, required=True)
-@quiet_option
 @json_option
-def references(models: tuple[str, ...], quiet: bool, as_json: bool) -> None:
+def references(models: tuple[str, ...], as_json: bool) -> None:
     """Compute the certified results of each shipped MODEL, for each friction law, and write them next to its file.
 
     A model without an icon gets one, and a model of fmus/more without a second formulation is named.
@@ -26,4 +25,4 @@ def references(models: tuple[str, ...], quiet: bool, as_json: bool) -> None:
     results = [result for model in models for result in certify_shipped(model)]
     output = [f"{result.path}, relative difference {result.difference:.1e}" for result in results]
     output += [sentence for model in models for sentence in missing_parts(model)]
-    Terminal(quiet, as_json).print_result(results, *output)
+    Terminal(as_json).print_result(results, *output)

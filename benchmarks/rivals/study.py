@@ -10,7 +10,7 @@ from harness.process.worker import Worker, WorkerError
 from harness.results.files import write_csv_rows
 from harness.results.folder import replace_folder
 from harness.results.provenance import write_provenance
-from harness.results.summary import Summary, read_cells, write_summary
+from harness.results.summary import Summary, write_summary
 from harness.scenes.fmu_files import find_fmu
 from harness.simulation.solution import Solution
 
@@ -57,7 +57,7 @@ def run_rivals(names: tuple[str, ...], timeout: float, out: Path, report: Callab
         write_provenance(
             folder, map(find_fmu, OWN_MODELS), scene=versions(comparison), source=source, command=command_line()
         )
-        tables, text = read_cells(rivals_table(comparison)), "Error over processor time of each rival, by scene"
+        tables, text = rivals_table(comparison).summarize(), "Error over processor time of each rival, by scene"
         write_summary(folder, Summary("rivals", "Scenes", tuple(summary_lines(comparison)), tables, text))
     return comparison
 

@@ -1,29 +1,29 @@
 """The table of all rivals, and its summary."""
 
 from collections.abc import Iterator
+from functools import partial
 
-from rich.table import Table
-from rich.text import Text
+from harness.results.table import ResultColumn, ResultTable
 
 from .catalogue import OWN
 from .comparison import Comparison, Result, format_setting
-from .scenes import SCENES
+from .scenes import SCENES, Scene
 
 EXACT = 1e-9  # in the unit of the error
 
 
-def rivals_table(comparison: Comparison) -> Table:
+def rivals_table(comparison: Comparison) -> ResultTable:
     """Return the table, the most accurate rival of each scene first."""
-    table = Table(box=None, padding=(0, 1, 0, 0))
-    table.add_column("rival, setting", no_wrap=True)
-    for name in ("error", "creep", "lost/extra", "late", "steps", "time", "lines"):
-        table.add_column(name, justify="right", no_wrap=True)
-    for scene in SCENES.values():
-        table.add_section()
-        table.add_row(Text(f"{scene.title} [{scene.unit}]", style="bold"))
-        for result in comparison.of_scene(scene):
-            table.add_row(f" {result.rival}, {result.setting}", *cells(comparison, result))
-    return table
+    rows = [(scene, result) for scene in SCENES.values() for result in comparison.of_scene(scene)]
+    columns = [ResultColumn("rival, setting", "{0[1].rival}, {0[1].setting}", is_text=True)]
+    for i, name in enumerate(("error", "creep", "lost/extra", "late", "steps", "time", "lines")):
+        columns.append(ResultColumn(name, partial(format_measure, comparison, i)))
+    return ResultTable(rows, columns, group=lambda row: (f"{row[0].title} [{row[0].unit}]",))
+
+
+def format_measure(comparison: Comparison, number: int, row: tuple[Scene, Result]) -> str:
+    """Return one of the cells of a result."""
+    return cells(comparison, row[1])[number]
 
 
 def cells(comparison: Comparison, result: Result) -> list[str]:

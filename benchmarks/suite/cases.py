@@ -14,7 +14,7 @@ from harness.references.models import MODEL_MODULES
 from harness.references.reference_trajectory import CommunicationGrid, compute_reference
 from harness.simulation.fmu_info import read_info
 from harness.simulation.solution import Solution
-from harness.studies.stability.cases import value_spans
+from harness.studies.stability.study import value_spans
 
 TOLERANCE = 1e-6  # of the motion, relative to the largest value of a state
 POINTS = 400  # communication steps

@@ -6,7 +6,7 @@ from pathlib import Path
 import click
 from rich.table import Table
 
-from harness.commands.terminal import Terminal, json_option, quiet_option
+from harness.commands.terminal import Terminal, json_option
 
 
 @click.command()
@@ -14,11 +14,8 @@ from harness.commands.terminal import Terminal, json_option, quiet_option
 @click.option("--case", "names", multiple=True, help="Write only this case; repeatable.")
 @click.option("--platform", "platforms", multiple=True, help="Compile only for this platform; repeatable.")
 @click.option("--run", "runs", is_flag=True, help="Run the cases in the importers that are installed, and judge them.")
-@quiet_option
 @json_option
-def suite(
-    folder: Path, names: tuple[str, ...], platforms: tuple[str, ...], runs: bool, quiet: bool, as_json: bool
-) -> None:
+def suite(folder: Path, names: tuple[str, ...], platforms: tuple[str, ...], runs: bool, as_json: bool) -> None:
     """Write the friction suite to the folder OUT: hard cases with certified results, and check.py, which judges a tool.
 
     With --run, also run the cases in fmpy, in the importers that are installed, and in three that are wrong on purpose;
@@ -36,7 +33,7 @@ def suite(
 
     check_names("case", names, [case.name for case in CASES])
     cases = [case for case in CASES if not names or case.name in names]
-    terminal = Terminal(quiet, as_json)
+    terminal = Terminal(as_json)
     with terminal.progress(1) as report:
         write_suite(cases, folder, platforms, lambda share: report("suite", share))
     index = json.loads((folder / "cases.json").read_text(encoding="utf-8"))

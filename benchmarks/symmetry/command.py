@@ -9,7 +9,7 @@ from typing import Any
 
 import click
 
-from harness.commands.terminal import POSITIVE, Terminal, json_option, quiet_option
+from harness.commands.terminal import POSITIVE, Terminal, json_option
 from harness.errors import HarnessError
 from harness.process.worker import WorkerPool
 
@@ -50,7 +50,6 @@ SOURCES = (".py", ".fmu")
     help="Folder that keeps the built FMUs.  Default: build/symmetry of the checkout.",
 )
 @click.option("--workers", type=click.IntRange(1), default=os.cpu_count() or 1, help="Processes. Default: all cores.")
-@quiet_option
 @json_option
 def symmetry(
     models: tuple[str, ...],
@@ -63,7 +62,6 @@ def symmetry(
     long_run: float,
     builds: Path,
     workers: int,
-    quiet: bool,
     as_json: bool,
 ) -> None:
     """Run models under a change of the start time, of the units, of all signs, of the order of declarations, of the
@@ -83,7 +81,7 @@ def symmetry(
     for source in sources:
         if not source.is_file():
             raise HarnessError(f"there is no file {source}: give a model name, a model file or an FMU")
-    terminal = Terminal(quiet, as_json)
+    terminal = Terminal(as_json)
     tasks = [(source, backend) for source in sources for backend in (backends if source.suffix == ".py" else ("fmu",))]
     arguments = partial(build_fmu, builds), kinds or KINDS, methods, Options(max_steps=max_steps, long_run=long_run)
     with terminal.progress(len(tasks)) as report:
@@ -96,7 +94,7 @@ def symmetry(
     cells = list_cells(count_differences(outcomes, by_method))
     blocks = [] if markdown else [make_table(cells)]
     terminal.print_result(as_data(outcomes), f"{TITLE}: runs that differ, of all", *blocks)
-    if not (quiet or as_json):
+    if not as_json:
         rows = make_markdown(cells) if markdown else []  # rich would break long rows
         click.echo("\n".join([*rows, *list_reasons(outcomes), *failed]))
     if failed:

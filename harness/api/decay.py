@@ -81,7 +81,8 @@ def identify_decay(
     x : array_like, optional
         The samples (n,), if `record` holds their times (n,) in s.
     unit : str, optional
-        Unit of the samples, as ``"mm"``, ``"deg/s"`` or ``"g"``; required for arrays, otherwise that of the heading.
+        Unit of the samples, as ``"mm"``, ``"deg/s"`` or ``"g"``, or the size of one count of an encoder, as
+        ``"0.36deg"``; required for arrays, otherwise that of the heading.
     quantity : {"position", "velocity", "acceleration"}, optional
         Measured quantity, if it follows neither from the unit nor from the name of the column.
     time, column : str, optional

@@ -157,10 +157,8 @@ def fit(
     from ..scenes.fmu_files import check_built, find_fmu
     from ..scenes.run_spec import RunSpec
     from ..studies.fit import study
-    from ..studies.fit.laws import make_tasks
-    from ..studies.fit.observed import choose_columns
-    from ..studies.fit.options import read_fitted_values, select_starts
-    from ..studies.fit.request import FitRequest
+    from ..studies.fit.request import FitRequest, choose_columns, read_fitted_values, select_starts
+    from ..studies.fit.study import make_tasks
 
     check_time_range(time, rate, begin, end)
     fmus = [find_fmu(str(law)) for law in (source, *against)]  # type: ignore[misc] # a list by its rule

@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     column=TEXT,
     quantity=QUANTITY,
     unit=TEXT,
-    time_unit=TEXT,
-    per_count=TEXT,
     headings=TEXT,
     rate=POSITIVE,
     begin=FINITE,
@@ -30,8 +28,6 @@ def read_record(
     column: str | None = None,
     quantity: str | None = None,
     unit: str | None = None,
-    time_unit: str | None = None,
-    per_count: str | None = None,
     headings: str | None = None,
     rate: float | None = None,
     begin: float | None = None,
@@ -44,13 +40,13 @@ def read_record(
     source : str or path
         A table in a text file, a spreadsheet, or a .mat, HDF5, Parquet, .npy, .npz or JSON file.
     time, column : str, optional
-        Headings of the columns of times and samples, if the table has several.
+        Headings of the columns of times and samples, if the table has several. A unit in the heading of the times
+        replaces that of the file, as in ``"Zeit [ms]"``, or ``"n [0.01s]"`` for sample numbers.
     quantity : {"position", "velocity", "acceleration"}, optional
         Measured quantity, if it follows neither from the unit nor from the heading.
-    unit, time_unit : str, optional
-        Units of the samples and of the times, as ``"mm"`` and ``"ms"``, if the file lacks them.
-    per_count : str, optional
-        Size of one count of an encoder, as ``"0.36deg"``.
+    unit : str, optional
+        Unit of the samples, as ``"mm"``, if the file lacks it, or the size of one count of an encoder, as
+        ``"0.36deg"``.
     headings : str, optional
         Headings of a file without any, separated by commas, as ``"t [s],x [mm]"``.
     rate : float, optional
@@ -79,7 +75,7 @@ def read_record(
     from ..records.record import load_record
 
     check_time_range(time, rate, begin, end)
-    options = ColumnOptions(time, column, quantity, unit, time_unit, per_count, headings, rate, begin, end)
+    options = ColumnOptions(time, column, quantity, unit, headings, rate, begin, end)
     record = load_record(str(source), options)
     record.check()
     return record

@@ -23,7 +23,7 @@ from ..arguments import (
     has_time_stamps,
     to_array,
 )
-from ..errors import HarnessError, SceneError, format_value
+from ..errors import SceneError, format_value
 from .options import apply_options, reporter, with_progress_bar
 from .tables import SIDE, convert_to_signals, is_xarray, list_variables
 
@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from ..scenes.run_spec import RunSpec
     from ..simulation.trajectory import Trajectory
     from ..studies.compare.result import ComparisonResult
+    from ..studies.run.result import RunResult
 
 
 @check_arguments(
@@ -70,13 +71,14 @@ def simulate(
     timeout: float | None = None,
     lenient: bool = False,
     progress: Progress | bool | None = None,
-) -> "Trajectory":
+) -> "RunResult":
     """Run a model, a scene or an FMU once.
 
     Parameters
     ----------
     source : str or path
         The name of a model (``"stickslip"``), the path of an FMU, or the name or path of a scene (``"my_scene.toml"``).
+        A name that a model and a scene share means the model here, and the scene for the command `run`.
     values : mapping, optional
         Parameters and start values by name, in the units of the FMU; enumerations by label or number.
     start, stop : float, optional
@@ -113,25 +115,27 @@ def simulate(
 
     Returns
     -------
-    Trajectory
-        Time, columns by name, units, events, statistics and effective parameters.
+    RunResult
+        Time, columns by name, units, events, statistics and effective parameters; for a scene, the `quantities` of its
+        analyses as well.
 
     Raises
     ------
     SceneError
         If the source or an argument is not valid.
     HarnessError
-        If the run fails; the text is the message of the FMU.
+        If the run fails; the text is the message of the FMU. If it ends early, `run` of the error holds it up to then.
 
     Examples
     --------
     >>> sled = simulate("stickslip", {"mu_s": 0.8}, stop=8.0)  # doctest: +SKIP
     >>> sled["x"][-1]  # doctest: +SKIP
     """
-    from ..simulation import runner
-    from ..simulation.resolve import resolve
+    from ..simulation.resolve import find_source, specify_run
+    from ..studies.run.study import run_once
 
-    spec = resolve(source)
+    item = find_source(source)
+    spec, scene = specify_run(item), None if isinstance(item, Path) else item
     if values:
         spec = replace(spec, values={**spec.values, **values})
     if inputs is not None:
@@ -143,10 +147,7 @@ def simulate(
     spec = apply_options(spec, stop, interval, outputs, method, rtol, interface, timeout, lenient)
     if interval is not None and spec.inputs:
         spec = replace(spec, grid=choose_fine_step(spec, interval))
-    trajectory = runner.run(spec, reporter(progress))
-    if trajectory.failure:
-        raise HarnessError(trajectory.failure)
-    return trajectory
+    return run_once(spec, scene, reporter(progress))
 
 
 @check_arguments(
@@ -189,9 +190,9 @@ def compare(
         If the two sides have no variable or no time in common.
     """
     from ..scenes.run_spec import RunOptions
-    from ..studies.compare.difference import compare as difference
     from ..studies.compare.result import ComparisonResult
-    from ..studies.compare.trajectory_sources import display_names, load_both
+    from ..studies.compare.study import compare as difference
+    from ..studies.compare.study import display_names, load_both
 
     options = {"stop": stop, "interface": interface, "timeout": timeout, "rtol": rtol, "lenient": lenient or None}
     first, second = load_both(

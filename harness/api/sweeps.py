@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ..arguments import (
     FINITE,
@@ -21,8 +21,9 @@ from ..arguments import (
     Rule,
     check_arguments,
     mapping,
+    text,
 )
-from ..errors import SceneError, import_optional
+from ..errors import SceneError, by_interface, import_optional
 from .options import apply_options, reporter, with_progress_bar
 
 if TYPE_CHECKING:
@@ -31,6 +32,14 @@ if TYPE_CHECKING:
     from ..studies.sweep.result import SweepResult
 
 
+def folder_name(value: Any) -> str:
+    """Return the name of a folder, which is no path and does not begin with a dot."""
+    if (name := text(value)).startswith(".") or Path(name).name != name:
+        raise ValueError
+    return name
+
+
+NAME = Rule("a single folder name that does not start with a dot", folder_name)
 GRID = mapping(Rule("numbers", lambda values: values), "numbers")  # the axes check their values
 
 
@@ -49,6 +58,7 @@ GRID = mapping(Rule("numbers", lambda values: values), "numbers")  # the axes ch
     workers=WORKERS,
     scheduler=TEXT,
     folder=PATH,
+    name=NAME,
     progress=PROGRESS,
 )
 @with_progress_bar
@@ -68,6 +78,7 @@ def sweep(
     workers: int | None = None,
     scheduler: str | None = None,
     folder: "str | Path | None" = None,
+    name: str | None = None,
     progress: Progress | bool | None = None,
 ) -> "SweepResult":
     """Run a model or an FMU at many points of its parameters.
@@ -92,11 +103,15 @@ def sweep(
     stop, rtol, interface, timeout, lenient
         As in `simulate`.
     workers : int, optional
-        Number of worker processes; by default all runs are done in this process.
+        Number of worker processes; by default all runs are done in this process, and by the command in one process for
+        each processor.
     scheduler : str, optional
         Address of a Dask cluster, as ``"tcp://host:8786"``.
     folder : path, optional
-        Folder for the files of the sweep; an interrupted sweep is resumed from it.
+        Folder for results, as the option ``--out``; the files are in ``sweep/NAME`` below it, and an interrupted sweep
+        is resumed. By default no file is written.
+    name : str, optional
+        Name of the folder of this sweep; by default that of the model, the varied parameters and a key.
     progress : callable or False, optional
         Receives the progress from 0 to 1. By default a terminal or a notebook shows a bar after two seconds; False
         switches it off.
@@ -117,9 +132,6 @@ def sweep(
     from ..process.temporary_directory import temporary_directory
     from ..scenes.fmu_files import find_fmu
     from ..scenes.run_spec import RunSpec
-    from ..studies.sweep.labels import list_labels, read_labels, replace_labels
-    from ..studies.sweep.runner import SweepSpec
-    from ..studies.sweep.sampling import SweepPoints, axis_from_numbers
     from ..studies.sweep.study import run_sweep
 
     import_optional("xarray", "a sweep", "sweep")
@@ -127,18 +139,17 @@ def sweep(
         raise SceneError("grid is empty: name at least one parameter and its values, as in {'mu_d': [0.3, 0.6]}")
     if workers is not None and scheduler is not None:
         raise SceneError("workers has no effect with scheduler, whose cluster has its own workers: leave one out")
+    if name is not None and folder is None:
+        raise SceneError("name has no effect without folder: give the folder for results as well")
     run = RunSpec(find_fmu(str(source)), values=dict(values or {}), follow=False)
     run = apply_options(run, stop=stop, rtol=rtol, interface=interface, timeout=timeout, lenient=lenient)
-    if twice := set(grid) & set(run.values):
-        raise SceneError(f"{min(twice)} is varied by grid and has a value for all runs: remove one")
-    labels = read_labels(run) if any(map(list_labels, grid.values())) else {}
-    columns = {name: replace_labels(name, column, labels) for name, column in grid.items()}
-    axes = tuple(axis_from_numbers(name, column, samples is not None) for name, column in columns.items())
-    points = SweepPoints(axes, samples, seed)
-    spec = SweepSpec(run, points.names, tuple(measures))
     with temporary_directory("sweep-") if folder is None else nullcontext(Path(folder)) as directory:
-        resume = "they are lost, because `folder` is not set" if folder is None else "repeat the call to resume"
-        result = run_sweep(spec, points, None, directory, scheduler, workers, reporter(progress), resume)
+        resume = by_interface("repeat the command to resume", "repeat the call to resume")
+        if folder is None:
+            resume = "they are lost, because `folder` is not set"
+        result = run_sweep(
+            run, grid, samples, seed, measures, name, directory, scheduler, workers, reporter(progress), resume
+        )
         result.data  # noqa: B018 - loads it before a temporary folder is removed
     if folder is None:
         result.folder = None

@@ -253,7 +253,7 @@ def convert_to_signals(source: Any) -> "Signals":
     """
     import numpy as np
 
-    from ..records.columns import ColumnOptions, find_column, list_columns, parse_numbers
+    from ..records.columns import ColumnOptions, find_column_and_unit, list_columns, parse_numbers
     from ..records.headings import TIME_NAME
     from ..records.units import TIMES
     from ..simulation.signals import Signals
@@ -266,8 +266,9 @@ def convert_to_signals(source: Any) -> "Signals":
     candidates = list_columns(table)
     time_column = next((column for column in candidates if TIME_NAME.search(column.name)), candidates[0])
     if options.time is not None:
-        time_column = find_column(options.time, table, candidates)
-    unit = options.time_unit or time_column.unit or "s"
+        time_column, time_unit = find_column_and_unit(options.time, table, candidates)
+        time_column = replace(time_column, unit=time_unit)
+    unit = time_column.unit or "s"
     if unit not in TIMES:
         raise SceneError(f"the times of the record are in {unit}: give them in {', '.join(TIMES)}")
     numbers = [parse_numbers(table, column.index, strict=False) for column in candidates]
@@ -284,7 +285,7 @@ def convert_to_signals(source: Any) -> "Signals":
         raise SceneError("the times of the record must be at least two finite numbers that do not fall")
     begin, end = options.interval
     part = (time >= begin) & (time <= end)
-    others = [column for column in candidates if column is not time_column]
+    others = [column for column in candidates if column.index != time_column.index]
     columns = {column.name: numbers[column.index][part] for column in others}
     units = {column.name: column.unit or "" for column in candidates}
     return Signals(time[part], columns, units, label=record.name)

@@ -5,7 +5,8 @@ from pkgutil import iter_modules
 
 import click
 
-from .run import outcome_as_json
+from ..errors import HarnessError
+from .run import run_and_save, run_as_json
 from .terminal import Terminal, result_options, write_options
 
 
@@ -61,16 +62,39 @@ def commands(context: click.Context, terminal: Terminal) -> None:
     # options before the command apply to the command as well
     context.default_map = dict.fromkeys(commands.commands, vars(terminal))
     if context.invoked_subcommand is None:
-        from ..studies.run import study
-        from ..studies.run.table import conclude, explain_chatter, results_table
+        run_published_scenes(terminal)
 
-        names = study.compared_scene_names()
-        with terminal.progress(len(names)) as report:
-            outcomes = list(study.run_scenes(names, terminal.out, report))
-        rows = [outcome_as_json(outcome, terminal.out) for outcome in outcomes]
-        failed = (outcome.error for outcome in outcomes if outcome.error)
-        blocks = [results_table(outcomes, everything=False), "", *filter(None, [explain_chatter(outcomes)])]
-        terminal.print_result(rows, *blocks, folder=terminal.out, failed=failed, conclusion=conclude(outcomes))
+
+def run_published_scenes(terminal: Terminal) -> None:
+    """Run all built-in scenes with known values; one that fails does not stop the others."""
+    from rich.text import Text
+
+    from ..process.interrupt import check_interrupt
+    from ..scenes.fmu_files import check_built
+    from ..scenes.scene import load_scene, shipped_scenes
+    from ..studies.run.result import conclude, explain_chatter, tabulate_quantities
+
+    scenes = [scene for scene in map(load_scene, shipped_scenes()) if scene.known]
+    for scene in scenes:
+        check_built(scene.run.fmu)
+    runs, rows, failed = [], [], list[str]()
+    with terminal.progress(len(scenes)) as report:
+        for scene in scenes:
+            check_interrupt()
+            try:
+                result, folder = run_and_save(scene.name, terminal.out, report)
+                runs.append(result)
+                rows.append(run_as_json(result, folder))
+                failed += filter(None, [result.failure])
+            except HarnessError as error:
+                check_interrupt()  # a Python FMU may have swallowed an interrupt
+                failed.append(str(error))
+                rows.append({"scene": scene.name, "quantities": [], "error": str(error), "comparison": None})
+    text, agrees = conclude(runs)
+    blocks = [tabulate_quantities(runs, everything=False), *(f"{row['scene']}: failed" for row in rows if row["error"])]
+    blocks += ["", *filter(None, [explain_chatter(runs)])]
+    conclusion = Text(text, style="green" if agrees else "red") if text else ""
+    terminal.print_result(rows, *blocks, folder=terminal.out, failed=failed, conclusion=conclusion)
 
 
 commands.checks = ("precision", "stability", "references")

@@ -10,7 +10,6 @@ from .terminal import (
     NONNEGATIVE,
     SectionedCommand,
     Terminal,
-    is_given,
     refuse_ignored_options,
     refuse_options,
     result_options,
@@ -32,8 +31,8 @@ def compare(
     second: str,
     within: float | None,
     atol: float | None,
+    run: dict[str, Any],
     terminal: Terminal,
-    **_: Any,
 ) -> None:
     """Compare A and B, variable by variable.  Each is an FMU (FMI 2.0 or 3.0), a scene, a result folder, or a file:
     CSV of fmpy, .csv or .mat of OpenModelica or Dymola, or any table whose first column is time.
@@ -56,20 +55,18 @@ def compare(
         from ..scenes.fmu_files import find_fmu
         from ..simulation.resolve import FMU_SUFFIXES
         from ..simulation.trajectory import Trajectory
-        from ..studies.compare.trajectory_sources import RUN_SUFFIXES, display_names
+        from ..studies.compare.study import RUN_SUFFIXES, display_names
 
         suffixes = [Path(source).suffix for source in (first, second)]
         if all(Path(source).exists() for source in (first, second)) and not {*suffixes} & {*RUN_SUFFIXES}:
             refuse_options(context, "on stored results and files", "stop")
         fmus = [find_fmu(source) for source in (first, second) if Path(source).suffix in FMU_SUFFIXES]
         refuse_ignored_options(context, fmus)
-        options = {name: context.params[name] for name in ("stop", "rtol", "interface", "lenient", "timeout")}
-        given = {name: value for name, value in options.items() if is_given(context, name)}
         sides = [Path(source) if Path(source).is_file() else source for source in (first, second)]
-        compute = partial(compare_sides, *sides, **given, progress=partial(report, "compare"))
+        compute = partial(compare_sides, *sides, **run, progress=partial(report, "compare"))
         folder = terminal.out / "compare" / "-".join(display_names((first, second))).replace("/", "-")
         source = describe_sources(first, second)
-        comparison = save_result(folder, compute, "compare", source, scene=options)
+        comparison = save_result(folder, compute, "compare", source, scene=run)
     runs = [side for side in (comparison.one, comparison.two) if isinstance(side, Trajectory)]
     failed = [run.failure for run in runs if run.failure]
     if within is not None or atol is not None:

@@ -14,7 +14,7 @@ from .terminal import (
     NONNEGATIVE,
     POSITIVE,
     RATE_OPTION,
-    TIME_UNIT_OPTION,
+    TIME_OPTION,
     SectionedCommand,
     Terminal,
     result_options,
@@ -30,8 +30,7 @@ from .terminal import (
 @click.option("--current", help="Heading of the current of the motor, instead of a force.")
 @click.option("--constant", metavar="SIZE", help="Constant of the motor: '0.12 N.m/A' or '35 N/A'.")
 @click.option("--points", is_flag=True, help="Take each row as a point, even if the file has times.")
-@click.option("--time", help="Heading of the time, in a record over time. Default: t, time, ...")
-@TIME_UNIT_OPTION
+@TIME_OPTION
 @HEADINGS_OPTION
 @RATE_OPTION
 @BEGIN_OPTION
@@ -75,7 +74,7 @@ def curve(source: str, terminal: Terminal, **options: Any) -> None:
     from ..results.provenance import describe_sources
     from ..results.result import save_result
 
-    columns = {name: options.pop(name) for name in ("time", "time_unit", "headings", "rate", "begin", "end")}
+    columns = {name: options.pop(name) for name in ("time", "headings", "rate", "begin", "end")}
     record = load_record(source, ColumnOptions(**columns))
     folder, files = terminal.out / "curve" / record.name, () if source == "-" else (Path(source),)
     compute = partial(identify_curve, record, **options)

@@ -1,22 +1,25 @@
 """decay: identify damping, dry friction and drag from a record or a scene."""
 
 import gc
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from functools import partial
+from os.path import exists
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from ..arguments import QUANTITIES
+from ..errors import HarnessError, RunError, SceneError, format_value
 from .terminal import (
     BEGIN_OPTION,
     END_OPTION,
     HEADINGS_OPTION,
     POSITIVE,
     RATE_OPTION,
-    TIME_UNIT_OPTION,
+    TIME_OPTION,
     SectionedCommand,
     Terminal,
     refuse_options,
@@ -24,13 +27,16 @@ from .terminal import (
     verbose_option,
 )
 
+if TYPE_CHECKING:
+    from ..records.columns import ColumnOptions
+    from ..records.record import Record
+    from ..studies.run.result import RunResult
+
 COLUMN_OPTIONS = (  # of records
     "time",
     "column",
     "quantity",
     "unit",
-    "per_count",
-    "time_unit",
     "headings",
     "rate",
 )
@@ -38,16 +44,14 @@ COLUMN_OPTIONS = (  # of records
 
 @click.command(cls=SectionedCommand)
 @click.argument("source", metavar="FILE|SCENE|-")
-@click.option("--time", help="Heading of the time column. Default: t, time, ..., or the first column.")
+@TIME_OPTION
 @click.option("--column", help="Heading of the column to fit. Default: x, theta, ...")
 @click.option(
     "--quantity",
     type=click.Choice(QUANTITIES),
     help="Measured quantity, if it does not follow from the unit (an angle is a position).",
 )
-@click.option("--unit", help="Unit of the column, if the heading has none: mm, deg/s, g, ...")
-@click.option("--per-count", metavar="SIZE", help="Size of one count: 0.36deg, 0.001mm, ...")
-@TIME_UNIT_OPTION
+@click.option("--unit", help="Unit of the column, if the heading has none: mm, deg/s, ..., or 0.36deg a count.")
 @HEADINGS_OPTION
 @RATE_OPTION
 @BEGIN_OPTION
@@ -80,7 +84,7 @@ def decay(
     Examples:
       a phone on a spring:    friction-fmus decay "Raw Data.csv" --mass 0.35
       a spreadsheet:          friction-fmus decay swing.xlsx --column "laser (mm)" --k 157.9
-      a pendulum's encoder:   friction-fmus decay swing.txt --pendulum --per-count 0.36deg --headings t,count
+      a pendulum's encoder:   friction-fmus decay swing.txt --pendulum --unit 0.36deg --headings t,count
       standard input:         zcat swing.gz | friction-fmus decay - --unit mm --begin 2.5
       a scene:                friction-fmus decay coulomb
     """
@@ -89,13 +93,13 @@ def decay(
     from ..records.record import Record
     from ..results.provenance import describe_sources
     from ..results.result import save_result
-    from ..studies.decay.study import is_record_file, load_source
+    from ..studies.decay.study import is_record_file
 
     columns = {name: options.pop(name) for name in (*COLUMN_OPTIONS, "begin", "end")}
     if not is_record_file(source):
         refuse_options(context, "on a scene, whose FMU declares names and units", *COLUMN_OPTIONS)
-    if columns["rate"] is not None and (columns["time"] is not None or columns["time_unit"] is not None):
-        raise click.UsageError("--rate replaces the times in the file: omit --time and --time-unit")
+    if columns["rate"] is not None and columns["time"] is not None:
+        raise click.UsageError("--rate replaces the times in the file: omit --time")
     with pause_gc(), terminal.progress(1) as report:
         progress = partial(report, "standard input" if source == "-" else source)
         record = load_source(source, ColumnOptions(**columns), progress)
@@ -103,12 +107,48 @@ def decay(
             origin: dict[str, Any] = {"files": () if source == "-" else (Path(source),)}
         else:
             options |= {"begin": columns["begin"], "end": columns["end"]}
-            origin = record.origin()
+            origin = record._origin()
         folder = terminal.out / "decay" / record.name
         compute = partial(identify_decay, record, **options, progress=progress)
         origin |= {"source": describe_sources(source), "scene": columns | options}
         result = save_result(folder, compute, "decay", **origin)
     terminal.print_result(result.as_json(), *result.blocks(), folder=folder)
+
+
+def load_source(source: str, columns: "ColumnOptions", report: Callable[[float], None]) -> "Record | RunResult":
+    """Return the record in a file, or the run of a scene.
+
+    Raises
+    ------
+    HarnessError
+        If there is no such source, or the run fails or its position has no unit.
+    """
+    from ..api import simulate
+    from ..records.record import load_record
+    from ..scenes.scene import load_scene
+    from ..simulation.resolve import prefer_scene
+    from ..studies.decay.study import is_record_file
+
+    if is_record_file(source):
+        if source != "-" and not exists(source):
+            raise SceneError(f"{format_value(source)} does not exist: give an existing record, or a scene")
+        return load_record(source, columns)
+    if Path(source).is_dir():
+        raise SceneError(f"{source} is a folder; give a file in it")
+    scene = load_scene(source)
+    position = scene.run.motion_outputs.get("position", "")
+    if not position:
+        raise SceneError(f"scene {scene.name}: a decay needs the position among the outputs")
+    try:
+        run = simulate(prefer_scene(source), progress=report)
+    except RunError as error:
+        raise HarnessError(f"scene {scene.name}: {error}") from None
+    if not run.units[position]:
+        raise SceneError(
+            f"scene {scene.name}: {position} has no unit in {scene.run.fmu.name}: run the scene, and identify the "
+            "decay in its trajectory.csv with --unit"
+        )
+    return replace(run, label=scene.name)
 
 
 @contextmanager

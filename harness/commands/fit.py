@@ -12,7 +12,7 @@ from .terminal import (
     HEADINGS_OPTION,
     POSITIVE,
     RATE_OPTION,
-    TIME_UNIT_OPTION,
+    TIME_OPTION,
     SectionedCommand,
     Terminal,
     result_options,
@@ -48,8 +48,7 @@ from .terminal import (
 @click.option("--against", multiple=True, metavar="MODEL|FMU", help="Other law to fit and compare; repeatable.")
 @click.option("--validate", multiple=True, metavar="FILE", help="Record to predict, not to fit; repeatable.")
 @click.option("--robust", is_flag=True, help="Limit the effect of outliers.")
-@click.option("--time", help="Heading of the time column. Default: t, time, ..., or the first column.")
-@TIME_UNIT_OPTION
+@TIME_OPTION
 @HEADINGS_OPTION
 @RATE_OPTION
 @BEGIN_OPTION
@@ -105,7 +104,7 @@ def fit(
         from ..results.result import save_result
         from ..scenes.assignments import parse_assignments
         from ..scenes.fmu_files import find_fmu
-        from ..studies.fit import options
+        from ..studies.fit import request as options
         from ..studies.fit.study import load_existing
 
         ranges, per_record = options.parse_ranges(free), options.split_list([each or ""])

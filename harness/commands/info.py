@@ -2,16 +2,15 @@
 
 import click
 
-from .terminal import SectionedCommand, Terminal, json_option, quiet_option
+from .terminal import SectionedCommand, Terminal, json_option
 
 SOURCE_HEADINGS = ("scene", "model", "title")
 
 
 @click.command(cls=SectionedCommand)
 @click.argument("model", metavar="[MODEL|FMU]", required=False)
-@quiet_option
 @json_option
-def info(model: str | None, quiet: bool, as_json: bool) -> None:
+def info(model: str | None, as_json: bool) -> None:
     """List the variables of MODEL: units, start values, ranges, friction laws, methods, defaults, and lookup tables.
 
     MODEL is the name of a model, or the path of any FMU, FMI 2.0 or 3.0.  The FMU is read, not run.  Without MODEL, the
@@ -23,31 +22,15 @@ def info(model: str | None, quiet: bool, as_json: bool) -> None:
       friction-fmus info stickslip
       friction-fmus info other.fmu --json
     """
-    terminal = Terminal(quiet, as_json)
+    terminal = Terminal(as_json)
     if model is None:
         list_sources(terminal)
         return
-    from ..results.summary import make_terminal_table
     from ..scenes.fmu_files import find_fmu
-    from ..simulation.fmu_variables import HEADINGS, describe_fmu
+    from ..simulation.fmu_variables import describe_fmu
 
     description = describe_fmu(find_fmu(model))
-    blocks: list[object] = [*description.sentences()]
-    for title, variables in description.groups():
-        table = make_terminal_table(title)
-        for heading in HEADINGS:
-            table.add_column(heading, justify="right" if heading == "start" else "left")
-        for variable in variables:
-            table.add_row(*variable.cells)
-        blocks += ["", table]
-    for title, (headings, *rows) in description.points():
-        table = make_terminal_table(title)
-        for heading in headings:
-            table.add_column(heading, justify="right")
-        for row in rows:
-            table.add_row(*row)
-        blocks += ["", table]
-    terminal.print_result(description.as_json(), *blocks)
+    terminal.print_result(description.as_json(), *description.blocks())
 
 
 def list_sources(terminal: Terminal) -> None:

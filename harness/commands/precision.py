@@ -1,8 +1,12 @@
 """precision: error against run time."""
 
+from functools import partial
+
 import click
 
 from .terminal import SectionedCommand, Terminal, result_options
+
+QUICK_RUN = "a quick run"  # does not replace a full run
 
 
 @click.command(cls=SectionedCommand)
@@ -23,26 +27,28 @@ def precision(models: tuple[str, ...], terminal: Terminal, quick: bool) -> None:
       friction-fmus precision path/to/belt.py
     """
     from ..references.models import MODELS
-    from ..studies.precision import table as tables
-    from ..studies.precision.study import FULL, QUICK
-    from ..studies.precision.survey import STUDY, run_survey
+    from ..results.provenance import load_provenance
+    from ..results.result import save_result
+    from ..scenes.fmu_files import find_fmu
+    from ..simulation.embedded_model import load_model_class
+    from ..simulation.fmu_archive import declared_parameters
+    from ..studies.precision.study import FULL, QUICK, measure_precision
 
-    with terminal.progress(len(models or MODELS)) as report:
-        result = run_survey(models or MODELS, QUICK if quick else FULL, terminal.out, report)
+    out, settings, results = terminal.out / "precision", QUICK if quick else FULL, []
+    files = {model: find_fmu(model) for model in models or MODELS}
+    for file in files.values():
+        load_model_class(file)  # before the first measurement
+    with terminal.progress(len(files)) as report:
+        for model, file in files.items():
+            # a full run replaces a quick one
+            source = QUICK_RUN if quick else load_provenance(out / file.stem).get("source", "")
+            compute = partial(measure_precision, model, settings, partial(report, model))
+            origin = {"files": [file], "parameters": declared_parameters(file)}
+            results.append(save_result(out / file.stem, compute, "precision", source, **origin))
     data = {
-        "points": {study.model: study.points for study in result.studies},
-        "laws": result.deviations,
-        "advice": result.advice,
-        "missing": result.missing,
+        "points": {result.model: result.points for result in results},
+        "laws": [law for result in results for law in result.deviations],
+        "advice": [result.advice for result in results],
+        "missing": [*dict.fromkeys(note for result in results for note in result.notes)],
     }
-    errors = (
-        tables.exchange_table(result.studies),
-        tables.deviation_table(result.deviations),
-    )
-    output = [
-        block
-        for table in (*map(tables.work_precision_table, result.studies), *errors)
-        if table.rows
-        for block in (table, "")
-    ]
-    terminal.print_result(data, *output, *result.advice, *result.missing, folder=terminal.out / STUDY.name)
+    terminal.print_result(data, *(block for result in results for block in result.blocks()), folder=out)

@@ -4,16 +4,15 @@ from pathlib import Path
 
 import click
 
-from .terminal import SectionedCommand, Terminal, json_option, quiet_option
+from .terminal import SectionedCommand, Terminal, json_option
 
 FILE = click.Path(exists=True, dir_okay=False, path_type=Path)
 
 
 @click.command(cls=SectionedCommand)
 @click.argument("files", metavar="FILE.py...", nargs=-1, required=True, type=FILE)
-@quiet_option
 @json_option
-def references(files: tuple[Path, ...], quiet: bool, as_json: bool) -> None:
+def references(files: tuple[Path, ...], as_json: bool) -> None:
     """Compute the certified result of the model in each FILE.py and write it to FILE.csv.  The FMU must be built.
 
     Two methods that share no formula solve the default run, one of them also with a thirtieth of the largest step.  If
@@ -28,4 +27,4 @@ def references(files: tuple[Path, ...], quiet: bool, as_json: bool) -> None:
 
     results = [result for file in files for result in certify(file)]
     output = (f"{result.path}, relative difference {result.difference:.1e}" for result in results)
-    Terminal(quiet, as_json).print_result(results, *output)
+    Terminal(as_json).print_result(results, *output)

@@ -1,12 +1,17 @@
 """run: one scene or one FMU."""
 
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
+from ..errors import HarnessError, RunError
 from .terminal import SectionedCommand, Terminal, refuse_ignored_options, result_options, run_options
+
+if TYPE_CHECKING:
+    from ..studies.run.result import RunResult
 
 
 @click.command(cls=SectionedCommand)
@@ -20,13 +25,7 @@ from .terminal import SectionedCommand, Terminal, refuse_ignored_options, result
 @run_options
 @result_options
 @click.pass_context
-def run(
-    context: click.Context,
-    source: str,
-    values: tuple[str, ...],
-    terminal: Terminal,
-    **options: Any,
-) -> None:
+def run(context: click.Context, source: str, values: tuple[str, ...], run: dict[str, Any], terminal: Terminal) -> None:
     """Run a model, a scene or an FMU.
 
     The argument is the name of a scene or a model (see info), the path of a scene file or a model file, or the path of
@@ -45,53 +44,48 @@ def run(
       friction-fmus run other.fmu --set mass=2 --stop 10 --rtol 1e-4
     """
     from ..scenes.assignments import parse_assignments
-    from ..scenes.scene import change_scene
-    from ..simulation.resolve import find_source
-    from ..studies.run import study
-    from ..studies.run.table import results_table
+    from ..simulation.resolve import find_source, prefer_scene
 
-    item = find_source(source, scenes_first=True)
+    item = find_source(prefer_scene(source))
     refuse_ignored_options(context, [item] if isinstance(item, Path) else [])
-    if isinstance(item, Path):
-        run_fmu_file(item, values, options, terminal)
-        return
-    item = change_scene(item, parse_assignments("--set", values), options["stop"])
     with terminal.progress(1) as report:
-        outcome = study.run_scene(item, terminal.out, partial(report, item.name))
-    table = results_table([outcome], everything=True)
-    folder = terminal.out / item.name
-    notes = [*study.describe_known_values(item), *filter(None, [outcome.run.note if outcome.run else ""])]
-    failed = failure_message(outcome.error, folder)
-    terminal.print_result(outcome_as_json(outcome, terminal.out), table, *notes, folder=folder, failed=failed)
+        options = {"values": parse_assignments("--set", values), **run}
+        result, folder = run_and_save(source, terminal.out, report, **options)
+    failed = [f"{result.failure}; the results up to that time are in {folder}"] if result.failure else []
+    content = run_as_json(result, folder) if result.scene else result.as_json() | {"folder": folder}
+    terminal.print_result(content, *result.blocks(), folder=folder, failed=failed)
 
 
-def run_fmu_file(path: Path, values: tuple[str, ...], options: dict[str, Any], terminal: Terminal) -> None:
-    """Run one FMU and print the first, last, smallest and largest value of each output."""
-    from ..scenes.assignments import parse_assignments
-    from ..scenes.run_spec import DEFAULT_EQUAL_STEPS, RunSpec
-    from ..simulation.resolve import set_rtol
-    from ..studies.run.study import run_fmu
+def run_and_save(
+    source: str, out: Path, report: Callable[[str, float], None], **options: Any
+) -> "tuple[RunResult, Path]":
+    """Run a scene, a model or an FMU, also in part, and write the result to out/<its name>."""
+    from ..api import simulate
+    from ..results.provenance import describe_sources
+    from ..results.result import save_result
+    from ..simulation.resolve import find_source, prefer_scene
 
-    rtol = options.pop("rtol")
-    with terminal.progress(1) as report:
-        spec = RunSpec(path, values=parse_assignments("--set", values), equal_steps=DEFAULT_EQUAL_STEPS, **options)
-        if rtol is not None:
-            spec = set_rtol(spec, rtol)
-        trajectory, folder = run_fmu(spec, terminal.out, partial(report, path.stem))
-    failed = failure_message(trajectory.failure, folder)
-    terminal.print_result(trajectory.as_json() | {"folder": folder}, *trajectory.blocks(), folder=folder, failed=failed)
+    item = find_source(path := prefer_scene(source))
+    is_fmu = isinstance(item, Path)
+    name, origin = (item.stem, describe_sources(str(item))) if isinstance(item, Path) else (item.name, item.source)
+
+    def compute() -> "RunResult":
+        try:
+            return simulate(path, progress=partial(report, name), **options)
+        except RunError as error:
+            partial_run: RunResult = error.run
+            return partial_run
+
+    try:
+        return save_result(out / name, compute, "run", origin), out / name
+    except HarnessError as error:
+        if is_fmu:
+            raise
+        raise type(error)(f"scene {name}: {error}") from None
 
 
-def failure_message(message: str | None, folder: Path) -> list[str]:
-    """Return the error message of an incomplete run in a list, which is empty if the run finished."""
-    return [f"{message}; the results up to that time are in {folder}"] if message else []
-
-
-def outcome_as_json(outcome: Any, out: Path) -> dict[str, object]:
-    """Return the results of a scene for JSON output."""
+def run_as_json(result: "RunResult", folder: Path) -> dict[str, Any]:
+    """Return the result of a scene for JSON output, with the note about the result that it replaces."""
     from ..results.provenance import replacement_note
-    from ..studies.run.table import comparison_as_json
 
-    data = {"scene": outcome.name, "quantities": outcome.quantities, "error": outcome.error}
-    data["comparison"] = comparison_as_json(outcome)
-    return data | {"said": [*filter(None, [replacement_note(out / outcome.name)])]}
+    return result.as_json() | {"said": [*filter(None, [replacement_note(folder)])]}

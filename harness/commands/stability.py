@@ -1,5 +1,7 @@
 """stability: stiff and extreme cases."""
 
+from functools import partial
+
 import click
 
 from .terminal import SectionedCommand, Terminal, result_options
@@ -21,11 +23,16 @@ def stability(models: tuple[str, ...], terminal: Terminal) -> None:
       friction-fmus stability
       friction-fmus stability stickslip path/to/belt.py
     """
-    from ..results.provenance import describe_sources
-    from ..studies.stability.study import STUDY, grouped_cases, run_stability
+    from ..results.provenance import describe_sources, prefix_parameters
+    from ..results.result import save_result
+    from ..scenes.fmu_files import find_fmu
+    from ..simulation.fmu_archive import declared_parameters
+    from ..studies.stability.study import grouped_cases, measure_stability
 
-    groups = grouped_cases(models=models)
+    groups, folder = grouped_cases(models=models), terminal.out / "stability"
+    fmus = {case.name: find_fmu(case.model) for group in groups for case in group}
+    parameters = prefix_parameters({name: declared_parameters(fmu) for name, fmu in fmus.items()})
     with terminal.progress(sum(map(len, groups))) as report:
-        result = run_stability(terminal.out, report, groups, describe_sources(*models))
-    folder = terminal.out / STUDY.name
+        compute, source = partial(measure_stability, groups, report), describe_sources(*models)
+        result = save_result(folder, compute, "stability", source, files=fmus.values(), parameters=parameters)
     terminal.print_result(result.as_json(), *result.blocks(), folder=folder, failed=result.describe_failures())

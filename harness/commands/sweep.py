@@ -2,14 +2,12 @@
 
 import os
 from functools import partial
-from importlib.util import find_spec
-from pathlib import Path
 from typing import Any
 
 import click
 
 from ..arguments import NATURAL, RUNS, WORKERS
-from ..errors import MAX_VALUE_LENGTH, HarnessError, install_command
+from ..errors import MAX_VALUE_LENGTH, SceneError
 from .terminal import (
     RuleType,
     SectionedCommand,
@@ -60,8 +58,8 @@ def sweep(
     workers: int,
     scheduler: str | None,
     name: str | None,
+    run: dict[str, Any],
     terminal: Terminal,
-    **options: Any,
 ) -> None:
     """Run MODEL, a name or the path of an FMU, over ranges of parameters and measure every run.
 
@@ -76,38 +74,41 @@ def sweep(
       friction-fmus sweep other.fmu --vary mu=0,0.1,0.2 --measures final,largest
       friction-fmus sweep coulomb --vary f=0.1:2 --vary k=50:500 --samples 1000 --scheduler tcp://host:8786
     """
-    if name is not None and (name.startswith(".") or Path(name).name != name):
-        raise click.UsageError(
-            f"--name {name[:MAX_VALUE_LENGTH]}: must be a single folder name that does not start with a dot"
-        )
     if samples is None:
         refuse_options(context, "without --samples", "seed")
     if scheduler is not None:
         refuse_options(context, "with --scheduler: the cluster has its own workers", "workers")
-    if find_spec("xarray") is None:  # checked before the runs
-        raise HarnessError(f"a sweep needs xarray: {install_command('sweep')}")
+    from ..api import sweep as sweep_model
     from ..scenes.assignments import parse_assignments
-    from ..scenes.fmu_files import check_built, find_fmu
-    from ..scenes.run_spec import RunSpec
-    from ..simulation.resolve import set_rtol
-    from ..studies.sweep.labels import read_labels, replace_labels_in_text
-    from ..studies.sweep.runner import SweepSpec
-    from ..studies.sweep.sampling import SweepPoints, parse_axis
-    from ..studies.sweep.study import run_sweep
+    from ..scenes.fmu_files import find_fmu
 
     refuse_ignored_options(context, [find_fmu(model)], timeout_is_ignored=True)
-    measured = tuple(dict.fromkeys(word.strip() for word in measures.split(","))) if measures is not None else ()
-    rtol = options.pop("rtol")
-    run = RunSpec(find_fmu(model), values=parse_assignments("--set", values), follow=False, **options)
-    run = run if rtol is None else set_rtol(run, rtol)
-    check_built(run.fmu)
-    labels = read_labels(run)
-    axes = tuple(parse_axis(replace_labels_in_text(text, labels), samples is not None) for text in vary)
-    points = SweepPoints(axes, samples, seed)
+    measured = [word.strip() for word in measures.split(",")] if measures is not None else ()
+    grid = dict(map(split_range, vary))
+    if len(grid) < len(vary):
+        raise SceneError("--vary names a parameter twice")
     with terminal.progress(1) as report:
-        spec, progress = SweepSpec(run, points.names, measured), partial(report, model)
-        result = run_sweep(
-            spec, points, name, terminal.out, scheduler, workers, progress, "repeat the command to resume"
+        result = sweep_model(
+            model,
+            grid,
+            values=parse_assignments("--set", values),
+            samples=samples,
+            seed=seed,
+            measures=measured,
+            workers=None if scheduler else workers,
+            scheduler=scheduler,
+            folder=terminal.out,
+            name=name,
+            progress=partial(report, model),
+            **run,
         )
     failed = [*result.describe_failures()]
     terminal.print_result(result.as_json(), *result.blocks(), folder=result.folder, failed=failed)
+
+
+def split_range(text: str) -> tuple[str, str]:
+    """Return the name and the values of an argument of --vary."""
+    name, equals, values = text.partition("=")
+    if not (name.strip() and equals):
+        raise SceneError(f"--vary {text[:MAX_VALUE_LENGTH]} is invalid; write it as in m=1:2:11 or m=1,2")
+    return name.strip(), values.strip()

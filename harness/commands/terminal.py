@@ -29,10 +29,10 @@ Command = Callable[..., Any]
 SECTIONS = {  # of the help of a command: options that several commands share, each in the same order everywhere
     "Input table": (
         *("time", "column", "velocity", "position", "force", "current", "constant", "points", "quantity", "unit"),
-        *("per_count", "time_unit", "headings", "rate", "begin", "end"),
+        *("headings", "rate", "begin", "end"),
     ),
     "Run": ("stop", "rtol", "interface", "lenient", "timeout"),
-    "Output": ("name", "out", "overwrite", "quiet", "verbose", "as_json"),
+    "Output": ("name", "out", "overwrite", "verbose", "as_json"),
 }
 
 
@@ -61,7 +61,6 @@ def out_option(text: str) -> Callable[..., Any]:
 
 
 default_out_option = out_option("Folder for the results, with one subfolder per scene.")
-quiet_option = click.option("--quiet", is_flag=True, help="Print errors only.")
 json_option = click.option("--json", "as_json", is_flag=True, help="Print only the result, as JSON.")
 
 
@@ -102,14 +101,14 @@ def result_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """Add the options of all commands with results; the command receives them as `terminal`."""
 
     @wraps(command)
-    def wrapper(out: Path, quiet: bool, as_json: bool, **others: Any) -> Any:
+    def wrapper(out: Path, as_json: bool, **others: Any) -> Any:
         context = click.get_current_context()
         for argument in context.command.params:
             if isinstance(argument, click.Argument) and others.get(argument.name or "") == "":
                 raise click.UsageError(f"{argument.make_metavar(context).strip('[]')} is empty: give a name or a path")
-        return command(terminal=Terminal(quiet, as_json, out), **others)
+        return command(terminal=Terminal(as_json, out), **others)
 
-    return default_out_option(overwrite_option(quiet_option(json_option(wrapper))))
+    return default_out_option(overwrite_option(json_option(wrapper)))
 
 
 class RuleType(click.FloatRange):
@@ -132,8 +131,9 @@ class RuleType(click.FloatRange):
 
 FINITE, POSITIVE, NONNEGATIVE = map(RuleType, (arguments.FINITE, arguments.POSITIVE, arguments.NONNEGATIVE))
 HEADINGS_OPTION = click.option("--headings", metavar="NAMES", help="Headings, if the file has none: 't [s],x [mm]'.")
-TIME_UNIT_OPTION = click.option(
-    "--time-unit", help="Unit of time, if the heading has none: ms, or 0.01s for sample numbers. Default: s."
+TIME_OPTION = click.option(
+    "--time",
+    help="Heading of the times, with their unit if the file lacks it: 'Zeit [ms]', or 'n [0.01s]' for sample numbers.",
 )
 RATE_OPTION = click.option(
     "--rate", type=POSITIVE, metavar="HZ", help="Sampling rate in Hz, which replaces the times in the file."
@@ -158,11 +158,10 @@ RUN_OPTIONS = (
     click.option(
         "--timeout",
         type=POSITIVE,
-        default=60.0,
-        show_default=True,
-        help="Seconds allowed for one FMI call, or for 1/4096 of a run of an FMU of this project.",
+        help="Seconds allowed for one FMI call, or for 1/4096 of a run of an FMU of this project.  [default: 60.0]",
     ),
 )
+RUN_NAMES = ("stop", "rtol", "interface", "lenient", "timeout")
 
 
 def is_given(context: click.Context, option: str) -> bool:
@@ -230,14 +229,12 @@ def uses_closed_form(description: Any, fixed_method: str, assignments: Iterable[
 
 
 def run_options(command: Command) -> Command:
-    """Add the options of commands that run FMUs.
-
-    The command receives fields of RunSpec, and `rtol`, which is None unless it is given.
-    """
+    """Add the options of commands that run FMUs; the command receives those that are given, by the name of Python."""
 
     @wraps(command)
-    def wrapper(interface: str | None, **others: Any) -> Any:
-        return command(exchange=interface == MODEL_EXCHANGE, **others)
+    def wrapper(**options: Any) -> Any:
+        given = {name: value for name in RUN_NAMES if (value := options.pop(name)) not in (None, False)}
+        return command(run=given, **options)
 
     result: Command = wrapper
     for option in reversed(RUN_OPTIONS):
@@ -262,7 +259,7 @@ def prepare_process() -> None:
 
 
 @contextmanager
-def progress(quiet: bool, total: int) -> Iterator[Callable[[str, float], None]]:
+def progress(is_shown: bool, total: int) -> Iterator[Callable[[str, float], None]]:
     """Show a progress bar on standard error; yield a callback that receives the scene and its finished share.
 
     A share of an external FMU has a note: the accuracy that the run has reached.
@@ -272,7 +269,7 @@ def progress(quiet: bool, total: int) -> Iterator[Callable[[str, float], None]]:
 
     console = Console(file=sys.stderr)
     columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
-    if quiet or not console.is_terminal:  # a disabled bar writes an empty line before rich 14.2
+    if not (is_shown and console.is_terminal):  # a disabled bar writes an empty line before rich 14.2
         yield lambda name, share: check_interrupt()
         return
     with (
@@ -301,19 +298,18 @@ def print_json(result: Any) -> None:
 
 @dataclass(frozen=True)
 class Terminal:
-    """Output of a command: only errors if `quiet`, only JSON if `as_json`; `out` is the folder for results."""
+    """Output of a command: only JSON if `as_json`; `out` is the folder for results."""
 
-    quiet: bool
     as_json: bool
     out: Path = Path()
 
     def progress(self, total: int) -> AbstractContextManager[Callable[[str, float], None]]:
-        return progress(self.quiet or self.as_json, total)
+        return progress(not self.as_json, total)
 
     def print_result(
         self, result: Any, *blocks: Any, folder: Path | None = None, failed: Iterable[str] = (), conclusion: Any = None
     ) -> None:
-        """Print the result as JSON, or as tables and sentences unless quiet.
+        """Print the result as JSON, or as tables and sentences.
 
         Parameters
         ----------
@@ -334,22 +330,19 @@ class Terminal:
             If `failed` is not empty.
         """
         from rich.console import Console
-        from rich.table import Table
 
         if self.as_json:
             print_json(result)
-        elif not self.quiet:
+        else:
             console = Console(markup=False, highlight=False)  # brackets in units and names are not markup
             for block in blocks:
-                for column in block.columns if isinstance(block, Table) else ():
-                    column.overflow = "fold"  # wrap long names instead of cutting them
-                console.print(block)
+                console.print(block.for_terminal() if hasattr(block, "for_terminal") else block)
             if folder:
                 from ..results.provenance import replacement_note
 
                 console.print("\n".join(filter(None, (replacement_note(folder), f"Results in {folder}"))))
         messages = [*failed]
-        if conclusion and not (messages or self.as_json or self.quiet):
+        if conclusion and not (messages or self.as_json):
             console.print(conclusion)
         if messages:
             raise HarnessError("\n".join(messages))

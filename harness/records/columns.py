@@ -29,13 +29,11 @@ class ColumnOptions:
     Attributes
     ----------
     time, column : str or None
-        Headings of the columns of times and of the motion.
+        Headings of the columns of times and of the motion; a unit in that of the times overrides that in the file.
     quantity : str or None
         Measured quantity: position, velocity or acceleration.
-    unit, time_unit : str or None
-        Units that override those in the file.
-    per_count : str or None
-        Size and unit of one count of an encoder.
+    unit : str or None
+        Unit that overrides that in the file, or the size of one count of an encoder, as 0.36deg.
     headings : str or None
         Headings, separated by commas, for a file without headings.
     rate : float or None
@@ -48,8 +46,6 @@ class ColumnOptions:
     column: str | None = None
     quantity: str | None = None
     unit: str | None = None
-    time_unit: str | None = None
-    per_count: str | None = None
     headings: str | None = None
     rate: float | None = None
     begin: float | None = None
@@ -159,7 +155,7 @@ def find_time_column(table: Table, candidates: Sequence[Column], columns: Column
     none.
     """
     if columns.time is not None:
-        return find_column(columns.time, table, candidates)
+        return find_column_and_unit(columns.time, table, candidates)[0]
     time_columns = find_time_columns(candidates)
     if columns.rate and len(candidates) == 1:
         return None
@@ -176,7 +172,7 @@ def find_time_column(table: Table, candidates: Sequence[Column], columns: Column
     t = t[np.isfinite(t)]
     if len(t) < 2 or (np.diff(t) <= 0).any():
         return None
-    may_be_index = not any(table.column_headings) and columns.time_unit is None and columns.rate is None
+    may_be_index = not any(table.column_headings) and columns.rate is None
     return None if may_be_index and (t == np.round(t)).all() else first
 
 
@@ -219,7 +215,9 @@ def read_times(table: Table, time_column: Column, columns: ColumnOptions) -> np.
     first_text = next((cell for cell in cells if isinstance(cell, str) and cell), None)
     if first_text is not None and ":" in first_text and TIMESTAMP.match(first_text):
         return parse_timestamps(cells, table.name)  # type: ignore[arg-type]
-    unit = columns.time_unit or time_column.unit
+    unit = time_column.unit
+    if columns.time is not None:
+        unit = find_column_and_unit(columns.time, table, list_columns(table))[1]
     size = time_unit_size(unit or "s")  # default s, as in nearly all programs and instruments
     if unit and not size:
         raise SceneError(unknown_name_message(f"unit of {time_column.name}", unit, TIMES))
@@ -228,8 +226,8 @@ def read_times(table: Table, time_column: Column, columns: ColumnOptions) -> np.
     if unit is None and len(finite) and ((finite == np.round(finite)).all() or finite.max() > MAX_PLAUSIBLE_TIME):
         raise SceneError(
             f"{table.name}: {time_column.name} has integer or very large numbers and no unit: set one in "
-            f"its heading, as in {time_column.name} [ms], or as in {option_text('time_unit', 'ms')}, or 0.01s for "
-            "sample numbers"
+            f"its heading, as in {time_column.name} [ms], or as in {option_text('time', f'{time_column.name} [ms]')}, "
+            "or [0.01s] for sample numbers"
         )
     return t * size
 

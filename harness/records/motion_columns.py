@@ -22,7 +22,7 @@ from .headings import FORCE_NAME, MAGNITUDE_NAME, TIME_NAME, order_from_name
 from .motion import NO_UNIT, RATE_SUFFIXES, Motion, check_samples
 from .samples import leave_out_saturated
 from .table_files import Table
-from .units import COUNT_NAMES, find_unit, is_force_unit, parse_per_count
+from .units import COUNT_NAMES, find_unit, is_force_unit, split_count
 
 EXAMPLE_UNITS = (("mm", "deg"), ("mm/s", "deg/s"), ("m/s2", "g"))  # by the order of the derivative
 
@@ -115,10 +115,9 @@ def find_signal_column(
 def resolve_unit(name: str, unit: str | None, columns: ColumnOptions, file: str) -> tuple[int, str, float, str]:
     """Return the order, base unit and SI factor of a column, and a note on an assumption."""
     requested = None if columns.quantity is None else QUANTITIES.index(columns.quantity)
-    order_of_name, size = order_from_name(name), 1.0
+    order_of_name = order_from_name(name)
+    size, unit = (1.0, None) if unit is None else split_count(unit)
     assumption = f"is assumed to be a position; {option_text('quantity', 'velocity')} or acceleration overrides this."
-    if columns.per_count is not None:
-        size, unit = parse_per_count(columns.per_count)
     if unit is None:
         order = requested if requested is not None else order_of_name or 0
         example, alternative = EXAMPLE_UNITS[order]
@@ -130,7 +129,7 @@ def resolve_unit(name: str, unit: str | None, columns: ColumnOptions, file: str)
             note += f" {name} {assumption}"
         return order, NO_UNIT, size, note
     if unit.lower() in COUNT_NAMES:
-        example = option_text("per_count", "0.36deg")
+        example = option_text("unit", "0.36deg")
         raise SceneError(f"{name} is in {unit}; set the size of one count, as in {example}")
     known_unit = find_unit(unit)
     if known_unit is None:

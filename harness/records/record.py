@@ -16,7 +16,7 @@ from .friction_curve import CurveColumns, extract_curve
 from .motion import Motion
 from .motion_columns import extract_motion
 from .table_files import Table, load_table
-from .units import conversion_factor, parse_per_count
+from .units import conversion_factor, split_count
 
 
 @dataclass(frozen=True)
@@ -148,8 +148,8 @@ class Record:
         options, size = self.options, 1.0
         if not source.is_input and options.column in (None, column.heading, column.name):  # the motion of the record
             unit = options.unit or unit
-            if options.per_count is not None:
-                size, unit = parse_per_count(options.per_count)
+        if unit:
+            size, unit = split_count(unit)
         target = source.unit
         if not unit:
             file = self.table.name

@@ -9,8 +9,6 @@ from collections import Counter
 from functools import cache
 from typing import NamedTuple
 
-from ..errors import SceneError, option_text
-
 TIMES = {"s": 1.0, "sec": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0}
 LENGTHS = {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "um": 1e-6, "nm": 1e-9, "in": 0.0254, "ft": 0.3048}
 TURN = 2 * 3.141592653589793
@@ -95,12 +93,10 @@ def time_unit_size(text: str) -> float | None:
         return None
 
 
-def parse_per_count(text: str) -> tuple[float, str]:
-    """Return size and unit of one count, as in 0.36deg or 1e-3 mm."""
-    match = re.fullmatch(r"\s*([-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?)\s*(\S.*?)\s*", text)
-    if not match or find_unit(match[2]) is None:
-        raise SceneError(f"{option_text('per_count', text)}: give a number and a unit, as in 0.36deg or 0.001mm")
-    return float(match[1]), match[2]
+def split_count(text: str) -> tuple[float, str]:
+    """Return size and unit of one count, as in 0.36deg or 1e-3 mm; any other unit has the size 1."""
+    match = re.fullmatch(r"\s*([-+]?[0-9]*\.?[0-9]+(?:[eE][-+]?[0-9]+)?)\s*(\S.*?)\s*", text)
+    return (float(match[1]), match[2]) if match and find_unit(match[2]) else (1.0, text)
 
 
 def build_unit_table() -> dict[str, MotionUnit]:

@@ -19,7 +19,8 @@ from ..scenes.fmu_files import find_fmu
 from ..simulation.embedded_model import EmbeddedModel, load_model_class, method_numbers
 from ..simulation.solution import Solution
 from .certified_reference import ERROR_LABEL, FOLDER, POINTS, event_time_error, max_relative_difference
-from .reference_trajectory import CommunicationGrid
+from .models import MODELS
+from .reference_trajectory import CommunicationGrid, compute_reference
 from .segments import ParameterSpan, ParameterValues
 
 # An explicit and a stiff method, with their relative tolerances.  A step across a kink may pass the error estimate of a
@@ -159,3 +160,17 @@ def solve_by_two_methods(
     if not has_same_events or len({run.run.events.count for run in runs}) > 1:
         return replace(reference, events=None, start_mode=None)
     return replace(reference, events=events)
+
+
+def solve_reference(model: str, spans: list[ParameterSpan], grid: CommunicationGrid) -> Solution:
+    """Return the reference of a model, or the result of two methods of a user model."""
+    solve = compute_reference if model in MODELS else compute_by_two_methods
+    return solve(model, spans, grid)
+
+
+def find_modes(model: str) -> list[str]:
+    """Return the modes of a model; HarnessError if it has no position with a speed."""
+    model_class: Any = load_model_class(find_fmu(model))
+    if not {*model_class.states} & {*model_class.states.values()}:
+        raise HarnessError(f"{model}: no state is the rate of another one; the cases need a position and a speed")
+    return list(model_class.contacts)

@@ -20,6 +20,9 @@ from .ode_problem import OdeProblem, RhsFunction, StateVector
 
 SCIPY = ("RK23", "RK45", "DOP853", "Radau", "LSODA")
 IMPLICIT = ("Radau", "LSODA", "BDF")  # methods that take a Jacobian
+FMU, FMPY = "FMU", "fmpy"  # code of the FMU in this process; FMU through fmpy
+CS, ME = "FMI 3.0 CS", "FMI 3.0 ME"  # FMI 3.0 FMU through fmpy: co-simulation, model exchange
+FMI3_TOOLS = (CS, ME)
 PACKAGES = {"scipy": ("scipy", "scipy"), "cvode": ("sksundae", "scikit-sundae")}  # module, and name to install
 
 

@@ -12,11 +12,11 @@ from .summary import SUMMARY_FILE, Summary, read_summary
 def load(folder: Path) -> Result:
     """Return the result in a folder; SceneError if there is none, or if it is damaged."""
     summary = load_summary(folder)
-    study = find_study(summary.study) if summary else study_of_folder(folder)
-    if not study.result_class().is_stored(folder):
+    kind = (find_study(summary.study) if summary else study_of_folder(folder)).result_class()
+    if not kind._is_stored(folder):
         command = load_provenance(folder).get("command", "the command that wrote it")
         raise SceneError(f"{folder} lacks the data of its result: run `{command}` again")
-    return study.read(folder)
+    return kind._load(folder)
 
 
 def load_summary(folder: Path) -> Summary | None:

@@ -68,6 +68,11 @@ def format_number(value: float, digits: int = 5) -> str:
     return str(value) if isinstance(value, int) else f"{value:.{digits}g}"
 
 
+def format_power(value: float) -> str:
+    """Format a power of ten: 1e-6."""
+    return f"{value:.0e}".replace("e-0", "e-")
+
+
 def format_interval(value: float, low: float, high: float) -> str:
     """Return a value with its interval for display.
 

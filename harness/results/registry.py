@@ -7,7 +7,7 @@ Classes are named by strings, because this module imports no study.
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from ..errors import SceneError, format_value, unknown_name_message
 
@@ -33,8 +33,6 @@ class Study:
         Files that a result may contain; the first one is compared when a result replaces another.
     title, intro : str
         Title and introduction of its section in the report.
-    reader : str
-        Function that reads a result folder, as "module:function"; by default `load` of the class.
     """
 
     name: str
@@ -43,34 +41,22 @@ class Study:
     files: tuple[str, ...]
     title: str
     intro: str
-    reader: str = ""
 
     def result_class(self) -> "type[Result]":
         """Import the class of the results."""
-        kind: type[Result] = import_item(self.result)
+        module, _, name = self.result.partition(":")
+        kind: type[Result] = getattr(import_module(f"harness.{module}"), name)
         return kind
-
-    def read(self, folder: Path) -> "Result":
-        """Read a result folder; SceneError if it is damaged."""
-        result: Result = import_item(self.reader)(folder) if self.reader else self.result_class().load(folder)
-        return result
-
-
-def import_item(text: str) -> Any:
-    """Return what "module:name" names, below `harness`."""
-    module, _, name = text.partition(":")
-    return getattr(import_module(f"harness.{module}"), name)
 
 
 STUDIES = (
     Study(
         "run",
         "run",
-        "simulation.trajectory:Trajectory",
+        "studies.run.result:RunResult",
         ("trajectory.csv", "steps.csv", "events.csv", "quantities.csv", PICTURE),
         "Runs",
         "Scenes, models and FMUs that you ran.",
-        reader="simulation.trajectory_files:read_run",
     ),
     Study(
         "decay",

@@ -1,7 +1,7 @@
 """Results of studies: what Python, the commands, notebooks and the report do with every result."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import replace
 from html import escape
 from pathlib import Path
@@ -9,10 +9,12 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar
 
 from ..arguments import AXES, FLAG, PATH, check_arguments
 from ..errors import HarnessError, check_names, import_optional
+from .files import to_json
 from .folder import OVERWRITE, replace_folder
 from .provenance import write_provenance
 from .stored_data import DATA_FILE, read_data, write_data
-from .summary import PICTURE_FILE, Summary, read_cells, write_summary
+from .summary import PICTURE_FILE, Outcome, Summary, write_summary
+from .table import ResultTable, format_blocks, format_html
 
 if TYPE_CHECKING:
     import numpy as np
@@ -31,12 +33,12 @@ class Result(ABC):
     ----------
     study : str
         Name of the study in its summary, as in `STUDIES` of the registry.
-    function : str
+    _function : str
         Function of Python that returns the result, for the provenance of saved results.
     """
 
     study: ClassVar[str]
-    function: ClassVar[str]
+    _function: ClassVar[str]
 
     @property
     @abstractmethod
@@ -45,38 +47,60 @@ class Result(ABC):
 
     @property
     @abstractmethod
-    def headline(self) -> str:
+    def _headline(self) -> str:
         """The result in a few words, for `repr`."""
-
-    @abstractmethod
-    def summary(self) -> Summary:
-        """Return the findings: sentences, tables and conclusion, as the report shows them."""
 
     @abstractmethod
     def as_json(self) -> dict[str, Any]:
         """Return the result as plain data, as `--json` prints it."""
 
-    @abstractmethod
-    def blocks(self) -> list[Any]:
-        """Return the tables of rich and the sentences that the command prints."""
+    def _tabulate(self) -> tuple[ResultTable, ...]:
+        """Return the tables of the result."""
+        return ()
 
-    def rows(self) -> "tuple[list[Mapping[str, Any]], str]":
-        """Return the rows of the main table, if possible as numbers, and the name of the column that is their index."""
-        if not (tables := self.summary().tables):
-            raise HarnessError(f"the result {self.title} has no table")
-        headings = tables[0].headings
-        return [dict(zip(headings, row, strict=True)) for row in tables[0].rows], headings[0]
+    def _tabulate_details(self) -> tuple[ResultTable, ...]:
+        """Return tables that only the report shows."""
+        return ()
 
-    @abstractmethod
-    def write_tables(self, folder: Path) -> None:
+    def _data_table(self) -> ResultTable:
+        """Return the table whose items `to_pandas` converts."""
+        return self._tabulate()[0]
+
+    def sentences(self) -> list[str]:
+        """Return findings and remarks, which are below the tables."""
+        return []
+
+    @property
+    def _caption(self) -> str:
+        """Text alternative of the figure."""
+        return ""
+
+    @property
+    def outcome(self) -> Outcome | None:
+        """Conclusion of the study; None if it judges nothing."""
+        return None
+
+    def summary(self) -> Summary:
+        """Return the findings: sentences, tables and conclusion, as the report shows them."""
+        tables = [part for table in (*self._tabulate(), *self._tabulate_details()) for part in table.summarize()]
+        if tables:
+            tables[0] = replace(tables[0], title="")
+        return Summary(self.study, self.title, tuple(self.sentences()), tuple(tables), self._caption, self.outcome)
+
+    def blocks(self) -> list[ResultTable | str]:
+        """Return the tables and the sentences that the command prints."""
+        return [*(block for table in self._tabulate() if table.items for block in (table, "")), *self.sentences()]
+
+    def _write_tables(self, folder: Path) -> None:
         """Write the files with numbers."""
+        (folder / f"{self.study}.json").write_text(to_json(self.as_json()) + "\n", encoding="utf-8")
 
     @abstractmethod
-    def draw(self, figure: "Figure") -> None:
+    def _draw(self, figure: "Figure") -> None:
         """Draw the figure of the command."""
 
     @abstractmethod
-    def draw_panel(self, axes: "Axes") -> None:
+    def _draw_panel(self, axes: "Axes") -> None:
         """Draw the main panel of the figure into given axes."""
 
     def to_pandas(self) -> "pandas.DataFrame":
@@ -93,8 +117,8 @@ class Result(ABC):
             If pandas is not installed.
         """
         library = import_optional("pandas", "to_pandas()", "sweep")
-        rows, index = self.rows()
-        frame: pandas.DataFrame = library.DataFrame(rows).set_index(index)
+        rows = self._data_table().records()
+        frame: pandas.DataFrame = library.DataFrame(rows).set_index(next(iter(rows[0])))
         return frame
 
     @check_arguments(ax=AXES)
@@ -123,10 +147,10 @@ class Result(ABC):
 
         with use_style():
             if ax is not None:
-                self.draw_panel(ax)
+                self._draw_panel(ax)
                 return np.array([ax])
             figure = plt.figure(dpi=DPI)
-            self.draw(figure)
+            self._draw(figure)
             if not figure.axes:
                 plt.close(figure)
                 raise HarnessError(f"this {self.study} result has nothing to plot; to_pandas() has its numbers")
@@ -152,44 +176,44 @@ class Result(ABC):
         """
         from .registry import find_study
 
-        origin = self.origin()
+        origin = self._origin()
         allowed = OVERWRITE.set(OVERWRITE.get() or overwrite)
         try:
             with replace_folder(Path(folder), find_study(self.study).files, origin["source"]) as new_folder:
-                self.write(new_folder)
-                write_provenance(new_folder, **origin, command=f"harness.{self.function}")
+                self._write(new_folder)
+                write_provenance(new_folder, **origin, command=f"harness.{self._function}")
                 write_summary(new_folder, replace(self.summary(), title=Path(folder).name))
         finally:
             OVERWRITE.reset(allowed)
 
-    def origin(self) -> dict[str, Any]:
+    def _origin(self) -> dict[str, Any]:
         """Return the files, parameters and source for the provenance of a result that Python saves."""
         return {"files": (), "source": self.title}
 
-    def write(self, folder: Path) -> None:
+    def _write(self, folder: Path) -> None:
         """Write tables, figure and data into a new folder."""
-        self.write_tables(folder)
-        self.write_figure(folder / PICTURE_FILE)
+        self._write_tables(folder)
+        self._write_figure(folder / PICTURE_FILE)
         write_data(self, folder / DATA_FILE)
 
-    def write_figure(self, path: Path) -> None:
+    def _write_figure(self, path: Path) -> None:
         """Save the figure as SVG, if anything can be drawn."""
         from .style import DPI, Figure, save_figure, use_style
 
         with use_style():
             figure = Figure(dpi=DPI)
-            self.draw(figure)
+            self._draw(figure)
             if figure.axes:
                 save_figure(figure, path)
 
     @classmethod
-    def is_stored(cls, folder: Path) -> bool:
+    def _is_stored(cls, folder: Path) -> bool:
         """Return whether a folder holds the data that `load` reads."""
         return (folder / DATA_FILE).is_file()
 
     @classmethod
     @check_arguments(folder=PATH)
-    def load(cls, folder: str | Path) -> Self:
+    def _load(cls, folder: str | Path) -> Self:
         """Read the result in a folder; SceneError if its data are damaged."""
         return read_data(cls, Path(folder) / DATA_FILE)
 
@@ -200,34 +224,15 @@ class Result(ABC):
         return content[name]
 
     def __repr__(self) -> str:
-        text = f"{type(self).__name__} of {self.title}: {self.headline}"
+        text = f"{type(self).__name__} of {self.title}: {self._headline}"
         return f"<{' '.join(text.split())}>"
 
     def __str__(self) -> str:
-        from rich.console import Console
-
-        console = Console(width=TEXT_WIDTH, markup=False, highlight=False)
-        with console.capture() as text:
-            for block in self.blocks():
-                console.print(block)
-        return text.get().rstrip("\n")
+        return format_blocks(self.blocks(), TEXT_WIDTH)
 
     def _repr_html_(self) -> str:
         """Return the tables and sentences of the command for notebooks."""
-        from rich.table import Table
-
-        parts = []
-        for block in self.blocks():
-            if isinstance(block, Table):
-                caption = f"<caption>{escape(str(block.title))}</caption>" if block.title else ""
-                for table in read_cells(block):
-                    head = "".join(f"<th>{escape(heading)}</th>" for heading in table.headings)
-                    rows = ("".join(f"<td>{escape(cell)}</td>" for cell in row) for row in table.rows)
-                    body = "".join(f"<tr>{row}</tr>" for row in rows)
-                    parts.append(f"<table>{caption}<tr>{head}</tr>{body}</table>")
-            elif str(block):
-                parts.append(f"<p>{escape(str(block))}</p>")
-        return f"<div><strong>{escape(self.title)}</strong>{''.join(parts)}</div>"
+        return f"<div><strong>{escape(self.title)}</strong>{format_html(self.blocks())}</div>"
 
 
 def save_result(folder: Path, compute: Callable[[], ResultType], study: str, source: str, **origin: Any) -> ResultType:
@@ -250,7 +255,7 @@ def save_result(folder: Path, compute: Callable[[], ResultType], study: str, sou
 
     with replace_folder(folder, find_study(study).files, source) as new_folder:
         result = compute()
-        result.write(new_folder)
-        write_provenance(new_folder, **result.origin() | origin | {"source": source})
+        result._write(new_folder)
+        write_provenance(new_folder, **result._origin() | origin | {"source": source})
         write_summary(new_folder, result.summary())
     return result

@@ -1,19 +1,16 @@
 """Summaries of results: every study writes summary.json in one schema, and the report reads nothing else."""
 
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from contextvars import ContextVar
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ..errors import HarnessError, SceneError, by_interface
 from ..scenes.schema import parse_table
 from . import provenance
 from .files import to_json
-
-if TYPE_CHECKING:
-    import rich.table
 
 SUMMARY_FILE, PICTURE_FILE = "summary.json", "figure.svg"
 VERSION = 1  # of the schema
@@ -42,6 +39,8 @@ class SummaryTable:
     def __post_init__(self) -> None:
         if any(len(row) != len(self.headings) for row in self.rows):
             raise ValueError("a row is not as long as the headings")
+        if not all(self.headings):  # which a reader of the report could not interpret
+            raise ValueError(f"a heading is empty in {self.headings}")
 
 
 @dataclass(frozen=True)
@@ -108,34 +107,6 @@ class Summary:
         outside = [name for name in self.files if Path(name).name != name]
         if outside:
             raise ValueError(f"{outside[0]} is not the name of a file in the folder")
-
-
-def make_table(headings: Iterable[str], rows: Iterable[Iterable[object]], title: str = "") -> tuple[SummaryTable, ...]:
-    """Return a table as the only item; nothing if it has no rows.
-
-    Raises
-    ------
-    ValueError
-        If a heading is empty, which a reader of the report could not interpret.
-    """
-    cells, names = tuple(tuple(map(str, row)) for row in rows), tuple(headings)
-    if not all(names):
-        raise ValueError(f"a heading is empty in {names}")
-    return (SummaryTable(names, cells, title),) if cells else ()
-
-
-def make_terminal_table(title: str | None = None) -> "rich.table.Table":
-    """Return an empty table for the terminal, in the style of all studies."""
-    from rich.box import SIMPLE_HEAD
-    from rich.table import Table
-
-    return Table(title=title, title_justify="left", box=SIMPLE_HEAD, show_edge=False, padding=(0, 1, 0, 0))
-
-
-def read_cells(table: "rich.table.Table", title: str = "") -> tuple[SummaryTable, ...]:
-    """Return a table of the terminal as the only item; nothing if it has no rows."""
-    rows = zip(*(column.cells for column in table.columns), strict=True)
-    return make_table((str(column.header) for column in table.columns), rows, title)
 
 
 def write_summary(folder: Path, summary: Summary) -> None:

@@ -34,7 +34,7 @@
 Required are title, outputs, and either model or fmu.
 """
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any
@@ -257,18 +257,15 @@ def build_scene(path: Path, table: dict[str, Any], source: str) -> Scene:
     return scene
 
 
-def change_scene(scene: Scene, values: Mapping[str, Any], stop: float | None) -> Scene:
-    """Return a scene with other values of variables, or another stop time in s.
-
-    Its known values hold no longer, but for parameters it keeps.
-    """
-    if not values and stop is None:
+def change_run(scene: Scene, run: RunSpec) -> Scene:
+    """Return a scene with another run; its known values hold no longer, but for parameters that keep their value."""
+    if run == scene.run:
         return scene
     known = scene.known
     if known:
-        kept = {name: value for name, value in known.values.items() if known.kind == "parameter" and name not in values}
+        is_kept = {name: run.values.get(name) == scene.run.values.get(name) for name in known.values}
+        kept = {name: value for name, value in known.values.items() if known.kind == "parameter" and is_kept[name]}
         known = replace(known, values=kept) if kept else None
-    run = replace(scene.run, values={**scene.run.values, **values}, stop=scene.run.stop if stop is None else stop)
     return replace(scene, run=run, known=known, remark=scene.remark if known == scene.known else "")
 
 

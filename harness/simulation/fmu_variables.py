@@ -2,12 +2,12 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..arguments import CO_SIMULATION, MODEL_EXCHANGE
 from ..errors import check_names, import_optional
+from ..results.table import ResultColumn, ResultTable, format_blocks, format_html
 from .fmu_archive import read_description
 from .model_data import LookupTable, read_model_data
 from .variable_values import ExclusiveBound, effective_value, enumeration_labels, find_bound, variable_unit
@@ -23,7 +23,6 @@ GROUPS = {  # causality and heading; other variables are internal
     "input": "Inputs",
     "output": "Outputs",
 }
-HEADINGS = ("name", "start", "range", "unit", "description")
 
 
 @dataclass(frozen=True)
@@ -66,11 +65,23 @@ class VariableInfo:
         high = "" if self.high is None else f"{'to below' if self.excludes_high else 'to'} {self.high:g}"
         return f"{low} {high}".strip()
 
-    @property
-    def cells(self) -> tuple[str, ...]:
-        """Return the texts of a row: name, start value, range, unit and description."""
-        start = f"{self.start:.7g}" if isinstance(self.start, float) else "" if self.start is None else str(self.start)
-        return self.name, start, self.range, self.unit, self.description
+
+def format_start(variable: VariableInfo) -> str:
+    """Return the start value of a variable; empty without one."""
+    if isinstance(variable.start, float):
+        return f"{variable.start:.7g}"
+    return "" if variable.start is None else str(variable.start)
+
+
+INTERNAL = "Internal variables"
+TEXT_WIDTH = 140  # characters of a line of `str`
+COLUMNS = (
+    ResultColumn("name", "{0.name}", is_text=True),
+    ResultColumn("start", format_start),
+    ResultColumn("range", "{0.range}", is_text=True),
+    ResultColumn("unit", "{0.unit}", is_text=True),
+    ResultColumn("description", "{0.description}", is_text=True),
+)
 
 
 @dataclass(frozen=True)
@@ -119,29 +130,27 @@ class FmuDescription:
         check_names("variable", [name], by_name)
         return by_name[name]
 
-    def summary(self) -> str:
-        """Return the description as text: defaults, laws and methods, and a table of the variables of each group."""
-        lines = [*self.sentences()]
-        for title, variables in self.groups():
-            rows = [HEADINGS, *(variable.cells for variable in variables)]
-            widths = [max(len(row[i]) for row in rows) for i in range(len(HEADINGS))]
-            lines += ["", title]
-            lines += [
-                "  ".join(text.ljust(width) for text, width in zip(row, widths, strict=True)).rstrip() for row in rows
-            ]
-        for title, points in self.points():
-            width = max(len(cell) for row in points for cell in row)
-            lines += ["", title, *("  ".join(cell.rjust(width) for cell in row) for row in points)]
-        return "\n".join(lines)
-
-    def points(self) -> Iterator[tuple[str, list[tuple[str, str]]]]:
-        """Yield the title of each table, and its headings and points; y has the name of its parameter, if any."""
+    def tabulate(self) -> tuple[ResultTable, ...]:
+        """Return a table of the variables of each group that is not empty, and of the points of each lookup table."""
+        groups: dict[str, list[VariableInfo]] = {title: [] for title in (*GROUPS.values(), INTERNAL)}
+        for variable in self.variables:
+            groups[GROUPS.get(variable.causality, INTERNAL)].append(variable)
+        tables = [ResultTable(variables, COLUMNS, title) for title, variables in groups.items() if variables]
         for table in self.tables:
-            rows = [
+            points = [
                 (f"{x:.7g}", f"{y:.7g}" + (f" ({parameter})" if parameter else ""))
                 for x, y, parameter in zip(table.x, table.y, table.parameters, strict=True)
             ]
-            yield f"Table {table.name}", [(f"x [{table.unit_x}]", f"{table.name} [{table.unit_y}]"), *rows]
+            columns = (
+                ResultColumn(f"x [{table.unit_x}]", "{0[0]}"),
+                ResultColumn(f"{table.name} [{table.unit_y}]", "{0[1]}"),
+            )
+            tables.append(ResultTable(points, columns, f"Table {table.name}"))
+        return tuple(tables)
+
+    def blocks(self) -> list[ResultTable | str]:
+        """Return the sentences and the tables that the command `info` prints."""
+        return [*self.sentences(), *(block for table in self.tabulate() for block in ("", table))]
 
     def sentences(self) -> Iterator[str]:
         """Yield the sentences above the tables."""
@@ -156,16 +165,6 @@ class FmuDescription:
                 yield f"{word} ({name}): {', '.join(choices)}; {default}"
         for table in self.tables:
             yield f"Table {table.name}: {len(table.x)} points, {table.interpolation}, ends: {table.ends}"
-
-    def groups(self) -> Iterator[tuple[str, list[VariableInfo]]]:
-        """Yield the title and the variables of each group that is not empty; internal variables are the last one."""
-        for causality, title in GROUPS.items():
-            variables = [variable for variable in self.variables if variable.causality == causality]
-            if variables:
-                yield title, variables
-        others = [variable for variable in self.variables if variable.causality not in GROUPS]
-        if others:
-            yield "Internal variables", others
 
     def to_pandas(self) -> "pandas.DataFrame":
         """Return a table with a row for each variable, indexed by name.
@@ -185,24 +184,14 @@ class FmuDescription:
         return vars(self) | {"laws": self.laws, "methods": self.methods, "variables": variables, "tables": tables}
 
     def __str__(self) -> str:
-        return self.summary()
+        return format_blocks(self.blocks(), TEXT_WIDTH)
 
     def __repr__(self) -> str:
-        counts = ", ".join(f"{title.lower()}: {len(variables)}" for title, variables in self.groups())
+        counts = ", ".join(f"{table.title.lower()}: {len(table.items)}" for table in self.tabulate())
         return f"<FmuDescription {self.name}: FMI {self.fmi_version}, {counts}>"
 
     def _repr_html_(self) -> str:
-        parts = [f"<p>{'<br>'.join(map(escape, self.sentences()))}</p>"]
-        head = "".join(f"<th>{heading}</th>" for heading in HEADINGS)
-        for title, variables in self.groups():
-            rows = (
-                f"<tr>{''.join(f'<td>{escape(cell)}</td>' for cell in variable.cells)}</tr>" for variable in variables
-            )
-            parts.append(f"<table><caption>{title}</caption><tr>{head}</tr>{''.join(rows)}</table>")
-        for title, points in self.points():
-            cells = (f"<tr>{''.join(f'<td>{escape(cell)}</td>' for cell in row)}</tr>" for row in points)
-            parts.append(f"<table><caption>{escape(title)}</caption>{''.join(cells)}</table>")
-        return "".join(parts)
+        return format_html(self.blocks())
 
     def _choices(self, name: str) -> tuple[str, ...]:
         fixed = (self.fixed[name],) if name in self.fixed else ()

@@ -13,39 +13,38 @@ FMU_SUFFIXES = (".fmu", ".py")
 METHOD, RTOL = "solver.method", "solver.rtol"
 
 
-def resolve(source: str | Path, options: RunOptions | None = None, scenes_first: bool = False) -> RunSpec:
-    """Return the run that a user specifies.
+def resolve(source: str | Path, options: RunOptions | None = None) -> RunSpec:
+    """Return the run of a source, as in `find_source`.
 
     Parameters
     ----------
-    source : str or path
-        As in `find_source`.
     options : RunOptions, optional
         Options of the run of an FMU or a model; a scene has its own.
-    scenes_first : bool
-        Whether a name that a scene and a model share means the scene.
-
-    Raises
-    ------
-    HarnessError
-        If there is no such source.
     """
-    item = find_source(source, scenes_first)
+    return specify_run(find_source(source), options)
+
+
+def specify_run(item: Path | Scene, options: RunOptions | None = None) -> RunSpec:
+    """Return the run of an FMU with options, or of a scene, which has its own; HarnessError if it is not built."""
     if isinstance(item, Path):
         return RunSpec(item, **vars(options or RunOptions(equal_steps=DEFAULT_EQUAL_STEPS)))
     check_built(item.run.fmu)
     return item.run
 
 
-def find_source(source: str | Path, scenes_first: bool = False) -> Path | Scene:
+def prefer_scene(source: str) -> str | Path:
+    """Return the file of the built-in scene of this name, which a model may have as well, or else the source."""
+    return next((file for file in shipped_scenes() if file.stem == source), source)
+
+
+def find_source(source: str | Path) -> Path | Scene:
     """Return the FMU or the scene of a source.
 
     Parameters
     ----------
     source : str or path
-        The path of an FMU or of a model file, the name of a model, or the name or path of a scene.
-    scenes_first : bool
-        Whether a name that a scene and a model share means the scene.
+        The path of an FMU or of a model file, the name of a model, or the name or path of a scene. A name that a scene
+        and a model share means the model.
 
     Raises
     ------
@@ -54,7 +53,7 @@ def find_source(source: str | Path, scenes_first: bool = False) -> Path | Scene:
     """
     path, name = Path(source), str(source)
     scenes = {file.stem for file in shipped_scenes()}
-    if path.suffix in FMU_SUFFIXES or (name in list_models() and not (scenes_first and name in scenes)):
+    if path.suffix in FMU_SUFFIXES or name in list_models():
         return find_fmu(name)
     if path.is_dir() and name not in scenes:
         raise SceneError(

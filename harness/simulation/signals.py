@@ -121,19 +121,9 @@ class Signals:
         return self.file
 
     @property
-    def accuracy(self) -> str:
-        """Return the estimated accuracy; empty if it is not known."""
-        return ""
-
-    @property
-    def attributes(self) -> dict[str, Any]:
+    def _attributes(self) -> dict[str, Any]:
         """Return the attributes of the Dataset."""
         return {"name": self.name}
-
-    @property
-    def effective_parameters(self) -> dict[str, tuple[object, str]]:
-        """Return value and unit of every parameter, by name."""
-        return {}
 
     @property
     def motion_outputs(self) -> dict[str, str]:
@@ -141,12 +131,12 @@ class Signals:
         return find_roles([*self.columns])
 
     @property
-    def headline(self) -> str:
+    def _headline(self) -> str:
         span = f" from {self.time[0]:g} to {self.time[-1]:g} s" if len(self.time) else ""
         return f"{', '.join(self.columns) or 'no outputs'}; {len(self.time)} points{span}"
 
     def __repr__(self) -> str:
-        return f"<{type(self).__name__} of {' '.join(self.name.split())}: {self.headline}>"
+        return f"<{type(self).__name__} of {' '.join(self.name.split())}: {self._headline}>"
 
     def __getitem__(self, name: str) -> np.ndarray:
         """Return the values (n,) of an output by its name."""
@@ -216,7 +206,7 @@ class Signals:
             for name, column in self.columns.items()
         }
         time = ("time", self.time, {"units": "s", "long_name": "time"})
-        dataset: xarray.Dataset = library.Dataset(variables, {"time": time}, self.attributes)
+        dataset: xarray.Dataset = library.Dataset(variables, {"time": time}, self._attributes)
         return dataset
 
     @check_arguments(x=TEXT, ax=AXES)

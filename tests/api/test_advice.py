@@ -81,8 +81,8 @@ def test_a_record_in_volts_is_converted_as_the_remark_says(quantity, unit, tmp_p
     file = tmp_path / "decay.csv"
     np.savetxt(file, np.c_[t, x], delimiter=",", header=f"t [s],u [{unit}]", comments="")
     (remark,) = (text for text in harness.identify_decay(file, k=36.0, quantity=quantity).remarks if "forces" in text)
-    (size,) = re.findall(r"per_count='(.*?)'", remark)
-    record = harness.read_record(file, quantity=quantity, per_count=size)
+    (size,) = re.findall(r"unit='(.*?)'", remark)
+    record = harness.read_record(file, quantity=quantity, unit=size)
     result = harness.identify_decay(record, k=36.0)
     assert result["c"].unit == "N.s/m"
     assert not any("forces" in text for text in result.remarks)

@@ -122,7 +122,7 @@ def test_tables_of_xarray_are_records(user_folder, monkeypatch):
     monkeypatch.chdir(user_folder)
     run = harness.simulate("smd")
     dataset = run.to_xarray()
-    assert {row["largest"] for row in harness.compare(run, dataset).rows()[0]} == {0.0}
+    assert {row["largest"] for row in harness.compare(run, dataset)["variables"]} == {0.0}
     expected = harness.identify_decay(run).as_json()["fit"]  # which takes k from the model
     for record in (dataset, dataset["x"]):
         assert harness.identify_decay(record, k=157.9).as_json()["fit"] == expected

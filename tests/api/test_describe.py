@@ -28,7 +28,7 @@ def test_a_description_has_every_variable_of_the_fmu_with_its_unit_and_default(f
             assert found.start == found.choices[[c.value for c in item.declaredType.items].index(item.start)]
         elif item.start is not None:
             assert found.start == float(item.start)
-    text = description.summary()
+    text = str(description)
     assert all(f"\n{item.name} " in text for item in expected.modelVariables)
     assert description["solver.rtol"].range == "from 0 to below 1"
     assert description["m"].range == "above 0"

@@ -49,7 +49,7 @@ IDENTIFY_DECAY = [
     ({"record": DECAY[0], "x": DECAY[1], "unit": "m", "column": "x"}, "column = 'x' has no effect on arrays"),
     ({"record": "nowhere.csv", "x": DECAY[1]}, "x has no effect, because the record has columns"),
     ({"record": "nowhere.csv", "begin": 2.0, "end": 1.0}, "begin = 2.0 s must be before end = 1.0 s"),
-    ({"record": {"t": range(20), "x [m]": range(20)}}, "as in t [ms], or as in time_unit='ms' of read_record"),
+    ({"record": {"t": range(20), "x [m]": range(20)}}, "as in t [ms], or as in time='t [ms]'"),
     (
         {"record": {"x [m]": SWING, "y [m]": SWING}},
         "name it, as in time='x [m]', or set the sampling rate in Hz, as in rate=",
@@ -58,7 +58,7 @@ IDENTIFY_DECAY = [
         {"record": {"v [m/s]": SWING, "F [N]": SWING}},
         "use harness.identify_curve, or name the column of times, as in time='t'",
     ),
-    ({"record": {"t [s]": DECAY[0], "n [counts]": DECAY[1]}}, "as in per_count='0.36deg' of read_record"),
+    ({"record": {"t [s]": DECAY[0], "n [counts]": DECAY[1]}}, "as in unit='0.36deg'"),
     (
         {"record": {"t [s]": DECAY[0], "x [m]": DECAY[1]}, "quantity": "velocity"},
         "quantity='velocity': m, the unit of x",
@@ -88,7 +88,7 @@ SWEEP = [  # changes of harness.sweep("smd", {"k": [1.0]})
     ({"grid": {"kk": [1.0]}}, "'kk' (nearest: 'k')"),
     ({"grid": {"k": [1.0, 2.0, 3.0]}, "samples": 4}, "its lower and its upper bound"),
     ({"grid": {"k": [[1.0, 2.0], [3.0, 4.0]]}}, "grid: k = [[1.0, 2.0], [3.0, 4.0]] must be numbers, one or a row"),
-    ({"values": {"k": 2.0}}, "k is varied by grid and has a value for all runs: remove one"),
+    ({"values": {"k": 2.0}}, "k is both varied and set; remove one of them"),
 ]
 FIT = [  # changes of a fit of mu_s of the sled to its position
     ({"free": ["mu_z"]}, "unknown parameter 'mu_z' (nearest: 'mu_s')"),

@@ -117,7 +117,7 @@ def test_a_missing_package_is_a_gap_with_its_reason(references):
     comparison = Comparison((missing,), tuple(results))
     scenes = ", ".join(SCENES)
     assert [*gap_lines(comparison)] == [f"No result of MuJoCo (default: {scenes}; best: {scenes}): {reason}."]
-    assert rivals_table(comparison).row_count == len(SCENES)
+    assert not rivals_table(comparison).items
 
 
 def test_what_an_engine_raises_is_a_gap(engine):

@@ -137,7 +137,7 @@ def test_any_scene_content_runs_or_is_refused(workspace, key):
     for value in VALUES:
         text = scene_text(default | {key: value})
         (workspace / "mine.toml").write_text(text, encoding="utf-8")
-        check(*run_command("run", "mine.toml", "--quiet"), text[:300])
+        check(*run_command("run", "mine.toml"), text[:300])
 
 
 @pytest.mark.slow
@@ -162,7 +162,7 @@ def test_any_file_content_is_a_scene_or_is_refused(workspace):
 def test_a_title_is_drawn_literally(workspace, title):
     text = scene_text(SCENE | {"title": f"'{title}'", "plots": '["position"]'})
     (workspace / "mine.toml").write_text(text, encoding="utf-8")
-    assert run_command("run", "mine.toml", "--quiet") == (0, "")
+    assert run_command("run", "mine.toml") == (0, "")
     assert (workspace / "results/mine/figure.svg").stat().st_size > 1000
 
 
@@ -170,7 +170,7 @@ def test_a_title_is_drawn_literally(workspace, title):
 def test_extreme_numbers_are_drawn_or_refused(workspace):
     for values in ("x0 = 1e308", "x0 = 1e-308", "k = 1e300", "v0 = -1e300", "x0 = 5e-324\nv0 = 1e250", "m = 1e308"):
         (workspace / "mine.toml").write_text(f"{scene_text(SCENE | {'plots': PLOTS})}[values]\n{values}\n")
-        check(*run_command("run", "mine.toml", "--quiet"), values)
+        check(*run_command("run", "mine.toml"), values)
 
 
 @pytest.mark.slow
@@ -182,11 +182,11 @@ def test_any_table_content_is_compared_or_refused(workspace):
     (workspace / "good.csv").write_text("t [s],x [m]\n0,1\n1,2\n2,3\n")
     (workspace / "\udcff$_{.csv").write_text("t [s],x [m]\n0,1\n1,2.5\n2,3\n")
     for name in (*names, "\udcff$_{.csv"):
-        check(*run_command("compare", name, "good.csv", "--quiet"), (name, Path(name).read_text()[:200]))
+        check(*run_command("compare", name, "good.csv"), (name, Path(name).read_text()[:200]))
     for name in names:  # the same tables are drawn
         for pair in (("good.csv", name), (name, name)):
-            check(*run_command("compare", *pair, "--quiet", figures=False), (pair, Path(name).read_text()[:200]))
-    check(*run_command("report", "--quiet"), "the report on all of these")
+            check(*run_command("compare", *pair, figures=False), (pair, Path(name).read_text()[:200]))
+    check(*run_command("report"), "the report on all of these")
     assert (workspace / "results/report.html").stat().st_size > 1000
 
 
@@ -214,9 +214,9 @@ def test_an_invalid_sweep_is_refused_before_a_worker_starts(workspace, option):
 @pytest.mark.parametrize("option", ["--stop", "--rtol", "--within"])
 def test_numbers_on_the_command_line_are_finite_or_refused(workspace, option, word):
     (workspace / "a.csv").write_text("t [s],x [m]\n0,1\n1,2\n2,3\n")
-    check(*run_command("compare", "a.csv", "a.csv", option, word, "--quiet"), word)
+    check(*run_command("compare", "a.csv", "a.csv", option, word), word)
     if option != "--within":
-        check(*run_command("run", "fmus/smd.fmu", option, word, "--quiet"), word)
+        check(*run_command("run", "fmus/smd.fmu", option, word), word)
 
 
 @pytest.mark.slow
@@ -229,7 +229,7 @@ def test_randomly_mutated_scenes_run_or_are_refused(workspace):
         for _ in range(dice.randint(1, 4)):
             text[dice.randrange(len(text))] = dice.choice('"[]{}=.,#\\\n0-e$\0\u00e9 ')
         (workspace / "mine.toml").write_text("".join(text), encoding="utf-8")
-        check(*run_command("run", "mine.toml", "--quiet"), "".join(text))
+        check(*run_command("run", "mine.toml"), "".join(text))
 
 
 UNREADABLE = "\udcff\udcfe"
@@ -262,7 +262,7 @@ def test_the_report_survives_any_content_of_a_result(tmp_path):
                 (tmp_path / file).mkdir()
             else:
                 (tmp_path / file).write_bytes(content.encode("utf-8", "surrogateescape"))
-        assert run_command("report", "--out", tmp_path, "--quiet") == (0, ""), contents
+        assert run_command("report", "--out", tmp_path) == (0, ""), contents
         page = (tmp_path / "report.html").read_text(encoding="utf-8")
         assert "right hand coulomb" in page
         unreadable = re.findall(f"{re.escape(str(tmp_path))}/([^ ]+) cannot be shown", page)

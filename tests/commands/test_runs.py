@@ -73,8 +73,9 @@ def test_the_main_job_ends_with_one_sentence_on_what_agrees_and_explains_steps_t
 
 def test_the_main_job_names_each_case_that_differs(workspace, monkeypatch):
     """In red, as in a terminal; the exit status is that of the runs."""
-    monkeypatch.setattr("harness.studies.run.study.compared_scene_names", lambda: ["coulomb-stop"])
-    monkeypatch.setattr("harness.studies.run.table.MAX_DEVIATION", -1.0)
+    stop = ROOT / "harness/scenes/coulomb-stop.toml"
+    monkeypatch.setattr("harness.scenes.scene.shipped_scenes", lambda: [stop])
+    monkeypatch.setattr("harness.studies.run.result.MAX_DEVIATION", -1.0)
     done = harness(workspace, "--out", "results", FORCE_COLOR="1")
     assert done.returncode == 0
     assert "\x1b[31m0 of 1 cases agree within" in done.stdout
@@ -283,7 +284,7 @@ def test_a_failing_case_does_not_lose_the_others(workspace, monkeypatch):
     assert done.returncode == 1
     assert done.stderr.startswith("Error: scene bad: mu_d is 0.95")
     assert done.stderr.count("\n") == 1
-    assert "failed" in done.stdout.split("\nbad ")[1].split("\n")[0]
+    assert "\nbad: failed\n" in done.stdout
     assert [path.name for path in (workspace / "out").iterdir()] == ["good"]
 
 
@@ -315,25 +316,16 @@ def test_a_command_runs_alike_in_a_process_of_its_own(workspace, arguments):
     assert one == pytest.approx(other, rel=1e-6, abs=1e-9)  # sums of numpy depend on the memory alignment of an array
 
 
-def test_quiet_prints_nothing(scene):
-    done, results = scene(BASE + "grid = 1", "--quiet")
-    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
-    assert results.exists()
-
-
 def test_a_scene_imports_only_the_modules_it_needs(user_folder, tmp_path):
     """Scenes that use more and more modules, one after the other in one process."""
     optional = ["harness.analyses.slip", "harness.analyses.decay", "harness.analyses.steps", "matplotlib"]
     extras = ("plots = []", "plots = []\nanalyses = ['slip']", "plots = ['position']")
-    code = (
-        "import sys; from pathlib import Path; from harness.studies.run.study import run_scene\n"
-        "from harness.scenes.scene import load_scene\n"
-    )
+    code = "import sys; from pathlib import Path; from harness.commands.run import run_and_save\n"
     for number, extra in enumerate(extras):
         (tmp_path / f"{number}.toml").write_text(BASE + extra)
         file = str(tmp_path / f"{number}.toml")
         code += (
-            f"run_scene(load_scene({file!r}), Path({str(tmp_path)!r}), lambda share: None)\n"
+            f"run_and_save({file!r}, Path({str(tmp_path)!r}), lambda name, share: None)\n"
             f"print([name for name in {optional} if name in sys.modules])\n"
         )
     done = commands.run_python(user_folder, "-c", code)

@@ -91,7 +91,7 @@ from typing import assert_type
 import fmus
 import harness
 
-assert_type(harness.simulate("smd"), harness.Trajectory)
+assert_type(harness.simulate("smd"), harness.RunResult)
 assert_type(harness.fit("smd", "record.csv", ["c"], observe=["x"]), harness.FitResult)
 assert_type(fmus.Parameter(1.0, "kg", "mass").unit, str)
 harness.simulate(stop="late")

@@ -15,13 +15,13 @@ analyses: slip
 process: interrupt interruptible_wait subprocess_runner temporary_directory worker
 records: columns extraction headings record samples size_limits text_table
 references: certified_reference models peer_solvers reference_trajectory
-results: folder quantity registry style
+results: folder quantity registry style table
 simulation: embedded_model native_equivalent runner whole_run
 simulation.external: step_refinement
 scenes: run_spec
-studies.precision: advice law_deviations study
+studies.precision: study
 studies.stability: study
-studies.sweep: checkpoint dispatch result
+studies.sweep: dispatch result
 """
 
 

@@ -121,7 +121,7 @@ FILES = {
 }  # fmt: skip
 OPTIONS = {
     "no-heading.csv": {"headings": "t [s],x [mm]"},
-    "encoder.csv": {"per_count": "0.001deg"},
+    "encoder.csv": {"unit": "0.001deg"},
 }
 PENDULUMS = ("stamps.csv", "gyroscope.csv", "encoder.csv")
 QUANTITIES = {"phone.csv": "acceleration", "accelerometer-in-g.csv": "acceleration", "gyroscope.csv": "velocity"}
@@ -203,7 +203,7 @@ NOTATIONS = {  # and the options of its reader; all hold the same motion
     "blanks before units": (lambda: "Time (s)   x [mm]\n" + text_lines(lambda t, x, s: f"{t:9.3f} {x:11.6f}"), {}),
     "samples": (
         lambda: "Sample,x [mm]\n" + text_lines(lambda t, x, s: f"{100 * t:.0f},{x:.6f}"),
-        {"time_unit": "0.01s"},
+        {"time": "Sample [0.01s]"},
     ),
     "day, month and year": (
         lambda: "Zeit;Weg [mm]\n" + text_lines(lambda t, x, s: f"{s:%d.%m.%Y %H:%M:%S,%f};{x:.6f}".replace(".6", ",6")),
@@ -282,7 +282,7 @@ UNITS = "\n".join(f"{i} sec,{i % 5} {'cm' if i == 3 else 'mm'}" for i in range(2
     [
         (f"t,x\n{ROWS}", {}, "t has integer or very large numbers and no unit"),
         (f"millivolts,x [m]\n{ROWS}", {}, "millivolts has integer or very large numbers and no unit"),
-        (f"t,x [m]\n{ROWS.replace(',', '763770000123.5,')}", {}, "as in time_unit='ms' of read_record, or 0.01s"),
+        (f"t,x [m]\n{ROWS.replace(',', '763770000123.5,')}", {}, "as in time='t [ms]', or [0.01s]"),
         (f"t [s],x [m]\n{ROWS}", {"column": "y"}, "unknown column 'y'"),
         (f"t [h/m],x [m]\n{ROWS}", {}, "unknown unit of t 'h/m'"),
         (f"t [s],x [m]\n{ROWS}\n20,abc", {}, "'abc' in row 22, column x [m], is not a number"),
@@ -308,8 +308,7 @@ UNITS = "\n".join(f"{i} sec,{i % 5} {'cm' if i == 3 else 'mm'}" for i in range(2
         ("t [s]\n" + ROWS.replace(",", "."), {}, "only one column that is not empty, t [s]; time and pos"),
         ('{"t": [0.1, 0.2, 0.3], "x": 1}', {}, "only one column that is not empty, t; time and position"),
         ("Dear Sir,\nno table.\n", {}, "contains no table"),
-        (f"t [s],count [counts]\n{ROWS}", {}, "as in per_count='0.36deg'"),
-        (f"t [s],count [counts]\n{ROWS}", {"per_count": "half a turn"}, "give a number and a unit"),
+        (f"t [s],count [counts]\n{ROWS}", {}, "as in unit='0.36deg'"),
         (f"t [s],acceleration [mm]\n{ROWS}", {}, "the name of an acceleration and the unit of a position"),
         (f"t [s],a [m/s^2]\n{ROWS}", {"quantity": "position"}, "measures an acceleration"),
         ("2026-11-21T15:18:03,1\n2026-21-11T15:18:03,2\n" * 9, {"headings": "t,x [m]"}, "is not a time stamp"),

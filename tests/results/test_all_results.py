@@ -19,9 +19,10 @@ from matplotlib.figure import Figure
 from native_fmus import build_native_fmus
 
 import harness
+from harness.references.peer_solvers import FMU
 from harness.references.reference_trajectory import CommunicationGrid
 from harness.results.registry import STUDIES
-from harness.studies.precision.study import FMU, Point, StudiedCase, Study
+from harness.studies.precision.study import Point, PrecisionCase
 from harness.studies.stability.study import CaseOutcome, StabilityCase, StabilityRegion
 
 pytestmark = pytest.mark.usefixtures("in_workspace")
@@ -71,16 +72,14 @@ def differentiated_sled():
 
 def measured_precision():
     """Points of one case by two methods, one of which failed once."""
-    case = StudiedCase("smd", "linear", {"k": 100.0})
+    case = PrecisionCase("smd", "linear", {"k": 100.0})
     points = [
         Point("smd", tool, method, rtol, 1e-3 * rtol, 1e-3, 100, rtol, rtol, rtol)
         for tool, method in ((FMU, "dop853"), (FMU, "ode45"), ("scipy", "RK45"))
         for rtol in (1e-4, 1e-7)
     ]
     points.append(Point("smd", "scipy", "RK45", 1e-9, 1e-12, failure="too slow"))
-    return harness.PrecisionResult(
-        Study("smd", (case,), tuple(points)), (), "smd: use dop853: error 1e-7 in 1 ms; no more."
-    )
+    return harness.PrecisionResult("smd", (case,), tuple(points))
 
 
 def judged_cases():
@@ -147,7 +146,7 @@ def test_a_result_is_one_line_text_and_html(study):
 def test_a_run_without_points_is_one_line():
     """As in the outcomes of stability, which keep no signals."""
     motion = judged_cases().outcomes[0].motion
-    assert repr(motion) == f"<Trajectory of {motion.title}: no outputs; 0 points>"
+    assert repr(motion) == f"<RunResult of {motion.title}: no outputs; 0 points>"
 
 
 @every_study
@@ -191,14 +190,14 @@ def test_a_saved_result_holds_its_summary_and_origin(study):
     assert (stored["study"], stored["title"], stored["sentences"]) == (study, "kept", [*expected.sentences])
     assert [table["rows"] for table in stored["tables"]] == [[*map(list, table.rows)] for table in expected.tables]
     assert stored["files"] == sorted(path.name for path in saved(study).glob("*.csv"))
-    assert f": harness.{result.function}" in stored["origin"][0]
+    assert f": harness.{result._function}" in stored["origin"][0]
 
 
 @every_study
 def test_a_result_of_another_source_is_replaced_only_on_request(study, monkeypatch):
     other = next(name for name in [*MAKERS][::-1] if name != study)
     shutil.copytree(saved(study), "kept")
-    monkeypatch.setattr("harness.results.result.Result.write_figure", lambda result, path: None)
+    monkeypatch.setattr("harness.results.result.Result._write_figure", lambda result, path: None)
     with pytest.raises(harness.HarnessError, match=r"kept holds"):
         result_of(other).save("kept")
     result_of(study).save("kept", overwrite=True)
@@ -252,7 +251,7 @@ def test_a_phase_plane_has_an_output_on_each_axis():
 
 def report_on(folder):
     """Return the report on the results in a folder."""
-    assert commands.harness(folder, "report", "--out", ".", "--quiet").returncode == 0
+    assert commands.harness(folder, "report", "--out", ".").returncode == 0
     return (Path(folder) / "report.html").read_text(encoding="utf-8")
 
 
@@ -287,14 +286,10 @@ def test_a_summary_of_an_unknown_study_is_at_the_end_of_the_report(tmp_path):
 
 # methods by which the harness calls its own classes, with arguments of types that users do not make
 INTERNAL = {
-    "draw",
-    "draw_panel",
-    "is_stored",
-    "write",
-    "write_figure",
-    "write_tables",
     "curve",
+    "rank_solvers",
     "signals",
+    "solvers",
     "unit_factor",
 }
 INTERNAL |= {"check_sampling", "column_of_role", "contact_of", "get_parameter", "sample_at", "rest", "signal"}
@@ -329,7 +324,7 @@ WRONG = [
 
 @pytest.mark.parametrize("maker", [*MAKERS, *OTHER_MAKERS])
 def test_a_method_uses_an_argument_or_refuses_it_in_one_sentence(maker, monkeypatch):
-    monkeypatch.setattr("harness.results.result.Result.write_figure", lambda result, path: None)
+    monkeypatch.setattr("harness.results.result.Result._write_figure", lambda result, path: None)
     value, failures = result_of(maker) if maker in MAKERS else OTHER_MAKERS[maker](), []
     methods = [getattr(value, name) for name in dir(type(value)) if name in OPERATORS or name[0] != "_"]
     for method in filter(inspect.ismethod, methods):

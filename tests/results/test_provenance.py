@@ -108,7 +108,7 @@ def test_the_report_shows_every_run(workspace):
     page = (workspace / "results/report.html").read_text()
     assert "<h2>Runs</h2>" in page
     assert all(f"<h3>{name}</h3>" in page for name in ("pacejka", "mine"))
-    assert re.search(r"<td[^>]*>x \[m\]</td>\s*<td[^>]*>0.1</td>", page)
+    assert re.search(r"<td[^>]*>x</td>\s*<td[^>]*>0.1</td>", page)
     assert "mine: plots of the run" in page
 
 

@@ -18,7 +18,7 @@ from power_series_body import Body, sample_motion
 from worker_client import FmiError
 
 from fmus.runtime.linear_closed_form import GROWING, LinearClosedForm
-from harness.studies.stability.study import grouped_cases, run_stability
+from harness.studies.stability.study import grouped_cases, measure_stability
 
 pytestmark = pytest.mark.slow
 
@@ -286,6 +286,6 @@ def test_references_and_stability_accept_an_unstable_model(tmp_path):
     (result,) = json.loads(done.stdout)
     assert result["difference"] < 1e-9
     cases = [[case for case in group if case.title == "as it comes"] for group in grouped_cases(models=[str(file)])]
-    rows = run_stability(tmp_path, lambda *_: None, [group for group in cases if group]).outcomes
+    rows = measure_stability([group for group in cases if group], lambda *_: None).outcomes
     assert rows
     assert [row.text for row in rows if not row.has_passed] == []

@@ -34,7 +34,7 @@ def odd_folder(tmp_path, fmus):
 def test_paths_of_temporary_files_fmus_and_results_may_contain_any_character(odd_folder, command):
     temporary = odd_folder / "temporary"
     temporary.mkdir()
-    done = run_process(odd_folder, *command, "--out", odd_folder / "out", "--quiet", TMPDIR=str(temporary))
+    done = run_process(odd_folder, *command, "--out", odd_folder / "out", TMPDIR=str(temporary))
     assert (done.returncode, done.stderr) == (0, "")
     assert list(temporary.iterdir()) == []
     assert any((odd_folder / "out").rglob("*.svg")) or any((odd_folder / "out").rglob("*.csv"))

@@ -103,7 +103,7 @@ def test_an_aborted_run_keeps_the_times_that_it_reached(tmp_path):
     for times in ([0.1, 0.2, 0.9], [0.8, 0.9]):
         faulty = build_external_fmus() / "Faulty.fmu"
         write_scene(tmp_path, faulty, times=times, stop=1.0, values="{kind = 2}")
-        done = commands.harness(tmp_path, "run", "scene.toml", "--quiet")
+        done = commands.harness(tmp_path, "run", "scene.toml")
         assert done.returncode == 1
         assert "crashed" in done.stderr
         reached = harness.load_result(tmp_path / "results/scene").time

@@ -435,8 +435,8 @@ def test_strings_are_compared_as_strings(tmp_path):
 def test_within_and_atol_set_the_allowed_difference(tmp_path, bounds, status):
     (tmp_path / "one.csv").write_text("t [s],x [m]\n0,1\n1,4\n2,3\n")
     (tmp_path / "two.csv").write_text("t [s],x [m]\n0,1\n1,3.75\n2,3\n")
-    done = commands.harness(tmp_path, "compare", "one.csv", "two.csv", *bounds, "--quiet")
-    assert (done.returncode, done.stdout) == (status, "")
+    done = commands.harness(tmp_path, "compare", "one.csv", "two.csv", *bounds)
+    assert done.returncode == status
     assert ("x differs by 0.25 m at t = 1 s, more than" in done.stderr) == bool(status)
 
 

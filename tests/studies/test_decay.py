@@ -105,12 +105,11 @@ def test_a_record_needs_no_fmu_modules_and_one_drawing(tmp_path):
     program = """
 import sys
 from matplotlib.figure import Figure
-from pathlib import Path
 from decays import decay_record, identify
 
 draws, draw = [], Figure.draw
 Figure.draw = lambda *arguments: draws.append(draw(*arguments))
-identify(decay_record(0.02)).write(Path.cwd())
+identify(decay_record(0.02)).save("kept")
 unnecessary = ("fmpy", "scipy.stats", "scipy.signal")
 unnecessary += ("harness.simulation.runner", "harness.simulation.session")
 unnecessary += ("harness.scenes.run_spec", "harness.scenes.scene")

@@ -548,7 +548,7 @@ def test_one_noise_of_all_samples_does_not_move_the_fit(model, omega, free):
     ]
     assert all(fit.values == fits[0].values for fit in fits)
     assert fits[-1].undetermined == tuple(free)
-    assert fits[-1].headline == ", ".join(f"{name} not determined" for name in free)
+    assert fits[-1]._headline == ", ".join(f"{name} not determined" for name in free)
 
 
 def test_irregular_slips_are_described_one_by_one():

@@ -16,22 +16,23 @@ from precision_points import make_point, make_study
 from spec_runs import ignore_progress
 
 from benchmarks.references import event_located
-from harness import HarnessError, PrecisionResult
+from harness import HarnessError
 from harness.references import peer_solvers
 from harness.references.certified_reference import compute_errors, load_reference, relative_errors
 from harness.references.models import CASES
+from harness.references.peer_solvers import FMI3_TOOLS, FMPY, FMU
 from harness.simulation.embedded_model import EmbeddedModel, load_model_class, load_more_model, method_numbers
-from harness.studies.precision import advice, law_deviations
 from harness.studies.precision.study import (
-    FMI3_TOOLS,
-    FMPY,
-    FMU,
+    BRISTLES,
     FULL,
     QUICK,
     SolverJob,
     SweepSettings,
+    compare_bristles,
+    compare_with_dry_friction,
+    measure_precision,
+    solve_dry_block,
     solver_jobs,
-    study_model,
     sweep_tolerances,
 )
 
@@ -149,11 +150,11 @@ def test_the_advice_is_derived_from_the_points():
         make_point("ode23", 1e-3, 1e-3, case="stickslip-threshold", beside_dry=5e-3),
     )
     study = make_study(*points, cases=("stickslip", "stickslip-threshold"))
-    assert advice.recommend(study, []) == (
+    assert study.advice == (
         "stickslip: use ode45: error 1e-6 in 2 ms at rtol 1e-6 (hybrid; relative run time at error 1e-6: ode23 4, "
         "scipy RK45 140); the law 'threshold' does not get below an error of 0.005 against stick and slip."
     )
-    assert advice.recommend(make_study(points[0]), []) == "stickslip: no method of the FMU reaches an error of 1e-6."
+    assert make_study(points[0]).advice == "stickslip: no method of the FMU reaches an error of 1e-6."
 
 
 def test_a_figure_labels_three_solvers_per_case_and_draws_the_others_in_grey():
@@ -168,7 +169,7 @@ def test_a_figure_labels_three_solvers_per_case_and_draws_the_others_in_grey():
         make_point("ode23", 1e-3, 1e-3, case="stickslip-threshold", beside_dry=5e-3),
     )
     figure = Figure()
-    PrecisionResult(make_study(*points, cases=("stickslip", "stickslip-threshold")), (), "").draw(figure)
+    make_study(*points, cases=("stickslip", "stickslip-threshold"))._draw(figure)
     panels = figure.get_axes()
     assert [text.get_text() for text in panels[1].get_legend().get_texts()] == [
         "FMU: ode45",
@@ -188,13 +189,13 @@ def test_no_advice_is_given_without_sufficient_evidence():
     own, slower = make_point("rodas", 2e-3, 1e-7), make_point("ode23", 4e-3, 1e-7)
     message = "stickslip: no recommendation from a quick run; use `friction-fmus precision stickslip`."
     for peer, carried in ((1.7e-3, False), (2.5e-3, False), (4e-3, True)):
-        study = make_study(own, slower, make_point("LSODA", peer, 1e-7, "scipy"))
-        quick, complete = (advice.recommend(study, [], clear) for clear in (QUICK.min_ratio, FULL.min_ratio))
+        points = own, slower, make_point("LSODA", peer, 1e-7, "scipy")
+        quick, complete = (make_study(*points, min_ratio=extent.min_ratio).advice for extent in (QUICK, FULL))
         assert (quick == complete) == carried
         assert carried or quick == message
         assert complete.startswith("stickslip: use rodas: ")
         assert ("scipy LSODA 0.85, not a method of the FMU" in complete) == (peer < own.seconds)
-    assert advice.recommend(make_study(), [], QUICK.min_ratio) == message
+    assert make_study(min_ratio=QUICK.min_ratio).advice == message
 
 
 def test_a_quick_run_does_not_replace_a_full_one(user_folder, tmp_path):
@@ -210,7 +211,7 @@ def test_a_quick_run_does_not_replace_a_full_one(user_folder, tmp_path):
 
 def test_the_laws_creep_and_lose_their_symmetry_as_published(fmus):
     analyses_by_case = {
-        case.name: law_deviations.compare_with_dry_friction(case, load_model_class(fmus / f"{case.model}.fmu"))
+        case.name: compare_with_dry_friction(case, load_model_class(fmus / f"{case.model}.fmu"))
         for case in CASES
         if case.dry_friction_reference
     }
@@ -229,13 +230,13 @@ def test_the_laws_creep_and_lose_their_symmetry_as_published(fmus):
 @pytest.mark.slow
 def test_bristles_creep_and_each_law_has_a_smaller_integration_than_model_error(fmus):
     """The bristles of LuGre and of the elasto-plastic law, against a block that sticks, by two methods."""
-    dry = law_deviations.solve_dry_block()
+    dry = solve_dry_block()
     problem = event_located.DryBlock()
     other, events = event_located.solve(problem, dry.times.tolist(), "Radau", *event_located.TOLERANCES["Radau"])
     assert relative_errors(other, dry.states).max() < 1e-9
     assert [mode for _, (mode,) in events] == [mode for _, mode in dry.events] == [1, 0, 1, 0]
-    for name, law in law_deviations.BRISTLES.items():
-        deviation = law_deviations.compare_bristles(name, law, load_more_model(name))
+    for name, law in BRISTLES.items():
+        deviation = compare_bristles(name, law, load_more_model(name))
         assert 1e-6 < deviation.creep < 1e-5
         assert 1e-3 < deviation.rms < 0.1
         assert 0.0 < deviation.integration < 1e-4
@@ -253,7 +254,7 @@ def test_bristles_creep_and_each_law_has_a_smaller_integration_than_model_error(
 def test_a_user_model_is_studied_by_its_path_or_that_of_its_fmu(path, ending):
     """Every check that needs only the equations of the file; the reference is where two of its methods agree."""
     name = (build_user_model(path) / path.name).with_suffix(ending)
-    points = study_model(str(name), SweepSettings((1e-6,), 5.0, 0.0), ignore_progress)
+    points = measure_precision(str(name), SweepSettings((1e-6,), 5.0, 0.0), ignore_progress)
     assert points.model == path.stem
     assert {tool for tool, _ in points.solvers(points.cases[0])} == {FMU, FMPY, *FMI3_TOOLS}
     best = {p.tool: p.largest for p in points.points if p.method == "dop853"}

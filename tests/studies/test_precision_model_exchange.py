@@ -18,21 +18,13 @@ from harness import HarnessError
 from harness.references import peer_solvers
 from harness.references.certified_reference import load_reference
 from harness.references.models import CASES
+from harness.references.peer_solvers import CS, FMI3_TOOLS, FMPY, FMU, ME
+from harness.results.quantity import format_power
 from harness.scenes.run_spec import RunSpec
 from harness.simulation.embedded_model import load_model_class
 from harness.simulation.runner import run_own_fmu
-from harness.studies.precision import advice, study
-from harness.studies.precision.study import (
-    CS,
-    FMI3_TOOLS,
-    FMPY,
-    FMU,
-    ME,
-    QUICK,
-    SweepSettings,
-    solver_jobs,
-    sweep_tolerances,
-)
+from harness.studies.precision import study
+from harness.studies.precision.study import QUICK, SweepSettings, solver_jobs, sweep_tolerances
 
 CASE = {case.name: case for case in CASES}
 pytestmark = pytest.mark.slow
@@ -163,7 +155,7 @@ def two_studies(both, fmus, tmp_path_factory):
         assert (done.returncode, done.stderr) == (0, "")
         outputs.append(done.stdout)
         files = files or {file.name: file.read_text() for file in (out / "precision/smd").glob("*.csv")}
-        assert harness(folder, "report", "--quiet", "--out", out).returncode == 0
+        assert harness(folder, "report", "--out", out).returncode == 0
         pages.append(unescape((out / "report.html").read_text(encoding="utf-8")))
         (out / "precision/pendulum").mkdir(exist_ok=True)
         (out / "precision/pendulum/points.csv").write_text("older")
@@ -186,7 +178,7 @@ def test_the_command_shows_both_interfaces_and_error_against_tolerance(two_studi
     assert table == [[row["rtol [1]"], row["largest [1]"]] for row in rows[1:]]
     printed = output.partition("FMI 3.0 model exchange with fmpy's CVode: largest error by rtol")[2]
     table_rows = [line.split() for line in printed.splitlines() if line.startswith("1e-")]
-    assert table_rows == [[advice.format_power(float(number)) if number else "-" for number in row] for row in table]
+    assert table_rows == [[format_power(float(number)) if number else "-" for number in row] for row in table]
 
 
 def test_json_holds_all_results(two_studies):

@@ -11,7 +11,7 @@ import pytest
 
 import harness
 from harness import HarnessError
-from harness.studies.sweep.checkpoint import Checkpoint
+from harness.studies.sweep.dispatch import Checkpoint
 from harness.studies.sweep.result import SweepResult
 
 pytest.importorskip("xarray", reason="the extra 'sweep' is not installed")
@@ -195,7 +195,7 @@ def test_results_that_do_not_fit_on_the_disk_are_one_sentence_and_no_run_is_lost
     """The disk is full before the data, or before the table."""
     masses = np.linspace(1.0, 2.0, 200)
     with monkeypatch.context() as patch:
-        patch.setattr(SweepResult, "write", limited_files(size)(SweepResult.write))
+        patch.setattr(SweepResult, "_write", limited_files(size)(SweepResult._write))
         with pytest.raises(HarnessError, match=r"^cannot write \S*: File too large; choose another `folder`$"):
             sweep("here", masses=masses)
     assert sweep("here", masses=masses).n_resumed == 200

@@ -39,7 +39,7 @@ def test_an_axis_spanning_decades_is_logarithmic(short_sweep, values, spread, ki
         replaced |= {"m": ("m", np.array(values), short_sweep["m"].attrs | {"scale": spread})}
     short_sweep.dataset = short_sweep.data.assign(replaced)
     axes = Figure().subplots()
-    short_sweep.draw_panel(axes)
+    short_sweep._draw_panel(axes)
     assert axes.get_yscale() == kind
     assert "m" not in replaced or axes.get_xscale() == kind
 

@@ -261,8 +261,8 @@ FORMATS = (
         lambda: lines("Time,x\n", "{t} sec,{x} mm"),
     ),
     Format("a unit in each cell, columns of blanks", "cells.dat", lambda: lines("Time x\n", "{t:.3f} sec  {x:.9f} mm")),
-    Format("sample numbers", "samples.csv", lambda: lines("Sample,x [mm]\n", "{i},{x}"), {"time_unit": "0.01s"}),
-    Format("counts of an encoder", "counts.csv", lambda: lines("t [s],count\n", PLAIN), {"per_count": "1mm"}),
+    Format("sample numbers", "samples.csv", lambda: lines("Sample,x [mm]\n", "{i},{x}"), {"time": "Sample [0.01s]"}),
+    Format("counts of an encoder", "counts.csv", lambda: lines("t [s],count\n", PLAIN), {"unit": "1mm"}),
     Format("one column of positions", "column.csv", lambda: lines("x [mm]\n", "{x}"), {"rate": 100}),
     Format("one column with decimal commas", "column.txt", lambda: lines("x [mm]\n", "{x:.9f}", True), {"rate": 100}),
     Format(

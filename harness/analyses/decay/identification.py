@@ -274,7 +274,7 @@ def identify_record(
     omega = by_unknown[OMEGA]
     estimates += force_estimates(record, omega, by_unknown, parameters)  # of the widened intervals
     if record.base not in ("m", "rad", NO_UNIT) and (parameters.k or parameters.m):
-        size = option_text("per_count", f"0.5mm{RATE_SUFFIXES[record.order]}")
+        size = option_text("unit", f"0.5mm{RATE_SUFFIXES[record.order]}")
         remarks.append(
             f"The forces f, c and q need a motion in a unit of length or angle, and that of {record.name} is in "
             f"{record.unit}: they are left out; convert it, as by {size}."

@@ -19,7 +19,7 @@ from ...results.style import (
     mask_undrawable,
     set_size,
 )
-from .difference import Comparison, Difference, is_string
+from .study import Comparison, Difference, is_string
 
 MAX_VARIABLES = 8  # the variables with the largest relative differences are drawn
 ROUNDING = 64 * np.finfo(float).eps

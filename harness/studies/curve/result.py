@@ -1,23 +1,51 @@
 """Identified friction over velocity with its files, its figure and what the command prints."""
 
-from collections.abc import Mapping
 from dataclasses import asdict, dataclass
+from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ...analyses.curve.identification import CurveIdentification
-from ...results.files import column_heading, to_json, write_csv
+from ...analyses.estimation.estimate import Estimate
+from ...errors import option_text
+from ...results.files import column_heading, write_csv
+from ...results.quantity import format_interval
 from ...results.result import Result
-from ...results.summary import Summary
-from .model_file import LAW_MODEL, TABLE_MODEL, table_file, write_law_model, write_table_model
-from .model_values import model_values, tabulate
-from .table import constants_table, laws_table, models_table, sentences, summarize_curve
+from ...results.summary import limit_remarks
+from ...results.table import ResultColumn, ResultTable
+from .model_file import (
+    LAW_MODEL,
+    LINEAR_FORCE,
+    TABLE_MODEL,
+    assignments,
+    law_of_models,
+    model_values,
+    table_file,
+    tabulate_friction,
+    write_law_model,
+    write_table_model,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+
+def format_estimate(estimate: Estimate) -> str:
+    """Format value and interval; an interval with one end is written as a limit."""
+    if isfinite(estimate.high) or not isfinite(estimate.low):
+        return format_interval(estimate.value, estimate.low, estimate.high)
+    return f"{estimate.value:.3g} (> {estimate.low:.3g})"
+
+
+CONSTANTS = (
+    ResultColumn("constant", "{0.text}, {0.name}", is_text=True),
+    ResultColumn("value, 95 % interval", format_estimate),
+    ResultColumn("unit", "{0.unit}", is_text=True),
+)
+MODELS = (ResultColumn("model", "{0[model]}", is_text=True), ResultColumn("options", "{0[options]}", is_text=True))
 
 
 @dataclass(frozen=True, repr=False)
@@ -27,14 +55,14 @@ class CurveResult(Result, CurveIdentification):
     ``result["F_c"]`` is the estimate of a constant of the best law; its attributes are those of `CurveIdentification`.
     """
 
-    study, function = "curve", "identify_curve"
+    study, _function = "curve", "identify_curve"
 
     @property
     def title(self) -> str:
         return self.points.name
 
     @property
-    def headline(self) -> str:
+    def _headline(self) -> str:
         constants = ", ".join(f"{item.name} = {item.value:.4g} {item.unit}" for item in self.estimates)
         return f"{self.best.name}: {constants}"
 
@@ -57,17 +85,38 @@ class CurveResult(Result, CurveIdentification):
         dict
             Arrays (n,): `speed` in m/s or rad/s, and `friction`, `forward` and `backward` in N or N.m.
         """
-        return tabulate(self)
+        return tabulate_friction(self)
 
-    def summary(self) -> Summary:
-        return summarize_curve(self)
+    @property
+    def _caption(self) -> str:
+        text = "over velocity: points of both directions, laws and residuals"
+        return f"Friction of {self.title} {text}. {self.sentence}"
 
-    def blocks(self) -> list[Any]:
-        tables = [constants_table(self.best, self.title), laws_table(self), models_table(self)]
-        return [*(block for table in tables if table.row_count for block in (table, "")), *sentences(self)]
+    def _tabulate(self) -> tuple[ResultTable, ...]:
+        """Return the constants of the best law, all laws, and values for models."""
+        best = self.best.bic
+        laws = (
+            ResultColumn("law", "{0.name}", is_text=True),
+            ResultColumn("constants", lambda fit: str(len(fit.estimates))),
+            ResultColumn(f"residual [{self.points.force_unit}]", "{0.residual:.3g}"),
+            ResultColumn("BIC", "{0.bic:.1f}"),
+            ResultColumn("above the best", lambda fit: f"{fit.bic - best:.1f}"),
+        )
+        models = [{"model": name, "options": assignments(values)} for name, values in self.models.items()]
+        return (
+            ResultTable(self.estimates, CONSTANTS, self.title),
+            ResultTable(self.laws, laws, "Laws, best first"),
+            ResultTable(models, MODELS, "Values for models"),
+        )
 
-    def rows(self) -> tuple[list[Mapping[str, Any]], str]:
-        return [asdict(estimate) for estimate in self.estimates], "name"
+    def sentences(self) -> list[str]:
+        used, count = int(self.used.sum()), len(self.points.v)
+        fit, unit = self.best, self.points.force_unit
+        lines = [self.sentence, f"Residual of {used} of {count} points: {fit.residual:.3g} {unit}."]
+        for reason in dict.fromkeys(self.unavailable.values()):
+            laws = [name for name, text in self.unavailable.items() if text == reason]
+            lines.append(f"Not fitted: {', '.join(laws)}; {reason}.")
+        return [*lines, *describe_models(self), *limit_remarks(self.remarks), *self.points.notes]
 
     def as_json(self) -> dict[str, Any]:
         points, residuals = self.points, self.residuals
@@ -106,11 +155,11 @@ class CurveResult(Result, CurveIdentification):
             "notes": list(points.notes),
         }
 
-    def write_tables(self, folder: Path) -> None:
+    def _write_tables(self, folder: Path) -> None:
         """Write curve.json, points, tables and model files."""
         points = self.points
         velocity, force = points.velocity_unit, points.force_unit
-        (folder / "curve.json").write_text(to_json(self.as_json()) + "\n", encoding="utf-8")
+        super()._write_tables(folder)
         headings = [column_heading("v", velocity), *(column_heading(name, force) for name in ("F", "fit", "residual"))]
         columns = [points.v, points.force, self.best.force(points.v), self.residuals, self.used.astype(int)]
         write_csv(folder / "curve.csv", [*headings, "used"], columns)
@@ -121,12 +170,30 @@ class CurveResult(Result, CurveIdentification):
         (folder / LAW_MODEL).write_text(write_law_model(self), encoding="utf-8")
         (folder / TABLE_MODEL).write_text(write_table_model(self), encoding="utf-8")
 
-    def draw(self, figure: "Figure") -> None:
+    def _draw(self, figure: "Figure") -> None:
         from .figure import draw
 
         draw(self, figure)
 
-    def draw_panel(self, axes: "Axes") -> None:
+    def _draw_panel(self, axes: "Axes") -> None:
         from .figure import plot_force
 
         plot_force(axes, self)
+
+
+def describe_models(identification: CurveIdentification) -> list[str]:
+    """Return the sentences on the values for models."""
+    fit, best = law_of_models(identification), identification.best
+    if identification.points.force_unit != LINEAR_FORCE:
+        return [f"The models of this project with such friction move along a line; {LAW_MODEL} rotates."]
+    if fit is None:
+        return [f"No model of this project has this friction; {LAW_MODEL} has it."]
+    lines = []
+    if fit.name != best.name:
+        lines.append(
+            f"The models have the law {fit.name}, whose BIC is larger by {fit.bic - best.bic:.1f}; {LAW_MODEL} has "
+            "the best law."
+        )
+    if identification.mass is None:
+        lines.append(f"stickslip needs the mass for its coefficients of friction: give it by {option_text('mass')}.")
+    return lines

@@ -1,6 +1,5 @@
 """An identified decay with its files, its figure and what the command prints."""
 
-from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -9,15 +8,26 @@ import numpy as np
 
 from ...analyses.decay.identification import DecayIdentification
 from ...analyses.decay.law import AMPLITUDE, T0
-from ...analyses.estimation.estimate import ColumnResiduals, UsedSamples, shared_json
-from ...results.files import column_heading, to_json, write_csv
+from ...analyses.decay.thresholds import LIMIT_SPEED
+from ...analyses.estimation.estimate import ColumnResiduals, Estimate, UsedSamples, shared_json
+from ...results.files import column_heading, write_csv
+from ...results.quantity import format_interval
 from ...results.result import Result
-from ...results.summary import Summary
-from .table import check_table, decay_table, summarize_decay, summary_lines
+from ...results.summary import limit_remarks
+from ...results.table import ResultColumn, ResultTable
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+
+def format_estimate(estimate: Estimate | None) -> str:
+    """Return value and interval; empty without an estimate."""
+    return format_interval(estimate.value, estimate.low, estimate.high) if estimate else ""
+
+
+VALUE = "value to use, 95 % interval"  # from the whole signal
+UNIT = ResultColumn("unit", lambda estimate: "" if estimate.unit == "1" else estimate.unit, is_text=True)
 
 
 @dataclass(frozen=True, repr=False)
@@ -28,14 +38,14 @@ class DecayResult(Result, DecayIdentification):
     `DecayIdentification`.
     """
 
-    study, function = "decay", "identify_decay"
+    study, _function = "decay", "identify_decay"
 
     @property
     def title(self) -> str:
         return self.record.name
 
     @property
-    def headline(self) -> str:
+    def _headline(self) -> str:
         return ", ".join(f"{estimate.name} = {estimate.value:.4g} {estimate.unit}" for estimate in self.estimates)
 
     def __getitem__(self, name: str) -> Any:
@@ -45,15 +55,69 @@ class DecayResult(Result, DecayIdentification):
             return content[name]
         return DecayIdentification.__getitem__(self, name)
 
-    def summary(self) -> Summary:
-        return summarize_decay(self)
+    @property
+    def _caption(self) -> str:
+        return f"Decay of {self.title}: signal, turning points, envelope and fit, and residuals. {self.sentence}"
 
-    def blocks(self) -> list[Any]:
-        tables = [table for table in (decay_table(self), check_table(self)) if table.row_count]
-        return [*(block for table in tables for block in (table, "")), *summary_lines(self)]
+    def _tabulate(self) -> tuple[ResultTable, ...]:
+        """Return the values to use, and below them those from the turning points and from two peaks as checks."""
+        checks = [{item.name: item for item in items} for items in (self.extrema_estimates, self.two_peak_estimates)]
+        checked = [item for item in self.estimates if any(item.name in values for values in checks)]
+        one, two = checks
+        columns = (
+            ResultColumn("turning points", lambda item: format_estimate(one.get(item.name))),
+            ResultColumn("two peaks (rough)", lambda item: format_estimate(two.get(item.name))),
+        )
+        values = (
+            ResultColumn("quantity", "{0.text}, {0.name}", is_text=True),
+            ResultColumn(VALUE, format_estimate),
+            UNIT,
+        )
+        return ResultTable(self.estimates, values, self.title), ResultTable(
+            checked, (ResultColumn("check", "{0.name}", is_text=True), *columns, UNIT)
+        )
 
-    def rows(self) -> tuple[list[Mapping[str, Any]], str]:
-        return [asdict(estimate) for estimate in self.estimates], "name"
+    def _tabulate_details(self) -> tuple[ResultTable, ...]:
+        """Return the combinations of losses."""
+        samples, scale = len(self.t), self.problem.scale
+        columns = (
+            ResultColumn("losses", "{0.description}", is_text=True),
+            ResultColumn("BIC, smaller is better", "{0.bic:.1f}"),
+            ResultColumn(
+                f"rms residual [{self.record.unit}]",
+                lambda law: f"{np.sqrt(law.sum_of_squares / samples) * scale:.3g}",
+            ),
+        )
+        return (ResultTable(self.laws, columns, "Combinations of losses, best first"),)
+
+    def sentences(self) -> list[str]:
+        lines = [self.sentence]
+        lines += [f"No {name}: {reason}." for name, reason in self.unavailable.items() if reason]
+        if self.two_peak_estimates and len(self.best.terms) > 1:
+            lines.append(
+                "The values from two peaks are rough checks: each attributes the whole loss to one mechanism, and is "
+                "too large if several act."
+            )
+        rise = self.undetected_rise
+        if np.isinf(rise):
+            lines.append(
+                "No friction that rises at low speed is excluded (Stribeck): the record departs from the law, and the "
+                "part after that shows none. The losses of the part before may be those of such friction."
+            )
+        elif rise < 1.0:  # a larger limit says nothing
+            lines.append(
+                f"Friction that rises at low speed by less than {100 * rise:.2g} % of r is not excluded (Stribeck, "
+                f"falling to 1/e of the rise at {LIMIT_SPEED:g} of the first peak speed)."
+            )
+        t, record = self.t, self.record
+        n_excluded = len(record.t) - len(t)
+        if n_excluded:
+            lines.append(
+                f"Fitted to {record.quantity} from t = {record.format_time(t[0])} to {record.format_time(t[-1])} s; "
+                f"{n_excluded} of {len(record.t)} samples are excluded (before release, after the last reliable cycle, "
+                "or outliers)."
+            )
+        return [*lines, *limit_remarks(self.remarks)]
 
     def as_json(self) -> dict[str, Any]:
         problem, record, best = self.problem, self.record, self.best
@@ -104,21 +168,21 @@ class DecayResult(Result, DecayIdentification):
             },
         }
 
-    def write_tables(self, folder: Path) -> None:
+    def _write_tables(self, folder: Path) -> None:
         """Write decay.json, turning points and fit."""
         name, unit = self.record.symbol, self.record.unit
-        (folder / "decay.json").write_text(to_json(self.as_json()) + "\n", encoding="utf-8")
+        super()._write_tables(folder)
         turning_points = ["t [s]", column_heading("x", self.record.base)]
         write_csv(folder / "turning-points.csv", turning_points, [self.extrema.t, self.extrema.x])
         headings = ["t [s]", *(column_heading(text, unit) for text in (name, "fit", "residual"))]
         write_csv(folder / "fit.csv", headings, [self.t, self.x, self.fit_values, self.x - self.fit_values])
 
-    def draw(self, figure: "Figure") -> None:
+    def _draw(self, figure: "Figure") -> None:
         from .figure import draw
 
         draw(self, figure)
 
-    def draw_panel(self, axes: "Axes") -> None:
+    def _draw_panel(self, axes: "Axes") -> None:
         from .figure import plot_signal
 
         plot_signal(axes, self)

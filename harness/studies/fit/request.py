@@ -1,5 +1,9 @@
-"""Request of a fit, checked against the FMU: unknowns, fixed values, observed variables and inputs."""
+"""Request of a fit: parsed from options, and checked against the FMU and the record.
 
+It holds unknowns, fixed values, observed variables and inputs; where the user observes none, they are chosen here.
+"""
+
+import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import inf, isfinite
@@ -10,9 +14,13 @@ import numpy as np
 
 from ...analyses.fit.unknowns import DELAY, GAIN, OFFSET, RANGE_FACTOR, SENSOR, Unknown
 from ...errors import SceneError, check_names, format_value, option_text
+from ...records.columns import Column, find_column, find_time_column, list_columns
 from ...records.extraction import Samples
 from ...records.motion import MIN_SAMPLES
-from ...records.record import SignalSource
+from ...records.record import Record, SignalSource
+from ...records.units import conversion_factor
+from ...scenes.assignments import parse_assignments
+from ...scenes.roles import ROLES, find_roles
 from ...scenes.run_spec import RunSpec
 from ...simulation.fmu_archive import default_stop, read_description
 from ...simulation.model_data import read_model_data
@@ -295,5 +303,189 @@ def span_remarks(task: FitTask, records: Sequence[Samples]) -> Iterator[str]:
                 yield (
                     f"{record.name} lasts {duration:.4g} s, about {how} a run of the FMU ({stop:g} s): if its times "
                     f"are in {unit}, state that in their heading, as in t [{unit}], or by "
-                    f"{option_text('time_unit', unit)}."
+                    f"{option_text('time', f't [{unit}]')}."
                 )
+
+
+def split_list(texts: Iterable[str]) -> list[str]:
+    """Return the items of comma-separated lists."""
+    return [item.strip() for text in texts for item in text.split(",") if item.strip()]
+
+
+def parse_ranges(texts: Iterable[str]) -> dict[str, tuple[float, float] | None]:
+    """Return the range of each name, as in "mu_s,mu_d=0.1:2"; None without a range."""
+    ranges: dict[str, tuple[float, float] | None] = {}
+    for item in split_list(texts):
+        name, separator, limits = (part.strip() for part in item.partition("="))
+        if name in ranges:
+            raise SceneError(f"--free names {name} twice: remove one")
+        low, colon, high = limits.partition(":")
+        if separator and not colon:
+            raise SceneError(f"--free {item}: give a range, as in {name}=0.1:2, or fix it by --set {item}")
+        ranges[name] = (parse_number("--free", item, low), parse_number("--free", item, high)) if separator else None
+    return ranges
+
+
+def parse_numbers(option: str, texts: Iterable[str]) -> dict[str, float]:
+    """Return the numbers of assignments, as in "k=800,m=3"."""
+    return {
+        name: parse_number(option, f"{name}={value}", str(value))
+        for name, value in parse_assignments(option, texts).items()
+    }
+
+
+def parse_starts(texts: Iterable[str], free: Iterable[str], each: Iterable[str]) -> dict[str, float]:
+    """Return the values to start from: assignments, and the values of stored fits that are free again."""
+    starts: dict[str, float] = {}
+    assignments = []
+    for text in texts:
+        path = Path(text)
+        if path.is_dir() or path.suffix == ".json":
+            starts |= select_starts(read_fitted_values(path), free, each)
+        else:
+            assignments.append(text)
+    return starts | parse_numbers("--start", assignments)
+
+
+def select_starts(values: Mapping[str, float], free: Iterable[str], each: Iterable[str]) -> dict[str, float]:
+    """Return those values of an earlier fit that are free again."""
+    return {name: value for name, value in values.items() if is_unknown(name, free, each)}
+
+
+def read_fitted_values(path: Path) -> dict[str, float]:
+    """Return the values of a stored fit by name, from its folder or its fit.json.
+
+    Raises
+    ------
+    SceneError
+        If there is no fit.
+    """
+    file = path / "fit.json" if path.is_dir() else path
+    try:
+        fitted = json.loads(file.read_text(encoding="utf-8"))["fit"]
+        return {estimate["name"]: float(estimate["value"]) for estimate in fitted if estimate["value"] is not None}
+    except (OSError, ValueError, KeyError, TypeError):
+        raise SceneError(f"{path} holds no result of a fit: name its folder or its fit.json") from None
+
+
+def parse_number(option: str, item: str, text: str) -> float:
+    """Return a finite number; raise SceneError if the text is none."""
+    try:
+        number = float(text)
+    except ValueError:
+        number = float("nan")
+    if not isfinite(number):
+        raise SceneError(f"{option} {item}: {format_value(text)} is not a finite number")
+    return number
+
+
+def parse_columns(option: str, texts: Iterable[str]) -> dict[str, str]:
+    """Return the heading of each variable, as in "x=position"; the name of the variable without a heading."""
+    columns = {}
+    for text in texts:
+        name, _, heading = text.partition("=")
+        if not name.strip():
+            raise SceneError(f"{option} {format_value(text)} names no variable; write it as in x=position")
+        columns[name.strip()] = heading.strip() or name.strip()
+    return columns
+
+
+def choose_columns(request: FitRequest, records: Sequence[Record]) -> tuple[FitRequest, tuple[str, ...]]:
+    """Return a request that observes outputs and names the inputs of the records, and a sentence on each choice.
+
+    Raises
+    ------
+    SceneError
+        If no output is named, and no column is that of an output.
+    """
+    request, driven = choose_inputs(request, records)
+    request, observed = choose_observed(request, records[0])
+    return request, tuple(filter(None, (observed, driven)))
+
+
+def choose_inputs(request: FitRequest, records: Sequence[Record]) -> tuple[FitRequest, str]:
+    """Return a request with the columns that are named like inputs of all FMUs, and a sentence; empty without any.
+
+    All records must have the column, because the same headings apply to all.
+    """
+    if request.inputs:
+        return request, ""
+    inputs = set.intersection(
+        *(
+            {name for name, variable in real_variables(read_description(fmu)).items() if variable.causality == "input"}
+            for fmu in (request.run.fmu, *request.against)
+        )
+    )
+    headings = [
+        {column.name: column.heading for column in list_columns(record.table) if column.name in inputs}
+        for record in records
+    ]
+    named = {name: heading for name, heading in headings[0].items() if all(name in others for others in headings[1:])}
+    if not named:
+        return request, ""
+    names = ", ".join(named)
+    columns = "the record has columns of these names" if len(named) > 1 else "a column has its name"
+    sentence = f"the runs are driven by {names}, because {columns}; {option_text('inputs')} selects others."
+    return replace(request, inputs=named), sentence
+
+
+def choose_observed(request: FitRequest, record: Record) -> tuple[FitRequest, str]:
+    """Return a request that observes outputs, and a sentence on the choice; empty if the request names outputs.
+
+    A column that is named like an output is taken: of several, the position, the velocity, the acceleration or the
+    first. Otherwise it is the only column whose unit fits one output only.
+
+    Raises
+    ------
+    SceneError
+        If there is no such column.
+    """
+    if request.observe:
+        return request, ""
+    table, options = record.table, record.options
+    candidates = list_columns(table)
+    time_column = find_time_column(table, candidates, options)
+    if options.column is not None:  # the record names its signal
+        column = find_column(options.column, table, candidates)
+        candidates = [replace(column, unit=options.unit or column.unit)]
+    driven = {heading.lower() for heading in request.inputs.values()}
+    columns = [
+        column
+        for column in candidates
+        if column is not time_column and not {column.name.lower(), column.heading.lower()} & driven
+    ]
+    description = read_description(request.run.fmu)
+    outputs = {
+        name: variable.unit for name, variable in real_variables(description).items() if variable.causality == "output"
+    }
+    named = {column.name: column for column in columns if column.name in outputs}
+    if named:
+        roles = find_roles({variable.name: variable for variable in description.modelVariables})
+        output = next((roles[role] for role in ROLES if roles.get(role) in named), next(iter(named)))
+        others = ", ".join(name for name in named if name != output)
+        return replace(request, observe={output: named[output].heading}), (
+            f"{output} is observed, because a column has its name{f', and {others} not' if others else ''}; "
+            f"{option_text('observe')} selects other outputs."
+        )
+    fits = list(fit_units(columns, outputs))
+    if len(fits) != 1:
+        headings = ", ".join(column.heading for column in columns if column.heading)
+        example = {fits[0][0] if fits else next(iter(outputs), "x"): (headings or "position").split(",")[0]}
+        raise SceneError(
+            f"nothing is observed: {table.name} has no column with the name of an output ({', '.join(outputs)}), and "
+            f"{'several units fit' if fits else 'no unit fits'}; name an output and its column, as in "
+            f"{option_text('observe', example)}"
+        )
+    ((output, column),) = fits
+    return replace(request, observe={output: column.heading}), (
+        f"{output} is observed in {column.heading}, the only column with a unit of this output; "
+        f"{option_text('observe')} selects another."
+    )
+
+
+def fit_units(columns: list[Column], outputs: dict[str, str]) -> Iterator[tuple[str, Column]]:
+    """Yield each output and column whose units measure the same quantity."""
+    for output, unit in outputs.items():
+        for column in columns:
+            if column.unit and unit and conversion_factor(column.unit, unit) is not None:
+                yield output, column

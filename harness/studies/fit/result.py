@@ -1,6 +1,6 @@
 """A fit with its files, its figure and what the command prints."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from math import isfinite
 from pathlib import Path
@@ -8,16 +8,41 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...analyses.estimation.estimate import UsedSamples, shared_json
+from ...analyses.estimation.estimate import ColumnResiduals, Estimate, UsedSamples, shared_json
 from ...analyses.fit.parameter_fit import FittedRecord, ParameterFit, Slips
-from ...results.files import column_heading, to_json, write_csv
+from ...results.files import column_heading, write_csv
+from ...results.quantity import format_interval
 from ...results.result import Result
-from ...results.summary import Summary
-from .table import format_estimate, result_parts, summarize_fit
+from ...results.summary import limit_remarks
+from ...results.table import ResultColumn, ResultTable
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+
+def format_estimate(estimate: Estimate) -> str:
+    """Format value and interval; an interval with one end is written as a limit."""
+    if isfinite(estimate.error) or not (isfinite(estimate.low) or isfinite(estimate.high)):
+        has_interval = isfinite(estimate.low) and isfinite(estimate.high)
+        return format_interval(estimate.value, estimate.low, estimate.high) if has_interval else "not determined"
+    if isfinite(estimate.low) and isfinite(estimate.high):
+        return f"{estimate.low:.3g} to {estimate.high:.3g}"
+    return f"> {estimate.low:.3g}" if isfinite(estimate.low) else f"< {estimate.high:.3g}"
+
+
+VALUES = (
+    ResultColumn("parameter", "{0.name}", is_text=True),
+    ResultColumn("value, 95 % interval", format_estimate),
+    ResultColumn("unit", "{0.unit}", is_text=True),
+)
+COMPARISON = (
+    ResultColumn("law", "{0.fmu}", is_text=True),
+    ResultColumn("unknowns", "{0.unknowns}"),
+    ResultColumn("residual/noise", "{0.residual:.3f}"),
+    ResultColumn("BIC", "{0.bic:.1f}"),
+    ResultColumn("above the best", "{0.difference:.1f}"),
+)
 
 
 @dataclass(frozen=True, repr=False)
@@ -27,14 +52,14 @@ class FitResult(Result, ParameterFit):
     ``result["mu_s"]`` is the estimate of an unknown or of a combination; its attributes are those of `ParameterFit`.
     """
 
-    study, function = "fit", "fit"
+    study, _function = "fit", "fit"
 
     @property
     def title(self) -> str:
         return f"{self.fmu}: {', '.join(record.name for record in self.records)}"
 
     @property
-    def headline(self) -> str:
+    def _headline(self) -> str:
         return ", ".join(
             f"{item.name} = {item.value:.4g} {item.unit}".rstrip()
             if isfinite(item.error)
@@ -49,38 +74,77 @@ class FitResult(Result, ParameterFit):
             return content[name]
         return ParameterFit.__getitem__(self, name)
 
-    def summary(self) -> Summary:
-        return summarize_fit(self)
+    @property
+    def _caption(self) -> str:
+        names = ", ".join(record.name for record in self.records)
+        return f"Fit of {self.fmu} to {names}: record, fitted signal, residuals, and profiles of the values"
 
-    def blocks(self) -> list[Any]:
-        return list(result_parts(self))
+    def _tabulate(self) -> tuple[ResultTable, ...]:
+        """Return the values of each fit, and the comparison of the laws."""
+        fits = [tabulate_fit(self, self.title), *(tabulate_fit(law, f"Fit of {law.fmu}") for law in self.against)]
+        comparison = self.comparison.laws if self.comparison else ()
+        return *fits, ResultTable(comparison, COMPARISON, "Compared laws, best first" if comparison else "")
 
-    def rows(self) -> tuple[list[Mapping[str, Any]], str]:
-        return [asdict(estimate) for estimate in (*self.estimates, *self.combinations)], "name"
+    def sentences(self) -> list[str]:
+        return describe_fit(self)
+
+    def blocks(self) -> list[ResultTable | str]:
+        """Return each fit with its sentences, and the comparison with its verdict."""
+        (own, *others), comparison = self._tabulate()[:-1], self._tabulate()[-1]
+        parts: list[ResultTable | str] = [own, "", *describe_fit(self)]
+        for law, table in zip(self.against, others, strict=True):
+            parts += ["", table, "", *describe_fit(law)]
+        if self.comparison:
+            parts += ["", comparison, ""]
+            parts += [] if self.comparison.verdict in self.remarks else [self.comparison.verdict]
+        return parts
 
     def as_json(self) -> dict[str, Any]:
         return fit_as_json(self)
 
-    def write_tables(self, folder: Path) -> None:
+    def _write_tables(self, folder: Path) -> None:
         """Write fit.json and the fitted signals."""
-        (folder / "fit.json").write_text(to_json(self.as_json()) + "\n", encoding="utf-8")
+        super()._write_tables(folder)
         laws = (self, *self.against)
         write_fitted_signals(folder / "fit.csv", laws, self.records, [law.predictions for law in laws])
         if self.validation:
             predictions = [law.validation.predictions for law in laws if law.validation]
             write_fitted_signals(folder / "validation.csv", laws, self.validation.records, predictions)
 
-    def draw(self, figure: "Figure") -> None:
+    def _draw(self, figure: "Figure") -> None:
         from .figure import draw
 
         draw(self, figure)
 
-    def draw_panel(self, axes: "Axes") -> None:
+    def _draw_panel(self, axes: "Axes") -> None:
         from .figure import fitted_columns, plot_fits
 
         laws = (self, *self.against)
         plot_fits(axes, laws, fitted_columns(laws)[0])
         axes.set_xlabel("t [s]")
+
+
+def tabulate_fit(fit: ParameterFit, title: str) -> ResultTable:
+    """Return the table of values with 95 % intervals."""
+    return ResultTable((*fit.estimates, *fit.combinations), VALUES, title)
+
+
+def describe_fit(fit: ParameterFit) -> list[str]:
+    """Return the sentences on the residuals of a fit, its remarks and its notes."""
+    lines = [describe_residuals(column, column.record) for column in fit.columns]
+    lines += [
+        describe_residuals(column, f"{column.record} (validation)")
+        for column in (fit.validation.columns if fit.validation else ())
+    ]
+    return [*lines, *limit_remarks(fit.remarks), *fit.notes]
+
+
+def describe_residuals(column: ColumnResiduals, record: str) -> str:
+    """Return a sentence on the residuals of a column."""
+    return (
+        f"Residuals of {column.name} in {record}: {column.residual:.3g} {column.unit}".rstrip()
+        + f" (noise {column.noise:.3g}, range {column.range:.3g})."
+    )
 
 
 def fit_as_json(fit: ParameterFit) -> dict[str, Any]:

@@ -4,16 +4,17 @@ Three solvers of each case are coloured and labelled: the two fastest methods of
 the error TARGET.  All others are grey; the CSV file of the study has the numbers of all.
 """
 
-from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.axes import Axes
 
+from ...references.peer_solvers import CS, FMPY, FMU, ME
+from ...results.quantity import format_power
 from ...results.style import BLUE, GREEN, GREY, LEGEND_ABOVE, ORANGE, WIDTH, Figure, set_size
-from .advice import TARGET, format_power, rank_solvers
-from .law_deviations import LawDeviation
-from .study import CS, FMPY, FMU, ME, StudiedCase, Study
+
+if TYPE_CHECKING:
+    from .result import PrecisionCase, PrecisionResult
 
 Solver = tuple[str, str]  # tool and method
 
@@ -28,7 +29,7 @@ CAPTION = "labelled: the two fastest methods of the FMU and the fastest other so
 FLOOR = 2.0**-53  # smaller errors are drawn at this value
 
 
-def draw(study: Study, laws: Sequence[LawDeviation], figure: Figure) -> None:
+def draw(study: "PrecisionResult", figure: Figure) -> None:
     """Draw the figure of a study, with one row per law.
 
     Laws that chatter are drawn in the first row, with their error against true stick and slip.
@@ -36,14 +37,16 @@ def draw(study: Study, laws: Sequence[LawDeviation], figure: Figure) -> None:
     cases = [case for case in study.cases if not case.is_chattering]
     shortcuts = [case for case in study.cases if case.is_chattering]
     set_size(figure, 2 * WIDTH, 0.7 + 3.4 * len(cases))
-    figure.suptitle(f"{study.model}: cost over error, lower left is better\n{CAPTION.format(format_power(TARGET))}")
+    figure.suptitle(
+        f"{study.model}: cost over error, lower left is better\n{CAPTION.format(format_power(study.target))}"
+    )
     panels = figure.subplots(len(cases), 2, squeeze=False, sharex=True, sharey="col")
     for case, row in zip(cases, panels, strict=True):
         row_cases = [case, *(shortcuts if case is cases[0] else [])]
         for axes, (cost, name) in zip(row, COSTS.items(), strict=True):
             for row_case in row_cases:
                 plot_curves(axes, study, row_case, cost)
-            for law in laws:
+            for law in study.deviations:
                 if law.largest and law.case in [row_case.name for row_case in row_cases]:
                     name_of_law = "the law" if law.case == case.name else f"the law '{law.law}'"
                     mark_error(axes, law.largest, f"error of {name_of_law} ")
@@ -55,7 +58,7 @@ def draw(study: Study, laws: Sequence[LawDeviation], figure: Figure) -> None:
         axes.set_xlabel("largest error, relative to the largest value")
 
 
-def draw_case(axes: Axes, study: Study, case: StudiedCase) -> None:
+def draw_case(axes: Axes, study: "PrecisionResult", case: "PrecisionCase") -> None:
     """Plot run time over error of a case."""
     plot_curves(axes, study, case, "seconds")
     axes.set_ylabel(COSTS["seconds"])
@@ -63,11 +66,11 @@ def draw_case(axes: Axes, study: Study, case: StudiedCase) -> None:
     add_legend(axes)
 
 
-def choose_labelled(study: Study, case: StudiedCase) -> list[Solver]:
+def choose_labelled(study: "PrecisionResult", case: "PrecisionCase") -> list[Solver]:
     """Return the solvers to label, fastest first; those with the smallest error fill up if few reach TARGET."""
     if case.is_chattering:
         return []
-    ranks = [(point.tool, point.method) for point in rank_solvers(study, case, TARGET)]
+    ranks = [(point.tool, point.method) for point in study.rank_solvers(case)]
     own_solvers = [solver for solver in ranks if solver[0] == FMU]
     peers = [solver for solver in ranks if solver[0] != FMU]
     solvers = [solver for solver in study.solvers(case) if solver[0] not in (FMPY, CS, ME)]
@@ -76,7 +79,7 @@ def choose_labelled(study: Study, case: StudiedCase) -> list[Solver]:
     return list(dict.fromkeys([*own_solvers[:2], *peers[:1], *ranks, *rest]))[: len(LABELLED)]
 
 
-def plot_curves(axes: Axes, study: Study, case: StudiedCase, cost: str) -> None:
+def plot_curves(axes: Axes, study: "PrecisionResult", case: "PrecisionCase", cost: str) -> None:
     """Plot every solver of a case, log-log; failed runs are gaps."""
     labelled = choose_labelled(study, case)
     for tool, method in study.solvers(case):

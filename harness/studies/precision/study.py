@@ -4,11 +4,18 @@ As in the SciML benchmarks, relative and absolute tolerance are varied together,
 runs after a warm-up, and a failed run is a gap.  All solvers are evaluated at the same times.  Errors are relative to
 the largest value of the motion.  The integration error refers to the exact solution for the friction law of the run;
 `beside_dry` is the total error against dry friction, which includes the error of the law.
+
+The error of an approximate friction law against true stick and slip is measured beside the integration error within the
+law.  It quantifies published observations: with the magic formula the sled creeps instead of sticking, and its
+acceleration is not symmetric; bristles creep, too.  The law sign has no model error: in the limit of small steps it is
+dry friction (A. F. Filippov, Differential Equations with Discontinuous Righthand Sides, 1988).  Bristles and a block
+that sticks are compared in one scene, as by D. A. Haessig and B. Friedland, On the modeling and simulation of friction,
+J. Dyn. Syst. Meas. Control 113 (1991) 354-362.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cache, partial
 from math import isnan, nan
 from pathlib import Path
 from time import perf_counter
@@ -16,25 +23,28 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import HarnessError
+from ...analyses.slip import upward_crossings
+from ...errors import HarnessError, install_command
 from ...references import peer_solvers
 from ...references.certification import solve_by_two_methods
-from ...references.certified_reference import ReferenceCase, compute_errors, load_reference
+from ...references.certified_reference import POINTS, ReferenceCase, compute_errors, load_reference
 from ...references.models import CASES
-from ...references.ode_problem import UnspecifiedProblem
+from ...references.ode_problem import OdeProblem, RhsFunction, UnspecifiedProblem
+from ...references.peer_solvers import CS, FMPY, FMU, ME, missing_packages
 from ...scenes.fmu_files import build_command, find_fmu, fmi3_path
 from ...scenes.run_spec import RunSpec
-from ...simulation.embedded_model import EmbeddedModel, load_model_class, method_numbers
+from ...simulation.embedded_model import EmbeddedModel, load_model_class, load_more_model, method_numbers
 from ...simulation.runner import run_own_fmu
 from ...simulation.signals import Signals, sample_at
 from ...simulation.solution import Solution
 from ...simulation.timing import time_call
+from .result import LawDeviation, Point, PrecisionCase, PrecisionResult
 
 MAX_REPEATS = 20  # maximum number of timed runs per point
-
-FMU, FMPY = "FMU", "fmpy"  # code of the FMU in this process; FMU through fmpy
-CS, ME = "FMI 3.0 CS", "FMI 3.0 ME"  # FMI 3.0 FMU through fmpy: co-simulation, model exchange
-FMI3_TOOLS = (CS, ME)
+FINE = 16001  # points used to find peaks and slips
+TOLERANCE = 1e-8
+CHATTERING_METHOD = "ode45"  # the closed form covers the hybrid law only
+BRISTLES = {"lugre": "LuGre", "elastoplastic": "elasto-plastic"}  # models of fmus/more and their laws
 
 
 @dataclass(frozen=True)
@@ -64,47 +74,6 @@ QUICK = SweepSettings((1e-3, 1e-6, 1e-9), 0.1, 0.005, min_ratio=1.5)
 
 
 @dataclass(frozen=True)
-class Point:
-    """One solver at one tolerance.
-
-    Attributes
-    ----------
-    case, tool, method
-        Case and solver.
-    rtol, atol
-        Tolerances; NaN for a closed form or for those of the FMU.
-    seconds
-        Run time in s.
-    evaluations
-        Number of right-hand side and Jacobian evaluations.
-    final, rms, largest, events
-        Errors as in certified_reference.SolutionErrors.
-    beside_dry
-        Largest error against dry friction.
-    failure
-        Error message of a failed run.
-    """
-
-    case: str
-    tool: str
-    method: str
-    rtol: float
-    atol: float
-    seconds: float = nan
-    evaluations: int | None = None
-    final: float = nan
-    rms: float = nan
-    largest: float = nan
-    events: float | None = None
-    beside_dry: float | None = None
-    failure: str = ""
-
-    def error(self, beside_dry: bool) -> float:
-        """Return the largest error; if `beside_dry`, that against dry friction where it is known."""
-        return self.beside_dry if beside_dry and self.beside_dry is not None else self.largest
-
-
-@dataclass(frozen=True)
 class SolverJob:
     """Runs of one solver.
 
@@ -130,44 +99,14 @@ class SolverJob:
     is_swept: bool = True
 
 
-@dataclass(frozen=True)
-class StudiedCase:
-    """Name and friction law of a case, the values that its runs set, and whether the law chatters."""
+def measure_precision(model: str, settings: SweepSettings, report: Callable[[float], None]) -> PrecisionResult:
+    """Measure error against run time of a model, given by name or by the path of its file.
 
-    name: str
-    law: str
-    values: dict[str, Any]
-    is_chattering: bool = False
-
-
-@dataclass(frozen=True)
-class Study:
-    """All points of one model."""
-
-    model: str
-    cases: tuple[StudiedCase, ...]
-    points: tuple[Point, ...]
-
-    def curve(self, case: StudiedCase, tool: str, method: str) -> list[Point]:
-        """Return the successful points of one solver, in the order of tolerances."""
-        key = (case.name, tool, method)
-        return [p for p in self.points if (p.case, p.tool, p.method) == key and not p.failure]
-
-    def solvers(self, case: StudiedCase) -> list[tuple[str, str]]:
-        """Return tool and method of every solver of a case."""
-        return list(dict.fromkeys((point.tool, point.method) for point in self.points if point.case == case.name))
-
-    def exchange_errors(self) -> dict[float, dict[str, float]]:
-        """Return the largest error of every case in model exchange by rtol; NaN for failed runs, empty without FMU."""
-        errors_by_rtol: dict[float, dict[str, float]] = {}
-        for point in self.points:
-            if point.tool == ME and not isnan(point.rtol):
-                errors_by_rtol.setdefault(point.rtol, {})[point.case] = point.largest
-        return errors_by_rtol
-
-
-def study_model(model: str, settings: SweepSettings, report: Callable[[float], None]) -> Study:
-    """Run the study of a model, given by name or by the path of its file; `report` receives the fraction done."""
+    Parameters
+    ----------
+    report : callable
+        Receives the finished share.
+    """
     file = find_fmu(model)
     model_class = load_model_class(file)
     cases = tuple(case for case in CASES if case.model == model) or (default_case(model, file, model_class),)
@@ -176,8 +115,24 @@ def study_model(model: str, settings: SweepSettings, report: Callable[[float], N
     for index, (case, job) in enumerate(tasks):
         points += sweep_tolerances(case, job, settings)
         report((index + 1) / len(tasks))
-    studied = tuple(StudiedCase(case.name, case.law, dict(case.run.values), case.is_chattering) for case in cases)
-    return Study(file.stem, studied, tuple(points))
+    measured = tuple(PrecisionCase(case.name, case.law, dict(case.run.values), case.is_chattering) for case in cases)
+    deviations = [compare_with_dry_friction(case, model_class) for case in cases if case.dry_friction_reference]
+    if model == "stickslip":
+        deviations += [compare_bristles(name, law, load_more_model(name)) for name, law in BRISTLES.items()]
+    notes = describe_failures(file.stem, points)
+    return PrecisionResult(file.stem, measured, tuple(points), tuple(deviations), settings.min_ratio, notes)
+
+
+def describe_failures(model: str, points: Sequence[Point]) -> tuple[str, ...]:
+    """Return sentences on the runs that failed, that were not built, and on solvers that are not installed."""
+    runs = [point for point in points if not (point.failure and isnan(point.rtol))]
+    failed = sum(bool(point.failure) for point in runs)
+    counts = [f"{model}: {failed} of {len(runs)} runs failed; see {model}/points.csv"] * bool(failed)
+    reasons = [*dict.fromkeys(point.failure for point in points if point.failure and isnan(point.rtol))]
+    if missing := missing_packages():
+        names = ", ".join(f"{package} ({peer})" for peer, package in missing.items())
+        reasons.append(f"not installed: {names}, {install_command('peers')}")
+    return (*counts, *([f"Not run: {'; '.join(reasons)}"] if reasons else ()))
 
 
 def default_case(model: str, file: Path, model_class: Any) -> ReferenceCase:
@@ -277,9 +232,7 @@ def solver_jobs(case: ReferenceCase, model_class: Any, file: Path) -> Iterator[S
         default_method = names[model_class.solver_class.method.start]
         for tool, method, is_swept in ((CS, default_method, False), (ME, "fmpy's CVode", fmi3_path(file).is_file())):
             yield SolverJob(tool, method, nan, partial(runner.run_fmi3, tool), is_swept=is_swept)
-        excluded_peers = (
-            peer_solvers.PACKAGES if isinstance(case.problem, UnspecifiedProblem) else peer_solvers.missing_packages()
-        )
+        excluded_peers = peer_solvers.PACKAGES if isinstance(case.problem, UnspecifiedProblem) else missing_packages()
         for peer, methods in (
             ("scipy", peer_solvers.SCIPY),
             ("cvode", ("BDF",) if case.problem.is_stiff else ("Adams",)),
@@ -334,3 +287,86 @@ def find_changes(signals: Signals, name: str) -> list[tuple[float, int]]:
     values = signals[name]
     after = np.flatnonzero(np.diff(values)) + 1
     return list(zip(signals.time[after].tolist(), values[after].tolist(), strict=True))
+
+
+class DryBlock(OdeProblem):
+    """The mass of the models with bristles, pulled through a spring, with Coulomb and viscous friction that sticks."""
+
+    start, stop, has_dry_friction = (0.0, 0.0), 20.0, True
+    k, v_driver, F_c, F_s, sigma_2 = 2.0, 0.1, 1.0, 1.5, 0.4
+
+    def rates(self, mode: int) -> RhsFunction:
+        k, speed, sliding, damping = self.k, self.v_driver, mode * self.F_c, self.sigma_2
+        return lambda t, y: (y[1], k * (speed * t - y[0]) - sliding - damping * y[1])
+
+    def static_load(self, t: float, x: float) -> tuple[float, float, float]:
+        return self.k * (self.v_driver * t - x), self.k * self.v_driver, self.F_s
+
+
+def compare_with_dry_friction(case: ReferenceCase, model: type) -> LawDeviation:
+    """Compare the law of a case with dry friction; `model` is the class in the FMU."""
+    assert case.dry_friction_reference is not None
+    law_reference, dry_reference = load_reference(case.reference_source), load_reference(case.dry_friction_reference)
+    deviation = compute_errors(replace(law_reference, events=None), dry_reference)
+    method = CHATTERING_METHOD if case.is_chattering else None
+    own_run = EmbeddedModel.create(model, case.run.values, method, 0.0).solve(law_reference.times.tolist())
+    make_result = partial(
+        LawDeviation,
+        case.model,
+        case.name,
+        case.law,
+        deviation.final,
+        deviation.rms,
+        deviation.largest,
+        integration=compute_errors(own_run, law_reference).largest,
+    )
+    sticking = stuck_points(dry_reference)
+    if not sticking.any():
+        return make_result(None, None, None)
+    creep = float(np.median(np.abs(law_reference.states[sticking, 1])))
+    if case.problem.has_dry_friction:
+        return make_result(creep, float(np.mean(np.diff([t for t, mode in law_reference.modes if mode]))), None)
+    times = np.linspace(0.0, case.problem.stop, FINE)
+    run = EmbeddedModel.create(model, case.run.values, None, TOLERANCE)
+    motion = run.compute_states(times.tolist())
+    rates = case.problem.rates(1)
+    a = [rates(t, y)[1] for t, y in zip(times.tolist(), motion, strict=True)]
+    slips = upward_crossings(times, np.array(motion)[:, 1] - run.model.v_driver)
+    return make_result(creep, float(np.mean(np.diff(slips))), max(a) / -min(a))
+
+
+def compare_bristles(name: str, law: str, model: type) -> LawDeviation:
+    """Compare a model of fmus/more with bristles, in its default run, with a block that sticks."""
+    reference, dry = load_reference(f"more/{name}"), solve_dry_block()
+    bristles = replace(reference, states=reference.states[:, :2], events=None)
+    deviation = compute_errors(bristles, dry)
+    own_run = EmbeddedModel.create(model, {}, None, 0.0).solve(reference.times.tolist())
+    times = np.linspace(0.0, float(reference.times[-1]), FINE)
+    fine_run = EmbeddedModel.create(model, {}, None, TOLERANCE)
+    motion = np.array(fine_run.compute_states(times.tolist()))
+    slips = upward_crossings(times, motion[:, 1] - fine_run.model.v_driver)
+    return LawDeviation(
+        name,
+        name,
+        law,
+        deviation.final,
+        deviation.rms,
+        deviation.largest,
+        creep=float(np.median(np.abs(bristles.states[stuck_points(dry), 1]))),
+        period=float(np.mean(np.diff(slips))),
+        asymmetry=None,
+        integration=compute_errors(own_run, reference).largest,
+    )
+
+
+@cache
+def solve_dry_block() -> Solution:
+    """Return the motion of the block that sticks, in the default run of the models with bristles."""
+    solution = peer_solvers.solve("scipy", "DOP853", DryBlock(), np.linspace(0.0, DryBlock.stop, POINTS), 3e-14, 1e-17)
+    return replace(solution, start_mode=0)
+
+
+def stuck_points(truth: Solution) -> np.ndarray:
+    """Return for each time (n,) of a reference whether the body is stuck."""
+    starts, modes = zip(*truth.modes, strict=True)
+    return np.array(modes)[np.searchsorted(starts, truth.times, side="right") - 1] == 0

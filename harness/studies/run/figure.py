@@ -7,8 +7,7 @@ Lookup tables of the FMU are drawn in the right column, with the values of the r
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
-from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -22,9 +21,10 @@ from ...results.style import (
     ORANGE,
     WIDTH,
     Axes,
+    Figure,
     axis_label,
     mask_undrawable,
-    open_figure,
+    set_size,
 )
 from ...scenes.scene import MAX_DEFAULT_PLOTS, KnownValues, is_panel
 from ...simulation.fmu_archive import exposes_solver_steps, read_description
@@ -32,6 +32,9 @@ from ...simulation.model_data import LookupTable, read_model_data
 from ...simulation.plot import contact_of, draw_sticking, draw_table
 from ...simulation.runner import run_own_fmu
 from ...simulation.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from .result import RunResult
 
 RIGHT_COLUMN = ("phase", "steps")  # plots in the right column; plots over time are in the left column
 CONTACT_HEIGHT = 0.12  # of a row of the panel with all contacts, in heights of a panel
@@ -45,15 +48,12 @@ HANDLE_WIDTH, LINE_WIDTH = 5, 75  # in characters: legend handle, width of a pan
 TITLE_PAD = 20  # in points: padding of a title above a legend
 
 
-Results = dict[str, Any]  # by the name of the analysis
-
-
 @dataclass(frozen=True)
 class PlottedRun:
     """A run with enough points for smooth curves, the `results` of its analyses, and the `known` values."""
 
     run: Trajectory
-    results: Results
+    results: dict[str, Any]
     known: KnownValues | None
 
     @property
@@ -77,39 +77,31 @@ class PlottedRun:
         return value * PUBLISHED_UNITS.get(unit, ("", 1.0))[1] if isinstance(value, int | float) else None
 
 
-def draw(
-    title: str,
-    plots: Iterable[str],
-    run: Trajectory,
-    results: Results,
-    path: Path,
-    known: KnownValues | None = None,
-) -> None:
-    """Save the figure of the named plots; arrays are drawn by element, strings are skipped."""
+def draw(run: "RunResult", title: str, plots: Iterable[str], figure: Figure) -> None:
+    """Draw the named plots; arrays are drawn by element, strings are skipped."""
     columns: list[list[Any]] = [*arrange_columns([panel for name in plots for panel in expand_plot(name, run)], run)]
     if not columns:
         return
     if tables := read_model_data(run.spec.fmu).tables:
         right = columns.pop() if is_right(columns[-1][0], run) else []
         columns.append([*right, *tables])
-    plotted = PlottedRun(refine(run), results, known)
+    plotted = PlottedRun(refine(run), run._analyses, run._known)
     # with several contacts, each column over time ends with a panel of all contacts
     below = [len(run.contacts) * CONTACT_HEIGHT + 0.2] if len(run.contacts) > 1 else []
     ratios = [[1.0] * len(names) + below * (not is_right(names[0], run)) for names in columns]
-    height = HEIGHT * max(2, *map(sum, ratios), 2)
-    with open_figure(path, WIDTH * len(columns), height) as figure:
-        figure.suptitle(f"{title}\n{run.settings_label}".strip(), fontsize=11)
-        parts = figure.subfigures(1, len(columns), squeeze=False)[0]
-        for part, names, heights in zip(parts, columns, ratios, strict=True):
-            over_time = not is_right(names[0], run)
-            grid = part.subplots(len(heights), sharex=over_time, squeeze=False, height_ratios=heights)[:, 0]
-            for axes, name in zip(grid, names, strict=False):
-                if isinstance(name, LookupTable):
-                    draw_table(axes, name, name.y_with(run.parameters), BLUE)
-                    continue
-                PANELS.get(name if is_panel(name, run.columns) else "", plot_output)(axes, plotted, name)
-            if len(heights) > len(names):
-                plot_sticking(grid[-1], plotted)
+    set_size(figure, WIDTH * len(columns), HEIGHT * max(2, *map(sum, ratios), 2))
+    figure.suptitle(f"{title}\n{run.settings_label}".strip(), fontsize=11)
+    parts = figure.subfigures(1, len(columns), squeeze=False)[0]
+    for part, names, heights in zip(parts, columns, ratios, strict=True):
+        over_time = not is_right(names[0], run)
+        grid = part.subplots(len(heights), sharex=over_time, squeeze=False, height_ratios=heights)[:, 0]
+        for axes, name in zip(grid, names, strict=False):
+            if isinstance(name, LookupTable):
+                draw_table(axes, name, name.y_with(run.parameters), BLUE)
+                continue
+            PANELS.get(name if is_panel(name, run.columns) else "", plot_output)(axes, plotted, name)
+        if len(heights) > len(names):
+            plot_sticking(grid[-1], plotted)
 
 
 def is_right(panel: str | LookupTable, run: Trajectory) -> bool:

@@ -1,7 +1,7 @@
 """Derivatives of a motion by parameters, with their files, their figure and what the command prints."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,14 +13,13 @@ from ...results.files import column_heading, write_csv, write_csv_rows
 from ...results.provenance import describe_sources
 from ...results.quantity import divide_units, format_number
 from ...results.result import Result
-from ...results.summary import Summary, make_terminal_table, read_cells
+from ...results.table import ResultColumn, ResultTable
 from ...scenes.run_spec import RunSpec
 
 if TYPE_CHECKING:
     import pandas
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-    from rich.table import Table
 
 EVENTS_TITLE = "Events, and the derivatives of their times"
 
@@ -83,7 +82,7 @@ class SensitivityResult(Result):
         Effective values of all parameters of the FMU.
     """
 
-    study, function = "sensitivity", "sensitivity"
+    study, _function = "sensitivity", "sensitivity"
 
     spec: RunSpec
     t: np.ndarray
@@ -102,7 +101,7 @@ class SensitivityResult(Result):
         return self.spec.model
 
     @property
-    def headline(self) -> str:
+    def _headline(self) -> str:
         return f"{', '.join(self.outputs)} by {', '.join(self.parameters)}; {len(self.events)} events"
 
     def __getitem__(self, name: Any) -> Any:
@@ -151,47 +150,24 @@ class SensitivityResult(Result):
         frame: pandas.DataFrame = library.DataFrame(columns, index=library.Index(self.t, name="time"))
         return frame
 
-    def rows(self) -> tuple[list[Mapping[str, Any]], str]:
-        names = [(output, parameter) for output in self.outputs for parameter in self.parameters]
-        return [{"output": pair[0], "parameter": pair[1], "derivative": self[pair][-1]} for pair in names], "output"
+    @property
+    def _caption(self) -> str:
+        return f"{self.title}: {self.outputs[0]} and its derivatives over time; sticking is shaded"
 
-    def table(self) -> "Table":
-        """Return the table of the derivatives at the last time and of the largest ones."""
-        table = make_terminal_table()
-        table.add_column("output", no_wrap=True)
-        table.add_column("by", no_wrap=True)
-        for heading in ("at the end", "relative", "largest", "at t [s]"):
-            table.add_column(heading, justify="right")
-        table.add_column("unit", no_wrap=True)
-        for output in self.outputs:
-            for parameter in self.parameters:
-                slope, relative = self[output, parameter], float(self.relative(output, parameter)[-1])
-                size = np.where(np.isfinite(slope), np.abs(slope), -1.0)
-                k = int(np.argmax(size))
-                cells = [format_number(value) for value in (float(slope[-1]), relative, float(slope[k]))]
-                cells = ["none" if cell == "nan" else cell for cell in cells]
-                unit = divide_units(self.units[output], self.units[parameter])
-                table.add_row(output, parameter, *cells, f"{self.t[k]:.6g}", unit)
-        return table
-
-    def event_table(self) -> "Table":
-        """Return the table of the events."""
-        table = make_terminal_table(EVENTS_TITLE)
-        table.add_column("t [s]", justify="right")
-        table.add_column("modes" if any(event.after for event in self.events) else "event")
+    def _tabulate(self) -> tuple[ResultTable, ...]:
+        """Return the derivatives at the last time and the largest ones, and the events."""
+        pairs = [measure_pair(self, output, name) for output in self.outputs for name in self.parameters]
+        event = ResultColumn(
+            "modes" if any(event.after for event in self.events) else "event", "{0.text}", is_text=True
+        )
+        columns = [ResultColumn("t [s]", "{0.t:.9g}"), event]
         for name in self.parameters:
-            table.add_column(f"by {name} [{divide_units('s', self.units[name])}]", justify="right")
-        for event in self.events:
-            table.add_row(f"{event.t:.9g}", event.text, *map(format_number, event.derivatives.values()))
-        return table
+            heading = f"by {name} [{divide_units('s', self.units[name])}]"
+            columns.append(ResultColumn(heading, partial(format_derivative, name)))
+        return ResultTable(pairs, COLUMNS), ResultTable(self.events, columns, EVENTS_TITLE)
 
-    def summary(self) -> Summary:
-        tables = (*read_cells(self.table()), *read_cells(self.event_table(), EVENTS_TITLE))
-        picture = f"{self.title}: {self.outputs[0]} and its derivatives over time; sticking is shaded"
-        return Summary("sensitivity", self.title, self.remarks, tables, picture)
-
-    def blocks(self) -> list[Any]:
-        return [self.table(), "", *([self.event_table(), ""] if self.events else []), *self.remarks]
+    def sentences(self) -> list[str]:
+        return [*self.remarks]
 
     def as_json(self) -> dict[str, Any]:
         pairs = {output: {name: self[output, name].tolist()[-1] for name in self.parameters} for output in self.outputs}
@@ -205,12 +181,12 @@ class SensitivityResult(Result):
             "remarks": list(self.remarks),
         }
 
-    def origin(self) -> dict[str, Any]:
+    def _origin(self) -> dict[str, Any]:
         fmu, source = self.spec.fmu, describe_sources(str(self.spec.fmu))
         parameters = {name: (value, self.units.get(name, "")) for name, value in self.settings.items()}
         return {"files": [fmu], "parameters": parameters, "source": source, "run": self.spec}
 
-    def write_tables(self, folder: Path) -> None:
+    def _write_tables(self, folder: Path) -> None:
         headings, columns = ["t [s]"], [self.t]
         for output in self.outputs:
             headings.append(column_heading(output, self.units[output]))
@@ -258,13 +234,50 @@ class SensitivityResult(Result):
             draw(self, figure, names)
         return np.array(figure.axes)
 
-    def draw(self, figure: "Figure") -> None:
+    def _draw(self, figure: "Figure") -> None:
         from .figure import draw
 
         draw(self, figure, self.outputs[:1])
 
-    def draw_panel(self, axes: "Axes") -> None:
+    def _draw_panel(self, axes: "Axes") -> None:
         from .figure import plot_slope
 
         plot_slope(axes, self, self.outputs[0], next(iter(self.parameters)))
         axes.set_xlabel("t [s]")
+
+
+def measure_pair(result: SensitivityResult, output: str, parameter: str) -> dict[str, Any]:
+    """Return the derivative of an output by a parameter at the last time, its elasticity, and the largest one."""
+    slope, relative = result[output, parameter], float(result.relative(output, parameter)[-1])
+    k = int(np.argmax(np.where(np.isfinite(slope), np.abs(slope), -1.0)))
+    return {
+        "output": output,
+        "by": parameter,
+        "derivative": float(slope[-1]),
+        "relative": relative,
+        "largest": float(slope[k]),
+        "at": float(result.t[k]),
+        "unit": divide_units(result.units[output], result.units[parameter]),
+    }
+
+
+def format_field(name: str, pair: dict[str, Any]) -> str:
+    """Return a number; "none" for one that does not exist."""
+    text = format_number(pair[name])
+    return "none" if text == "nan" else text
+
+
+def format_derivative(parameter: str, event: SensitivityEvent) -> str:
+    """Return the derivative of the time of an event by a parameter."""
+    return format_number(event.derivatives[parameter])
+
+
+COLUMNS = (
+    ResultColumn("output", "{0[output]}", is_text=True),
+    ResultColumn("by", "{0[by]}", is_text=True),
+    ResultColumn("at the end", partial(format_field, "derivative")),
+    ResultColumn("relative", partial(format_field, "relative")),
+    ResultColumn("largest", partial(format_field, "largest")),
+    ResultColumn("at t [s]", "{0[at]:.6g}"),
+    ResultColumn("unit", "{0[unit]}", is_text=True),
+)

@@ -1,18 +1,21 @@
 """Stability figure: internal steps over stiffness for every method."""
 
 from collections.abc import Iterable
+from typing import TYPE_CHECKING
 
 from ...results.style import HEIGHT, METHOD_COLOURS, WIDTH, Axes, Figure, set_size
-from .outcomes import StabilityRegion
+
+if TYPE_CHECKING:
+    from .result import StabilityRegion
 
 
-def draw(regions: Iterable[StabilityRegion], figure: Figure) -> None:
+def draw(regions: Iterable["StabilityRegion"], figure: Figure) -> None:
     """Draw the figure."""
     set_size(figure, 1.3 * WIDTH, 2 * HEIGHT)
     plot_steps(figure.subplots(), regions)
 
 
-def plot_steps(axes: Axes, regions: Iterable[StabilityRegion]) -> None:
+def plot_steps(axes: Axes, regions: Iterable["StabilityRegion"]) -> None:
     """Plot internal steps over stiffness; a slope of -1 means that steps are bounded by stability."""
     for region in regions:
         axes.loglog(

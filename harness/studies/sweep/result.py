@@ -1,7 +1,7 @@
 """A finished sweep with its data, its figure and what the command prints."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
@@ -74,7 +74,7 @@ class SweepResult(Result):
         The varied parameters and the measures, with their units.
     """
 
-    study, function = "sweep", "sweep"
+    study, _function = "sweep", "sweep"
 
     name: str
     runs: int
@@ -87,12 +87,12 @@ class SweepResult(Result):
     dataset: Any = field(default=None, init=False)
 
     @classmethod
-    def is_stored(cls, folder: Path) -> bool:
+    def _is_stored(cls, folder: Path) -> bool:
         return (folder / DATASET_FILE).is_file()
 
     @classmethod
-    def load(cls, folder: str | Path) -> Self:
-        result = super().load(folder)
+    def _load(cls, folder: str | Path) -> Self:
+        result = super()._load(folder)
         result.folder = folder = Path(folder)
         library = import_optional("xarray", "to read a sweep", "sweep")
         try:
@@ -113,7 +113,7 @@ class SweepResult(Result):
         return self.name
 
     @property
-    def headline(self) -> str:
+    def _headline(self) -> str:
         return f"{self.runs} runs, {self.failed} failed"
 
     @property
@@ -148,15 +148,23 @@ class SweepResult(Result):
             raise AttributeError(name)
         return getattr(self.data, name)
 
+    @property
+    def _caption(self) -> str:
+        return f"Sweep {self.name}. {self.counts}"
+
+    @property
+    def counts(self) -> str:
+        """The numbers of runs, and the columns of the table."""
+        return f"{self.runs} runs, {self.failed} failed. Columns: {self.columns}."
+
     def summary(self) -> Summary:
-        text = f"{self.runs} runs, {self.failed} failed. Columns: {self.columns}."
-        return Summary("sweep", self.name, (text,), picture=f"Sweep {self.name}. {text}")
+        return replace(super().summary(), sentences=(self.counts,))
 
     def as_json(self) -> dict[str, Any]:
         names = ("runs", "folder", "n_resumed", "damaged", "failures", "seconds")
         return {name: getattr(self, name) for name in names}
 
-    def blocks(self) -> list[Any]:
+    def sentences(self) -> list[str]:
         n_new = self.runs - self.n_resumed
         output = [f"{self.runs} runs, {self.n_resumed} of them resumed, {self.failed} failed"]
         if self.damaged:
@@ -180,11 +188,11 @@ class SweepResult(Result):
         frame.attrs["units"] = {str(name): item.attrs.get("units", "") for name, item in self.data.variables.items()}
         return frame
 
-    def origin(self) -> dict[str, Any]:
+    def _origin(self) -> dict[str, Any]:
         old = load_provenance(self.folder) if self.folder else {}
         return {"files": (), "scene": old.get("scene"), "source": self.name}
 
-    def write_tables(self, folder: Path) -> None:
+    def _write_tables(self, folder: Path) -> None:
         """Write the values for xarray and as CSV."""
         self.data.to_netcdf(folder / DATASET_FILE, engine="scipy", format="NETCDF3_64BIT")
         measures = self.data.drop_vars("error").data_vars  # a loaded file has the errors first, a new sweep last
@@ -194,14 +202,14 @@ class SweepResult(Result):
         frame.columns = [column_heading(name, "" if units[name] == "1" else units[name]) for name in names]
         frame.to_csv(folder / TABLE_FILE, index=False, lineterminator="\n")
 
-    def draw(self, figure: "Figure") -> None:
+    def _draw(self, figure: "Figure") -> None:
         from .figure import draw, thin_out
 
         if not self.data.drop_vars("error").data_vars:
             raise HarnessError(f"{self.name} has no measures to draw")
         draw(thin_out(self.data), figure, self.failed)
 
-    def draw_panel(self, axes: "Axes") -> None:
+    def _draw_panel(self, axes: "Axes") -> None:
         from .figure import draw_measure, thin_out
 
         data = thin_out(self.data)

@@ -1,5 +1,6 @@
-"""Points of a sweep: a full grid, or a Latin hypercube."""
+"""Points of a sweep: a full grid, or a Latin hypercube, over numbers or labels of enumerations."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from math import isfinite, log, prod
@@ -8,9 +9,13 @@ from typing import Any
 import numpy as np
 
 from ...arguments import MAX_RUNS, to_array
-from ...errors import MAX_VALUE_LENGTH, SceneError, format_value
+from ...errors import MAX_VALUE_LENGTH, SceneError, by_interface, format_value, unknown_name_message
+from ...scenes.run_spec import RunSpec
+from ...simulation.fmu_archive import read_description
+from ...simulation.variable_values import enumeration_labels
 
-VARY_HELP = "as in m=1:2:11, k=10:1000:31:log, mu=0.1,0.2,0.4 or, with --samples, m=1:2"
+Labels = Mapping[str, Mapping[str, int]]  # numbers of the labels of each enumeration
+SPANS = "as in 1:2:11, 10:1000:31:log, 0.1,0.2,0.4 or, with samples, 1:2"
 
 
 @dataclass(frozen=True)
@@ -26,17 +31,23 @@ class SweepAxis:
         return f"{len(self.values)} values, {self.values[0]!r} to {self.values[-1]!r}{', logarithmic' * self.log}"
 
 
-def parse_axis(text: str, random: bool) -> SweepAxis:
-    """Parse the argument of --vary; SceneError if it is invalid."""
-    name, _, span = text.partition("=")
-    name = name.strip()
-    invalid = SceneError(f"--vary {text[:MAX_VALUE_LENGTH]} is invalid; write it {VARY_HELP}")
-    words = span.split(":")
+def read_axis(name: str, values: Any, random: bool, labels: Labels) -> SweepAxis:
+    """Return the axis of a parameter from numbers, labels of an enumeration, or a text as on the command line."""
+    if isinstance(values, str):
+        return parse_axis(name, replace_labels_in_text(name, values, labels), random)
+    return axis_from_numbers(name, replace_labels(name, values, labels), random)
+
+
+def parse_axis(name: str, text: str, random: bool) -> SweepAxis:
+    """Parse a range or a list of values; SceneError if it is invalid."""
+    label = by_interface(f"--vary {name}={text}", f"grid: {name} = {text!r}")[:MAX_VALUE_LENGTH]
+    invalid = SceneError(f"{label} is invalid; write it {SPANS}")
+    words = text.split(":")
     is_log = words[-1] == "log"
     words = words[: len(words) - is_log]
     try:
-        if "," in span:
-            values = tuple(map(float, span.split(",")))
+        if len(words) == 1 and not (random or is_log):
+            values = tuple(map(float, text.split(",")))
         elif len(words) == 2 and random:
             values = (float(words[0]), float(words[1]))
         elif len(words) == 3 and not random:
@@ -45,11 +56,11 @@ def parse_axis(text: str, random: bool) -> SweepAxis:
             raise invalid
     except (ValueError, OverflowError):
         raise invalid from None
-    if not name or not all(map(isfinite, values)) or (random and ("," in span or not values[0] < values[1])):
+    if not name or not all(map(isfinite, values)) or (random and not values[0] < values[1]):
         raise invalid
     if is_log and not min(values) > 0:
-        raise SceneError(f"--vary {text}: a logarithmic axis needs bounds above 0")
-    return SweepAxis(name, check_distinct(values, f"--vary {text}"), is_log)
+        raise SceneError(f"{label}: a logarithmic axis needs bounds above 0")
+    return SweepAxis(name, check_distinct(values, label), is_log)
 
 
 def axis_from_numbers(name: str, column: Any, random: bool) -> SweepAxis:
@@ -103,8 +114,6 @@ class SweepPoints:
     seed: int = 1
 
     def __post_init__(self) -> None:
-        if len({axis.name for axis in self.axes}) < len(self.axes):
-            raise SceneError("--vary names a parameter twice")
         if self.n_runs > MAX_RUNS:
             raise SceneError(f"{self.n_runs} runs exceed the maximum of {MAX_RUNS}; reduce the number of values")
 
@@ -137,3 +146,47 @@ class SweepPoints:
             low, high = map(log, axis.values) if axis.log else axis.values
             column[:] = np.exp(low + column * (high - low)) if axis.log else low + column * (high - low)
         return points
+
+
+def read_labels(run: RunSpec) -> Labels:
+    """Return the labels of all enumerations of the FMU of a run."""
+    variables = read_description(run.fmu, run.lenient).modelVariables
+    tables = {variable.name: enumeration_labels(variable) for variable in variables if variable.type == "Enumeration"}
+    return {name: {label: number for number, label in table.items()} for name, table in tables.items()}
+
+
+def replace_labels(name: str, values: Any, labels: Labels) -> Any:
+    """Return the values of a parameter with the numbers of its labels; SceneError for an unknown label."""
+    items = list_labels(values)
+    if not any(isinstance(item, str) for item in items):
+        return values
+    if name not in labels:
+        raise SceneError(f"grid: {name} = {values!r} must be numbers, because {name} is no enumeration")
+    numbers = labels[name]
+    for item in items:
+        if isinstance(item, str) and item not in numbers:
+            raise SceneError(unknown_name_message(f"label of {name}", item, numbers))
+    return [numbers[item] if isinstance(item, str) else item for item in items]
+
+
+def list_labels(values: Any) -> list[Any]:
+    """Return a label, or the items of a sequence or of an array of texts; empty for other values."""
+    if isinstance(values, str):
+        return [values]
+    if isinstance(values, list | tuple):
+        return list(values)
+    kind = getattr(getattr(values, "dtype", None), "kind", "")
+    return list(values) if kind in ("U", "O", "T") and getattr(values, "ndim", 0) == 1 else []
+
+
+def replace_labels_in_text(name: str, text: str, labels: Labels) -> str:
+    """Return a list of values in a text with the numbers of its labels, as 1,3 for hybrid,threshold."""
+    numbers = labels.get(name, {})
+    return ",".join(str(numbers.get(word.strip(), word)) for word in text.split(","))
+
+
+def describe_labels(variable: Any) -> str:
+    """Return the labels of an enumeration in parentheses; empty for any other variable."""
+    if variable.type != "Enumeration":
+        return ""
+    return f" ({', '.join(f'{number} = {label}' for number, label in enumeration_labels(variable).items())})"

@@ -14,7 +14,7 @@ The data are an xarray.Dataset, stored as sweep.nc and, with the same content, a
 
 import json
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -27,16 +27,14 @@ from ...results.folder import replace_folder
 from ...results.provenance import describe_sources, write_provenance
 from ...results.summary import write_summary
 from ...scenes.fmu_files import check_built
+from ...scenes.run_spec import RunSpec
 from ...simulation.fmu_archive import read_description
 from ...simulation.model_data import LookupTable, read_tables_with
 from ...simulation.variable_values import REAL_TYPES, variable_unit
-from .checkpoint import Checkpoint
-from .dispatch import Sweep, run_pending
-from .labels import describe_labels
-from .measures import MeasureColumn
+from .dispatch import Checkpoint, Sweep, run_pending
 from .result import STUDY, FailureGroup, SweepResult
-from .runner import SweepSpec, open_runner
-from .sampling import SweepPoints
+from .runner import MeasureColumn, SweepSpec, open_runner
+from .sampling import SweepPoints, describe_labels, read_axis, read_labels
 
 if TYPE_CHECKING:
     import xarray
@@ -73,8 +71,11 @@ class SweepDescription:
 
 
 def run_sweep(
-    runs: SweepSpec,
-    points: SweepPoints,
+    run: RunSpec,
+    grid: Mapping[str, Any],
+    samples: int | None,
+    seed: int,
+    measures: Sequence[str],
     name: str | None,
     out: Path,
     scheduler: str | None,
@@ -83,8 +84,12 @@ def run_sweep(
     resume: str,
 ) -> SweepResult:
     """Run the sweep and write its files to out/sweep/<name>; `resume` is as in `run_pending`."""
-    file = runs.run.fmu
+    file = run.fmu
     check_built(file)
+    labels = read_labels(run)
+    axes = tuple(read_axis(parameter, values, samples is not None, labels) for parameter, values in grid.items())
+    points = SweepPoints(axes, samples, seed)
+    runs = SweepSpec(run, points.names, tuple(measures))
     about = describe(runs, points)
     sweep = Sweep(runs, points, file.read_bytes(), len(about.columns))
     folder = out / STUDY.name / (name or "-".join((runs.run.model, *runs.varied, sweep.key[:8])))
@@ -116,7 +121,7 @@ def run_sweep(
             ", ".join(about.headings),
         )
         result.dataset = build_dataset(sweep, checkpoint, about, constants, stop)
-        result.write(new_folder)
+        result._write(new_folder)
         write_provenance(new_folder, [file], constants, options, source=source)
         write_summary(new_folder, result.summary())
     checkpoint.delete()
