@@ -20,7 +20,7 @@ from ..compiler.equations.model_declaration import Output, Variable
 from ..compiler.equations.model_file import ModelFile
 from ..compiler.equations.model_roles import TIME
 from ..compiler.lowering import lowered_files, lowered_model, select_features
-from .native.c_sources import collect_sources
+from .native.native_fmu import collect_sources
 
 MAX_LENGTH = 3000  # characters of an expression inside of another one
 

@@ -15,8 +15,7 @@ from ..compiler.equations.model_file import ModelFile
 from ..compiler.lowering import lowered_model, select_features
 from ..packaging.archive import build_date, write
 from ..packaging.native.binaries import compile_and_link
-from ..packaging.native.c_sources import MAIN_SOURCE
-from ..packaging.native.native_fmu import generate_c_sources
+from ..packaging.native.native_fmu import MAIN_SOURCE, generate_c_sources
 from .model_json import ModelJson, build_model_json
 
 FILE, MORE_FILE = "index.html", "more.html"  # pages of the shipped models and of those in fmus/more

@@ -11,7 +11,7 @@ from variants import slow_after
 from fmus.compiler import BuildError
 from fmus.compiler.equations.model_file import load_model_file
 from fmus.compiler.lowering import lowered_files, lowered_model, select_features
-from fmus.packaging.native.c_sources import collect_sources
+from fmus.packaging.native.native_fmu import collect_sources
 
 MODEL = '''
 from fmus import *

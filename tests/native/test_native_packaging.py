@@ -34,7 +34,7 @@ from fmus.packaging.native.binaries import (
     compile_and_link,
     compile_libraries,
 )
-from fmus.packaging.native.c_sources import FMI_HEADERS, MAIN_SOURCE, OWN_HEADERS
+from fmus.packaging.native.native_fmu import FMI_HEADERS, MAIN_SOURCE, OWN_HEADERS
 
 pytestmark = pytest.mark.slow
 

@@ -31,7 +31,7 @@ from native_host import (
 
 from fmus.packaging import native
 from fmus.packaging.native.binaries import PLATFORMS, compile_binaries, find_compiler
-from fmus.packaging.native.c_sources import MAIN_SOURCE
+from fmus.packaging.native.native_fmu import MAIN_SOURCE
 
 pytestmark = pytest.mark.slow
 

@@ -9,7 +9,7 @@ from variants import slow_after
 from fmus.compiler.lowering import lowered_model
 from fmus.compiler.lowering.feature_selection import select_features
 from fmus.compiler.model_lookup import find_model
-from fmus.packaging.native.c_sources import collect_sources
+from fmus.packaging.native.native_fmu import collect_sources
 
 MODEL = """from fmus import HYBRID, SIGN, THRESHOLD, choose, fabs
 from fmus import Contact, Input, Mode, Model, Output, Parameter, State, Table

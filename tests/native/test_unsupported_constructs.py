@@ -9,7 +9,7 @@ from fmus.compiler.c.c_types import FLOAT
 from fmus.compiler.c.call_graph import CallGraph
 from fmus.compiler.c.struct_layout import AttributeTypeError
 from fmus.compiler.syntax_trees import TranslationError
-from fmus.packaging.native.c_sources import collect_sources
+from fmus.packaging.native.native_fmu import collect_sources
 from tests.native.test_language_subset import THIRD, Allowed, Part, half
 
 

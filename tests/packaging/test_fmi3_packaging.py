@@ -22,7 +22,7 @@ from variants import slow_after
 from fmus.compiler.lowering import model_exchange_run
 from fmus.compiler.model_lookup import find_model, model_names
 from fmus.packaging.fmi_variables import declared_variables
-from fmus.packaging.native.c_sources import FMI_HEADERS, OWN_HEADERS
+from fmus.packaging.native.native_fmu import FMI_HEADERS, OWN_HEADERS
 from fmus.runtime.variable_declarations import variables
 from tests.packaging.test_packaging import (  # noqa: F401
     EVERY_MODEL,
