@@ -74,7 +74,8 @@ class CurveIdentification:
     @property
     def residuals(self) -> np.ndarray:
         """Return the residuals (n,) of all points."""
-        return self.points.force - self.best.force(self.points.v)
+        nodes, weights = self.points.nodes
+        return np.asarray(self.points.force - weights @ [self.best.force(v) for v in nodes])
 
     @property
     def sentence(self) -> str:
@@ -274,7 +275,8 @@ def widen_by_neighbours(points: CurvePoints, residuals: np.ndarray) -> float:
         if len(order):
             e = residuals[np.argsort(order, kind="stable")]
             rho = float(e[:-1] @ e[1:]) / float(e @ e + 1e-300)
-            if rho > SIGNIFICANT_CORRELATION / np.sqrt(len(e)):
+            is_visible = float(e @ e) > 4 * len(e) * points.precision**2
+            if is_visible and rho > SIGNIFICANT_CORRELATION / np.sqrt(len(e)):
                 factor = max(factor, (1 + rho) / (1 - rho))
     return factor
 

@@ -17,7 +17,6 @@ from .points import CurvePoints, Effect
 
 COARSE, FINE = 64, 256  # values of v_s, in its range and in its interval
 ZOOM, ZOOMS = 25, 3  # values of v_s about the best one, and number of repetitions
-ROUNDOFF = 1e-12  # relative to the largest force: smaller residuals are rounding errors
 MIN_FREEDOM = 2  # points beyond the number of constants
 MIN_POINTS_PER_CONSTANT = 2.0  # with fewer, the BIC prefers laws with too many constants
 MIN_SPEEDS = {0: 1, 1: 4, 2: 4}  # different speeds of one direction, by the exponent of the law
@@ -284,8 +283,7 @@ def fit_law(
         return f"with {count} constants at least {required} points are required"
     if not all(part.is_valid for part in parts):
         return "friction does not fall with the speed"
-    floor = n * (ROUNDOFF * float(np.abs(points.force).max())) ** 2
-    squares = max(sum(float(part.best.squares[0]) for part in parts), floor)
+    squares = max(sum(float(part.best.squares[0]) for part in parts), n * points.precision**2)
     variance = widening * squares / (n - count)
     margin = variance * student_quantile(n - count) ** 2 if has_intervals else np.nan
     estimates = tuple(estimate for part in parts for estimate in part.estimates(margin, points.units))

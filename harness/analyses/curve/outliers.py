@@ -36,13 +36,16 @@ def find_outliers(
         if isinstance(fit, str):
             return fit
         residuals, jacobian, _ = linearise(fit, points)
-        best, used = (fit, used), find_fitting(residuals, jacobian, float(np.abs(residuals[used]).max()) / STEP)
+        best, used = (
+            (fit, used),
+            find_fitting(residuals, jacobian, float(np.abs(residuals[used]).max()) / STEP, points.precision),
+        )
         if (used == best[1]).all():
             break
     return best or "the points do not suffice"
 
 
-def find_fitting(e: np.ndarray, jacobian: np.ndarray, smallest: float) -> np.ndarray:
+def find_fitting(e: np.ndarray, jacobian: np.ndarray, smallest: float, precision: float) -> np.ndarray:
     """Return the mask (n,) of the values e (n,) without the outliers of the linear model with a jacobian (n, p).
 
     Residuals below `smallest` are left in: a fit without the larger ones shows whether they are outliers.
@@ -59,7 +62,7 @@ def find_fitting(e: np.ndarray, jacobian: np.ndarray, smallest: float) -> np.nda
         drops = residuals**2 / np.maximum(1 - (q**2).sum(axis=1), MIN_WEIGHT)
         worst = int(np.argmax(drops))
         # the drop of the sum of squares by a point is an F-distributed multiple of the remaining variance
-        variance = max(float(residuals @ residuals - drops[worst]), 1e-24 * float(e @ e)) / (freedom - 1)
+        variance = max(float(residuals @ residuals - drops[worst]) / (freedom - 1), precision**2)
         used = used.copy()
         used[np.flatnonzero(used)[worst]] = False
         deviation = float(np.sqrt(drops[worst] / (variance + 1e-300)))

@@ -9,6 +9,7 @@ import numpy as np
 ABSORBED = 0.02  # share of the power of a column: a dependence with less left by the law cannot be separated from it
 SCORE = 5.0  # standard deviations of a dependence beyond chance
 PRESLIDING = np.geomspace(1e-4, 1e-2, 9)  # distances over the stroke
+ROUNDOFF, SWEEP_PRECISION = 1e-12, 1e-4  # relative to the largest force
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(3)
 VISIBLE, MIN_VISIBLE = 0.1, 4  # share of presliding in a point, and points that have it
 
@@ -68,6 +69,11 @@ class CurvePoints:
         names = ("v", "force", "elapsed", "span", "a", "slope", "travelled")
         parts = {name: values[mask] if len(values := getattr(self, name)) else values for name in names}
         return replace(self, labels=tuple(np.array(labels, object)[mask]), **parts)
+
+    @property
+    def precision(self) -> float:
+        """Return the force below which residuals are errors of rounding, or of the means of a sweep."""
+        return (SWEEP_PRECISION if len(self.span) else ROUNDOFF) * float(np.abs(self.force).max())
 
     @property
     def units(self) -> dict[str, str]:
@@ -132,7 +138,7 @@ def find_dependences(
         power, gain = float(own @ own), float(own @ residuals)
         if power <= ABSORBED * float(column @ column) or effect.name in [other.name for other in chosen]:
             continue
-        rest = max(squares - gain**2 / power, 1e-12 * squares)
+        rest = max(squares - gain**2 / power, len(residuals) * points.precision**2)
         score = gain / float(np.sqrt(power * rest / freedom + 1e-300))
         if score > SCORE or (score < -SCORE and not effect.is_positive):
             found.append(effect)
