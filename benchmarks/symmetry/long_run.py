@@ -16,7 +16,7 @@ from .motion import FmuRuns
 DURATION = 1e5  # s
 EARLY = 0.1  # part of the run in which the period is determined, in its second half
 MAX_PERIOD = 400  # events
-MAX_LONG_STEPS = 10_000_000
+MAX_LONG_STEPS = 20_000_000
 SLACK = 100.0  # tolerance of a period relative to that of the method
 
 

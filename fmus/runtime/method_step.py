@@ -117,9 +117,12 @@ def accept_proposal(model, step):
             scale = elementwise_max(method.error_scale_floor, scale)
         if h <= h_min or attempts == MAX_TRIES:
             return STALLED if error < inf and sum_of(size1) < OVERFLOW_LIMIT else DIVERGED
-        shrink = method.safety * error**-method.power if 1.0 < error < inf and attempts == 1 else 0.5
-        shrink_limit = method.shrink if attempts == 1 else 0.5
-        h_new = h * (shrink if shrink > shrink_limit else shrink_limit)
+        shrink = 0.5
+        if attempts == 1 and (1.0 < error < inf or not sum_of(size1) < OVERFLOW_LIMIT):
+            # Where numbers overflow depends on the units: the step shrinks there as after a large error.
+            shrink = method.safety * error**-method.power
+            shrink = shrink if shrink > method.shrink else method.shrink
+        h_new = h * shrink
         if has_narrow_features(model, step) and share < 1.0:
             h_new = h * share
         h = h_min if h_new < h_min else h_new

@@ -2,7 +2,11 @@
 
 import pytest
 from build_cache import build_once
+from internal_steps import compute_step, prepared_run, start
+from models import DOP853
 
+from fmus.compiler.lowering import lowered_model
+from fmus.compiler.model_lookup import MORE as MORE_FOLDER
 from fmus.compiler.model_lookup import find_model
 from fmus.compiler.units import parse_unit
 from fmus.runtime.variable_declarations import variables
@@ -42,6 +46,24 @@ def run(worker, fmus, name, method, *exponents):
         [t / factors[-1], *(value / size for value, size in zip(row, factors, strict=False)), *row[len(factors) :]]
         for t, row in zip(times, rows, strict=True)
     ]
+
+
+def first_steps(length):
+    """Return end, rejections and position of the first steps of a bristle model, with lengths in another unit."""
+    model = lowered_model(MORE_FOLDER / "lugre.py")()
+    speeds_and_forces = {name: getattr(model, name) * length for name in ("F_s", "F_c", "v_s", "v_driver")}
+    run = prepared_run(model, {"solver.method": DOP853, "solver.rtol": 1e-6, **speeds_and_forces})
+    start(model, run, model.initial_state(0.0), 20.0)
+    step, rows = run.solver.step, []
+    for _ in range(20):
+        assert compute_step(model, run) == 0
+        rows.append((step.t1, step.n_rejected, step.y1_x / length))
+    return rows
+
+
+def test_a_proposal_beyond_the_range_of_numbers_shortens_the_step_alike_in_all_units():
+    """The first step of stiff bristles is far too long for an explicit method, whose proposal overflows."""
+    assert first_steps(2.0**40) == first_steps(1.0)
 
 
 RUNS = [
