@@ -146,7 +146,7 @@ def check_record(task):
         return kind, number, None, [], str(refusal)
     held, far = [], []
     for estimate in estimates:
-        if (name := estimate.name.rstrip("+-")) not in ranges:
+        if (name := estimate.name.rstrip("+-")) not in ranges or not estimate.low <= estimate.high:  # or no interval
             continue
         low, high = min(ranges[name]), max(ranges[name])
         held.append(estimate.low <= high and low <= estimate.high)
