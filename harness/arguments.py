@@ -305,7 +305,8 @@ def setting(value: Any) -> Any:
     try:
         return index(value)  # an integer keeps its digits
     except TypeError:
-        return real(value)
+        number = real(value)
+        return value if isinstance(value, float) else number  # of the command line, it keeps its text
 
 
 def limits(value: Any) -> tuple[float, float] | None:

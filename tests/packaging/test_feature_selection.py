@@ -95,7 +95,7 @@ def test_an_enumeration_of_one_item_is_no_variable_and_stays_known(tmp_path, opt
     description = read_model_description(fmu)
     assert [v.name for v in description.modelVariables if v.type == "Enumeration"] == ["solver.method"]
     assert describe(fmu).laws == ("sign",)
-    assert "Friction laws (friction): sign; fixed by the build" in describe(fmu).summary()
+    assert "Friction laws (friction): sign; fixed by the build" in str(describe(fmu))
     assert simulate(fmu, {"friction": "sign"}, stop=1.0, method="rodas").settings_label == "rodas, sign"
     exchange = description.modelExchange
     assert exchange is None or not exchange.completedIntegratorStepNotNeeded

@@ -89,7 +89,7 @@ def test_commands_work_with_the_choices_of_the_build(folders):
     fmu = folders[1] / "coulomb.fmu"
     described = describe(fmu)
     assert (described.laws, described.methods) == (("hybrid",), ("exact",))
-    assert "Friction laws (friction): hybrid; fixed by the build" in described.summary()
+    assert "Friction laws (friction): hybrid; fixed by the build" in str(described)
     assert simulate(fmu, {"friction": "hybrid"}, method="exact").settings_label == "exact, hybrid"
     with pytest.raises(SceneError, match=r"solver.method = 'ode23': coulomb.fmu was built with exact only; remove it"):
         simulate(fmu, method="ode23")

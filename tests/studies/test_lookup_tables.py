@@ -50,7 +50,7 @@ def sled(tmp_path_factory):
 def draw(result):
     """Return the panels of the figure of a result by their titles."""
     figure = Figure(layout="constrained")
-    result.draw(figure)
+    result._draw(figure)
     return {axes.get_title(): axes for axes in figure.get_axes()}
 
 

@@ -147,8 +147,8 @@ def declaration(e: Variable, **more: object) -> str:
     texts = [string_literal(e.unit), string_literal(e.text)]
     for name in DECLARED_ATTRIBUTES:
         value, default = more.get(name, getattr(e, name)), getattr(VariableDeclaration, name)
-        if name in OPTIONS and not e.is_integer:
-            value = OPTIONS[name].type(value)
+        if not e.is_integer and (name == "start" or name in OPTIONS):  # a number of numpy as one of Python
+            value = float(value) if name == "start" else OPTIONS[name].type(value)
         if repr(value) != repr(default):
             texts.append(f"{name}={string_literal(value) if isinstance(value, str) else repr(value)}")
     return f"VariableDeclaration({', '.join(texts)})"

@@ -21,7 +21,8 @@ from ..model_lookup import FMUS, find_model
 from .feature_selection import FeatureSelection, select_features
 from .lowered_modules import lower_all, lowered_texts
 
-LOAD, STORE = ast.Load(), ast.Store()
+LOAD, STORE, DELETE = ast.Load(), ast.Store(), ast.Del()
+TARGETS = ("target", "targets", "optional_vars")  # fields with what a statement stores, or deletes
 GROUPS = (ast.Tuple, ast.List, ast.Starred)  # targets whose parts are targets
 TREE_NAME = "written_out"  # attribute of lowered modules: the tree with source line numbers
 
@@ -89,8 +90,9 @@ def complete_tree(node: Any, line: int = 1, context: ast.expr_context = LOAD) ->
     """Return a copy of a tree with line numbers and contexts, for the compiler; nodes without a line have that of their
     statement."""
     line, copy = getattr(node, "lineno", line), type(node)()
+    stored = DELETE if isinstance(node, ast.Delete) else STORE
     for name, value in ast.iter_fields(node):
-        inner = STORE if name in ("target", "targets") else context if isinstance(node, GROUPS) else LOAD
+        inner = stored if name in TARGETS else context if isinstance(node, GROUPS) else LOAD
         if isinstance(value, list):
             value = [complete_tree(part, line, inner) if isinstance(part, ast.AST) else part for part in value]
         elif isinstance(value, ast.AST) and name != "ctx":
