@@ -135,7 +135,7 @@ def test_a_peer_is_reported_as_a_ratio_and_a_missing_one_by_name():
         "theirs: 5 µs, 2.5 times",
         "absent is not installed",
     ]
-    assert benchmark_table([FAST]).row_count == 1
+    assert len(benchmark_table([FAST]).rows()) == 1
 
 
 def test_the_csv_holds_every_value_and_the_provenance_every_parameter(tmp_path, user_folder, monkeypatch):
@@ -220,7 +220,7 @@ def test_missing_tools_are_reported_in_their_row_and_fail_nothing(both_backends,
     monkeypatch.setattr(c_host, "COMPILER", "false")  # one that finds no header
     with pytest.raises(c_host.MissingToolError, match="not installed: SUNDIALS"):
         native.time_cvode("smd", 1e-6)
-    assert "not measured" in "".join(str(cell) for cell in benchmark_table(measures).columns[3].cells)
+    assert "not measured" in "".join(row[3] for row in benchmark_table(measures).rows())
 
 
 @pytest.mark.skipif(c_host.COMPILER is None, reason="there is no C compiler on this machine: install gcc")

@@ -241,13 +241,11 @@ def test_a_motion_that_grows_without_bound_ends_with_one_sentence(worker, backen
 
 
 def test_a_force_with_derivatives_acts_on_a_growing_motion(worker):
-    """Of order 1 in closed form, of higher orders by power series."""
     for k, c in ((k, c) for k, c in SIGNS if k < 0.0 or c < 0.0):
-        for force in ((0.3, 2.0), (0.0, -3.0), (0.3, 2.1, -9.0, 12.5)):
+        for force in ((0.3, 2.0), (0.0, -3.0)):
             values = {"solver.method": EXACT, "k": k, "c": c, "x0": 0.01, "v0": 0.3}
             body = worker.instantiate(fmu("native")).begin(values, stop=1.5)
-            for order in range(len(force) - 1, 0, -1):
-                body.ramp("F_ext", force[order], order)
+            body.ramp("F_ext", force[1], 1)
             body.set({"F_ext": force[0]})
             times = [0.125 * n for n in range(1, 13)]
             rows = [body.get("x", "v") for t, end in pairwise([0.0, *times]) if body.step(t, end - t) is None]

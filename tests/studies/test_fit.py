@@ -591,13 +591,13 @@ def test_regular_slips_are_described_by_the_fit_alone():
 @pytest.mark.slow
 def test_slips_that_an_input_makes_irregular_are_described_by_the_fit_alone():
     random, t = np.random.default_rng(1), np.linspace(0.0, 30.0, 3001)
-    force = np.interp(t, np.arange(0.0, 31.0, 1.5), random.uniform(-30.0, 30.0, 21))
+    force = np.interp(t, np.arange(0.0, 31.0, 1.5), random.uniform(-45.0, 45.0, 21))
     run = harness.simulate(native("stickslip"), times=t, inputs={"time": t, "F_ext": force})
     frame = {"t [s]": t, "F_spring [N]": run["F_spring"] + random.normal(size=len(t))}
     without, with_input = (
         harness.fit(native("stickslip"), table, {"mu_s": (0.85, 0.95)}, observe="F_spring")
         for table in (frame, frame | {"F_ext [N]": force})
     )
-    assert "slips of F_spring in the record are irregular" in without.remarks[0]
+    assert "slips of F_spring in the record are irregular" in " ".join(without.remarks)
     assert (with_input.slips, [text for text in with_input.remarks if "irregular" in text]) == ((), [])
     assert with_input["mu_s"].value == pytest.approx(0.9, rel=1e-3)

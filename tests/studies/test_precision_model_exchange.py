@@ -131,7 +131,7 @@ def test_a_failure_is_one_sentence(both, tmp_path, exchange, capfd):
     assert refused(sled, {"mu_d": 2.0}).startswith("mu_d is 2.0, above mu_s = 0.9: ")
     assert "'mess'" in refused(sled, {"mess": 1.0})
     assert refused(sled, timeout=1e-6).endswith(" s after 1e-06 s of run time")
-    assert refused(missing).startswith(f"there is no {missing}: build ")
+    assert refused(missing).startswith(f"there is no {missing}: ")
     assert refused(broken).startswith("broken.fmu cannot be read: File is not a zip file")
     assert capfd.readouterr() == ("", "")
 
@@ -189,7 +189,7 @@ def test_json_holds_all_results(two_studies):
 
 
 def test_the_page_shows_error_against_tolerance_of_the_fmus_that_are_built(two_studies):
-    head = "model exchange by fmpy's CVode: largest error at rtol"
+    head = "FMI 3.0 model exchange with fmpy's CVode: largest error by rtol"
     complete, incomplete = two_studies[2]
     assert head in complete
     assert head not in incomplete  # files of another build are removed

@@ -29,6 +29,7 @@ class Program:
         self.command, self.name = command, name
 
     def main(self, args, prog_name):
+        sys.stdout.reconfigure(errors="replace")  # as `prepare_process` does
         with exit_on_error():
             copy_context().run(run_arguments, self.command, prog_name, args)
 

@@ -148,7 +148,7 @@ def declaration(e: Variable, **more: object) -> str:
     for name in DECLARED_ATTRIBUTES:
         value, default = more.get(name, getattr(e, name)), getattr(VariableDeclaration, name)
         if not e.is_integer and (name == "start" or name in OPTIONS):  # a number of numpy as one of Python
-            value = float(value) if name == "start" else OPTIONS[name].type(value)
+            value = float(e.start) if name == "start" else OPTIONS[name].type(value)
         if repr(value) != repr(default):
             texts.append(f"{name}={string_literal(value) if isinstance(value, str) else repr(value)}")
     return f"VariableDeclaration({', '.join(texts)})"
