@@ -210,7 +210,7 @@ def test_the_error_of_the_inputs_is_added_to_the_variance():
         all=(),
         residuals=lambda z, selection: e,
         choose_steps=lambda z, e: jacobian,
-        records=[SimpleNamespace(y=e[:, None], step=np.zeros(1), noise=np.ones(1))],
+        records=[SimpleNamespace(y=e[:, None], step=np.zeros(1), noise=np.ones(1), scatter=np.ones(1))],
     )
     without, with_error = (estimate_uncertainty(problem, MINIMUM, size * error, 0.0).deviations for size in (0.0, 9.0))
     shift = 9.0 * np.linalg.pinv(jacobian) @ error

@@ -551,6 +551,22 @@ def test_one_noise_of_all_samples_does_not_move_the_fit(model, omega, free):
     assert fits[-1]._headline == ", ".join(f"{name} not determined" for name in free)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["long", "quantised"])
+def test_one_noise_of_all_samples_moves_no_values_of_a_long_or_quantised_record(kind):
+    """A long record is averaged where its own scatter allows it, whatever noise is stated."""
+    t = np.linspace(0.0, 4.0, 12001 if kind == "long" else 401)
+    x = harness.simulate(native("coulomb"), {"f": 0.3}, times=t)["x"]
+    noisy = x + np.random.default_rng(3).normal(0.0, 1e-4, len(t))
+    record = {"t [s]": t, "x [m]": noisy if kind == "long" else np.round(noisy / 2e-3) * 2e-3}
+    fits = [
+        harness.fit(native("coulomb"), record, ["f", "k"], observe="x", sigma={"x": 2.0**power})
+        for power in (-14, -9, -4)
+    ]
+    assert all(fit.values == fits[0].values for fit in fits)
+    assert fits[0].values["f"] == pytest.approx(0.3, rel=0.01)
+
+
 def test_irregular_slips_are_described_one_by_one():
     """Of a real surface each slip starts at another force, which no fit of one static friction describes."""
     random, t = np.random.default_rng(0), np.linspace(0.0, 40.0, 801)

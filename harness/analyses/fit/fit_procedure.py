@@ -9,7 +9,7 @@ from ...errors import HarnessError, SceneError, option_text
 from ...records.extraction import Samples
 from ...simulation.whole_run import Simulator
 from .fit_problem import FitProblem, Selection
-from .measured_record import MAX_AVERAGING_ERROR, MeasuredRecord
+from .measured_record import MeasuredRecord
 from .profile_likelihood import profile_bound, search_bound
 from .search import DISTINCT, Minimum, search, select_distinct
 from .uncertainty import Uncertainty, estimate_uncertainty
@@ -110,18 +110,23 @@ def fit_records(
 
 
 def is_averaging_negligible(problem: FitProblem, raw_fit: RawFit) -> bool:
-    """Return whether a fit of means of neighbouring samples has nearly the values of a fit of all samples."""
+    """Return whether a fit of means of neighbouring samples has nearly the values of a fit of all samples.
+
+    The scatter of the record decides, and not a noise that the user states: it moves no values.
+    """
     z, uncertainty, errors = raw_fit.z, raw_fit.uncertainty, []
     for i, record in enumerate(problem.records):
         record_errors = record.averaging_errors(problem.values(z, i))
-        if record_errors is None or np.abs(record_errors).max() >= MAX_AVERAGING_ERROR:
+        if record_errors is None or not record.is_averaging_error_small(record_errors):
             return False
         errors.append(record_errors.ravel())
     if not any(map(np.any, errors)):
         return True  # nothing was averaged
     jacobian = problem.jacobian(z, uncertainty.residuals, problem.all, np.arange(len(z)), central=True)
     shift = np.linalg.lstsq(jacobian, np.concatenate(errors), rcond=None)[0]
-    return bool((np.abs(shift) <= MAX_AVERAGING_SHIFT * uncertainty.deviations).all())
+    residual_variance = uncertainty.squares / max(len(uncertainty.residuals) - len(z), 1)
+    deviations = uncertainty.deviations * (residual_variance / uncertainty.variance) ** 0.5
+    return bool((np.abs(shift) <= MAX_AVERAGING_SHIFT * deviations).all())
 
 
 def search_and_refine(

@@ -193,7 +193,11 @@ class MeasuredRecord:
     def can_be_averaged(self, values: Mapping[str, float]) -> bool:
         """Return whether the means of the outputs over neighbouring samples are the outputs at their mean times."""
         errors = self.averaging_errors(values)
-        return errors is not None and bool(np.abs(errors).max() < MAX_AVERAGING_ERROR)
+        return errors is not None and self.is_averaging_error_small(errors)
+
+    def is_averaging_error_small(self, errors: np.ndarray) -> bool:
+        """Return whether errors (n, columns) of the means, in units of the noise, are small beside the scatter."""
+        return bool((np.abs(errors) * self.noise <= MAX_AVERAGING_ERROR * self.scatter).all())
 
     def averaging_errors(self, values: Mapping[str, float]) -> np.ndarray | None:
         """Return by how much means of the outputs over neighbouring samples exceed the outputs at their mean times.

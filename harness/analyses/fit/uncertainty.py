@@ -100,7 +100,7 @@ def estimate_uncertainty(
     if correlation:
         inflation *= max(map(correlation_length, by_record))
         inflation = np.maximum(inflation, score_inflation(e, jacobian, inverse, axes, variance, white))
-    if any((record.step > record.noise / 2).any() for record in problem.records):
+    if any((record.step > record.scatter / 2).any() for record in problem.records):
         inflation = np.maximum(inflation, quantiser_variance(problem, z, jacobian, inverse, axes, eigenvalues) / white)
     shift = inverse @ (jacobian.T @ input_error)
     draws = INPUT_DRAWS if correlation and any(record.noisy_inputs for record in problem.records) else 0
