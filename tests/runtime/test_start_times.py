@@ -50,6 +50,7 @@ def test_events_are_the_same_from_any_start_time(worker, name, kind):
         assert all(abs(t - start - time) <= PLACES * place for (t, *_), (time, *_) in zip(events, first, strict=True))
 
 
+@pytest.mark.slow
 def test_every_period_of_a_long_run_has_the_same_events(worker):
     """The motor of the joint comes to rest in every period, however late in the run."""
     require_compiler()

@@ -135,6 +135,7 @@ def test_a_choice_between_columns_is_left_to_the_user(model, units, words):
         assert text in str(refused.value)
 
 
+@pytest.mark.slow
 def test_the_noise_of_an_input_is_named_as_the_cause_and_in_the_intervals():
     push = 5.0 * np.sin(2.7 * T) + 3.0 * np.sin(7.0 * T)
     truth = {"f": 0.7, "c": 0.4}
