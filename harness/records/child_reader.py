@@ -10,7 +10,7 @@ from typing import Any
 
 from ..errors import HarnessError, SceneError, first_line
 from ..process.temporary_directory import temporary_directory
-from ..process.worker import WorkerDiedError, WorkerTimeoutError, call_once
+from ..process.worker import WorkerCallError, WorkerDiedError, WorkerTimeoutError, call_once
 from . import size_limits, text_table
 
 MEMORY_PROBLEM = (
@@ -47,7 +47,7 @@ def read_in_child(data: bytes, name: str, file_format: str) -> dict[str, Any]:
             contents: dict[str, Any] = call_once(read_file, request, timeout=timeout, memory=size_limits.MAX_MEMORY)
         except WorkerTimeoutError:
             raise SceneError(f"{name} takes longer than {timeout:g} s to read: save its columns as .csv") from None
-        except WorkerDiedError:
+        except (WorkerDiedError, WorkerCallError):  # where its memory did not suffice for the imports of this module
             raise SceneError(f"{name} cannot be read: {MEMORY_PROBLEM}") from None
     if "library" in contents:
         raise ImportError(name=contents["library"])
