@@ -1,11 +1,11 @@
 """Peaks, decrements, rests, slips and steps of any sampled motion, such as the arrays of a solver."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..errors import import_optional
+from ..errors import check_names, import_optional
 from ..results.quantity import Quantity
 from .decay.decrement import find_extrema_from_velocity
 
@@ -49,8 +49,6 @@ class MotionMeasures:
 
     def __getitem__(self, name: str) -> float:
         """Return the value of a quantity by its name."""
-        from ..errors import check_names
-
         values = {quantity.name: quantity.value for quantity in self.quantities}
         check_names("quantity", [name], values)
         return values[name]
@@ -110,7 +108,7 @@ def measure_motion(t: np.ndarray, x: np.ndarray, v: np.ndarray, unit: str) -> Mo
             Quantity("chatter", reversals, "", "changes of sign of the velocity at rest"),
         ]
         quantities += slip_quantities(t, first, last)
-    return MotionMeasures(turning_t, turning_x, t[first], t[last], tuple(quantities))
+    return replace(measures, quantities=tuple(quantities))
 
 
 def find_rests(t: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -83,7 +83,7 @@ def sensitivity(
     inputs : mapping, DataFrame or Dataset, optional
         Input signals as in `simulate`.
     timeout : float, optional
-        Seconds in which an FMU that is not of this project must advance; 60 by default.
+        Seconds in which the run of an FMU that is not of this project must end; 60 by default.
     lenient : bool
         Whether to run an FMU that violates the FMI standard.
     progress : callable or False, optional

@@ -37,7 +37,7 @@ def split_names(context: click.Context, option: click.Parameter, text: str | Non
     type=POSITIVE,
     default=60.0,
     show_default=True,
-    help="Seconds in which an FMU that is not of this project must advance.",
+    help="Seconds in which the run of an FMU that is not of this project must end.",
 )
 @result_options
 @click.pass_context

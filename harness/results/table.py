@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class ResultColumn:
-    """ResultColumn of a table.
+    """Column of a table.
 
     Attributes
     ----------
