@@ -5,6 +5,7 @@ import contextlib
 import numpy as np
 import pytest
 from decays import OMEGA, Signal, T, decay_record, identify, remarks_text
+from scipy.integrate import solve_ivp
 from variants import slow_after
 
 from harness import HarnessError, identify_decay
@@ -51,6 +52,19 @@ def test_a_loss_in_phase_with_the_sensor_resolution_is_reported(r, repeated):
 def test_a_second_oscillation_is_reported():
     x = decay_record(0.02).x + 0.004 * np.sin(50 * T)
     assert "something else acts" in remarks_text(identify(Signal(T, x)))
+
+
+@pytest.mark.parametrize(("method", "rtol", "is_named"), [("RK23", 1e-3, True), ("DOP853", 1e-10, False)])
+def test_errors_of_a_solver_are_named_as_a_cause_of_losses(method, rtol, is_named):
+    """Of an oscillator with sign(v), as users write it."""
+    force = 0.4
+
+    def rates(t, y):
+        return y[1], -100 * y[0] - force * np.sign(y[1])
+
+    t = np.linspace(0, 2, 401)
+    motion = solve_ivp(rates, (0, 2), (0.1, 0.0), method, t, rtol=rtol, atol=rtol / 1000)
+    assert ("If a solver wrote the record" in remarks_text(identify(Signal(t, motion.y[0])))) == is_named
 
 
 @pytest.mark.parametrize(

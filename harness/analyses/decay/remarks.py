@@ -61,17 +61,24 @@ def make_remarks(
     correlated = "the noise is not independent from sample to sample"
     disturbed = f"something else acts on the oscillator too, or {correlated}"
     share = uncertainty.rms / problem.signal_rms
+    solver = ""
+    if problem.noise < thresholds.NOISELESS * full.p[AMPLITUDE]:
+        solver = (
+            " If a solver wrote the record, its errors change the losses like this: simulate with a smaller tolerance."
+        )
     if is_rough and share > thresholds.WARNED:
         e, _ = problem.residuals(full.p, full.terms)
         remarks.append(
             f"{residuals}, {100 * share:.1f} % of the motion, and largest near "
             f"t = {record.format_time(time_of_largest_residuals(problem, full.p, e))} s, while {noise_level}: "
-            f"{disturbed}. " + ("Do not rely on these values." if is_unreliable(problem, uncertainty) else WIDENED)
+            f"{disturbed}. "
+            + ("Do not rely on these values." if is_unreliable(problem, uncertainty) else WIDENED)
+            + solver
         )
     elif is_rough and uncertainty.is_correlated:
-        remarks.append(f"{residuals}, while {noise_level}: {disturbed}. {WIDENED}")
+        remarks.append(f"{residuals}, while {noise_level}: {disturbed}. {WIDENED}{solver}")
     elif is_rough:
-        remarks.append(f"{residuals}, while {noise_level}: check the time stamps.")
+        remarks.append(f"{residuals}, while {noise_level}: check the time stamps.{solver}")
     elif uncertainty.is_correlated:
         remarks.append(
             f"Neighbouring residuals are correlated ({uncertainty.neighbour_correlation:.2f}): {correlated}. "
