@@ -34,8 +34,8 @@ ROOT = Path(__file__).parents[2]
 EXAMPLES = ROOT / "tests" / "example_models"
 SOURCES = {
     "stribeck_sled": EXAMPLES / "fit" / "stribeck_sled.py",
-    "belt": EXAMPLES / "larger" / "belt.py",
-    "sleds": EXAMPLES / "larger" / "sleds.py",
+    "belt": EXAMPLES / "fit" / "belt.py",
+    "sleds": EXAMPLES / "fit" / "sleds.py",
 }
 
 

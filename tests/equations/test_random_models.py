@@ -26,7 +26,7 @@ LITERATURE = {
         v_driver=0.034,
         stop=16.0,
     ),
-    "blocks": System(
+    "stacked": System(
         (4.0, 2.0),
         (Spring((1.0, 0.0), 150.0), Spring((0.0, 1.0), 400.0, drive=1.0)),
         (
@@ -40,15 +40,15 @@ LITERATURE = {
         v_driver=0.2,
         stop=8.0,
     ),
-    "belt": System(
+    "stribeck": System(  # the viscous part of friction is a damper between block and belt
         (1.0,),
-        (Spring((1.0,), 100.0), Spring((1.0,), 0.0, c=0.2)),
-        (Contact((1.0,), 5.0, 8.0, 8.0, 1.0, v_s=0.1, belt=0.1),),
+        (Spring((1.0,), 1.0), Spring((1.0,), 0.0, c=0.05)),
+        (Contact((1.0,), 0.7, 1.0, 1.0, 1.0, v_s=0.1, belt=0.2),),
+        (0.01,),
         (0.0,),
+        (1.067,),
         (0.0,),
-        (0.0,),
-        (0.0,),
-        stop=10.0,
+        stop=50.0,
     ),
 }
 

@@ -41,7 +41,7 @@ NAMES = {
     ],
 }
 NATIVE = ("--native", "--platform", "linux64")
-INDICATORS = [f"events.{kind}_mode{n}" for kind in ("to_rest", "to_break_away") for n in (1, 2)]
+INDICATORS = [f"events.{kind}_mode_{n}" for kind in ("to_rest", "to_break_away") for n in (1, 2)]
 CHOSEN = '{}="stiffer {} times"', "{}={}.0"  # an item, and its case
 
 
@@ -97,10 +97,10 @@ def test_author_choices_named_like_an_unavailable_method_or_law_are_kept(tmp_pat
 
 def test_names_used_by_the_contact_solver_change_nothing(tmp_path):
     """Two blocks whose modes are named like entries of their matrix."""
-    (blocks,) = (path for path in LARGER_MODELS if path.stem == "blocks")
+    (blocks,) = (path for path in LARGER_MODELS if path.stem == "stacked")
     path, rates = tmp_path / "blocks.py", []
-    for names in ("mode1", "mode2"), ("row_F1_F2", "row_F2_F1"):
-        path.write_text(blocks.read_text().replace("mode1", names[0]).replace("mode2", names[1]))
+    for names in ("mode_1", "mode_2"), ("row_F_1_F_2", "row_F_2_F_1"):
+        path.write_text(blocks.read_text().replace("mode_1", names[0]).replace("mode_2", names[1]))
         model = find_model(path).model()
         assert model.prepare() == 0
         rates.append([model.rates(0.3, 0.1, 0.2, -0.1, 0.1, *modes) for modes in ((0, 0), (0, 1), (1, 0), (1, -1))])
@@ -110,11 +110,11 @@ def test_names_used_by_the_contact_solver_change_nothing(tmp_path):
 @pytest.mark.slow
 def test_event_indicators_of_a_native_fmu_do_not_depend_on_names(tmp_path, worker):
     """Two blocks, one of whose positions is named like a step size of the numerics."""
-    (blocks,) = (path for path in LARGER_MODELS if path.stem == "blocks")
+    (blocks,) = (path for path in LARGER_MODELS if path.stem == "stacked")
     results = []
     for name in "place", "h":
         path = tmp_path / f"blocks_{name}.py"
-        path.write_text(re.sub(r"\bx1\b", name, blocks.read_text()))
+        path.write_text(re.sub(r"\bx_1\b", name, blocks.read_text()))
         fmu = worker.instantiate(build_user_model(path, *NATIVE) / "native" / f"{path.stem}.fmu").begin(stop=2.0)
         results.append(fmu.run([0.01 * i for i in range(200)], [name, *INDICATORS]))
         fmu.free()

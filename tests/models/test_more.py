@@ -9,8 +9,6 @@ from models import DOP853
 from native_fmus import require_compiler
 from row_comparison import assert_identical
 
-from benchmarks.campaigns.independent_contacts import Contact, Spring, System
-from benchmarks.campaigns.independent_contacts import solve as solve_by_taylor_series
 from benchmarks.references import event_located
 from fmus.compiler.model_lookup import find_model, more_model_names
 from fmus.runtime.variable_declarations import variables
@@ -110,28 +108,6 @@ def test_the_belt_follows_each_law(worker, law):
     events = [(t, mode) for t, mode in follow_events(fmu, ["mode"], 20.0)]
     assert event_time_error(events, [(t, mode) for t, (mode,) in truth]) < 1e-10
     assert fmu.get("x", "v") == pytest.approx(end, abs=1e-10)
-    fmu.free()
-
-
-@pytest.mark.slow
-def test_two_sleds_have_the_events_of_a_taylor_series(worker):
-    """The system of benchmarks/campaigns/independent_contacts.py, solved by series of order 24: within 1e-10."""
-    sleds = System(
-        masses=(12.5, 8.0),
-        springs=(Spring((-1.0, 0.0), 742.5, drive=-1.0), Spring((1.0, -1.0), 1100.0)),
-        contacts=(
-            Contact((1.0, 0.0), 73.575, 73.575, 110.3625, 1.0),
-            Contact((0.0, 1.0), 40.0, 40.0, 66.0, 1.0),
-        ),
-        force_0=(0.0, 0.0), force_1=(0.0, 0.0), q_0=(0.0, 0.0), v_0=(0.0, 0.0), v_driver=0.034, stop=16.0,
-    )  # fmt: skip
-    truth = solve_by_taylor_series(sleds)
-    fmu = worker.instantiate(built("sleds")).begin({"solver.rtol": 1e-12, "solver.method": DOP853}, stop=16.0)
-    events = follow_events(fmu, ["mode_1", "mode_2"], 16.0)
-    assert [tuple(modes) for _, *modes in events] == [modes for _, modes in truth.events]
-    assert np.abs(np.array([t for t, *_ in events]) - [t for t, _ in truth.events]).max() < 1e-10
-    x_1, x_2, v_1, v_2 = truth.states(16.0)
-    assert fmu.get("x_1", "v_1", "x_2", "v_2") == pytest.approx([x_1, v_1, x_2, v_2], abs=1e-10)
     fmu.free()
 
 

@@ -133,7 +133,7 @@ def test_the_envelope_of_the_known_loss_passes_through_the_turning_points(draw, 
     assert upper == pytest.approx(turning_points, abs=0.02 * turning_points[0])
 
 
-CONTACTS = ROOT / "tests/example_models/larger"
+CONTACTS = ROOT / "fmus/more"
 
 
 def build_fmu(path):
@@ -145,53 +145,56 @@ def build_fmu(path):
 def blocks_run(tmp_path_factory):
     """The run of a model of two contacts, by itself, with its result folder."""
     folder = tmp_path_factory.mktemp("blocks")
-    fmu = build_fmu(CONTACTS / "blocks.py")
+    fmu = build_fmu(CONTACTS / "stacked.py")
     done = commands.harness(folder, "run", str(fmu), figures=True)
     assert done.returncode == 0, done.stderr
-    return done.stdout, folder / "results/blocks"
+    return done.stdout, folder / "results/stacked"
 
 
 def test_several_contacts_are_named_in_the_events_and_in_the_figure(blocks_run):
     """The modes in the event list are those of the recorded modes; each contact has a row in each column."""
     printed, folder = blocks_run
     events = np.genfromtxt(folder / "events.csv", delimiter=",", names=True, deletechars="")
-    assert events.dtype.names == ("t_[s]", "F1", "F2")
+    assert events.dtype.names == ("t_[s]", "F_1", "F_2")
     columns = np.genfromtxt(folder / "trajectory.csv", delimiter=",", names=True, deletechars="")
-    for contact, mode in (("F1", "mode1"), ("F2", "mode2")):
+    for contact, mode in (("F_1", "mode_1"), ("F_2", "mode_2")):
         after = np.searchsorted(columns["t_[s]"], events["t_[s]"], side="right") - 1
         assert (columns[mode][after] == events[contact]).mean() > 0.9  # an event may lie within rounding of its row
         assert f"{contact}: {np.count_nonzero(np.diff(events[contact]))} change" in printed
     figure = (folder / "figure.svg").read_text(encoding="utf-8")
-    for text in ("friction on the ground", "friction between the blocks"):
+    for text in (
+        "friction force of the ground on the lower block",
+        "friction force of the lower block on the upper one",
+    ):
         assert f">{text}<" in figure
     assert figure.count(">sticking of each contact<") == 2
 
 
 def test_each_contact_force_is_shaded_where_its_own_contact_sticks(blocks_run):
     run = harness.load_result(blocks_run[1])
-    for contact, speed in (("F1", run["v1"]), ("F2", run["v2"] - run["v1"])):
+    for contact, speed in (("F_1", run["v_1"]), ("F_2", run["v_2"] - run["v_1"])):
         for begin, end in run.sticking[contact]:
             inside = (run.time > begin + 1e-6) & (run.time < end - 1e-6)
             assert np.abs(speed[inside]).max(initial=0.0) < 1e-12
-    with pytest.raises(harness.HarnessError, match=r"2 contacts \(F1, F2\)"):
+    with pytest.raises(harness.HarnessError, match=r"2 contacts \(F_1, F_2\)"):
         _ = run.events.mode
 
 
 @pytest.mark.slow
 def test_the_order_of_declaration_does_not_exchange_the_contacts(tmp_path):
     """Modes declared in another order than the contacts belong to the contacts that name them."""
-    source = (CONTACTS / "sleds.py").read_text(encoding="utf-8").replace("mode1, mode2 =", "mode2, mode1 =")
+    source = (CONTACTS / "sleds.py").read_text(encoding="utf-8").replace("mode_1, mode_2 =", "mode_2, mode_1 =")
     (tmp_path / "exchanged.py").write_text(source, encoding="utf-8")
     plain, other = (harness.simulate(build_fmu(path)) for path in (CONTACTS / "sleds.py", tmp_path / "exchanged.py"))
     assert {contact: modes.tolist() for contact, modes in other.events.modes.items()} == {
-        contact: plain.events.modes[contact].tolist() for contact in ("F2", "F1")
+        contact: plain.events.modes[contact].tolist() for contact in ("F_2", "F_1")
     }
 
 
 @pytest.mark.slow
 def test_input_signals_are_plotted_with_the_outputs():
     run = harness.simulate(
-        build_fmu(CONTACTS / "blocks.py"), inputs={"time": [0.0, 4.0, 8.0], "F_ext": [0.0, 5.0, 0.0]}
+        build_fmu(CONTACTS / "stacked.py"), inputs={"time": [0.0, 4.0, 8.0], "F_ext": [0.0, 5.0, 0.0]}
     )
     labels = [axes.get_ylabel() for axes in run.plot()]
     assert labels[-2:] == ["F_ext [N]", "sticking"]

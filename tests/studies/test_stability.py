@@ -268,7 +268,7 @@ def test_a_user_model_passes_the_standard_scenes(tmp_path, name):
     and a belt adds energy."""
     (path,) = (path for path in (*EXAMPLE_MODELS, *LARGER_MODELS) if path.stem == name)
     file = build_user_model(path) / f"{name}.fmu"
-    titles = ("as it comes", "rtol = 1e-09", "NaN", "T_d = 3", "J = 0.002", "m1 = 125")
+    titles = ("as it comes", "rtol = 1e-09", "NaN", "T_d = 3", "J = 0.002", "m_1 = 125")
     groups = [[case for case in group if case.title.startswith(titles)] for group in grouped_cases(models=[str(file)])]
     rows = measure_stability([group for group in groups if group], ignore_progress).outcomes
     assert {row.case.name for row in rows} == {name}

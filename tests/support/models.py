@@ -19,7 +19,10 @@ STICKSLIP_IN_CI = [  # the other models run in campaigns
     pytest.param(name, marks=() if name == "stickslip" else pytest.mark.campaign) for name in MODELS
 ]
 EXAMPLE_MODELS = sorted((ROOT / "tests" / "example_models").glob("*.py"))  # as users write them, in files of their own
-LARGER_MODELS = sorted((ROOT / "tests" / "example_models" / "larger").glob("*.py"))  # with more states or more contacts
+LARGER_MODELS = [  # with more states, more contacts, or limits that vary
+    *(ROOT / "fmus" / "more" / f"{name}.py" for name in ("belt", "clutch", "lugre", "sleds", "stacked")),
+    *sorted((ROOT / "tests" / "example_models" / "larger").glob("*.py")),
+]
 EXACT, ODE23, ODE45, DOP853, RODAS, RADAU9 = 1, 2, 3, 4, 5, 6
 HYBRID, SIGN, THRESHOLD = 1, 2, 3
 
@@ -128,14 +131,3 @@ def push(name):
     if entry is None:
         pytest.skip(f"{name} has no input")
     return entry, {"pendulum": 0.02}.get(name, 200.0)
-
-
-def write_growing_friction_model(folder):
-    """Write a variant of the two sleds whose first sliding friction grows with its displacement."""
-    (sleds,) = (path for path in LARGER_MODELS if path.stem == "sleds")
-    text = sleds.read_text().replace("import Contact", "import fabs, Contact")
-    text = text.replace("    x1 =", '    wear = Parameter(1.0, "N/m", "how friction grows")\n    x1 =')
-    (folder / "growing.py").write_text(
-        text.replace("slide=slide1", "slide=slide1 + wear * fabs(x1)").replace("class Sleds", "class Growing")
-    )
-    return folder / "growing.py"

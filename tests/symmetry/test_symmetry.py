@@ -54,7 +54,7 @@ def check_all_changes(label, **options):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("label", ["smd", "blocks", "servo"])
+@pytest.mark.parametrize("label", ["smd", "stacked", "servo"])
 def test_no_motion_of_a_further_model_depends_on_them(label):
     check_all_changes(label, methods=("ode45",), **FEW)
 

@@ -16,10 +16,10 @@ def test_moving_bodies_of_any_model_are_read_from_its_declaration():
     kinds = {name: [body["kind"] for body in bodies_of_model] for name, bodies_of_model in bodies_by_model.items()}
     assert kinds["viscous_pendulum"] == ["pendulum"]
     assert kinds["rotor_brake"] == ["rotor"]
-    assert kinds["blocks"] == kinds["sleds"] == ["block", "block"]
+    assert kinds["stacked"] == kinds["sleds"] == ["block", "block"]
     assert kinds["clutch"] == ["none"]  # it has no position
     assert {bodies_by_model[name][0]["friction"] for name in ("bumper", "lugre")} == {"F_drag", "F_friction"}  # smooth
-    assert bodies_by_model["sleds"][0]["linked"] == ["x2"]
+    assert bodies_by_model["sleds"][0]["linked"] == ["x_2"]
     assert bodies_by_model["viscous_pendulum"][0]["dampers"] == ["d"]
 
 
@@ -59,7 +59,7 @@ def check_servo(page):
 
 
 def test_user_models_run_on_a_page_of_their_own(quiet, tmp_path):
-    files = [ROOT / "tests" / "example_models" / name for name in ("rotor_brake.py", "larger/blocks.py")]
+    files = [ROOT / name for name in ("tests/example_models/rotor_brake.py", "fmus/more/stacked.py")]
     curve = tmp_path / "curve.py"
     curve.write_text(CURVE)
     page = web_page.Page(quiet, web_page.build_page("users", *map(str, (*files, curve)), "--method", "ode45"))
@@ -74,10 +74,10 @@ def test_user_models_run_on_a_page_of_their_own(quiet, tmp_path):
         assert page.run("document.querySelectorAll('#mechanism .body').length") == count
         assert page.run("document.getElementById('body').parentElement.hidden") == (count == 1)
     check_table_values(page)
-    page.open(".model=blocks")
+    page.open(".model=stacked")
     page.choose("body", 1)  # the plots of the motion come first here too
     shown = "[...document.querySelectorAll('figure')].filter(each => !each.hidden).map(each => each.id).slice(0, 3)"
-    second = page.run("app.library.models.get('blocks').bodies[1]")
+    second = page.run("app.library.models.get('stacked').bodies[1]")
     assert page.when_done(shown) == [f"panel-{second[name]}" for name in ("position", "speed", "acceleration")]
 
 
@@ -91,18 +91,18 @@ def check_table_values(page):
 
 def test_several_contacts_are_shaded_and_named_each(quiet):
     """Bands, force panels and events of the lower block, on which two contacts act; its input is plotted if it acts."""
-    files = [ROOT / "tests" / "example_models" / name for name in ("rotor_brake.py", "larger/blocks.py")]
+    files = [ROOT / name for name in ("tests/example_models/rotor_brake.py", "fmus/more/stacked.py")]
     page = web_page.Page(quiet, web_page.build_page("users", *map(str, files), "--method", "ode45"))
-    page.open(".model=blocks&F_ext=3")
+    page.open(".model=stacked&F_ext=3")
     content = "app.plots.get({!r}).panel.content"
-    for key, rows in ((".sticking", ["F1", "F2"]), ("x1", ["F1", "F2"]), ("F1", ["F1"]), ("F2", ["F2"])):
+    for key, rows in ((".sticking", ["F_1", "F_2"]), ("x_1", ["F_1", "F_2"]), ("F_1", ["F_1"]), ("F_2", ["F_2"])):
         assert page.run(f"{content.format(key)}.rows") == rows
-    sticks = page.run(f"{content.format('F2')}.bands")
-    speeds = "(({ time, columns: { v1, v2 } }) => time.map((t, i) => [t, v2[i] - v1[i]]))(app.runs.main)"
+    sticks = page.run(f"{content.format('F_2')}.bands")
+    speeds = "(({ time, columns: { v_1, v_2 } }) => time.map((t, i) => [t, v_2[i] - v_1[i]]))(app.runs.main)"
     for t, slip in page.run(speeds):
         if any(band["from"] < t < band["to"] for band in sticks):
             assert abs(slip) < 1e-12
     assert set(page.run(f"{content.format('F_ext')}.curves.at(-1).y")) == {3.0}
     named = [cells[-1] for cells in page.table("Events").values()]
-    assert named[:2] == ["F1 slides forward", "F2 slides forward"]
-    assert {"F1 sticks", "F2 sticks"} <= {*named}
+    assert named[:2] == ["F_1 slides forward", "F_2 slides forward"]
+    assert {"F_1 sticks", "F_2 sticks"} <= {*named}
