@@ -35,7 +35,7 @@ def built(name, kind="python"):
         platform = ["--platform", "linux64"]
     if kind == "fmi3":
         return build_once(f"more-fmi3-{name}", name, *KINDS[kind], *platform) / f"{name}.fmu"
-    return build_once(f"more-{kind}", "--more", *KINDS[kind], *platform, timeout=600) / f"{name}.fmu"
+    return build_once(f"more-{kind}", "--more", *KINDS[kind], *platform) / f"{name}.fmu"
 
 
 def states(name):

@@ -13,17 +13,26 @@ from contextlib import suppress
 from math import inf, isnan, nan
 
 import pytest
+from build_cache import build_once
 from models import HYBRID, MODELS, declared, label, model_class, pairwise_cases, parameters, tunable
-from native_fmus import build_native_fmus
+from native_fmus import require_compiler
 from worker_client import FmiError, Worker
 
 EVENTS = 30  # per life cycle, of which there is one for each model, law and method
-CASES = [(name, values, 0.0) for name in MODELS for values in pairwise_cases(name)]
+CASES = [
+    pytest.param((name, values, 0.0), marks=() if name == "stickslip" else pytest.mark.slow)
+    for name in MODELS
+    for values in pairwise_cases(name)
+]
+EVERY_CASE = pytest.mark.parametrize("case", CASES, ids=label)
 
 
-@pytest.fixture(scope="module")
-def native_folder():
-    return build_native_fmus()
+@pytest.fixture
+def native_folder(case):
+    """The native FMU of a case, built as users do; those of other tests are not optimised."""
+    require_compiler()
+    name, *_ = case
+    return build_once(f"optimised-{name}", name, "--native", "--platform", "linux64", optimised=True)
 
 
 @pytest.fixture(scope="module")
@@ -230,13 +239,13 @@ def assert_agree(folders, pair, name, events):
         assert python == native, event
 
 
-@pytest.mark.parametrize("case", CASES, ids=label)
+@EVERY_CASE
 def test_both_backends_respond_identically_to_every_call(fmus, native_folder, pair, case):
     name, choices, _ = case
     assert_agree((fmus, native_folder), pair, name, random_scenario(random.Random(label(case)), name, choices))
 
 
-@pytest.mark.parametrize("case", CASES, ids=label)
+@EVERY_CASE
 def test_both_backends_fail_at_the_same_point_with_the_same_message(fmus, native_folder, pair, case):
     name, choices, _ = case
     assert_agree((fmus, native_folder), pair, name, random_breakdown(random.Random(label(case)), name, choices))

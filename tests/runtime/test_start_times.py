@@ -25,7 +25,7 @@ def kind(request):
 
 
 def built(name, kind):
-    return build_once(f"more-{kind}", "--more", *KINDS[kind], timeout=600) / f"{name}.fmu"
+    return build_once(f"more-{kind}", "--more", *KINDS[kind]) / f"{name}.fmu"
 
 
 def follow_events(fmu, start, stop, modes):

@@ -1,5 +1,6 @@
 """Lists of all models, their variables, and combinations of laws and methods that tests iterate over."""
 
+from copy import copy
 from functools import cache
 from itertools import combinations as choose
 from itertools import product
@@ -7,7 +8,7 @@ from itertools import product
 import pytest
 from build_cache import ROOT
 
-from fmus.compiler.lowering import lowered_model, sibling_module
+from fmus.compiler.lowering import lowered_model, select_features, sibling_module
 from fmus.compiler.model_lookup import find_model
 from fmus.packaging.fmi_variables import declared_variables
 
@@ -39,8 +40,16 @@ def runtime(name, part):
 
 @cache
 def declared(name):
-    """Return name and declaration of every variable of a model, in the order of the XML."""
-    return dict(declared_variables(lowered_model(name)))
+    """Return name and declaration of every variable of a model, in the order of the XML.
+
+    They are those of the model before it is lowered, which takes a second, with the methods that its FMU has.
+    """
+    source = find_model(name)
+    variables = dict(declared_variables(source.model))
+    method = variables["solver.method"] = copy(variables["solver.method"])
+    offered = select_features(source).methods
+    method.items = tuple(item for item in method.items if item[0] in offered)
+    return variables
 
 
 def outputs(name):
