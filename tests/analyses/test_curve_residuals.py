@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from scipy.signal import lfilter
+from variants import slow_after
 
 import harness
 from benchmarks.campaigns.hidden_defects import preslide
@@ -35,7 +36,7 @@ def assert_covers(curve, margin=1.0, **truth):
     ("share", "changes", "remark"),
     [
         ({"F_c": 0.2}, {"F_c": 6.6}, "F_c drifts by +1.2 N over the record"),
-        ({"F_v": -0.3}, {"F_v": 17.0}, "F_v drifts"),
+        pytest.param({"F_v": -0.3}, {"F_v": 17.0}, "F_v drifts", marks=pytest.mark.slow),
     ],
     ids=["Coulomb", "viscous"],
 )
@@ -48,7 +49,7 @@ def test_friction_that_drifts_is_no_bias_and_no_asymmetry(share, changes, remark
     assert any(remark in text for text in curve.remarks)
 
 
-@pytest.mark.parametrize("time_constant", [0.02, 0.08])
+@pytest.mark.parametrize("time_constant", slow_after(1, [0.08, 0.02]))
 def test_a_lag_of_the_force_is_estimated(time_constant):
     keep = np.exp(-0.005 / time_constant)
     curve = identify(T, V, lfilter([1 - keep], [1, -keep], stribeck(V)))
@@ -57,6 +58,7 @@ def test_a_lag_of_the_force_is_estimated(time_constant):
     assert any("The force lags the velocity" in text for text in curve.remarks)
 
 
+@pytest.mark.slow
 def test_presliding_suggests_the_option_that_leaves_it_out():
     force = preslide(np.cumsum(V) * 0.005, V, stribeck(V, F_s=10.48), 5e-4)
     curve = identify(T, V, force)

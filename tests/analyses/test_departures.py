@@ -67,6 +67,7 @@ def test_hum_widens_the_intervals():
     assert all(fit[name].low <= value <= fit[name].high for name, value in {"zeta": 0.005, "r": 2e-4}.items())
 
 
+@pytest.mark.slow
 def test_a_sustained_oscillation_whose_amplitude_wanders_has_no_interval():
     t = np.arange(0, 40.0, 0.02)
     for seed in range(4):

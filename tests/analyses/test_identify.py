@@ -8,9 +8,12 @@ from variants import slow_after
 
 @pytest.mark.parametrize(  # every law, of a mass and of a pendulum in turn, with the quantities in turn
     ("law", "sine", "order"),
-    [(law, i % 2 == 0, i % 3) for i, law in enumerate(LAWS)]
-    + [(LAWS[0], False, order) for order in (0, 1, 2)]
-    + [(LAWS[-1], len(LAWS) % 2 == 0, 0)],
+    slow_after(
+        4,
+        [(law, i % 2 == 0, i % 3) for i, law in enumerate(LAWS)]
+        + [(LAWS[0], False, order) for order in (0, 1, 2)]
+        + [(LAWS[-1], len(LAWS) % 2 == 0, 0)],
+    ),
     ids=lambda item: "+".join(item) if isinstance(item, tuple) else None,
 )
 def test_clean_signals_are_identified_to_nine_digits(law, sine, order):

@@ -40,6 +40,7 @@ def test_the_losses_of_halves_and_thirds_of_a_measured_record_agree(name):
                 assert other[loss].low <= one[loss].high, loss
 
 
+@pytest.mark.slow
 def test_a_measured_pendulum_on_ball_bearings_has_dry_friction():
     """Its swings fall by 4 r in each half cycle under friction alone, and by more with other losses."""
     whole, _ = fits("pendulum_multiarm.csv")

@@ -6,6 +6,7 @@ import re
 import commands
 import numpy as np
 import pytest
+from variants import slow_after
 
 import harness
 from fmus.compiler.equations.expressions import FUNCTIONS, Expression, ModelError
@@ -54,7 +55,7 @@ def test_an_fmu_in_another_folder_is_built_as_the_message_says(tmp_path):
     assert commands.harness(tmp_path, "run", "there/smd.fmu").returncode == 0
 
 
-@pytest.mark.parametrize("native", [(), ("--native",)])
+@pytest.mark.parametrize("native", [(), pytest.param(("--native",), marks=pytest.mark.slow)])
 def test_an_unknown_platform_lists_those_that_exist(native, tmp_path):
     message = commands.build("smd", "--platform", "vax", *native, "--out", tmp_path).stderr
     listed = re.search(r"choose from (\w+)", message)[1]
@@ -74,7 +75,9 @@ def test_the_product_in_place_of_a_power_has_its_value(exponent):
         assert value == pytest.approx(x**exponent, rel=1e-13)
 
 
-@pytest.mark.parametrize(("quantity", "unit"), [("position", "V"), ("velocity", "V"), ("acceleration", "V")])
+@pytest.mark.parametrize(
+    ("quantity", "unit"), slow_after(1, [("position", "V"), ("velocity", "V"), ("acceleration", "V")])
+)
 def test_a_record_in_volts_is_converted_as_the_remark_says(quantity, unit, tmp_path):
     t = np.linspace(0.0, 10.0, 2001)
     x = np.exp(-0.1 * t) * np.sin(6 * t)

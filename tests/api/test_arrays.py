@@ -31,7 +31,7 @@ def each_function(convert):
     return run["x"].tolist(), difference.to_csv(), frame.to_csv()
 
 
-@pytest.mark.parametrize("kind", slow_after(2, KINDS))
+@pytest.mark.parametrize("kind", slow_after(1, KINDS))
 def test_numbers_of_any_type_are_taken_as_they_are(user_folder, monkeypatch, kind):
     monkeypatch.chdir(user_folder)
     convert = KINDS[kind]

@@ -45,7 +45,7 @@ def numbers(result):
     return {estimate.name: (estimate.low, estimate.value, estimate.high) for estimate in result.estimates}
 
 
-@EVERY_KIND
+@pytest.mark.parametrize("kind", slow_after(1, KINDS))
 def test_a_decay_is_that_of_its_file(files, kind):
     path = files / "decay.csv"
     assert numbers(identify_decay(KINDS[kind](path))) == numbers(identify_decay(path))
@@ -74,6 +74,7 @@ def test_a_comparison_is_that_of_its_file(files, kind):
     assert result.to_pandas()["largest"].tolist() == [0.0]
 
 
+@pytest.mark.slow
 def test_options_of_a_record_hold_in_every_function(files, tmp_path):
     """Unit, interval and column are those given to `read_record`, unless the call replaces them."""
     path = tmp_path / "bare.csv"

@@ -18,7 +18,7 @@ harness.simulate("coulomb", stop=2.0{options})
 @pytest.mark.parametrize(
     ("terminal", "delay", "options", "is_shown"),
     slow_after(
-        2,
+        1,
         [
             (True, 0.0, "", True),
             (True, 1e3, "", False),

@@ -41,7 +41,7 @@ def lean(tmp_path_factory):
     return build
 
 
-@pytest.mark.parametrize("case", slow_after(3, [(case,) for case in FEW_CASES]), ids=label)
+@pytest.mark.parametrize("case", slow_after(1, [(case,) for case in FEW_CASES]), ids=label)
 def test_a_reduced_fmu_carries_one_method_and_runs_alike(lean, launch, worker, case):
     name, values, stop = case
     path = lean(case)

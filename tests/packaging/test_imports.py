@@ -21,6 +21,7 @@ def test_an_import_loads_no_other_modules(statement):
     assert (done.stdout.split(), done.stderr) == (LOADED[statement].split(), "")
 
 
+@pytest.mark.slow
 def test_the_build_command_runs_without_the_harness(tmp_path):
     """The import contracts cover packages only, and build_fmus.py is a file."""
     script = "import sys; sys.modules['harness'] = None; from build_fmus import main; main()"

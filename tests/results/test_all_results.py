@@ -17,6 +17,7 @@ import pytest
 from decays import decay_record
 from matplotlib.figure import Figure
 from native_fmus import build_native_fmus
+from variants import slow_after
 
 import harness
 from harness.references.peer_solvers import FMU
@@ -169,7 +170,7 @@ def test_a_result_is_plotted_whole_or_in_given_axes(study):
     assert matplotlib.rcParams["font.size"] != 9  # the style of the figure is not that of the user
 
 
-@every_study
+@pytest.mark.parametrize("study", slow_after(3, MAKERS))  # which draws its figure twice
 def test_a_saved_result_loads_as_the_same_class_with_the_same_files(study):
     """Among them its figure."""
     result, loaded = result_of(study), harness.load_result(saved(study))
