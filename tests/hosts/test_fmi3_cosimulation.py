@@ -5,7 +5,7 @@ import fmi3_fixtures
 import numpy as np
 import pytest
 import worker_client
-from models import FEW_CASES, MODELS, counts, declared, label, model_class, outputs
+from models import MODELS, counts, declared, each_case, model_class, outputs
 from row_comparison import assert_identical
 
 from harness.references.certified_reference import POINTS, load_reference, relative_errors
@@ -63,7 +63,7 @@ def process():
     assert worker.close() == 0
 
 
-@pytest.mark.parametrize("case", FEW_CASES, ids=label)
+@each_case
 def test_co_simulation_agrees_with_fmi2_bit_for_bit(process, fmus, case):
     """On the same grid, with a change of the input during the run and without a stop time."""
     name, values, stop = case

@@ -7,7 +7,7 @@ import itertools
 from math import inf, isfinite, isnan, nan
 
 import pytest
-from models import FEW_CASES, MODELS, ODE23, counts, declared, label, outputs, parameters, push
+from models import MODELS, ODE23, counts, declared, each_case, outputs, parameters, push
 from row_comparison import assert_identical
 from worker_client import FmiError
 
@@ -34,7 +34,7 @@ def assert_failed(fmu, name, t, h, *words):
     assert all(isnan(value) for value in fmu.get(*REALS[name], "solver.t_next"))
 
 
-@pytest.mark.parametrize("case", FEW_CASES, ids=label)
+@each_case
 def test_a_value_that_becomes_invalid_during_a_run_is_refused_and_the_run_continues(launch, case):
     name, values, stop = case
     times, names = [stop * i / 20 for i in range(21)], outputs(name) + counts(name)

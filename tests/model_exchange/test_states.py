@@ -3,7 +3,7 @@ reset."""
 
 import pytest
 from model_exchange_client import DRIVEN, DRIVER, DRY, K, handle_event_at, single_error
-from models import FEW_CASES, MODELS, counts, declared, label, model_class, outputs, push
+from models import MODELS, counts, declared, each_case, model_class, outputs, push
 from row_comparison import assert_identical
 from worker_client import FmiError
 
@@ -43,7 +43,7 @@ def test_start_values_become_the_states(launch, name):
         assert fmu.get("mode") == -1
 
 
-@pytest.mark.parametrize("case", FEW_CASES, ids=label)
+@each_case
 def test_model_exchange_starts_like_co_simulation(launch, worker, fmus, case):
     name, values, _ = case
     solver = worker.instantiate(fmus / f"{name}.fmu").begin(values)

@@ -16,11 +16,11 @@ from models import (
     BODIES,
     CASES,
     EXACT,
-    FEW_CASES,
     MODELS,
     ODE23,
     combinations,
     declared,
+    each_case,
     label,
     model_class,
     outputs,
@@ -363,7 +363,7 @@ def infinite(values):
 
 
 @pytest.mark.parametrize("stop", [None, 7.0])
-@pytest.mark.parametrize("case", FEW_CASES, ids=label)
+@each_case
 def test_a_healthy_run_has_only_finite_values(launch, case, stop):
     """Importers drop other rows. Without a limit, the reported step is that of a default run, or up to the stop
     time."""

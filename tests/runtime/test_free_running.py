@@ -14,6 +14,7 @@ from models import (
     THRESHOLD,
     counts,
     declared,
+    each_case,
     label,
     model_class,
     outputs,
@@ -79,7 +80,7 @@ def test_any_two_communication_grids_agree(launch, following, case, pushed):
         assert_close(launch(name, values, stop=stop).run([0.0, stop], names)[-1:], expected[-1:], names, 1e-12)
 
 
-@pytest.mark.parametrize("case", FEW_CASES, ids=label)
+@each_case
 def test_reading_changes_nothing_at_any_time(worker, fmus, case):
     name, values, stop = case
     names = outputs(name) + counts(name)
@@ -99,7 +100,7 @@ def test_reading_changes_nothing_at_any_time(worker, fmus, case):
     curious.free()
 
 
-@pytest.mark.parametrize("case", FEW_CASES, ids=label)
+@each_case
 def test_a_change_at_the_end_of_an_internal_step_discards_the_lookahead(launch, following, case):
     name, values, stop = case
     names = outputs(name) + counts(name)
@@ -116,7 +117,7 @@ def test_a_change_at_the_end_of_an_internal_step_discards_the_lookahead(launch, 
     assert_identical(runs[1], runs[0], names)
 
 
-@pytest.mark.parametrize("case", FEW_CASES, ids=label)
+@each_case
 def test_the_effective_step_size_is_finite_and_unaffected_by_lookahead_and_setting(launch, case):
     name, values, stop = case
     force, size = push(name)
@@ -131,7 +132,7 @@ def test_the_effective_step_size_is_finite_and_unaffected_by_lookahead_and_setti
         assert step_sizes == [step_size] * 3
 
 
-@pytest.mark.parametrize("case", FEW_CASES, ids=label)
+@each_case
 def test_a_step_too_short_to_change_the_time_changes_nothing(launch, case):
     """At the ends of internal steps, which the closed form reaches with a compensation of rounding errors."""
     name, values, stop = case
@@ -146,7 +147,7 @@ def test_a_step_too_short_to_change_the_time_changes_nothing(launch, case):
         assert_identical([fmu.get(*names)], [before], names)
 
 
-@pytest.mark.parametrize("case", FEW_CASES, ids=label)
+@each_case
 def test_setting_a_value_to_itself_changes_nothing(launch, case):
     name, values, stop = case
     names = outputs(name) + counts(name)
@@ -157,7 +158,7 @@ def test_setting_a_value_to_itself_changes_nothing(launch, case):
     assert_identical(fmu.run_with_changes(times, names, dict.fromkeys(times[1:-1], same)), expected, names)
 
 
-@pytest.mark.parametrize("case", FEW_CASES, ids=label)
+@each_case
 def test_following_t_next_shows_every_internal_step(following, case):
     times, rows = following(case)
     assert times[-1] == case[-1]
@@ -204,7 +205,7 @@ def test_a_changed_driver_speed_causes_no_jump(launch, case):
     assert before[names.index("x_driver")] == pytest.approx(0.034 * 4.6, rel=1e-12)
 
 
-@pytest.mark.parametrize("case", FEW_CASES, ids=label)
+@each_case
 def test_a_run_without_stop_time_continues(launch, case):
     name, values, stop = case
     names = outputs(name)[:2]
@@ -230,7 +231,7 @@ def test_the_last_internal_step_ends_at_the_stop_time_without_another_one():
         assert step.t1 - step.t0 > 1e-3
 
 
-@pytest.mark.parametrize("case", FEW_CASES, ids=label)
+@each_case
 def test_outputs_satisfy_force_and_energy_balance(launch, case):
     """Forces give the acceleration, and the energy is that of the state, at every point, including the start."""
     name, values, stop = case

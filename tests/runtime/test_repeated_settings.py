@@ -1,13 +1,12 @@
 """Successive settings at one time act like one setting, even if values are read in between."""
 
-import pytest
-from models import FEW_CASES, counts, label, outputs, push
+from models import counts, each_case, outputs, push
 from row_comparison import assert_identical
 
 WHERE = (0.0, 0.13, 0.5, 0.77)  # fraction of the run
 
 
-@pytest.mark.parametrize("case", FEW_CASES, ids=label)
+@each_case
 def test_two_settings_at_one_point_act_as_one(launch, case):
     """The first setting starts the body, or reverses it; the second undoes that. All begin at the state saved there."""
     name, values, stop = case

@@ -9,12 +9,12 @@ import pytest
 from models import (
     CASES,
     EXACT,
-    FEW_CASES,
     LARGER_MODELS,
     MODELS,
     ROOT,
     SIGN,
     declared,
+    each_case,
     label,
     model_class,
     outputs,
@@ -141,7 +141,7 @@ def number_paths(owner, path, seen):
     return numbers
 
 
-@pytest.mark.parametrize("case", FEW_CASES, ids=label)
+@each_case
 def test_attributes_are_created_in_init_and_keep_their_type(case):
     """So that a flat copy of the numbers is the complete state."""
     name, values, stop = case

@@ -4,7 +4,7 @@ import random
 from itertools import cycle
 
 import pytest
-from models import FEW_CASES, counts, declared, label, outputs, push
+from models import counts, declared, each_case, label, outputs, push
 from row_comparison import assert_identical
 from worker_client import FmiError
 
@@ -18,7 +18,7 @@ def wander(fmu, name, t, stop):
     fmu.get("solver.t_next")
 
 
-@pytest.mark.parametrize("case", FEW_CASES, ids=label)
+@each_case
 def test_a_restored_state_continues_bit_for_bit(launch, worker, fmus, case):
     """At random points and at one of every mode; after a look ahead or not; in this instance, another, and a fresh
     one."""
@@ -52,7 +52,7 @@ def test_a_restored_state_continues_bit_for_bit(launch, worker, fmus, case):
     raw.free()
 
 
-@pytest.mark.parametrize("case", FEW_CASES, ids=label)
+@each_case
 def test_a_state_includes_parameters_not_yet_effective(launch, case):
     name, values, stop = case
     everything, times = list(declared(name)), [0.0, 0.1 * stop, 0.2 * stop]
@@ -68,7 +68,7 @@ def test_a_state_includes_parameters_not_yet_effective(launch, case):
     assert_identical(fmu.run(times[1:], everything), expected, everything)
 
 
-@pytest.mark.parametrize("case", FEW_CASES, ids=label)
+@each_case
 def test_a_restored_state_recovers_from_a_failure_and_restores_a_pending_one(launch, case):
     """The load is so large that the motion overflows."""
     name, values, stop = case

@@ -7,6 +7,7 @@ from itertools import product
 
 import pytest
 from build_cache import ROOT
+from variants import slow_after
 
 from fmus.compiler.lowering import lowered_model, select_features, sibling_module
 from fmus.compiler.model_lookup import find_model
@@ -140,3 +141,7 @@ def push(name):
     if entry is None:
         pytest.skip(f"{name} has no input")
     return entry, {"pendulum": 0.02}.get(name, 200.0)
+
+
+# by default five cases, which have every model but smd and every method but radau9; all of them in CI
+each_case = pytest.mark.parametrize("case", slow_after(5, [(case,) for case in FEW_CASES]), ids=label)
