@@ -117,6 +117,7 @@ def test_a_long_text_takes_the_memory_of_one_text():
     tracemalloc.stop()
 
 
+@pytest.mark.slow
 def test_tables_of_xarray_are_records(user_folder, monkeypatch):
     pytest.importorskip("xarray")
     monkeypatch.chdir(user_folder)

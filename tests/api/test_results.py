@@ -108,6 +108,7 @@ def test_a_run_starts_at_a_given_time():
     assert (run.time[0], run.time[-1]) == (1.0, 2.0)
 
 
+@pytest.mark.slow
 def test_a_decay_is_identified_from_any_source(tmp_path):
     pandas = pytest.importorskip("pandas")
     run = harness.simulate("coulomb", stop=2.0, interval=0.02, outputs=["x"])

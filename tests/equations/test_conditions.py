@@ -183,7 +183,7 @@ def piecewise_solution(name):
 
 @pytest.mark.parametrize(
     "name",
-    slow_after(2, ["nested", "domain", *(name for name in PIECES if name not in ("nested", "domain"))]),
+    slow_after(1, ["nested", "domain", *(name for name in PIECES if name not in ("nested", "domain"))]),
 )
 def test_the_error_is_proportional_to_the_tolerance(launch, name):
     """Each method, with jumps and kinks of the force, nested conditions, and operations with a limited domain."""

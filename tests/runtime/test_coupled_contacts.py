@@ -170,7 +170,7 @@ def test_contacts_whose_effects_on_each_other_cancel_move_as_single_ones(custom_
         assert 0.5 * (x1 + x2) == pytest.approx(x4, abs=1e-10)
 
 
-@pytest.mark.parametrize("method", [ODE23, ODE45, DOP853, RODAS])
+@pytest.mark.parametrize("method", slow_after(1, [DOP853, ODE23, ODE45, RODAS]))
 @pytest.mark.parametrize(
     ("belt", "second_speed"),
     [
@@ -225,7 +225,7 @@ def test_the_order_of_declaration_does_not_matter(custom_model):
 STEPS = [(DOP853, 1e-3), (DOP853, 1e-6), (DOP853, 1e-9), (ODE45, 1e-4), (ODE23, 1e-3), (RODAS, 1e-4)]
 
 
-@pytest.mark.parametrize(("method", "rtol"), STEPS)
+@pytest.mark.parametrize(("method", "rtol"), slow_after(2, STEPS))
 def test_a_load_that_peaks_inside_a_step_is_detected(custom_model, method, rtol):
     """A free mass shakes a block held by friction with up to 10 N: 10 % to 0.01 % above the limit, or as far as the
     method resolves it."""
@@ -452,7 +452,7 @@ def test_a_slip_that_only_touches_zero_is_no_event(custom_model, method, rtol):
 CRANK_BEHIND = {"J": 1.0, "k": 0.0, "r": 0.3, "f_d": 2.0, "f_s": 3.0}
 
 
-@pytest.mark.parametrize("method", [ODE23, ODE45, DOP853, RODAS])
+@pytest.mark.parametrize("method", slow_after(2, [DOP853, RODAS, ODE23, ODE45]))
 @pytest.mark.parametrize("start_angle", [0.0, 0.5 * pi])
 def test_a_crank_passes_its_dead_points(method, start_angle):
     """Without a spring: friction takes the energy f r |cos q| for each angle, and the time follows by quadrature; the

@@ -38,7 +38,7 @@ def follow(fmu, stop, *names):
 
 
 @EVERY_LAW
-@pytest.mark.parametrize("method", [ODE23, RODAS])
+@pytest.mark.parametrize("method", [ODE23, pytest.param(RODAS, marks=pytest.mark.slow)])
 def test_every_change_of_mode_is_counted_with_its_time(worker, backend_fmus, name, law, stop, method):
     fmu = worker.instantiate(backend_fmus / f"{name}.fmu")
     fmu.begin({"friction": law, "solver.method": method, "solver.rtol": 1e-3}, stop=stop)
@@ -51,6 +51,7 @@ def test_every_change_of_mode_is_counted_with_its_time(worker, backend_fmus, nam
     fmu.free()
 
 
+@pytest.mark.slow
 def test_the_events_of_the_threshold_law_are_those_of_the_certified_list(worker, backend_fmus):
     certified = load_reference("stickslip-threshold").modes[1:]
     fmu = worker.instantiate(backend_fmus / "stickslip.fmu")
