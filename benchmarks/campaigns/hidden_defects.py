@@ -117,13 +117,19 @@ def check_decay(rng, kind):
 
 
 def check_fit(rng, kind):
-    """Fit a driven oscillator with dry friction to a record whose input has noise."""
+    """Fit a driven oscillator with dry friction to a record whose input has noise, or whose sensor lags or drifts."""
     truth = {"f": rng.uniform(0.5, 1.5), "c": rng.uniform(0.2, 1.0)}
     t = np.linspace(0, 10, 1001)
     force = 5.0 * np.sin(2 * np.pi * rng.uniform(0.3, 0.6) * t) + 3.0 * np.sin(2 * np.pi * rng.uniform(0.8, 1.5) * t)
     run = harness.simulate("coulomb", truth | {"x0": 0.0}, inputs={"time": t, "F_ext": force}, times=t)
     x = run["x"] + 1e-4 * np.ptp(run["x"]) * rng.standard_normal(len(t))
-    noisy = force + 0.02 * np.ptp(force) * rng.standard_normal(len(t))
+    noisy = force
+    if kind == "input noise":
+        noisy = force + 0.02 * np.ptp(force) * rng.standard_normal(len(t))
+    elif kind == "sensor lag":
+        x = np.interp(t - rng.uniform(0.005, 0.05), t, x)
+    else:
+        x += rng.uniform(0.02, 0.1) * np.ptp(x) * t / t[-1]
     fit = harness.fit(
         "coulomb", {"t [s]": t, "x [m]": x, "F_ext [N]": noisy}, {"f": (0.1, 4.0), "c": (0.0, 4.0)}, values={"x0": 0.0}
     )
@@ -133,7 +139,7 @@ def check_fit(rng, kind):
 KINDS = {
     **dict.fromkeys(("none", "drift", "viscous drift", "lag", "presliding", "offset", "code"), check_curve),
     **dict.fromkeys(("driven", "sustained"), check_decay),
-    "input noise": check_fit,
+    **dict.fromkeys(("input noise", "sensor lag", "sensor drift"), check_fit),
 }
 
 

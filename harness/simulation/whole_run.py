@@ -79,6 +79,7 @@ class RealVariable:
     """A scalar Real of an FMU. Start value and bounds are None if the FMU declares none."""
 
     causality: str
+    variability: str
     start: float | None
     minimum: float | None
     maximum: float | None
@@ -348,6 +349,7 @@ def real_variables(description: Any) -> dict[str, RealVariable]:
     return {
         variable.name: RealVariable(
             variable.causality,
+            variable.variability or "",
             effective_value(variable, variable.start),
             find_bound(variable, "min"),
             find_bound(variable, "max"),

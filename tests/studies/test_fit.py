@@ -1,6 +1,7 @@
 """fit: parameters of FMUs from drawn records and what a record does not determine."""
 
 import json
+import re
 from dataclasses import replace
 from math import isfinite
 
@@ -10,6 +11,7 @@ import numpy as np
 import pytest
 from fmpy import read_model_description
 from native_fmus import build_native_fmus, require_compiler
+from scipy.integrate import solve_ivp
 from shared_keys import check_shared_keys
 from variants import slow_after
 
@@ -617,3 +619,41 @@ def test_slips_that_an_input_makes_irregular_are_described_by_the_fit_alone():
     assert "slips of F_spring in the record are irregular" in " ".join(without.remarks)
     assert (with_input.slips, [text for text in with_input.remarks if "irregular" in text]) == ((), [])
     assert with_input["mu_s"].value == pytest.approx(0.9, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("kind", "words"),
+    slow_after(
+        2,
+        [
+            ("lag", "x lags by 0.02"),
+            ("warming", "c rises during the record"),
+            ("sensor", "x drifts by +4.* % of its range"),
+            ("offset", "x is off by +"),
+            ("none", ""),
+        ],
+    ),
+)
+def test_residuals_name_what_the_model_lacks(kind, words):
+    """The motion of a linear oscillator from another solver, with 40 % more damping at the end, or a wrong sensor."""
+    t = np.linspace(0.0, 20.0, 1001)
+    change = 0.4 if kind == "warming" else 0.0
+
+    def force(t):
+        return 5.0 * np.sin(2.8 * t) + 3.0 * np.sin(7.5 * t)
+
+    def rates(t, y):
+        return y[1], force(t) - 100.0 * y[0] - 0.5 * (1 + change * (t / 20.0 - 0.5)) * y[1]
+
+    x = solve_ivp(rates, (0.0, 20.0), (0.0, 0.0), "DOP853", t, rtol=1e-10, atol=1e-12).y[0]
+    size = float(np.ptp(x))
+    x = {"lag": np.interp(t - 0.02, t, x), "sensor": x + 0.05 * size * t / 20.0, "offset": x + 0.04 * size}.get(kind, x)
+    x += 1e-4 * size * np.random.default_rng(1).standard_normal(len(t))
+    frame = {"t [s]": t, "x [m]": x, "F_ext [N]": force(t)}
+    free = {"c": (0.05, 4.0), "k": (50.0, 200.0)}
+    fit = harness.fit(native("coulomb"), frame, free, values={"x0": 0.0, "f": 0.0})
+    assert re.search(words.replace("+", r"\+"), " ".join(fit.remarks))
+    assert bool(fit.remarks) == bool(words)
+    assert holds(fit["k"], 100.0)
+    if kind != "warming":
+        assert holds(fit["c"], 0.5)

@@ -40,7 +40,7 @@ def describe_fit(
     combinations = () if is_unfit else determined_combinations(problem.unknowns, values, uncertainty, undetermined)
     deviations = np.sqrt(np.diag(uncertainty.covariance))
     remarks = (
-        unfit_remark(columns)
+        unfit_remark(columns, uncertainty)
         if is_unfit
         else fit_remarks(problem, raw_fit, columns, estimates, ambiguous, undetermined)
     )
@@ -145,12 +145,13 @@ def make_profiles(problem: FitProblem, raw_fit: RawFit) -> tuple[Profile, ...]:
     return tuple(profiles)
 
 
-def unfit_remark(columns: Sequence[ColumnResiduals]) -> list[str]:
-    """Return the remark on a fit that does not describe the record."""
+def unfit_remark(columns: Sequence[ColumnResiduals], uncertainty: Uncertainty) -> list[str]:
+    """Return the remark on a fit that does not describe the record, and on what explains its residuals."""
     worst = max(columns, key=lambda column: column.residual / column.range)
     return [
         f"The model does not describe {worst.record}: the best values leave residuals of "
-        f"{100 * worst.residual / worst.range:.2g} % of the range of {worst.name}; do not rely on these values."
+        f"{100 * worst.residual / worst.range:.2g} % of the range of {worst.name}; do not rely on these values.",
+        *([f"{uncertainty.dependence.text}."] if uncertainty.dependence else []),
     ]
 
 
@@ -161,6 +162,8 @@ def describe_cause(problem: FitProblem, uncertainty: Uncertainty) -> str:
     if noisy and uncertainty.input_noise > EXPLAINED * rms:
         inputs = " and ".join(f"the input {name}, {100 * share:.2g} % of its range," for name, share in noisy.items())
         return f"the noise of {inputs} makes residuals of this size; filter it, or sample it faster"
+    if uncertainty.dependence:
+        return uncertainty.dependence.text
     return "the noise is coloured, or the model lacks an effect"
 
 

@@ -12,6 +12,7 @@ from ..estimation.estimate import student_quantile
 from ..estimation.noise import block_scores
 from .fit_problem import FitProblem
 from .noise import correlation_length, significant_correlation
+from .residual_dependence import Dependence, find_dependence
 
 STIFF = 100.0  # ratio of the axes of the squares from which one-sided differences are too coarse
 INDETERMINATE = 0.5  # relative standard error from which a value counts as not determined
@@ -45,6 +46,8 @@ class Uncertainty:
         Displacements (k,) by the error of the inputs between samples.
     input_noise : float
         Root mean square of the residuals by the noise of the inputs, in units of the noise.
+    dependence : Dependence or None
+        What explains most of the residuals, if they are not white.
     """
 
     squares: float
@@ -56,6 +59,7 @@ class Uncertainty:
     correlation: float
     input_shift: np.ndarray
     input_noise: float = 0.0
+    dependence: Dependence | None = None
 
     @property
     def quantile(self) -> float:
@@ -106,11 +110,14 @@ def estimate_uncertainty(
     draws = INPUT_DRAWS if correlation and any(record.noisy_inputs for record in problem.records) else 0
     noise_shifts, noise_effect = input_noise_effect(problem, z, jacobian, inverse, draws)
     inflation = np.maximum(inflation, 1 + noise_shifts / white) + shift**2 / white
+    dependence = find_dependence(problem, e, jacobian) if correlation else None
+    if dependence:
+        inflation += (inverse @ (jacobian.T @ dependence.change)) ** 2 / white
     deviation = np.sqrt(variance * inflation.max() / eigenvalues)
     indeterminate = axes[:, deviation > INDETERMINATE]
     squares = float(e @ e)
     return Uncertainty(
-        squares, variance, inverse * variance, inflation, indeterminate, e, correlation, shift, noise_effect
+        squares, variance, inverse * variance, inflation, indeterminate, e, correlation, shift, noise_effect, dependence
     )
 
 

@@ -33,6 +33,8 @@ class Unknown:
         Index of the observed column whose sensor it describes.
     start : float or None
         Value to start from, in addition to those of the search.
+    is_tunable : bool
+        Whether it may change during a run.
     """
 
     name: str
@@ -45,6 +47,7 @@ class Unknown:
     record: int | None = None
     column: int | None = None
     start: float | None = None
+    is_tunable: bool = False
 
     @cached_property
     def sign(self) -> int:

@@ -264,7 +264,8 @@ def make_unknown(name: str, limits: Range, start: float | None, task: FitTask, r
         low, high = limits
     check_range(name, low, high, minimum, maximum, variable.unit)
     check_start(name, start, low, high)
-    return Unknown(name, name, variable.unit, low, high, minimum, maximum, start=start)
+    is_tunable = variable.variability == "tunable"
+    return Unknown(name, name, variable.unit, low, high, minimum, maximum, start=start, is_tunable=is_tunable)
 
 
 def table_size(name: str, request: FitRequest) -> float:
