@@ -3,7 +3,6 @@
 import json
 from base64 import b64encode
 from collections.abc import Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from gzip import compress
 from hashlib import sha256
 from pathlib import Path
@@ -14,7 +13,7 @@ from ..compiler import __version__
 from ..compiler.equations.model_file import ModelFile
 from ..compiler.lowering import lowered_model, select_features
 from ..packaging.archive import build_date, write
-from ..packaging.native.binaries import compile_and_link
+from ..packaging.native.binaries import CompilerPool, compile_and_link
 from ..packaging.native.native_fmu import MAIN_SOURCE, generate_c_sources
 from .model_json import ModelJson, build_model_json
 
@@ -50,7 +49,7 @@ def build(
         Name of the page.
     """
     models, compiled = [], []
-    with ThreadPoolExecutor() as pool:  # for the compiler only: ast.parse may fail in threads of Python 3.11
+    with CompilerPool() as pool:  # for the compiler only: ast.parse may fail in threads of Python 3.11
         for source in sources:
             model, files = model_with_sources(source, methods, laws)
             models.append(model)

@@ -3,13 +3,18 @@
 import logging
 import math
 import os
+import signal
 import subprocess
 from collections.abc import Iterable, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 from struct import pack, unpack_from
 from tempfile import TemporaryDirectory, gettempdir
+from threading import Event
+from typing import Any
 
 from ...compiler import BuildError
 from ...compiler.c.c_expressions import MAY_RAISE, NEVER_RAISING
@@ -101,6 +106,29 @@ def compile_libraries(name: str, files: Mapping[str, str], main: str, platform: 
     }
 
 
+RUNNING: set[subprocess.Popen[str]] = set()  # compilers
+IS_STOPPED = Event()  # while a pool ends its compilers; one that starts then ends at once
+
+
+class CompilerPool(ThreadPoolExecutor):
+    """Threads that wait for compilers. An exception, such as an interrupt, ends the compilers, which take minutes."""
+
+    def __exit__(self, kind: Any, error: Any, traceback: Any) -> None:
+        if kind is not None:
+            IS_STOPPED.set()
+            self.shutdown(wait=False, cancel_futures=True)
+            for process in list(RUNNING):
+                stop_compiler(process)
+        super().__exit__(kind, error, traceback)
+        IS_STOPPED.clear()
+
+
+def stop_compiler(process: subprocess.Popen[str]) -> None:
+    """Kill a compiler with its child processes, which are a process group."""
+    with suppress(ProcessLookupError):
+        os.killpg(process.pid, signal.SIGKILL) if hasattr(os, "killpg") else process.kill()
+
+
 def find_compiler() -> Path:
     """Return the folder of the package ziglang; raise BuildError if it is not installed."""
     spec = find_spec("ziglang")
@@ -129,9 +157,15 @@ def compile_and_link(files: Mapping[str, str], main: str, target: str, out: str,
         # the temporary folder, so that the cache does not grow.
         caches = {"HOME": gettempdir(), "ZIG_LOCAL_CACHE_DIR": f"{folder}/cache"} | os.environ
         LOG.debug("the C compiler starts for %s, %s", out, target)
-        completed = subprocess.run(command, cwd=folder, capture_output=True, text=True, env=caches)
-        if completed.returncode:
-            raise BuildError(f"{out} does not compile for {target}:\n{completed.stderr.strip()}")
+        streams: dict[str, Any] = {"stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE, "text": True}
+        with subprocess.Popen(command, cwd=folder, env=caches, start_new_session=True, **streams) as process:
+            RUNNING.add(process)
+            if IS_STOPPED.is_set():
+                stop_compiler(process)
+            _, errors = process.communicate()
+            RUNNING.discard(process)
+        if process.returncode:
+            raise BuildError(f"{out} does not compile for {target}:\n{errors.strip()}")
         return (Path(folder) / out).read_bytes()
 
 

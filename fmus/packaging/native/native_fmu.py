@@ -9,7 +9,6 @@ model.png                                 the icon; in FMI 3.0 terminalsAndIcons
 """
 
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
@@ -27,7 +26,7 @@ from ..fmi_variables import declared_variables
 from ..model_description import describe
 from ..model_description_fmi3 import describe as describe3
 from ..terminals import terminals
-from .binaries import DEFAULT_PLATFORMS, PLATFORMS, compile_binaries
+from .binaries import DEFAULT_PLATFORMS, PLATFORMS, CompilerPool, compile_binaries
 from .model_header import render_model_header
 
 MAIN_SOURCE = {"2": "fmi2.c", "3": "fmi3.c"}  # by version of FMI; includes all other files
@@ -96,7 +95,7 @@ def build(
     entries |= {"modelDescription.xml": description, LICENSE: license_files()[LICENSE]}
     entries |= {f"sources/{file}": text.encode() for file, text in files.items()}
     entries["sources/buildDescription.xml"] = render_build_description(name, fmi)
-    with ThreadPoolExecutor() as pool:
+    with CompilerPool() as pool:
         for content in pool.map(
             lambda platform: compile_binaries(name, files, MAIN_SOURCE[fmi], platform, fmi), platforms
         ):
