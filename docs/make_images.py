@@ -42,8 +42,8 @@ FIGURES_OF_PAGES = {
     "curve": ("how-to/friction_curve.md", "results/curve/bench/figure.svg"),
     "fit": ("tutorials/fit_parameters.md", "results/fit/pulled_block/figure.svg"),
     "sweep": ("tutorials/sweep.md", "results/sweep/map/figure.svg"),
-    "compare": ("how-to/external_fmus.md", "results/compare/coulomb-coulomb-sign/figure.svg"),
-    "my_scene": ("reference/scene_files.md", "results/my_scene/figure.svg"),
+    "compare": ("how-to/test_tools.md", "results/compare/coulomb-coulomb-sign/figure.svg"),
+    "my_scene": ("reference/files.md", "results/my_scene/figure.svg"),
 }
 # Figures of commands that pages show but do not run: the command and the path.
 FIGURES_OF_COMMANDS = {
@@ -334,7 +334,7 @@ def read_text(page: str) -> str:
 
 def draw_report(folder: Path) -> None:
     """Save a screenshot of the report of the page on reports, up to the end of its first section, with its text."""
-    run_blocks_of_page("how-to/report.md", folder)
+    run_blocks_of_page("how-to/share.md", folder)
     report = folder / "results" / "report.html"
     save_screenshot(report, IMAGES / "report.png", folder, 930, read_text_of_report)
 

@@ -7,6 +7,7 @@ between the comments <!-- generated: NAME --> and <!-- end --> in docs/reference
 import re
 import shlex
 import sys
+from collections import Counter
 from collections.abc import Callable, Iterable
 from dataclasses import MISSING, fields, is_dataclass
 from inspect import cleandoc
@@ -220,22 +221,35 @@ def all_commands() -> dict[str, Any]:
     return {"friction-fmus": commands, "friction-fmus build": main} | others
 
 
-def command_list() -> str:
-    """Return the table of the commands with their purposes."""
-    rows = []
-    for name, command in all_commands().items():
-        anchor = name.replace(" ", "-")
-        rows.append((f"[`{name}`](#{anchor})", command.get_short_help_str(limit=1000)))
-    return format_table(("command", "purpose"), rows)
+def shared_options() -> list[tuple[str, str]]:
+    """Return option and meaning of each option that at least three commands have."""
+    import click
+
+    contexts = (click.Context(command, info_name=name) for name, command in all_commands().items())
+    counts = Counter(record for context in contexts for record in option_records(context))
+    return [record for record, count in counts.items() if count >= 3]
+
+
+def option_records(context: Any) -> list[tuple[str, str]]:
+    """Return option and meaning of each option of a command, in the order of its help."""
+    parameters = [parameter for parameter in context.command.get_params(context) if "--help" not in parameter.opts]
+    records = filter(None, (parameter.get_help_record(context) for parameter in parameters))
+    return [(option, text) for option, text in records if text]
+
+
+def command_options() -> str:
+    """Return the table of the options that several commands have."""
+    return format_table(("option", "meaning"), ((f"`{option}`", text) for option, text in shared_options()))
 
 
 def command_texts() -> str:
     """Return description, usage and options of every command."""
-    return "\n".join(command_text(name, command) for name, command in all_commands().items())
+    shared = shared_options()
+    return "\n".join(command_text(name, command, shared) for name, command in all_commands().items())
 
 
-def command_text(name: str, command: Any) -> str:
-    """Return the section of one command."""
+def command_text(name: str, command: Any, shared: list[tuple[str, str]]) -> str:
+    """Return the section of one command, which only names the shared options."""
     import click
 
     context = click.Context(command, info_name=name)
@@ -244,38 +258,31 @@ def command_text(name: str, command: Any) -> str:
         verbatim = paragraph.startswith("\b\n")
         lines.append(f"```text\n{paragraph[2:]}\n```\n" if verbatim else f"{' '.join(paragraph.split())}\n")
     lines.append(f"```text\n{name} {' '.join(command.collect_usage_pieces(context))}\n```\n")
-    records = [
-        parameter.get_help_record(context)
-        for parameter in command.get_params(context)
-        if "--help" not in parameter.opts
-    ]
-    return (
-        "\n".join(lines)
-        + "\n"
-        + format_table(("option", "meaning"), ((f"`{option}`", text) for option, text in filter(None, records) if text))
-    )
+    records = option_records(context)
+    rows = [(f"`{option}`", text) for option, text in records if (option, text) not in shared]
+    names = ", ".join(f"`{record[0].split()[0]}`" for record in records if record in shared)
+    if names:
+        lines.append(f"[Shared options](#shared-options): {names}.\n")
+    return "\n".join(lines) + (f"\n{format_table(('option', 'meaning'), rows)}" if rows else "")
 
 
 def record_formats() -> str:
-    """Return the table of the record formats that the tests write, with the options that `decay` needs to read them."""
+    """Return the record formats that the tests write: those that need no option, and a table of the others."""
     sys.path.append(str(DOCS.parent / "tests" / "support"))
     from record_formats import FORMATS
 
-    rows = []
+    plain, rows = [], []
     for record_format in FORMATS:
-        arguments = (f"--{key} {shlex.quote(f'{value}')}" for key, value in record_format.options.items())
-        options = " ".join(f"`{argument}`" for argument in arguments)
-        result = "read" + (f" with {options}" if options else "")
+        arguments = [f"`--{key} {shlex.quote(f'{value}')}`" for key, value in record_format.options.items()]
         if record_format.base == "units":
-            result += "; has no unit, `--unit` sets it"
-        rows.append(
-            (
-                record_format.text,
-                f"`{record_format.file}`",
-                f"refused: {record_format.refusal}" if record_format.refusal else result,
-            )
-        )
-    return format_table(("format", "example", "result"), rows)
+            arguments.append("`--unit`")
+        if record_format.refusal or arguments:
+            result = f"refused: {record_format.refusal}" if record_format.refusal else " ".join(arguments)
+            rows.append((record_format.text, result))
+        else:
+            plain.append(record_format.text)
+    table = format_table(("format", "options, or the refusal"), rows)
+    return f"These need no option: {'; '.join(plain)}.\n\n{table}"
 
 
 SAMPLES = (
@@ -293,7 +300,7 @@ def parts(fmus: Path) -> dict[str, Callable[[], str]]:
 
     return {
         **{f"variables-{model}": lambda model=model: variables(fmus, model) for model in MODELS},
-        "command-list": command_list,
+        "command-options": command_options,
         "command-texts": command_texts,
         "variables-common": lambda: common_variables(fmus),
         "enumerations": lambda: enumerations(fmus),

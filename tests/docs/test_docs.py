@@ -97,7 +97,7 @@ def test_code_blocks_run_and_draw_the_pictures_of_the_page(page, workspace, envi
         if source == page:
             (figure,) = workspace.glob(file)
             assert_same_texts(DOCS / "images" / f"{name}.svg", figure)
-    if page == "how-to/report.md":
+    if page == "how-to/share.md":
         report = (workspace / "results/report.html").read_text(encoding="utf-8")
         assert load("make_images").read_text_of_report(report) == read_description("report")
 
@@ -162,7 +162,7 @@ def test_the_picture_of_rivals_has_the_texts_of_its_script_and_the_errors_of_the
     picture = DOCS / "images" / "rivals.svg"
     rivals_figure.draw(Comparison(tuple(RIVALS.values()), ()), tmp_path / "rivals.svg")
     assert_same_texts(picture, tmp_path / "rivals.svg")
-    page = (DOCS / "explanation" / "rivals.md").read_text(encoding="utf-8")
+    page = (DOCS / "explanation" / "accuracy.md").read_text(encoding="utf-8")
     (table,) = re.findall(r"^\| engine \|( `rest`.*?)\n\n", page, re.M | re.S)
     heading, _, *rows = table.splitlines()
     assert len(rows) == len(RIVALS)
@@ -263,11 +263,11 @@ def test_generated_tables_are_up_to_date(fmus, environment, monkeypatch):
         assert reference.update_page(text, fmus) == text, f"run `python docs/make_reference.py` for {page.name}"
 
 
-def test_the_page_on_code_generation_quotes_the_numerics_as_they_are():
+def test_the_page_on_architecture_quotes_the_numerics_as_they_are():
     """Its other texts are outputs of commands, which run with the page."""
     (quoted,) = [
         block.text
-        for block in scripts.find_blocks((DOCS / "explanation" / "equation_to_c.md").read_text(encoding="utf-8"))
+        for block in scripts.find_blocks((DOCS / "explanation" / "architecture.md").read_text(encoding="utf-8"))
         if block.language == "text" and "model.rates(" in block.text and "modes)" in block.text
     ]
     lines = {line.strip() for line in (ROOT / "fmus" / "runtime" / "ode23.py").read_text(encoding="utf-8").splitlines()}

@@ -206,7 +206,7 @@ def test_the_claims_of_the_opening_hold():
 
 def test_the_tools_that_the_opening_names_hold_exactly_in_the_comparison_of_engines(still):
     row = r"^\| ([^|]+?) \| ([^|/]+) / ([^|]+?) \| [^|]+ \| [^|]+ \| [^|]+ \| \d+ \|$"  # engine, both creeps
-    rows = re.findall(row, (DOCS / "explanation" / "rivals.md").read_text(encoding="utf-8"), re.M)
+    rows = re.findall(row, (DOCS / "explanation" / "accuracy.md").read_text(encoding="utf-8"), re.M)
     exact = {engine for engine, *creeps in rows if {*map(str.strip, creeps)} == {"0"}}
     assert {"scipy", "PathSim", "Drake, witness functions", "FMU"} <= exact
     assert "scipy, PathSim and Drake do" in text(still, "opening")
