@@ -107,7 +107,11 @@ def read_picture(file: Path) -> str:
 
 
 def build_sections(items: list[ResultItem]) -> list[Section]:
-    """Return the sections that have results, in the order of the studies; results of other studies are last."""
+    """Return the sections that have results: first those with results of the user, then by the order of the studies.
+
+    Runs that are compared with known values, as those of the project, are last within their section.
+    """
+    items = sorted(items, key=is_compared)
     known = {study.name: Section(study.name, study.title, study.intro) for study in STUDIES}
     others = {item.summary.study: Section(item.summary.study, item.summary.study, "") for item in items}
     sections = [
@@ -115,4 +119,12 @@ def build_sections(items: list[ResultItem]) -> list[Section]:
         for section in (others | known).values()
     ]
     order = [*known, *others]
-    return sorted((section for section in sections if section.items), key=lambda section: order.index(section.study))
+    return sorted(
+        (section for section in sections if section.items),
+        key=lambda section: (all(map(is_compared, section.items)), order.index(section.study)),
+    )
+
+
+def is_compared(item: ResultItem) -> bool:
+    """Return whether a result is compared with known values."""
+    return item.summary.outcome is not None and item.summary.outcome.deviation is not None

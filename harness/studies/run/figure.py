@@ -38,6 +38,7 @@ if TYPE_CHECKING:
 
 RIGHT_COLUMN = ("phase", "steps")  # plots in the right column; plots over time are in the left column
 CONTACT_HEIGHT = 0.12  # of a row of the panel with all contacts, in heights of a panel
+PHASE_HEIGHT = 1.8  # of the phase plane, which is a square, in heights of a panel
 LIMITS = np.array([[1.01, -0.01], [-0.01, 1.01]])  # limits of a time axis from start and stop, with a margin of 1 %
 CURVE_POINTS = 1000  # points of a smooth curve
 MAX_MARKED = 100  # reversals that are marked; more would be indistinguishable
@@ -88,7 +89,11 @@ def draw(run: "RunResult", title: str, plots: Iterable[str], figure: Figure) -> 
     plotted = PlottedRun(refine(run), run._analyses, run._known)
     # with several contacts, each column over time ends with a panel of all contacts
     below = [len(run.contacts) * CONTACT_HEIGHT + 0.2] if len(run.contacts) > 1 else []
-    ratios = [[1.0] * len(names) + below * (not is_right(names[0], run)) for names in columns]
+    ratios = [
+        [PHASE_HEIGHT if name == "phase" and is_right(name, run) else 1.0 for name in names]
+        + below * (not is_right(names[0], run))
+        for names in columns
+    ]
     set_size(figure, WIDTH * len(columns), HEIGHT * max(2, *map(sum, ratios), 2))
     figure.suptitle(f"{title}\n{run.settings_label}".strip(), fontsize=11)
     parts = figure.subfigures(1, len(columns), squeeze=False)[0]
@@ -222,9 +227,11 @@ def envelope(decay: Any, value: float) -> np.ndarray:
 
 
 def add_legend(axes: Axes) -> None:
-    """Put a legend without duplicates above the panel."""
+    """Put a legend above the panel, without the labels that the legend of a panel before it has."""
+    legends = filter(None, (panel.get_legend() for panel in axes.figure.figure.axes if panel is not axes))
+    shown = {text.get_text() for legend in legends for text in legend.get_texts()}
     handles, labels = axes.get_legend_handles_labels()
-    entries = dict(zip(labels, handles, strict=True))
+    entries = {label: handle for label, handle in zip(labels, handles, strict=True) if label not in shown}
     if entries:
         axes.legend(entries.values(), entries, **LEGEND_ABOVE, ncols=len(entries))
         title = axes.get_title(loc="left")
@@ -233,11 +240,14 @@ def add_legend(axes: Axes) -> None:
 
 
 def plot_phase_plane(axes: Axes, plotted: PlottedRun, name: str) -> None:
-    """Plot velocity over position."""
+    """Plot velocity over position in a square, in which a free oscillation is a circle."""
     motion = plotted.run.motion_outputs
     x, v = motion["position"], motion["velocity"]
     axes.plot(plotted.values(x), plotted.values(v), color=BLUE)
     axes.set_title("phase plane")
+    axes.set_box_aspect(1)
+    axes.set_anchor("N")
+    axes.locator_params(axis="x", nbins=5)
     axes.set_xlabel(axis_label(x, plotted.unit(x)[0]))
     axes.set_ylabel(axis_label(v, plotted.unit(v)[0]))
 

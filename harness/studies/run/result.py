@@ -224,8 +224,10 @@ class RunResult(Trajectory, Result):
 
     @property
     def _plots(self) -> tuple[str, ...]:
-        """The names of the plots: those of the scene, or outputs and the phase plane."""
-        return self.scene.plots if self.scene else choose_plots(self)
+        """The names of the plots: those that the scene names, or outputs and the phase plane."""
+        if self.scene and self.scene.plots != default_plots(self.scene.run.outputs):
+            return self.scene.plots
+        return choose_plots(self)
 
     def _write_figure(self, path: Path) -> None:
         if self._plots:  # otherwise matplotlib is not needed
@@ -305,12 +307,13 @@ def describe_known_values(scene: Scene) -> tuple[str, ...]:
 
 
 def choose_plots(run: Trajectory) -> tuple[str, ...]:
-    """Return the plots of a run without a scene.
+    """Return the plots of a run for which none is named.
 
-    These are the first outputs, with the friction forces among them.  With several contacts, the forces are additional,
-    and the modes are not plotted as curves.
+    These are the first outputs, with the friction forces among them; with several contacts, the forces are additional.
+    Modes are not plotted as curves, because shading and lines show them.
     """
-    outputs = run.spec.outputs
+    modes = run.events.mode_names.values() if run.events else ()
+    outputs = tuple(name for name in run.spec.outputs if name not in modes) or run.spec.outputs
     if len(run.contacts) < 2:
         return default_plots(outputs, choose_outputs(outputs, run.contacts, MAX_DEFAULT_PLOTS))
     others = [name for name in outputs if not contact_of(run, name)]
