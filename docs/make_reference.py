@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import MISSING, fields, is_dataclass
 from inspect import cleandoc
 from pathlib import Path
-from typing import Any, get_args, get_origin
+from typing import Any, get_args
 
 DOCS = Path(__file__).parent
 PART = re.compile(r"(<!-- generated: ([\w-]+) -->\n).*?(<!-- end -->)", re.S)
@@ -43,7 +43,8 @@ SCENE_TEXTS = {
     "about": "Description of the model, which the report prints.",
     "analyses": "Analyses to perform: `decay`, `slip`, `steps`.",
     "plots": "Panels of the figure: `position`, `velocity`, `acceleration`, `phase`, `steps`, or the name of an "
-    "output, which takes precedence; `[]` for no figure. Default: the first six outputs and the phase plane.",
+    "output, which takes precedence; `[]` for no figure. Default: the first six outputs without modes, and the phase "
+    "plane.",
     "values": "Parameters and inputs by name, in SI units; enumerations by name.",
     "inputs": "Input signals: the times `time` in s and a list of values for each input, in SI units; linear between "
     "two times, and a time that occurs twice is a jump.",
@@ -156,15 +157,11 @@ def declaration_options() -> str:
 
 
 def describe_values(annotation: Any) -> str:
-    """Return what a value of a type must be, and what each value of its table must be."""
+    """Return what a value of a type must be, in a few words."""
     from harness.scenes.schema import LIST, find_rule
 
     rule = find_rule(annotation)
-    if rule is LIST:
-        return "a list of tables"
-    if get_origin(annotation) is dict and not is_dataclass(get_args(annotation)[1]):
-        return f"{rule.text}; each value is {find_rule(get_args(annotation)[1]).text}"
-    return rule.text
+    return "a list of tables" if rule is LIST else re.sub(r"^a text\b.*", "a text", rule.text)
 
 
 def schema_within(schema: Any, key: str) -> Any:
@@ -179,16 +176,12 @@ def keys(texts: dict[str, str], *schemas: Any) -> str:
     rows = []
     for name, text in texts.items():
         field = declared[name]
-        is_required = field.default is MISSING and field.default_factory is MISSING
-        default = field.default
-        if is_required:
-            default_text = "**required**"
-        elif default is None or default is MISSING or default in ((), "") or "Default:" in text:
-            default_text = ""
-        else:
-            default_text = f"`{str(default).lower() if isinstance(default, bool) else default}`"
-        rows.append((f"`{name}`", describe_values(field.type), default_text, text))
-    return format_table(("key", "value", "default", "meaning"), rows)
+        if field.default is MISSING and field.default_factory is MISSING:
+            text += " Required."
+        elif field.default not in (None, MISSING, (), "", False) and "Default:" not in text:
+            text += f" Default: {field.default}."
+        rows.append((f"`{name}`", describe_values(field.type), text))
+    return format_table(("key", "value", "meaning"), rows)
 
 
 def result_files(fmus: Path) -> str:

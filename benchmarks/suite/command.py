@@ -1,6 +1,7 @@
 """suite: the friction suite for developers of tools."""
 
 import json
+import shutil
 from pathlib import Path
 
 import click
@@ -13,9 +14,12 @@ from harness.commands.terminal import Terminal, json_option
 @click.argument("folder", metavar="OUT", type=click.Path(file_okay=False, path_type=Path))
 @click.option("--case", "names", multiple=True, help="Write only this case; repeatable.")
 @click.option("--platform", "platforms", multiple=True, help="Compile only for this platform; repeatable.")
+@click.option("--archive", "archives", is_flag=True, help="Also write OUT.zip, which a release has as an attachment.")
 @click.option("--run", "runs", is_flag=True, help="Run the cases in the importers that are installed, and judge them.")
 @json_option
-def suite(folder: Path, names: tuple[str, ...], platforms: tuple[str, ...], runs: bool, as_json: bool) -> None:
+def suite(
+    folder: Path, names: tuple[str, ...], platforms: tuple[str, ...], archives: bool, runs: bool, as_json: bool
+) -> None:
     """Write the friction suite to the folder OUT: hard cases with certified results, and check.py, which judges a tool.
 
     With --run, also run the cases in fmpy, in the importers that are installed, and in three that are wrong on purpose;
@@ -25,6 +29,7 @@ def suite(folder: Path, names: tuple[str, ...], platforms: tuple[str, ...], runs
     Examples:
       python -m benchmarks suite suite
       python -m benchmarks suite suite --platform linux64 --run
+      python -m benchmarks suite dist/friction-suite --archive
     """
     from harness.errors import check_names
 
@@ -36,6 +41,8 @@ def suite(folder: Path, names: tuple[str, ...], platforms: tuple[str, ...], runs
     terminal = Terminal(as_json)
     with terminal.progress(1) as report:
         write_suite(cases, folder, platforms, lambda share: report("suite", share))
+    if archives:
+        shutil.make_archive(str(folder), "zip", folder.resolve().parent, folder.name)
     index = json.loads((folder / "cases.json").read_text(encoding="utf-8"))
     if not runs:
         terminal.print_result(

@@ -4,6 +4,7 @@ import json
 import re
 import subprocess
 import sys
+from zipfile import ZipFile
 
 import commands
 import numpy as np
@@ -22,9 +23,17 @@ def suite(tmp_path_factory):
     require_compiler()
     folder = tmp_path_factory.mktemp("suite")
     words = [word for name in WRITTEN for word in ("--case", name)]
-    done = commands.benchmarks(folder, "suite", folder, "--platform", "linux64", *words)
+    done = commands.benchmarks(folder, "suite", folder, "--platform", "linux64", "--archive", *words)
     assert (done.returncode, done.stderr) == (0, "")
     return folder
+
+
+@pytest.mark.slow
+def test_the_archive_of_a_release_has_all_files(suite):
+    files = {file.relative_to(suite.parent).as_posix() for file in suite.rglob("*") if file.is_file()}
+    with ZipFile(f"{suite}.zip") as archive:
+        assert {name for name in archive.namelist() if not name.endswith("/")} == files
+        assert f"{suite.name}/rest/rest_ref.csv" in files
 
 
 def verdict(suite, runner, name, tmp_path):

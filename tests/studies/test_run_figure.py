@@ -198,7 +198,7 @@ def test_input_signals_are_plotted_with_the_outputs():
     )
     labels = [axes.get_ylabel() for axes in run.plot()]
     assert labels[-2:] == ["F_ext [N]", "sticking"]
-    assert {"F1 [N]", "F2 [N]"} <= {*labels}
+    assert {"F_1 [N]", "F_2 [N]"} <= {*labels}
 
 
 OUTPUTS_NAMED_LIKE_PANELS = """
