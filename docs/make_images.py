@@ -43,7 +43,6 @@ FIGURES_OF_PAGES = {
     "fit": ("tutorials/fit_parameters.md", "results/fit/pulled_block/figure.svg"),
     "sweep": ("tutorials/sweep.md", "results/sweep/map/figure.svg"),
     "compare": ("how-to/test_tools.md", "results/compare/coulomb-coulomb-sign/figure.svg"),
-    "my_scene": ("reference/files.md", "results/my_scene/figure.svg"),
 }
 # Figures of commands that pages show but do not run: the command and the path.
 FIGURES_OF_COMMANDS = {
