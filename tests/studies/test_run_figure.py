@@ -87,6 +87,25 @@ def test_no_legend_covers_a_title(draw, name):
     assert [title for title, axes in panels.items() if is_title_covered(axes)] == []
 
 
+@pytest.mark.parametrize("name", slow_after(1, MODAL))
+def test_a_figure_explains_each_label_once(draw, name):
+    _, panels = draw(name)
+    legends = filter(None, (axes.get_legend() for axes in panels.values()))
+    labels = [text.get_text() for legend in legends for text in legend.get_texts()]
+    assert sorted(labels) == sorted({*labels}) != []
+
+
+@pytest.mark.slow
+def test_a_run_without_named_plots_has_no_panel_of_its_mode(fmus, tmp_path):
+    figures = []
+    with patch.object(Figure, "savefig", lambda figure, *_, **__: figures.append(figure)):
+        done = commands.harness(tmp_path, "run", str(fmus / "stickslip.fmu"), figures=True)
+    assert done.returncode == 0, done.stderr
+    labels = {axes.get_ylabel() for axes in figures[0].get_axes()}
+    assert "F_friction [N]" in labels
+    assert "mode" not in labels
+
+
 def test_angles_are_in_degrees(draw):
     _, panels = draw("pendulum")
     assert panels["angle, zero when hanging down"].get_ylabel() == "theta [deg]"
