@@ -395,6 +395,7 @@ def test_a_fit_finds_values_of_a_table(tunable_fmus, kind):
         assert fit[name].value == pytest.approx(value, rel=1e-4)
 
 
+@pytest.mark.slow
 def test_a_sweep_varies_an_element_of_an_array(tunable_fmus):
     """Runs in FMI 3.0 are those of the scalar in FMI 2.0; other elements keep their start values."""
     ends = [harness.simulate(tunable_fmus["native"], {"mu.y[2]": value})["x"][-1] for value in (0.2, 0.4)]

@@ -44,7 +44,7 @@ def built(path, kind):
     return folder / kind / f"{path.stem}.fmu"
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", slow_after(2, KINDS))
 def test_it_is_built_beside_its_file_for_every_backend_and_is_valid(kind):
     (path,) = (path for path in EXAMPLE_MODELS if path.stem == "rotor_brake")
     fmu = built(path, kind)

@@ -25,7 +25,7 @@ def kind(request):
 
 
 def built(name, kind):
-    return build_once(f"more-{kind}", "--more", *KINDS[kind]) / f"{name}.fmu"
+    return build_once(f"more-{kind}-{name}", name, *KINDS[kind]) / f"{name}.fmu"
 
 
 def follow_events(fmu, start, stop, modes):
@@ -35,7 +35,7 @@ def follow_events(fmu, start, stop, modes):
     return [after[1:] for before, after in pairwise(rows) if after[0] != before[0]]
 
 
-@pytest.mark.parametrize("name", ["belt", "clutch", "forced", "joint", "sleds", "stacked"])
+@pytest.mark.parametrize("name", slow_after(2, ["joint", "belt", "clutch", "forced", "sleds", "stacked"]))
 def test_events_are_the_same_from_any_start_time(worker, name, kind):
     model = find_model(name).model
     modes = [*model().contacts]

@@ -5,7 +5,7 @@ FMU and in the independent solution.
 """
 
 import random
-from itertools import pairwise, product
+from itertools import pairwise
 from operator import methodcaller
 
 import independent_solution
@@ -13,6 +13,7 @@ import pytest
 from independent_solution import ClosedFormMotion
 from models import DOP853, EXACT, ODE23, ODE45, RODAS
 from native_fmus import build_native_fmus
+from variants import slow_after
 
 from tests.runtime.test_exact_method import EVENTS, PLACES
 
@@ -79,11 +80,7 @@ def events(fmu, start, stop):
 
 
 @pytest.mark.parametrize(
-    ("name", "seed"),
-    [
-        pytest.param(name, seed, marks=pytest.mark.slow if seed >= 8 else ())
-        for name, seed in product(["coulomb", "stickslip"], range(16))
-    ],
+    ("name", "seed"), slow_after(8, [(name, seed) for seed in range(16) for name in ("coulomb", "stickslip")])
 )
 def test_every_tie_ends_as_in_the_closed_form(pair, name, seed):
     values, start, stop = case(name, seed)
@@ -113,7 +110,9 @@ TOUCHES = [  # covers every pair of method, values and start
 ]
 
 
-@pytest.mark.parametrize(("method", "values", "start"), TOUCHES, ids=str)
+@pytest.mark.parametrize(
+    ("method", "values", "start"), slow_after(8, TOUCHES[::3] + TOUCHES[1::3] + TOUCHES[2::3]), ids=str
+)
 def test_a_speed_that_only_touches_zero_is_no_rest_and_no_event(pair, method, values, start):
     stop = start + 30.0
     values = {**values, "solver.method": method, "solver.rtol": 1e-5}

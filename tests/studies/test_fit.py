@@ -70,12 +70,12 @@ def fit_drawn(name, seed, max_samples):
     return record, fit
 
 
-SLOW = {"position, 4 free": pytest.mark.slow, "Stribeck": pytest.mark.slow}
+SLOW = {"force": pytest.mark.slow, "position, 4 free": pytest.mark.slow, "Stribeck": pytest.mark.slow}
 CAMPAIGN = {"forced": pytest.mark.campaign, "belt": pytest.mark.campaign}
 
 
 @pytest.mark.parametrize(
-    "name", ["force", "pendulum", *(pytest.param(name, marks=mark) for name, mark in (SLOW | CAMPAIGN).items())]
+    "name", ["pendulum", *(pytest.param(name, marks=mark) for name, mark in (SLOW | CAMPAIGN).items())]
 )
 def test_the_parameters_of_a_drawn_record_are_found(name):
     """The seed was drawn once; benchmarks/campaigns/fit_campaign.py fits hundreds of others."""
@@ -117,6 +117,7 @@ def test_a_position_determines_the_ratio_of_stiffness_and_mass():
 DRIVEN = {"mu_d": 0.5, "v_driver": 0.04}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("displacement", "undetermined", "is_remarked"),
     slow_after(
@@ -569,6 +570,7 @@ def test_one_noise_of_all_samples_moves_no_values_of_a_long_or_quantised_record(
     assert fits[0].values["f"] == pytest.approx(0.3, rel=0.01)
 
 
+@pytest.mark.slow
 def test_irregular_slips_are_described_one_by_one():
     """Of a real surface each slip starts at another force, which no fit of one static friction describes."""
     random, t = np.random.default_rng(0), np.linspace(0.0, 40.0, 801)

@@ -106,6 +106,7 @@ def test_a_column_that_fits_is_observed_and_named(tmp_path, columns, units, sent
     assert json.loads(done.stdout)["notes"][0] == fit.notes[0].replace("`observe`", "--observe")
 
 
+@pytest.mark.slow
 def test_a_column_with_the_name_of_an_input_drives_the_runs():
     """Without it, the fit would explain the motion by other parameters."""
     push = {"time": T, "F_ext": 3.0 * np.sin(11.0 * T)}
