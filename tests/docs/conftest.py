@@ -5,8 +5,9 @@ import sys
 from pathlib import Path
 
 import pytest
-from command_server import start_programs
 from commands import ROOT
+
+from tests.docs.command_server import start_programs
 
 
 @pytest.fixture(scope="session")

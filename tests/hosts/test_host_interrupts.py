@@ -4,9 +4,9 @@ process."""
 import json
 import subprocess
 import zipfile
+from pathlib import Path
 
 import pytest
-from build_cache import SUPPORT
 from interrupted_host import HANDLERS
 from variants import slow_after
 from worker_client import run_script_with_stderr
@@ -47,7 +47,7 @@ def test_every_entry_point_is_protected_from_its_first_instruction(fmu, tmp_path
         pytest.skip(f"there is no Python {version} here")
     with zipfile.ZipFile(fmu.with_name("stickslip.fmu")) as archive:
         archive.extractall(tmp_path)
-    script = SUPPORT / "interrupted_embedded.py"
+    script = Path(__file__).with_name("interrupted_embedded.py")
     command = [python, "-I", script, tmp_path / "resources"]
     done = subprocess.run(command, capture_output=True, text=True, timeout=60)
     assert done.returncode == 0, done.stderr

@@ -11,7 +11,7 @@ from pathlib import Path
 import commands
 import independent_solution
 import pytest
-from build_cache import ROOT, SUPPORT
+from build_cache import ROOT
 from fmpy import read_model_description
 from independent_solution import ClosedFormMotion
 from models import CASES, MODELS, declared, label, outputs
@@ -115,7 +115,10 @@ def test_the_embedded_code_behaves_alike_on_the_oldest_and_newest_python(request
     python = interpreter(version)
     if python is None:
         pytest.skip(f"there is no Python {version} here")
-    command, inputs = [python, "-I", SUPPORT / "run_embedded.py"], json.dumps([inputs for inputs, _, _ in requests])
+    command, inputs = (
+        [python, "-I", Path(__file__).with_name("run_embedded.py")],
+        json.dumps([inputs for inputs, _, _ in requests]),
+    )
     done = subprocess.run(command, input=inputs, capture_output=True, text=True, timeout=120)
     assert done.returncode == 0, done.stderr
     for (_, names, expected), rows in zip(requests, json.loads(done.stdout), strict=True):

@@ -43,7 +43,10 @@ def start_programs(folder):
     for name in PROGRAMS:
         (folder / name).write_text(CLIENT.format(python=sys.executable, address=address))
         (folder / name).chmod(0o755)
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(ROOT), str(ROOT / "docs")])}
+    environment = {
+        **os.environ,
+        "PYTHONPATH": os.pathsep.join(str(ROOT / part) for part in ("", "docs", "tests/support")),
+    }
     pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
     with subprocess.Popen([sys.executable, __file__, address], cwd=folder, env=environment, **pipes) as server:
         assert server.stdout.readline() == b"ready\n"
