@@ -54,7 +54,10 @@ def plot_signal(axes: Axes, identification: DecayIdentification) -> None:
 
 
 def plot_energy_loss(axes: Axes, identification: DecayIdentification) -> None:
-    """Plot the relative energy loss per half cycle, with the curves of all laws."""
+    """Plot the relative energy loss per half cycle, with the curves of all laws.
+
+    The legend leaves out what that of the signal explains.
+    """
     best, others, loss = identification.best, identification.laws[1:], identification.energy_loss
     unit, size = display_unit(identification.record.base)
 
@@ -67,9 +70,10 @@ def plot_energy_loss(axes: Axes, identification: DecayIdentification) -> None:
     for i, law in enumerate(law for law in others if law.terms not in COLOURS):
         label_once = "" if i else "other combinations"
         axes.plot(*curve(loss.curves[law.terms]), color=GREY, linestyle=":", label=label_once)
-    axes.plot(*curve(loss.curves[best.terms]), color=ORANGE, linewidth=2, label=f"fit: {best.description}")
+    axes.plot(*curve(loss.curves[best.terms]), color=ORANGE, linewidth=2)
     if len(loss.amplitude):
-        axes.plot(*curve((loss.amplitude, loss.fraction)), "o", color="black", fillstyle="none", label="turning points")
+        label = "turning points" if identification.record.order else ""
+        axes.plot(*curve((loss.amplitude, loss.fraction)), "o", color="black", fillstyle="none", label=label)
     drawn = np.concatenate([loss.fraction, loss.curves[best.terms][1]])
     if len(drawn):
         low, high = np.percentile(100 * drawn, [5, 95])
