@@ -37,6 +37,7 @@ if TYPE_CHECKING:
         Model,
         Output,
         Parameter,
+        PlanarContact,
         Rule,
         State,
     )
@@ -54,6 +55,7 @@ __all__ = [
     "Model",
     "Output",
     "Parameter",
+    "PlanarContact",
     "Rule",
     "State",
     "Table",

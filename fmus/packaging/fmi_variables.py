@@ -72,6 +72,11 @@ def has_step_events(model: Any) -> bool:
     return any(law != HYBRID_LAW[0] for law in friction_laws(model))
 
 
+def offers_model_exchange(model: Any) -> bool:
+    """Check whether an importer may use its own solver: contacts in a plane need that of the FMU."""
+    return not getattr(model, "planar_modes", ())
+
+
 def array_name(declared: VariableDeclaration) -> str:
     """Return the name of the array of an element, as mu.y of mu.y[1]; empty for a scalar."""
     return declared.element.rpartition("[")[0]

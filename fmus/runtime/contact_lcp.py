@@ -23,7 +23,9 @@ from .vectors import (
     any_of,
     contact_indices,
     contact_vector,
+    is_planar,
     max_of,
+    planar_indices,
     select_kinematic,
 )
 
@@ -98,6 +100,11 @@ def update_contact_event_functions(model, location, t, y: StateVector, modes: Co
                 location.roundings[i] = location.roundings[len(modes) + i] = terms[i]
                 location.values[i] = widened_limit - force[i]
                 location.values[len(modes) + i] = widened_limit + force[i]
+                if is_planar[i] and widened_limit > 0.0:  # smooth where the load, a size, passes zero
+                    location.values[i] *= location.values[len(modes) + i] / widened_limit
+    for i in planar_indices:
+        if modes[i] != STUCK:
+            location.values[i] = 1.0  # a size has no change of sign: see planar_contact.comes_to_rest
 
 
 def find_frictionless_contacts(model, location, step):
@@ -133,7 +140,7 @@ def resolve_after_event(model, step, h, ends: ContactVector, tie_tolerance) -> t
                 new_modes[i] = sign(slips[i])  # it reversed without friction, which has returned
             elif ends[i] <= h or new_modes[i] * slips[i] <= SIMULTANEITY_MARGIN * size + rounding:
                 depth = inf
-                if fabs(force[i]) >= EQUAL_SHARE * limit[i]:
+                if not is_planar[i] and fabs(force[i]) >= EQUAL_SHARE * limit[i]:
                     depth = reversal_depth(model, t, y, step.modes0, delta, limit[i], i)
                 if depth <= tie_tolerance * (terms[i] + start_slip(model, step, i) + floors[i]):
                     y = raise_slip(model, t, y, step.modes0, 2.0 * depth + rounding, i)

@@ -5,14 +5,14 @@ step_control.py computes the next one.
 
 from math import inf
 
-from . import conditions, phase_repetition, step_end, time_scale
+from . import conditions, phase_repetition, planar_contact, step_end, time_scale
 from .active_method import ActiveMethod
 from .codes import EXACT, ROUNDOFF_MARGIN, STUCK
 from .event_location import EventLocation
 from .interpolant import Interpolant
 from .step_counters import RoundoffCompensation, StepCounters
 from .step_kind import follows_closed_form, has_events, has_law_without_sticking, is_at_rest
-from .vectors import ContactVector, RateVector, StateVector, error_size
+from .vectors import ContactVector, RateVector, StateVector, error_size, planar_indices
 
 
 class InternalStep:
@@ -85,6 +85,9 @@ class InternalStep:
                 self.h_next, size = time_scale.initial_step(model, self, t, self.y1, self.f1, self.modes1)
                 self.save_scale_floor()
                 self.active_method.raise_scale_floor(model, size)
+        for i in planar_indices:
+            self.y1 = planar_contact.begin_slip(model, self, i)
+            self.f1 = model.rates(t, self.y1, self.modes1)
         self.t0 = t
         self.save_counters()
         if has_events(model):

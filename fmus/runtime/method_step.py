@@ -6,7 +6,7 @@ SIAM J. Sci. Comput. 18 (1997) 1-22).
 
 from math import inf
 
-from . import conditions, contact_lcp, event_location, phase_repetition, step_end, step_limits
+from . import conditions, contact_lcp, event_location, phase_repetition, planar_contact, step_end, step_limits
 from .codes import DIVERGED, EPSILON, NEEDS_REPETITION, OK, STALLED, STUCK
 from .event_location import INTERPOLANT_SHARE, NEAR_ZERO_SHARE
 from .interpolant import largest_of
@@ -24,6 +24,7 @@ from .vectors import (
     kinematic_rates,
     magnitude,
     max_of,
+    planar_indices,
     select_kinematic,
     slip_index,
     sum_of,
@@ -102,6 +103,8 @@ def accept_proposal(model, step):
         if error > 1.0 and method.floor_share > 0.0:
             e = relative_to_rounding(model, step, modes, y, d, size2, h)
             error = h * max_of(e) / tolerance
+        for i in planar_indices:
+            error = planar_contact.larger_error(model, step, modes, h, y1, d, error, i)
         share = 1.0
         if error <= 1.0 and sum_of(size1, e) < OVERFLOW_LIMIT:  # False for NaN
             if has_narrow_features(model, step):
@@ -194,6 +197,8 @@ def end_at_first_event(model, step):
     if model.is_coupled or model.has_conditions:
         event_location.evaluate_on_cubic(model, step)
         step_limits.limit_step(model, step)
+        for i in planar_indices:
+            location.must_shorten = location.must_shorten or planar_contact.has_reversed(model, step, i)
         if location.must_shorten:
             return NEEDS_REPETITION
     end = event_location.locate_events(model, step)
@@ -210,6 +215,10 @@ def end_at_first_event(model, step):
         if location.must_shorten:
             return NEEDS_REPETITION
         return step_end.end_at(model, step, end)
+    for i in planar_indices:
+        duration = planar_contact.time_to_rest(model, step, i)
+        if duration < inf:
+            return step_end.end_at_rest(model, step, duration, i)
     if model.is_coupled and step.is_hybrid:
         step.y1 = contact_lcp.stop_slips(model, step.t1, step.y1, step.modes0)
         step.f1 = complete_rates(step.y1, step.f1)

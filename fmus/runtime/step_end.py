@@ -1,14 +1,18 @@
 """End of a step: state, modes and rates at an event, and what the next step starts with."""
 
-from . import conditions, contact_lcp, phase_repetition, stick_slip, time_scale
+from math import inf
+
+from . import conditions, contact_lcp, phase_repetition, planar_contact, stick_slip, time_scale
 from .codes import DIVERGED, EXACT, OK, ROUNDOFF_MARGIN, STUCK
 from .step_kind import follows_closed_form, has_events, has_law_without_sticking, is_at_rest
 from .vectors import (
+    ContactIndex,
     ContactVector,
     any_of,
     contact_indices,
     contact_vector,
     magnitude,
+    planar_indices,
     slip_index,
     sum_of,
 )
@@ -55,6 +59,24 @@ def end_at(model, step, h):
             for i in contact_indices:
                 if ends[i] <= h:
                     step.y1[slip_index[i]] = 0.0
+    return end_at_event(model, step)
+
+
+def end_at_rest(model, step, duration, i: ContactIndex):
+    """End a step where the slip of a contact in a plane vanishes, `duration` seconds after its end.  Returns a status.
+
+    The duration is so short that the rates at the end of the step give the states.
+    """
+    step.y1 = step.y1 + duration * step.f1
+    step.t1 = step.roundoff.event_time(step.t0, step.h_full + duration)
+    ends = contact_vector()
+    for j in contact_indices:
+        ends[j] = inf
+    ends[i] = step.h_full
+    step.y1, step.modes1, step.has_consistent_modes = contact_lcp.resolve_after_event(
+        model, step, step.h_full, ends, tie_tolerance(model, step)
+    )
+    step.h_next = 0.0  # the last steps before rest are short
     return end_at_event(model, step)
 
 
@@ -136,6 +158,9 @@ def restart_after_event(model, step):
                 step.f1[slip_index[i]] = a if step.modes1[i] * a > 0.0 else 0.0
     if step.h_next == 0.0 and step.active_method.method_number != EXACT:
         step.h_next, _size = time_scale.initial_step(model, step, step.t1, step.y1, step.f1, step.modes1)
+    for i in planar_indices:
+        step.y1 = planar_contact.begin_slip(model, step, i)
+        step.f1 = model.rates(step.t1, step.y1, step.modes1)
     if has_events(model):
         phase_repetition.begin_phase(model, step)
 

@@ -6,7 +6,7 @@ small range of slip velocities (narrow features).
 
 from math import fabs, sqrt
 
-from . import contact_lcp
+from . import contact_lcp, planar_contact
 from .codes import ROUNDOFF_MARGIN, STUCK
 from .event_location import update_event_functions
 from .interpolant import largest_of, smallest_of
@@ -19,6 +19,7 @@ from .vectors import (
     any_of,
     contact_indices,
     contact_vector,
+    planar_indices,
     select_kinematic,
     slip_index,
 )
@@ -104,6 +105,8 @@ def limit_proposal(model, step, modes: ContactVector, h):
         h *= narrow_feature_share(model, step, h, y1, step.f0)
     if model.has_conditions or (model.is_coupled and any_of(modes == STUCK)):
         h = limit_by_clocks(model, step, h)
+    for i in planar_indices:
+        h = planar_contact.limit_step(model, step, modes, h, i)
     return h
 
 

@@ -29,13 +29,15 @@ class ConditionVector(Any):
 ContactIndex = int
 Derivatives = tuple[RateVector, Any]  # of rates by time, and by the states
 
-# Indices of the model: all states; states that are the rate of another; all contacts; for each contact the index of its
-# slip velocity and of the state whose rate that is.
+# Indices of the model: all states; states that are the rate of another; all contacts; contacts in a plane; for each
+# contact the index of its slip velocity and of the state whose rate that is, and whether it acts in a plane.
 state_indices: list[int] = []
 velocity_indices: list[int] = []
 contact_indices: list[int] = []
+planar_indices: list[int] = []
 slip_index: list[int] = []
 position_index: list[int] = []
+is_planar: list[bool] = []
 
 
 def state_vector() -> StateVector:

@@ -20,6 +20,7 @@ PACKAGE = "vector_sources"
 VECTOR_TYPES = (StateVector, RateVector, ContactVector, ConditionVector)
 
 state_indices, velocity_indices, contact_indices, slip_index, position_index = [], [], [], [], []
+planar_indices, is_planar = [], []
 is_dynamic, is_angle, rate_index = [], [], []  # of each state; the rate where it is a state
 
 
@@ -195,6 +196,8 @@ def fill_indices(model):
     velocity_indices[:] = [states.index(name) for name in states if name in rates]
     slip_index[:] = [states.index(name) if name in states else -1 for name in slips]
     position_index[:] = [rates.index(name) if name in rates else -1 for name in slips]
+    is_planar[:] = [mode in getattr(model, "planar_modes", ()) for mode in model.contacts]
+    planar_indices[:] = [i for i, planar in enumerate(is_planar) if planar]
     is_angle[:] = [name in model.angles for name in states]
     is_dynamic[:] = [name not in states for name in rates]
     rate_index[:] = [states.index(name) if name in states else -1 for name in rates]

@@ -284,6 +284,10 @@ def differentiate_term(e: Term, slope: Callable[[Operand], Operand]) -> Operand:
             return build_term("choose", a, slope(e.args[1]), slope(b))
         case "copysign":
             return 0.0
+        case "slip_direction":
+            changes = slope(a), slope(e.args[1])
+            is_constant_direction = all(is_constant(change, 0.0) for change in changes)
+            return 0.0 if is_constant_direction else Term("slip_turn", a, e.args[1], *changes)
     if e.op in COMPARISONS:
         raise ModelError("a comparison has no derivative", e.location)
     return _apply_chain_rule(FUNCTIONS[e.op](a, e), slope(a))
@@ -414,6 +418,8 @@ def _term_magnitude(e: Term, scales: Memo) -> Operand:
             return scales[id(a)]
         case "choose":
             return build_term("choose", a, scales[id(e.args[1])], scales[id(b)])
+        case "slip_direction":  # at its zeros, it is not small
+            return 1.0
         case "sin" | "tan":
             return Term("fabs", e)
         case "cos":  # at its zeros, it is not small

@@ -21,7 +21,7 @@ from .algebra import (
 )
 from .expressions import Expression, ModelError, Operand, Term, is_among
 from .model_conditions import HOLD_TOLERANCE, Condition, is_nonnegative, table_limits
-from .model_declaration import Contact, Rule, State
+from .model_declaration import Contact, PlanarContact, Rule, State
 from .model_roles import TIME, ModelRoles
 
 SMALLEST_DIVISOR = 1e-100  # in place of an inverse mass that vanishes; its square is not zero
@@ -41,14 +41,18 @@ class ContactAnalysis(ModelRoles):
         forces = (*self.contacts, *self.modes)
         for c in self.contacts:
             self._check_inputs_in_slip(c)
-        self.slip_rate: dict[Contact, Operand] = {
-            c: self.derivative(c.slip, self.time_derivatives) for c in self.contacts
-        }
-        self.A: dict[tuple[Contact, Contact], Operand] = {}
-        for c in self.contacts:
+        self.planar_contacts = [c for c in self.contacts if isinstance(c, PlanarContact)]
+        self.line_contacts = lines = [c for c in self.contacts if not is_among(c, self.planar_contacts)]
+        self.slip_rate: dict[Contact, Operand] = {c: self.derivative(c.slip, self.time_derivatives) for c in lines}
+        self.A: dict[tuple[Contact, Contact], Operand] = {(c, d): 0.0 for c in self.contacts for d in self.contacts}
+        self.load: dict[Contact, Operand] = {}
+        self.planar_rates: dict[PlanarContact, list[Operand]] = {}  # of both slips, without friction
+        for planar in self.planar_contacts:
+            self._find_planar_load(planar)
+        for c in lines:
             if depends_on(c.slip, forces) or depends_on(c.slide, self.contacts):
                 raise ModelError(f"slip and slide of {c.name} must not depend on the force of a contact", c.location)
-            for d in self.contacts:
+            for d in lines:
                 effect = self.derivative(self.slip_rate[c], {d: 1.0})
                 if depends_on(effect, forces):
                     raise ModelError(f"{d.name} must enter the rate of the slip of {c.name} linearly", d.location)
@@ -64,14 +68,11 @@ class ContactAnalysis(ModelRoles):
         self.interacting_contacts = [c for c in self.contacts if not is_among(c, self.independent_contacts)]
         moving = (*self.time_varying, *self.input_symbols)
         self.variable_lever_contacts = [
-            c
-            for c in self.contacts
-            if any(depends_on(self.derivative(c.slip, {s: 1.0}), moving) for s in self.dynamic_states)
+            c for c in lines if any(depends_on(self.derivative(c.slip, {s: 1.0}), moving) for s in self.dynamic_states)
         ]
         self.holding_limit: dict[Contact, Operand] = {}
-        self.load: dict[Contact, Operand] = {}
         for c in self.contacts:
-            at_rest = {c.slip: 0.0} if isinstance(c.slip, Expression) else {}
+            at_rest = values_at_rest(c)
             self.holding_limit[c] = substitute(c.slide, at_rest) if c.hold is None else c.hold
             if depends_on(self.holding_limit[c], forces):
                 equal = "pass hold=" if c.hold is None else "write a hold= that does not"
@@ -80,7 +81,7 @@ class ContactAnalysis(ModelRoles):
                     f"directions; otherwise {DIRECTION_ADVICE}",
                     c.location,
                 )
-            if is_among(c, self.independent_contacts):
+            if is_among(c, lines) and is_among(c, self.independent_contacts):
                 # other forces that occur in the rate cancel
                 e = substitute(self.slip_rate[c], {d: 0.0 for d in self.contacts if d is not c})
                 load = (
@@ -89,6 +90,60 @@ class ContactAnalysis(ModelRoles):
                     else build_term("/", substitute(e, {c: 0.0}), self.divisor(c))
                 )
                 self.load[c] = substitute(load, {c.mode: 0.0} | (at_rest if isinstance(c.slip, State) else {}))
+
+    def _find_planar_load(self, c: PlanarContact) -> None:
+        """Derive the load of a contact in a plane, and the components of its force.
+
+        Its forces act alike in all directions, and on its own slips only.  So the load is a vector, which holds the
+        body at rest, and the direction of the friction while it slides is that of the slip.
+        """
+        if depends_on(c.slide - (0.0 if c.hold is None else c.hold), (*self.contacts, *self.modes, *c.components)):
+            raise ModelError(f"slide and hold of {c.name} must not depend on friction or on its mode", c.location)
+        rates = [self.derivative(slip, self.time_derivatives) for slip in c.slips]
+        inverse_mass, across, other_across, other_inverse_mass = (
+            negate(self.derivative(rate, {force: 1.0})) for rate in rates for force in c.components
+        )
+        for e in (c.slips[0], c.slips[1]):
+            if any(depends_on(self.derivative(e, {s: 1.0}), self.time_varying) for s in self.states):
+                raise ModelError(f"slip of {c.name} must be sums of speeds, without products or functions", c.location)
+        if is_same_expression(inverse_mass, 0.0):
+            raise ModelError(f"{c.name}.x does not act on its own slip, so it can never stick", c.location)
+        is_alike = is_same_expression(inverse_mass, other_inverse_mass)
+        if not (is_alike and is_same_expression(across, 0.0) and is_same_expression(other_across, 0.0)):
+            raise ModelError(
+                f"{c.name}.x and {c.name}.y do not accelerate their slips alike: a PlanarContact needs the same mass "
+                "in all directions, and a body that does not turn",
+                c.location,
+            )
+        for d in self.contacts:
+            parts = d.components if isinstance(d, PlanarContact) else (d,)
+            slips = d.slips if isinstance(d, PlanarContact) else (d.slip,)
+            others = [self.derivative(slip, self.time_derivatives) for slip in slips]
+            pairs = [(rate, force) for rate in rates for force in parts]
+            pairs += [(rate, force) for rate in others for force in c.components]
+            if d is not c and any(
+                not is_same_expression(self.derivative(rate, {force: 1.0}), 0.0) for rate, force in pairs
+            ):
+                raise ModelError(
+                    f"{c.name} and {d.name} act on the same motion: put a spring between the bodies, because a "
+                    "PlanarContact cannot share the rest of a body with another contact",
+                    c.location,
+                )
+        loads = [
+            solve_for(rate, force)
+            if path_to(rate, force) is not None
+            else build_term("/", substitute(rate, {force: 0.0}), inverse_mass)
+            for rate, force in zip(rates, c.components, strict=True)
+        ]
+        (x, y), (load_x, load_y), total = c.slips, loads, 0.0
+        is_stuck = Term("==", c.mode, 0)
+        for force, *pair in (c.x, x, y, load_x, load_y), (c.y, y, x, load_y, load_x):
+            direction = Term("slip_direction", *pair)
+            force.expression = Term("choose", is_stuck, pair[2], build_term("*", c.slide, direction))
+            total = build_term("+", total, build_term("*", pair[2], direction))
+        self.load[c], self.A[c, c] = total, inverse_mass
+        self.slip_rate[c] = build_term("*", inverse_mass, build_term("-", total, c))
+        self.planar_rates[c] = [substitute(rate, dict.fromkeys(c.components, 0.0)) for rate in rates]
 
     def _check_inputs_in_slip(self, c: Contact) -> None:
         """Raise ModelError for an input without a rate in a slip: static friction could not follow it."""
@@ -163,20 +218,22 @@ class ContactAnalysis(ModelRoles):
         and for slips that are the product of a lever and a speed.
         """
         result: list[tuple[Contact, State, Operand]] = []
-        remaining = list(self.contacts)
+        remaining = [
+            (c, slip) for c in self.contacts for slip in (c.slips if isinstance(c, PlanarContact) else (c.slip,))
+        ]
         while True:
             alone = [
-                (c, s)
-                for c in remaining
+                (c, slip, s)
+                for c, slip in remaining
                 for s in self.dynamic_states
-                if (is_summand(c.slip, s) or (is_factor(c.slip, s) and depends_on(self.rate_outputs[s], (c,))))
-                and not any(depends_on(d.slip, (s,)) for d in remaining if d is not c)
+                if (is_summand(slip, s) or (is_factor(slip, s) and depends_on(self.rate_outputs[s], (c,))))
+                and not any(depends_on(other, (s,)) for _, other in remaining if other is not slip)
             ]
             if not alone:
                 return result
-            c, s = alone[0]
-            result.insert(0, (c, s, solve_for(c.slip, s) if is_summand(c.slip, s) else 0.0))
-            remaining = [d for d in remaining if d is not c]
+            c, slip, s = alone[0]
+            result.insert(0, (c, s, solve_for(slip, s) if is_summand(slip, s) else 0.0))
+            remaining = [(d, other) for d, other in remaining if other is not slip]
 
     def _dynamic_expressions(self) -> list[Operand]:
         """Return the expressions that determine the motion."""
@@ -238,7 +295,7 @@ class ContactAnalysis(ModelRoles):
                     "contact lifts off there, declare lifts_off=True"
                 )
                 result.append(Condition(c.slide, (c.slide,), sentence=sentence))
-            at_rest = substitute(c.slide, {c.slip: 0.0}) if isinstance(c.slip, Expression) else c.slide
+            at_rest = substitute(c.slide, values_at_rest(c))
             if c.hold is None or depends_on(c.slide, (c.mode,)) or not depends_on(c.hold - at_rest, varying):
                 continue
             surplus = build_term("-", build_term("*", 1.0 + HOLD_TOLERANCE, c.hold), at_rest)
@@ -306,3 +363,9 @@ class ContactAnalysis(ModelRoles):
                 share = A[d, c] / A[c, c]
                 for e in contacts[n + 1 :]:
                     A[d, e] -= share * A[c, e]
+
+
+def values_at_rest(c: Contact) -> dict[Expression, Operand]:
+    """Return the slips of a contact at rest, and for one in a plane also the speeds that are its slips."""
+    slips = (c.slip, *(c.slips if isinstance(c, PlanarContact) else ()))
+    return {slip: 0.0 for slip in slips if isinstance(slip, Expression)}

@@ -5,7 +5,7 @@ Interacting contacts share one linear system, in which a sliding contact has the
 derivatives and impulses of the forces satisfy systems with the same matrix.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from .algebra import build_term, is_same_expression, magnitudes, rounding_scales, substitute
@@ -14,7 +14,7 @@ from .contact_analysis import SMALLEST_DIVISOR
 from .expression_printer import ExpressionPrinter
 from .expressions import Expression, Operand, Term, is_among
 from .model_analysis import ModelAnalysis
-from .model_declaration import SIGN, THRESHOLD, Contact, State
+from .model_declaration import SIGN, THRESHOLD, Contact, PlanarContact, State, Variable
 
 
 @dataclass
@@ -38,40 +38,40 @@ def coupled_contact_methods(context: CodegenContext) -> list[str]:
     slips = [c.slip for c in context.analysis.contacts]
     return [
         method_source("slip_velocities", ["t", *context.states], context.return_lines(context.printer(), slips)),
-        slip_scale_method(context, "slip_magnitudes", magnitudes(slips)),
-        slip_scale_method(context, "slip_roundings", rounding_scales(slips)),
+        slip_scale_method(context, "slip_magnitudes", slip_scales(context, magnitudes)),
+        slip_scale_method(context, "slip_roundings", slip_scales(context, rounding_scales)),
         *slip_deviation_method(context),
         forces_method(context),
         force_rates_method(context),
         impulse_method(context),
+        *planar_motion_method(context),
     ]
 
 
 # ---- unknowns
 
 
-def force_unknown(context: CodegenContext) -> ContactUnknown:
-    """Return the contact forces as unknowns."""
+def force_unknown(context: CodegenContext, contacts: Sequence[Contact]) -> ContactUnknown:
+    """Return the forces of some contacts as unknowns."""
     analysis = context.analysis
     no_force = dict.fromkeys(analysis.contacts, 0.0)
     stuck_values = {
-        c: analysis.load[c] if c in analysis.load else substitute(analysis.slip_rate[c], no_force)
-        for c in analysis.contacts
+        c: analysis.load[c] if c in analysis.load else substitute(analysis.slip_rate[c], no_force) for c in contacts
     }
-    return ContactUnknown(
-        {c: c for c in analysis.contacts}, {c: Term("*", c.mode, c.slide) for c in analysis.contacts}, stuck_values
-    )
+    return ContactUnknown({c: c for c in contacts}, {c: Term("*", c.mode, c.slide) for c in contacts}, stuck_values)
 
 
-def derivative_unknown(context: CodegenContext, name: str, by: dict[Expression, Operand]) -> ContactUnknown:
-    """Return the derivatives of the forces along `by` as unknowns."""
+def derivative_unknown(
+    context: CodegenContext, name: str, by: dict[Expression, Operand], contacts: Sequence[Contact]
+) -> ContactUnknown:
+    """Return the derivatives of the forces of some contacts along `by` as unknowns."""
     analysis, fixed = context.analysis, by | dict.fromkeys(context.analysis.contacts, 0.0)
-    sliding_values = {c: analysis.sliding_force_derivative(c, by) for c in analysis.contacts}
+    sliding_values = {c: analysis.sliding_force_derivative(c, by) for c in contacts}
     stuck_values = {
         c: analysis.derivative(analysis.load[c], by)
         if c in analysis.load
         else analysis.derivative(analysis.slip_rate[c], fixed)
-        for c in analysis.contacts
+        for c in contacts
     }
     terms = {
         c: [
@@ -79,13 +79,13 @@ def derivative_unknown(context: CodegenContext, name: str, by: dict[Expression, 
             stuck_values[c],
             *([analysis.derivative(analysis.holding_limit[c], by)] if THRESHOLD in c.laws else []),
         ]
-        for c in analysis.contacts
+        for c in contacts
     }
-    zeros = {c for c in analysis.contacts if all(is_same_expression(e, 0.0) for e in terms[c])}
+    zeros = {c for c in contacts if all(is_same_expression(e, 0.0) for e in terms[c])}
     if not zeros.issuperset(analysis.interacting_contacts):  # their system has a solution other than zero
         zeros &= {*analysis.independent_contacts}
     return ContactUnknown(
-        {c: 0.0 if c in zeros else local_symbol(f"{name}_{c.name}") for c in analysis.contacts},
+        {c: 0.0 if c in zeros else local_symbol(f"{name}_{c.name}") for c in contacts},
         sliding_values,
         stuck_values,
     )
@@ -180,14 +180,14 @@ def slips_of_laws(analysis: ModelAnalysis) -> list[Operand]:
     return [c.slip for c in analysis.contacts if len(c.laws) > 1]
 
 
-def emit_friction_forces(context: CodegenContext, printer: ExpressionPrinter) -> None:
-    """Emit the forces and modes under the selected law."""
+def emit_friction_forces(context: CodegenContext, printer: ExpressionPrinter, needed: Sequence[Contact]) -> None:
+    """Emit the modes, and the forces of some contacts, under the selected law."""
     contacts = [c for c in context.analysis.contacts if len(c.laws) > 1]
     if contacts:
         with printer.block("if self.friction != HYBRID:"):
             for c in contacts:
                 printer.emit(f"{c.mode.name} = {law_mode(printer, c)}")
-    emit_solution(context, printer, [force_unknown(context)], by_law=True)
+    emit_solution(context, printer, [force_unknown(context, needed)], by_law=True)
     for c in contacts:
         if THRESHOLD in c.laws:
             with printer.block(f"if {c.mode.name} == 0 and self.friction != HYBRID:"):
@@ -202,6 +202,30 @@ def slip_scale_method(context: CodegenContext, name: str, scales: list[Operand])
     context.emit_driver(printer, sizes)
     printer.count_uses(*sizes)
     return method_source(name, ["t", *context.states], emit_return(printer, sizes))
+
+
+def slip_scales(context: CodegenContext, scales: Callable[[Sequence[Operand]], list[Operand]]) -> list[Operand]:
+    """Return the scales of the slips; in a plane the sum of those of the components, which a square root would lose."""
+    result = []
+    for c in context.analysis.contacts:
+        parts = scales(c.slips if isinstance(c, PlanarContact) else [c.slip])
+        result.append(parts[0] if len(parts) == 1 else build_term("+", *parts))
+    return result
+
+
+def planar_motion_method(context: CodegenContext) -> list[str]:
+    """Return the source of the method for the motion in planes; nothing without contacts in planes."""
+    analysis = context.analysis
+    if not analysis.planar_contacts:
+        return []
+    rows: list[list[Operand]] = [
+        [*c.slips, *analysis.planar_rates[c], build_term("*", analysis.A[c, c], c.slide)]
+        if isinstance(c, PlanarContact)
+        else [0.0] * 5
+        for c in analysis.contacts
+    ]
+    targets = [row[k] for k in range(5) for row in rows]
+    return [method_source("planar_motion", context.arguments, context.return_lines(context.printer(), targets))]
 
 
 def slip_deviation_method(context: CodegenContext) -> list[str]:
@@ -226,7 +250,7 @@ def slip_deviation_method(context: CodegenContext) -> list[str]:
 
 def forces_method(context: CodegenContext) -> str:
     """Forces, limits, and of both together sizes and rounding scales, larger than the limits where terms cancel."""
-    analysis, printer, forces = context.analysis, context.printer(), force_unknown(context)
+    analysis, printer, forces = context.analysis, context.printer(), force_unknown(context, context.analysis.contacts)
     loads = [analysis.load.get(c, analysis.slip_rate[c]) for c in analysis.contacts]
     limits = [analysis.holding_limit[c] for c in analysis.contacts]
     sizes = [
@@ -245,9 +269,10 @@ def forces_method(context: CodegenContext) -> str:
 
 def force_rates_method(context: CodegenContext) -> str:
     """Rates of forces and limits, residual forces that would hold the contacts, and their rates."""
-    analysis, printer, forces = context.analysis, context.printer(), force_unknown(context)
+    analysis, printer = context.analysis, context.printer()
+    forces = force_unknown(context, analysis.contacts)
     by_time = analysis.time_derivatives
-    force_rates = derivative_unknown(context, "rate", by_time)
+    force_rates = derivative_unknown(context, "rate", by_time, analysis.contacts)
     by_time_with_forces = by_time | {c: force_rates.symbols[c] for c in analysis.contacts}
     residual_forces, residual_force_rates = [], []
     for c in analysis.contacts:
@@ -278,19 +303,34 @@ def impulse_method(context: CodegenContext) -> str:
         c: c.slip if c not in analysis.load else build_term("/", c.slip, analysis.divisor(c)) for c in analysis.contacts
     }
     impulse = ContactUnknown(
-        {c: local_symbol(f"impulse_{c.name}") for c in analysis.contacts},
+        {
+            c: 0.0 if is_among(c, analysis.planar_contacts) else local_symbol(f"impulse_{c.name}")
+            for c in analysis.contacts
+        },
         dict.fromkeys(analysis.contacts, 0.0),
         stuck_values,
     )
+    # the impulse in each contact, or in each component of one in a plane, by the force
+    impulses: dict[Variable, Operand] = {c: impulse.symbols[c] for c in analysis.line_contacts}
+    components: list[tuple[PlanarContact, Expression, Operand]] = []
+    for planar in analysis.planar_contacts:
+        for component, slip in zip(planar.components, planar.slips, strict=True):
+            symbol = local_symbol(printer.fresh_name(f"impulse_{component.name}"))
+            impulses[component] = symbol
+            components.append((planar, symbol, build_term("/", slip, analysis.divisor(planar))))
     after: dict[State, Operand] = {}
     for state in analysis.dynamic_states:
-        for c in analysis.contacts:
-            effect = analysis.derivative(analysis.rate_outputs[state], {c: 1.0})
+        for force, value in impulses.items():
+            effect = analysis.derivative(analysis.rate_outputs[state], {force: 1.0})
             if not is_same_expression(effect, 0.0):
-                after[state] = build_term("+", after.get(state, state), build_term("*", effect, impulse.symbols[c]))
-    context.emit_driver(printer, [*impulse.terms, *after.values()])
-    printer.count_uses(*impulse.terms, *after.values())
+                after[state] = build_term("+", after.get(state, state), build_term("*", effect, value))
+    values = [*impulse.terms, *(value for _, _, value in components), *after.values()]
+    context.emit_driver(printer, values)
+    printer.count_uses(*values)
     emit_solution(context, printer, [impulse])
+    for planar, symbol, value in components:
+        printer.emit(f"{symbol.name} = {printer.text(value)} if {planar.mode.name} == 0 else 0.0")
+        printer.bound_names[symbol] = symbol.name
     printer.emit(", ".join(e.name for e in after) + " = " + ", ".join(printer.text(e) for e in after.values()))
     for c, state, value in analysis.stick_assignments:
         with printer.block(f"if {c.mode.name} == 0:"):

@@ -229,6 +229,8 @@ def _term_dimensions(e: Expression, memo: dict[int, Dimensions | None]) -> Dimen
             return quotient(a, b) if e.op == "/" else quotient(a, quotient(DIMENSIONLESS, b))
         case "neg" | "fabs":
             return a
+        case "slip_direction":
+            return DIMENSIONLESS
         case "sqrt":
             return a and tuple(p / 2 for p in a)
     if a not in (None, DIMENSIONLESS):

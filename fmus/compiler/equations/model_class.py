@@ -100,6 +100,8 @@ def table_lines(analysis: ModelAnalysis) -> list[str]:
 
 def base_class(analysis: ModelAnalysis) -> str:
     """Return the runtime base class of the model."""
+    if analysis.planar_contacts:
+        return "PlanarFriction"
     return "DryFriction" if analysis.rests_when_stuck else "CoupledFriction" if analysis.contacts else "Oscillator"
 
 
@@ -164,6 +166,8 @@ def class_attribute_lines(analysis: ModelAnalysis) -> list[str]:
             for c in analysis.contacts
         )
         lines.append(f"contacts = {{{slips}}}")
+    if analysis.planar_contacts:
+        lines.append(f"planar_modes = ({', '.join(string_literal(c.mode.name) for c in analysis.planar_contacts)},)")
     if analysis.angles:
         lines.append(f"angles = ({', '.join(string_literal(s.name) for s in analysis.angles)},)")
     states_and_drivers = (*analysis.states, *analysis.drivers)

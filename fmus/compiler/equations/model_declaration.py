@@ -320,6 +320,62 @@ class Contact(Variable):
             raise ModelError("eps is required with the law THRESHOLD and not allowed without it")
 
 
+class PlanarContact(Contact):
+    """The force of dry friction of a body on a plane, with the same limit in all directions. ::
+
+        mode = Mode("0 stuck, 1 sliding")
+        R = PlanarContact("N", "friction", mode=mode, slip=(v_x, v_y), slide=mu * m * g)
+        a_x = Output("m/s2", "acceleration along x", (F_x - R.x) / m, rate_of=v_x)
+        a_y = Output("m/s2", "acceleration along y", (F_y - R.y) / m, rate_of=v_y)
+
+    `R` is the size of the force, and `R.x` and `R.y` are its components, which oppose the slip: they are outputs of the
+    FMU as well.  `R.speed` is the size of the slip.
+
+    Parameters
+    ----------
+    unit, text
+        As for Parameter.
+    mode
+        The declared Mode of the contact: 0 stuck, 1 sliding.
+    slip
+        Both components of the relative velocity: states or sums of states and prescribed motions, such as v_x - v_belt.
+    slide
+        Force while sliding, at least 0.
+    hold
+        Largest force while stuck, at least `slide`; by default the sliding force at rest.
+    **options
+        See the table of options.
+    """
+
+    def __init__(
+        self,
+        unit: str,
+        text: str,
+        mode: Mode,
+        slip: tuple[Operand, Operand],
+        slide: Operand,
+        hold: Operand = None,
+        **options: Unpack[Options],
+    ) -> None:
+        if not isinstance(slip, tuple) or len(slip) != 2:
+            raise ModelError(
+                f"slip of a PlanarContact must be a pair of speeds, as in (v_x, v_y), got {describe(slip)}"
+            )
+        x, y = map(as_operand, slip)
+        self.slips = (x, y)
+        self.speed = Term("sqrt", Term("+", Term("*", x, x), Term("*", y, y)))
+        Contact.__init__(self, unit, text, mode, self.speed, slide, hold, **options)
+        mode.low = 0
+        # the analysis of the contacts sets their expressions
+        self.x, self.y = (Output(unit, f"{text}, component along {axis}", 0.0) for axis in ("x", "y"))
+        self.own_variables = (("_x", ".x", self.x), ("_y", ".y", self.y))
+
+    @property
+    def components(self) -> tuple[Output, Output]:
+        """The components of the force."""
+        return self.x, self.y
+
+
 class Rule:
     """Parameters that the model refuses.
 

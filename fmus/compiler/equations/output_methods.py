@@ -38,7 +38,7 @@ def observe_method(context: CodegenContext) -> str:
     if context.single_contact is not None:
         emit_friction_force(context, printer, context.single_contact)
     elif analysis.contacts:
-        emit_friction_forces(context, printer)
+        emit_friction_forces(context, printer, analysis.contacts)
     for e in analysis.outputs:
         if isinstance(e.expression, Term):
             printer.local_variable(e)

@@ -51,10 +51,10 @@ def rates_method(context: CodegenContext, of_terms: bool = False) -> str:
         printer.bound_names[c] = c.name
         return method_source(name, context.arguments, emit_return(printer, targets))
     elif analysis.contacts:
-        terms = force_unknown(context).terms
+        terms = force_unknown(context, analysis.line_contacts).terms
         context.emit_driver(printer, [*targets, *terms, *slips_of_laws(analysis)])
         printer.count_uses(*targets, *terms)
-        emit_friction_forces(context, printer)
+        emit_friction_forces(context, printer, analysis.line_contacts)
         return method_source(name, context.arguments, emit_return(printer, targets))
     return method_source(name, context.arguments, context.return_lines(printer, targets))
 
@@ -102,18 +102,19 @@ def coupled_jacobian_lines(
     context: CodegenContext, printer: ExpressionPrinter, directions: list[dict[Expression, Operand]]
 ) -> list[str]:
     """Return the lines that compute the Jacobian while some contacts slide and others stick."""
-    forces = [derivative_unknown(context, f"by_{next(iter(by)).name}", by) for by in directions]
+    contacts = context.analysis.line_contacts
+    forces = [derivative_unknown(context, f"by_{next(iter(by)).name}", by, contacts) for by in directions]
     targets = [
         context.analysis.derivative(rate, by | unknown.symbols)
         for rate in context.rate_outputs
         for by, unknown in zip(directions, forces, strict=True)
     ]
-    terms = [e for unknown in (force_unknown(context), *forces) for e in unknown.terms]
+    terms = [e for unknown in (force_unknown(context, contacts), *forces) for e in unknown.terms]
     context.emit_driver(printer, [*terms, *targets, *slips_of_laws(context.analysis)])
     printer.count_uses(*terms, *targets)
-    emit_friction_forces(context, printer)
+    emit_friction_forces(context, printer, contacts)
     emit_solution(context, printer, forces, by_law=True)
-    for c in context.analysis.contacts:
+    for c in contacts:
         columns = [
             (unknown.symbols[c], by)
             for unknown, by in zip(forces, directions, strict=True)

@@ -6,6 +6,7 @@ from keyword import iskeyword
 from ...runtime.contact_lcp import CoupledFriction
 from ...runtime.method_registry import methods
 from ...runtime.oscillator import Oscillator
+from ...runtime.planar_contact import PlanarFriction
 from ...runtime.stick_slip import DryFriction
 from .expressions import FUNCTIONS, Expression, ModelError
 from .model_declaration import Model
@@ -17,13 +18,14 @@ IMPORTS = {  # module -> names that generated code may import
     "codes": ("EXACT", "HYBRID", "MODEL_RULE", "OK"),
     "input_polynomial": ("InputPolynomial", "PrescribedMotion"),
     "contact_lcp": ("CoupledFriction",),
+    "planar_contact": ("PlanarFriction", "slip_direction", "slip_turn"),
     "variable_declarations": ("Enumeration", "VariableDeclaration"),
     "integrator": ("Integrator",),
     "active_method": ("EXACT_ITEM", "METHOD_ITEMS"),
     "oscillator": ("Oscillator",),
 }
 CLASSES = ("Solver", "Model", "Fmi3Slave")
-BASES = (Model, Oscillator, DryFriction, CoupledFriction)  # of declared and generated classes
+BASES = (Model, Oscillator, DryFriction, CoupledFriction, PlanarFriction)  # of declared and generated classes
 ATTRIBUTES = {name for base in BASES for name in (*dir(base), *get_annotations(base)) if not name.startswith("_")}
 FMI_NAMES = ("time", "solver", "events")  # of variables that each FMU has
 RESERVED = {

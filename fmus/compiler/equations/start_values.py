@@ -5,12 +5,13 @@ import operator
 from collections.abc import Callable, Sequence
 from typing import Any
 
+from ...runtime.planar_contact import slip_direction
 from .algebra import ARITHMETIC, has_condition_on, is_same_expression, operands, subexpressions, variables_in
 from .contact_analysis import DIRECTION_ADVICE
 from .dimensions import expression_text
 from .expressions import Expression, ModelError, Operand, Term
 from .model_analysis import ModelAnalysis
-from .model_declaration import Contact, Fixed, Input, Output, Parameter, State
+from .model_declaration import Contact, Fixed, Input, Output, Parameter, PlanarContact, State
 from .tables import Coefficient, Piece
 
 SMALL_SLIP = 1e-9  # m/s or rad/s, for the two sides of zero slip
@@ -20,6 +21,7 @@ OPERATIONS: dict[str, Callable[..., Any]] = {
     **ARITHMETIC,
     **{"<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operator.ge, "==": operator.eq},
     "neg": operator.neg,
+    "slip_direction": slip_direction,
 }
 
 
@@ -42,6 +44,8 @@ def check_friction_forces(analysis: ModelAnalysis) -> None:
                 evaluate(e, values, {})
             except ModelError as error:
                 raise ModelError(f"{c.name}: {error}", c.location) from error
+        if isinstance(c, PlanarContact):  # its slip has a size only
+            continue
         check_symmetry(c, values, values | output_values)
         if c.hold is None:
             for point in (values, shifted_values(analysis, values)):
@@ -122,7 +126,7 @@ def check_state_ranges(analysis: ModelAnalysis) -> None:
 
 def start_values(analysis: ModelAnalysis) -> dict[Expression, float]:
     """Return the values of parameters, inputs and states at the start; what follows from them counts as 0."""
-    values: dict[Expression, float] = dict.fromkeys(analysis.time_varying, 0.0)
+    values: dict[Expression, float] = dict.fromkeys((*analysis.time_varying, *analysis.input_symbols), 0.0)
     values |= {e: float(e.start) for e in (*analysis.parameters, *analysis.choices, *analysis.inputs)}
     memo: dict[int, float] = {}
     for s in analysis.states:

@@ -27,6 +27,7 @@ class ModelLayout:
     n_conditions
                 number of conditions of the equations
     angles      states that are angles and enter the equations by periodic functions only
+    planar      modes of the contacts in a plane
     """
 
     states: dict[str, str]
@@ -38,6 +39,7 @@ class ModelLayout:
     zeros: frozenset[tuple[int, int]] = frozenset()
     n_conditions: int = 0
     angles: tuple[str, ...] = ()
+    planar: tuple[str, ...] = ()
 
     def component_names(self, kind: str) -> list[str]:
         """Return the names of the states or modes."""
@@ -80,6 +82,10 @@ class ModelLayout:
         """Return the index of the state whose rate is the slip of a contact."""
         name = list(self.contacts.values())[contact]
         return list(self.states.values()).index(name) if name else -1
+
+    def is_planar(self, contact: int) -> bool:
+        """Return whether a contact acts in a plane."""
+        return list(self.contacts)[contact] in self.planar
 
     def contact_suffix(self, contact: int) -> str:
         """Return the suffix of names that belong to a contact; empty for a single contact."""

@@ -53,7 +53,8 @@ def model_layout(source: ModelFile, features: FeatureSelection) -> ModelLayout:
     )
     zeros = zero_jacobian_entries(source.generated_source, layout)
     n_conditions = model.n_event_functions - model.first_condition
-    return replace(layout, zeros=zeros, n_conditions=n_conditions, angles=model.angles)
+    planar = getattr(model, "planar_modes", ())
+    return replace(layout, zeros=zeros, n_conditions=n_conditions, angles=model.angles, planar=planar)
 
 
 def zero_jacobian_entries(text: str, spec: ModelLayout) -> frozenset[tuple[int, int]]:
@@ -76,6 +77,7 @@ def lower_all(source: ModelFile, features: FeatureSelection) -> LoweredFiles:
     file = f"{source.name}.py"
     modules = {label: "linear_closed_form" if label == EXACT else label for label in spec.excluded}
     excluded = {f"runtime/{module}.py" for module in modules.values()}
+    excluded |= set() if spec.planar else {"runtime/planar_contact.py"}
     texts = {path: text for path, text in runtime_sources().items() if path not in excluded} | {
         file: source.generated_source
     }

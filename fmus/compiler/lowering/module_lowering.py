@@ -69,6 +69,7 @@ class FileLowerer:
         """Unroll a loop over states or contacts."""
         index_ranges = {
             "contact_indices": range(len(self.spec.contacts)),
+            "planar_indices": filter(self.spec.is_planar, range(len(self.spec.contacts))),
             "state_indices": range(len(self.spec.states)),
         }
         result = []

@@ -11,9 +11,9 @@ from .vector_symbols import ELEMENTWISE, ERROR_SIZE_OF_ANGLE, SELECTIONS, Source
 
 REDUCTIONS = {"max_of": ">", "min_of": "<"}  # reductions to one component
 ALLOCATORS = ("state_vector", "contact_vector")
-LOOP_RANGES = ("state_indices", "velocity_indices", "contact_indices")  # iterables of loops
+LOOP_RANGES = ("state_indices", "velocity_indices", "contact_indices", "planar_indices")  # iterables of loops
 METHOD_LOOP = "methods"  # iterable of (label, module, class)
-INDEX_LOOKUPS = {"slip_index": "slip", "position_index": "place"}
+INDEX_LOOKUPS = {"slip_index": "slip", "position_index": "place", "is_planar": "is_planar"}
 
 
 class Substitution(TreeTransformer):

@@ -260,6 +260,8 @@ class TangentWriter:
                 if branches == (None, None):
                     return None
                 return parse_expression(f"{source_of(branches[0])} if {source_of(test)} else {source_of(branches[1])}")
+            case ast.Call(func=ast.Name(id="slip_direction"), args=parts):
+                return self.operation_tangent(e, "slip_direction", *parts)
             case ast.Call(func=ast.Name(id="threshold"), args=[v, eps, load, slide, hold]):
                 changes = [source_of(self.tangent_of(e)) for e in (load, slide, hold)]
                 return parse_expression(

@@ -1,0 +1,154 @@
+"""Stick and slip of contacts in a plane, where friction opposes the slip velocity and its limit is a circle.
+
+The slip velocity is a vector, and its size is the slip of the contact: mode 0 is stuck, 1 sliding.  At rest the force
+equals the load, up to the holding limit; a body that breaks away starts along its load.
+
+While the size of the slip falls, a step covers a share of the time in which the present rate would remove it.  For a
+constant load that time is a lower bound on the time to rest, so no step passes the kink of the friction at zero slip.
+Where the slip is below the errors of the method and the load below the friction, the motion to rest has a closed form:
+
+    d(s (d + w cos(phi)))/dt = w^2 - d^2
+
+with the size s of the slip, the accelerations d by friction and w by the load, and the angle phi between slip and load.
+A body whose load exceeds the friction leaves along its load from where its slip is a rounding error.
+"""
+
+from math import inf, sqrt
+
+from .codes import CO_SIMULATION_ONLY, EPSILON, MODEL_EXCHANGE, OK, ROUNDOFF_MARGIN, STUCK
+from .contact_lcp import CoupledFriction
+from .vectors import ContactIndex, ContactVector, StateVector, select_kinematic
+
+# Of the time in which the present rate would remove the slip, or has built it up
+APPROACH_SHARE, GROWTH_SHARE = 0.75, 3.0
+FIRST_SHARE = 1e-12  # of the first step after a break-away: duration after which the slip begins with a direction
+ROUNDING_SHARE = 1e-12  # of the largest slip since the last event; a smaller one is a rounding error
+ERROR_SHARE = 1e-3  # of the slip, by which errors may change it in a step
+UNCERTAIN = 2.0  # relative error of a step where they change it more
+CONSTANT_SHARE = 0.01  # of the excess of friction over load, by which the load may change up to the rest
+TINY = 1e-300  # avoids a division by zero
+TIME_RESOLUTION = 64.0 * EPSILON  # share of the time since the start; shorter steps stall
+
+
+class PlanarFriction(CoupledFriction):
+    """Oscillator with contacts in a plane."""
+
+    rules: dict[int, str] = {
+        **CoupledFriction.rules,
+        CO_SIMULATION_ONLY: "model exchange is refused: the solver of the FMU finds where a body comes to rest "
+        "in a plane; use co-simulation",
+    }
+
+    def planar_motion(
+        self, t: float, y: StateVector, modes: ContactVector
+    ) -> tuple[ContactVector, ContactVector, ContactVector, ContactVector, ContactVector]:
+        """Return both components of the slips, those of their rates without friction, and the rate by friction."""
+
+
+def interface_status(run):
+    """Return OK, or the status of the refusal if the importer uses its own solver."""
+    return CO_SIMULATION_ONLY if run.interface == MODEL_EXCHANGE else OK
+
+
+def slip_direction(slip, other_slip, load, other_load):
+    """Return one component of the direction of the slip; where nothing slips, of the load."""
+    size = sqrt(slip * slip + other_slip * other_slip)
+    if size > 0.0:
+        return slip / size
+    size = sqrt(load * load + other_load * other_load)
+    return load / size if size > 0.0 else 0.0
+
+
+def slip_turn(slip, other_slip, change, other_change):
+    """Return the change of one component of the direction of the slip; at rest the direction is that of the load."""
+    size = sqrt(slip * slip + other_slip * other_slip)
+    return other_slip / size * (other_slip / size * change - slip / size * other_change) / size if size > 0.0 else 0.0
+
+
+def slips_freely(model, step, modes: ContactVector, i: ContactIndex):
+    """Return whether no friction opposes the slip."""
+    force, limit, _sizes, _terms = model.contact_forces(step.t0, step.y0, modes)
+    return force[i] == 0.0 and limit[i] == 0.0
+
+
+def limit_step(model, step, modes: ContactVector, h, i: ContactIndex):
+    """Limit a step by the time in which the present rate would remove the slip, or has built it up.
+
+    Friction turns a small slip fast.
+    """
+    x, y, load_x, load_y, friction = model.planar_motion(step.t0, step.y0, modes)
+    size = sqrt(x[i] * x[i] + y[i] * y[i])
+    if modes[i] == STUCK or size == 0.0 or slips_freely(model, step, modes, i):
+        return h
+    rate_x, rate_y = load_x[i] - friction[i] * x[i] / size, load_y[i] - friction[i] * y[i] / size
+    share = APPROACH_SHARE if x[i] * rate_x + y[i] * rate_y < 0.0 else GROWTH_SHARE
+    longest = share * size / sqrt(rate_x * rate_x + rate_y * rate_y + TINY)
+    return longest if longest < h else h
+
+
+def begin_slip(model, step, i: ContactIndex) -> StateVector:
+    """Return the states after an event; a slip that begins there has the direction of its load, not of rounding errors.
+
+    The slip of a moment later is below all errors.
+    """
+    states, modes = step.y1, step.modes1
+    x, y, _load_x, _load_y, _friction = model.planar_motion(step.t1, states, modes)
+    duration = FIRST_SHARE * step.h_next if modes[i] != STUCK and x[i] == 0.0 and y[i] == 0.0 else 0.0
+    f = model.rates(step.t1 + duration, states, modes)
+    return select_kinematic(states, states + duration * f)
+
+
+def larger_error(model, step, modes: ContactVector, h, y1: StateVector, e: StateVector, error, i: ContactIndex):
+    """Return the relative error of a proposed step, above 1 if the errors `h * e` of the states turn the slip.
+
+    Where the slip is small, they may be within the tolerance and yet larger than the slip.
+    """
+    if modes[i] == STUCK or error > 1.0 or h <= TIME_RESOLUTION * step.t0:
+        return error
+    y2 = y1 + h * e
+    x, y, _load_x, _load_y, friction = model.planar_motion(step.t0 + h, y1, modes)
+    other_x, other_y, _load_x2, _load_y2, _friction2 = model.planar_motion(step.t0 + h, y2, modes)
+    dx, dy = other_x[i] - x[i], other_y[i] - y[i]
+    is_small = ERROR_SHARE * sqrt(x[i] * x[i] + y[i] * y[i]) < sqrt(dx * dx + dy * dy)
+    return UNCERTAIN if friction[i] > 0.0 and is_small else error
+
+
+def has_reversed(model, step, i: ContactIndex):
+    """Return whether a step that could be shorter turns the slip by more than a right angle.
+
+    The slip may have passed zero, where its direction changes at once.
+    """
+    if step.modes0[i] == STUCK or step.event_location.is_frictionless[i] > 0.0:
+        return False
+    x, y, _load_x, _load_y, _friction = model.planar_motion(step.t0, step.y0, step.modes0)
+    x1, y1, _load_x1, _load_y1, _friction1 = model.planar_motion(step.t1, step.y1, step.modes0)
+    return x[i] * x1[i] + y[i] * y1[i] < 0.0 and step.h_full > TIME_RESOLUTION * step.t0
+
+
+def time_to_rest(model, step, i: ContactIndex):
+    """Return how long after a step the slip vanishes, if it falls and the method does not resolve it; else inf."""
+    location = step.event_location
+    if step.modes0[i] == STUCK or location.is_frictionless[i] > 0.0:
+        return inf
+    x, y, load_x, load_y, friction = model.planar_motion(step.t1, step.y1, step.modes0)
+    size = sqrt(x[i] * x[i] + y[i] * y[i])
+    if size == 0.0:
+        return inf  # it has just broken away
+    along, across = (x[i] * load_x[i] + y[i] * load_y[i]) / size, (x[i] * load_y[i] - y[i] * load_x[i]) / size
+    if not along < friction[i]:
+        return inf
+    rate = sqrt((along - friction[i]) * (along - friction[i]) + across * across)
+    rounding = ROUNDING_SHARE * location.peaks[i] + ROUNDOFF_MARGIN * location.roundings[i]
+    if size <= rounding + TIME_RESOLUTION * step.t1 * rate:
+        return 0.0
+    load = sqrt(load_x[i] * load_x[i] + load_y[i] * load_y[i])
+    if size > step.tolerance * location.peaks[i] or not load < friction[i]:
+        return inf
+    duration = size * (friction[i] + along) / ((friction[i] - load) * (friction[i] + load))
+    y2 = step.y1 + duration * step.f1
+    _x2, _y2, load_x2, load_y2, _friction2 = model.planar_motion(step.t1 + duration, y2, step.modes0)
+    change = sqrt(
+        (load_x2[i] - load_x[i]) * (load_x2[i] - load_x[i]) + (load_y2[i] - load_y[i]) * (load_y2[i] - load_y[i])
+    )
+    is_constant = change <= CONSTANT_SHARE * (friction[i] - load)
+    return duration if is_constant and step.t1 + duration < step.t_end else inf

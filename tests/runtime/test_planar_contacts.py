@@ -1,0 +1,260 @@
+"""Friction in a plane opposes the velocity, holds up to a circle, and brings a body to rest as the closed form says."""
+
+import re
+from math import atan2, cos, hypot, pi, radians, sin
+
+import commands
+import numpy as np
+import pytest
+from build_cache import build_user_model
+from fmpy import read_model_description
+from mpmath import MPContext
+from native_fmus import require_compiler
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
+from variants import slow_after
+
+import harness
+
+mp = MPContext()
+mp.dps = 40
+NATIVE = ("--native", "--platform", "linux64")
+PUCK = '''from fmus import Contact, cos, Fixed, Input, Mode, Model, Output, Parameter, PlanarContact, State
+
+class {name}(Model):
+    """Body on a plane, on springs."""
+
+    m = Parameter(1.0, "kg", "mass", above=0.0)
+    f = Parameter(2.0, "N", "sliding friction", low=0.0)
+    f_s = Parameter(2.0, "N", "holding friction", low=0.0)
+    k = Parameter(0.0, "N/m", "stiffness", low=0.0)
+    x0 = Fixed(0.0, "m", "initial position along x")
+    v_x0 = Fixed(0.0, "m/s", "initial speed along x")
+    v_y0 = Fixed(0.0, "m/s", "initial speed along y")
+    F_x = Input(0.0, "N", "force along x")
+    F_y = Input(0.0, "N", "force along y")
+    x = State("m", "position along x", start=x0)
+    y = State("m", "position along y")
+    v_x = State("m/s", "speed along x", start=v_x0, rate_of=x)
+    v_y = State("m/s", "speed along y", start=v_y0, rate_of=y)
+    mode = Mode("0 stuck, 1 sliding")
+{belt}    R = PlanarContact("N", "friction", mode=mode, slip={slip}, slide=f, hold=f_s)
+    a_x = Output("m/s2", "acceleration along x", ({load_x} - R.x) / m, rate_of=v_x)
+    a_y = Output("m/s2", "acceleration along y", ({load_y} - R.y) / {mass}, rate_of=v_y)
+{more}    stop_time, step_size, method = 2.0, 0.01, "radau9"
+'''
+# force, direction of the motion from that of the force; friction 2 N, mass 1 kg, speed 1 m/s
+SCENES = [(1.0, pi / 2), (0.1, 2.0), (1.9, 3.1), (1.999, 1.0), (1.0, pi - 1e-6), (1.9, pi / 2)]
+BLOCK = """    k_b = Parameter(100.0, "N/m", "stiffness of the spring of a block")
+    z = State("m", "position of a block", start=0.1)
+    w = State("m/s", "speed of a block", rate_of=z)
+    block_mode = Mode()
+    B = Contact("N", "friction of the block", mode=block_mode, slip=w, slide=f, hold=f_s)
+    b = Output("m/s2", "acceleration of the block", (-k_b * z - B) / m, rate_of=w)
+"""
+
+
+def puck_text(name="Puck", **parts):
+    usual = {"slip": "(v_x, v_y)", "mass": "m", "belt": "", "more": ""}
+    return PUCK.format(name=name, **(usual | {"load_x": "F_x - k * x", "load_y": "F_y - k * y"} | parts))
+
+
+@pytest.fixture(scope="module")
+def build(tmp_path_factory):
+    def build_puck(name, *words, **parts):
+        file = tmp_path_factory.mktemp("models") / f"{name}.py"
+        file.write_text(puck_text(name.title(), **parts))
+        folder = build_user_model(file, *words)
+        return str(next(folder.rglob(f"{name}.fmu")))
+
+    return build_puck
+
+
+@pytest.fixture(scope="module")
+def puck(build):
+    require_compiler()
+    return build("puck", *NATIVE)
+
+
+def push(F_x, F_y, stop):
+    return {"time": [0.0, stop], "F_x": [F_x, F_x], "F_y": [F_y, F_y]}
+
+
+def rest(m, F, f, speed, phi):
+    """Return time and position of the rest under a force along x, by u = tan(phi/2) with d(u)/dt = -F u/(m s)."""
+    m, F, f, speed, phi = map(mp.mpf, (m, F, f, speed, phi))
+    k, u = f / F, mp.tan(phi / 2)
+    C = 2 * speed * u ** (1 - k) / (1 + u * u)
+
+    def power(p):
+        return u**p / p
+
+    time = m * C / (2 * F) * (power(k - 1) + power(k + 1))
+    x = m * C * C / (4 * F) * (power(2 * k - 2) - power(2 * k + 2))
+    y = m * C * C / (2 * F) * (power(2 * k - 1) + power(2 * k + 1))
+    return float(time), float(x), float(y)
+
+
+def errors_at_rest(fmu, m, F, f, speed, phi, turn=0.0, rtol=1e-10):
+    """Return the relative errors of time and position at rest, and the speed afterwards; the plane is turned."""
+    time, x, y = rest(m, F, f, speed, phi)
+    start = {"m": m, "f": f, "f_s": f, "v_x0": speed * cos(phi + turn), "v_y0": speed * sin(phi + turn)}
+    stop = 1.3 * time
+    run = harness.simulate(fmu, start, stop=stop, inputs=push(F * cos(turn), F * sin(turn), stop), rtol=rtol)
+    assert run.events.modes["R"][-1] == 0
+    along = run["x"][-1] * cos(turn) + run["y"][-1] * sin(turn) - x
+    across = run["y"][-1] * cos(turn) - run["x"][-1] * sin(turn) - y
+    return run.events.t[-1] / time - 1.0, hypot(along, across) / (speed * time), hypot(run["v_x"][-1], run["v_y"][-1])
+
+
+@pytest.mark.parametrize(("F", "phi"), slow_after(3, SCENES))
+def test_body_comes_to_rest_as_the_closed_form_says(puck, F, phi):
+    time_error, position_error, speed = errors_at_rest(puck, 1.0, F, 2.0, 1.0, phi)
+    assert abs(time_error) < 1e-10
+    assert position_error < 1e-10
+    assert speed == 0.0
+
+
+@pytest.mark.parametrize(
+    "count", [pytest.param(40, marks=pytest.mark.slow), pytest.param(1000, marks=pytest.mark.campaign)]
+)
+def test_random_motions_come_to_rest_as_the_closed_form_says(puck, count):
+    random = np.random.default_rng(3)
+    for _ in range(count):
+        ratio = random.choice([random.uniform(1e-3, 0.99), 1.0 - 10 ** random.uniform(-4.0, -2.0)])
+        phi = pi - random.choice([random.uniform(0.0, pi), 10 ** random.uniform(-9.0, -3.0)])
+        m, f, speed = random.uniform(0.5, 3.0), random.uniform(0.5, 5.0), random.uniform(0.1, 3.0)
+        time_error, position_error, after = errors_at_rest(puck, m, ratio * f, f, speed, phi, random.uniform(-pi, pi))
+        # a load near the friction decelerates little: the errors of the speed grow by 1 / (1 - ratio)
+        assert abs(time_error) < 1e-9 + 1e-11 / (1.0 - ratio), (ratio, phi)
+        assert position_error < 1e-9, (ratio, phi)
+        assert after == 0.0, (ratio, phi)
+
+
+@pytest.mark.parametrize("degrees", [0, 30, 77, 200])
+def test_limit_is_a_circle(puck, degrees):
+    angle = radians(degrees)
+    for force in (2.0 - 1e-7, 2.0 + 1e-7):
+        run = harness.simulate(puck, stop=1.0, inputs=push(force * cos(angle), force * sin(angle), 1.0), rtol=1e-10)
+        moved, direction = hypot(run["x"][-1], run["y"][-1]), atan2(run["y"][-1], run["x"][-1])
+        assert moved == pytest.approx(max(0.0, 0.5 * (force - 2.0)), rel=1e-7)
+        assert moved == 0.0 or cos(direction - angle) == pytest.approx(1.0, abs=1e-15)
+
+
+@pytest.mark.parametrize("offset", slow_after(2, (0.0, 1e-6, 1e-12, 1e-9, 1e-3)))
+def test_body_passes_zero_speed_nearly_head_on(puck, offset):
+    run = harness.simulate(
+        puck, {"v_x0": cos(offset), "v_y0": sin(offset)}, stop=1.2, inputs=push(-3.0, 0.0, 1.2), rtol=1e-10
+    )
+    # along x to second order in the offset, and across as far as the first 0.2 s lead; both by the closed form
+    assert run["x"][-1] == pytest.approx(-0.4, abs=1e-10 + 0.4 * offset**2)
+    assert run["y"][-1] == pytest.approx(offset / 7.0, rel=1e-4, abs=1e-12)
+
+
+def test_quarter_turn_of_the_plane_changes_no_bit(puck):
+    runs = [
+        harness.simulate(
+            puck, {"k": 40.0, "v_x0": v_x, "v_y0": v_y}, stop=3.0, inputs=push(*force, 3.0), method="dop853"
+        )
+        for v_x, v_y, force in ((1.0, 0.3, (5.0, -2.0)), (-0.3, 1.0, (2.0, 5.0)))
+    ]
+    assert runs[0].events.t.tolist() == runs[1].events.t.tolist()
+    assert len(runs[0].events.t) > 1
+    assert runs[0]["x"].tolist() == runs[1]["y"].tolist()
+    assert runs[0]["y"].tolist() == (-runs[1]["x"]).tolist()
+
+
+def test_body_on_a_belt_moves_as_on_a_table_that_stands_still(puck, build):
+    belt = '    v_b = Input(0.0, "m/s", "speed of the belt", rate=0.0)\n'
+    moving = build("carried", *NATIVE, slip="(v_x - v_b, v_y)", belt=belt, more=BLOCK)
+    still, force = {"v_x0": -0.5, "v_y0": 1.0}, push(0.5, 0.3, 2.0)
+    on_table = harness.simulate(puck, still, stop=2.0, inputs=force, rtol=1e-10)
+    run = harness.simulate(moving, still | {"v_x0": 0.2}, stop=2.0, inputs=force | {"v_b": [0.7, 0.7]}, rtol=1e-10)
+    assert run["x"][-1] - 0.7 * 2.0 == pytest.approx(on_table["x"][-1], abs=1e-10)
+    assert run["y"][-1] == pytest.approx(on_table["y"][-1], abs=1e-10)
+    assert run["v_x"][-1] == 0.7
+    assert on_table.events.t[-1] == pytest.approx(run.events.t[np.array(run.events.modes["R"]) == 0][0], abs=1e-10)
+
+
+@pytest.mark.slow
+def test_python_and_native_fmus_have_the_same_bits(puck, build):
+    python = build("puck")
+    start, force = {"k": 90.0, "f_s": 2.5, "v_y0": 1.0}, push(4.0, 1.0, 3.0)
+    runs = [harness.simulate(fmu, start, stop=3.0, inputs=force) for fmu in (puck, python)]
+    for name in ("x", "y", "v_x", "v_y", "R", "R.x", "R.y", "mode"):
+        assert runs[0][name].tolist() == runs[1][name].tolist(), name
+
+
+def solve_pulled(m, k, f, hold, r, speed, stop):
+    """Return the events of a body at rest that a spring pulls along x and y = r (1 - cos), by scipy."""
+
+    def load(t, y):
+        return np.array([k * (speed * t - y[0]), k * (r * (1.0 - cos(5.0 * t)) - y[1])])
+
+    def rates(t, y):
+        v = hypot(y[2], y[3])
+        return [y[2], y[3], *((load(t, y) - f * y[2:] / v) / m)]
+
+    def slow(t, y):
+        return hypot(y[2], y[3]) - 1e-9
+
+    slow.terminal, slow.direction = True, -1.0
+    t, y, events = 0.0, np.zeros(4), []
+    while True:
+        grid = np.linspace(t, stop, 2000)
+        later = next((i for i, s in enumerate(grid) if hypot(*load(s, y)) > hold), None)
+        if later is None:
+            return events, y
+        t = brentq(lambda s, y=y: hypot(*load(s, y)) - hold, grid[later - 1], grid[later], xtol=1e-15)
+        events.append(t)
+        e = load(t, y) / hypot(*load(t, y))
+        y = y + np.array([0.0, 0.0, *(1e-9 * (hold - f) / m * e)])
+        part = solve_ivp(rates, (t + 1e-9, stop), y, "Radau", rtol=1e-11, atol=1e-13, events=slow)
+        t, y = part.t[-1], part.y[:, -1].copy()
+        if part.status != 1:
+            return events, y
+        force = load(t, y)
+        t += m * (f * hypot(y[2], y[3]) + force @ y[2:]) / (f * f - force @ force)
+        y[2:] = 0.0
+        events.append(t)
+
+
+@pytest.mark.slow
+def test_pulled_body_sticks_and_slips_as_scipy_says(build):
+    require_compiler()
+    driver = """    speed = Parameter(0.1, "m/s", "speed of the driver")
+    r = Parameter(0.05, "m", "amplitude of the driver")
+    Omega = Parameter(5.0, "rad/s", "angular speed")
+    s = State("m", "position of the driver", rate=speed)
+    angle = State("rad", "angle of the driver", rate=Omega)
+"""
+    loads = {"load_x": "k * (s - x) + F_x", "load_y": "k * (r - r * cos(angle) - y) + F_y"}
+    fmu = build("pulled", *NATIVE, belt=driver, **loads)
+    events, y = solve_pulled(1.0, 100.0, 2.0, 3.0, 0.05, 0.1, 4.0)
+    run = harness.simulate(fmu, {"k": 100.0, "f_s": 3.0}, stop=4.0, rtol=1e-10)
+    times = run.events.t[run.events.t > 0.0]
+    assert len(times) == len(events) > 4
+    assert times == pytest.approx(np.array(events), abs=1e-8)
+    assert (run["x"][-1], run["y"][-1]) == pytest.approx((y[0], y[1]), abs=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("parts", "message"),
+    [
+        ({"mass": "(2.0 * m)"}, "R.x and R.y do not accelerate their slips alike"),
+        ({"slip": "(v_x * x, v_y)"}, "slip of R must be sums of speeds"),
+        ({"slip": "v_x"}, "slip of a PlanarContact must be a pair of speeds"),
+        ({"more": BLOCK.replace("slip=w", "slip=w - v_x")}, "R and B act on the same motion"),
+    ],
+)
+def test_unsupported_contact_is_refused_by_name(tmp_path, parts, message):
+    (tmp_path / "puck.py").write_text(puck_text(**parts))
+    done = commands.build("puck.py", folder=tmp_path)
+    assert done.returncode == 1
+    assert re.match(rf"Error: puck.py, line \d+: {message}", done.stderr), done.stderr
+
+
+def test_model_exchange_is_not_offered(puck):
+    description = read_model_description(puck)
+    assert description.modelExchange is None
+    assert description.coSimulation is not None
