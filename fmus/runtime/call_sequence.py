@@ -6,7 +6,6 @@ texts).
 
 from math import fabs, inf, isfinite, nan
 
-from . import planar_contact
 from .codes import (
     BAD_START,
     BAD_STEP,
@@ -24,7 +23,6 @@ from .codes import (
     RUNNING,
 )
 from .integrator import STEP_END_TOLERANCE
-from .vectors import planar_indices
 
 # ---- values
 
@@ -67,10 +65,6 @@ def check_values(run, model):
     status = check_experiment(run)
     if status != OK:
         return status
-    for _ in planar_indices:
-        status = planar_contact.interface_status(run)
-        if status != OK:
-            return status
     status = model.prepare()
     if status == OK and run.interface == CO_SIMULATION:  # in model exchange the importer uses its own solver
         return run.solver.check_method(model)

@@ -24,7 +24,6 @@ MAX_INPUT_ORDER = 3  # highest derivative of an input, of the chain of position,
 # Rules that the values violate; a model has their messages by status
 FIRST_RULE = 101
 HYBRID_LAW_ONLY, NO_CONSISTENT_MODES = 101, 102  # method exact with another law; no stick and slip balances the forces
-CO_SIMULATION_ONLY = 103  # contacts in a plane
 MODEL_RULE = 110  # first rule of the model itself, then its others and its limits
 
 EPSILON = 2.220446049250313e-16  # machine epsilon of a double

@@ -15,7 +15,7 @@ A body whose load exceeds the friction leaves along its load from where its slip
 
 from math import inf, sqrt
 
-from .codes import CO_SIMULATION_ONLY, EPSILON, MODEL_EXCHANGE, OK, ROUNDOFF_MARGIN, STUCK
+from .codes import EPSILON, ROUNDOFF_MARGIN, STUCK
 from .contact_lcp import CoupledFriction
 from .vectors import ContactIndex, ContactVector, StateVector, select_kinematic
 
@@ -33,21 +33,10 @@ TIME_RESOLUTION = 64.0 * EPSILON  # share of the time since the start; shorter s
 class PlanarFriction(CoupledFriction):
     """Oscillator with contacts in a plane."""
 
-    rules: dict[int, str] = {
-        **CoupledFriction.rules,
-        CO_SIMULATION_ONLY: "model exchange is refused: the solver of the FMU finds where a body comes to rest "
-        "in a plane; use co-simulation",
-    }
-
     def planar_motion(
         self, t: float, y: StateVector, modes: ContactVector
     ) -> tuple[ContactVector, ContactVector, ContactVector, ContactVector, ContactVector]:
         """Return both components of the slips, those of their rates without friction, and the rate by friction."""
-
-
-def interface_status(run):
-    """Return OK, or the status of the refusal if the importer uses its own solver."""
-    return CO_SIMULATION_ONLY if run.interface == MODEL_EXCHANGE else OK
 
 
 def slip_direction(slip, other_slip, load, other_load):
