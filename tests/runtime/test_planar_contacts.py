@@ -164,6 +164,7 @@ def test_quarter_turn_of_the_plane_changes_no_bit(puck):
     assert runs[0]["y"].tolist() == (-runs[1]["x"]).tolist()
 
 
+@pytest.mark.slow
 def test_body_on_a_belt_moves_as_on_a_table_that_stands_still(puck, build):
     belt = '    v_b = Input(0.0, "m/s", "speed of the belt", rate=0.0)\n'
     moving = build("carried", *NATIVE, slip="(v_x - v_b, v_y)", belt=belt, more=BLOCK)
