@@ -3,10 +3,10 @@
     M v' = f(t, q, v) - G^T F,   q' = v,   slip = G v - belt(t)
 
 A contact slides with F = mode * slide(slip, load), or sticks with slip = 0 while |F| <= hold.  While its limit is
-zero it neither sticks nor makes events, and its mode stays that of its last slip with friction.  Nothing here is shared
-with the code under test: the motion between events is a Taylor series of high order, so every guard is a polynomial
-whose first root is located to rounding errors; the modes after an event come from all combinations of stick and slip,
-judged by the first Taylor coefficients that do not vanish.
+zero it neither sticks nor makes events, and its mode stays that of its last slip with friction (unless
+`reversals_are_events`).  Nothing here is shared with the code under test: the motion between events is a Taylor series
+of high order, so every guard is a polynomial whose first root is located to rounding errors; the modes after an event
+come from all combinations of stick and slip, judged by the first Taylor coefficients that do not vanish.
 
 References
 ----------
@@ -71,7 +71,10 @@ class Contact:
 
 @dataclass(frozen=True)
 class System:
-    """Bodies, springs, contacts and the forces force_0 + force_1 sin(angle), angle = angle_0 + omega t."""
+    """Bodies, springs, contacts and the forces force_0 + force_1 sin(angle), angle = angle_0 + omega t.
+
+    `reversals_are_events` says that contacts have events at reversals of their slips also without friction.
+    """
 
     masses: tuple[float, ...]
     springs: tuple[Spring, ...]
@@ -84,6 +87,7 @@ class System:
     angle_0: float = 0.0
     v_driver: float = 0.0
     stop: float = 4.0
+    reversals_are_events: bool = False
 
 
 class UnsolvableError(Exception):
@@ -95,7 +99,8 @@ class Decision:
     """A decision and its margin: how far it is from the opposite one, relative to the scale of the quantity.
 
     `kind` is "dip" (a guard nearly falls to zero), "crossing" (a guard falls below zero and would rise again),
-    "order" (another guard falls to zero nearly at the same time), "touch" (a guard touches zero, which is no event),
+    "order" (another guard falls to zero nearly at the same time), "touch" (a guard touches zero, which is no event, but
+    errors decide whether a slip that would then be held ends there),
     "modes" (which contacts stick) or "choice" (several
     combinations hold equally many contacts, so the rule that prefers held contacts does not decide).
     """
@@ -330,8 +335,8 @@ class _Run:
         return abs(g.slope(end)) * end**g.power / scale
 
     def is_free(self, i):
-        """Return whether a contact has no friction at present."""
-        return self.mu_s[i] == 0.0 or not self.pressed[i]
+        """Return whether a contact has neither friction nor events at present."""
+        return not self.system.reversals_are_events and (self.mu_s[i] == 0.0 or not self.pressed[i])
 
     def advance(self, series, t):
         self.q, self.v = series.state(t)
@@ -392,7 +397,10 @@ class _Run:
                 if GRID[j] * h < end and min(values[j, n], values[j + 1, n]) > -TOUCH * g.scale:
                     low = brentq(g.slope, GRID[j] * h, GRID[j + 1] * h, xtol=1e-16)
                     if low < end and abs(g.value(low)) <= TOUCH * g.scale:
-                        self.solution.decisions.append(Decision(self.t + low, "touch", g.contact, inf))
+                        # a slip that touches zero ends there if a static limit above the sliding force holds it
+                        ends = g.kind == "slip" and self.mu_s[g.contact] > self.mu_p[g.contact]
+                        margin = 0.0 if ends else inf
+                        self.solution.decisions.append(Decision(self.t + low, "touch", g.contact, margin))
                     elif low < end:
                         self.note("dip", g.contact, g.value(low), g.kind, self.t + low)
 

@@ -55,6 +55,15 @@ class Structure:
         return any(other == DRIVER for _, other, _, _ in self.springs)
 
     @property
+    def rests_when_stuck(self):
+        """Whether the only body rests while the only contact sticks, under a load that is linear in time.
+
+        Such a contact has events at reversals without friction too.
+        """
+        c = self.contacts[0]
+        return self.n == 1 and not (c.belt or c.load_1 or c.load_t or c.limited or self.force_1[0])
+
+    @property
     def has_clock(self):
         return any(c.load_t for c in self.contacts)
 
@@ -353,6 +362,7 @@ def to_system(structure, values):
         get("angle_0"),
         get("v_driver"),
         STOP,
+        s.rests_when_stuck,
     )
 
 
