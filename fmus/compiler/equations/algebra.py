@@ -236,34 +236,6 @@ def negate(e: Operand) -> Operand:
     return Term("neg", e)
 
 
-def differentiate(e: Operand, by: Mapping[Expression, Operand], names: dict[Expression, str] | None = None) -> Operand:
-    """Return the derivative of e, where `by` gives the derivatives of the variables.
-
-    New terms that are derivatives of named terms are added to `names`.
-    """
-    names = {} if names is None else names
-    existing, moving, result = subexpressions(e), dependents([e], by), Memo()
-
-    def moving_operands(part: Operand) -> tuple[Operand, ...]:
-        if id(part) not in moving or part in by or getattr(part, "op", "") == "copysign":
-            return ()
-        return value_operands(part)
-
-    for part in operands_first(e, operands_of=moving_operands):
-        if id(part) not in moving or part in by:
-            new = by.get(part, 0.0)
-        elif isinstance(part, Output):
-            new = result[id(part.expression)]
-        else:
-            assert isinstance(part, Term)
-            new = differentiate_term(part, lambda operand: result[id(operand)])
-        result[id(part)] = new
-        name = (part.name or names.get(part, "")) if isinstance(part, (Term, Output)) and part not in by else ""
-        if name and isinstance(new, Term) and not (new.name or new in names) and id(new) not in existing:
-            names[new] = f"d{name}_d{next(iter(by)).name}"
-    return result[id(e)]
-
-
 def differentiate_term(e: Term, slope: Callable[[Operand], Operand]) -> Operand:
     """Return the derivative of a term, where `slope` returns those of its operands."""
     a, b = e.args[0], e.args[-1]
@@ -291,6 +263,48 @@ def differentiate_term(e: Term, slope: Callable[[Operand], Operand]) -> Operand:
     if e.op in COMPARISONS:
         raise ModelError("a comparison has no derivative", e.location)
     return _apply_chain_rule(FUNCTIONS[e.op](a, e), slope(a))
+
+
+def differentiate(
+    e: Operand,
+    by: Mapping[Expression, Operand],
+    names: dict[Expression, str] | None = None,
+    of_term: Callable[[Term, Callable[[Operand], Operand]], Operand] = differentiate_term,
+) -> Operand:
+    """Return the derivative of an expression.
+
+    Parameters
+    ----------
+    e
+        Expression.
+    by
+        Derivatives of the variables; those of others are zero.
+    names
+        Receives new terms that are derivatives of named terms.
+    of_term
+        Rules: returns the derivative of a term, given a function that returns those of its operands.
+    """
+    names = {} if names is None else names
+    existing, moving, result = subexpressions(e), dependents([e], by), Memo()
+
+    def moving_operands(part: Operand) -> tuple[Operand, ...]:
+        if id(part) not in moving or part in by or getattr(part, "op", "") == "copysign":
+            return ()
+        return value_operands(part)
+
+    for part in operands_first(e, operands_of=moving_operands):
+        if id(part) not in moving or part in by:
+            new = by.get(part, 0.0)
+        elif isinstance(part, Output):
+            new = result[id(part.expression)]
+        else:
+            assert isinstance(part, Term)
+            new = of_term(part, lambda operand: result[id(operand)])
+        result[id(part)] = new
+        name = (part.name or names.get(part, "")) if isinstance(part, (Term, Output)) and part not in by else ""
+        if name and isinstance(new, Term) and not (new.name or new in names) and id(new) not in existing:
+            names[new] = f"d{name}_d{next(iter(by)).name}"
+    return result[id(e)]
 
 
 def _apply_chain_rule(outer: Operand, inner: Operand) -> Operand:

@@ -7,8 +7,10 @@ inputs and parameters change in a given direction:
     propagate_constant_tangent  of the constants that prepare calculates: by parameters
     propagate_tangent           of outputs and derivatives, from compute_outputs: by states, driver, inputs, parameters
 
-The rules of derivatives are those of compiler/equations/algebra.py.  The functions take the same branches as those of
-the model.  Where friction sticks, the force equals the load, and their tangents are equal as well.
+The right-hand side of each statement is read as an expression, which compiler/equations/algebra.py differentiates as it
+does the equations.  Only the statements are walked here: they are those of the lowered model, with the branches, the
+forces of stuck contacts and the constants that it calculates.  Where friction sticks, the force equals the load, and
+their tangents are equal as well.
 
 References
 ----------
@@ -18,23 +20,23 @@ A. Griewank, A. Walther, Evaluating Derivatives, chapter 3.
 import ast
 import math
 import sys
-from collections.abc import Iterable, Sequence
-from itertools import count
+from collections.abc import Callable, Iterable, Sequence
 from math import fabs
 from types import FunctionType
 from typing import Any
 
-from ...compiler.equations.algebra import differentiate_term
+from ...compiler.equations.algebra import build_term, differentiate, differentiate_term
 from ...compiler.equations.expression_printer import BINARY_OPERATORS, ExpressionPrinter
 from ...compiler.equations.expressions import FUNCTIONS, Expression, Operand, Term
 from ...compiler.equations.model_analysis import ANALYSES
 from ...compiler.lowering import component_name, function_tree
-from ...compiler.lowering.import_hook import TREE_NAME
+from ...compiler.lowering.import_hook import TREE_NAME, complete_tree
 from ..fmi_variables import DERIVATIVE_NAME, Variables
 
 # Prefix of tangents, and the parameter that holds the direction and the results. No variable of a model starts with _.
 PREFIX, TANGENT = "_d_", "_tangent"
-ARGUMENT = Expression()
+# functions beside those of the equations: the friction force under the threshold law, the direction of a planar slip
+THRESHOLD, SLIP_DIRECTION = "threshold", "slip_direction"
 OPERATIONS = {type(operator): word for word, operator in BINARY_OPERATORS.items()}
 
 
@@ -74,8 +76,7 @@ def build_tangent_functions(model: Any, declared: Variables) -> tuple[Tangent, d
     names = vars(math) | vars(module) | {threshold_tangent.__name__: threshold_tangent}
     functions = {}
     for name, body in bodies.items():
-        text = ast.unparse(ast.fix_missing_locations(ast.Module([function_around(name, body)], [])))
-        tree = ast.parse(text)
+        tree = complete_tree(ast.Module([function_around(name, body)], []))
         own_names = names | {TREE_NAME: tree}
         exec(compile(tree, module.__file__ or "?", "exec", optimize=0), own_names)
         functions[name] = own_names[name]
@@ -150,14 +151,14 @@ class TangentWriter:
             elif meaning.causality in ("input", "parameter") and name in fields:
                 self.seeds |= dict.fromkeys((name, f"{name}_polynomial"), fields[name])
         # derivatives of inputs with a declared rate -> the expressions that the rates give for them
-        derivatives = ANALYSES[model].declared_derivatives()
-        texts = {e.name: ExpressionPrinter({}, (), (), 0).text(value) for e, value in derivatives.items()}
-        self.input_derivatives = {name: parse_expression(text) for name, text in texts.items()}
+        self.input_derivatives = {
+            e.name: ast.parse(ExpressionPrinter({}, (), (), 0).text(value), mode="eval").body
+            for e, value in ANALYSES[model].declared_derivatives().items()
+        }
         self.driver_rates = {fields[DERIVATIVE_NAME.format(name)]: d.rate for name, d in declared if d.rate}
         self.arrays: list[str] = []  # lists of constants, which have lists of tangents
         self.with_tangent: set[str] = set()  # local variables with a tangent
-        self.temporaries = count(1)
-        self.pending: list[ast.stmt] = []  # statements that the next assignment needs
+        self.used_names: set[str] = set()  # of the local variables
 
     def differentiate_start(self, statements: list[ast.stmt]) -> list[ast.stmt]:
         """Return statements that add the changes of the states at the start to their tangents."""
@@ -190,10 +191,11 @@ class TangentWriter:
             Tangents to which the changes of the returned values are added.
         """
         lines: list[ast.stmt] = []
+        self.used_names |= {part.id for node in statements for part in ast.walk(node) if isinstance(part, ast.Name)}
         for node in statements:
             match node:
                 case ast.Assign(targets=[ast.Name(id=name)]) if name in self.drivers:  # a state of the importer
-                    lines += [self.assignment(f"{PREFIX}{name}", parse_expression(f"{TANGENT}.{name}")), node]
+                    lines += [*parse_statements([f"{PREFIX}{name} = {TANGENT}.{name}"]), node]
                     self.with_tangent.add(name)
                 case ast.Assign(targets=[ast.Name(id=name)]) if name in self.input_derivatives:
                     lines += [*self.assign_tangent(f"{PREFIX}{name}", self.input_derivatives[name]), node]
@@ -207,91 +209,97 @@ class TangentWriter:
                     lines += self.assign_tangent(f"{TANGENT}.{results[name]}", value)
                 case ast.Assign(targets=[ast.Subscript(ast.Attribute(attr=name), index)], value=value):
                     self.arrays += [name] if name not in self.arrays else []
-                    lines += self.assign_tangent(f"{TANGENT}.{name}[{source_of(index)}]", value)
+                    lines += self.assign_tangent(f"{TANGENT}.{name}[{ast.unparse(index)}]", value)
                 case ast.If():
                     branches = (self.differentiate(part, results, returned) for part in (node.body, node.orelse))
                     lines.append(ast.If(node.test, *branches))
                 case ast.Return(value=value) if returned and value is not None:
                     starts = value.elts if isinstance(value, ast.Tuple) else [value]
                     for name, start in zip(returned, starts, strict=True):
-                        lines += self.assign_tangent(f"{TANGENT}.{name}", start, parse_expression(f"{TANGENT}.{name}"))
+                        lines += self.assign_tangent(f"{TANGENT}.{name}", start, f"{TANGENT}.{name}")
                     lines.append(ast.Return())
         return lines
 
-    def assign_tangent(self, target: str, value: ast.expr, before: ast.expr | None = None) -> list[ast.stmt]:
-        """Return the statements that assign the tangent of a value, added to the one before."""
-        tangent = add_terms(before, self.tangent_of(value))
-        lines, self.pending = [*self.pending, self.assignment(target, tangent)], []
-        return lines
+    def assign_tangent(self, target: str, value: ast.expr, before: str = "") -> list[ast.stmt]:
+        """Return the statements that assign the tangent of a value, added to the tangent with the text `before`."""
+        names: dict[Expression, str] = {}
+        e, by = self.read_expression(value, names)
+        tangent = differentiate(e, by, of_term=term_tangent)
+        if before:
+            tangent = build_term("+", new_symbol(before, names), tangent)
+        printer = ExpressionPrinter(names, (), self.used_names, 0)
+        printer.count_uses(tangent)
+        printer.emit(f"{target} = {printer.text(tangent)}")
+        self.used_names = printer.used_names  # a local variable of another statement may have another type
+        return parse_statements(printer.lines)
 
-    def function_tangent(self, name: str, argument: ast.expr) -> ast.expr | None:
-        """Return the tangent of a function; zero if its argument does not change, even where its slope is infinite."""
-        change, slope = self.tangent_of(argument), derivative_factor(name, source_of(argument))
-        if change is None:
-            return None
-        if not isinstance(change, (ast.Name, ast.Attribute)):
-            local = f"{PREFIX}{next(self.temporaries)}"
-            self.pending.append(self.assignment(local, change))
-            change = ast.Name(local)
-        return parse_expression(f"({slope}) * {source_of(change)} if {source_of(change)} != 0.0 else 0.0")
+    def read_expression(
+        self, value: ast.expr, names: dict[Expression, str]
+    ) -> tuple[Operand, dict[Expression, Operand]]:
+        """Return a value as an expression, and the tangents of its variables; `names` receives the texts of both."""
+        symbols: dict[str, Expression] = {}
+        by: dict[Expression, Operand] = {}
 
-    @staticmethod
-    def assignment(target: str, value: ast.expr | None) -> ast.stmt:
-        """Return the statement target = value."""
-        return ast.parse(f"{target} = {source_of(value)}").body[0]
+        def symbol(e: ast.expr) -> Expression:
+            text = ast.unparse(e)
+            if text not in symbols:
+                symbols[text] = new_symbol(text, names)
+                if tangent := self.tangent_text(e):
+                    by[symbols[text]] = new_symbol(tangent, names)
+            return symbols[text]
 
-    def tangent_of(self, e: ast.expr) -> ast.expr | None:
-        """Return the tangent of an expression; None if it is zero."""
+        def expression(e: ast.expr) -> Operand:
+            match e:
+                case ast.Constant(value=float(number)):
+                    return number
+                case ast.UnaryOp(op=ast.USub(), operand=inner):
+                    return Term("neg", expression(inner))
+                case ast.BinOp(left=a, op=op, right=b):
+                    return Term(OPERATIONS[type(op)], expression(a), expression(b))
+                case ast.IfExp(test=test, body=yes, orelse=no):
+                    return Term("choose", symbol(test), expression(yes), expression(no))
+                case ast.Call(func=ast.Name(id=name), args=args) if name in (THRESHOLD, SLIP_DIRECTION, *FUNCTIONS):
+                    return Term(name, *map(expression, args))
+            return symbol(e)
+
+        return expression(value), by
+
+    def tangent_text(self, e: ast.expr) -> str:
+        """Return the text of the tangent of a variable; empty if it is zero."""
         match e:
             case ast.Name(id=name) if name in self.with_tangent:
-                return ast.Name(PREFIX + name)
+                return PREFIX + name
             case ast.Attribute(attr=name) if name in self.seeds:
-                return ast.parse(f"{TANGENT}.{self.seeds[name]}", mode="eval").body
+                return f"{TANGENT}.{self.seeds[name]}"
             case ast.Subscript(value=ast.Attribute(attr=name), slice=index) if name in self.arrays:
-                return parse_expression(f"{TANGENT}.{name}[{source_of(index)}]")
+                return f"{TANGENT}.{name}[{ast.unparse(index)}]"
             case ast.Call(func=ast.Attribute(value=polynomial, attr="value_at")):
-                return self.tangent_of(polynomial)
-            case ast.UnaryOp(op=ast.USub(), operand=inner):
-                return self.operation_tangent(e, "neg", inner)
-            case ast.BinOp(left=a, op=op, right=b):
-                return self.operation_tangent(e, OPERATIONS[type(op)], a, b)
-            case ast.IfExp(test=test, body=yes, orelse=no):
-                branches = self.tangent_of(yes), self.tangent_of(no)
-                if branches == (None, None):
-                    return None
-                return parse_expression(f"{source_of(branches[0])} if {source_of(test)} else {source_of(branches[1])}")
-            case ast.Call(func=ast.Name(id="slip_direction"), args=parts):
-                return self.operation_tangent(e, "slip_direction", *parts)
-            case ast.Call(func=ast.Name(id="threshold"), args=[v, eps, load, slide, hold]):
-                changes = [source_of(self.tangent_of(e)) for e in (load, slide, hold)]
-                return parse_expression(
-                    f"threshold_tangent({', '.join(map(source_of, (v, eps, load, hold)))}, {', '.join(changes)})"
-                )
-            case ast.Call(func=ast.Name(id=name), args=[a]) if name in FUNCTIONS:
-                return self.function_tangent(name, a)
-        return None
-
-    def operation_tangent(self, e: ast.expr, word: str, *operands: ast.expr) -> ast.expr | None:
-        """Return the tangent of an operation, by the rules of derivatives for the equations."""
-        changes = [self.tangent_of(operand) for operand in operands]
-        if not any(changes):
-            return None
-        symbols, slopes = ([Expression() for _ in operands] for _ in range(2))
-        term = Term(word, *symbols)
-        rates: dict[int, Operand] = {
-            id(symbol): 0.0 if change is None else slope
-            for symbol, slope, change in zip(symbols, slopes, changes, strict=True)
-        }
-        texts = dict(zip([term, *symbols, *slopes], map(source_of, [e, *operands, *changes]), strict=True))
-        derivative = differentiate_term(term, lambda operand: rates[id(operand)])
-        return parse_expression(ExpressionPrinter(texts, (), (), 0).text(derivative))
+                return self.tangent_text(polynomial)
+        return ""
 
 
-def derivative_factor(name: str, a: str) -> str:
-    """Return the derivative of a function with respect to its argument, as text."""
-    if name == "sqrt":
-        return f"0.5 / sqrt({a})"  # the equations define it as zero at zero; here it faults
-    return ExpressionPrinter({ARGUMENT: a}, (), (), 0).text(FUNCTIONS[name](ARGUMENT, Term(name, ARGUMENT)))
+def new_symbol(text: str, names: dict[Expression, str]) -> Expression:
+    """Return a symbol for a variable, and note its text."""
+    symbol = Expression()
+    names[symbol] = text
+    return symbol
+
+
+def term_tangent(e: Term, tangent: Callable[[Operand], Operand]) -> Operand:
+    """Return the tangent of a term by the rules of derivatives, given those of its operands.
+
+    The tangent of a function is zero if its argument does not change, even where its slope is infinite.  There,
+    another tangent faults; the equations of motion take the slope of sqrt as zero at zero.
+    """
+    if e.op == THRESHOLD:
+        v, eps, load, slide, hold = e.args
+        return Term(threshold_tangent.__name__, v, eps, load, hold, *map(tangent, (load, slide, hold)))
+    if e.op not in FUNCTIONS or e.op == "fabs":
+        return differentiate_term(e, tangent)
+    (argument,) = e.args
+    slope = Term("/", 0.5, e) if e.op == "sqrt" else FUNCTIONS[e.op](argument, e)
+    change = tangent(argument)
+    return build_term("choose", Term("==", change, 0.0), 0.0, build_term("*", slope, change))
 
 
 def threshold_tangent(v, eps, load, hold, d_load, d_slide, d_hold):  # type: ignore[no-untyped-def] # translated to C
@@ -304,18 +312,3 @@ def threshold_tangent(v, eps, load, hold, d_load, d_slide, d_hold):  # type: ign
 def parse_statements(lines: Iterable[str]) -> list[ast.stmt]:
     """Parse lines of source."""
     return ast.parse("\n".join(lines)).body
-
-
-def parse_expression(text: str) -> ast.expr:
-    """Parse the text of an expression."""
-    return ast.parse(text, mode="eval").body
-
-
-def source_of(e: ast.expr | None) -> str:
-    """Return the text of an expression; None is zero."""
-    return "0.0" if e is None else ast.unparse(e)
-
-
-def add_terms(a: ast.expr | None, b: ast.expr | None) -> ast.expr | None:
-    """Return a + b; None is zero."""
-    return b if a is None else a if b is None else ast.BinOp(a, ast.Add(), b)
