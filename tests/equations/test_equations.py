@@ -7,7 +7,7 @@ from itertools import product
 
 import mpmath
 import pytest
-from models import EXAMPLE_MODELS, LARGER_MODELS, MODELS, ROOT
+from models import EXAMPLE_MODELS, LARGER_MODELS, MODELS, ROOT, scalar_class
 
 import fmus
 from fmus.compiler.equations.algebra import ARITHMETIC, rounding_scale
@@ -91,7 +91,7 @@ def same_bits(a, b):
 @EVERY_SOURCE
 def test_generated_code_has_the_bits_of_the_declared_equations(source):
     """Rates and outputs while sliding and while stuck, and the load for which the rates vanish."""
-    analysis, model = find_model(source).analysis, find_model(source).model()
+    analysis, model = find_model(source).analysis, scalar_class(source)()
     modes = [m.name for m in analysis.modes]
     n_tried = 0
     for values, t, at, mode in situations(analysis, model, 300):
@@ -119,7 +119,7 @@ def test_generated_code_has_the_bits_of_the_declared_equations(source):
 @EVERY_SOURCE
 def test_the_rounding_scale_of_loads_and_rates_bounds_them_and_their_rounding_errors(source):
     """Also where large terms cancel; the rounding error is the difference from fifty digits."""
-    analysis, model = find_model(source).analysis, find_model(source).model()
+    analysis, model = find_model(source).analysis, scalar_class(source)()
     for values, t, at, mode in situations(analysis, model, 60):
         values |= at | driver_positions(analysis, model, t) | {m.name: mode for m in analysis.modes}
         values |= {c.name: mode * Evaluated(analysis, values, math).of(c.slide) for c in analysis.contacts}
@@ -156,7 +156,7 @@ def test_magnitudes_of_rates_depend_on_a_choice_and_on_a_driver(tmp_path):
     """They have the driver's own magnitude, and its position where a function takes it."""
     file = tmp_path / "guided.py"
     file.write_text(GUIDED)
-    analysis, model = find_model(file).analysis, find_model(file).model()
+    analysis, model = find_model(file).analysis, scalar_class(file)()
     for values, t, at, _ in situations(analysis, model, 20):
         guide = driver_positions(analysis, model, t)["guide"]
         size = abs(model.x_base) + abs(model.u) * (abs(t) + abs(model.t_base))
@@ -173,7 +173,7 @@ def test_magnitudes_of_rates_depend_on_a_choice_and_on_a_driver(tmp_path):
 @EVERY_SOURCE
 def test_jacobians_agree_with_differences_in_fifty_digits(source):
     """By time and by each state, sliding either way, from direct evaluation of the equations."""
-    analysis, model, differences = find_model(source).analysis, find_model(source).model(), []
+    analysis, model, differences = find_model(source).analysis, scalar_class(source)(), []
     for values, t, at, mode in situations(analysis, model, 40):
         point = values | at | driver_positions(analysis, model, t) | {m.name: mode for m in analysis.modes}
         differences += zip(
@@ -190,7 +190,7 @@ def test_any_number_of_states_and_contacts_is_derived(source):
     """Rates and Jacobian in every mode, for three states and for two contacts; bodies stuck to the ground do not
     move."""
     analysis = find_model(source).analysis
-    model = find_model(source).model()
+    model = scalar_class(source)()
     for values, t, at, _ in situations(analysis, model, 12):
         for modes in product((-1, 0, 1), repeat=len(analysis.modes)):
             situation = values | at | driver_positions(analysis, model, t)
@@ -299,7 +299,7 @@ def test_a_changed_file_is_read_again(tmp_path):
     first = find_model(path)
     assert find_model(path) is first
     path.write_text(path.read_text().replace("157.9", "158.0"))
-    assert find_model(path).model().k == 158.0
+    assert scalar_class(path)().k == 158.0
 
 
 def test_subclassed_variable_types_behave_like_their_base(tmp_path):

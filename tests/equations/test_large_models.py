@@ -6,6 +6,7 @@ import sys
 from contextlib import contextmanager
 
 import pytest
+from models import scalar_class
 from variants import slow_after
 
 from fmus.compiler import BuildError
@@ -89,7 +90,7 @@ def test_work_grows_no_faster_than_n_log_n(tmp_path, shape):
     work = []
     for n in (N, 2 * N, 4 * N):
         source = write_model(tmp_path, shape, n)
-        work.append(count_calls(lambda source=source: source.model))
+        work.append(count_calls(lambda source=source: source.generated_source))
     limit = (4 * math.log(4 * N) - 2 * math.log(2 * N)) / (2 * math.log(2 * N) - math.log(N))
     assert (work[2] - work[1]) / (work[1] - work[0]) < limit
 
@@ -116,7 +117,7 @@ def test_equations_deeper_than_the_stack_of_python_build(tmp_path, shape):
     """The rate has the value that Python calculates; all conditions of a new model object hold."""
     n = 350
     with shallow_stack(300):
-        model = write_model(tmp_path, shape, n).model()
+        model = scalar_class(write_model(tmp_path, shape, n))()
         model.prepare()
     step, force, _ = SHAPES[shape]
     values = [0.1]
@@ -130,7 +131,7 @@ def test_equations_deeper_than_the_stack_of_python_build(tmp_path, shape):
 def test_the_order_of_operations_stays_as_written(tmp_path):
     """Long sums are split into statements without regrouping, so that no bit changes."""
     n, x = 300, 0.1
-    model = write_model(tmp_path, "sum", n).model()
+    model = scalar_class(write_model(tmp_path, "sum", n))()
     model.prepare()
     total = 0 + x / 1.0
     for i in range(n):
@@ -150,7 +151,7 @@ def test_a_chain_of_too_many_cases_is_refused(tmp_path):
     step = "choose(r < 0.001 * i, i * r, values[-1])"
     path.write_text(MODEL.format(n=200, step=step, force=LAST, slide="f"), encoding="utf-8")
     with pytest.raises(BuildError, match=r"line 18: more than 40 choose\(\).*nest them by halves"):
-        load_model_file(path).model  # noqa: B018
+        load_model_file(path).generated_source  # noqa: B018
 
 
 def test_cases_that_share_branches_are_refused_before_they_multiply(tmp_path, monkeypatch):
@@ -159,7 +160,7 @@ def test_cases_that_share_branches_are_refused_before_they_multiply(tmp_path, mo
     step = "choose(r > 0.1 * i, 2.0 * values[-1], r) + choose(v > 0.0, 3.0 * values[-1], r)"
     path.write_text(MODEL.format(n=30, step=step, force=LAST, slide="f"), encoding="utf-8")
     with pytest.raises(BuildError, match=r"a method of this model would have more than 2000 lines"):
-        load_model_file(path).model  # noqa: B018
+        load_model_file(path).generated_source  # noqa: B018
 
 
 def test_many_choices_do_not_multiply(tmp_path):
@@ -175,7 +176,7 @@ def test_many_choices_do_not_multiply(tmp_path):
     path.write_text(f"{head}{declarations}{marker}{tail}", encoding="utf-8")
     source = load_model_file(path)
     assert source.generated_source.count("\n") < 600
-    model = source.model()
+    model = scalar_class(source)()
     model.c3 = 2
     model.prepare()
     assert model.rates(0.0, 0.1, 1.0, 1) == pytest.approx(100.0 * 14 * 0.1 - 10.0 - 2.0, rel=1e-14)

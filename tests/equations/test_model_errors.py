@@ -5,6 +5,7 @@ import re
 
 import pytest
 from commands import build
+from models import scalar_class
 
 import fmus
 from fmus.compiler import BuildError
@@ -638,7 +639,7 @@ def test_a_mistake_is_reported_in_one_sentence_with_its_line(wrong, tmp_path):
     path = tmp_path / "mine.py"
     path.write_text(HEAD + body)
     with pytest.raises(BuildError, match=re.escape(f"{path}, line {line}: {sentence}")) as error:
-        find_model(path).model  # noqa: B018
+        find_model(path).generated_source  # noqa: B018
     assert "\n" not in str(error.value)
 
 
@@ -648,7 +649,7 @@ def test_a_reserved_name_is_refused(name, tmp_path):
     path = tmp_path / "mine.py"
     path.write_text(f'{HEAD}{RATE}    {name} = Parameter(1.0, "1", "ours")\n')
     with pytest.raises(BuildError, match=f"line 17: the name {name} is reserved by the solver or by C"):
-        find_model(path).model  # noqa: B018
+        find_model(path).generated_source  # noqa: B018
 
 
 WORKS = """
@@ -683,7 +684,7 @@ def test_helper_values_of_the_class_body_are_allowed(tmp_path):
     path = tmp_path / "mine.py"
     numbers = '    q = Parameter(np.int64(2), "kg", "q", low=np.float32(0.5))\n    twice = Output("kg", "2 q", q + q)\n'
     path.write_text(HEAD.replace("from", "import numpy as np\nfrom", 1) + RATE + WORKS + USE + numbers)
-    model = find_model(path).model
+    model = scalar_class(path)
     assert {"x_force", "y_force"} <= vars(model).keys()
     assert model.total.text == "sum of x and an expression"
     assert (model.stop_time, model.q.start, model.q.low) == (8.0, 2.0, 0.5)
@@ -693,20 +694,20 @@ def test_helper_values_of_the_class_body_are_allowed(tmp_path):
 def test_friction_may_be_zero_at_the_start(tmp_path):
     path = tmp_path / "mine.py"
     path.write_text(HEAD.replace("f = Parameter(1.0", "f = Parameter(0.0") + DRY + STUCK + USE)
-    assert find_model(path).model.f.start == 0.0
+    assert scalar_class(path).f.start == 0.0
 
 
 def test_friction_may_have_no_value_at_high_speeds(tmp_path):
     path = tmp_path / "mine.py"
     path.write_text(HEAD + DRY.replace("slide=f", "slide=f * sqrt(1.0 - 4.0 * v * v / (u * u))") + STUCK)
-    assert find_model(path).model.f.start == 1.0
+    assert scalar_class(path).f.start == 1.0
 
 
 def test_friction_may_be_divided_by_an_input_that_starts_above_zero(tmp_path):
     path = tmp_path / "mine.py"
     tank = '    tank = Input(2.0, "kg", "mass of a tank")\n'
     path.write_text(HEAD + tank + DRY.replace("slide=f", "slide=f * m / tank") + STUCK + USE)
-    assert find_model(path).model.tank.start == 2.0
+    assert scalar_class(path).tank.start == 2.0
 
 
 def test_a_model_file_may_print(tmp_path, capsys):
@@ -733,7 +734,7 @@ def test_any_docstring_text_survives_unchanged(tmp_path):
     path = tmp_path / "mine.py"
     text = (HEAD + RATE + USE).replace('    """A mass on a spring.', f"    r'''{words}")
     path.write_text("\ufeff" + text.replace('- c v\n    """', "- c v\n    '''"), encoding="utf-8")
-    assert find_model(path).model.__doc__.startswith(words)
+    assert scalar_class(path).__doc__.startswith(words)
 
 
 @pytest.mark.parametrize(

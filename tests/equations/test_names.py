@@ -6,6 +6,7 @@ from inspect import get_annotations
 import numpy as np
 import pytest
 from build_cache import build_user_model
+from models import scalar_class
 from native_fmus import require_compiler
 from variants import slow_after
 
@@ -28,7 +29,7 @@ class Names(Model):
     mode = Mode()
 """
 ALONE = """    F = Contact("N", "friction force", mode=mode, slip=v, slide=f, hold=1.2 * f, laws=(HYBRID, SIGN))
-    a = Output("m/s2", "acceleration", (-k * x - choose(x > b, k * (x - b), 0.0) - F) / m, rate_of=v)
+    a = Output("m/s2", "acceleration", (-k * x - choose(x > b, k * (x - b), 0.0) - F{more}) / m, rate_of=v)
 """
 TOGETHER = """    a_belt = Input(0.1, "m/s2", "acceleration of the belt")
     v_belt = Input(0.2, "m/s", "speed of the belt", rate=a_belt)
@@ -81,7 +82,7 @@ def used_names(body, folder):
     names = {
         node.id.rstrip("123456789") for node in ast.walk(ast.parse(source.generated_source)) if hasattr(node, "id")
     }
-    attributes = public_attributes(source.model) | public_attributes(lowered_model(source))
+    attributes = public_attributes(scalar_class(source)) | public_attributes(lowered_model(source))
     own = {e.name for e in source.analysis.declared}
     return sorted(attributes - own), sorted(names - attributes - own - {*fmus.__all__})
 

@@ -12,7 +12,7 @@ from build_cache import build_user_model
 from fmpy.fmi1 import FMICallException
 from fmpy.fmi3 import FMU3Model
 from model_text import remove_unused
-from models import DOP853, ODE23, ODE45, RODAS
+from models import DOP853, ODE23, ODE45, RODAS, scalar_class
 from native_fmus import require_compiler
 from row_comparison import assert_identical
 from scipy.integrate import solve_ivp
@@ -433,14 +433,14 @@ def test_a_table_reads_a_file_beside_the_model(tmp_path, headings):
         (tmp_path / "mu.csv").write_text(f"{headings}\n0,{value}\n1,0.25\n")
         source = find_model(tmp_path / "bench.py")
         assert f"_mu_value = ({value}, {value}, 0.25)" in source.generated_source
-        assert source.model().prepare() == 0
+        assert scalar_class(source)().prepare() == 0
 
 
 def test_values_of_a_file_become_parameters_that_keep_their_kind(tmp_path):
     (tmp_path / "mu.csv").write_text("v [m/s],mu [1]\n0,0.5\n1,0.25\n")
     text = MODEL.format(friction='"mu.csv", values="fixed", low=0.125', spring=points(SPRING, '"m", "N"'))
     (tmp_path / "bench.py").write_text(text)
-    declared = [d for d in declarations(find_model(tmp_path / "bench.py").model) if d.name.startswith("mu_")]
+    declared = [d for d in declarations(scalar_class(tmp_path / "bench.py")) if d.name.startswith("mu_")]
     elements = [(d.element, d.start, d.unit, d.low, d.variability, d.text) for d in declared]
     assert elements == [
         ("mu.y[1]", 0.5, "1", 0.125, "fixed", "value at 0 m/s"),
@@ -524,7 +524,7 @@ def test_a_wrong_table_is_refused_in_one_sentence(tmp_path, name):
 def test_a_table_is_called(tmp_path, lines, message):
     (tmp_path / "wrong.py").write_text(f'{HEAD}    T = Table([0.0, 1.0], [1.0, 2.0], "s", "1")\n{lines}')
     with pytest.raises(BuildError, match=message.replace("(", r"\(").replace(")", r"\)")):
-        find_model(tmp_path / "wrong.py").model  # noqa: B018
+        find_model(tmp_path / "wrong.py").generated_source  # noqa: B018
 
 
 @pytest.mark.parametrize(

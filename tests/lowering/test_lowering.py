@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 from internal_steps import list_steps, prepared_run, scalar_steps
-from models import CASES, LARGER_MODELS, MODELS, ROOT, label, model_class
+from models import CASES, LARGER_MODELS, MODELS, ROOT, label, model_class, scalar_class
 
 from fmus.compiler import BuildError
 from fmus.compiler.lowering import function_tree, lowered_files, lowered_model, select_features
@@ -42,7 +42,7 @@ def test_lists_and_scalars_give_the_same_bits_at_every_step(case):
 
 @pytest.mark.parametrize("path", [*MODELS, *LARGER_MODELS], ids=str)
 def test_the_runtime_declares_each_generated_method_with_its_arguments(path):
-    model, checked = find_model(path).model, set()
+    model, checked = scalar_class(path), set()
     components = {StateVector: model.states, ContactVector: model.contacts, ContactIndex: ()}
     for name, function in vars(model).items():
         if isfunction(function) and name != "__init__":

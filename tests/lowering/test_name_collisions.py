@@ -5,7 +5,7 @@ import re
 import pytest
 from build_cache import build_user_model
 from internal_steps import prepared_run, start
-from models import DOP853, LARGER_MODELS, RODAS
+from models import DOP853, LARGER_MODELS, RODAS, scalar_class
 
 from fmus.compiler.lowering import LAWS, METHODS, lowered_model, select_features, sibling_module
 from fmus.compiler.model_lookup import find_model
@@ -101,7 +101,7 @@ def test_names_used_by_the_contact_solver_change_nothing(tmp_path):
     path, rates = tmp_path / "blocks.py", []
     for names in ("mode_1", "mode_2"), ("row_F_1_F_2", "row_F_2_F_1"):
         path.write_text(blocks.read_text().replace("mode_1", names[0]).replace("mode_2", names[1]))
-        model = find_model(path).model()
+        model = scalar_class(path)()
         assert model.prepare() == 0
         rates.append([model.rates(0.3, 0.1, 0.2, -0.1, 0.1, *modes) for modes in ((0, 0), (0, 1), (1, 0), (1, -1))])
     assert rates[0] == rates[1]

@@ -5,12 +5,12 @@ import numpy as np
 import pytest
 from build_cache import ROOT, build_once
 from fmpy.validation import validate_fmu
-from models import DOP853
+from models import DOP853, scalar_class
 from native_fmus import require_compiler
 from row_comparison import assert_identical
 
 from benchmarks.references import event_located
-from fmus.compiler.model_lookup import find_model, more_model_names
+from fmus.compiler.model_lookup import more_model_names
 from fmus.runtime.variable_declarations import variables
 from harness.references.certified_reference import event_time_error, load_reference, relative_errors
 
@@ -40,7 +40,7 @@ def built(name, kind="python"):
 
 def states(name):
     """Return the names of the states that the solver integrates."""
-    return [*find_model(name).model().states]
+    return [*scalar_class(name)().states]
 
 
 def follow_events(fmu, names, stop):
@@ -58,7 +58,7 @@ def follow_events(fmu, names, stop):
 
 def mode_names(name):
     """Return the names of the modes of the contacts."""
-    return [*find_model(name).model().contacts]
+    return [*scalar_class(name)().contacts]
 
 
 @pytest.mark.parametrize("name", OSCILLATORS)
@@ -117,7 +117,7 @@ def test_the_belt_follows_each_law(worker, law):
 )
 def test_native_and_fmi3_agree_with_python_bit_for_bit(worker, name, kind):
     """All outputs at 101 points of the default run."""
-    model = find_model(name).model()
+    model = scalar_class(name)()
     names = [variable for variable, declared in variables(model) if declared.causality == "output"]
     times = np.linspace(0.0, type(model).stop_time, 101).tolist()
     rows = []

@@ -569,7 +569,7 @@ def test_an_input_that_cannot_be_continued_is_refused(tmp_path, change, sentence
     path = tmp_path / "block.py"
     path.write_text(BLOCK.replace("State\n", "State, choose\n", 1).replace(*change))
     with pytest.raises(BuildError) as refusal:
-        find_model(path).model  # noqa: B018 - builds
+        find_model(path).generated_source  # noqa: B018 - builds
     assert sentence in str(refusal.value)
 
 

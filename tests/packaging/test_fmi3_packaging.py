@@ -15,12 +15,12 @@ from archives import read_archive
 from fmpy import read_model_description, simulate_fmu
 from fmpy.validation import validate_fmu
 from lxml import etree
-from models import ROOT, declared, model_class
+from models import ROOT, declared, model_class, scalar_class
 from PIL import Image
 from variants import slow_after
 
 from fmus.compiler.lowering import model_exchange_run
-from fmus.compiler.model_lookup import find_model, model_names
+from fmus.compiler.model_lookup import model_names
 from fmus.packaging.fmi_variables import declared_variables
 from fmus.packaging.native.native_fmu import FMI_HEADERS, OWN_HEADERS
 from fmus.runtime.variable_declarations import variables
@@ -32,8 +32,8 @@ from tests.packaging.test_packaging import (  # noqa: F401
 )
 
 SCHEMA = Path(fmpy.__file__).parent / "schema/fmi3"
-DRY = {name for name in model_names() if find_model(name).model.has_dry_friction}
-DRIVEN = {name for name in model_names() if find_model(name).model.has_driver}
+DRY = {name for name in model_names() if scalar_class(name).has_dry_friction}
+DRIVEN = {name for name in model_names() if scalar_class(name).has_driver}
 TYPES = {"Real": "Float64", "Integer": "Int64", "Enumeration": "Enumeration"}
 STRUCTURE = ("Output", "ContinuousStateDerivative", "InitialUnknown", "EventIndicator")
 # Every parameter has an effect, and friction often holds.
@@ -153,9 +153,7 @@ def test_the_structure_lists_all_unknowns_in_schema_order(fmu, name):
 @EVERY_MODEL
 def test_only_the_speed_may_jump_and_only_with_dry_friction(fmu, name):
     jumping = [element.get("name") for element in description_of(fmu(name)).findall("ModelVariables/*[@reinit='true']")]
-    _, speed, *_ = [
-        variable for variable, meaning in variables(find_model(name).model()) if meaning.causality == "output"
-    ]
+    _, speed, *_ = [variable for variable, meaning in variables(scalar_class(name)()) if meaning.causality == "output"]
     assert jumping == ([speed] if name in DRY else [])
 
 
@@ -218,7 +216,7 @@ def test_an_instance_starts_with_the_values_of_the_xml_and_accepts_others(fmu, i
     assert starts == {variable: values["starts"][variable] for variable in starts}
     settable = {
         variable
-        for variable, meaning in declared_variables(find_model(name).model)
+        for variable, meaning in declared_variables(scalar_class(name))
         if meaning.causality in ("parameter", "input")
     }
     assert set(values["after"]) == settable == set(starts)
@@ -260,7 +258,7 @@ def test_the_terminal_describes_the_body_and_is_valid_and_drawn(fmu, name):
         tuple(map(m.get, ("variableName", "variableKind")))
         for m in etree.fromstring(content).iter("TerminalMemberVariable")
     ]
-    x, v = [variable for variable, meaning in variables(find_model(name).model()) if meaning.role == "state"][:2]
+    x, v = [variable for variable, meaning in variables(scalar_class(name)()) if meaning.role == "state"][:2]
     assert members == [(x, "signal"), (v, "signal"), ("T_ext" if name == "pendulum" else "F_ext", "inflow")]
     (representation,) = etree.fromstring(content).iter("TerminalGraphicalRepresentation")
     with Image.open(BytesIO(files[f"terminalsAndIcons/{representation.get('iconBaseName')}.png"])) as icon:

@@ -19,11 +19,11 @@ from archives import read_archive
 from build_cache import ROOT
 from commands import build as command
 from fmpy.validation import validate_fmu
-from models import declared
+from models import declared, scalar_class
 
 from fmus.compiler import BuildError
 from fmus.compiler.embedded_modules import embedded_files, installed_package
-from fmus.compiler.model_lookup import find_model, model_names, more_model_names
+from fmus.compiler.model_lookup import model_names, more_model_names
 from fmus.packaging.archive import write, zip_entries
 from fmus.packaging.fmi_variables import declared_variables
 from fmus.packaging.model_description import REAL_ONLY_HINT, describe
@@ -107,7 +107,7 @@ def test_validation_reports_no_problems(fmu, name):
 @EVERY_MODEL
 def test_the_xml_matches_the_declarations(fmu, name):
     scalars = description_of(fmu(name)).findall("ModelVariables/ScalarVariable")
-    instance = find_model(name).model()
+    instance = scalar_class(name)()
     declared = variables(instance) + variables(RunState(instance))
     force = next((variable for variable, meaning in declared if meaning.role == "contact"), "")
     for index, (scalar, (variable, meaning)) in enumerate(zip(scalars, declared, strict=True)):
@@ -151,7 +151,7 @@ def test_enumerations_list_their_items(fmu, name):
 @EVERY_MODEL
 def test_direct_outputs_depend_on_the_input_and_the_others_on_nothing(fmu, name):
     root = description_of(fmu(name))
-    meanings = [meaning for _, meaning in declared_variables(find_model(name).model)]
+    meanings = [meaning for _, meaning in declared_variables(scalar_class(name))]
     (force,) = [index for index, meaning in enumerate(meanings, 1) if meaning.causality == "input"]
     outputs = {int(u.get("index")): u.get("dependencies") for u in root.findall("ModelStructure/Outputs/Unknown")}
     assert outputs == {
@@ -165,7 +165,7 @@ def test_direct_outputs_depend_on_the_input_and_the_others_on_nothing(fmu, name)
 
 @EVERY_MODEL
 def test_capabilities_and_experiment_match_the_contract(fmu, name):
-    root, model = description_of(fmu(name)), find_model(name).model
+    root, model = description_of(fmu(name)), scalar_class(name)
     able = root.find("CoSimulation").attrib
     assert able["modelIdentifier"] == root.get("modelName") == name
     for flag in ("canHandleVariableCommunicationStepSize", "canGetAndSetFMUstate", "canSerializeFMUstate"):

@@ -6,11 +6,10 @@ from math import ulp
 
 import pytest
 from build_cache import build_once
+from models import scalar_class
 from native_fmus import require_compiler
 from variants import slow_after
 from worker_client import FmiError
-
-from fmus.compiler.model_lookup import find_model
 
 STARTS = (1.0, 1e6, -1e3)
 PLACES = 4  # units in the last place of the time
@@ -37,7 +36,7 @@ def follow_events(fmu, start, stop, modes):
 
 @pytest.mark.parametrize("name", slow_after(2, ["joint", "belt", "clutch", "forced", "sleds", "stacked"]))
 def test_events_are_the_same_from_any_start_time(worker, name, kind):
-    model = find_model(name).model
+    model = scalar_class(name)
     modes = [*model().contacts]
     first, *others = (
         follow_events(worker.instantiate(built(name, kind)), start, start + model.stop_time, modes)
@@ -63,7 +62,7 @@ def test_every_period_of_a_long_run_has_the_same_events(worker):
 def test_events_that_a_late_time_cannot_tell_apart_are_passed_in_order(worker, kind):
     """At 1e15 s, whose neighbours are 1/8 s away, solver.t_next still leads to the stop time."""
     start, stop = 1e15, 1e15 + 8.0
-    modes = [*find_model("stacked").model().contacts]
+    modes = [*scalar_class("stacked")().contacts]
     late = follow_events(worker.instantiate(built("stacked", kind)), start, stop, modes)
     assert late
     assert all(start <= t <= stop for t, *_ in late)

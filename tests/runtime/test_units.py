@@ -3,11 +3,10 @@
 import pytest
 from build_cache import build_once
 from internal_steps import compute_step, prepared_run, start
-from models import DOP853
+from models import DOP853, scalar_class
 
 from fmus.compiler.lowering import lowered_model
 from fmus.compiler.model_lookup import MORE as MORE_FOLDER
-from fmus.compiler.model_lookup import find_model
 from fmus.compiler.units import parse_unit
 from fmus.runtime.variable_declarations import variables
 
@@ -25,7 +24,7 @@ def factor(unit, length, time, mass):
 
 def run(worker, fmus, name, method, *exponents):
     """Return the rows of all internal steps of a run in scaled units, in the units of the model."""
-    model = find_model(name).model()
+    model = scalar_class(name)()
     declared = dict(variables(model))
     values = {
         variable: meaning.start * factor(meaning.unit, *exponents)

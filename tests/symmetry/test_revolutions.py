@@ -5,6 +5,7 @@ from math import pi
 import build_cache
 import numpy as np
 import pytest
+from models import scalar_class
 from native_fmus import require_compiler
 from symmetry_models import build
 
@@ -13,7 +14,6 @@ from benchmarks.symmetry.builds import NATIVE, PYTHON
 from benchmarks.symmetry.changes import REVOLUTIONS, REVOLUTIONS_ADDED
 from benchmarks.symmetry.command import describe
 from benchmarks.symmetry.study import run_model
-from fmus.compiler.model_lookup import find_model
 
 HEAD = """from fmus import Contact, Fixed, Mode, Model, Output, Parameter, State, choose, cos, sin, sqrt
 
@@ -142,7 +142,7 @@ def test_a_held_crank_stays_at_rest(moment, turns):
 
 def test_the_allowance_for_rounding_errors_does_not_grow_with_the_power_of_an_angle():
     """A rate with four sines of an angle has the rounding error of one."""
-    model = find_model(write("slider_crank")).model()
+    model = scalar_class(write("slider_crank"))()
     model.prepare()
     at_rest = [model.rate_magnitudes(0.0, 0.4 + 2.0 * pi * n, 1.0, 1) for n in (0, 100, 1000)]
     first, hundred, thousand = (float(np.ravel(size)[0]) for size in at_rest)
@@ -152,6 +152,6 @@ def test_the_allowance_for_rounding_errors_does_not_grow_with_the_power_of_an_an
 
 def test_the_size_of_an_angle_for_the_error_control_is_at_most_one_radian():
     """Only of angles by which nothing but periodic functions are taken."""
-    assert find_model(write("rotors")).model.angles == ("q", "p")
-    assert find_model("pendulum").model.angles == ("theta",)
-    assert find_model("joint").model.angles == ()  # springs act on its angles
+    assert scalar_class(write("rotors")).angles == ("q", "p")
+    assert scalar_class("pendulum").angles == ("theta",)
+    assert scalar_class("joint").angles == ()  # springs act on its angles

@@ -2,10 +2,14 @@
 
 import ast
 from inspect import cleandoc
+from json import dumps
 from textwrap import indent, wrap
 
 from ...runtime.active_method import EXACT_ITEM
+from ...runtime.contact_lcp import CoupledFriction
 from ...runtime.oscillator import Oscillator
+from ...runtime.planar_contact import PlanarFriction
+from ...runtime.stick_slip import DryFriction
 from ...runtime.variable_declarations import VariableDeclaration
 from ..text_output import string_literal
 from .algebra import depends_on, has_condition_on, variables_in
@@ -67,7 +71,7 @@ def model_source(analysis: ModelAnalysis, file: str) -> str:
         method="EXACT" if analysis.method == EXACT_ITEM[0] else f"{analysis.method}.NUMBER",
         items="(EXACT_ITEM, *METHOD_ITEMS)" if analysis.closed_form else "METHOD_ITEMS",
         name=analysis.name,
-        base_class=base_class(analysis),
+        base_class=base_class(analysis).__name__,
         about=about.rstrip(" ") + (INDENT if remainder else ""),
         declaration_lines=indent("\n".join(declaration_lines(analysis)), INDENT),
         class_attribute_lines=indent("\n".join(class_attribute_lines(analysis)), INDENT),
@@ -98,11 +102,40 @@ def table_lines(analysis: ModelAnalysis) -> list[str]:
     return ["", *(f"{name} = {column!r}" for name, column in arrays.items())] if arrays else []
 
 
-def base_class(analysis: ModelAnalysis) -> str:
+def base_class(analysis: ModelAnalysis) -> type[Oscillator]:
     """Return the runtime base class of the model."""
     if analysis.planar_contacts:
-        return "PlanarFriction"
-    return "DryFriction" if analysis.rests_when_stuck else "CoupledFriction" if analysis.contacts else "Oscillator"
+        return PlanarFriction
+    return DryFriction if analysis.rests_when_stuck else CoupledFriction if analysis.contacts else Oscillator
+
+
+def rates_of_states(analysis: ModelAnalysis) -> dict[str, str]:
+    """Return the rate of each state, which may be a state."""
+    return {s.name: analysis.rate[s].name for s in analysis.states}
+
+
+def slips_of_contacts(analysis: ModelAnalysis) -> dict[str, str]:
+    """Return the state that is the slip of each contact, by its mode; an empty text for an expression."""
+    return {c.mode.name: c.slip.name if analysis.rests_when_stuck else "" for c in analysis.contacts}
+
+
+def flags(analysis: ModelAnalysis) -> dict[str, bool]:
+    """Return the flags of the model class, apart from those of its base class."""
+    moving = (*analysis.time_varying, *analysis.input_rates)
+    return {
+        "is_linear": bool(analysis.closed_form),
+        "has_other_laws": bool(analysis.laws[1:]),
+        "has_driver": bool(analysis.drivers),
+        "has_input_derivatives": bool(analysis.input_rates),
+        "counts_jumps": any(depends_on(e.declared_rate, analysis.inputs) for e in analysis.prescribed_inputs),
+        "has_prescribed_slips": analysis.has_prescribed_slips,
+        "has_conditions": bool(analysis.conditions),
+        "has_pieces": analysis.has_pieces,
+        "checks_event_steps": analysis.checks_event_steps,
+        "has_nominal_velocity": any(s.nominal_velocity is not None for s in (*analysis.states, *analysis.drivers)),
+        "has_variable_levers": bool(not analysis.rests_when_stuck and analysis.variable_lever_contacts),
+        "has_slip_conditions": any(has_condition_on(c.slip, moving) for c in analysis.contacts),
+    }
 
 
 def import_lines(text: str) -> str:
@@ -158,40 +191,15 @@ def declaration(e: Variable, **more: object) -> str:
 
 def class_attribute_lines(analysis: ModelAnalysis) -> list[str]:
     """Return the class attributes that the runtime reads."""
-    states = ", ".join(f"{string_literal(s.name)}: {string_literal(analysis.rate[s].name)}" for s in analysis.states)
-    lines = ["solver_class = Solver", f"states = {{{states}}}"]
+    lines = ["solver_class = Solver", f"states = {dumps(rates_of_states(analysis))}"]
     if analysis.contacts:
-        slips = ", ".join(
-            f"{string_literal(c.mode.name)}: {string_literal(c.slip.name if analysis.rests_when_stuck else '')}"
-            for c in analysis.contacts
-        )
-        lines.append(f"contacts = {{{slips}}}")
+        lines.append(f"contacts = {dumps(slips_of_contacts(analysis))}")
     if analysis.planar_contacts:
         lines.append(f"planar_modes = ({', '.join(string_literal(c.mode.name) for c in analysis.planar_contacts)},)")
     if analysis.angles:
         lines.append(f"angles = ({', '.join(string_literal(s.name) for s in analysis.angles)},)")
-    states_and_drivers = (*analysis.states, *analysis.drivers)
-    moving = (*analysis.time_varying, *analysis.input_rates)
-    nominal_velocities = [s.nominal_velocity for s in states_and_drivers if s.nominal_velocity is not None]
-    lines += [
-        f"{attribute} = True"
-        for attribute, is_set in (
-            ("is_linear", analysis.closed_form),
-            ("has_other_laws", analysis.laws[1:]),
-            ("has_driver", analysis.drivers),
-            ("has_input_derivatives", analysis.input_rates),
-            ("counts_jumps", any(depends_on(e.declared_rate, analysis.inputs) for e in analysis.prescribed_inputs)),
-            ("has_prescribed_slips", analysis.has_prescribed_slips),
-            ("has_conditions", analysis.conditions),
-            ("has_pieces", analysis.has_pieces),
-            ("checks_event_steps", analysis.checks_event_steps),
-            ("has_nominal_velocity", nominal_velocities),
-            ("has_variable_levers", not analysis.rests_when_stuck and analysis.variable_lever_contacts),
-            ("has_slip_conditions", any(has_condition_on(c.slip, moving) for c in analysis.contacts)),
-        )
-        if is_set
-    ]
-    if n := n_event_functions(analysis):
+    lines += [f"{flag} = True" for flag, is_set in flags(analysis).items() if is_set]
+    if n := 2 * len(analysis.contacts) + len(analysis.conditions):
         numbers = f"{n}, {2 * len(analysis.contacts)}, {len(analysis.switches)}"
         lines.append(f"n_event_functions, first_condition, n_switches = {numbers}")
     if analysis.prescribed_inputs:
@@ -210,7 +218,7 @@ def class_attribute_lines(analysis: ModelAnalysis) -> list[str]:
         if (value := float(getattr(analysis.model, attribute))) != getattr(Oscillator, attribute):
             lines.append(f"{attribute} = {value!r}")
     if analysis.rules or analysis.limits:
-        inherited = [f"{INDENT}**{base_class(analysis)}.rules,"] if analysis.contacts else []
+        inherited = [f"{INDENT}**{base_class(analysis).__name__}.rules,"] if analysis.contacts else []
         messages = [rule.sentence for rule in analysis.rules] + [limit.sentence for limit in analysis.limits]
         sentences = [f"{INDENT}{rule_status(n)}: {string_lines(message)}," for n, message in enumerate(messages)]
         lines += ["rules = {", *inherited, *sentences, "}"]
@@ -221,11 +229,6 @@ def rate_names(e: Input) -> str:
     """Return the names of the inputs in the declared rate of an input; the rate itself if there are none."""
     inputs = [one.name for one in variables_in(e.declared_rate) if isinstance(one, Input)]
     return " and ".join(inputs) or expression_text(e.declared_rate)
-
-
-def n_event_functions(analysis: ModelAnalysis) -> int:
-    """Return the number of event functions: two for each contact, and one for each condition."""
-    return 2 * len(analysis.contacts) + len(analysis.conditions)
 
 
 def condition_texts(analysis: ModelAnalysis) -> list[str]:

@@ -1,22 +1,16 @@
-"""Loads model files: path, model class, and generated source.
+"""Loads model files: path, analysed model, and the source of the generated class.
 
 Errors are reported in one sentence with file and line.
 """
 
 import ast
-import linecache
-import sys
 from dataclasses import dataclass
 from functools import cached_property
-from hashlib import sha256
 from keyword import iskeyword
 from pathlib import Path
 from traceback import extract_tb
 from types import ModuleType
-from typing import Any
 
-from ...runtime.codes import MODEL_RULE, OK
-from ...runtime.variable_declarations import VariableOwner
 from .. import BuildError
 from .declaration_checks import check_use
 from .dimensions import check_frequencies, check_units
@@ -26,7 +20,7 @@ from .model_class import model_source
 from .model_conditions import add_liftoff, locate_kinks
 from .model_declaration import Model
 from .python_errors import check_statements, explain
-from .start_values import check_evaluation, check_friction_forces, check_state_ranges
+from .start_values import check_start_values
 
 PACKAGE = __name__.split(".", 1)[0]
 RESERVED_FILE_NAMES = ("pythonfmu", "runtime")  # embedded in the same package
@@ -66,57 +60,12 @@ class ModelFile:
         """Source of the generated module."""
         try:
             self.analysis.check_solvable()
-            return model_source(self.analysis, self.path.name)
+            source = model_source(self.analysis, self.path.name)
+            check_start_values(self.analysis)
+            check_use(self.analysis)
+            return source
         except ModelError as mistake:
             raise self._build_error(mistake) from mistake
-
-    @cached_property
-    def model(self) -> type[VariableOwner]:
-        """The generated model class, loaded in this process; `inspect` and tracebacks find its source."""
-        digest = sha256(self.generated_source.encode()).hexdigest()[:12]
-        file = f"generated-{digest}/{self.name}.py"
-        module = ModuleType(f"{PACKAGE}.generated_{digest}.{self.name}")
-        module.__package__, module.__file__ = PACKAGE, file
-        linecache.cache[file] = (
-            len(self.generated_source),
-            None,
-            self.generated_source.splitlines(keepends=True),
-            file,
-        )
-        sys.modules[module.__name__] = module
-        exec(compile(self.generated_source, file, "exec", optimize=0), vars(module))
-        cls = vars(module)[self.class_name]
-        self._check_start_values(cls())
-        return cls
-
-    def _check_start_values(self, thing: Any) -> None:
-        """Raise BuildError if the equations cannot be evaluated at the start values."""
-        try:
-            status = thing.prepare()
-            initial = thing.initial_state(0.0)
-            states = initial if isinstance(initial, tuple) else (initial,)  # a model with one state returns a number
-            thing.compute_outputs(0.0, *states, *(0 for _ in self.analysis.contacts))
-        except (ArithmeticError, ValueError) as error:
-            mistake = ModelError(
-                f"the equations cannot be evaluated at the start values: {error}", self.analysis.model.location
-            )
-            try:
-                check_evaluation(self.analysis)
-            except ModelError as named:
-                mistake = named
-            raise self._build_error(mistake) from error
-        if status == OK:
-            try:
-                check_friction_forces(self.analysis)
-                check_state_ranges(self.analysis)
-                check_use(self.analysis)
-            except ModelError as mistake:
-                raise self._build_error(mistake) from mistake
-        else:
-            sentence = thing.rules[status].format_map(vars(thing))
-            own_rules = dict(enumerate(self.analysis.rules, MODEL_RULE))
-            location = own_rules[status].broken.location if status in own_rules else self.analysis.model.location
-            raise self._build_error(ModelError(f"the start values are invalid: {sentence}", location))
 
     def _load_class(self) -> type[Model]:
         """Execute the file and return its model class."""

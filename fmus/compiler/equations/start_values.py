@@ -25,19 +25,33 @@ OPERATIONS: dict[str, Callable[..., Any]] = {
 }
 
 
-def check_evaluation(analysis: ModelAnalysis) -> None:
-    """Raise ModelError for the first expression without a value at the start values; contact forces count as 0."""
+def check_start_values(analysis: ModelAnalysis) -> None:
+    """Raise ModelError for an expression without a value at the start values, or for values that the model refuses.
+
+    Contacts that share bodies have a force of 0 here, others their load.
+    """
     values = start_values(analysis)
     memo: dict[int, float] = {}
-    for e in analysis.outputs:
-        evaluate(e, values, memo)
+    at_rest = values | dict.fromkeys(analysis.input_derivatives, 0.0)
+    for symbol, rate in analysis.declared_derivatives().items():
+        at_rest[symbol] = evaluate(rate, values, memo)
+    at_rest |= {c: evaluate(analysis.load[c], at_rest, memo) for c in analysis.independent_contacts}
+    memo = {}
+    output_values = {e: evaluate(e, at_rest, memo) for e in analysis.outputs}
+    for rule in analysis.rules:
+        if evaluate(rule.broken, values, {}):
+            numbers = {e.name: e.start if e.is_integer else float(e.start) for e in analysis.parameters}
+            numbers |= {e.name: e.start for e in analysis.choices}
+            sentence = f"the start values are invalid: {rule.sentence.format_map(numbers)}"
+            raise ModelError(sentence, rule.broken.location)
+    check_friction_forces(analysis, values, output_values)
+    check_state_ranges(analysis, values)
 
 
-def check_friction_forces(analysis: ModelAnalysis) -> None:
+def check_friction_forces(
+    analysis: ModelAnalysis, values: dict[Expression, float], output_values: dict[Expression, float]
+) -> None:
     """Raise ModelError for a sliding or holding force without a value at the start values, or with a direction."""
-    values = start_values(analysis)
-    memo: dict[int, float] = {}
-    output_values = {e: evaluate(e, values, memo) for e in analysis.outputs} if analysis.contacts else {}
     for c in analysis.contacts:
         for e in (c.slide, analysis.holding_limit[c]):
             try:
@@ -113,9 +127,8 @@ def differ(a: float, b: float) -> bool:
     return abs(a - b) > FORCE_TOLERANCE * max(abs(a), abs(b))
 
 
-def check_state_ranges(analysis: ModelAnalysis) -> None:
+def check_state_ranges(analysis: ModelAnalysis, values: dict[Expression, float]) -> None:
     """Raise ModelError for a state that starts outside its declared range."""
-    values = start_values(analysis)
     for s in analysis.states:
         if not s.accepts(values[s]):
             raise ModelError(

@@ -48,7 +48,7 @@ def lowered_model(source: str | Path | ModelFile, features: FeatureSelection | N
 @cache
 def import_lowered(source: ModelFile, features: FeatureSelection) -> type[VariableOwner]:
     """Import the model class from a package of its lowered files with a unique name."""
-    texts, name, model = lowered_texts(source, features), source.name, source.model
+    texts, name = lowered_texts(source, features), source.name
     package = f"lowered_{name}_{digest(texts)[:12]}"
     for parent in package, f"{package}.runtime":
         sys.modules[parent] = ModuleType(parent)
@@ -56,9 +56,9 @@ def import_lowered(source: ModelFile, features: FeatureSelection) -> type[Variab
     sys.modules[f"{package}.runtime.variable_declarations"] = (
         variable_declarations  # declarations keep their classes, for isinstance
     )
-    file = sys.modules[model.__module__].__file__ or "?"
-    sys.meta_path.insert(0, LoweredModuleFinder(package, texts, lower_all(source, features), {f"{name}.py": file}))
-    result = vars(import_module(f"{package}.{name}"))[model.__name__]
+    files = {f"{name}.py": f"generated/{name}.py"}
+    sys.meta_path.insert(0, LoweredModuleFinder(package, texts, lower_all(source, features), files))
+    result = vars(import_module(f"{package}.{name}"))[source.class_name]
     result.real_only = features.real_only  # variable_declarations.py is not lowered here
     ANALYSES[result] = source.analysis
     return result

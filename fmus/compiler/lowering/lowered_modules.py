@@ -4,10 +4,10 @@ import ast
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
-from typing import Any
 
 from ...runtime.oscillator import Oscillator
 from .. import __version__
+from ..equations import model_class
 from ..equations.model_file import ModelFile
 from ..syntax_trees import all_nodes, parsed_nodes
 from .feature_selection import EXACT, HYBRID, FeatureSelection
@@ -41,20 +41,26 @@ def runtime_symbols() -> SourceSymbols:
 
 def model_layout(source: ModelFile, features: FeatureSelection) -> ModelLayout:
     """Return the layout of a model."""
-    model: Any = source.model
-    flags = {flag: getattr(model, flag) for flag, default in vars(Oscillator).items() if isinstance(default, bool)}
+    base, analysis = model_class.base_class(source.analysis), source.analysis
+    flags = {flag: getattr(base, flag) for flag, default in vars(Oscillator).items() if isinstance(default, bool)}
+    flags |= model_class.flags(analysis)
     flags["is_linear"] = EXACT in features.methods
     flags["real_only"] = features.real_only
     flags["has_other_laws"] = any(law != HYBRID for law in features.laws)
     if not (HYBRID in features.laws and flags["has_other_laws"]):
         flags["is_hybrid"] = HYBRID in features.laws
     layout = ModelLayout(
-        model.states, model.contacts, flags, features.choices, features.excluded, features.stepping_methods
+        model_class.rates_of_states(analysis),
+        model_class.slips_of_contacts(analysis),
+        flags,
+        features.choices,
+        features.excluded,
+        features.stepping_methods,
     )
     zeros = zero_jacobian_entries(source.generated_source, layout)
-    n_conditions = model.n_event_functions - model.first_condition
-    planar = getattr(model, "planar_modes", ())
-    return replace(layout, zeros=zeros, n_conditions=n_conditions, angles=model.angles, planar=planar)
+    angles = tuple(s.name for s in analysis.angles)
+    planar = tuple(c.mode.name for c in analysis.planar_contacts)
+    return replace(layout, zeros=zeros, n_conditions=len(analysis.conditions), angles=angles, planar=planar)
 
 
 def zero_jacobian_entries(text: str, spec: ModelLayout) -> frozenset[tuple[int, int]]:
