@@ -88,8 +88,8 @@ class Allowed(Base):
     def tests(self, x, y):
         return math.isfinite(x), math.isnan(y), math.isinf(x * y), math.isfinite(x) and not math.isnan(y)
 
-    def choosing(self, x, y):
-        return min(x, y), max(x, y, self.a), abs(x - y), float(self.n)
+    def converted(self, x, y):
+        return float(self.n) * x, int(self.row[2]) + self.n
 
     def comparisons(self, x, y):
         return x < y, x <= y, x > y, x >= y, x == y, x != y, self.n == 3, (x < y) == (y < x)
@@ -138,17 +138,17 @@ class Allowed(Base):
 
     def guarded(self, x, y):
         remaining = 30
-        while remaining > 0 and 1.0 / x < y:
+        while True:
+            if not (remaining > 0 and 1.0 / x < y):
+                break
             x = x * 0.75
             remaining -= 1
-            if remaining == 7:
-                continue
             self.a += x
         return x, remaining
 
     def effects_in_a_test(self, x, y):
-        while self.left.take(x) < y:
-            if self.left.calls > 20:
+        while True:
+            if not self.left.take(x) < y or self.left.calls > 20:
                 break
         if self.right.take(y) / x > 1.0:
             self.b = x
@@ -165,8 +165,9 @@ class Allowed(Base):
 
     def elements(self, x, y):
         i = -5
-        while i < x and i < 5:
-            i += 1
+        for _ in range(10):
+            if i < x:
+                i += 1
         self.a = 9.0
         self.row[i] = y / x
         return self.row[i] + self.row[2]

@@ -25,7 +25,6 @@ class Draw:
         shapes += ["0.5 * ({a})", "({a}) / 8.0", "({a}) - 1e-3", "-3.0 / ({a})", "THIRD - ({a})"]
         shapes += ["math.sqrt({a})", "math.exp({a})", "math.sin({a})", "math.fabs({a})", "math.atan2({a}, {b})"]
         shapes += [
-            "min({a}, {b})",
             "({a}) * {i}",
             "half({a})",
             "self.shape({a})",
@@ -48,7 +47,7 @@ class Draw:
         lines = [line for _ in range(self.draw.randint(1, 4)) for line in self.statement(depth)]
         if loop:
             test = f"if {self.truth(1)}:"
-            lines += self.draw.choice([[], [test, "    break"], [test, "    continue", "x = y"]])
+            lines += self.draw.choice([[], [test, "    break"]])
         return [" " * indent + line for line in lines]
 
     def statement(self, depth):
@@ -75,7 +74,9 @@ class Draw:
             lambda: [f"for i in range({self.draw.randint(1, 3)}):", *self.block(inner, 4, True), "i = 1"],
             lambda: [
                 f"{counter} = 3",
-                f"while {counter} > 0 and {self.truth(1)}:",
+                "while True:",
+                f"    if {counter} == 0 or {self.truth(1)}:",
+                "        break",
                 f"    {counter} -= 1",
                 *self.block(inner, 4, True),
             ],

@@ -60,8 +60,8 @@ def number_in_logic(self, x, y):
     return x > 0.0 and y
 
 
-def smallest_of_ints(self, x, y):
-    return min(self.n, 4)
+def smallest(self, x, y):
+    return min(x, y)
 
 
 def unknown_attribute(self, x, y):
@@ -136,11 +136,9 @@ def call_in_a_chain(self, x, y):
     return x < half(y) < 1.0
 
 
-def else_of_a_loop(self, x, y):
+def loop_with_a_test(self, x, y):
     while x > y:
         x = x - 1.0
-    else:
-        x = y
     return x
 
 

@@ -6,5 +6,6 @@
     call_graph.py            all functions that the FMI layer reaches
 
 The C code does what CPython does, bit for bit: the same operations in the same order. Where Python raises an exception,
-a fault flag ends the function at the same statement.
+a fault flag ends the function at the same statement. Loops are `while True` and `for` over a range, without
+continue; the built-in functions are float and int.
 """

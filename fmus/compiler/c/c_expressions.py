@@ -389,23 +389,12 @@ class ExpressionTranslator(ast.NodeVisitor):
         return CExpression(compiled.result or CompileTimeValue(None), text)
 
     def translate_builtin(self, node: ast.Call, function: Callable[..., Any], values: list[CExpression]) -> CExpression:
-        """Translate a call of a function of math or one of the supported built-in functions."""
-        allowed = (*NEVER_RAISING, *MAY_RAISE, *PREDICATES, abs, min, max, float, int)
-        if function not in allowed:
-            raise self.error(node)
-        is_count_right = len(values) > 1 if function in (min, max) else len(values) == ARGUMENT_COUNTS.get(function, 1)
-        if not is_count_right:
+        """Translate a call of a function of math, of float or of int."""
+        allowed = (*NEVER_RAISING, *MAY_RAISE, *PREDICATES, float, int)
+        if function not in allowed or len(values) != ARGUMENT_COUNTS.get(function, 1):
             raise self.error(node)
         values = [self.arithmetic_operand(argument, value) for argument, value in zip(node.args, values, strict=True)]
         texts = ", ".join(value.text for value in values)
-        if function in (min, max, abs):
-            if {value.ctype for value in values} != {FLOAT}:
-                raise self.error(node)
-            name = {min: "py_min", max: "py_max", abs: "fabs"}[function]
-            text = values[0].text
-            for value in values[1:]:
-                text = f"{name}({text}, {value.text})"
-            return CExpression(FLOAT, f"fabs({text})" if function is abs else text)
         if function is float:
             return CExpression(FLOAT, f"(double){values[0].as_operand(PRIMARY)}", UNARY)
         if function is int:  # of whole numbers

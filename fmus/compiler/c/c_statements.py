@@ -268,31 +268,15 @@ class FunctionTranslator(ExpressionTranslator):
         return name
 
     def visit_While(self, node: ast.While) -> bool:
-        if node.orelse:
-            raise self.error(node)
-        before = set(self.assigned_names)
-        self.assigned_at_breaks.append([])
-        lines, self.lines = self.lines, []
-        self.depth += 1
-        test = self.boolean(node.test)
-        endless, condition = test.text == "true", self.condition_text(test)
-        prelude, self.lines = self.lines, lines
-        self.depth -= 1
-        head = f"while ({'true' if prelude else condition})"
-
-        def body() -> bool:
-            if prelude:
-                self.lines += prelude
-                self.emit(f"if (!{condition if condition.isidentifier() else f'({condition})'}) break;")
-            return self.translate_block(node.body)
-
-        self.emit_block(head, body)
-        break_sets = self.assigned_at_breaks.pop()
-        if endless:
-            self.assigned_names = set.intersection(*break_sets) if break_sets else before
-            return bool(break_sets)
-        self.assigned_names = before
-        return True
+        match node:
+            case ast.While(test=ast.Constant(value=True), orelse=[]):
+                before = set(self.assigned_names)
+                self.assigned_at_breaks.append([])
+                self.emit_block("while (true)", lambda: self.translate_block(node.body))
+                break_sets = self.assigned_at_breaks.pop()
+                self.assigned_names = set.intersection(*break_sets) if break_sets else before
+                return bool(break_sets)
+        raise self.error(node)
 
     def visit_For(self, node: ast.For) -> bool:
         match node:
@@ -319,10 +303,6 @@ class FunctionTranslator(ExpressionTranslator):
     def visit_Break(self, node: ast.Break) -> bool:
         self.assigned_at_breaks[-1].append(set(self.assigned_names))
         self.emit("break;")
-        return False
-
-    def visit_Continue(self, node: ast.Continue) -> bool:
-        self.emit("continue;")
         return False
 
 

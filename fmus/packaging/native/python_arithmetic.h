@@ -53,10 +53,6 @@ CHECKED_UNARY(sqrt) CHECKED_UNARY(sin) CHECKED_UNARY(cos) CHECKED_UNARY(tan) CHE
 CHECKED_UNARY(sinh) CHECKED_UNARY(cosh) CHECKED_UNARY(exp) CHECKED_UNARY(expm1) CHECKED_UNARY(log) CHECKED_UNARY(log1p)
 CHECKED_BINARY(pow) CHECKED_BINARY(fmod)
 
-/* Python's min and max return the first of equal values, and the first argument if a comparison involves NaN. */
-static inline double py_min(double a, double b) { return b < a ? b : a; }
-static inline double py_max(double a, double b) { return b > a ? b : a; }
-
 /* Index into a list as in Python: negative indices count from the end. */
 static inline int64_t py_index(int64_t i, int64_t length, bool *fault)
 {
