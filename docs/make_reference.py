@@ -147,7 +147,7 @@ def enumerations(fmus: Path) -> str:
 
 def declaration_options() -> str:
     """Return the table of the options of declarations in model files."""
-    from fmus.compiler.equations.declaration_options import OPTIONS
+    from fmus.compiler.equations.model_declaration import OPTIONS
 
     rows = [
         (f"`{name}`", {float: "a number", str: "a string"}[option.type], option.text)

@@ -29,7 +29,7 @@ from ..compiler import BuildError, __date__
 from ..compiler.embedded_modules import digest, embedded_files, installed_package
 from ..compiler.lowering import lowered_files, lowered_model, select_features
 from ..compiler.model_lookup import find_model
-from .documentation_page import extra_files
+from .extra_files import extra_files
 from .fmi_variables import declared_variables
 from .model_description import describe
 

@@ -1,24 +1,26 @@
-"""Writes the files that FMUs of all kinds have: documentation page, icon, certified result, data for the harness."""
+"""Writes the documentation page of an FMU as self-contained HTML; colours of charts come from its style sheet."""
 
 import re
 from collections.abc import Sequence
 from html import escape
 from inspect import cleandoc
+from itertools import pairwise
+from math import ceil, floor, log10
 from pathlib import Path
 
 from ..compiler import __version__
-from ..compiler.equations.model_analysis import ModelAnalysis
 from ..compiler.equations.tables import PCHIP, Table
 from ..compiler.units import unit_of
 from ..runtime.variable_access import SETTABLE_CAUSALITIES
 from ..runtime.variable_declarations import VariableDeclaration, VariableOwner, exported_name
-from .certified_result import RESULT_FOLDER, CertifiedResult, find_certified_result, result_files
+from .certified_result import RESULT_FOLDER, CertifiedResult
 from .fmi_variables import Variables, fixed_choices, integrated_states
-from .model_data import MODEL_DATA_FILE, model_data
-from .svg_chart import draw_chart
 
 GREEK = {"theta": "theta", "omega": "omega", "alpha": "alpha", "mu": "mu", "eps": "epsilon", "phi": "phi", "pi": "pi"}
 CURVE_POINTS = 200  # of a table that is not linear
+WIDTH, HEIGHT = 640, 230  # of the view box of a chart
+LEFT, RIGHT, TOP, BOTTOM = 70, 14, 10, 48  # its margins for the tick labels
+TICKS = 5
 STYLE = Path(__file__).with_name("documentation_page.css")
 USAGE = """\
 <p>Parameters can be changed at every communication point, those marked <i>fixed</i> only until initialization ends.
@@ -189,27 +191,51 @@ def _footer(model: type[VariableOwner], result: CertifiedResult | None) -> str:
     return f"<footer>{run}{certified}{licences} friction-fmus {__version__}.</footer>"
 
 
-def extra_files(
-    model: type[VariableOwner],
-    path: Path,
-    declared: Variables,
-    analysis: ModelAnalysis,
-    icon: str = "model.png",
-    use: str = "",
-) -> dict[str, bytes]:
-    """Return the content of these files by path in the FMU.
+def draw_chart(times: list[float], values: list[float], label: str, axis: str = "time in s") -> str:
+    """Return the SVG of values over times, or over another quantity; `label` and `axis` name both with their units."""
+    low, high = min(values), max(values)
+    margin = 0.05 * (high - low) or 1.0
+    low, high = low - margin, high + margin
 
-    Icon (.png) and certified result (.csv) are optional and stand next to the model file
-    at `path`, under the same name.  `icon` is the path of the icon in the FMU; `use` is a paragraph of the page on how
-    to run the FMU.
+    def to_view_box(t: float, value: float) -> tuple[float, float]:
+        x = LEFT + (t - times[0]) / (times[-1] - times[0]) * (WIDTH - LEFT - RIGHT)
+        return x, TOP + (high - value) / (high - low) * (HEIGHT - TOP - BOTTOM)
+
+    parts = [f'<svg viewBox="0 0 {WIDTH} {HEIGHT}" role="img" aria-label="{label} over {axis}">']
+    for value in tick_values(low, high):
+        _, y = to_view_box(times[0], value)
+        parts.append(f'<line class="grid" x1="{LEFT}" x2="{WIDTH - RIGHT}" y1="{y:.1f}" y2="{y:.1f}"/>')
+        parts.append(f'<text x="{LEFT - 6}" y="{y + 4:.1f}" text-anchor="end">{value:g}</text>')
+    for t in tick_values(times[0], times[-1]):
+        x, _ = to_view_box(t, low)
+        parts.append(f'<line class="grid" x1="{x:.1f}" x2="{x:.1f}" y1="{TOP}" y2="{HEIGHT - BOTTOM}"/>')
+        parts.append(f'<text x="{x:.1f}" y="{HEIGHT - BOTTOM + 19}" text-anchor="middle">{t:g}</text>')
+    points = [to_view_box(t, value) for t, value in zip(times, values, strict=True)]
+    parts.append(f'<path class="curve" d="{relative_path(points)}"/>')
+    parts.append(f'<text x="{WIDTH - RIGHT}" y="{HEIGHT - 6}" text-anchor="end">{axis}</text>')
+    parts.append(f'<text x="{LEFT}" y="{HEIGHT - 6}">{label}</text></svg>')
+    return "\n".join(parts)
+
+
+def relative_path(points: list[tuple[float, float]]) -> str:
+    """Return the path data of a polyline, with points relative to the one before, which compress to half the size.
+
+    >>> relative_path([(0.0, 1.0), (0.26, 1.0), (0.5, 0.5)])
+    'M0 1l0.3 0 0.2 -0.5'
     """
-    name, picture = path.stem, path.with_suffix(".png")
-    certified = find_certified_result(path, model, declared)
-    icon_path = icon if picture.is_file() else ""
-    page = documentation_page(model, name, declared, certified, analysis.tables, icon_path, use)
-    entries = {"documentation/index.html": page, MODEL_DATA_FILE: model_data(model, declared, analysis)}
-    if certified is not None:
-        entries |= result_files(name, certified, declared)
-    if picture.is_file():
-        entries[icon] = picture.read_bytes()
-    return entries
+    rounded = [(round(10.0 * x), round(10.0 * y)) for x, y in points]  # in tenths, so that roundings do not add up
+    steps = [(x - x0, y - y0) for (x0, y0), (x, y) in pairwise(rounded)]
+    start = "M{:g} {:g}l".format(*(place / 10.0 for place in rounded[0]))
+    return start + " ".join(f"{dx / 10.0:g} {dy / 10.0:g}" for dx, dy in steps)
+
+
+def tick_values(low: float, high: float) -> list[float]:
+    """Return about TICKS round numbers from low to high.
+
+    >>> tick_values(-0.11, 0.11)
+    [-0.1, -0.05, 0.0, 0.05, 0.1]
+    """
+    rough = (high - low) / TICKS
+    power = 10.0 ** floor(log10(rough))
+    step = next(factor * power for factor in (1.0, 2.0, 5.0, 10.0) if factor * power >= rough * (1.0 - 1e-9))
+    return [round(i * step, 12) + 0.0 for i in range(ceil(low / step - 1e-9), floor(high / step + 1e-9) + 1)]

@@ -12,7 +12,7 @@ from uuid import NAMESPACE_OID, uuid5
 from xml.etree.ElementTree import Element, SubElement, tostring
 
 from ..compiler import __version__
-from ..compiler.equations.declaration_options import OPTIONS
+from ..compiler.equations.model_declaration import OPTIONS
 from ..compiler.text_output import xml_bytes
 from ..compiler.units import BASE_UNITS, UNITS, Unit, unit_of
 from ..runtime.variable_access import SETTABLE_CAUSALITIES

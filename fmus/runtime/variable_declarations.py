@@ -35,7 +35,7 @@ class VariableDeclaration:
     rate_of = ""  # name of the state whose rate this is
     rate = ""  # name of the parameter that is its constant rate, as for a driver
     element = ""  # name in the FMU of an element of an array, as mu.y[1]; others have that of the attribute
-    # options, see compiler/equations/declaration_options.py
+    # options, see compiler/equations/model_declaration.py
     low: float = -inf
     high: float = inf
     above: float = -inf

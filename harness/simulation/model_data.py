@@ -12,7 +12,7 @@ import numpy as np
 from ..errors import HarnessError
 from .mtime_cache import cached_by_mtime
 
-MODEL_DATA_FILE = "resources/model_data.json"  # fmus/packaging/model_data.py writes it
+MODEL_DATA_FILE = "resources/model_data.json"  # fmus/packaging/extra_files.py writes it
 PCHIP = "pchip"
 CURVE_POINTS = 200  # of a table that is not linear
 

@@ -13,10 +13,9 @@ from models import CASES, LARGER_MODELS, MODELS, ROOT, label, model_class, scala
 from fmus.compiler import BuildError
 from fmus.compiler.lowering import function_tree, lowered_files, lowered_model, select_features
 from fmus.compiler.lowering.layout import ModelLayout, component_name
-from fmus.compiler.lowering.lowered_modules import lower_all
+from fmus.compiler.lowering.lowered_modules import lower_all, remove_unused_code
 from fmus.compiler.lowering.module_lowering import FileLowerer
 from fmus.compiler.lowering.scalarize import fold_zero
-from fmus.compiler.lowering.unused_code import remove_unused_code
 from fmus.compiler.lowering.vector_symbols import SourceSymbols
 from fmus.compiler.model_lookup import find_model
 from fmus.compiler.syntax_trees import TranslationError, nested_statements

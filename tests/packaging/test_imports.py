@@ -5,9 +5,7 @@ import pytest
 from build_cache import ROOT
 
 SCRIPT = "import sys; {}; print(*sorted(name for name in sys.modules if name.split('.')[0] in ('fmus', 'numpy')))"
-DECLARATIONS = " ".join(
-    f"fmus.compiler.equations.{name}" for name in ("declaration_options", "expressions", "model_declaration")
-)
+DECLARATIONS = " ".join(f"fmus.compiler.equations.{name}" for name in ("expressions", "model_declaration"))
 LOADED = {
     "import fmus.runtime.codes": "fmus fmus.runtime fmus.runtime.codes",
     "from fmus import Model, sin, pi": f"fmus fmus.compiler fmus.compiler.equations {DECLARATIONS} fmus.runtime "

@@ -15,10 +15,9 @@ from build_cache import ROOT
 from models import MODELS, declared, model_class, outputs
 
 from fmus.packaging import archive
-from fmus.packaging.documentation_page import documentation_page, typeset
+from fmus.packaging.documentation_page import documentation_page, tick_values, typeset
 from fmus.packaging.fmi_variables import declared_variables
 from fmus.packaging.native import native_fmu as fmu
-from fmus.packaging.svg_chart import tick_values
 
 EVERY_MODEL = pytest.mark.parametrize("name", MODELS)
 WITH = {  # an ending -> the models that have such a file

@@ -14,7 +14,7 @@
     reserved_names.py           names reserved by generated models and in C
     expression_printer.py       prints expressions as Python statements
     codegen_context.py          shared by the generators of methods
-    setup_methods.py, rate_methods.py, single_contact_methods.py, coupled_contact_methods.py, output_methods.py
+    setup_methods.py, rate_methods.py, contact_methods.py, output_methods.py
                                 generate the methods of a model class
     model_class.py              generates the module
 

@@ -5,7 +5,6 @@ from sys import float_info
 
 from ...runtime.active_method import EXACT_ITEM, METHOD_ITEMS
 from .algebra import depends_on, operands, operands_first, subexpressions
-from .declaration_options import OPTIONS
 from .expressions import (
     NO_EQUALITY,
     Expression,
@@ -17,7 +16,7 @@ from .expressions import (
     is_comparison,
     is_number,
 )
-from .model_declaration import Choice, Contact, Output, SettableVariable, Variable
+from .model_declaration import OPTIONS, Choice, Contact, Output, SettableVariable, Variable
 from .model_roles import ModelRoles
 from .reserved_names import RESERVED
 

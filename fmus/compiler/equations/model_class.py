@@ -14,19 +14,17 @@ from ...runtime.variable_declarations import VariableDeclaration
 from ..text_output import string_literal
 from .algebra import depends_on, has_condition_on, variables_in
 from .codegen_context import CodegenContext, rule_status
-from .coupled_contact_methods import coupled_contact_methods
-from .declaration_options import OPTIONS
+from .contact_methods import coupled_contact_methods, single_contact_methods
 from .dimensions import DIMENSIONLESS, Dimensions, declared_dimensions, dimensions_of, expression_text
 from .expression_printer import INDENT
 from .expressions import is_among
 from .model_analysis import ModelAnalysis
 from .model_conditions import Condition
-from .model_declaration import Contact, Input, Mode, Output, State, Variable
+from .model_declaration import OPTIONS, Contact, Input, Mode, Output, State, Variable
 from .output_methods import condition_methods, law_modes_method, observe_method
 from .rate_methods import rate_methods
 from .reserved_names import IMPORTS, MATH
 from .setup_methods import setup_methods
-from .single_contact_methods import single_contact_methods
 from .tables import EDGE, VARIABLE_KINDS, array_name, table_of
 
 MODULE_TEMPLATE = '''"""{first}

@@ -7,16 +7,45 @@ from inspect import Parameter as Argument
 from inspect import Signature, cleandoc, signature
 from linecache import getline
 from types import FunctionType, ModuleType
-from typing import Any, ClassVar, Unpack, get_args, get_type_hints
+from typing import Annotated, Any, ClassVar, NamedTuple, TypedDict, Unpack, get_args, get_type_hints
 
 from ...runtime.variable_declarations import VariableDeclaration, exported_name
-from .declaration_options import OPTIONS, Options, SettableOptions
 from .expressions import Expression, ModelError, Operand, Term, as_operand, author_location, describe, is_comparison
 
 HYBRID, SIGN, THRESHOLD = "hybrid", "sign", "threshold"
 SETTINGS = ("rules", "stop_time", "step_size", "tolerance", "method")  # attributes of Model
 FUNCTION_TYPES = (FunctionType, property, staticmethod, classmethod, cached_property)
 OPTIONS_ENTRY = "**options\n    See the table of options."  # of docstrings
+
+
+class Options(TypedDict, total=False):
+    """Options of calculated variables: type, meaning and, for some, the attribute of a Real in the XML."""
+
+    low: Annotated[float, "Inclusive lower bound."]
+    high: Annotated[float, "Inclusive upper bound."]
+    above: Annotated[float, "Exclusive lower bound."]
+    below: Annotated[float, "Exclusive upper bound."]
+    display: Annotated[str, 'Display unit, such as "deg".', "displayUnit"]
+
+
+class SettableOptions(Options, total=False):
+    """Options of parameters and inputs."""
+
+    alias: Annotated[str, "Alternative name, exported in FMI 3.0; of parameters and inputs only."]
+
+
+class Option(NamedTuple):
+    """Type, meaning and XML attribute of an option."""
+
+    type: type
+    text: str
+    attribute: str = ""
+
+
+OPTIONS = {
+    name: Option(hint.__origin__, *hint.__metadata__)
+    for name, hint in get_type_hints(SettableOptions, include_extras=True).items()
+}
 
 
 def signature_text(function: Callable[..., object]) -> str:

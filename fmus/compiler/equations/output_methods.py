@@ -2,9 +2,8 @@
 
 from .algebra import rounding_scales
 from .codegen_context import CodegenContext, emit_return, emit_scales, method_source
-from .coupled_contact_methods import emit_friction_forces, law_mode
+from .contact_methods import emit_friction_force, emit_friction_forces, law_mode
 from .expressions import Term
-from .single_contact_methods import emit_friction_force
 from .tables import Piece
 
 MAX_SUMMANDS = 50  # in one statement

@@ -2,18 +2,18 @@
 
 from .algebra import build_term, depends_on, is_same_expression, operands_first, rounding_scales, substitute
 from .codegen_context import CodegenContext, emit_return, emit_scales, method_source
-from .coupled_contact_methods import (
+from .contact_methods import (
     derivative_unknown,
     emit_friction_forces,
     emit_solution,
     force_unknown,
     slips_of_laws,
+    threshold_call,
 )
 from .expression_printer import ExpressionPrinter
 from .expressions import FUNCTIONS, Expression, Operand, Term
 from .model_analysis import ModelAnalysis
 from .model_declaration import THRESHOLD, Contact
-from .single_contact_methods import threshold_call
 
 
 def rate_methods(context: CodegenContext) -> list[str]:

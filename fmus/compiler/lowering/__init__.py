@@ -7,8 +7,7 @@
     elimination.py         the linear systems of rodas and radau9
     constant_folding.py    replaces flags, choices and dependent tests by constants
     module_lowering.py     a file, statement by statement
-    unused_code.py         removes functions that nothing calls, and unused imports
-    lowered_modules.py     lowers all files of the runtime and the model
+    lowered_modules.py     lowers all files of the runtime and the model, and removes what nothing calls
     import_hook.py         imports the lowered model into this process
 
 An annotation such as `e: StateVector` of a parameter, result or class attribute declares a vector; results of vector

@@ -21,11 +21,10 @@ from ...compiler.model_lookup import find_model
 from ...compiler.text_output import xml_bytes
 from ...runtime.variable_declarations import VariableOwner
 from ..archive import build_date, license_files, write, zip_entries
-from ..documentation_page import extra_files
+from ..extra_files import extra_files, terminals
 from ..fmi_variables import declared_variables
 from ..model_description import describe
 from ..model_description_fmi3 import describe as describe3
-from ..terminals import terminals
 from .binaries import DEFAULT_PLATFORMS, PLATFORMS, CompilerPool, compile_binaries
 from .model_header import render_model_header
 
