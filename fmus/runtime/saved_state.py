@@ -83,7 +83,7 @@ class InvalidStateError(ValueError):
 class SavedStateAccess(VariableAccess):
     """Mixin of an FMU instance that saves and restores its state."""
 
-    # set by make_fmu_class()
+    # set by make_slave_class()
     model_tree: AttributeTree
     run_tree: AttributeTree
     instances: WeakSet[Any]
@@ -96,7 +96,7 @@ class SavedStateAccess(VariableAccess):
             run = dict(read_numbers(self.run, self.run_tree), outputs_current=False)
             state = {"run": run, "origin": __name__, "invalid_values": dict(self.invalid_values)}
             return state | {"model": read_numbers(self.model, self.model_tree)}
-        except BaseException as error:  # as in model_instance.py
+        except BaseException as error:  # as in slave.py
             self.handle_exception(error)
             return {}
 
@@ -140,7 +140,7 @@ class SavedStateAccess(VariableAccess):
             own = type(state) is dict and state.get("origin") == __name__
             if own:
                 self.restore(state)
-        except BaseException as error:  # as in model_instance.py
+        except BaseException as error:  # as in slave.py
             self.handle_exception(error)
         else:
             if not own:

@@ -27,7 +27,7 @@ from fmus.runtime.codes import EPSILON
 from harness.simulation.embedded_model import create_run, load_model_class
 
 FMI_SIDE = [
-    *("__init__", "failure_handling", "model_instance", "messages", "method_registry", "pythonfmu_workarounds"),
+    *("__init__", "failure_handling", "messages", "method_registry", "pythonfmu_workarounds"),
     *("saved_state", "slave", "variable_access", "variable_declarations"),
     *("linear_solver", "vectors"),  # of the build: never embedded
 ]

@@ -28,7 +28,7 @@ LoweredFiles = dict[str, ast.Module]  # by path; statements have the lines of th
 FMI_LAYER = frozenset(  # kept whole: importers and the C sources call its functions
     f"runtime/{name}.py"
     for name in (
-        *("call_sequence", "early_return", "failure_handling", "model_instance", "messages", "model_exchange"),
+        *("call_sequence", "early_return", "failure_handling", "messages", "model_exchange"),
         *("pythonfmu_workarounds", "saved_state", "slave", "variable_access", "variable_declarations"),
     )
 )
