@@ -2,11 +2,19 @@
 
 import math
 import operator
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any
 
 from ...runtime.planar_contact import slip_direction
-from .algebra import ARITHMETIC, has_condition_on, is_same_expression, operands, subexpressions, variables_in
+from .algebra import (
+    ARITHMETIC,
+    has_condition_on,
+    is_same_expression,
+    operands,
+    operands_first,
+    subexpressions,
+    variables_in,
+)
 from .contact_analysis import DIRECTION_ADVICE
 from .dimensions import expression_text
 from .expressions import Expression, ModelError, Operand, Term
@@ -31,8 +39,8 @@ def check_start_values(analysis: ModelAnalysis) -> None:
     Contacts that share bodies have a force of 0 here, others their load.
     """
     values = start_values(analysis)
-    memo: dict[int, float] = {}
-    at_rest = values | dict.fromkeys(analysis.input_derivatives, 0.0)
+    memo: dict[int, Value] = {}
+    at_rest = dict(values)
     for symbol, rate in analysis.declared_derivatives().items():
         at_rest[symbol] = evaluate(rate, values, memo)
     at_rest |= {c: evaluate(analysis.load[c], at_rest, memo) for c in analysis.independent_contacts}
@@ -141,63 +149,56 @@ def start_values(analysis: ModelAnalysis) -> dict[Expression, float]:
     """Return the values of parameters, inputs and states at the start; what follows from them counts as 0."""
     values: dict[Expression, float] = dict.fromkeys((*analysis.time_varying, *analysis.input_symbols), 0.0)
     values |= {e: float(e.start) for e in (*analysis.parameters, *analysis.choices, *analysis.inputs)}
-    memo: dict[int, float] = {}
+    memo: dict[int, Value] = {}
     for s in analysis.states:
         values[s] = evaluate(s.start_expression, values, memo)
     return values
 
 
-def evaluate(e: Operand, values: dict[Expression, float], memo: dict[int, float]) -> float:
+Value = float | ModelError  # an expression without a value has the error of the operation that fails
+
+
+def evaluate(e: Operand, values: dict[Expression, float], memo: dict[int, Value]) -> float:
     """Return the value of an expression; raise ModelError where it has none."""
-    stack = [e]
-    while stack:
-        part = stack[-1]
-        missing = [
-            operand for operand in _needed_operands(part, values, memo) if _known_value(operand, values, memo) is None
-        ]
-        if missing:
-            stack += reversed(missing)
-            continue
-        stack.pop()
-        if _known_value(part, values, memo) is None:
+
+    def unknown_operands(part: Operand) -> tuple[Operand, ...]:
+        return () if id(part) in memo or (isinstance(part, Expression) and part in values) else operands(part)
+
+    for part in operands_first(e, operands_of=unknown_operands):
+        if id(part) not in memo:
             memo[id(part)] = _value_of(part, values, memo)
-    value = _known_value(e, values, memo)
-    assert value is not None
-    return value
+    result = memo[id(e)]
+    if isinstance(result, ModelError):
+        raise result
+    return result
 
 
-def _known_value(e: Operand, values: dict[Expression, float], memo: dict[int, float]) -> float | None:
-    """Return the value of an expression; None if it was not evaluated yet."""
+def _value_of(e: Operand, values: dict[Expression, float], memo: dict[int, Value]) -> Value:
+    """Return the value of an expression whose operands are in the memo; of choose() only one case needs a value."""
     if not isinstance(e, Expression):
         return float(e)
-    return values[e] if e in values else memo.get(id(e))
-
-
-def _needed_operands(e: Operand, values: dict[Expression, float], memo: dict[int, float]) -> Sequence[Operand]:
-    """Return the operands that decide the value; of choose() the condition, and then the selected case."""
-    if not isinstance(e, Term) or e.op != "choose":
-        return () if _known_value(e, values, memo) is not None else operands(e)
-    condition, this, that = e.args
-    holds = _known_value(condition, values, memo)
-    return (condition,) if holds is None else (condition, this if holds else that)
-
-
-def _value_of(e: Expression, values: dict[Expression, float], memo: dict[int, float]) -> float:
-    args = [_known_value(operand, values, memo) for operand in _needed_operands(e, values, memo)]
-    if isinstance(e, Output) or (isinstance(e, Term) and e.op == "choose"):
-        return args[-1]  # type: ignore[return-value]
+    if e in values:
+        return values[e]
+    args: list[Any] = [memo[id(operand)] for operand in operands(e)]
+    if isinstance(e, Term) and e.op == "choose" and not isinstance(args[0], ModelError):
+        return args[1] if args[0] else args[2]
+    for argument in args:
+        if isinstance(argument, ModelError):
+            return argument
+    if isinstance(e, Output):
+        return args[0]
     assert isinstance(e, Term)
     if isinstance(e.op, (Piece, Coefficient)):
-        return e.op.evaluate(*args)  # type: ignore[arg-type]
+        return e.op.evaluate(*args)
     function = OPERATIONS[e.op] if e.op in OPERATIONS else getattr(math, e.op)
     try:
         return float(function(*args))
-    except (ArithmeticError, ValueError) as error:
-        raise ModelError(
+    except (ArithmeticError, ValueError):
+        return ModelError(
             f"{_short_text(e)} cannot be calculated at the start values, "
-            f"where {_short_text(e.args[-1])} is {(args[-1] or 0.0) + 0.0!r}",  # 0.0 instead of -0.0
+            f"where {_short_text(e.args[-1])} is {args[-1] + 0.0!r}",  # 0.0 instead of -0.0
             e.location,
-        ) from error
+        )
 
 
 def _short_text(e: Operand) -> str:
