@@ -61,7 +61,7 @@ from fmus.compiler import BuildError, __version__
 from fmus.compiler.equations.model_file import ModelFile
 from fmus.compiler.lowering import LAWS, METHODS
 from fmus.compiler.model_lookup import find_model, model_names, more_model_names
-from fmus.packaging.archive import build, measure_import_time
+from fmus.packaging.archive import build
 
 LOG = logging.getLogger("fmus.build")
 HERE = Path(__file__).parent
@@ -135,7 +135,7 @@ def main(
     """Build an FMU for each model NAME or model file FILE.py; without arguments, for the five models
     of fmus.  FMUs of fmus/more are written there.
 
-    The command prints the size of each file, its import time in Python, and the first digits of its SHA-256 digest.
+    The command prints the size of each file and the first digits of its SHA-256 digest.
 
     \b
     Examples:
@@ -206,13 +206,11 @@ def main(
                     f"{source.name}: compiling (the first build also compiles the C libraries, half a minute)"
                 ):
                     path = build_native(source.path, folder, methods, laws, platforms, fmi, real_only)
-                import_time = ""
             else:
                 path = build(source.path, folder, methods, laws, platforms, real_only)
-                import_time = f"  {1000 * measure_import_time(path):3.0f} ms"
         except BuildError as error:
             raise click.ClickException(str(error)) from error
-        print_summary(path, import_time)
+        print_summary(path)
 
 
 def default_folder(model: str, source: ModelFile) -> Path:
@@ -229,10 +227,10 @@ def show_progress(text: str) -> AbstractContextManager[Any]:
     return Console(stderr=True).status(text)
 
 
-def print_summary(path: Path, import_time: str = "") -> None:
-    """Print name, size, import time and digest of a file that was built."""
+def print_summary(path: Path) -> None:
+    """Print name, size and digest of a file that was built."""
     content = path.read_bytes()
-    click.echo(f"{path.name}  {len(content) / 1000:4.0f} kB{import_time}  {sha256(content).hexdigest()[:16]}")
+    click.echo(f"{path.name}  {len(content) / 1000:4.0f} kB  {sha256(content).hexdigest()[:16]}")
 
 
 def build_native(

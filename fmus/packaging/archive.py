@@ -15,14 +15,11 @@ content, so that two versions of an FMU can be loaded side by side.
 """
 
 import os
-import subprocess
-import sys
 from collections.abc import Sequence
 from datetime import UTC, datetime
 from io import BytesIO
 from pathlib import Path
 from stat import S_IFREG
-from tempfile import TemporaryDirectory
 from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
 
 from ..compiler import BuildError, __date__
@@ -170,29 +167,3 @@ def write(path: Path, content: bytes) -> Path:
     except OSError as error:
         raise BuildError(f"Cannot write {path}: {error.strerror}; try another folder with --out.") from error
     return path
-
-
-TIMING_SCRIPT = """
-import sys, time
-sys.path.insert(0, sys.argv[1])
-begin = time.process_time()
-__import__(sys.argv[2])
-print(time.process_time() - begin)
-"""
-
-
-def measure_import_time(fmu: Path) -> float:
-    """Return the CPU time of the import in s, including the standard library and without cached bytecode."""
-    with TemporaryDirectory() as folder:
-        with ZipFile(fmu) as archive:
-            archive.extractall(folder, [path for path in archive.namelist() if path.startswith("resources/")])
-        resources = Path(folder, "resources")
-        command = [
-            sys.executable,
-            "-IB",
-            "-c",
-            TIMING_SCRIPT,
-            str(resources),
-            (resources / "slavemodule.txt").read_text(),
-        ]
-        return float(subprocess.run(command, capture_output=True, text=True, check=True).stdout)
