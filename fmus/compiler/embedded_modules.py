@@ -5,8 +5,7 @@ They form one package that needs only the standard library.  The required part o
 """
 
 import ast
-import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from functools import cache
 from hashlib import sha256
 from importlib.util import find_spec
@@ -15,7 +14,7 @@ from pathlib import Path, PurePosixPath
 from . import BuildError
 from .equations.model_file import ModelFile
 from .model_lookup import FMUS
-from .syntax_trees import nested_statements, parsed_module
+from .syntax_trees import parsed_module
 
 ROOT, VENDORED = "__init__.py", "pythonfmu/__init__.py"  # replaced by generated or empty files
 SLAVE = "runtime/slave.py"  # embedded with every model
@@ -68,15 +67,13 @@ def _on_disk(path: str, root: Path) -> Path:
 
 
 def _embed(path: str, text: str, root: Path) -> tuple[str, list[str]]:
-    """Return the text of a file as embedded, and the paths of the files that it imports."""
+    """Return the text of a file as embedded, and the paths of the files that it imports, at the top of the file."""
     # Text mode converts line ends to "\n", so checkouts on all systems build the same bytes.
     lines = text.splitlines(keepends=True)
     parts = PurePosixPath(path).parts
     imports = ["/".join((*parts[:depth], "__init__.py")) for depth in range(1, len(parts))]
-    for node in _imports(path, "".join(lines)):
-        if isinstance(node, ast.Import):
-            for alias in node.names:
-                _standard(path, alias.name)
+    for node in parsed_module("".join(lines)).body:
+        if not isinstance(node, ast.ImportFrom):
             continue
         base = tuple(node.module.split(".")) if node.module else ()
         if node.level:
@@ -85,26 +82,9 @@ def _embed(path: str, text: str, root: Path) -> tuple[str, list[str]]:
             dots = "." * len(parts)
             lines[node.lineno - 1] = lines[node.lineno - 1].replace("from pythonfmu", f"from {dots}pythonfmu", 1)
         else:
-            _standard(path, base[0])
-            continue
+            continue  # of the standard library; the import contracts allow no other
         imports += [_resolve(path, base, alias.name, root) for alias in node.names]
     return "".join(lines), imports
-
-
-def _imports(path: str, source: str) -> Iterator[ast.Import | ast.ImportFrom]:
-    """Yield all import statements; all must be at top level, because hosts may delete the files after loading."""
-    tree = parsed_module(source)
-    for node in nested_statements(tree):
-        if isinstance(node, (ast.Import, ast.ImportFrom)):
-            if node not in tree.body:
-                raise BuildError(f"{path} imports inside a block in line {node.lineno}: import at the top of the file.")
-            yield node
-
-
-def _standard(path: str, module: str) -> None:
-    """Raise BuildError for a module outside the standard library."""
-    if module.split(".")[0] not in sys.stdlib_module_names:
-        raise BuildError(f"{path} imports {module}; inside an FMU only the standard library and relative imports work.")
 
 
 def _resolve(path: str, base: tuple[str, ...], name: str, root: Path) -> str:

@@ -1,7 +1,6 @@
 """Cached and immutable Python syntax trees: parsed once, and shared where they do not change."""
 
 import ast
-from collections.abc import Iterator
 from functools import lru_cache
 from operator import is_
 from typing import Any, TypeVar
@@ -13,7 +12,6 @@ NON_NODE_FIELDS = {"ctx", "id", "attr", "arg", "name", "asname", "module", "leve
 NODE_TYPES = [
     node_type for node_type in vars(ast).values() if isinstance(node_type, type) and issubclass(node_type, ast.AST)
 ]
-STATEMENT_FIELDS = ("body", "handlers", "orelse", "finalbody")
 CHILD_FIELDS = {kind: [name for name in kind._fields if name not in NON_NODE_FIELDS] for kind in NODE_TYPES} | {
     ast.Constant: []
 }
@@ -52,18 +50,6 @@ def child_nodes(node: ast.AST) -> list[ast.AST]:
         elif isinstance(value, ast.AST):
             result.append(value)
     return result
-
-
-def child_statements(node: ast.AST) -> list[ast.stmt | ast.ExceptHandler]:
-    """Return the statements directly inside a statement or a module; those of an exception handler are inside it."""
-    return [statement for name in STATEMENT_FIELDS for statement in getattr(node, name, ())]
-
-
-def nested_statements(node: ast.AST) -> Iterator[ast.stmt | ast.ExceptHandler]:
-    """Yield all statements inside a node."""
-    for statement in child_statements(node):
-        yield statement
-        yield from nested_statements(statement)
 
 
 def all_nodes(root: ast.AST) -> list[ast.AST]:

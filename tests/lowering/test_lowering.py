@@ -18,7 +18,7 @@ from fmus.compiler.lowering.module_lowering import FileLowerer
 from fmus.compiler.lowering.scalarize import fold_zero
 from fmus.compiler.lowering.vector_symbols import SourceSymbols
 from fmus.compiler.model_lookup import find_model
-from fmus.compiler.syntax_trees import TranslationError, nested_statements
+from fmus.compiler.syntax_trees import TranslationError
 from fmus.runtime import stick_slip
 from fmus.runtime.vectors import ContactIndex, ContactVector, StateVector
 
@@ -195,7 +195,7 @@ def test_every_statement_keeps_the_number_of_its_source_line(name):
         if not path.startswith("runtime/"):
             continue
         source = (ROOT / "fmus" / path).read_text(encoding="utf-8").split("\n")
-        for node in nested_statements(tree):
+        for node in ast.walk(tree):
             if type(node) in words:
                 line = source[node.lineno - 1].strip()
                 assert line.startswith(words[type(node)]), (path, node.lineno)
