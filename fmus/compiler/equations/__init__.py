@@ -9,7 +9,7 @@
     model_roles.py, declaration_checks.py, contact_analysis.py, model_analysis.py
                                 structural analysis: roles of variables, contact loads, applicable solvers
     dimensions.py               checks the units of expressions
-    start_values.py             names the expression that has no value at the start
+    start_values.py             checks the values of equations, rules and friction forces at the start
     python_errors.py            explains Python exceptions in model files
     reserved_names.py           names reserved by generated models and in C
     expression_printer.py       prints expressions as Python statements

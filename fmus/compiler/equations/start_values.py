@@ -1,4 +1,4 @@
-"""Evaluates the equations at the start values, to name the expression that has no value there."""
+"""Checks the start values: equations and rules are evaluated there, and an expression without a value is named."""
 
 import math
 import operator
