@@ -56,7 +56,7 @@ def declared(name):
     They are those of the model before it is lowered, which takes a second, with the methods that its FMU has.
     """
     source = find_model(name)
-    variables = dict(declared_variables(source.model))
+    variables = dict(declared_variables(scalar_class(source)))
     method = variables["solver.method"] = copy(variables["solver.method"])
     offered = select_features(source).methods
     method.items = tuple(item for item in method.items if item[0] in offered)
